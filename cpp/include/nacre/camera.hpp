@@ -1,0 +1,73 @@
+/// Camera models. One ray table serves all of them: the point seen by a pixel is origin + depth * direction.
+#pragma once
+
+#include <array>
+#include <memory>
+#include <vector>
+
+#include "nacre/types.hpp"
+
+namespace nacre {
+
+/// What a depth value measures: the distance along the optical axis, or along the pixel's ray.
+enum class DepthKind { z, radial };
+
+/// The line of sight of a pixel in the camera frame (x right, y down, z forward): point = origin + depth * direction.
+/// Pinhole: the origin is 0; direction.z is 1 for DepthKind::z, direction has length 1 for DepthKind::radial.
+/// Orthographic: the direction is (0, 0, 1).
+struct Ray {
+  float origin_x, origin_y;
+  float direction_x, direction_y, direction_z;
+};
+
+/// An immutable camera; copies are cheap and share the ray table. Pixel centres are integers.
+class Camera {
+ public:
+  enum class Model { pinhole, orthographic };
+  /// Brown-Conrady coefficients k1 k2 p1 p2 k3 (OpenCV's order).
+  using Distortion = std::array<double, 5>;
+
+  /// x = (u - cx) z / fx. Throws std::invalid_argument naming the argument that is out of range.
+  static Camera pinhole(int width, int height, double fx, double fy, double cx, double cy,
+                        const Distortion& distortion = {}, DepthKind depth_kind = DepthKind::z);
+  /// x = (u - (width - 1) / 2) pixel_size, y likewise [m].
+  static Camera orthographic(int width, int height, double pixel_size);
+
+  Model model() const { return model_; }
+  int width() const { return width_; }
+  int height() const { return height_; }
+  double fx() const { return fx_; }  ///< [pixels]; 1 / pixel_size for an orthographic camera
+  double fy() const { return fy_; }
+  double cx() const { return cx_; }
+  double cy() const { return cy_; }
+  const Distortion& distortion() const { return distortion_; }
+  DepthKind depth_kind() const { return depth_kind_; }
+  double pixel_size() const { return 1.0 / fx_; }  ///< [m], orthographic only
+
+  /// height * width rays, row by row.
+  const std::vector<Ray>& rays() const { return *rays_; }
+
+  /// The pixel (u, v) that sees a point of the camera frame, distortion included; NaN behind a pinhole camera.
+  Eigen::Vector2d project(const Eigen::Vector3d& point) const;
+
+  /// The depth value of a point of the camera frame, in this camera's depth kind [m].
+  double depth_of(const Eigen::Vector3d& point) const;
+
+  /// The side of a pixel on a surface that faces the camera at a distance z [m].
+  double footprint(double z) const { return model_ == Model::pinhole ? z / fx_ : 1.0 / fx_; }
+
+  bool operator==(const Camera& other) const;
+  bool operator!=(const Camera& other) const { return !(*this == other); }
+
+ private:
+  Camera() = default;
+
+  Model model_ = Model::pinhole;
+  int width_ = 0, height_ = 0;
+  double fx_ = 0, fy_ = 0, cx_ = 0, cy_ = 0;
+  Distortion distortion_{};
+  DepthKind depth_kind_ = DepthKind::z;
+  std::shared_ptr<const std::vector<Ray>> rays_;
+};
+
+}  // namespace nacre

@@ -1,0 +1,59 @@
+/// Consolidation: few, evenly spread, denoised points in place of many noisy ones (WLOP).
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "nacre/types.hpp"
+
+namespace nacre {
+
+enum class ConsolidationMethod {
+  wlop,       ///< Huang et al. 2009, density weights for both sets: the paper's form
+  wlop_plus,  ///< repaired for incremental use: tangential, bounded repulsion that fades where there are no neighbours
+  cgal        ///< the kernel of CGAL's wlop_simplify_and_regularize_point_set, for comparison
+};
+
+/// The weight of a point at distance r within the support radius h.
+enum class Theta {
+  huang,   ///< exp(-16 r^2 / h^2)
+  printed  ///< exp(-4 r^2 / h), as printed in the 2010 paper; cut at h
+};
+
+struct ConsolidateOptions {
+  ConsolidationMethod method = ConsolidationMethod::wlop;
+  double radius = 0.008;  ///< support radius h [m]
+  int num_points = 2000;  ///< size of the result, at most the size of the input
+  int iterations = 10;
+  double mu = 0.4;  ///< weight of the repulsion, 0 to 0.5
+  Theta theta = Theta::huang;
+  std::uint64_t seed = 0;  ///< of the choice of the first samples
+  int num_threads = 0;     ///< 0: all
+
+  void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
+};
+
+struct Consolidated {
+  Points points;
+  Attributes attributes;              ///< one row a point: means of the input's attributes, weighted as the positions
+  std::vector<std::int64_t> sources;  ///< the input point that each point started from
+};
+
+/// num_points of the input, chosen at random, moved by project_samples. Input rows that are not finite are ignored.
+Consolidated consolidate(const PointsRef& points, const ConsolidateOptions& options = {},
+                         const AttributesRef& attributes = Attributes());
+
+/// What project_samples may know besides positions; empty arrays mean "not known".
+struct ProjectionHints {
+  ValuesRef point_weights;   ///< how many observations each point stands for (wlop_plus)
+  PointsRef sample_normals;  ///< the tangent planes in which samples repel each other (wlop_plus)
+  const std::vector<std::uint8_t>* frozen = nullptr;  ///< samples that stay where they are, and still repel (wlop_plus)
+
+  ProjectionHints();
+};
+
+/// The iteration itself: samples are drawn to the weighted medians of the points around them and repel each other.
+Points project_samples(const PointsRef& samples, const PointsRef& points, const ConsolidateOptions& options = {},
+                       const ProjectionHints& hints = {});
+
+}  // namespace nacre

@@ -1,0 +1,91 @@
+/// Depth images: cleaning (edge noise above all), back-projection, normals of organised points.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "nacre/camera.hpp"
+#include "nacre/types.hpp"
+
+namespace nacre {
+
+/// The standard deviation of a depth value: sigma(z) = constant + quadratic * (z - offset)^2 [m].
+struct NoiseModel {
+  double constant = 0.0;   ///< [m]
+  double quadratic = 0.0;  ///< [1/m]
+  double offset = 0.0;     ///< [m]
+
+  double sigma(double z) const { return constant + quadratic * (z - offset) * (z - offset); }
+  /// Structured light, Nguyen et al. 2012: 1.2 mm + 1.9 mm (z - 0.4 m)^2.
+  static NoiseModel kinect() { return {0.0012, 0.0019, 0.4}; }
+};
+
+/// Which pixels at depth edges are noise.
+enum class EdgeTest {
+  none,
+  gradient,      ///< the paper's: strong gradients of depth (3 x 3 Sobel), dilated
+  inverse_depth  ///< second difference of inverse depth, zero on any plane, and a slope cap: keeps slanted surfaces
+};
+
+/// What preprocess_depth removes. Every pixel that is removed becomes NaN.
+struct DepthOptions {
+  EdgeTest edge_test = EdgeTest::inverse_depth;
+  double min_depth = 0.0;                                      ///< nearer values are removed [m]
+  double max_depth = std::numeric_limits<double>::infinity();  ///< farther values are removed [m]
+  double gradient_threshold = 0.005;                           ///< gradient test: depth step across one pixel [m]
+  int edge_dilation = 1;                                       ///< both tests: an edge grows by so many pixels
+  double edge_sigmas = 4.0;       ///< inverse-depth test: threshold in standard deviations of the second difference
+  double max_slant = 1.3962634;   ///< inverse-depth test: steeper surfaces are removed [rad]; 80 degrees
+  double max_missing = 0.6;       ///< a pixel goes where more than this part of its 5 x 5 neighbours is missing
+  int min_component = 20;         ///< connected specks of fewer pixels go
+  std::optional<NoiseModel> noise;  ///< unset: measured from the image itself (estimate_noise)
+
+  void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
+};
+
+/// How many pixels each step of preprocess_depth removed; the counts add up to num_pixels.
+struct DepthReport {
+  std::int64_t num_pixels = 0;
+  std::int64_t num_invalid = 0;       ///< no measurement came in: 0, negative, NaN, inf, 65535 of integer images
+  std::int64_t num_out_of_range = 0;  ///< nearer than min_depth, farther than max_depth
+  std::int64_t num_masked = 0;
+  std::int64_t num_edge = 0;
+  std::int64_t num_slanted = 0;
+  std::int64_t num_isolated = 0;
+  std::int64_t num_kept = 0;
+};
+
+/// Metres from raw integers: value / depth_scale, NaN for 0 and 65535. depth_scale is in stored units a metre.
+DepthImage depth_from_raw(const Eigen::Ref<const Eigen::Array<std::uint16_t, Eigen::Dynamic, Eigen::Dynamic,
+                                                              Eigen::RowMajor>>& raw,
+                          double depth_scale);
+
+/// The noise of a depth image, from the residuals of local plane fits (robust): for a pinhole camera the Kinect's
+/// curve scaled to the residuals, for an orthographic camera a constant. A clean image gives a small positive floor.
+NoiseModel estimate_noise(const DepthRef& depth, const Camera& camera, int num_threads = 0);
+
+/// A copy of a depth image in which noise is NaN. Throws std::invalid_argument when depth and camera or mask differ in
+/// size, and when the median depth lies outside 0.05-50 m (the message names depth_scale).
+DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const DepthOptions& options = {},
+                            const MaskRef& mask = MaskImage(), DepthReport* report = nullptr, int num_threads = 0);
+
+/// The valid pixels as points of the camera frame, row by row.
+Points back_project(const DepthRef& depth, const Camera& camera);
+
+/// A depth image as organised points: row v * width + u of each array belongs to pixel (u, v); NaN where invalid.
+struct Frame {
+  int width = 0, height = 0;
+  Points points;                    ///< camera frame [m]
+  Points normals;                   ///< unit length, towards the camera; NaN where no plane fits
+  Values sigma;                     ///< standard deviation of the depth [m]
+  std::vector<std::int32_t> valid;  ///< the rows that have a point and a normal, ascending
+};
+
+/// Points and normals of a cleaned depth image. A plane is affine in inverse depth over the image of a pinhole camera
+/// and affine in depth for an orthographic one, so a normal is one linear fit over a window; the window (5 x 5 to
+/// 11 x 11) grows with the noise.
+Frame make_frame(const DepthRef& depth, const Camera& camera, const NoiseModel& noise, int num_threads = 0);
+
+}  // namespace nacre

@@ -1,0 +1,22 @@
+/// Normals of unorganised points.
+#pragma once
+
+#include <limits>
+
+#include "nacre/kdtree.hpp"
+#include "nacre/types.hpp"
+
+namespace nacre {
+
+struct NormalOptions {
+  int k = 16;                                                   ///< neighbours, the point itself included
+  double max_radius = std::numeric_limits<double>::infinity();  ///< farther neighbours are not used [m]
+  int num_threads = 0;                                          ///< 0: all
+};
+
+/// The normal of the plane through each point's neighbours (least squares), unit length, towards the viewpoint. NaN for
+/// points that are not finite, with fewer than 3 neighbours, or whose neighbours lie on a line or fill space.
+Points estimate_normals(const PointsRef& points, const NormalOptions& options = {},
+                        const Eigen::Vector3d& viewpoint = Eigen::Vector3d::Zero());
+
+}  // namespace nacre

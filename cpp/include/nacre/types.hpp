@@ -1,0 +1,41 @@
+/// The few types that every part of nacre shares.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+
+namespace nacre {
+
+/// N x 3 float coordinates [m], one point a row, contiguous: the layout of a NumPy array.
+using Points = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
+using PointsRef = Eigen::Ref<const Points>;
+
+/// N x 3 colours, red green blue.
+using Colors = Eigen::Matrix<std::uint8_t, Eigen::Dynamic, 3, Eigen::RowMajor>;
+using ColorsRef = Eigen::Ref<const Colors>;
+
+/// N x A values that travel with points (normals, colours, intensities), one point a row.
+using Attributes = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using AttributesRef = Eigen::Ref<const Attributes>;
+
+/// One value a point.
+using Values = Eigen::Matrix<float, Eigen::Dynamic, 1>;
+using ValuesRef = Eigen::Ref<const Values>;
+
+/// height x width float depth [m]; NaN means "no measurement".
+using DepthImage = Eigen::Array<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using DepthRef = Eigen::Ref<const DepthImage>;
+
+/// height x width; a pixel is used where the mask is not 0. An empty mask uses every pixel.
+using MaskImage = Eigen::Array<std::uint8_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using MaskRef = Eigen::Ref<const MaskImage>;
+
+/// A rigid motion, named target_from_source: p_target = target_from_source * p_source.
+/// Unaligned, so that a client built with other vector flags shares its layout.
+using Pose = Eigen::Transform<double, 3, Eigen::Isometry, Eigen::DontAlign>;
+
+using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
+using Vector6 = Eigen::Matrix<double, 6, 1, Eigen::DontAlign>;
+
+}  // namespace nacre

@@ -1,0 +1,1 @@
+#include "nacre/kdtree.hpp"

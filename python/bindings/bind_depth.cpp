@@ -1,0 +1,3 @@
+#include "bindings.hpp"
+
+void bind_depth(py::module_&) {}

@@ -1,0 +1,3 @@
+#include "bindings.hpp"
+
+void bind_normals(py::module_&) {}

@@ -1,0 +1,107 @@
+"""Validation of arrays: what comes in is checked once, here, and named in the error."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float32] | npt.NDArray[np.float64]
+
+
+def _real(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
+    array = np.asarray(value)
+    if array.dtype.kind not in "buif":
+        raise TypeError(f"{name} must be an array of real numbers, got dtype {array.dtype}")
+    return array
+
+
+def as_points(name: str, value: npt.ArrayLike) -> FloatArray:
+    """
+    Return ``value`` as a C-contiguous (N, 3) array of float32 or float64.
+
+    float32 and float64 arrays that are already C-contiguous are returned as they are; other real dtypes become float64.
+    """
+    array = _real(name, value)
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise ValueError(f"{name} must have shape (N, 3), got {array.shape}")
+    dtype = array.dtype if array.dtype in (np.float32, np.float64) else np.float64
+    return np.ascontiguousarray(array, dtype=dtype)
+
+
+def as_matching_points(name: str, value: npt.ArrayLike, like_name: str, num_points: int) -> FloatArray:
+    """Return ``value`` as :func:`as_points` does, with one row for each of the points it belongs to."""
+    array = as_points(name, value)
+    if len(array) != num_points:
+        raise ValueError(f"{name} must have one row per point of {like_name} ({num_points}), got {len(array)}")
+    return array
+
+
+def as_vector(name: str, value: npt.ArrayLike, size: int) -> npt.NDArray[np.float64]:
+    """Return ``value`` as ``size`` finite float64 numbers."""
+    array = np.ascontiguousarray(_real(name, value), dtype=np.float64)
+    if array.shape != (size,) or not np.isfinite(array).all():
+        raise ValueError(f"{name} must be {size} finite numbers, got {value!r}")
+    return array
+
+
+def as_pose(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Return ``value`` as a rigid 4x4 float64 matrix."""
+    array = np.ascontiguousarray(_real(name, value), dtype=np.float64)
+    if array.shape != (4, 4):
+        raise ValueError(f"{name} must be a 4x4 matrix, got shape {array.shape}")
+    rotation = array[:3, :3]
+    is_rigid = (
+        np.isfinite(array).all()
+        and np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-5)
+        and np.linalg.det(rotation) > 0
+        and np.allclose(array[3], (0, 0, 0, 1))
+    )
+    if not is_rigid:
+        raise ValueError(f"{name} must be a rigid transform (rotation and translation), got\n{array}")
+    return array
+
+
+def as_depth(name: str, value: npt.ArrayLike, depth_scale: float = 1.0) -> npt.NDArray[np.float32]:
+    """
+    Return a depth image as (H, W) float32 metres; a copy is made unless ``value`` is C-contiguous float32 metres.
+
+    ``depth_scale`` is in stored units per metre. 0 and 65535 of integer images become NaN.
+    """
+    array = _real(name, value)
+    if array.ndim != 2:
+        raise ValueError(f"{name} must have shape (H, W), got {array.shape}")
+    if not (np.isfinite(depth_scale) and depth_scale > 0):
+        raise ValueError(f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}")
+    if array.dtype.kind in "bui":
+        metres = array.astype(np.float32)
+        metres[(array == 0) | (array == 65535)] = np.nan
+    else:
+        metres = np.ascontiguousarray(array, dtype=np.float32)
+    if depth_scale != 1.0:
+        metres = metres / np.float32(depth_scale)
+    return metres
+
+
+def as_mask(name: str, value: npt.ArrayLike | None, shape: tuple[int, int]) -> npt.NDArray[np.uint8]:
+    """Return a mask as (H, W) uint8, 1 where a pixel is used; an empty array for None."""
+    if value is None:
+        return np.zeros((0, 0), dtype=np.uint8)
+    array = _real(name, value)
+    if array.shape != shape:
+        raise ValueError(f"{name} must have the depth image's shape {shape}, got {array.shape}")
+    return np.ascontiguousarray(array != 0, dtype=np.uint8)
+
+
+def localize(points: FloatArray) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float64]]:
+    """
+    Split points into float32 coordinates about an origin and the origin, so that far-away coordinates keep their digits.
+
+    float32 points come back as they are, with origin 0.
+    """
+    if points.dtype == np.float32:
+        return points, np.zeros(3)  # type: ignore[return-value]
+    finite = points[np.isfinite(points).all(axis=1)]
+    origin = np.round(finite.mean(axis=0)) if len(finite) else np.zeros(3)
+    return (points - origin).astype(np.float32), origin
