@@ -1,0 +1,1 @@
+"""Files: points, meshes, images, cameras and trajectories, in and out."""
