@@ -16,7 +16,7 @@ using PointsDoubleRef = Eigen::Ref<const PointsDouble>;
 /// k nearest neighbours of each query: row q lists them nearest first; where fewer exist, index = tree size and
 /// distance = infinity.
 struct Neighbors {
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> distances;      ///< [m]
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> distances;  ///< [m]
   Eigen::Matrix<std::int64_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> indices;
 };
 
