@@ -10,13 +10,21 @@ from nacre.depth import (
     estimate_noise,
     preprocess_depth,
 )
+from nacre.model import FrameReport, Model, ModelParameters
+from nacre.registration import AlignResult, RegistrationParameters, align
 
 __all__ = [
+    "AlignResult",
     "Camera",
     "DepthParameters",
     "DepthReport",
+    "FrameReport",
+    "Model",
+    "ModelParameters",
     "NoiseModel",
+    "RegistrationParameters",
     "__version__",
+    "align",
     "back_project",
     "depth_normals",
     "estimate_noise",
