@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import numbers
+import operator
+from collections.abc import Mapping
 from typing import Any, TypeVar
 
 Core = TypeVar("Core")
@@ -17,3 +20,25 @@ def to_core(parameters: Any, core: Core) -> Core:
         else:
             setattr(core, field.name, value)
     return core
+
+
+def as_int(name: str, value: Any) -> int:
+    """Return ``value`` as an int; floats are refused."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} must be an integer, got {value!r}") from None
+
+
+def as_number(name: str, value: Any) -> float:
+    """Return a real number as a float."""
+    if not isinstance(value, numbers.Real):
+        raise TypeError(f"{name} must be a number, got {value!r}")
+    return float(value)
+
+
+def as_choice(name: str, value: Any, choices: Mapping[str, Core]) -> Core:
+    """Return what ``value`` stands for among the named choices."""
+    if not isinstance(value, str) or value not in choices:
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
+    return choices[value]
