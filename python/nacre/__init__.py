@@ -1,6 +1,7 @@
 """nacre grows a 3D model from depth-camera images, layer by layer."""
 
 from nacre._core import Camera, __version__
+from nacre.consolidation import Consolidated, consolidate, project_samples
 from nacre.depth import (
     DepthParameters,
     DepthReport,
@@ -16,6 +17,7 @@ from nacre.registration import AlignResult, RegistrationParameters, align
 __all__ = [
     "AlignResult",
     "Camera",
+    "Consolidated",
     "DepthParameters",
     "DepthReport",
     "FrameReport",
@@ -26,7 +28,9 @@ __all__ = [
     "__version__",
     "align",
     "back_project",
+    "consolidate",
     "depth_normals",
     "estimate_noise",
     "preprocess_depth",
+    "project_samples",
 ]
