@@ -80,7 +80,8 @@ double leaf(const Vector3d& p, double length, double width, double cup, double b
   const Vector2d scaled = Vector2d(p.x(), p.y() - half_axes.y()).cwiseQuotient(half_axes);
   const double outline = scaled.norm() * (scaled.norm() - 1.0) / (scaled.cwiseQuotient(half_axes).norm() + 1e-9);
   const Vector2d slope(2.0 * cup * p.x() / width, 2.0 * bend * along / length);
-  const double across = (p.z() - bend * along * along - cup * p.x() * p.x() / width) / std::sqrt(1.0 + slope.squaredNorm());
+  const double across =
+      (p.z() - bend * along * along - cup * p.x() * p.x() / width) / std::sqrt(1.0 + slope.squaredNorm());
   constexpr double half_thickness = 1.5;
   return Vector2d(std::max(outline + half_thickness, 0.0), across).norm() - half_thickness;
 }
@@ -154,7 +155,8 @@ class Shell {
   static Vector3d to_local(const Vector3d& world) {
     const double yaw = 0.3, roll = 0.25;
     const Vector3d d = world - Vector3d(-13.0, 58.0, -8.0);
-    const Vector3d a(std::cos(yaw) * d.x() - std::sin(yaw) * d.z(), d.y(), std::sin(yaw) * d.x() + std::cos(yaw) * d.z());
+    const Vector3d a(std::cos(yaw) * d.x() - std::sin(yaw) * d.z(), d.y(),
+                     std::sin(yaw) * d.x() + std::cos(yaw) * d.z());
     return {a.x(), std::cos(roll) * a.y() - std::sin(roll) * a.z(), std::sin(roll) * a.y() + std::cos(roll) * a.z()};
   }
 };
@@ -168,7 +170,8 @@ double within(const Vector3d& p, const Vector3d& center, double radius, Shape&& 
 
 double snail(const Vector3d& p) {
   const double foot = join(body(p), hem(p), 4.0);
-  return join(join(foot, within(p, {52.0, 80.0, 18.0}, 52.0, head), 6.0), within(p, {-10.0, 52.0, -2.0}, 60.0, Shell()), 3.0);
+  return join(join(foot, within(p, {52.0, 80.0, 18.0}, 52.0, head), 6.0), within(p, {-10.0, 52.0, -2.0}, 60.0, Shell()),
+              3.0);
 }
 
 }  // namespace

@@ -79,7 +79,7 @@ class Bvh {
   static constexpr double infinity = std::numeric_limits<double>::infinity();
   static constexpr int num_bins = 16;
   static constexpr int max_leaf = 8;
-  static constexpr int sah_depth = 32;              // below it nodes are halved, which ends after 31 more levels
+  static constexpr int sah_depth = 32;  // below it nodes are halved, which ends after 31 more levels
   static constexpr std::size_t max_depth = sah_depth + 32;
 
   struct Bin {

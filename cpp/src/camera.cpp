@@ -87,8 +87,8 @@ Camera Camera::orthographic(int width, int height, double pixel_size) {
   rays->reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   for (int v = 0; v < height; ++v) {
     for (int u = 0; u < width; ++u) {
-      rays->push_back({static_cast<float>((u - camera.cx_) * pixel_size), static_cast<float>((v - camera.cy_) * pixel_size),
-                       0.0F, 0.0F, 1.0F});
+      rays->push_back({static_cast<float>((u - camera.cx_) * pixel_size),
+                       static_cast<float>((v - camera.cy_) * pixel_size), 0.0F, 0.0F, 1.0F});
     }
   }
   camera.rays_ = std::move(rays);

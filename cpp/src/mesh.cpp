@@ -39,8 +39,8 @@ class PreparedRay {
     }
   }
 
-  // Where the ray enters a box before it has gone `limit`; infinity where it does not. Boxes are padded by more than the
-  // rounding, and 0 * infinity, of a ray within the plane of a side, is NaN and leaves the interval as it is.
+  // Where the ray enters a box before it has gone `limit`; infinity where it does not. Boxes are padded by more than
+  // the rounding, and 0 * infinity, of a ray within the plane of a side, is NaN and leaves the interval as it is.
   double entry(const BvhNode& node, double limit) const {
     double enter = 0.0, leave = limit;
     for (int axis = 0; axis < 3; ++axis) {
@@ -106,7 +106,8 @@ void check_mesh(const PointsRef& vertices, const TrianglesRef& triangles) {
   require(vertices.allFinite(), "vertices", "finite", "NaN or infinity");
   const std::int32_t smallest = triangles.minCoeff(), largest = triangles.maxCoeff();
   require(smallest >= 0, "triangles", "vertex indices from 0", smallest);
-  require(largest < vertices.rows(), "triangles", "indices of " + std::to_string(vertices.rows()) + " vertices", largest);
+  require(largest < vertices.rows(), "triangles", "indices of " + std::to_string(vertices.rows()) + " vertices",
+          largest);
 }
 
 std::vector<Triangle> gather(const PointsRef& vertices, const TrianglesRef& triangles) {
@@ -198,22 +199,25 @@ MeshTree::Closest MeshTree::closest(const Vector3d& point) const {
                                  .cwiseMax(Vector3d::Zero());
     return outside.squaredNorm();
   };
-  impl_->bvh.walk(box_distance, [&] { return nearest; }, [&](std::int32_t first, std::int32_t count) {
-    for (std::int32_t i = first; i < first + count; ++i) {
-      const Triangle& triangle = impl_->sorted[static_cast<std::size_t>(i)];
-      const Vector3d candidate = closest_on_triangle(point, triangle);
-      const double distance = (candidate - point).squaredNorm();
-      if (distance > nearest || (distance == nearest && triangle.id > best.triangle)) continue;
-      nearest = distance;
-      best.point = candidate;
-      best.triangle = triangle.id;
-    }
-  });
+  impl_->bvh.walk(
+      box_distance, [&] { return nearest; },
+      [&](std::int32_t first, std::int32_t count) {
+        for (std::int32_t i = first; i < first + count; ++i) {
+          const Triangle& triangle = impl_->sorted[static_cast<std::size_t>(i)];
+          const Vector3d candidate = closest_on_triangle(point, triangle);
+          const double distance = (candidate - point).squaredNorm();
+          if (distance > nearest || (distance == nearest && triangle.id > best.triangle)) continue;
+          nearest = distance;
+          best.point = candidate;
+          best.triangle = triangle.id;
+        }
+      });
   best.distance = std::sqrt(nearest);
   return best;
 }
 
-MeshTree::Hits MeshTree::cast(const PointsDoubleRef& origins, const PointsDoubleRef& directions, int num_threads) const {
+MeshTree::Hits MeshTree::cast(const PointsDoubleRef& origins, const PointsDoubleRef& directions,
+                              int num_threads) const {
   require(origins.rows() == directions.rows(), "directions", std::to_string(origins.rows()) + " rows, one per origin",
           directions.rows());
   Hits hits{Eigen::VectorXd(origins.rows()), Eigen::Matrix<std::int32_t, Eigen::Dynamic, 1>(origins.rows())};

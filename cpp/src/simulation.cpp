@@ -25,7 +25,10 @@ struct WorldRay {
 class View {
  public:
   View(const MeshTree& mesh, const Camera& camera, const Pose& world_from_camera)
-      : mesh_(mesh), camera_(camera), rotation_(world_from_camera.linear()), translation_(world_from_camera.translation()) {}
+      : mesh_(mesh),
+        camera_(camera),
+        rotation_(world_from_camera.linear()),
+        translation_(world_from_camera.translation()) {}
 
   std::int64_t num_pixels() const { return static_cast<std::int64_t>(camera_.rays().size()); }
   int width() const { return camera_.width(); }
@@ -99,8 +102,8 @@ bool is_connected(const View& view, const Hits& hits, std::int64_t a, std::int64
   return step >= std::min(step_a, step_b) - tolerance && step <= std::max(step_a, step_b) + tolerance;
 }
 
-// 1 for the pixels that may see a depth edge within `radius`: the corners of each square of four pixels through which an
-// edge runs, and their neighbours where the radius is more than a pixel.
+// 1 for the pixels that may see a depth edge within `radius`: the corners of each square of four pixels through which
+// an edge runs, and their neighbours where the radius is more than a pixel.
 std::vector<std::uint8_t> find_edges(const View& view, const Hits& hits, double radius, int num_threads) {
   const int width = view.width(), height = view.height();
   const auto pixel = [width](int u, int v) { return static_cast<std::int64_t>(v) * width + u; };
@@ -154,7 +157,8 @@ double mixed_depth(const View& view, int u, int v, double radius, double backgro
 
 using Depths = std::vector<double>;
 
-void mix_edges(const View& view, const MeshTree& mesh, const Hits& hits, const SimulationOptions& options, Depths& depths) {
+void mix_edges(const View& view, const MeshTree& mesh, const Hits& hits, const SimulationOptions& options,
+               Depths& depths) {
   double background = options.background_depth;
   if (background == 0.0) {
     for (const MeshTree::Hit& hit : hits) background = std::max(background, hit.distance);
@@ -163,8 +167,8 @@ void mix_edges(const View& view, const MeshTree& mesh, const Hits& hits, const S
   const std::vector<std::uint8_t> edges = find_edges(view, hits, options.edge_mixing, options.num_threads);
   parallel_for(view.num_pixels(), 64, options.num_threads, [&](std::int64_t i) {
     if (!edges[static_cast<std::size_t>(i)]) return;
-    depths[static_cast<std::size_t>(i)] = mixed_depth(view, static_cast<int>(i % view.width()),
-                                                      static_cast<int>(i / view.width()), options.edge_mixing, background);
+    depths[static_cast<std::size_t>(i)] = mixed_depth(
+        view, static_cast<int>(i % view.width()), static_cast<int>(i / view.width()), options.edge_mixing, background);
   });
 }
 
@@ -175,7 +179,8 @@ double measure(double depth, std::int64_t pixel, const SimulationOptions& option
   if (sigma > 0.0) depth += sigma * random_normal(options.seed, counter);
   if (options.quantization > 0.0) depth = std::round(depth / options.quantization) * options.quantization;
   constexpr std::uint64_t dropout_stream = std::uint64_t{1} << 63;
-  const bool dropped = options.dropout > 0.0 && random_uniform(options.seed, dropout_stream | counter) < options.dropout;
+  const bool dropped =
+      options.dropout > 0.0 && random_uniform(options.seed, dropout_stream | counter) < options.dropout;
   return depth > 0.0 && !dropped ? depth : nan;
 }
 

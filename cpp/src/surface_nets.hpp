@@ -1,6 +1,6 @@
-// A mesh of the zero level of a function by surface nets (Gibson 1998), with one vertex for each patch of the surface in
-// a grid cell, not for each cell, so that thin sheets stay manifold (dual marching cubes, Nielson 2004). One quad for
-// each grid edge that the surface crosses.
+// A mesh of the zero level of a function by surface nets (Gibson 1998), with one vertex for each patch of the surface
+// in a grid cell, not for each cell, so that thin sheets stay manifold (dual marching cubes, Nielson 2004). One quad
+// for each grid edge that the surface crosses.
 #pragma once
 
 #include <Eigen/Core>
@@ -42,7 +42,8 @@ class SurfaceNets {
     for (std::size_t i = 0; i < vertices_.size(); ++i) {
       mesh.vertices.row(static_cast<Eigen::Index>(i)) = vertices_[i].template cast<float>().transpose();
     }
-    mesh.triangles = Eigen::Map<const Triangles>(triangles_.data(), static_cast<Eigen::Index>(triangles_.size() / 3), 3);
+    mesh.triangles =
+        Eigen::Map<const Triangles>(triangles_.data(), static_cast<Eigen::Index>(triangles_.size() / 3), 3);
     return mesh;
   }
 
@@ -60,7 +61,9 @@ class SurfaceNets {
   bool inside(const Cell& c) const { return values_[at(c)] < 0.0; }
 
   // The edges of a cell: four along each axis, by their place along the next axis and the one after it.
-  static std::size_t edge_index(int axis, int next, int after) { return static_cast<std::size_t>(4 * axis + next + 2 * after); }
+  static std::size_t edge_index(int axis, int next, int after) {
+    return static_cast<std::size_t>(4 * axis + next + 2 * after);
+  }
   static Cell corner(const Cell& cell, int axis, int along, int next, int after) {
     Cell corner = cell;
     corner[axis] += along;
@@ -84,8 +87,8 @@ class SurfaceNets {
     return count != 0 && count != 8;
   }
 
-  // Numbers the patches of a cell: edges that a patch crosses are linked through the faces of the cell. Where a face has
-  // four crossings, they are linked around its inside corners, which both cells of the face see alike.
+  // Numbers the patches of a cell: edges that a patch crosses are linked through the faces of the cell. Where a face
+  // has four crossings, they are linked around its inside corners, which both cells of the face see alike.
   int find_patches(const Cell& cell, std::array<std::uint8_t, 12>& of_edge) const {
     std::array<std::uint8_t, 12> label;
     for (std::size_t i = 0; i < 12; ++i) label[i] = static_cast<std::uint8_t>(i);
@@ -194,7 +197,9 @@ class SurfaceNets {
   // Along the shorter diagonal.
   void split_quads() {
     for (const Quad& q : quads_) {
-      const auto length = [&](std::size_t a, std::size_t b) { return (vertices_[q[a]] - vertices_[q[b]]).squaredNorm(); };
+      const auto length = [&](std::size_t a, std::size_t b) {
+        return (vertices_[q[a]] - vertices_[q[b]]).squaredNorm();
+      };
       const auto add = [&](std::size_t a, std::size_t b, std::size_t c) {
         for (const std::size_t i : {a, b, c}) triangles_.push_back(static_cast<std::int32_t>(q[i]));
       };

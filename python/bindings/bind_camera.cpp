@@ -58,7 +58,9 @@ Camera from_state(const py::tuple& state) {
 }  // namespace
 
 void bind_camera(py::module_& m) {
-  py::class_<Camera>(m, "Camera", R"(An immutable camera model. Pixel centres are integers; axes are OpenCV's (x right, y down, z forward).
+  py::class_<Camera>(
+      m, "Camera",
+      R"(An immutable camera model. Pixel centres are integers; axes are OpenCV's (x right, y down, z forward).
 
 Parameters
 ----------
@@ -79,8 +81,8 @@ ValueError
                        const Camera::Distortion& distortion, const std::string& depth) {
              return Camera::pinhole(width, height, fx, fy, cx, cy, distortion, parse_depth_kind(depth));
            }),
-           py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"), py::kw_only(),
-           py::arg("distortion") = Camera::Distortion{}, py::arg("depth") = "z")
+           py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
+           py::kw_only(), py::arg("distortion") = Camera::Distortion{}, py::arg("depth") = "z")
       .def_static("orthographic", &Camera::orthographic, py::arg("width"), py::arg("height"), py::arg("pixel_size"),
                   "A camera with parallel rays: x = (u - (width - 1) / 2) pixel_size [m].")
       .def_property_readonly("model", &model_name, "'pinhole' or 'orthographic'")
@@ -95,13 +97,16 @@ ValueError
       .def_property_readonly("pixel_size", &Camera::pixel_size, "[m], of an orthographic camera")
       .def(
           "project",
-          [](const Camera& camera, const Eigen::Ref<const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>>& points) {
+          [](const Camera& camera,
+             const Eigen::Ref<const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>>& points) {
             Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor> pixels(points.rows(), 2);
             for (Eigen::Index i = 0; i < points.rows(); ++i) pixels.row(i) = camera.project(points.row(i).transpose());
             return pixels;
           },
-          py::arg("points"), "The pixels (u, v) that see points of the camera frame, (N, 3) -> (N, 2); NaN behind the camera.")
-      .def("__eq__", [](const Camera& a, const Camera& b) { return a == b; }, py::is_operator())
+          py::arg("points"),
+          "The pixels (u, v) that see points of the camera frame, (N, 3) -> (N, 2); NaN behind the camera.")
+      .def(
+          "__eq__", [](const Camera& a, const Camera& b) { return a == b; }, py::is_operator())
       .def("__hash__", [](const Camera& camera) { return py::hash(to_state(camera)); })
       .def("__repr__", &repr)
       .def(py::pickle(&to_state, &from_state));

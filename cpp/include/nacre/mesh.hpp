@@ -20,7 +20,8 @@ struct Mesh {
 };
 
 /// The built-in object, made by formula: a snail with the ears of a rabbit, 0.15 m long, y up, z to its right, looking
-/// along +x. Closed, with thin parts (ears, the lip of the shell, the hem of the foot: 3 mm), concavities and no symmetry.
+/// along +x. Closed, with thin parts (ears, the lip of the shell, the hem of the foot: 3 mm), concavities and no
+/// symmetry.
 Mesh built_in_object();
 
 /// A bounding volume hierarchy over a mesh; immutable, so any number of threads may ask it. Distances and intersections
@@ -37,12 +38,12 @@ class MeshTree {
     double distance = -1.0;  ///< in units of |direction|; negative: nothing was hit
     std::int32_t triangle = -1;
   };
-  /// The first triangle hit in front of the origin, from either side; ties by the smaller triangle index. Watertight: no
-  /// ray slips between triangles that share vertices. A ray that is not finite, or has no direction, hits nothing.
+  /// The first triangle hit in front of the origin, from either side; ties by the smaller triangle index. Watertight:
+  /// no ray slips between triangles that share vertices. A ray that is not finite, or has no direction, hits nothing.
   Hit cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
 
   struct Hits {
-    Eigen::VectorXd distances;                                ///< NaN: nothing was hit
+    Eigen::VectorXd distances;                                 ///< NaN: nothing was hit
     Eigen::Matrix<std::int32_t, Eigen::Dynamic, 1> triangles;  ///< -1: nothing was hit
   };
   /// One ray a row.
