@@ -10,12 +10,15 @@ from nacre.depth import (
     estimate_noise,
     preprocess_depth,
 )
+from nacre.neighbors import KdTree, RadiusNeighbors
 
 __all__ = [
     "Camera",
     "DepthParameters",
     "DepthReport",
+    "KdTree",
     "NoiseModel",
+    "RadiusNeighbors",
     "__version__",
     "back_project",
     "depth_normals",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 import numpy as np
@@ -105,3 +106,25 @@ def localize(points: FloatArray) -> tuple[npt.NDArray[np.float32], npt.NDArray[n
     finite = points[np.isfinite(points).all(axis=1)]
     origin = np.round(finite.mean(axis=0)) if len(finite) else np.zeros(3)
     return (points - origin).astype(np.float32), origin
+
+
+def as_count(name: str, value: Any, *, minimum: int = 0) -> int:
+    """Return ``value`` as an int of at least ``minimum``."""
+    try:
+        count = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} must be an integer, got {value!r}") from None
+    if not minimum <= count < 2**31:
+        raise ValueError(f"{name} must be an integer of at least {minimum}, got {count}")
+    return count
+
+
+def as_length(name: str, value: Any) -> float:
+    """Return ``value`` as a float that is not negative and not NaN."""
+    try:
+        length = float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be a number, got {value!r}") from None
+    if not length >= 0:
+        raise ValueError(f"{name} must be at least 0, got {length}")
+    return length
