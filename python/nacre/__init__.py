@@ -12,6 +12,7 @@ from nacre.depth import (
     preprocess_depth,
 )
 from nacre.model import FrameReport, Model, ModelParameters
+from nacre.neighbors import KdTree, RadiusNeighbors
 from nacre.registration import AlignResult, RegistrationParameters, align
 
 __all__ = [
@@ -21,9 +22,11 @@ __all__ = [
     "DepthParameters",
     "DepthReport",
     "FrameReport",
+    "KdTree",
     "Model",
     "ModelParameters",
     "NoiseModel",
+    "RadiusNeighbors",
     "RegistrationParameters",
     "__version__",
     "align",
