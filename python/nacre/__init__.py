@@ -1,6 +1,7 @@
 """nacre grows a 3D model from depth-camera images, layer by layer."""
 
 from nacre._core import Camera, __version__
+from nacre.consolidation import Consolidated, consolidate, project_samples
 from nacre.depth import (
     DepthParameters,
     DepthReport,
@@ -15,26 +16,32 @@ from nacre.io.cloud import Cloud
 from nacre.io.meshes import read_mesh, write_mesh
 from nacre.io.points import read_points, write_points
 from nacre.model import FrameReport, Model, ModelParameters
+from nacre.neighbors import KdTree, RadiusNeighbors
 from nacre.registration import AlignResult, RegistrationParameters, align
 
 __all__ = [
     "AlignResult",
     "Camera",
     "Cloud",
+    "Consolidated",
     "DepthParameters",
     "DepthReport",
     "FileFormatError",
     "FrameReport",
+    "KdTree",
     "Model",
     "ModelParameters",
     "NoiseModel",
+    "RadiusNeighbors",
     "RegistrationParameters",
     "__version__",
     "align",
     "back_project",
+    "consolidate",
     "depth_normals",
     "estimate_noise",
     "preprocess_depth",
+    "project_samples",
     "read_mesh",
     "read_points",
     "write_mesh",
