@@ -1,4 +1,4 @@
-"""What PLY and PCD files have in common: nothing is lost, nothing is half written, errors name the argument."""
+"""What PLY and PCD files share: nothing is lost or half written, errors name the argument."""
 
 import errno
 import pickle
@@ -130,7 +130,11 @@ def test_any_real_dtype_and_layout(tmp_path, name, points):
 @FILES
 def test_attributes_of_types_without_a_name_in_the_format(tmp_path, name):
     points = np.zeros((2, 3), dtype=np.float32)
-    attributes = {"flag": np.array([True, False]), "half": np.array([0.5, 2], dtype=np.float16), "count": [1, -1]}
+    attributes = {
+        "flag": np.array([True, False]),
+        "half": np.array([0.5, 2], dtype=np.float16),
+        "count": [1, -1],
+    }
     nacre.write_points(tmp_path / name, points, attributes=attributes)
     read = nacre.read_points(tmp_path / name).attributes
     assert equal(read["flag"], np.array([1, 0], dtype=np.uint8))
@@ -141,13 +145,17 @@ def test_attributes_of_types_without_a_name_in_the_format(tmp_path, name):
 def test_ply_has_no_large_integers(tmp_path):
     points = np.zeros((1, 3))
     nacre.write_points(tmp_path / "a.ply", points, attributes={"id": np.array([2**32 - 1])})
-    assert equal(nacre.read_points(tmp_path / "a.ply").attributes["id"], np.array([2**32 - 1], dtype=np.uint32))
+    assert equal(
+        nacre.read_points(tmp_path / "a.ply").attributes["id"], np.array([2**32 - 1], dtype=np.uint32)
+    )
     with pytest.raises(ValueError, match=r"attributes\['id'\].*32-bit"):
         nacre.write_points(tmp_path / "a.ply", points, attributes={"id": np.array([2**32])})
 
 
 def test_representation(tmp_path):
-    nacre.write_points(tmp_path / "a.ply", np.zeros((2, 3)), colors=np.zeros((2, 3), int), attributes={"t": [1, 2]})
+    nacre.write_points(
+        tmp_path / "a.ply", np.zeros((2, 3)), colors=np.zeros((2, 3), int), attributes={"t": [1, 2]}
+    )
     cloud = nacre.read_points(tmp_path / "a.ply")
     assert repr(cloud) == f"Cloud(2 points, float64, colors, t: int32, path={str(tmp_path / 'a.ply')!r})"
     with pytest.raises(AttributeError):
@@ -204,15 +212,27 @@ ONE = np.zeros((1, 3))
         ({"points": ONE, "normals": np.zeros((2, 3))}, ValueError, "normals must have one row per point"),
         ({"points": ONE, "normals": np.zeros((1, 2))}, ValueError, r"normals must have shape \(N, 3\)"),
         ({"points": ONE, "colors": np.zeros((1, 4), int)}, ValueError, r"colors must have shape \(1, 3\)"),
-        ({"points": ONE, "colors": ONE}, TypeError, "colors must be integers from 0 to 255, got dtype float64"),
+        (
+            {"points": ONE, "colors": ONE},
+            TypeError,
+            "colors must be integers from 0 to 255, got dtype float64",
+        ),
         ({"points": ONE, "colors": [[0, 0, 256]]}, ValueError, "colors must be integers from 0 to 255"),
         ({"points": ONE, "colors": [[0, 0, -1]]}, ValueError, "colors must be integers from 0 to 255"),
-        ({"points": ONE, "attributes": {"a": [1, 2]}}, ValueError, r"attributes\['a'\] must have shape \(1,\)"),
+        (
+            {"points": ONE, "attributes": {"a": [1, 2]}},
+            ValueError,
+            r"attributes\['a'\] must have shape \(1,\)",
+        ),
         ({"points": ONE, "attributes": {"a": 1}}, ValueError, r"attributes\['a'\] must have shape"),
         ({"points": ONE, "attributes": {"a": [[[1]]]}}, ValueError, r"attributes\['a'\] must have shape"),
         ({"points": ONE, "attributes": {"a": ["b"]}}, TypeError, r"attributes\['a'\].*real numbers"),
         ({"points": ONE, "attributes": {"a": [1j]}}, TypeError, r"attributes\['a'\].*real numbers"),
-        ({"points": ONE, "attributes": {"a b": [1]}}, ValueError, "names of visible ASCII characters, got 'a b'"),
+        (
+            {"points": ONE, "attributes": {"a b": [1]}},
+            ValueError,
+            "names of visible ASCII characters, got 'a b'",
+        ),
         ({"points": ONE, "attributes": {"a\nb": [1]}}, ValueError, "names of visible ASCII characters"),
         ({"points": ONE, "attributes": {"": [1]}}, ValueError, "names of visible ASCII characters"),
         ({"points": ONE, "attributes": {"\u00e4": [1]}}, ValueError, "names of visible ASCII characters"),

@@ -41,7 +41,9 @@ Table = dict[str, "npt.NDArray[Any] | Ragged"]
 
 def read_text_table(text: TextTable, element: Element) -> Table:
     """Read the next rows of a text as the table of ``element``."""
-    _check_size(text.path, element, 2 * len(element.properties), len(text.data) + 1 - text.offset)
+    _check_size(
+        text.path, element, element.num_rows * 2 * len(element.properties) - 1, len(text.data) - text.offset
+    )
     columns = {
         entry.name: np.empty(element.num_rows, dtype=entry.dtype)
         for entry in element.properties
@@ -110,17 +112,17 @@ def read_binary_table(
     if not element.properties:
         return {}, position
     row_bytes = sum((entry.count_dtype or entry.dtype).itemsize for entry in element.properties)
-    _check_size(path, element, row_bytes, len(data) - position)
+    _check_size(path, element, element.num_rows * row_bytes, len(data) - position)
     found = _read_equal_rows(data, position, element, byte_order)
     return found or _read_unequal_rows(path, data, position, element, byte_order)
 
 
-def _check_size(path: str | os.PathLike[str], element: Element, row_bytes: int, num_bytes: int) -> None:
+def _check_size(path: str | os.PathLike[str], element: Element, smallest: int, num_bytes: int) -> None:
     """Refuse a number of rows that cannot be in the rest of the file, before memory is set aside for it."""
-    if element.num_rows * row_bytes > num_bytes:
+    if smallest > num_bytes:
         raise FileFormatError(
             path,
-            f"the header promises {element.num_rows} rows of element {element.name} of at least {row_bytes} "
+            f"the header promises {element.num_rows} rows of element {element.name}, at least {smallest} "
             f"bytes, but {num_bytes} bytes are left in the file",
             line=element.line,
         )
