@@ -186,7 +186,10 @@ def test_missing_files_and_directories(tmp_path, suffix):
         read_mesh_arrays(tmp_path / f"a{suffix}")
 
 
-PLY_HEADER = f"ply\nformat ascii 1.0\n{PLY_VERTICES}element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+PLY_HEADER = (
+    f"ply\nformat ascii 1.0\n{PLY_VERTICES}element face 1\n"
+    "property list uchar int vertex_indices\nend_header\n"
+)
 STL = stl_binary(SQUARE[FAN])
 STL_LINES = stl_text(SQUARE[FAN]).decode()
 BROKEN = {
@@ -229,6 +232,7 @@ BROKEN = {
     "corner enormous.off": (f"OFF\n4 1 0\n{OFF_SQUARE}3 0 1 {10**30}\n", "line 7"),
     "more lines.off": (f"OFF\n4 1 0\n{OFF_SQUARE}3 0 1 2\n3 0 2 3\n", "line 8: more lines"),
     "empty.stl": ("", "neither a binary STL file nor"),
+    "84 - 50 bytes.stl": (b"STL:" + bytes(30), "neither a binary STL file nor"),
     "short.stl": (STL[:83], "line 1"),
     "cut.stl": (STL.replace(b"solid", b"STL: ")[:-1], "byte 80: .*2 facets has 184 bytes, this one 183"),
     "longer.stl": (STL.replace(b"solid", b"STL: ") + b"\0", "2 facets has 184 bytes, this one 185"),

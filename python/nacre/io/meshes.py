@@ -275,15 +275,15 @@ def _whole(word: bytes) -> int:
 
 def _read_stl(path: str | os.PathLike[str]) -> MeshArrays:
     data = read_file(path)
-    num_facets = int.from_bytes(data[80:84], "little") if len(data) >= _STL_HEADER_BYTES else -1
-    if len(data) == _STL_HEADER_BYTES + num_facets * _STL_FACET.itemsize:
+    num_facets = int.from_bytes(data[80:84], "little")
+    expected = _STL_HEADER_BYTES + num_facets * _STL_FACET.itemsize
+    if len(data) == expected:
         facets = np.frombuffer(data, _STL_FACET, num_facets, _STL_HEADER_BYTES)
         return _merge(facets["corners"].reshape(-1, 3))
     if data[:5].lower() == b"solid":
         return _merge(_read_stl_text(path, data))
-    if num_facets < 0:
+    if len(data) < _STL_HEADER_BYTES:
         raise FileFormatError(path, "neither a binary STL file nor a text that begins with 'solid'", offset=0)
-    expected = _STL_HEADER_BYTES + num_facets * _STL_FACET.itemsize
     reason = f"a binary STL file of {num_facets} facets has {expected} bytes, this one {len(data)}"
     raise FileFormatError(path, reason, offset=80)
 
