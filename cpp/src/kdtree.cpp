@@ -21,18 +21,22 @@ std::variant<BlockTree<float>, BlockTree<double>> make_tree(const Eigen::Ref<con
   return BlockTree<T>(points, num_threads);
 }
 
-// The rows in an order in which each is near the one before, rows that are not finite last.
+// The queries in an order in which each is near the one before, those that are not finite last.
 template <class T>
-std::vector<std::uint32_t> visiting_order(const Eigen::Ref<const PointMatrix<T>>& queries, int num_threads) {
-  std::vector<IndexedPoint<T>> points = finite_points<T>(queries);
-  kd_order(points, num_threads);
-  std::vector<std::uint32_t> order;
-  order.reserve(static_cast<std::size_t>(queries.rows()));
-  for (const IndexedPoint<T>& point : points) order.push_back(point.id);
-  for (Eigen::Index i = 0; i < queries.rows() && order.size() < static_cast<std::size_t>(queries.rows()); ++i) {
-    if (!queries.row(i).allFinite()) order.push_back(static_cast<std::uint32_t>(i));
+std::vector<IndexedPoint<T>> visiting_order(const Eigen::Ref<const PointMatrix<T>>& queries, int num_threads) {
+  require(queries.rows() < static_cast<Eigen::Index>(no_id), "queries", "fewer than 2^32 - 1 points", queries.rows());
+  std::vector<IndexedPoint<T>> order = finite_points<T>(queries);
+  kd_order(order, num_threads);
+  for (Eigen::Index i = 0; order.size() < static_cast<std::size_t>(queries.rows()); ++i) {
+    if (queries.row(i).allFinite()) continue;
+    order.push_back({{queries(i, 0), queries(i, 1), queries(i, 2)}, static_cast<std::uint32_t>(i)});
   }
   return order;
+}
+
+template <class T>
+Eigen::Vector3d position(const IndexedPoint<T>& point) {
+  return {point.p[0], point.p[1], point.p[2]};
 }
 
 // The k nearest of query after query: the last answer bounds the next, because k points within r of one place are
@@ -81,7 +85,7 @@ struct KdTree::Impl {
   Neighbors query(const Eigen::Ref<const PointMatrix<T>>& queries, int k, double max_distance, int num_threads) const {
     require(k >= 1, "k", "at least 1", k);
     require_distance("max_distance", max_distance);
-    const std::vector<std::uint32_t> order = visiting_order<T>(queries, num_threads);
+    const std::vector<IndexedPoint<T>> order = visiting_order<T>(queries, num_threads);
     Neighbors result;
     result.distances.resize(queries.rows(), k);
     result.indices.resize(queries.rows(), k);
@@ -89,12 +93,16 @@ struct KdTree::Impl {
       parallel_blocks(queries.rows(), queries_per_block, num_threads, [&](auto, std::int64_t begin, std::int64_t end) {
         WarmSearch search(blocks, k, max_distance);
         for (std::int64_t i = begin; i < end; ++i) {
-          const std::uint32_t row = order[static_cast<std::size_t>(i)];
-          const int found = search(queries.row(row).transpose().template cast<double>());
-          for (int j = 0; j < k; ++j) {
-            result.distances(row, j) = j < found ? std::sqrt(search[j].d2) : infinity;
-            result.indices(row, j) = j < found ? search[j].id : size;
+          const IndexedPoint<T>& point = order[static_cast<std::size_t>(i)];
+          const int found = search(position(point));
+          double* distances = result.distances.row(point.id).data();
+          std::int64_t* indices = result.indices.row(point.id).data();
+          for (int j = 0; j < found; ++j) {
+            distances[j] = std::sqrt(search[j].d2);
+            indices[j] = search[j].id;
           }
+          std::fill(distances + found, distances + k, infinity);
+          std::fill(indices + found, indices + k, size);
         }
       });
     };
@@ -105,7 +113,7 @@ struct KdTree::Impl {
   template <class T>
   RadiusNeighbors query_radius(const Eigen::Ref<const PointMatrix<T>>& queries, double radius, int num_threads) const {
     require_distance("radius", radius);
-    const std::vector<std::uint32_t> order = visiting_order<T>(queries, num_threads);
+    const std::vector<IndexedPoint<T>> order = visiting_order<T>(queries, num_threads);
     const auto num_queries = static_cast<std::size_t>(queries.rows());
     RadiusNeighbors result;
     result.offsets.assign(num_queries + 1, 0);
@@ -116,12 +124,12 @@ struct KdTree::Impl {
       parallel_blocks(queries.rows(), queries_per_block, num_threads, [&](auto block, auto begin, auto end) {
         std::vector<Found>& found = found_by_block[static_cast<std::size_t>(block)];
         for (std::int64_t i = begin; i < end; ++i) {
-          const std::uint32_t row = order[static_cast<std::size_t>(i)];
+          const IndexedPoint<T>& point = order[static_cast<std::size_t>(i)];
           const std::size_t before = found.size();
           WithinRadius within(radius * radius, found);
-          blocks.search(queries.row(row).transpose().template cast<double>(), within);
+          blocks.search(position(point), within);
           std::sort(found.begin() + static_cast<std::ptrdiff_t>(before), found.end());
-          result.offsets[row + 1] = static_cast<std::int64_t>(found.size() - before);
+          result.offsets[point.id + 1] = static_cast<std::int64_t>(found.size() - before);
         }
       });
     };
@@ -132,7 +140,7 @@ struct KdTree::Impl {
     parallel_blocks(queries.rows(), queries_per_block, num_threads, [&](auto block, auto begin, auto end) {
       auto found = found_by_block[static_cast<std::size_t>(block)].cbegin();
       for (std::int64_t i = begin; i < end; ++i) {
-        const std::uint32_t row = order[static_cast<std::size_t>(i)];
+        const std::uint32_t row = order[static_cast<std::size_t>(i)].id;
         for (auto j = static_cast<std::size_t>(result.offsets[row]);
              j < static_cast<std::size_t>(result.offsets[row + 1]); ++j, ++found) {
           result.indices[j] = found->id;
