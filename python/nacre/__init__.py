@@ -11,6 +11,10 @@ from nacre.depth import (
     estimate_noise,
     preprocess_depth,
 )
+from nacre.errors import FileFormatError
+from nacre.io.cloud import Cloud
+from nacre.io.meshes import read_mesh, write_mesh
+from nacre.io.points import read_points, write_points
 from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
 from nacre.model import FrameReport, Model, ModelParameters
 from nacre.neighbors import KdTree, RadiusNeighbors
@@ -21,9 +25,11 @@ __all__ = [
     "AlignResult",
     "Camera",
     "ClosestPoints",
+    "Cloud",
     "Consolidated",
     "DepthParameters",
     "DepthReport",
+    "FileFormatError",
     "FrameReport",
     "KdTree",
     "Mesh",
@@ -43,6 +49,10 @@ __all__ = [
     "estimate_noise",
     "preprocess_depth",
     "project_samples",
+    "read_mesh",
+    "read_points",
     "simulate_depth",
     "turntable_poses",
+    "write_mesh",
+    "write_points",
 ]
