@@ -2,6 +2,7 @@
 
 from nacre._core import Camera, __version__
 from nacre.consolidation import Consolidated, consolidate, project_samples
+from nacre.datasets import Sequence, SequenceFrame, open_sequence, write_recording
 from nacre.depth import (
     DepthParameters,
     DepthReport,
@@ -12,9 +13,11 @@ from nacre.depth import (
     preprocess_depth,
 )
 from nacre.errors import FileFormatError
+from nacre.io.cameras import CameraFile, read_camera, write_camera
 from nacre.io.cloud import Cloud
 from nacre.io.meshes import read_mesh, write_mesh
 from nacre.io.points import read_points, write_points
+from nacre.io.trajectories import Trajectory, associate, read_trajectory, write_trajectory
 from nacre.model import FrameReport, Model, ModelParameters
 from nacre.neighbors import KdTree, RadiusNeighbors
 from nacre.registration import AlignResult, RegistrationParameters, align
@@ -22,6 +25,7 @@ from nacre.registration import AlignResult, RegistrationParameters, align
 __all__ = [
     "AlignResult",
     "Camera",
+    "CameraFile",
     "Cloud",
     "Consolidated",
     "DepthParameters",
@@ -34,16 +38,26 @@ __all__ = [
     "NoiseModel",
     "RadiusNeighbors",
     "RegistrationParameters",
+    "Sequence",
+    "SequenceFrame",
+    "Trajectory",
     "__version__",
     "align",
+    "associate",
     "back_project",
     "consolidate",
     "depth_normals",
     "estimate_noise",
+    "open_sequence",
     "preprocess_depth",
     "project_samples",
+    "read_camera",
     "read_mesh",
     "read_points",
+    "read_trajectory",
+    "write_camera",
     "write_mesh",
     "write_points",
+    "write_recording",
+    "write_trajectory",
 ]
