@@ -18,14 +18,17 @@ from nacre.io.cloud import Cloud
 from nacre.io.meshes import read_mesh, write_mesh
 from nacre.io.points import read_points, write_points
 from nacre.io.trajectories import Trajectory, associate, read_trajectory, write_trajectory
+from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
 from nacre.model import FrameReport, Model, ModelParameters
 from nacre.neighbors import KdTree, RadiusNeighbors
 from nacre.registration import AlignResult, RegistrationParameters, align
+from nacre.simulation import default_camera, simulate_depth, turntable_poses
 
 __all__ = [
     "AlignResult",
     "Camera",
     "CameraFile",
+    "ClosestPoints",
     "Cloud",
     "Consolidated",
     "DepthParameters",
@@ -33,10 +36,12 @@ __all__ = [
     "FileFormatError",
     "FrameReport",
     "KdTree",
+    "Mesh",
     "Model",
     "ModelParameters",
     "NoiseModel",
     "RadiusNeighbors",
+    "RayHits",
     "RegistrationParameters",
     "Sequence",
     "SequenceFrame",
@@ -45,7 +50,9 @@ __all__ = [
     "align",
     "associate",
     "back_project",
+    "built_in_object",
     "consolidate",
+    "default_camera",
     "depth_normals",
     "estimate_noise",
     "open_sequence",
@@ -55,6 +62,8 @@ __all__ = [
     "read_mesh",
     "read_points",
     "read_trajectory",
+    "simulate_depth",
+    "turntable_poses",
     "write_camera",
     "write_mesh",
     "write_points",
