@@ -11,6 +11,7 @@ from nacre.depth import (
     preprocess_depth,
 )
 from nacre.neighbors import KdTree, RadiusNeighbors
+from nacre.normals import estimate_normals
 
 __all__ = [
     "Camera",
@@ -23,5 +24,6 @@ __all__ = [
     "back_project",
     "depth_normals",
     "estimate_noise",
+    "estimate_normals",
     "preprocess_depth",
 ]
