@@ -38,10 +38,10 @@ struct DepthOptions {
   double max_depth = std::numeric_limits<double>::infinity();  ///< farther values are removed [m]
   double gradient_threshold = 0.005;                           ///< gradient test: depth step across one pixel [m]
   int edge_dilation = 1;                                       ///< both tests: an edge grows by so many pixels
-  double edge_sigmas = 4.0;       ///< inverse-depth test: threshold in standard deviations of the second difference
-  double max_slant = 1.3962634;   ///< inverse-depth test: steeper surfaces are removed [rad]; 80 degrees
-  double max_missing = 0.6;       ///< a pixel goes where more than this part of its 5 x 5 neighbours is missing
-  int min_component = 20;         ///< connected specks of fewer pixels go
+  double edge_sigmas = 4.0;         ///< inverse-depth test: threshold in standard deviations of the second difference
+  double max_slant = 1.3962634;     ///< inverse-depth test: steeper surfaces are removed [rad]; 80 degrees
+  double max_missing = 0.6;         ///< a pixel goes where more than this part of its 5 x 5 neighbours is missing
+  int min_component = 20;           ///< connected specks of fewer pixels go
   std::optional<NoiseModel> noise;  ///< unset: measured from the image itself (estimate_noise)
 
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
@@ -60,9 +60,9 @@ struct DepthReport {
 };
 
 /// Metres from raw integers: value / depth_scale, NaN for 0 and 65535. depth_scale is in stored units a metre.
-DepthImage depth_from_raw(const Eigen::Ref<const Eigen::Array<std::uint16_t, Eigen::Dynamic, Eigen::Dynamic,
-                                                              Eigen::RowMajor>>& raw,
-                          double depth_scale);
+DepthImage depth_from_raw(
+    const Eigen::Ref<const Eigen::Array<std::uint16_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>& raw,
+    double depth_scale);
 
 /// The noise of a depth image, from the residuals of local plane fits (robust): for a pinhole camera the Kinect's
 /// curve scaled to the residuals, for an orthographic camera a constant. A clean image gives a small positive floor.
