@@ -19,19 +19,20 @@ enum class Metric {
 struct AlignOptions {
   Metric method = Metric::symmetric;
   int max_iterations = 40;
-  double max_distance = 0.0;    ///< pairs farther apart are rejected in the first iteration [m]; 0: a quarter of the
-                                ///< target's diameter
-  double final_distance = 0.0;  ///< the gate shrinks to this [m]; 0: from the spacing of the target and the residuals
-  double gate_decay = 0.7;      ///< the gate is multiplied by this at each iteration; 1: it stays at max_distance
-  double max_angle = 0.7853982; ///< pairs whose normals differ more are rejected [rad]; 45 degrees
-  bool robust = true;           ///< weights of Geman and McClure on the residuals, scaled by their median
-  double sample_fraction = 1.0; ///< part of the source points that is used
-  int max_samples = 20000;      ///< at most so many of them in the last iterations; 0: no limit
-  int coarse_samples = 600;     ///< at most so many of them while the gate shrinks; 0: no limit
-  bool keep_best = false;       ///< return the iterate of least rmse instead of the last (the paper's choice)
-  double weak_threshold = 0.01; ///< directions whose eigenvalue of the scaled information, per pair, is smaller are weak
-  std::uint64_t seed = 0;       ///< of the sampling
-  int num_threads = 0;          ///< 0: all
+  double max_distance = 0.0;     ///< pairs farther apart are rejected in the first iteration [m]; 0: a quarter of the
+                                 ///< target's diameter
+  double final_distance = 0.0;   ///< the gate shrinks to this [m]; 0: from the spacing of the target and the residuals
+  double gate_decay = 0.7;       ///< the gate is multiplied by this at each iteration; 1: it stays at max_distance
+  double max_angle = 0.7853982;  ///< pairs whose normals differ more are rejected [rad]; 45 degrees
+  bool robust = true;            ///< weights of Geman and McClure on the residuals, scaled by their median
+  double sample_fraction = 1.0;  ///< part of the source points that is used
+  int max_samples = 20000;       ///< at most so many of them in the last iterations; 0: no limit
+  int coarse_samples = 600;      ///< at most so many of them while the gate shrinks; 0: no limit
+  bool keep_best = false;        ///< return the iterate of least rmse instead of the last (the paper's choice)
+  double weak_threshold =
+      0.01;                ///< directions whose eigenvalue of the scaled information, per pair, is smaller are weak
+  std::uint64_t seed = 0;  ///< of the sampling
+  int num_threads = 0;     ///< 0: all
 
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };
@@ -56,14 +57,14 @@ struct AlignResult {
   Pose target_from_source = Pose::Identity();
   AlignStatus status = AlignStatus::too_few_pairs;
   int iterations = 0;
-  int num_inliers = 0;        ///< pairs inside the last gate, of the source points that were used
-  double overlap = 0.0;       ///< num_inliers / source points that were used
-  double rmse = 0.0;          ///< of the inliers' residuals along the normals (distances, for point_to_point) [m]
+  int num_inliers = 0;   ///< pairs inside the last gate, of the source points that were used
+  double overlap = 0.0;  ///< num_inliers / source points that were used
+  double rmse = 0.0;     ///< of the inliers' residuals along the normals (distances, for point_to_point) [m]
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< centroid of the inliers, target frame [m]
   /// Inverse covariance of the pose: a twist (rotation [rad], translation [m]) about `center`, in the target frame.
   Matrix6 information = Matrix6::Zero();
-  /// One column per direction that the data does not determine: unit twists about `center` with the rotation in units of
-  /// the inliers' extent. The pose keeps its initial value along them.
+  /// One column per direction that the data does not determine: unit twists about `center` with the rotation in units
+  /// of the inliers' extent. The pose keeps its initial value along them.
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;
 
   bool converged() const { return status == AlignStatus::converged; }

@@ -1,0 +1,57 @@
+/// Fusion of a registered depth frame into a point model, weighted by confidence.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "nacre/camera.hpp"
+#include "nacre/depth.hpp"
+#include "nacre/types.hpp"
+
+namespace nacre {
+
+/// A growing set of oriented points, one array an attribute; all arrays have the same length.
+struct PointModel {
+  std::vector<Eigen::Vector3f> points;   ///< world frame [m]
+  std::vector<Eigen::Vector3f> normals;  ///< unit length, towards the cameras that saw the point
+  std::vector<Eigen::Vector3f>
+      colors;                     ///< red green blue, 0 to 255, NaN where never seen; empty when no frame had colour
+  std::vector<float> confidence;  ///< frontal observations that the point stands for
+  std::vector<std::int32_t> last_seen;   ///< frame that last observed the point
+  std::vector<std::uint8_t> violations;  ///< how often a camera saw through the point since it was last observed
+
+  std::int64_t size() const { return static_cast<std::int64_t>(points.size()); }
+  /// Keeps the points whose flag is not 0, in order.
+  void keep(const std::vector<std::uint8_t>& flags);
+};
+
+struct FusionOptions {
+  double support = 0.0;  ///< observations farther from a model point do not move it [m]; 0: from noise and pixels
+  double max_angle = 1.0471976;  ///< nor do those whose normal differs more [rad]; 60 degrees
+  double max_confidence = 1e6;   ///< a lower bound on the weight of new observations, for objects that change
+  double min_confidence = 3.0;   ///< a point below it that is not seen again goes
+  int max_age = 10;              ///< after so many frames
+  int max_violations = 3;        ///< a point that was seen through so often goes
+
+  double reference_sigma = 0.0;  ///< noise of an observation of weight 1 [m]; 0: the frame's median
+
+  void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
+};
+
+struct FusionReport {
+  std::int64_t num_updated = 0;
+  std::int64_t num_inserted = 0;
+  std::int64_t num_removed = 0;
+};
+
+/// Folds a frame in: model points that the camera observes move along their normals by the symmetric implicit
+/// moving-least-squares residual; surface that the model lacks is inserted at the given spacing; points that the camera
+/// sees through, or that were never confirmed, are removed. colors is empty or has a row per pixel.
+FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, const Pose& world_from_camera,
+                  double spacing, std::int32_t frame_index, const FusionOptions& options = {},
+                  const ColorsRef& colors = Colors(), int num_threads = 0);
+
+/// Drops points until neighbours are at least `spacing` apart along the surface; earlier points stay.
+void thin(PointModel& model, double spacing);
+
+}  // namespace nacre

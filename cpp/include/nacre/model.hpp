@@ -1,0 +1,116 @@
+/// The loop: depth frames in, a growing point model and a camera trajectory out.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "nacre/camera.hpp"
+#include "nacre/consolidation.hpp"
+#include "nacre/depth.hpp"
+#include "nacre/fusion.hpp"
+#include "nacre/normals.hpp"
+#include "nacre/registration.hpp"
+#include "nacre/types.hpp"
+
+namespace nacre {
+
+enum class FrameStatus {
+  tracked,      ///< registered and folded in
+  weak,         ///< registered, but the data leaves a direction of the pose open: not folded in
+  lost,         ///< not registered: the model is as it was before
+  relocalised,  ///< registered again after being lost, and folded in
+};
+const char* to_string(FrameStatus status);  ///< TRACKED, WEAK, LOST, RELOCALISED
+
+/// How a registered frame becomes part of the model.
+enum class FoldIn {
+  fuse,      ///< confidence-weighted fusion (fusion.hpp)
+  wlop,      ///< the 2010 paper: WLOP of model and new points
+  wlop_plus  ///< WLOP repaired for incremental use
+};
+
+struct ModelOptions {
+  DepthOptions depth;
+  AlignOptions registration;
+  FoldIn fold_in = FoldIn::fuse;
+  FusionOptions fusion;
+  ConsolidateOptions consolidation;  ///< its num_points is not used: see max_points
+  NormalOptions normals;             ///< of the model, where fold_in is not fuse
+  double spacing = 0.0;              ///< distance between model points [m]; 0: twice the first frame's median pixel
+  int max_points = 500000;           ///< the model never grows beyond: its spacing is widened instead
+  bool predict_motion = true;        ///< start also from the pose that continues the last motion
+  double min_overlap = 0.25;         ///< a frame of which a smaller part matches the model is lost
+  double min_consistency = 0.7;      ///< so is one that sees through more than the rest of what the model shows there
+  double first_fraction = 0.5;       ///< wlop: part of the first frame that becomes the model
+  double kept_fraction = 0.9;        ///< wlop: part of the model that is kept at each frame
+  double new_fraction = 0.2;         ///< wlop: new points, as a part of the model
+  int num_threads = 0;               ///< 0: all
+
+  /// "default" (what measures best) or "paper" (every number of the 2010 paper); std::invalid_argument otherwise.
+  static ModelOptions preset(const std::string& name);
+  void check() const;
+};
+
+/// Wall time of each step of the loop [ms].
+struct StepTimes {
+  double preprocess = 0, back_project = 0, registration = 0, fold_in = 0, normals = 0, total = 0;
+};
+
+/// What became of one frame.
+struct FrameReport {
+  std::int64_t index = 0;
+  std::optional<double> timestamp;  ///< [s], as given
+  FrameStatus status = FrameStatus::lost;
+  std::string reason;                         ///< why the frame is weak or lost; empty otherwise
+  Pose world_from_camera = Pose::Identity();  ///< of a lost frame: the last known pose
+  int num_inliers = 0;
+  double overlap = 0.0;                   ///< part of the frame that matches the model
+  double consistency = 0.0;               ///< part of the model's points in view that the frame does not see through
+  double rmse = 0.0;                      ///< of the inliers, along the normals [m]
+  Matrix6 information = Matrix6::Zero();  ///< see AlignResult
+  Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult
+  DepthReport depth;
+  FusionReport fusion;
+  std::int64_t num_points = 0;  ///< of the model, after the frame
+  double spacing = 0.0;         ///< of the model [m]
+  StepTimes milliseconds;
+};
+
+/// What may come with a depth image.
+struct FrameExtras {
+  Colors colors;                    ///< height * width rows, row by row; empty: none
+  MaskImage mask;                   ///< pixels of the object, see MaskImage
+  std::optional<double> timestamp;  ///< [s]
+  std::optional<Pose> guess;        ///< world_from_camera to start the registration from
+  bool keep_guess = false;          ///< take the guess for the pose, without registration
+};
+
+/// A 3D model that grows with every depth frame. The world is the first camera's frame unless the first frame comes
+/// with a guess. Frames that cannot be registered change nothing.
+class Model {
+ public:
+  explicit Model(const Camera& camera, const ModelOptions& options = {});
+  ~Model();
+  Model(Model&&) noexcept;
+  Model& operator=(Model&&) noexcept;
+
+  /// Depth [m], NaN or values that are not positive mean "no measurement". Throws std::invalid_argument when sizes do
+  /// not fit or the depth scale cannot be right, before anything is changed.
+  FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras = {});
+
+  const Camera& camera() const;
+  const ModelOptions& options() const;
+  const PointModel& cloud() const;                 ///< in the world frame
+  PointModel cloud_in_camera() const;              ///< in the newest registered camera's frame
+  const std::vector<FrameReport>& frames() const;  ///< one report per frame that was added
+  double spacing() const;                          ///< [m]; 0 before the first frame
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace nacre
