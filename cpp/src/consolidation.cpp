@@ -233,8 +233,12 @@ class Projection {
     } else {
       attracting = sum_pairs<1>(attraction, attracting_points, points, place);
     }
-    if (!(attracting.mass > 0.0F)) return Eigen::Vector3f::Zero();
-    Eigen::Vector3f step = attracting.first / attracting.mass;
+    Eigen::Vector3f step = Eigen::Vector3f::Zero();
+    if (attracting.mass > 0.0F) {
+      step = attracting.first / attracting.mass;
+    } else if (!(sum_pairs<0>(form_.density, attracting_points, points, place).mass > 0.0F)) {
+      return step;  // isolated: not even a point at the sample's own place
+    }
 
     const PairSums repelling = sum_pairs<1>(form_.repulsion, sample_grid_.with_mass(sample_mass_), others, place);
     if (repelling.mass > 0.0F) {

@@ -126,9 +126,9 @@ def consolidate(
     """
     array = as_points("points", points)
     options = _options(radius, iterations, mu, method, theta, num_threads)
-    options.num_points = max(1, len(array)) if num_points is None else as_int("num_points", num_points)
-    options.seed = as_int("seed", seed)
-    options.check()
+    wanted = len(array) if num_points is None else as_int("num_points", num_points, low=1)
+    options.num_points = max(1, min(wanted, len(array)))
+    options.seed = as_int("seed", seed, high=2**64 - 1)
     local, origin = localize(array)
     cargo = _Cargo(attributes, len(array))
     moved, carried, sources = _core.consolidate(local, options, cargo.columns)
@@ -202,11 +202,11 @@ def _options(
 ) -> _core.ConsolidateOptions:
     options = _core.ConsolidateOptions()
     options.radius = as_number("radius", radius)
-    options.iterations = as_int("iterations", iterations)
+    options.iterations = as_int("iterations", iterations, high=2**31 - 1)
     options.mu = as_number("mu", mu)
     options.method = as_choice("method", method, _METHODS)
     options.theta = as_choice("theta", theta, _THETAS)
-    options.num_threads = as_int("num_threads", num_threads)
+    options.num_threads = as_int("num_threads", num_threads, high=2**31 - 1)
     return options
 
 
@@ -253,7 +253,7 @@ class _Cargo:
             if name == "normals" and (array.dtype.kind != "f" or array.shape[1:] != (3,)):
                 expected = f"floating-point of shape ({num_points}, 3)"
                 raise ValueError(f"{label} must be {expected}, got {array.dtype} {array.shape}")
-            rows = array.reshape(num_points, -1 if num_points else math.prod(array.shape[1:])).astype(
+            rows = array.reshape(num_points, math.prod(array.shape[1:])).astype(
                 np.float64
             )
             finite = np.isfinite(rows)
@@ -270,7 +270,7 @@ class _Cargo:
         start = 0
         for name, array in self._arrays.items():
             mean = self._means[name]
-            values = (carried[:, start : start + len(mean)] + mean).reshape(-1, *array.shape[1:])
+            values = (carried[:, start : start + len(mean)] + mean).reshape(len(sources), *array.shape[1:])
             start += len(mean)
             if name == "normals":
                 lengths = np.linalg.norm(values, axis=1, keepdims=True)
