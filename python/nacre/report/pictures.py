@@ -1,0 +1,161 @@
+"""The pictures of a report: the model from its sides, and a depth image before and after cleaning."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre.arrays import as_points
+from nacre.report.charts import length_unit, ticks
+from nacre.report.colormap import category_rgb, viridis
+from nacre.report.data import DepthExample, ModelCloud
+from nacre.report.png import encode_png
+from nacre.report.render import measure_spacing, render_points, reverse_part
+from nacre.report.view import SIDES, View
+
+OBLIQUE = (-0.75, -0.55, -1.0)
+BEHIND = (0.75, -0.55, 1.0)
+
+_SIZE = (560, 560)
+_REASON_COLORS = {"edge": 5, "slanted": 1, "isolated": 3, "out_of_range": 0, "masked": 4, "removed": 5}
+_MAX_DEPTH_WIDTH = 800
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture with what is to be said about it."""
+
+    caption: str
+    uri: str
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class ModelPictures:
+    """The model as pictures, all sides at one scale."""
+
+    oblique: Picture
+    sides: tuple[Picture, ...]
+    confidence: tuple[Picture, ...]
+    confidence_range: tuple[float, float]
+    colors: tuple[Picture, ...]
+    scale_bar: tuple[str, float]  #: its length in words, and as a part of a side picture's width
+
+
+def data_uri(image: npt.NDArray[np.uint8]) -> str:
+    """Return an image as the text of a link."""
+    return "data:image/png;base64," + base64.b64encode(encode_png(image)).decode("ascii")
+
+
+def draw_model(model: ModelCloud) -> ModelPictures | None:
+    """Draw the model from all sides; None where there is no point to draw."""
+    points = as_points("points", model.points)
+    if not np.isfinite(points).all(axis=1).any():
+        return None
+    spacing = measure_spacing(points)
+
+    def picture(
+        caption: str,
+        view_from: str | Sequence[float],
+        colors: npt.NDArray[np.uint8] | None = None,
+        scale: float | None = None,
+        size: tuple[int, int] = _SIZE,
+    ) -> Picture:
+        view = View.fit(points, view_from, size=size, metres_per_pixel=scale)
+        inside_out = model.normals is not None and reverse_part(points, model.normals, view) > 0.5
+        image = render_points(
+            points, model.normals, colors, view=view, spacing=spacing, hide_reverse=inside_out, background=None
+        )
+        return Picture(caption, data_uri(image), "reverse sides left out" if inside_out else "")
+
+    scale = max(View.fit(points, side, size=_SIZE).metres_per_pixel for side in SIDES)
+    confidence: tuple[Picture, ...] = ()
+    low = high = 0.0
+    if model.confidence is not None:
+        values = np.nan_to_num(np.asarray(model.confidence, dtype=np.float64).reshape(-1))
+        low, high = (float(bound) for bound in np.percentile(values, (2, 98)))
+        shades = viridis((values - low) / (high - low) if high > low else np.ones(len(values)))
+        confidence = (
+            picture("Confidence, from the front", OBLIQUE, shades),
+            picture("Confidence, from behind", BEHIND, shades),
+        )
+    colors: tuple[Picture, ...] = ()
+    if model.colors is not None:
+        colors = (
+            picture("Colour, from the front", OBLIQUE, model.colors),
+            picture("Colour, from behind", BEHIND, model.colors),
+        )
+    return ModelPictures(
+        oblique=picture("The model", OBLIQUE, size=(760, 640)),
+        sides=tuple(picture(side.capitalize(), side, scale=scale) for side in SIDES),
+        confidence=confidence,
+        confidence_range=(low, high),
+        colors=colors,
+        scale_bar=_scale_bar(scale * _SIZE[0]),
+    )
+
+
+def _scale_bar(width: float) -> tuple[str, float]:
+    length = ticks(0, width, 4)[1]
+    unit, factor = length_unit(length)
+    return f"{length * factor:.4g} {unit}", length / width
+
+
+@dataclass(frozen=True)
+class DepthPictures:
+    """A depth image before and after cleaning, and what was removed."""
+
+    pictures: tuple[Picture, ...]
+    removed: tuple[tuple[str, int, int], ...]  #: reason, its colour's index, pixels
+    num_measured: int
+    range: tuple[float, float]  #: nearest and farthest colour [m]
+
+
+def draw_depth(example: DepthExample) -> DepthPictures:
+    """Draw a depth image as it was measured, as it is used, and what was removed in between."""
+    before, after = (np.asarray(image, dtype=np.float64) for image in (example.before, example.after))
+    if before.ndim != 2 or before.shape != after.shape:
+        raise ValueError(f"depth.before and depth.after must be images of one size, got {before.shape}, {after.shape}")
+    measured = np.isfinite(before) & (before > 0)
+    kept = np.isfinite(after) & (after > 0)
+    gone = measured & ~kept
+    names = list(example.reason_names) or ["removed"]
+    if example.reasons is None:
+        reasons = gone.astype(np.int64)
+        names = names[:1]
+    else:
+        reasons = np.where(gone, np.asarray(example.reasons), 0)
+        if reasons.min() < 0 or reasons.max() > len(names):
+            raise ValueError(f"depth.reasons must lie between 0 and the number of reason_names ({len(names)})")
+
+    shown = before[kept] if kept.any() else before[measured]
+    low, high = (float(bound) for bound in np.percentile(shown, (1, 99))) if len(shown) else (0.0, 1.0)
+    step = max(-(-before.shape[1] // _MAX_DEPTH_WIDTH), 1)
+
+    def by_depth(visible: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
+        position = (before - low) / (high - low) if high > low else np.zeros_like(before)
+        position = np.clip(np.nan_to_num(1 - position), 0, 1)
+        position = np.round(position * 95) / 95  # fewer colours make a smaller file
+        return np.concatenate([viridis(position), _alpha(visible)], axis=2)
+
+    marked = np.zeros((*before.shape, 4), dtype=np.uint8)
+    marked[kept] = (160, 160, 160, 90)
+    colors = [_REASON_COLORS.get(name, i) for i, name in enumerate(names)]
+    for i, color in enumerate(colors):
+        marked[reasons == i + 1] = (*category_rgb(color), 255)
+    pictures = (
+        Picture("As measured", data_uri(by_depth(measured)[::step, ::step])),
+        Picture("What was removed", data_uri(marked[::step, ::step])),
+        Picture("As used", data_uri(by_depth(kept)[::step, ::step])),
+    )
+    removed = [(name, colors[i], int((reasons == i + 1).sum())) for i, name in enumerate(names)]
+    return DepthPictures(pictures, tuple(removed), int(measured.sum()), (low, high))
+
+
+def _alpha(visible: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
+    return (visible * np.uint8(255))[:, :, None]
