@@ -1,5 +1,32 @@
 """nacre grows a 3D model from depth-camera images, layer by layer."""
 
 from nacre._core import Camera, __version__
+from nacre.depth import (
+    DepthParameters,
+    DepthReport,
+    NoiseModel,
+    back_project,
+    depth_normals,
+    estimate_noise,
+    preprocess_depth,
+)
+from nacre.model import FrameReport, Model, ModelParameters
+from nacre.registration import AlignResult, RegistrationParameters, align
 
-__all__ = ["Camera", "__version__"]
+__all__ = [
+    "AlignResult",
+    "Camera",
+    "DepthParameters",
+    "DepthReport",
+    "FrameReport",
+    "Model",
+    "ModelParameters",
+    "NoiseModel",
+    "RegistrationParameters",
+    "__version__",
+    "align",
+    "back_project",
+    "depth_normals",
+    "estimate_noise",
+    "preprocess_depth",
+]
