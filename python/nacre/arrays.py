@@ -123,3 +123,16 @@ def localize(points: FloatArray) -> tuple[npt.NDArray[np.float32], npt.NDArray[n
     finite = points[np.isfinite(points).all(axis=1)]
     origin = np.round(finite.mean(axis=0)) if len(finite) else np.zeros(3)
     return (points - origin).astype(np.float32), origin
+
+
+def as_triangles(name: str, value: npt.ArrayLike, num_vertices: int) -> npt.NDArray[np.int32]:
+    """Return ``value`` as a C-contiguous (N, 3) int32 array of indices of ``num_vertices`` vertices."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "iu" and array.size:
+        raise TypeError(f"{name} must be an array of integers, got dtype {array.dtype}")
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
+        raise ValueError(f"{name} must have shape (N, 3) with at least one row, got {array.shape}")
+    for index in (array.min(), array.max()):
+        if not 0 <= index < num_vertices:
+            raise ValueError(f"{name} must hold indices of the {num_vertices} vertices, got {index}")
+    return np.ascontiguousarray(array, dtype=np.int32)
