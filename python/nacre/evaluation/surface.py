@@ -4,28 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre.arrays import as_matching_points, as_points
 from nacre.evaluation.result import Result, measure, per_item
+from nacre.mesh import Mesh
 
 Array = npt.NDArray[np.float64]
-
-
-class Surface(Protocol):
-    """A triangle mesh that can be asked for distances, such as :class:`nacre.Mesh`."""
-
-    @property
-    def vertices(self) -> npt.NDArray[Any]: ...  # noqa: D102
-    @property
-    def triangles(self) -> npt.NDArray[Any]: ...  # noqa: D102
-    def distance(self, points: Any, /) -> npt.NDArray[Any]: ...  # noqa: D102
-
-
-Reference: TypeAlias = "Surface | npt.ArrayLike"
 
 
 class SurfaceSamples(NamedTuple):
@@ -123,7 +111,7 @@ def sample_surface(
 
 
 def surface_accuracy(
-    points: npt.ArrayLike, reference: Reference, *, reference_normals: npt.ArrayLike | None = None
+    points: npt.ArrayLike, reference: Mesh | npt.ArrayLike, *, reference_normals: npt.ArrayLike | None = None
 ) -> SurfaceAccuracy:
     """
     Measure how far model points are from a reference surface.
@@ -146,7 +134,7 @@ def surface_accuracy(
     Notes
     -----
     ``bias`` is the mean of the distances with their sign, so that it shows a model that has shrunk or grown while noise
-    averages out. For a mesh the sign is the side of the nearest of about 200 000 surface samples.
+    averages out. The sign is the side of the nearest triangle (or disk) on which the point lies.
     """
     array = as_points("points", points).astype(np.float64)
     finite = np.isfinite(array).all(axis=1)
@@ -154,17 +142,16 @@ def surface_accuracy(
     distances = np.full(len(array), np.nan)
     if not len(used):
         return SurfaceAccuracy(*[np.nan] * 6, num_points=0, distances=distances)
-    if _is_mesh(reference):
+    if isinstance(reference, Mesh):
         if reference_normals is not None:
             raise ValueError("reference_normals must not be given for a mesh, which has its own")
-        distances[finite] = reference.distance(used)
-        samples = sample_surface(reference.vertices, reference.triangles, 200_000)
-        _, heights = _to_disks(used, samples.points, samples.normals)
-        signed = np.copysign(distances[finite], heights)
+        closest = reference.closest(used)
+        heights = np.einsum("ij,ij->i", used - closest.points, closest.normals)
+        distances[finite], signed = closest.distances, np.copysign(closest.distances, heights)
     else:
         cloud, normals = _as_reference(reference, reference_normals)
         if normals is None:
-            distances[finite], _ = _nearest(cloud, used)
+            distances[finite] = _nearest(cloud, used)[0]
             signed = np.full(len(used), np.nan)
         else:
             distances[finite], heights = _to_disks(used, cloud, normals)
@@ -184,7 +171,7 @@ def surface_accuracy(
 
 def completeness(
     points: npt.ArrayLike,
-    reference: Reference,
+    reference: Mesh | npt.ArrayLike,
     *,
     tau: float | Sequence[float] = (0.005, 0.010, 0.020),
     seen: npt.ArrayLike | None = None,
@@ -213,7 +200,7 @@ def completeness(
         With an empty model every fraction is 0 and every distance infinite.
     """
     thresholds = _thresholds(tau)
-    if _is_mesh(reference):
+    if isinstance(reference, Mesh):
         samples = sample_surface(reference.vertices, reference.triangles, num_samples, seed=seed).points
     else:
         samples = as_points("reference", reference).astype(np.float64)
@@ -241,7 +228,7 @@ def completeness(
 
 def f_score(
     points: npt.ArrayLike,
-    reference: Reference,
+    reference: Mesh | npt.ArrayLike,
     *,
     tau: float | Sequence[float] = (0.005, 0.010, 0.020),
     reference_normals: npt.ArrayLike | None = None,
@@ -273,10 +260,6 @@ def f_score(
             2 * p * r / (p + r) if p + r > 0 else p + r for p, r in zip(precision, covered.fraction, strict=True)
         ),
     )
-
-
-def _is_mesh(reference: Any) -> bool:
-    return hasattr(reference, "vertices") and hasattr(reference, "triangles")
 
 
 def _thresholds(tau: float | Sequence[float]) -> tuple[float, ...]:

@@ -119,7 +119,7 @@ def map_chart(
     """
     Draw tracks (N, 2), each with its name and colour, in the plane with equal scales; y grows upwards or downwards.
 
-    The first point of the first track is marked. NaN leaves a gap.
+    The first point of the last track is marked. NaN leaves a gap.
     """
     known = [xy[np.isfinite(xy).all(axis=1)] for _, xy, _ in tracks]
     everything = np.concatenate([*known, np.zeros((0, 2))])
@@ -151,13 +151,13 @@ def map_chart(
                 parts.append(f'<text class="tick end" x="{_LEFT - 6}" y="{at + 4:.1f}">{_number(tick)}</text>')
     for name, xy, color in tracks:
         thinned = xy[:: max(len(xy) // 1500, 1)]
-        style = " dashed" if name == "truth" else ""
+        style = " wide" if name == "truth" else ""
         parts.append(f'<path class="line s{color}{style}" d="{_path(place(thinned))}"/>')
-        if len(xy) <= 60:
+        if len(xy) <= 60 and not style:
             dots = place(xy[np.isfinite(xy).all(axis=1)])
             parts += [f'<circle class="f{color}" cx="{a:.1f}" cy="{b:.1f}" r="2"/>' for a, b in dots]
-    if known and len(known[0]):
-        x, y = place(known[0][:1])[0]
+    if known and len(known[-1]):
+        x, y = place(known[-1][:1])[0]
         parts.append(f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="5"><title>first frame</title></circle>')
     parts.append(_axis_labels(f"{x_label} [{unit}]", f"{y_label} [{unit}]", width, height))
     return _svg(parts, width, height, f"{y_label} over {x_label}")
@@ -203,7 +203,7 @@ def length_unit(metres: float) -> tuple[str, float]:
     """Return the unit in which a length reads well, and how many of it are in a metre."""
     if not math.isfinite(metres) or metres >= 2:
         return "m", 1.0
-    return ("mm", 1e3) if metres >= 2e-4 else ("µm", 1e6)
+    return ("mm", 1e3) if metres >= 5e-5 else ("µm", 1e6)
 
 
 class _Frame:
@@ -304,4 +304,5 @@ def _largest(series: Sequence[Series]) -> float:
 
 
 def _number(value: float) -> str:
-    return f"{0.0 if abs(value) < 1e-12 else value:.6g}".replace("-", "\N{MINUS SIGN}")
+    text = f"{value:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}") if abs(value) >= 1e4 else f"{value:.6g}"
+    return "0" if abs(value) < 1e-12 else text.replace("-", "\N{MINUS SIGN}")

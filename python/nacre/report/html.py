@@ -18,7 +18,7 @@ from nacre.io.atomic import atomic_writer
 from nacre.report.charts import Mark, Series, group_size, length_unit, line_chart, map_chart, runs, stacked_chart
 from nacre.report.colormap import CATEGORIES
 from nacre.report.data import DepthExample, FrameEntry, ModelCloud, ReportData
-from nacre.report.pictures import ModelPictures, Picture, draw_depth, draw_model
+from nacre.report.pictures import ModelPictures, Picture, draw_depth, draw_model, reason_color
 from nacre.report.summary import Summary, is_tracked, summarize, total_milliseconds
 from nacre.report.text import count, flatten, label, quantity
 
@@ -84,8 +84,8 @@ def _header(data: ReportData, summary: Summary, model: ModelPictures | None) -> 
     picture = f'<img src="{model.oblique.uri}" alt="The model, seen from the upper left">' if model else ""
     source = f'<p class="source">{escape(data.source)}</p>' if data.source else ""
     return (
-        f'<header><p class="brand">nacre reconstruction</p><h1>{escape(data.title)}</h1>{source}</header>'
-        f'<div class="intro{"" if model else " alone"}"><div>{verdict}<dl class="tiles">{tiles}</dl></div>{picture}</div>'
+        f'<header class="intro{"" if model else " alone"}"><div><p class="brand">nacre reconstruction</p>'
+        f'<h1>{escape(data.title)}</h1>{source}{verdict}<dl class="tiles">{tiles}</dl></div>{picture}</header>'
     )
 
 
@@ -99,12 +99,12 @@ def _model_section(model: ModelPictures | None) -> str:
         "in all six pictures</p></div>"
         '<p class="note">Front is what the first camera saw. Brown: reverse sides of surfaces.</p>'
     )
+    attributes = model.colors + model.confidence
+    if attributes:
+        parts.append(_pictures(attributes, "two" if len(attributes) == 2 else "four"))
     if model.confidence:
         low, high = model.confidence_range
-        parts.append(_pictures(model.confidence, "two"))
         parts.append(f'<p class="note">Confidence {low:.4g}<span class="ramp"></span>{high:.4g}</p>')
-    if model.colors:
-        parts.append(_pictures(model.colors, "two"))
     return "".join(parts)
 
 
@@ -128,7 +128,11 @@ def _depth_section(example: DepthExample | None, frames: Sequence[FrameEntry]) -
     reasons = list(dict.fromkeys(reason for frame in frames for reason in frame.removed))
     if reasons and len(frames) > 1:
         series = [
-            Series(label(reason), np.array([frame.removed.get(reason, 0) / 1000 for frame in frames]), i)
+            Series(
+                label(reason),
+                np.array([frame.removed.get(reason, 0) / 1000 for frame in frames]),
+                reason_color(reason, i),
+            )
             for i, reason in enumerate(reasons)
         ]
         chart = stacked_chart(
@@ -142,23 +146,20 @@ def _trajectory_section(frames: Sequence[FrameEntry], error: AbsoluteTrajectoryE
     positions = _positions(frames, lambda frame: frame.world_from_camera if is_tracked(frame) else None)
     if not np.isfinite(positions).any():
         return ""
-    tracks = [positions]
+    tracks = [("estimated", positions, 0)]
     truth = _positions(frames, lambda frame: frame.truth)
-    keys = '<span class="key"><i class="k0"></i>estimated</span>'
+    keys = '<span class="key"><i class="thin k0"></i>estimated</span>'
     if error is not None and np.isfinite(truth).any():
         rotation, translation = error.truth_from_estimated[:3, :3], error.truth_from_estimated[:3, 3]
-        tracks.append((truth - translation) @ rotation)
-        keys += '<span class="key"><i class="dash k6"></i>truth, aligned</span>'
+        tracks.insert(0, ("truth", (truth - translation) @ rotation, 1))
+        keys += '<span class="key"><i class="thick k1"></i>truth, aligned</span>'
     keys += '<span class="key">○ first frame</span>'
     maps = []
     for caption, axes, names in (
         ("From above", (0, 2), ("x, to the right", "z, forward")),
         ("From the side", (2, 1), ("z, forward", "y, down")),
     ):
-        lines = [
-            (name, track[:, axes], color)
-            for name, track, color in zip(("estimated", "truth"), tracks, (0, 6), strict=False)
-        ]
+        lines = [(name, track[:, axes], color) for name, track, color in tracks]
         chart = map_chart(lines, x_label=names[0], y_label=names[1], y_up=axes[1] == 2)
         maps.append(_chart(caption, chart, keys))
     parts = [_heading("Trajectory"), f'<div class="grid two">{"".join(maps)}</div>']
@@ -177,12 +178,12 @@ def _error_charts(frames: Sequence[FrameEntry], error: AbsoluteTrajectoryError |
         unit, factor = length_unit(float(np.nanmax(translation)))
         one = [Series("", translation * factor)]
         chart = line_chart(one, y_label=f"position [{unit}]", indices=indices, marks=marks)
-        charts.append(_chart("Position error", chart, _mark_keys(frames)))
+        charts.append(_chart("Position error", chart))
     if np.isfinite(rotation).any():
         one = [Series("", np.degrees(rotation))]
         chart = line_chart(one, y_label="rotation [\N{DEGREE SIGN}]", indices=indices, marks=marks)
-        charts.append(_chart("Rotation error", chart, _mark_keys(frames)))
-    return f'<div class="grid two">{"".join(charts)}</div>' if charts else ""
+        charts.append(_chart("Rotation error", chart))
+    return f'{_mark_keys(frames)}<div class="grid two">{"".join(charts)}</div>' if charts else ""
 
 
 def _frames_section(frames: Sequence[FrameEntry]) -> str:
@@ -194,23 +195,24 @@ def _frames_section(frames: Sequence[FrameEntry]) -> str:
     if np.isfinite(overlap).any():
         one = [Series("", 100 * overlap)]
         chart = line_chart(one, y_label="overlap [%]", indices=indices, marks=marks, y_max=100)
-        charts.append(_chart("Part of the frame that matches the model", chart, _mark_keys(frames)))
+        charts.append(_chart("Part of the frame that matches the model", chart))
     inliers = _values(frames, lambda frame: frame.num_inliers)
     if np.isfinite(inliers).any():
-        chart = line_chart([Series("", inliers)], y_label="inliers", indices=indices, marks=marks)
-        charts.append(_chart("Pairs used for the registration", chart, _mark_keys(frames)))
+        one = [Series("", inliers / 1000)]
+        chart = line_chart(one, y_label="thousand pairs", indices=indices, marks=marks)
+        charts.append(_chart("Pairs used for the registration", chart))
     rmse = _values(frames, lambda frame: frame.rmse)
     if np.isfinite(rmse).any():
         unit, factor = length_unit(float(np.nanmax(rmse)))
         one = [Series("", rmse * factor)]
         chart = line_chart(one, y_label=f"residual [{unit}]", indices=indices, marks=marks)
-        charts.append(_chart("Residual of the registration (RMS)", chart, _mark_keys(frames)))
+        charts.append(_chart("Residual of the registration (RMS)", chart))
     num_points = _values(frames, lambda frame: frame.num_points)
     if np.isfinite(num_points).any():
         one = [Series("", num_points / 1000)]
         chart = line_chart(one, y_label="thousand points", indices=indices, marks=marks)
-        charts.append(_chart("Size of the model", chart, _mark_keys(frames)))
-    parts = [f'<div class="grid two">{"".join(charts)}</div>'] if charts else []
+        charts.append(_chart("Size of the model", chart))
+    parts = [f'{_mark_keys(frames)}<div class="grid two">{"".join(charts)}</div>'] if charts else []
     steps = _steps(frames)
     if steps:
         chart = stacked_chart(steps, y_label="time [ms]", indices=indices, width=1080, height=210)
@@ -325,7 +327,8 @@ def _pictures(pictures: Iterable[Picture], layout: str, kind: str = "") -> str:
 
 
 def _chart(caption: str, svg: str, keys: str = "") -> str:
-    return f'<figure class="chart"><figcaption><b>{escape(caption)}</b><br>{keys}</figcaption>{svg}</figure>'
+    lines = f"<b>{escape(caption)}</b>" + (f"<br>{keys}" if keys else "")
+    return f'<figure class="chart"><figcaption>{lines}</figcaption>{svg}</figure>'
 
 
 def _keys(series: Sequence[Series]) -> str:
@@ -333,7 +336,8 @@ def _keys(series: Sequence[Series]) -> str:
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    head = f"<tr>{''.join(f'<th>{escape(name)}</th>' for name in heads)}</tr>" if heads else ""
+    cells = "".join(f'<th class="number">{escape(name)}</th>' for name in heads)
+    head = f"<tr>{cells}</tr>" if heads else ""
     body = "".join(
         "<tr>"
         + "".join(
@@ -367,9 +371,10 @@ def _marks(frames: Sequence[FrameEntry]) -> list[Mark]:
 
 def _mark_keys(frames: Sequence[FrameEntry]) -> str:
     present = {frame.status.upper() for frame in frames}
-    return "".join(
+    keys = "".join(
         f'<span class="key"><i class="k-{status.lower()}"></i>{status}</span>'
         for status in ("LOST", "WEAK", "RELOCALISED")
         if status in present
     )
+    return f'<p class="note">{keys}</p>' if keys else ""
 

@@ -91,7 +91,7 @@ def draw_model(model: ModelCloud) -> ModelPictures | None:
             picture("Colour, from behind", BEHIND, model.colors),
         )
     return ModelPictures(
-        oblique=picture("The model", OBLIQUE, size=(760, 640)),
+        oblique=picture("The model", OBLIQUE, size=(680, 640)),
         sides=tuple(picture(side.capitalize(), side, scale=scale) for side in SIDES),
         confidence=confidence,
         confidence_range=(low, high),
@@ -116,6 +116,11 @@ class DepthPictures:
     range: tuple[float, float]  #: nearest and farthest colour [m]
 
 
+def reason_color(name: str, index: int) -> int:
+    """Return the index of the colour that stands for a reason to remove pixels."""
+    return _REASON_COLORS.get(name, index)
+
+
 def draw_depth(example: DepthExample) -> DepthPictures:
     """Draw a depth image as it was measured, as it is used, and what was removed in between."""
     before, after = (np.asarray(image, dtype=np.float64) for image in (example.before, example.after))
@@ -134,18 +139,19 @@ def draw_depth(example: DepthExample) -> DepthPictures:
             raise ValueError(f"depth.reasons must lie between 0 and the number of reason_names ({len(names)})")
 
     shown = before[kept] if kept.any() else before[measured]
-    low, high = (float(bound) for bound in np.percentile(shown, (1, 99))) if len(shown) else (0.0, 1.0)
+    low, high = (float(bound) for bound in np.percentile(shown, (1, 99))) if len(shown) else (1.0, 1.0)
     step = max(-(-before.shape[1] // _MAX_DEPTH_WIDTH), 1)
 
     def by_depth(visible: npt.NDArray[np.bool_]) -> npt.NDArray[np.uint8]:
-        position = (before - low) / (high - low) if high > low else np.zeros_like(before)
-        position = np.clip(np.nan_to_num(1 - position), 0, 1)
+        # By inverse depth: near things, which are measured best, get most of the colours.
+        inverse = 1 / np.clip(np.where(measured, before, high), low, high)
+        position = (inverse - 1 / high) / (1 / low - 1 / high) if high > low else np.ones_like(before)
         position = np.round(position * 95) / 95  # fewer colours make a smaller file
         return np.concatenate([viridis(position), _alpha(visible)], axis=2)
 
     marked = np.zeros((*before.shape, 4), dtype=np.uint8)
     marked[kept] = (160, 160, 160, 90)
-    colors = [_REASON_COLORS.get(name, i) for i, name in enumerate(names)]
+    colors = [reason_color(name, i) for i, name in enumerate(names)]
     for i, color in enumerate(colors):
         marked[reasons == i + 1] = (*category_rgb(color), 255)
     pictures = (

@@ -13,6 +13,17 @@ from nacre.evaluation.result import plain
 from nacre.report.charts import length_unit
 
 _MISSING = "\N{EN DASH}"
+_WORDS = {
+    "rms": "RMS",
+    "rmse": "RMSE",
+    "std": "standard deviation",
+    "tau": "within",
+    "min": "least",
+    "max": "greatest",
+    "p95": "95th percentile",
+    "p99": "99th percentile",
+    "f": "F",
+}
 
 
 def quantity(value: Any, unit: str = "") -> str:
@@ -47,7 +58,7 @@ def count(value: int) -> str:
 
 def label(name: str) -> str:
     """Return a field's name as words."""
-    words = name.replace("_", " ").strip()
+    words = " ".join(_WORDS.get(word, word) for word in name.split("_") if word != "num")
     return words[:1].upper() + words[1:]
 
 
@@ -56,7 +67,8 @@ def flatten(parameters: Any, prefix: str = "") -> list[tuple[str, str]]:
     if dataclasses.is_dataclass(parameters) and not isinstance(parameters, type):
         parameters = {field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)}
     if isinstance(parameters, Mapping):
-        return [row for name, value in parameters.items() for row in flatten(value, f"{prefix}.{name}" if prefix else str(name))]
+        named = ((f"{prefix}.{name}" if prefix else str(name), value) for name, value in parameters.items())
+        return [row for name, value in named for row in flatten(value, name)]
     if isinstance(parameters, (float, np.floating)):
         return [(prefix, f"{parameters:.7g}")]
     return [(prefix, str(parameters))]
