@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
+
+
+import numbers
+import operator
+
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
@@ -61,7 +66,9 @@ def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
         head, _, rest = name.partition(".")
         names = [field.name for field in dataclasses.fields(parameters)]  # type: ignore[arg-type]
         if head not in names:
-            raise ValueError(f"there is no parameter {name!r} in {type(parameters).__name__}; it has {', '.join(names)}")
+            raise ValueError(
+                f"there is no parameter {name!r} in {type(parameters).__name__}; it has {', '.join(names)}"
+            )
         current = getattr(parameters, head)
         if rest:
             value = updated(current, {rest: value})
@@ -71,3 +78,25 @@ def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
             value = float(value)
         parameters = dataclasses.replace(parameters, **{head: value})  # type: ignore[type-var]
     return parameters
+
+
+def as_int(name: str, value: Any) -> int:
+    """Return ``value`` as an int; floats are refused."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} must be an integer, got {value!r}") from None
+
+
+def as_number(name: str, value: Any) -> float:
+    """Return a real number as a float."""
+    if not isinstance(value, numbers.Real):
+        raise TypeError(f"{name} must be a number, got {value!r}")
+    return float(value)
+
+
+def as_choice(name: str, value: Any, choices: Mapping[str, Core]) -> Core:
+    """Return what ``value`` stands for among the named choices."""
+    if not isinstance(value, str) or value not in choices:
+        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
+    return choices[value]
