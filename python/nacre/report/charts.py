@@ -15,7 +15,7 @@ Array = npt.NDArray[np.float64]
 #: More values than this are drawn in groups of equal size.
 MAX_VALUES = 400
 
-_LEFT, _RIGHT, _TOP, _BOTTOM = 52, 12, 12, 36
+_LEFT, _RIGHT, _TOP, _BOTTOM = 56, 12, 12, 36
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +113,15 @@ def map_chart(
     x_label: str,
     y_label: str,
     y_up: bool,
+    unit: str,
+    factor: float,
     width: int = 520,
     height: int = 320,
 ) -> str:
     """
     Draw tracks (N, 2), each with its name and colour, in the plane with equal scales; y grows upwards or downwards.
+
+    ``unit`` stands at the axes; there are ``factor`` of it in a metre.
 
     The first point of the last track is marked. NaN leaves a gap.
     """
@@ -136,12 +140,11 @@ def map_chart(
     def place(xy: Array) -> Array:
         return np.asarray(origin + direction * (xy - middle) / scale)
 
-    unit, factor = length_unit(scale * float(inner.max()))
     parts = [f'<rect class="plot" x="{_LEFT}" y="{_TOP}" width="{inner[0]:g}" height="{inner[1]:g}"/>']
     for axis in (0, 1):
         half = scale * inner[axis] / 2
         bounds = ((middle[axis] - half) * factor, (middle[axis] + half) * factor)
-        for tick in ticks(*bounds, 5 if axis == 0 else 4):
+        for tick in ticks(*bounds, 7 if axis == 0 else 4):
             at = origin[axis] + direction[axis] * (tick / factor - middle[axis]) / scale
             if axis == 0:
                 parts.append(f'<path class="grid" d="M{at:.1f} {_TOP}v{inner[1]:g}"/>')
@@ -305,4 +308,4 @@ def _largest(series: Sequence[Series]) -> float:
 
 def _number(value: float) -> str:
     text = f"{value:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}") if abs(value) >= 1e4 else f"{value:.6g}"
-    return "0" if abs(value) < 1e-12 else text.replace("-", "\N{MINUS SIGN}")
+    return text.replace("-", "\N{MINUS SIGN}")

@@ -51,7 +51,7 @@ def write_report(path: str | os.PathLike[str], data: ReportData) -> None:
 def render_page(data: ReportData) -> str:
     """Return the report as HTML text."""
     summary = summarize(data)
-    model = draw_model(data.model) if data.model is not None else None
+    model = draw_model(data.model, data.frames) if data.model is not None else None
     sections = [
         _header(data, summary, model),
         _model_section(model),
@@ -81,7 +81,7 @@ def _header(data: ReportData, summary: Summary, model: ModelPictures | None) -> 
         for tile in summary.tiles
     )
     verdict = f'<p class="verdict {summary.level}">{escape(summary.sentence)}</p>' if summary.sentence else ""
-    picture = f'<img src="{model.oblique.uri}" alt="The model, seen from the upper left">' if model else ""
+    picture = f'<img src="{model.main.uri}" alt="The model">' if model else ""
     source = f'<p class="source">{escape(data.source)}</p>' if data.source else ""
     return (
         f'<header class="intro{"" if model else " alone"}"><div><p class="brand">nacre reconstruction</p>'
@@ -93,7 +93,10 @@ def _model_section(model: ModelPictures | None) -> str:
     if model is None:
         return ""
     length, part = model.scale_bar
-    parts = [_heading("Model"), _pictures(model.sides, "three")]
+    parts = [_heading("Model")]
+    if model.cameras:
+        parts.append(_pictures(model.cameras, "three"))
+    parts.append(_pictures(model.sides, "three"))
     parts.append(
         f'<div class="grid three"><p class="scale"><i style="width:{100 * part:.2f}%"></i>{escape(length)}, '
         "in all six pictures</p></div>"
@@ -154,13 +157,15 @@ def _trajectory_section(frames: Sequence[FrameEntry], error: AbsoluteTrajectoryE
         tracks.insert(0, ("truth", (truth - translation) @ rotation, 1))
         keys += '<span class="key"><i class="thick k1"></i>truth, aligned</span>'
     keys += '<span class="key">○ first frame</span>'
+    extent = np.concatenate([track for _, track, _ in tracks])
+    unit, factor = length_unit(float(np.nanmax(np.ptp(extent[np.isfinite(extent).all(axis=1)], axis=0))))
     maps = []
     for caption, axes, names in (
         ("From above", (0, 2), ("x, to the right", "z, forward")),
         ("From the side", (2, 1), ("z, forward", "y, down")),
     ):
         lines = [(name, track[:, axes], color) for name, track, color in tracks]
-        chart = map_chart(lines, x_label=names[0], y_label=names[1], y_up=axes[1] == 2)
+        chart = map_chart(lines, x_label=names[0], y_label=names[1], y_up=axes[1] == 2, unit=unit, factor=factor)
         maps.append(_chart(caption, chart, keys))
     parts = [_heading("Trajectory"), f'<div class="grid two">{"".join(maps)}</div>']
     parts.append(_error_charts(frames, error))

@@ -13,15 +13,17 @@ import numpy.typing as npt
 from nacre.arrays import as_points
 from nacre.report.charts import length_unit, ticks
 from nacre.report.colormap import category_rgb, viridis
-from nacre.report.data import DepthExample, ModelCloud
+from nacre.report.data import DepthExample, FrameEntry, ModelCloud
 from nacre.report.png import encode_png
-from nacre.report.render import measure_spacing, render_points, reverse_part
+from nacre.report.render import is_inside_out, measure_spacing, render_points, reverse_part
 from nacre.report.view import SIDES, View
 
 OBLIQUE = (-0.75, -0.55, -1.0)
 BEHIND = (0.75, -0.55, 1.0)
 
 _SIZE = (560, 560)
+_CAMERA_SIZE = (640, 480)
+_MAX_POINTS = 300_000
 _REASON_COLORS = {"edge": 5, "slanted": 1, "isolated": 3, "out_of_range": 0, "masked": 4, "removed": 5}
 _MAX_DEPTH_WIDTH = 800
 
@@ -39,7 +41,8 @@ class Picture:
 class ModelPictures:
     """The model as pictures, all sides at one scale."""
 
-    oblique: Picture
+    main: Picture
+    cameras: tuple[Picture, ...]  #: what some of the cameras saw; of scenes that surround the camera
     sides: tuple[Picture, ...]
     confidence: tuple[Picture, ...]
     confidence_range: tuple[float, float]
@@ -52,52 +55,82 @@ def data_uri(image: npt.NDArray[np.uint8]) -> str:
     return "data:image/png;base64," + base64.b64encode(encode_png(image)).decode("ascii")
 
 
-def draw_model(model: ModelCloud) -> ModelPictures | None:
-    """Draw the model from all sides; None where there is no point to draw."""
-    points = as_points("points", model.points)
-    if not np.isfinite(points).all(axis=1).any():
+def draw_model(model: ModelCloud, frames: Sequence[FrameEntry] = ()) -> ModelPictures | None:
+    """Draw the model from all sides, a scene also as its cameras saw it; None where there is no point to draw."""
+    model = _thinned(model)
+    points = model.points
+    if not len(points):
         return None
     spacing = measure_spacing(points)
 
-    def picture(
-        caption: str,
-        view_from: str | Sequence[float],
-        colors: npt.NDArray[np.uint8] | None = None,
-        scale: float | None = None,
-        size: tuple[int, int] = _SIZE,
-    ) -> Picture:
-        view = View.fit(points, view_from, size=size, metres_per_pixel=scale)
-        inside_out = model.normals is not None and reverse_part(points, model.normals, view) > 0.5
+    def picture(caption: str, view: View, colors: npt.NDArray[np.uint8] | None = None) -> Picture:
+        hidden = model.normals is not None and is_inside_out(points, model.normals, view)
         image = render_points(
-            points, model.normals, colors, view=view, spacing=spacing, hide_reverse=inside_out, background=None
+            points, model.normals, colors, view=view, spacing=spacing, hide_reverse=hidden, background=None
         )
-        return Picture(caption, data_uri(image), "reverse sides left out" if inside_out else "")
+        return Picture(caption, data_uri(image), "reverse sides left out" if hidden else "")
 
     scale = max(View.fit(points, side, size=_SIZE).metres_per_pixel for side in SIDES)
+    sides = {side: View.fit(points, side, size=_SIZE, metres_per_pixel=scale) for side in SIDES}
+    poses = [frame for frame in frames if frame.world_from_camera is not None and frame.status.upper() != "LOST"]
+    main = View.fit(points, OBLIQUE, size=(680, 640))
+    views = {"from the front": View.fit(points, OBLIQUE, size=_SIZE), "from behind": View.fit(points, BEHIND, size=_SIZE)}
+    cameras: dict[str, View] = {}
+    if poses and model.normals is not None and _is_scene(points, model.normals, sides):
+        chosen = [poses[i] for i in sorted({0, len(poses) // 2, len(poses) - 1})]
+        views = {
+            f"as frame {frame.index} saw it": View.from_camera(points, frame.world_from_camera, size=_CAMERA_SIZE)
+            for frame in chosen
+            if frame.world_from_camera is not None
+        }
+        main, cameras = View.from_camera(points, np.eye(4), size=(680, 560)), views
+
     confidence: tuple[Picture, ...] = ()
     low = high = 0.0
     if model.confidence is not None:
         values = np.nan_to_num(np.asarray(model.confidence, dtype=np.float64).reshape(-1))
         low, high = (float(bound) for bound in np.percentile(values, (2, 98)))
         shades = viridis((values - low) / (high - low) if high > low else np.ones(len(values)))
-        confidence = (
-            picture("Confidence, from the front", OBLIQUE, shades),
-            picture("Confidence, from behind", BEHIND, shades),
-        )
+        confidence = tuple(picture(f"Confidence, {name}", view, shades) for name, view in list(views.items())[:2])
     colors: tuple[Picture, ...] = ()
     if model.colors is not None:
-        colors = (
-            picture("Colour, from the front", OBLIQUE, model.colors),
-            picture("Colour, from behind", BEHIND, model.colors),
-        )
+        colors = tuple(picture(f"Colour, {name}", view, model.colors) for name, view in list(views.items())[:2])
     return ModelPictures(
-        oblique=picture("The model", OBLIQUE, size=(680, 640)),
-        sides=tuple(picture(side.capitalize(), side, scale=scale) for side in SIDES),
+        main=picture("The model", main),
+        cameras=tuple(picture(name[:1].upper() + name[1:], view) for name, view in cameras.items()),
+        sides=tuple(picture(side.capitalize(), view) for side, view in sides.items()),
         confidence=confidence,
         confidence_range=(low, high),
         colors=colors,
         scale_bar=_scale_bar(scale * _SIZE[0]),
     )
+
+
+def _thinned(model: ModelCloud) -> ModelCloud:
+    """Return the finite points of a model, as many as pictures of this size can show."""
+    points = as_points("model.points", model.points)
+    rows = np.flatnonzero(np.isfinite(points).all(axis=1))
+    if len(rows) > _MAX_POINTS:
+        rows = np.sort(np.random.default_rng(0).choice(rows, _MAX_POINTS, replace=False))
+
+    def pick(name: str, values: Any) -> Any:
+        if values is None:
+            return None
+        if len(values) != len(points):
+            raise ValueError(f"model.{name} must have one row per point ({len(points)}), got {len(values)}")
+        return np.asarray(values)[rows]
+
+    return ModelCloud(
+        points[rows],
+        pick("normals", model.normals),
+        pick("colors", model.colors),
+        pick("confidence", model.confidence),
+    )
+
+
+def _is_scene(points: npt.ArrayLike, normals: npt.ArrayLike, sides: dict[str, View]) -> bool:
+    """Return whether a model surrounds its cameras: two or more of its sides are seen from behind."""
+    return sum(reverse_part(points, normals, view) > 0.5 for view in sides.values()) >= 2
 
 
 def _scale_bar(width: float) -> tuple[str, float]:

@@ -78,7 +78,7 @@ def render_points(
         view = View.fit(cloud, view_from, size=size)
     if normals is None:
         normals = _normals_towards(view, cloud)
-    facing = as_matching_points("normals", normals, "points", len(cloud))
+    normals = as_matching_points("normals", normals, "points", len(cloud))
     if spacing is None:
         radius = measure_spacing(cloud)
     else:
@@ -86,33 +86,49 @@ def render_points(
         if not (radius[finite] > 0).all():
             raise ValueError("spacing must be positive")
 
-    facing = np.where(np.isfinite(facing).all(axis=1, keepdims=True), facing, 0) @ view.view_from_model.T
-    length = np.linalg.norm(facing, axis=1, keepdims=True)
-    facing = np.where(length > 0, facing / np.where(length > 0, length, 1), (0, 0, -1)).astype(np.float32)
-    drawn = finite & (facing[:, 2] < 0) if hide_reverse else finite
+    seen, scale = view.project(cloud)
+    facing = view.face(normals, cloud)
+    drawn = np.isfinite(seen).all(axis=1)
+    if hide_reverse:
+        drawn &= facing[:, 2] < 0
     canvas = Canvas(view.size)
     canvas.draw(
-        ((cloud[drawn] - view.center) @ view.view_from_model.T / view.metres_per_pixel).astype(np.float32),
+        seen[drawn],
         facing[drawn],
-        (radius[drawn] / view.metres_per_pixel).astype(np.float32),
+        radius[drawn].astype(np.float32) / scale[drawn],
         None if colors is None else colors[drawn],
     )
     return canvas.picture(background)
 
 
 def reverse_part(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) -> float:
-    """Return which part of the nearest points in a coarse picture of a model turn their back to the viewer."""
-    cloud, facing = as_points("points", points), as_points("normals", normals)
-    usable = np.isfinite(cloud).all(axis=1) & np.isfinite(facing).all(axis=1)
-    seen = (cloud[usable] - view.center) @ view.view_from_model.T
-    away = facing[usable] @ view.view_from_model[2]
+    """Return which part of a picture of a model would show reverse sides of surfaces."""
+    return _reverse_parts(points, normals, view)[0]
+
+
+def is_inside_out(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) -> bool:
+    """
+    Return whether a view shows a model from behind, and hiding the reverse sides would open the sight on its front.
+
+    That is so for a room that is seen through one of its walls.
+    """
+    in_picture, in_model = _reverse_parts(points, normals, view)
+    return in_picture > 0.5 and in_model < 0.75
+
+
+def _reverse_parts(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) -> tuple[float, float]:
+    """Return which part of the nearest points, and which part of all points in a picture, turn their back to it."""
+    cloud = as_points("points", points)
+    seen, _ = view.project(cloud)
+    reverse = view.face(as_matching_points("normals", normals, "points", len(cloud)), cloud)[:, 2] > 0
+    inside = (np.abs(seen[:, :2]) < np.asarray(view.size) / 2).all(axis=1)  # False for NaN
+    seen, reverse = seen[inside], reverse[inside]
     if not len(seen):
-        return 0.0
-    cell = max(np.ptp(seen[:, 0]), np.ptp(seen[:, 1]), 1e-12) / 48
-    pixel = np.floor(seen[:, :2] / cell).astype(np.int64) @ (1 << 20, 1)
-    order = np.lexsort((seen[:, 2], pixel))
-    _, nearest = np.unique(pixel[order], return_index=True)
-    return float((away[order[nearest]] > 0).mean())
+        return 0.0, 0.0
+    cell = (seen[:, :2] // 12).astype(np.int64) @ (1 << 20, 1)
+    order = np.lexsort((seen[:, 2], cell))
+    _, nearest = np.unique(cell[order], return_index=True)
+    return float(reverse[order[nearest]].mean()), float(reverse.mean())
 
 
 def measure_spacing(points: npt.ArrayLike) -> Array:
@@ -131,7 +147,7 @@ def measure_spacing(points: npt.ArrayLike) -> Array:
         distance = np.asarray(KdTree(usable).query(usable, k=min(7, len(usable)))[0], dtype=np.float64)[:, -1]
         typical = float(np.median(distance))
         if typical > 0:
-            spacing[finite] = np.clip(distance, 0.3 * typical, 3 * typical)
+            spacing[finite] = np.clip(distance, 0.05 * typical, 3 * typical)
     return spacing
 
 

@@ -15,10 +15,10 @@ _KEY_LIGHT = np.array([-0.55, -0.65, -0.52])  # towards the light: from the uppe
 
 
 class Canvas:
-    """A z-buffer with normals and colours. Pictures have a border that is as wide as the largest disk."""
+    """A z-buffer with normals and colours. Its border has room for disks whose center lies just outside."""
 
     def __init__(self, size: tuple[int, int]) -> None:
-        self.border = int(_MAX_SPLAT) + 1
+        self.border = 2 * int(_MAX_SPLAT) + 1
         self.width, self.height = size
         self.stride = self.width + 2 * self.border
         self.num_pixels = self.stride * (self.height + 2 * self.border)
@@ -34,7 +34,7 @@ class Canvas:
         """Draw disks at ``seen`` (pixels from the middle of the picture, depth in pixels)."""
         column = np.floor(seen[:, 0] + self.width / 2).astype(np.int64)
         row = np.floor(seen[:, 1] + self.height / 2).astype(np.int64)
-        edge = self.border - 1
+        edge = int(_MAX_SPLAT)
         inside = (column >= -edge) & (column < self.width + edge) & (row >= -edge) & (row < self.height + edge)
         pixel = (row + self.border) * self.stride + column + self.border
 

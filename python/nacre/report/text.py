@@ -39,6 +39,8 @@ def quantity(value: Any, unit: str = "") -> str:
         return ", ".join(quantity(item, unit) for item in value)
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return str(value)
+    if unit in ("m", "rad") and abs(value) < 1e-12:
+        value = 0  # nothing but rounding
     if unit == "m":
         name, factor = length_unit(abs(value))
         return f"{_digits(value * factor)} {name}" if value else "0 mm"
