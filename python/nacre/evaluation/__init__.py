@@ -1,4 +1,4 @@
-"""How good a trajectory and a model are: errors in metres and radians, with the definitions of the literature."""
+"""How good a trajectory and a model are: errors in metres and radians, as the literature defines them."""
 
 from nacre.evaluation.normals import NormalError, normal_error
 from nacre.evaluation.surface import (

@@ -8,20 +8,20 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.arrays import as_matching_points, as_points
-from nacre.evaluation.result import Result, measure
+from nacre.evaluation.result import Count, Fraction, Radians, Result
 
 
 @dataclass(frozen=True)
 class NormalError(Result):
     """Angles between normals and their references; made by :func:`normal_error`."""
 
-    mean: float = measure("rad")  #: from 0 to pi: the side counts
-    p95: float = measure("rad")
-    unoriented_mean: float = measure("rad")  #: from 0 to pi / 2: a flipped normal is as good
-    unoriented_p95: float = measure("rad")
-    flipped: float = measure("fraction")  #: normals on the wrong side
-    beyond_30_degrees: float = measure("fraction")  #: of the unoriented angles
-    num_normals: int = measure("count")  #: pairs that were compared
+    mean: Radians  #: from 0 to pi: the side counts
+    p95: Radians
+    unoriented_mean: Radians  #: from 0 to pi / 2: a flipped normal is as good
+    unoriented_p95: Radians
+    flipped: Fraction  #: normals on the wrong side
+    beyond_30_degrees: Fraction  #: of the unoriented angles
+    num_normals: Count  #: pairs that were compared
 
 
 def normal_error(normals: npt.ArrayLike, reference_normals: npt.ArrayLike) -> NormalError:
@@ -39,12 +39,13 @@ def normal_error(normals: npt.ArrayLike, reference_normals: npt.ArrayLike) -> No
         NaN where no row can be compared.
     """
     array = as_points("normals", normals).astype(np.float64)
-    reference = as_matching_points("reference_normals", reference_normals, "normals", len(array)).astype(np.float64)
+    reference = as_matching_points("reference_normals", reference_normals, "normals", len(array))
+    reference = reference.astype(np.float64)
     dot = np.einsum("ij,ij->i", array, reference)
     cross = np.linalg.norm(np.cross(array, reference), axis=1)
     usable = np.isfinite(dot) & np.isfinite(cross) & ((dot != 0) | (cross != 0))
     if not usable.any():
-        return NormalError(*[np.nan] * 6, num_normals=0)
+        return NormalError(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, num_normals=0)
     angle = np.arctan2(cross[usable], dot[usable])
     unoriented = np.minimum(angle, np.pi - angle)
     return NormalError(

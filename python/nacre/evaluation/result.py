@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Any
+from typing import Annotated, Any, TypeAlias, get_type_hints
 
 import numpy as np
+import numpy.typing as npt
 
+Array: TypeAlias = npt.NDArray[np.float64]
 
-def measure(unit: str) -> Any:
-    """Declare a dataclass field that carries the unit of its value: "m", "rad", "fraction" or "count"."""
-    return dataclasses.field(metadata={"unit": unit})
-
-
-def per_item(unit: str) -> Any:
-    """Declare a dataclass field with one value per frame or point; it is left out of the repr."""
-    return dataclasses.field(metadata={"unit": unit}, repr=False)
+Metres = Annotated[float, "m"]
+Radians = Annotated[float, "rad"]
+Fraction = Annotated[float, "fraction"]
+Count = Annotated[int, "count"]
+ManyMetres = Annotated[tuple[float, ...], "m"]
+ManyFractions = Annotated[tuple[float, ...], "fraction"]
 
 
 def plain(value: Any) -> Any:
@@ -37,7 +37,11 @@ class Result:
 
     def as_dict(self) -> dict[str, Any]:
         """Return every field under its name, as plain Python values that JSON can hold (NaN becomes None)."""
-        return {
-            field.name: plain(getattr(self, field.name))
-            for field in dataclasses.fields(self)  # type: ignore[arg-type]
-        }
+        return {name: plain(getattr(self, name)) for name in self.units()}
+
+    @classmethod
+    def units(cls) -> dict[str, str]:
+        """Return the unit of every field: "m", "rad", "fraction", "count", or "" for none."""
+        hints = get_type_hints(cls, include_extras=True)
+        fields = dataclasses.fields(cls)  # type: ignore[arg-type]
+        return {field.name: getattr(hints[field.name], "__metadata__", ("",))[0] for field in fields}

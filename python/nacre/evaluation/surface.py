@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre.arrays import as_matching_points, as_points
-from nacre.evaluation.result import Result, measure, per_item
+from nacre.evaluation.result import Array, Count, ManyFractions, ManyMetres, Metres, Result
 from nacre.mesh import Mesh
-
-Array = npt.NDArray[np.float64]
 
 
 class SurfaceSamples(NamedTuple):
@@ -28,36 +26,36 @@ class SurfaceSamples(NamedTuple):
 class SurfaceAccuracy(Result):
     """Distances from model points to the reference surface; made by :func:`surface_accuracy`."""
 
-    rms: float = measure("m")
-    mean: float = measure("m")
-    median: float = measure("m")
-    p95: float = measure("m")
-    max: float = measure("m")
-    bias: float = measure("m")  #: mean signed distance, positive outside; NaN where the reference has no normals
-    num_points: int = measure("count")  #: points that are finite
-    distances: Array = per_item("m")  #: one per point [m], NaN where the point is not finite
+    rms: Metres
+    mean: Metres
+    median: Metres
+    p95: Metres
+    max: Metres
+    bias: Metres  #: mean signed distance, positive outside; NaN without normals
+    num_points: Count  #: points that are finite
+    distances: Array = field(repr=False)  #: one per point [m], NaN where the point is not finite
 
 
 @dataclass(frozen=True)
 class Completeness(Result):
     """How much of the reference surface the model covers; made by :func:`completeness`."""
 
-    tau: tuple[float, ...] = measure("m")  #: how near a model point must be
-    fraction: tuple[float, ...] = measure("fraction")  #: part of the surface that is covered, for each tau
-    mean: float = measure("m")  #: distance from the surface to the nearest model point
-    p95: float = measure("m")
-    p99: float = measure("m")  #: the coverage radius
-    num_samples: int = measure("count")  #: surface samples that were asked for and seen
+    tau: ManyMetres  #: how near a model point must be
+    fraction: ManyFractions  #: part of the surface that is covered, for each tau
+    mean: Metres  #: distance from the surface to the nearest model point
+    p95: Metres
+    p99: Metres  #: the coverage radius
+    num_samples: Count  #: surface samples that were asked for and seen
 
 
 @dataclass(frozen=True)
 class FScore(Result):
     """Precision, recall and their harmonic mean for each threshold; made by :func:`f_score`."""
 
-    tau: tuple[float, ...] = measure("m")
-    precision: tuple[float, ...] = measure("fraction")  #: part of the model points within tau of the reference
-    recall: tuple[float, ...] = measure("fraction")  #: part of the reference within tau of a model point
-    f_score: tuple[float, ...] = measure("fraction")
+    tau: ManyMetres
+    precision: ManyFractions  #: part of the model within tau of the reference
+    recall: ManyFractions  #: part of the reference within tau of a model point
+    f_score: ManyFractions
 
 
 def sample_surface(
@@ -123,8 +121,8 @@ def surface_accuracy(
     reference : Mesh or array_like, shape (M, 3)
         A mesh (exact distances), or a dense cloud of surface points [m].
     reference_normals : array_like, shape (M, 3), optional
-        Outward unit normals of a reference cloud. Each of its points then stands for a small disk instead of a point, so
-        that the distance does not contain the spacing of the cloud.
+        Outward unit normals of a reference cloud. Each of its points then stands for a small disk instead of
+        a point, so that the distance does not contain the spacing of the cloud.
 
     Returns
     -------
@@ -133,15 +131,15 @@ def surface_accuracy(
 
     Notes
     -----
-    ``bias`` is the mean of the distances with their sign, so that it shows a model that has shrunk or grown while noise
-    averages out. The sign is the side of the nearest triangle (or disk) on which the point lies.
+    ``bias`` is the mean of the distances with their sign, so that it shows a model that has shrunk or grown
+    while noise averages out. The sign is the side of the nearest triangle (or disk) on which the point lies.
     """
     array = as_points("points", points).astype(np.float64)
     finite = np.isfinite(array).all(axis=1)
     used = array[finite]
     distances = np.full(len(array), np.nan)
     if not len(used):
-        return SurfaceAccuracy(*[np.nan] * 6, num_points=0, distances=distances)
+        return SurfaceAccuracy(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, 0, distances)
     if isinstance(reference, Mesh):
         if reference_normals is not None:
             raise ValueError("reference_normals must not be given for a mesh, which has its own")
@@ -207,7 +205,7 @@ def completeness(
     if seen is not None:
         mask = np.asarray(seen)
         if mask.shape != (len(samples),):
-            raise ValueError(f"seen must have one entry per surface sample ({len(samples)}), got shape {mask.shape}")
+            raise ValueError(f"seen must have one entry per sample ({len(samples)}), got shape {mask.shape}")
         samples = samples[mask.astype(bool)]
     samples = samples[np.isfinite(samples).all(axis=1)]
     if not len(samples):
@@ -239,9 +237,9 @@ def f_score(
     """
     Measure precision, recall and F-score of a model (Knapitsch et al., Tanks and Temples, 2017).
 
-    Precision is the part of the model within ``tau`` of the reference, recall the part of the reference within ``tau`` of
-    the model (:func:`completeness`), F their harmonic mean. Parameters are those of :func:`surface_accuracy` and
-    :func:`completeness`.
+    Precision is the part of the model within ``tau`` of the reference, recall the part of the reference
+    within ``tau`` of the model (:func:`completeness`), F their harmonic mean. Parameters are those of
+    :func:`surface_accuracy` and :func:`completeness`.
 
     Returns
     -------
@@ -256,10 +254,12 @@ def f_score(
         tau=thresholds,
         precision=precision,
         recall=covered.fraction,
-        f_score=tuple(
-            2 * p * r / (p + r) if p + r > 0 else p + r for p, r in zip(precision, covered.fraction, strict=True)
-        ),
+        f_score=tuple(map(_harmonic_mean, precision, covered.fraction)),
     )
+
+
+def _harmonic_mean(a: float, b: float) -> float:
+    return a + b if a + b == 0 else 2 * a * b / (a + b)
 
 
 def _thresholds(tau: float | Sequence[float]) -> tuple[float, ...]:
@@ -272,22 +272,21 @@ def _thresholds(tau: float | Sequence[float]) -> tuple[float, ...]:
 def _as_reference(reference: Any, reference_normals: npt.ArrayLike | None) -> tuple[Array, Array | None]:
     cloud = as_points("reference", reference).astype(np.float64)
     usable = np.isfinite(cloud).all(axis=1)
-    normals = None
+    normals: Array | None = None
     if reference_normals is not None:
-        normals = as_matching_points("reference_normals", reference_normals, "reference", len(cloud)).astype(np.float64)
-        usable &= np.isfinite(normals).all(axis=1)
-        normals = normals[usable]
-    cloud = cloud[usable]
-    if not len(cloud):
+        given = as_matching_points("reference_normals", reference_normals, "reference", len(cloud))
+        usable &= np.isfinite(given).all(axis=1)
+        normals = given[usable].astype(np.float64)
+    if not usable.any():
         raise ValueError("reference must have at least one point that is finite")
-    return cloud, normals
+    return cloud[usable], normals
 
 
 def _nearest(cloud: Array, queries: Array) -> tuple[Array, npt.NDArray[np.int64]]:
     from nacre import KdTree
 
     distances, indices = KdTree(cloud).query(queries, k=1)
-    return np.asarray(distances, dtype=np.float64).reshape(-1), np.asarray(indices, dtype=np.int64).reshape(-1)
+    return np.asarray(distances, dtype=np.float64), np.asarray(indices, dtype=np.int64)
 
 
 def _to_disks(points: Array, cloud: Array, normals: Array) -> tuple[Array, Array]:

@@ -1,17 +1,15 @@
-"""How far a camera trajectory is from the truth (Sturm et al., A benchmark for the evaluation of RGB-D SLAM, 2012)."""
+"""How far a camera trajectory is from the truth (Sturm et al. 2012)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre.arrays import as_poses
-from nacre.evaluation.result import Result, measure, per_item
-
-Array = npt.NDArray[np.float64]
+from nacre.evaluation.result import Array, Count, Fraction, Metres, Radians, Result
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,36 +20,36 @@ class AbsoluteTrajectoryError(Result):
     The statistics are NaN where no frame has both an estimate and a truth.
     """
 
-    rmse: float = measure("m")
-    mean: float = measure("m")
-    median: float = measure("m")
-    max: float = measure("m")
-    rotation_rmse: float = measure("rad")
-    rotation_mean: float = measure("rad")
-    rotation_median: float = measure("rad")
-    rotation_max: float = measure("rad")
-    num_frames: int = measure("count")  #: all frames of the recording
-    num_tracked: int = measure("count")  #: frames with an estimated pose
-    num_compared: int = measure("count")  #: frames with an estimated and a true pose
-    coverage: float = measure("fraction")  #: num_tracked / num_frames
-    truth_from_estimated: Array = per_item("m")  #: the alignment (4, 4)
-    errors: Array = per_item("m")  #: one per row of the estimate, NaN where it was not compared
-    rotation_errors: Array = per_item("rad")  #: likewise
+    rmse: Metres
+    mean: Metres
+    median: Metres
+    max: Metres
+    rotation_rmse: Radians
+    rotation_mean: Radians
+    rotation_median: Radians
+    rotation_max: Radians
+    num_frames: Count  #: all frames of the recording
+    num_tracked: Count  #: frames with an estimated pose
+    num_compared: Count  #: frames with an estimated and a true pose
+    coverage: Fraction  #: num_tracked / num_frames
+    truth_from_estimated: Array = field(repr=False)  #: the alignment (4, 4)
+    errors: Array = field(repr=False)  #: one per row of the estimate, NaN where it was not compared
+    rotation_errors: Array = field(repr=False)  #: likewise
 
 
 @dataclass(frozen=True, eq=False)
 class RelativePoseError(Result):
-    """How far the motion over a fixed interval is from the true motion; made by :func:`relative_pose_error`."""
+    """How far the motion over a fixed interval is from the true motion; see :func:`relative_pose_error`."""
 
-    translation_rmse: float = measure("m")
-    translation_mean: float = measure("m")
-    translation_max: float = measure("m")
-    rotation_rmse: float = measure("rad")
-    rotation_mean: float = measure("rad")
-    rotation_max: float = measure("rad")
+    translation_rmse: Metres
+    translation_mean: Metres
+    translation_max: Metres
+    rotation_rmse: Radians
+    rotation_mean: Radians
+    rotation_max: Radians
     delta: float  #: the interval, in ``unit``
     unit: str  #: "frames" or "seconds"
-    num_pairs: int = measure("count")
+    num_pairs: Count
 
 
 def absolute_trajectory_error(
@@ -76,13 +74,14 @@ def absolute_trajectory_error(
         True poses; one that is not finite is not known.
     align : bool or "first", optional
         True moves the estimate by the rigid transform that brings its positions closest to the true ones
-        (Umeyama 1991, without scale); where the positions leave the rotation open (a straight line, a camera that stays
-        in one place), the orientations decide. "first" moves the first compared pose onto its true pose.
-        False compares the poses as they are.
+        (Umeyama 1991, without scale); where the positions leave the rotation open (a straight line, a camera
+        that stays in one place), the orientations decide. "first" moves the first compared pose onto its true
+        pose. False compares the poses as they are.
     valid : array_like of bool, shape (N,), optional
         False where a pose of ``estimated`` is not to be counted as tracked.
     timestamps, truth_timestamps : array_like, shapes (N,) and (M,), optional
-        Times of the poses [s]. Given both, poses are compared with the one nearest in time; otherwise row by row.
+        Times of the poses [s]. Given both, poses are compared with the one nearest in time, otherwise row
+        by row.
     max_time_difference : float, optional
         Poses farther apart in time are not compared [s].
     num_frames : int, optional
@@ -116,7 +115,7 @@ def absolute_trajectory_error(
     num_tracked = int(tracked.sum())
     total = len(poses) if num_frames is None else num_frames
     if total < num_tracked:
-        raise ValueError(f"num_frames must be at least the number of tracked frames ({num_tracked}), got {num_frames}")
+        raise ValueError(f"num_frames must be at least the {num_tracked} tracked frames, got {num_frames}")
 
     compared = tracked[rows] & np.isfinite(true_poses[true_rows]).all(axis=(1, 2))
     rows, true_rows = rows[compared], true_rows[compared]
@@ -159,8 +158,8 @@ def relative_pose_error(
     """
     Measure the drift: the error of the motion over a fixed interval (RPE, Sturm et al. 2012).
 
-    Every pair of poses that lie ``delta`` apart counts. The result does not depend on the frames of reference of the
-    two trajectories. Arguments that are not listed are those of :func:`absolute_trajectory_error`.
+    Every pair of poses that lie ``delta`` apart counts. The result does not depend on the frames of reference
+    of the two trajectories. Arguments that are not listed are those of :func:`absolute_trajectory_error`.
 
     Parameters
     ----------
@@ -169,8 +168,8 @@ def relative_pose_error(
     delta : float, optional
         Length of the interval, in ``unit``.
     unit : {"frames", "seconds"}, optional
-        "frames" counts rows of ``estimated``; "seconds" needs ``timestamps`` and takes the pose nearest to the
-        interval's end.
+        "frames" counts rows of ``estimated``; "seconds" needs ``timestamps`` and takes the pose nearest to
+        the end of the interval.
 
     Returns
     -------
@@ -185,7 +184,7 @@ def relative_pose_error(
     if unit not in ("frames", "seconds"):
         raise ValueError(f'unit must be "frames" or "seconds", got {unit!r}')
     if not (np.isfinite(delta) and delta > 0) or (unit == "frames" and delta != int(delta)):
-        raise ValueError(f"delta must be a positive {'whole ' if unit == 'frames' else ''}number, got {delta!r}")
+        raise ValueError(f"delta must be a positive number (whole for frames), got {delta!r}")
     poses, tracked = _tracked(estimated, valid)
     true_poses = as_poses("truth", truth)
     rows, true_rows = _matching_rows(poses, true_poses, timestamps, truth_timestamps, max_time_difference)
@@ -258,9 +257,9 @@ def _tracked(estimated: npt.ArrayLike, valid: npt.ArrayLike | None) -> tuple[Arr
     if valid is not None:
         mask = np.asarray(valid)
         if mask.shape != (len(poses),):
-            raise ValueError(f"valid must have one entry per pose of estimated ({len(poses)}), got shape {mask.shape}")
-        tracked &= mask.astype(bool)
-    return poses, tracked
+            raise ValueError(f"valid must have one entry per pose ({len(poses)}), got shape {mask.shape}")
+        return poses, np.asarray(tracked & mask.astype(bool))
+    return poses, np.asarray(tracked)
 
 
 def _times(name: str, value: npt.ArrayLike, size: int | None = None) -> Array:
@@ -322,7 +321,7 @@ def _inverse(poses: Array) -> Array:
 
 
 def _rotation_angles(rotation: Array) -> Array:
-    """Return the angle of each rotation; exact for small angles too, where the arc cosine of the trace is not."""
+    """Return the angle of each rotation; exact for small angles too, unlike the arc cosine."""
     axis = np.stack(
         [
             rotation[:, 2, 1] - rotation[:, 1, 2],
@@ -336,5 +335,12 @@ def _rotation_angles(rotation: Array) -> Array:
 
 
 def _statistics(prefix: str, errors: Array, names: tuple[str, ...]) -> dict[str, Any]:
-    formulas = {"rmse": lambda e: np.sqrt(np.mean(e**2)), "mean": np.mean, "median": np.median, "max": np.max}
-    return {prefix + name: float(formulas[name](errors)) if len(errors) else np.nan for name in names}
+    if not len(errors):
+        return dict.fromkeys((prefix + name for name in names), np.nan)
+    values = {
+        "rmse": np.sqrt(np.mean(errors**2)),
+        "mean": np.mean(errors),
+        "median": np.median(errors),
+        "max": np.max(errors),
+    }
+    return {prefix + name: float(values[name]) for name in names}

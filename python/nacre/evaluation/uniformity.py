@@ -8,28 +8,28 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.arrays import as_points
-from nacre.evaluation.result import Result, measure
+from nacre.evaluation.result import Count, Fraction, Metres, Result
 
 
 @dataclass(frozen=True)
 class Uniformity(Result):
     """Statistics of each point's distance to its nearest other point; made by :func:`uniformity`."""
 
-    mean: float = measure("m")
-    std: float = measure("m")
-    min: float = measure("m")
-    max: float = measure("m")
-    coefficient_of_variation: float = measure("number")  #: std / mean
-    duplicates: float = measure("fraction")  #: points with a neighbour nearer than half of the mean
-    num_points: int = measure("count")  #: points that are finite
+    mean: Metres
+    std: Metres
+    min: Metres
+    max: Metres
+    coefficient_of_variation: float  #: std / mean
+    duplicates: Fraction  #: points with a neighbour nearer than half of the mean
+    num_points: Count  #: points that are finite
 
 
 def uniformity(points: npt.ArrayLike) -> Uniformity:
     """
     Measure how evenly points are spread over their surface.
 
-    The coefficient of variation of the nearest-neighbour distances is 0 for a regular lattice and sqrt(4 / pi - 1) = 0.523
-    for points thrown at random on a plane (Clark and Evans 1954).
+    The coefficient of variation of the nearest-neighbour distances is 0 for a regular lattice and
+    sqrt(4 / pi - 1) = 0.523 for points thrown at random on a plane (Clark and Evans 1954).
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def uniformity(points: npt.ArrayLike) -> Uniformity:
     array = as_points("points", points)
     array = array[np.isfinite(array).all(axis=1)]
     if len(array) < 2:
-        return Uniformity(*[np.nan] * 6, num_points=len(array))
+        return Uniformity(np.nan, np.nan, np.nan, np.nan, np.nan, np.nan, num_points=len(array))
     distances = np.asarray(KdTree(array).query(array, k=2)[0], dtype=np.float64)[:, 1]
     mean, std = float(distances.mean()), float(distances.std())
     return Uniformity(

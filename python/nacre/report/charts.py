@@ -1,4 +1,4 @@
-"""Line, bar and map charts as inline SVG. Colours come from the page's style sheet, so that they follow light and dark."""
+"""Line, bar and map charts as inline SVG; the style sheet colours them, for light and for dark."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def line_chart(
     """
     Draw one value per frame, from 0 upwards.
 
-    Long series are drawn as a band between the least and the greatest value of each group of frames, so that no peak is
-    lost, with the mean as its line.
+    Long series are drawn as a band between the least and the greatest value of each group of frames, so that
+    no peak is lost, with the mean as its line.
     """
     top = y_max or _largest(series)
     frame = _Frame(_num_values(series), indices, top, width, height)
@@ -62,7 +62,9 @@ def line_chart(
         if frame.group > 1:
             upper, lower = np.stack([x, frame.y(high)], 1), np.stack([x, frame.y(low)], 1)
             bands = (np.concatenate([upper[a:b], lower[a:b][::-1]]) for a, b in runs(np.isfinite(low)))
-            parts.append(f'<path class="band f{one.color}" d="{"".join(_path(band) + "Z" for band in bands)}"/>')
+            parts.append(
+                f'<path class="band f{one.color}" d="{"".join(_path(band) + "Z" for band in bands)}"/>'
+            )
         parts.append(f'<path class="line s{one.color}" d="{_path(np.stack([x, frame.y(mean)], 1))}"/>')
         if len(mean) <= 60:
             radius = 2.2 if len(mean) <= 30 else 1.6
@@ -119,9 +121,9 @@ def map_chart(
     height: int = 320,
 ) -> str:
     """
-    Draw tracks (N, 2), each with its name and colour, in the plane with equal scales; y grows upwards or downwards.
+    Draw tracks (N, 2), each with its name and colour, in the plane with equal scales.
 
-    ``unit`` stands at the axes; there are ``factor`` of it in a metre.
+    y grows upwards where ``y_up``, else downwards. ``unit`` stands at the axes; there are ``factor`` of it in a metre.
 
     The first point of the last track is marked. NaN leaves a gap.
     """
@@ -148,10 +150,13 @@ def map_chart(
             at = origin[axis] + direction[axis] * (tick / factor - middle[axis]) / scale
             if axis == 0:
                 parts.append(f'<path class="grid" d="M{at:.1f} {_TOP}v{inner[1]:g}"/>')
-                parts.append(f'<text class="tick mid" x="{at:.1f}" y="{_TOP + inner[1] + 15:.1f}">{_number(tick)}</text>')
+                y = _TOP + inner[1] + 15
+                parts.append(f'<text class="tick mid" x="{at:.1f}" y="{y:.1f}">{_number(tick)}</text>')
             else:
                 parts.append(f'<path class="grid" d="M{_LEFT} {at:.1f}h{inner[0]:g}"/>')
-                parts.append(f'<text class="tick end" x="{_LEFT - 6}" y="{at + 4:.1f}">{_number(tick)}</text>')
+                parts.append(
+                    f'<text class="tick end" x="{_LEFT - 6}" y="{at + 4:.1f}">{_number(tick)}</text>'
+                )
     for name, xy, color in tracks:
         thinned = xy[:: max(len(xy) // 1500, 1)]
         style = " wide" if name == "truth" else ""
@@ -161,13 +166,15 @@ def map_chart(
             parts += [f'<circle class="f{color}" cx="{a:.1f}" cy="{b:.1f}" r="2"/>' for a, b in dots]
     if known and len(known[-1]):
         x, y = place(known[-1][:1])[0]
-        parts.append(f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="5"><title>first frame</title></circle>')
+        parts.append(
+            f'<circle class="start" cx="{x:.1f}" cy="{y:.1f}" r="5"><title>first frame</title></circle>'
+        )
     parts.append(_axis_labels(f"{x_label} [{unit}]", f"{y_label} [{unit}]", width, height))
     return _svg(parts, width, height, f"{y_label} over {x_label}")
 
 
 def grouped(values: Array) -> tuple[Array, Array, Array]:
-    """Return the least, mean and greatest value of each group of neighbouring values; NaN where a group has none."""
+    """Return the least, mean and greatest value of each group of neighbours; NaN where a group has none."""
     size = group_size(len(values))
     padded = np.full(-(-len(values) // size) * size if len(values) else 0, np.nan)
     padded[: len(values)] = values
@@ -212,7 +219,9 @@ def length_unit(metres: float) -> tuple[str, float]:
 class _Frame:
     """The axes of a chart with frames to the right and values from 0 upwards."""
 
-    def __init__(self, num_frames: int, indices: Sequence[int] | None, top: float, width: int, height: int) -> None:
+    def __init__(
+        self, num_frames: int, indices: Sequence[int] | None, top: float, width: int, height: int
+    ) -> None:
         self.num_frames = num_frames
         self.indices = list(range(num_frames)) if indices is None else list(indices)
         self.group = group_size(num_frames)
@@ -221,7 +230,9 @@ class _Frame:
 
     def x(self, position: npt.ArrayLike) -> Array:
         inner = self.width - _LEFT - _RIGHT
-        return np.asarray(_LEFT + (np.asarray(position, dtype=np.float64) + 0.5) * inner / max(self.num_frames, 1))
+        return np.asarray(
+            _LEFT + (np.asarray(position, dtype=np.float64) + 0.5) * inner / max(self.num_frames, 1)
+        )
 
     def y(self, value: npt.ArrayLike) -> Array:
         inner = self.height - _TOP - _BOTTOM
@@ -233,7 +244,9 @@ class _Frame:
         for mark in marks:
             left, right = self.x(mark.first - 0.5), self.x(mark.last + 0.5)
             width = max(float(right - left), 1.5)
-            parts.append(f'<rect class="{mark.kind}" x="{left:.1f}" y="{_TOP}" width="{width:.1f}" height="{height}"/>')
+            parts.append(
+                f'<rect class="{mark.kind}" x="{left:.1f}" y="{_TOP}" width="{width:.1f}" height="{height}"/>'
+            )
         return "".join(parts)
 
     def hover(self, series: Sequence[Series], y_label: str) -> str:
@@ -245,7 +258,9 @@ class _Frame:
         parts = []
         for i in range(self.num_frames):
             told = [f"frame {self.indices[i]}"]
-            told += [f"{one.name or y_label} {one.values[i]:.4g}" for one in series if math.isfinite(one.values[i])]
+            told += [
+                f"{one.name or y_label} {one.values[i]:.4g}" for one in series if math.isfinite(one.values[i])
+            ]
             left = float(self.x(i)) - width / 2
             parts.append(
                 f'<rect class="hover" x="{left:.1f}" y="{_TOP}" width="{width:.1f}" height="{height}">'
@@ -257,7 +272,8 @@ class _Frame:
         axes = []
         for tick in ticks(0, self.top, 4):
             at = float(self.y(tick))
-            axes.append(f'<path class="{"axis" if tick == 0 else "grid"}" d="M{_LEFT} {at:.1f}H{self.width - _RIGHT}"/>')
+            kind = "grid" if tick else "axis"
+            axes.append(f'<path class="{kind}" d="M{_LEFT} {at:.1f}H{self.width - _RIGHT}"/>')
             axes.append(f'<text class="tick end" x="{_LEFT - 6}" y="{at + 4:.1f}">{_number(tick)}</text>')
         last = max(self.num_frames - 1, 0)
         for tick in ticks(0, last, 8) if last else [0.0]:
@@ -265,7 +281,9 @@ class _Frame:
                 at = float(self.x(tick))
                 y = self.height - _BOTTOM
                 axes.append(f'<path class="axis" d="M{at:.1f} {y}v4"/>')
-                axes.append(f'<text class="tick mid" x="{at:.1f}" y="{y + 16}">{self.indices[int(tick)]}</text>')
+                axes.append(
+                    f'<text class="tick mid" x="{at:.1f}" y="{y + 16}">{self.indices[int(tick)]}</text>'
+                )
         axes.append(_axis_labels(x_label, y_label, self.width, self.height))
         return _svg([*axes, *parts], self.width, self.height, f"{y_label} over {x_label}")
 

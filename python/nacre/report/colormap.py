@@ -29,7 +29,11 @@ def viridis(values: npt.ArrayLike) -> npt.NDArray[np.uint8]:
     """Return the colours (N, 3) of values between 0 and 1."""
     position = np.clip(np.asarray(values, dtype=np.float64), 0, 1) * (len(_VIRIDIS) - 1)
     steps = np.arange(len(_VIRIDIS))
-    return np.stack([np.interp(position, steps, channel) for channel in _VIRIDIS.T], axis=-1).round().astype(np.uint8)
+    return (
+        np.stack([np.interp(position, steps, channel) for channel in _VIRIDIS.T], axis=-1)
+        .round()
+        .astype(np.uint8)
+    )
 
 
 def category_rgb(index: int) -> npt.NDArray[np.uint8]:

@@ -26,7 +26,9 @@ class FrameEntry:
     translation_error: float | None = None  #: [m]; worked out from the poses where no frame has it
     rotation_error: float | None = None  #: [rad]; likewise
     num_points: int | None = None  #: of the model, after the frame
-    removed: Mapping[str, int] = field(default_factory=dict)  #: pixels removed from the depth image, by reason
+    removed: Mapping[str, int] = field(
+        default_factory=dict
+    )  #: pixels removed from the depth image, by reason
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +47,9 @@ class DepthExample:
 
     before: npt.NDArray[np.floating[Any]]  #: (H, W) [m]; not finite or not positive: no measurement
     after: npt.NDArray[np.floating[Any]]  #: (H, W) [m]; NaN where removed
-    reasons: npt.NDArray[np.integer[Any]] | None = None  #: (H, W); i > 0: removed because of reason_names[i - 1]
+    reasons: npt.NDArray[np.integer[Any]] | None = (
+        None  #: (H, W); i > 0: removed because of reason_names[i - 1]
+    )
     reason_names: Sequence[str] = ()
     index: int = 0  #: of the frame
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from collections.abc import Callable, Iterable, Sequence
 from html import escape
@@ -14,10 +13,20 @@ import numpy.typing as npt
 
 from nacre import __version__
 from nacre.evaluation import AbsoluteTrajectoryError
+from nacre.evaluation.result import Result
 from nacre.io.atomic import atomic_writer
-from nacre.report.charts import Mark, Series, group_size, length_unit, line_chart, map_chart, runs, stacked_chart
+from nacre.report.charts import (
+    Mark,
+    Series,
+    group_size,
+    length_unit,
+    line_chart,
+    map_chart,
+    runs,
+    stacked_chart,
+)
 from nacre.report.colormap import CATEGORIES
-from nacre.report.data import DepthExample, FrameEntry, ModelCloud, ReportData
+from nacre.report.data import DepthExample, FrameEntry, ReportData
 from nacre.report.pictures import ModelPictures, Picture, draw_depth, draw_model, reason_color
 from nacre.report.summary import Summary, is_tracked, summarize, total_milliseconds
 from nacre.report.text import count, flatten, label, quantity
@@ -29,19 +38,20 @@ _MAX_ROWS = 300
 
 def write_report(path: str | os.PathLike[str], data: ReportData) -> None:
     """
-    Write a reconstruction's report: one HTML file with all its pictures inside, which needs no network and no script.
+    Write a reconstruction's report: one HTML file with its pictures inside, without network or script.
 
     Parameters
     ----------
     path : path-like
-        The file to write, usually ``report.html``; its folder must exist. It appears only when it is complete.
+        The file to write, usually ``report.html``; its folder must exist. It appears only when it is
+        complete.
     data : ReportData
         What to show. Whatever is missing is left out.
 
     Notes
     -----
-    The same data gives the same bytes. Errors of the poses are worked out from ``frames`` where ``evaluation`` holds no
-    trajectory error.
+    The same data gives the same bytes. Errors of the poses are worked out from ``frames`` where
+    ``evaluation`` holds no trajectory error.
     """
     page = render_page(data)
     with atomic_writer(path) as stream:
@@ -68,7 +78,7 @@ def render_page(data: ReportData) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(data.title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n<main>\n"
         + "\n".join(section for section in sections if section)
-        + f"\n<footer>Made by nacre {escape(__version__)}. Lengths are metric, poses are camera to world.</footer>\n"
+        + f"\n<footer>Made by nacre {escape(__version__)}. Poses are camera to world.</footer>\n"
         "</main>\n</body>\n</html>\n"
     )
 
@@ -85,7 +95,8 @@ def _header(data: ReportData, summary: Summary, model: ModelPictures | None) -> 
     source = f'<p class="source">{escape(data.source)}</p>' if data.source else ""
     return (
         f'<header class="intro{"" if model else " alone"}"><div><p class="brand">nacre reconstruction</p>'
-        f'<h1>{escape(data.title)}</h1>{source}{verdict}<dl class="tiles">{tiles}</dl></div>{picture}</header>'
+        f"<h1>{escape(data.title)}</h1>{source}{verdict}"
+        f'<dl class="tiles">{tiles}</dl></div>{picture}</header>'
     )
 
 
@@ -125,7 +136,8 @@ def _depth_section(example: DepthExample | None, frames: Sequence[FrameEntry]) -
     parts = [
         _heading("Depth image before and after cleaning"),
         f'<p class="note">Frame {example.index}. Depth {quantity(low, "m")}<span class="ramp near"></span>'
-        f"{quantity(high, 'm')}. Removed, of {count(drawn.num_measured)} measured pixels: {keys or 'none'}</p>",
+        f"{quantity(high, 'm')}. Removed, of {count(drawn.num_measured)} measured pixels: "
+        f"{keys or 'none'}</p>",
         _pictures(drawn.pictures, "three", "depth"),
     ]
     reasons = list(dict.fromkeys(reason for frame in frames for reason in frame.removed))
@@ -139,7 +151,11 @@ def _depth_section(example: DepthExample | None, frames: Sequence[FrameEntry]) -
             for i, reason in enumerate(reasons)
         ]
         chart = stacked_chart(
-            series, y_label="thousand pixels", indices=[frame.index for frame in frames], width=1080, height=170
+            series,
+            y_label="thousand pixels",
+            indices=[frame.index for frame in frames],
+            width=1080,
+            height=170,
         )
         parts.append(_chart("Pixels removed from each frame", chart, _keys(series)))
     return "".join(parts)
@@ -165,7 +181,9 @@ def _trajectory_section(frames: Sequence[FrameEntry], error: AbsoluteTrajectoryE
         ("From the side", (2, 1), ("z, forward", "y, down")),
     ):
         lines = [(name, track[:, axes], color) for name, track, color in tracks]
-        chart = map_chart(lines, x_label=names[0], y_label=names[1], y_up=axes[1] == 2, unit=unit, factor=factor)
+        chart = map_chart(
+            lines, x_label=names[0], y_label=names[1], y_up=axes[1] == 2, unit=unit, factor=factor
+        )
         maps.append(_chart(caption, chart, keys))
     parts = [_heading("Trajectory"), f'<div class="grid two">{"".join(maps)}</div>']
     parts.append(_error_charts(frames, error))
@@ -233,9 +251,11 @@ def _frames_section(frames: Sequence[FrameEntry]) -> str:
 
 def _steps(frames: Sequence[FrameEntry]) -> list[Series]:
     """Return the time of each step; what the total has beyond the steps is the last layer."""
-    names = [n for n in dict.fromkeys(name for frame in frames for name in frame.milliseconds) if n != "total"]
+    names = [
+        n for n in dict.fromkeys(name for frame in frames for name in frame.milliseconds) if n != "total"
+    ]
     steps = [
-        Series(label(name), _values(frames, lambda frame, name=name: frame.milliseconds.get(name)), i)
+        Series(label(name), np.array([frame.milliseconds.get(name, np.nan) for frame in frames]), i)
         for i, name in enumerate(names)
     ]
     rest = np.array([total_milliseconds(frame) for frame in frames])
@@ -248,18 +268,22 @@ def _steps(frames: Sequence[FrameEntry]) -> list[Series]:
 
 def _figures_section(data: ReportData, summary: Summary) -> str:
     results = dict(data.evaluation)
-    if summary.trajectory is not None and not any(result is summary.trajectory for result in results.values()):
+    if summary.trajectory is not None and not any(
+        result is summary.trajectory for result in results.values()
+    ):
         results["Absolute trajectory error"] = summary.trajectory
     if data.figures:
         results["Further figures"] = data.figures
-    tables = [f"<div><h3>{escape(str(name))}</h3>{_result_table(result)}</div>" for name, result in results.items()]
+    tables = [
+        f"<div><h3>{escape(str(name))}</h3>{_result_table(result)}</div>" for name, result in results.items()
+    ]
     return _heading("Figures") + f'<div class="figures">{"".join(tables)}</div>' if tables else ""
 
 
 def _result_table(result: Any) -> str:
-    if not dataclasses.is_dataclass(result):
+    if not isinstance(result, Result):
         return _table([], flatten(result))
-    units = {field.name: field.metadata.get("unit", "") for field in dataclasses.fields(result)}
+    units = result.units()
     values = {name: getattr(result, name) for name in units}
     columns = {name: value for name, value in values.items() if isinstance(value, tuple)}
     single = [
@@ -270,7 +294,9 @@ def _result_table(result: Any) -> str:
     table = ""
     if columns:
         heads = [label(name) for name in columns]
-        rows = zip(*([quantity(item, units[name]) for item in value] for name, value in columns.items()), strict=True)
+        rows = zip(
+            *([quantity(item, units[name]) for item in value] for name, value in columns.items()), strict=True
+        )
         table = _table(heads, rows)
     return table + (_table([], single) if single else "")
 
@@ -306,14 +332,17 @@ def _table_section(frames: Sequence[FrameEntry]) -> str:
     rows = []
     for frame in chosen:
         status = escape(frame.status.upper())
-        cells = "".join(f'<td class="number">{quantity(value(frame), unit)}</td>' for _, value, unit in columns)
+        cells = "".join(
+            f'<td class="number">{quantity(value(frame), unit)}</td>' for _, value, unit in columns
+        )
         rows.append(
             f'<tr><td class="number">{frame.index}</td><td class="status-{status}">{status}</td>'
             f"{cells}<td>{escape(frame.reason)}</td></tr>"
         )
     return (
         f'<h2>Table of frames</h2><details><summary>{title}</summary><div class="wide"><table>'
-        f'<tr><th class="number">Frame</th><th>Status</th>{heads}<th></th></tr>{"".join(rows)}</table></div></details>'
+        f'<tr><th class="number">Frame</th><th>Status</th>{heads}<th></th></tr>{"".join(rows)}'
+        "</table></div></details>"
     )
 
 
@@ -337,7 +366,9 @@ def _chart(caption: str, svg: str, keys: str = "") -> str:
 
 
 def _keys(series: Sequence[Series]) -> str:
-    return "".join(f'<span class="key"><i class="k{one.color}"></i>{escape(one.name)}</span>' for one in series)
+    return "".join(
+        f'<span class="key"><i class="k{one.color}"></i>{escape(one.name)}</span>' for one in series
+    )
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -361,7 +392,9 @@ def _values(frames: Sequence[FrameEntry], value: Callable[[FrameEntry], float | 
 
 def _positions(frames: Sequence[FrameEntry], pose: Callable[[FrameEntry], Any]) -> Array:
     missing = np.full(3, np.nan)
-    rows = [missing if (p := pose(frame)) is None else np.asarray(p, dtype=np.float64)[:3, 3] for frame in frames]
+    rows = [
+        missing if (p := pose(frame)) is None else np.asarray(p, dtype=np.float64)[:3, 3] for frame in frames
+    ]
     return np.array(rows).reshape(-1, 3)
 
 
@@ -382,4 +415,3 @@ def _mark_keys(frames: Sequence[FrameEntry]) -> str:
         if status in present
     )
     return f'<p class="note">{keys}</p>' if keys else ""
-

@@ -56,7 +56,7 @@ def data_uri(image: npt.NDArray[np.uint8]) -> str:
 
 
 def draw_model(model: ModelCloud, frames: Sequence[FrameEntry] = ()) -> ModelPictures | None:
-    """Draw the model from all sides, a scene also as its cameras saw it; None where there is no point to draw."""
+    """Draw the model from all sides, a scene also as its cameras saw it; None where there is no point."""
     model = _thinned(model)
     points = model.points
     if not len(points):
@@ -72,14 +72,21 @@ def draw_model(model: ModelCloud, frames: Sequence[FrameEntry] = ()) -> ModelPic
 
     scale = max(View.fit(points, side, size=_SIZE).metres_per_pixel for side in SIDES)
     sides = {side: View.fit(points, side, size=_SIZE, metres_per_pixel=scale) for side in SIDES}
-    poses = [frame for frame in frames if frame.world_from_camera is not None and frame.status.upper() != "LOST"]
+    poses = [
+        frame for frame in frames if frame.world_from_camera is not None and frame.status.upper() != "LOST"
+    ]
     main = View.fit(points, OBLIQUE, size=(680, 640))
-    views = {"from the front": View.fit(points, OBLIQUE, size=_SIZE), "from behind": View.fit(points, BEHIND, size=_SIZE)}
+    views = {
+        "from the front": View.fit(points, OBLIQUE, size=_SIZE),
+        "from behind": View.fit(points, BEHIND, size=_SIZE),
+    }
     cameras: dict[str, View] = {}
     if poses and model.normals is not None and _is_scene(points, model.normals, sides):
         chosen = [poses[i] for i in sorted({0, len(poses) // 2, len(poses) - 1})]
         views = {
-            f"as frame {frame.index} saw it": View.from_camera(points, frame.world_from_camera, size=_CAMERA_SIZE)
+            f"as frame {frame.index} saw it": View.from_camera(
+                points, frame.world_from_camera, size=_CAMERA_SIZE
+            )
             for frame in chosen
             if frame.world_from_camera is not None
         }
@@ -91,10 +98,14 @@ def draw_model(model: ModelCloud, frames: Sequence[FrameEntry] = ()) -> ModelPic
         values = np.nan_to_num(np.asarray(model.confidence, dtype=np.float64).reshape(-1))
         low, high = (float(bound) for bound in np.percentile(values, (2, 98)))
         shades = viridis((values - low) / (high - low) if high > low else np.ones(len(values)))
-        confidence = tuple(picture(f"Confidence, {name}", view, shades) for name, view in list(views.items())[:2])
+        confidence = tuple(
+            picture(f"Confidence, {name}", view, shades) for name, view in list(views.items())[:2]
+        )
     colors: tuple[Picture, ...] = ()
     if model.colors is not None:
-        colors = tuple(picture(f"Colour, {name}", view, model.colors) for name, view in list(views.items())[:2])
+        colors = tuple(
+            picture(f"Colour, {name}", view, model.colors) for name, view in list(views.items())[:2]
+        )
     return ModelPictures(
         main=picture("The model", main),
         cameras=tuple(picture(name[:1].upper() + name[1:], view) for name, view in cameras.items()),
@@ -158,7 +169,9 @@ def draw_depth(example: DepthExample) -> DepthPictures:
     """Draw a depth image as it was measured, as it is used, and what was removed in between."""
     before, after = (np.asarray(image, dtype=np.float64) for image in (example.before, example.after))
     if before.ndim != 2 or before.shape != after.shape:
-        raise ValueError(f"depth.before and depth.after must be images of one size, got {before.shape}, {after.shape}")
+        raise ValueError(
+            f"depth.before and depth.after must be images of one size, got {before.shape}, {after.shape}"
+        )
     measured = np.isfinite(before) & (before > 0)
     kept = np.isfinite(after) & (after > 0)
     gone = measured & ~kept
@@ -169,7 +182,9 @@ def draw_depth(example: DepthExample) -> DepthPictures:
     else:
         reasons = np.where(gone, np.asarray(example.reasons), 0)
         if reasons.min() < 0 or reasons.max() > len(names):
-            raise ValueError(f"depth.reasons must lie between 0 and the number of reason_names ({len(names)})")
+            raise ValueError(
+                f"depth.reasons must lie between 0 and the number of reason_names ({len(names)})"
+            )
 
     shown = before[kept] if kept.any() else before[measured]
     low, high = (float(bound) for bound in np.percentile(shown, (1, 99))) if len(shown) else (1.0, 1.0)

@@ -36,12 +36,13 @@ def encode_png(image: npt.NDArray[np.uint8]) -> bytes:
     header = struct.pack(">IIBBBBB", width, height, 8, _COLOR_TYPES[channels], 0, 0, 0)
     chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(filtered, 6)), (b"IEND", b""))
     return b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data)) for kind, data in chunks
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        for kind, data in chunks
     )
 
 
 def _filter_rows(rows: npt.NDArray[np.uint8], channels: int) -> bytes:
-    """Predict each row from its left or upper neighbours, whichever leaves least (PNG specification, 9.2 and 12.7)."""
+    """Predict rows from the left or from above, whichever leaves least (PNG specification, 9.2, 12.7)."""
     left, up = rows.copy(), rows.copy()
     left[:, channels:] -= rows[:, :-channels]
     up[1:] -= rows[:-1]

@@ -29,22 +29,22 @@ def render_points(
     """
     Draw a point model as a closed, shaded surface.
 
-    Every point is a disk in the plane of its normal, as large as the distance to its neighbours asks for, so that no
-    holes appear; disks that overlap at the same depth are blended. The light comes from the viewer, and places that
-    lie behind their surroundings are a little darker.
+    Every point is a disk in the plane of its normal, as large as the distance to its neighbours asks for, so
+    that no holes appear; disks that overlap at the same depth are blended. The light comes from the viewer,
+    and places that lie behind their surroundings are a little darker.
 
     Parameters
     ----------
     points : array_like, shape (N, 3)
         The model [m]; rows that are not finite are left out.
     normals : array_like, shape (N, 3), optional
-        Outward normals. Sides turned away from the viewer are drawn in brown. Without normals (or where they are not
-        finite) the disks face the viewer.
+        Outward normals. Sides turned away from the viewer are drawn in brown. Without normals (or where they
+        are not finite) the disks face the viewer.
     colors : array_like of uint8, shape (N, 3), optional
         Colours of the points; they are shaded gently. Default: light grey.
     view_from : str or three numbers, optional
-        "front" (what the first camera saw), "right", "back", "left", "top", "bottom", or the direction from the model to
-        the viewer.
+        "front" (what the first camera saw), "right", "back", "left", "top", "bottom", or the direction from
+        the model to the viewer.
     size : (int, int), optional
         Width and height of the picture [pixels].
     view : View, optional
@@ -73,7 +73,9 @@ def render_points(
     if colors is not None:
         colors = np.asarray(colors)
         if colors.shape != cloud.shape or colors.dtype != np.uint8:
-            raise ValueError(f"colors must be uint8 of shape {cloud.shape}, got {colors.dtype} {colors.shape}")
+            raise ValueError(
+                f"colors must be uint8 of shape {cloud.shape}, got {colors.dtype} {colors.shape}"
+            )
     if view is None:
         view = View.fit(cloud, view_from, size=size)
     if normals is None:
@@ -108,7 +110,7 @@ def reverse_part(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) -> f
 
 def is_inside_out(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) -> bool:
     """
-    Return whether a view shows a model from behind, and hiding the reverse sides would open the sight on its front.
+    Return whether a view shows a model from behind, and hiding its reverse sides would show its front.
 
     That is so for a room that is seen through one of its walls.
     """
@@ -117,7 +119,7 @@ def is_inside_out(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) -> 
 
 
 def _reverse_parts(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) -> tuple[float, float]:
-    """Return which part of the nearest points, and which part of all points in a picture, turn their back to it."""
+    """Return which part of the nearest and which part of all points in a picture turn their back to it."""
     cloud = as_points("points", points)
     seen, _ = view.project(cloud)
     reverse = view.face(as_matching_points("normals", normals, "points", len(cloud)), cloud)[:, 2] > 0
@@ -135,7 +137,8 @@ def measure_spacing(points: npt.ArrayLike) -> Array:
     """
     Return how far each point's disk must reach to meet the disks around it.
 
-    That is the distance to the sixth neighbour, where a regular lattice has its ring; outliers get three medians.
+    That is the distance to the sixth neighbour, where a regular lattice has its ring; outliers get three
+    medians.
     """
     from nacre import KdTree
 

@@ -35,7 +35,9 @@ class Canvas:
         column = np.floor(seen[:, 0] + self.width / 2).astype(np.int64)
         row = np.floor(seen[:, 1] + self.height / 2).astype(np.int64)
         edge = int(_MAX_SPLAT)
-        inside = (column >= -edge) & (column < self.width + edge) & (row >= -edge) & (row < self.height + edge)
+        inside = (
+            (column >= -edge) & (column < self.width + edge) & (row >= -edge) & (row < self.height + edge)
+        )
         pixel = (row + self.border) * self.stride + column + self.border
 
         nearest_last = np.flatnonzero(inside)
@@ -90,7 +92,7 @@ class Canvas:
         depth = self.depth.reshape(shape)[cut]
         covered = weight > 0
         length = np.linalg.norm(normal, axis=2)
-        normal = normal / np.where(length > 0, length, 1)[:, :, None]
+        normal = normal / np.where(length > 0, length, np.float32(1))[:, :, None]
         toward = -normal[:, :, 2]
         side = np.where(toward < 0, -1.0, 1.0)
         lambert = 0.8 * np.abs(toward) + 0.2 * np.maximum(side * (normal @ _KEY_LIGHT), 0)
@@ -101,8 +103,8 @@ class Canvas:
         else:
             base = self.albedo.reshape(*shape, 3)[cut] / np.where(covered, weight, 1)[:, :, None]
             shade = 0.55 + 0.45 * lambert
-        shade = shade * _cavity(depth, covered) * covered
-        image = np.concatenate([np.clip(base * shade[:, :, None], 0, 1), covered[:, :, None]], axis=2)
+        brightness = shade * _cavity(depth, covered) * covered
+        image = np.concatenate([np.clip(base * brightness[:, :, None], 0, 1), covered[:, :, None]], axis=2)
         image = _smooth_edges(image, np.where(covered, depth, np.inf))
         opacity = image[:, :, 3:]
         if background is None:
@@ -114,12 +116,16 @@ class Canvas:
 
 def _disk_offsets(radius: float) -> list[tuple[int, int, float]]:
     reach = int(radius)
-    offsets = [(dx, dy, float(np.hypot(dx, dy))) for dy in range(-reach, reach + 1) for dx in range(-reach, reach + 1)]
+    offsets = [
+        (dx, dy, float(np.hypot(dx, dy)))
+        for dy in range(-reach, reach + 1)
+        for dx in range(-reach, reach + 1)
+    ]
     return sorted((o for o in offsets if o[2] <= radius), key=lambda o: (o[2], o[1], o[0]))
 
 
 def _cavity(depth: Float32, covered: npt.NDArray[np.bool_]) -> Array:
-    """Return how bright each pixel is by its depth against its surroundings (Luft et al. 2006, depth unsharp mask)."""
+    """Return each pixel's brightness by its depth against its surroundings (Luft et al. 2006)."""
     factor = np.ones(depth.shape)
     if not covered.any():
         return factor

@@ -66,8 +66,13 @@ def summarize(data: ReportData) -> Summary:
     sentences, tiles = [], []
     if num_frames:
         told = "All" if not num_lost else f"{count(num_frames - num_lost)} of"
-        sentence = f"{told} {count(num_frames)} frames were tracked" if num_frames > 1 or num_lost else "One frame"
-        extra = [f"{count(num_lost)} lost" * bool(num_lost), f"{count(num_weak)} with weak geometry" * bool(num_weak)]
+        sentence = (
+            f"{told} {count(num_frames)} frames were tracked" if num_frames > 1 or num_lost else "One frame"
+        )
+        extra = [
+            f"{count(num_lost)} lost" * bool(num_lost),
+            f"{count(num_weak)} with weak geometry" * bool(num_weak),
+        ]
         extra = [text for text in extra if text]
         sentences.append(sentence + (f" ({', '.join(extra)})" if extra else ""))
         tiles.append(
@@ -92,14 +97,24 @@ def summarize(data: ReportData) -> Summary:
     if trajectory is not None and trajectory.num_compared:
         rmse = quantity(trajectory.rmse, "m")
         sentences.append(f"The camera positions are off by {rmse} (RMS)")
-        tiles.append(Tile("Trajectory error", rmse, f"ATE RMSE; {quantity(trajectory.rotation_rmse, 'rad')} in rotation"))
+        tiles.append(
+            Tile(
+                "Trajectory error", rmse, f"ATE RMSE; {quantity(trajectory.rotation_rmse, 'rad')} in rotation"
+            )
+        )
 
     times = np.array([total_milliseconds(frame) for frame in data.frames])
     times = times[np.isfinite(times)]
     if len(times):
         median = quantity(float(np.median(times)), "ms")
         sentences.append(f"A frame takes {median}")
-        tiles.append(Tile("Time per frame", median, f"median; 99 % within {quantity(float(np.percentile(times, 99)), 'ms')}"))
+        tiles.append(
+            Tile(
+                "Time per frame",
+                median,
+                f"median; 99 % within {quantity(float(np.percentile(times, 99)), 'ms')}",
+            )
+        )
     return Summary(level, ". ".join(sentences) + "." * bool(sentences), tuple(tiles), trajectory)
 
 
@@ -127,5 +142,5 @@ def _extent(data: ReportData) -> str:
     sides = [quantity(float(side), "m") for side in high - low]
     units = {side.split(" ")[1] for side in sides}
     if len(units) == 1:
-        return " × ".join(side.split(" ")[0] for side in sides) + f" {units.pop()}"
-    return " × ".join(sides)
+        return " \N{MULTIPLICATION SIGN} ".join(side.split(" ")[0] for side in sides) + f" {units.pop()}"
+    return " \N{MULTIPLICATION SIGN} ".join(sides)

@@ -15,8 +15,9 @@ from nacre.arrays import as_points, as_pose
 Array = npt.NDArray[np.float64]
 Float32 = npt.NDArray[np.float32]
 
-#: For each named side: where the viewer is, seen from the model, and which way is down in the picture. The model is in
-#: the first camera's frame (x right, y down, z forward), so that the front is what the first camera saw.
+#: For each named side: where the viewer is, seen from the model, and which way is down in the picture. The
+#: model is in the first camera's frame (x right, y down, z forward), so that the front is what the first
+#: camera saw.
 SIDES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] = {
     "front": ((0, 0, -1), (0, 1, 0)),
     "right": ((1, 0, 0), (0, 1, 0)),
@@ -80,7 +81,7 @@ class View:
         cls, points: npt.ArrayLike, world_from_camera: npt.ArrayLike, *, size: tuple[int, int] = (640, 480)
     ) -> View:
         """
-        Return the perspective view of a camera, as wide as most of the model in front of it, 20 to 75 degrees.
+        Return the perspective view of a camera, 20 to 75 degrees wide, as the model in front of it asks.
 
         Parameters
         ----------
@@ -110,8 +111,9 @@ class View:
         """
         Return where points appear, and the length that a pixel has there [m].
 
-        Columns are right and down of the picture's middle and away from the viewer, all in pixels of the point's own
-        scale: for a perspective that makes the third the logarithm of the depth. NaN for points behind the viewer.
+        Columns are right and down of the picture's middle and away from the viewer, all in pixels of the
+        point's own scale: for a perspective that makes the third the logarithm of the depth. NaN for points
+        behind the viewer.
         """
         local = (points - self.center) @ self.view_from_model.T
         if math.isinf(self.distance):
@@ -128,8 +130,8 @@ class View:
         """
         Return normals in the picture: right, down, and along the ray to each point, of unit length.
 
-        So the depth of a point's plane rises by -x / z per pixel to the right, also in a perspective. Zero and NaN
-        normals face the viewer.
+        So the depth of a point's plane rises by -x / z per pixel to the right, also in a perspective. Zero
+        and NaN normals face the viewer.
         """
         facing = normals @ self.view_from_model.T
         if not math.isinf(self.distance):
@@ -149,12 +151,16 @@ def _check_size(size: tuple[int, int]) -> None:
 def _rotation(view_from: str | Sequence[float]) -> Array:
     if isinstance(view_from, str):
         if view_from not in SIDES:
-            raise ValueError(f"view_from must be one of {', '.join(SIDES)}, or a direction, got {view_from!r}")
+            raise ValueError(
+                f"view_from must be one of {', '.join(SIDES)}, or a direction, got {view_from!r}"
+            )
         toward, down = (np.array(axis, dtype=np.float64) for axis in SIDES[view_from])
     else:
         toward = np.asarray(view_from, dtype=np.float64)
         if toward.shape != (3,) or not np.isfinite(toward).all() or not toward.any():
-            raise ValueError(f"view_from must be a side's name or three numbers that are not all 0, got {view_from!r}")
+            raise ValueError(
+                f"view_from must be a side's name or three numbers that are not all 0, got {view_from!r}"
+            )
         down = np.array([0.0, 1.0, 0.0])
     forward = -toward / np.linalg.norm(toward)
     right = np.cross(down, forward)
