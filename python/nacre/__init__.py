@@ -11,29 +11,48 @@ from nacre.depth import (
     estimate_noise,
     preprocess_depth,
 )
+from nacre.errors import FileFormatError
+from nacre.io.cloud import Cloud
+from nacre.io.meshes import read_mesh, write_mesh
+from nacre.io.points import read_points, write_points
+from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
 from nacre.model import FrameReport, Model, ModelParameters
 from nacre.neighbors import KdTree, RadiusNeighbors
 from nacre.registration import AlignResult, RegistrationParameters, align
+from nacre.simulation import default_camera, simulate_depth, turntable_poses
 
 __all__ = [
     "AlignResult",
     "Camera",
+    "ClosestPoints",
+    "Cloud",
     "Consolidated",
     "DepthParameters",
     "DepthReport",
+    "FileFormatError",
     "FrameReport",
     "KdTree",
+    "Mesh",
     "Model",
     "ModelParameters",
     "NoiseModel",
     "RadiusNeighbors",
+    "RayHits",
     "RegistrationParameters",
     "__version__",
     "align",
     "back_project",
+    "built_in_object",
     "consolidate",
+    "default_camera",
     "depth_normals",
     "estimate_noise",
     "preprocess_depth",
     "project_samples",
+    "read_mesh",
+    "read_points",
+    "simulate_depth",
+    "turntable_poses",
+    "write_mesh",
+    "write_points",
 ]
