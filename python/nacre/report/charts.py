@@ -123,7 +123,7 @@ def map_chart(
     """
     Draw tracks (N, 2), each with its name and colour, in the plane with equal scales.
 
-    y grows upwards where ``y_up``, else downwards. ``unit`` stands at the axes; there are ``factor`` of it in a metre.
+    y grows upwards where ``y_up``, else downwards. ``unit`` stands at the axes; a metre has ``factor`` of it.
 
     The first point of the last track is marked. NaN leaves a gap.
     """

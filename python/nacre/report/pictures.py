@@ -22,6 +22,7 @@ OBLIQUE = (-0.75, -0.55, -1.0)
 BEHIND = (0.75, -0.55, 1.0)
 
 _SIZE = (560, 560)
+_MAIN_SIZE = (680, 640)
 _CAMERA_SIZE = (640, 480)
 _MAX_POINTS = 300_000
 _REASON_COLORS = {"edge": 5, "slanted": 1, "isolated": 3, "out_of_range": 0, "masked": 4, "removed": 5}
@@ -75,7 +76,7 @@ def draw_model(model: ModelCloud, frames: Sequence[FrameEntry] = ()) -> ModelPic
     poses = [
         frame for frame in frames if frame.world_from_camera is not None and frame.status.upper() != "LOST"
     ]
-    main = View.fit(points, OBLIQUE, size=(680, 640))
+    main = View.fit(points, OBLIQUE, size=_MAIN_SIZE)
     views = {
         "from the front": View.fit(points, OBLIQUE, size=_SIZE),
         "from behind": View.fit(points, BEHIND, size=_SIZE),
@@ -90,7 +91,7 @@ def draw_model(model: ModelCloud, frames: Sequence[FrameEntry] = ()) -> ModelPic
             for frame in chosen
             if frame.world_from_camera is not None
         }
-        main, cameras = View.from_camera(points, np.eye(4), size=(680, 560)), views
+        main, cameras = View.from_camera(points, np.eye(4), size=_MAIN_SIZE), views
 
     confidence: tuple[Picture, ...] = ()
     low = high = 0.0
@@ -145,7 +146,7 @@ def _is_scene(points: npt.ArrayLike, normals: npt.ArrayLike, sides: dict[str, Vi
 
 
 def _scale_bar(width: float) -> tuple[str, float]:
-    length = ticks(0, width, 4)[1]
+    length = ticks(0, width, 5)[1]
     unit, factor = length_unit(length)
     return f"{length * factor:.4g} {unit}", length / width
 

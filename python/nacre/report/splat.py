@@ -88,11 +88,11 @@ class Canvas:
         cut = (slice(self.border, -self.border),) * 2
         shape = (-1, self.stride)
         weight = self.weight.reshape(shape)[cut]
-        normal = self.normal.reshape(*shape, 3)[cut]
+        normal = self.normal.reshape(*shape, 3)[cut].astype(np.float64)
         depth = self.depth.reshape(shape)[cut]
         covered = weight > 0
         length = np.linalg.norm(normal, axis=2)
-        normal = normal / np.where(length > 0, length, np.float32(1))[:, :, None]
+        normal /= np.where(length > 0, length, 1)[:, :, None]
         toward = -normal[:, :, 2]
         side = np.where(toward < 0, -1.0, 1.0)
         lambert = 0.8 * np.abs(toward) + 0.2 * np.maximum(side * (normal @ _KEY_LIGHT), 0)

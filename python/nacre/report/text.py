@@ -72,7 +72,7 @@ def flatten(parameters: Any, prefix: str = "") -> list[tuple[str, str]]:
         named = ((f"{prefix}.{name}" if prefix else str(name), value) for name, value in parameters.items())
         return [row for name, value in named for row in flatten(value, name)]
     if isinstance(parameters, (float, np.floating)):
-        return [(prefix, f"{parameters:.7g}")]
+        return [(prefix, _MISSING if math.isnan(parameters) else f"{parameters:.7g}")]
     return [(prefix, str(parameters))]
 
 

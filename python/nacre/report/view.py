@@ -115,7 +115,8 @@ class View:
         point's own scale: for a perspective that makes the third the logarithm of the depth. NaN for points
         behind the viewer.
         """
-        local = (points - self.center) @ self.view_from_model.T
+        with np.errstate(invalid="ignore"):  # points that are not finite
+            local = (points - self.center) @ self.view_from_model.T
         if math.isinf(self.distance):
             scale = np.full(len(local), self.metres_per_pixel)
             return (local / self.metres_per_pixel).astype(np.float32), scale.astype(np.float32)
@@ -133,11 +134,12 @@ class View:
         So the depth of a point's plane rises by -x / z per pixel to the right, also in a perspective. Zero
         and NaN normals face the viewer.
         """
-        facing = normals @ self.view_from_model.T
-        if not math.isinf(self.distance):
-            local = (points - self.center) @ self.view_from_model.T
-            ray = local[:, :2] / (local[:, 2:] + self.distance)
-            facing[:, 2] += (facing[:, :2] * ray).sum(axis=1)
+        with np.errstate(invalid="ignore"):
+            facing = normals @ self.view_from_model.T
+            if not math.isinf(self.distance):
+                local = (points - self.center) @ self.view_from_model.T
+                ray = local[:, :2] / (local[:, 2:] + self.distance)
+                facing[:, 2] += (facing[:, :2] * ray).sum(axis=1)
         length = np.linalg.norm(facing, axis=1, keepdims=True)
         known = length > 0  # False for NaN
         return np.where(known, facing / np.where(known, length, 1), (0, 0, -1)).astype(np.float32)
