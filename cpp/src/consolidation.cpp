@@ -149,9 +149,8 @@ class Projection {
   static Runs runs_around(const CellGrid& grid, CellGrid::Key key) {
     Runs runs;
     runs.reserve(9);
-    grid.for_each_run(key, [&](std::int64_t first, std::int64_t last) {
-      runs.emplace_back(grid.begin(first), grid.begin(last));
-    });
+    grid.for_each_run(
+        key, [&](std::int64_t first, std::int64_t last) { runs.emplace_back(grid.begin(first), grid.begin(last)); });
     return runs;
   }
 

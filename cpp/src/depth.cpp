@@ -50,7 +50,8 @@ EdgeMarks mark_edges(const DepthRef& depth, const PlanarImage& image, const Wind
 }  // namespace
 
 void DepthOptions::check() const {
-  require(min_depth >= 0.0 && std::isfinite(min_depth), "min_depth", "a finite number of metres, at least 0", min_depth);
+  require(min_depth >= 0.0 && std::isfinite(min_depth), "min_depth", "a finite number of metres, at least 0",
+          min_depth);
   require(max_depth > min_depth, "max_depth", "greater than min_depth", max_depth);
   require(gradient_threshold > 0.0, "gradient_threshold", "a positive depth step in metres", gradient_threshold);
   require(edge_dilation >= 0 && edge_dilation <= 100, "edge_dilation", "0 to 100 pixels", edge_dilation);
@@ -62,7 +63,8 @@ void DepthOptions::check() const {
 }
 
 void NoiseModel::check() const {
-  require(std::isfinite(constant) && constant >= 0.0, "noise.constant", "a finite number of metres, at least 0", constant);
+  require(std::isfinite(constant) && constant >= 0.0, "noise.constant", "a finite number of metres, at least 0",
+          constant);
   require(std::isfinite(quadratic) && quadratic >= 0.0, "noise.quadratic", "finite, at least 0", quadratic);
   require(std::isfinite(offset), "noise.offset", "finite", offset);
 }

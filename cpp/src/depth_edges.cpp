@@ -56,15 +56,13 @@ EdgeMarks mark_planar_edges(const PlanarImage& image, const WindowFits& fits, co
   const Quadratic sigma = image.sigma(noise), unit_slope = image.unit_slope();
   const auto bend_sigmas = static_cast<float>(options.edge_sigmas * std::sqrt(6.0));
   const float step_sigmas = kStepSigmas * std::sqrt(2.0F);
-  const PlanarLimits limits{sigma * bend_sigmas,
-                            unit_slope * kCreaseSlope,
-                            sigma * step_sigmas,
-                            unit_slope * static_cast<float>(std::tan(options.max_slant)),
-                            bend_sigmas * kLateralSigma,
-                            step_sigmas * kLateralSigma};
+  const PlanarLimits limits{sigma * bend_sigmas,         unit_slope * kCreaseSlope,
+                            sigma * step_sigmas,         unit_slope * static_cast<float>(std::tan(options.max_slant)),
+                            bend_sigmas * kLateralSigma, step_sigmas * kLateralSigma};
   const std::vector<float> slopes = smooth_slopes(fits);
   const auto nearest = [](std::int64_t pixel, int count) {
-    return std::clamp<std::int64_t>((pixel - WindowFits::kRadius + WindowFits::kStep / 2) / WindowFits::kStep, 0, count - 1);
+    return std::clamp<std::int64_t>((pixel - WindowFits::kRadius + WindowFits::kStep / 2) / WindowFits::kStep, 0,
+                                    count - 1);
   };
   const std::size_t size = static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height());
   EdgeMarks marks{Marks(size), Marks(size)};

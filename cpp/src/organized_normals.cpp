@@ -9,10 +9,10 @@ namespace nacre {
 namespace {
 
 constexpr int kMinRadius = 2, kMaxRadius = 5;
-constexpr float kSlopeSigma = 0.07F;   // the window grows until the fitted slope is this certain
-constexpr float kMinFilled = 0.4F;     // of the window
-constexpr float kMinSpread = 0.02F;    // of the squared spread of a full window, in its two directions together
-constexpr float kGateSlope = 5.67F;    // neighbours belong to the surface up to a slant of 80 degrees
+constexpr float kSlopeSigma = 0.07F;  // the window grows until the fitted slope is this certain
+constexpr float kMinFilled = 0.4F;    // of the window
+constexpr float kMinSpread = 0.02F;   // of the squared spread of a full window, in its two directions together
+constexpr float kGateSlope = 5.67F;   // neighbours belong to the surface up to a slant of 80 degrees
 constexpr float kGateSigmas = 4.0F;
 
 constexpr int kChunk = 64;  // pixels of a row that are fitted together
@@ -28,7 +28,9 @@ struct Gate {
 
 constexpr int full_window(int radius) { return (2 * radius + 1) * (2 * radius + 1); }
 // Sum of du^2 over a full window.
-constexpr float full_spread(int radius) { return static_cast<float>(full_window(radius) * radius * (radius + 1)) / 3.0F; }
+constexpr float full_spread(int radius) {
+  return static_cast<float>(full_window(radius) * radius * (radius + 1)) / 3.0F;
+}
 
 template <int Radius>
 void sum_windows(const float* centre, std::ptrdiff_t stride, int count, const Gate& gate, Moments& m) {
