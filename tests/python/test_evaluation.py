@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from nacre import evaluation
 from nacre.evaluation import (
     absolute_trajectory_error,
-    associate,
     completeness,
     f_score,
     normal_error,
@@ -239,34 +238,6 @@ class TestRelativePoseError:
     def test_illegal_input_is_named(self, options: Any, message: str) -> None:
         with pytest.raises(ValueError, match=message):
             relative_pose_error(wandering(3), wandering(3), **options)
-
-
-class TestAssociate:
-    @settings(max_examples=60, deadline=None)
-    @given(
-        st.lists(st.floats(0, 1), max_size=12),
-        st.lists(st.floats(0, 1), max_size=12),
-        st.floats(0, 0.5),
-    )
-    def test_pairs_are_near_and_unique(self, times: list[float], others: list[float], limit: float) -> None:
-        rows, other_rows = associate(times, others, max_difference=limit)
-        assert len(set(rows)) == len(rows) == len(set(other_rows)) == len(other_rows)
-        assert list(rows) == sorted(rows)
-        for row, other in zip(rows, other_rows, strict=True):
-            difference = abs(times[row] - others[other])
-            assert difference <= limit
-            assert difference == min(abs(times[row] - time) for time in others)
-
-    def test_the_nearest_rival_wins(self) -> None:
-        rows, others = associate([1.010, 1.001, 5.0], [1.0, 4.99])
-        assert rows.tolist() == [1, 2]
-        assert others.tolist() == [0, 1]
-
-    def test_illegal_input_is_named(self) -> None:
-        with pytest.raises(ValueError, match="max_difference"):
-            associate([0], [0], max_difference=-1)
-        with pytest.raises(ValueError, match="other_timestamps"):
-            associate([0], [np.nan])
 
 
 class TestSampleSurface:

@@ -15,7 +15,6 @@ from nacre.evaluation.trajectory import (
     AbsoluteTrajectoryError,
     RelativePoseError,
     absolute_trajectory_error,
-    associate,
     relative_pose_error,
 )
 from nacre.evaluation.uniformity import Uniformity, uniformity
@@ -30,7 +29,6 @@ __all__ = [
     "SurfaceSamples",
     "Uniformity",
     "absolute_trajectory_error",
-    "associate",
     "completeness",
     "f_score",
     "normal_error",

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from nacre.arrays import as_poses
 from nacre.evaluation.result import Array, Count, Fraction, Metres, Radians, Result
+from nacre.io.trajectories import associate
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +200,7 @@ def relative_pose_error(
         if timestamps is None:
             raise ValueError('timestamps must be given where unit is "seconds"')
         times = _times("timestamps", timestamps, len(poses))
-        first, last = associate(times + delta, times, max_difference=max_time_difference)
+        first, last = associate(times + delta, times, max_time_difference)
     both = usable[first] & usable[last]
     first, last = first[both], last[both]
 
@@ -214,41 +215,6 @@ def relative_pose_error(
         unit=unit,
         num_pairs=len(first),
     )
-
-
-def associate(
-    timestamps: npt.ArrayLike, other_timestamps: npt.ArrayLike, *, max_difference: float = 0.02
-) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """
-    Pair two lists of times: each with the nearest of the other, no time twice.
-
-    Parameters
-    ----------
-    timestamps, other_timestamps : array_like, shapes (N,) and (M,)
-        Times [s], in any order.
-    max_difference : float, optional
-        Times farther apart are not paired [s].
-
-    Returns
-    -------
-    indices, other_indices : numpy.ndarray
-        The rows that belong together, in the order of ``timestamps``.
-    """
-    times, others = _times("timestamps", timestamps), _times("other_timestamps", other_timestamps)
-    if not max_difference >= 0:
-        raise ValueError(f"max_difference must be a time that is not negative, got {max_difference!r}")
-    if not (len(times) and len(others)):
-        return np.zeros(0, np.intp), np.zeros(0, np.intp)
-    order = np.argsort(others, kind="stable")
-    place = np.searchsorted(others[order], times)
-    below, above = order[np.maximum(place - 1, 0)], order[np.minimum(place, len(order) - 1)]
-    nearest = np.where(np.abs(others[below] - times) <= np.abs(others[above] - times), below, above)
-    difference = np.abs(others[nearest] - times)
-    by_difference = np.argsort(difference, kind="stable")
-    _, first = np.unique(nearest[by_difference], return_index=True)  # of rivals, the nearest wins
-    rows = np.sort(by_difference[first])
-    rows = rows[difference[rows] <= max_difference]
-    return rows, nearest[rows]
 
 
 def _tracked(estimated: npt.ArrayLike, valid: npt.ArrayLike | None) -> tuple[Array, npt.NDArray[np.bool_]]:
@@ -282,7 +248,7 @@ def _matching_rows(
         return associate(
             _times("timestamps", timestamps, len(poses)),
             _times("truth_timestamps", truth_timestamps, len(true_poses)),
-            max_difference=max_time_difference,
+            max_time_difference,
         )
     if truth_timestamps is not None:
         raise ValueError("timestamps must be given where truth_timestamps are")
