@@ -1,1 +1,201 @@
 #include "nacre/registration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "check.hpp"
+#include "icp_target.hpp"
+
+namespace nacre {
+namespace {
+
+constexpr double mad_to_sigma = 1.4826;  // median absolute deviation of a Gaussian to its standard deviation
+
+template <class Value>
+double median_of(const std::vector<Pair>& pairs, Value&& value) {
+  std::vector<double> values(pairs.size());
+  std::transform(pairs.begin(), pairs.end(), values.begin(), value);
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+// Weights relative to the median pair; with `robust` also those of Geman and McClure 1985 on the whitened residuals,
+// whose scale is their median absolute value but at least `floor` [m]. Returns that scale [m].
+double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double floor) {
+  const double median_weight = median_of(pairs, [](const Pair& pair) { return pair.weight; });
+  for (Pair& pair : pairs) pair.weight /= median_weight;
+  const auto whitened = [&](const Pair& pair) { return std::abs(residual(pair, metric)) * std::sqrt(pair.weight); };
+  const double scale = std::max(floor, mad_to_sigma * median_of(pairs, whitened));
+  if (robust) {
+    for (Pair& pair : pairs) {
+      const double ratio = whitened(pair) / (3.0 * scale);
+      pair.weight /= (1.0 + ratio * ratio) * (1.0 + ratio * ratio);
+    }
+  }
+  return scale;
+}
+
+// How many points and which gate an iteration uses. The gate starts wide and shrinks to the accuracy of the data, with
+// few points; then it stays, and the points become more until the pose is at rest.
+class Schedule {
+ public:
+  Schedule(const IcpTarget& target, const IcpSource& source, const AlignOptions& options)
+      : options_(options), source_(source) {
+    first_ = options.max_distance > 0.0 ? options.max_distance : 0.25 * target.diameter();
+    smallest_ = options.final_distance > 0.0 ? options.final_distance : 2.5 * target.spacing();
+    const std::size_t all = source.order.size();
+    const std::size_t few = options.coarse_samples > 0 ? static_cast<std::size_t>(options.coarse_samples) : all;
+    levels_ = {std::min(few, all), std::min(5 * few, all), all};
+    set_level(0);
+    update_gate(0.0);
+  }
+
+  const Gate& gate() const { return gate_; }
+  const std::vector<std::int32_t>& samples() const { return samples_; }
+
+  // After a step: returns false when the pose is at rest with the last gate and all points.
+  bool advance(double step_size, double residual_scale, double resting_size) {
+    ++iteration_;
+    ++iterations_at_level_;
+    const bool shrinking = !at_smallest_;
+    update_gate(residual_scale);
+    if (shrinking) return true;
+    const bool is_last = level_ + 1 == levels_.size();
+    const bool at_rest = step_size < resting_size;
+    if (at_rest && is_last) return false;
+    if (!is_last && (at_rest || iterations_at_level_ >= 4)) set_level(level_ + 1);
+    return true;
+  }
+
+  // The last gate with all points, to judge the final pose.
+  void finish() { set_level(levels_.size() - 1); }
+
+ private:
+  void set_level(std::size_t level) {
+    while (level + 1 < levels_.size() && levels_[level + 1] == levels_[level]) ++level;
+    level_ = level;
+    iterations_at_level_ = 0;
+    samples_.assign(source_.order.begin(), source_.order.begin() + static_cast<std::ptrdiff_t>(levels_[level]));
+    std::sort(samples_.begin(), samples_.end());  // neighbours in memory are neighbours in space
+  }
+
+  void update_gate(double residual_scale) {
+    const double smallest = std::min(
+        first_, options_.final_distance > 0.0 ? options_.final_distance : std::max(smallest_, 4.0 * residual_scale));
+    const double decayed = first_ * std::pow(options_.gate_decay, iteration_);
+    gate_.distance = std::max(smallest, decayed);
+    at_smallest_ = options_.gate_decay >= 1.0 || decayed <= smallest;
+    // Normals of a source that is still far off may differ by a third more.
+    const double widening = options_.gate_decay < 1.0 ? gate_.distance / first_ / 3.0 : 0.0;
+    gate_.cos_angle = std::cos(std::min(options_.max_angle * (1.0 + widening), 3.141592653589793));
+  }
+
+  const AlignOptions& options_;
+  const IcpSource& source_;
+  std::vector<std::size_t> levels_;
+  std::size_t level_ = 0;
+  int iteration_ = 0, iterations_at_level_ = 0;
+  double first_ = 0.0, smallest_ = 0.0;
+  bool at_smallest_ = false;
+  Gate gate_{0.0, -1.0};
+  std::vector<std::int32_t> samples_;
+};
+
+std::size_t least_pairs(std::size_t num_samples) { return std::max<std::size_t>(6, num_samples / 100); }
+
+}  // namespace
+
+const char* to_string(AlignStatus status) {
+  switch (status) {
+    case AlignStatus::converged:
+      return "converged";
+    case AlignStatus::max_iterations:
+      return "max_iterations";
+    default:
+      return "too_few_pairs";
+  }
+}
+
+void AlignOptions::check() const {
+  require(max_iterations >= 1, "max_iterations", "at least 1", max_iterations);
+  require(max_distance >= 0.0, "max_distance", "0 (automatic) or a positive distance in metres", max_distance);
+  require(final_distance >= 0.0, "final_distance", "0 (automatic) or a positive distance in metres", final_distance);
+  require(gate_decay > 0.0 && gate_decay <= 1.0, "gate_decay", "in (0, 1]", gate_decay);
+  require(max_angle > 0.0, "max_angle", "a positive angle in radians", max_angle);
+  require(sample_fraction > 0.0 && sample_fraction <= 1.0, "sample_fraction", "in (0, 1]", sample_fraction);
+  require(max_samples >= 0, "max_samples", "0 (no limit) or more", max_samples);
+  require(coarse_samples >= 0, "coarse_samples", "0 (no limit) or more", coarse_samples);
+  require(weak_threshold >= 0.0, "weak_threshold", "at least 0", weak_threshold);
+  require(num_threads >= 0, "num_threads", "0 (all) or more", num_threads);
+}
+
+AlignCloud::AlignCloud(const PointsRef& points_in, const PointsRef& normals_in, const ValuesRef& sigma_in)
+    : points(points_in), normals(normals_in), sigma(sigma_in) {
+  require(normals.rows() == 0 || normals.rows() == points.rows(), "normals", "one row per point", normals.rows());
+  require(sigma.size() == 0 || sigma.size() == points.rows(), "sigma", "one value per point", sigma.size());
+}
+
+AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial,
+                     const AlignOptions& options) {
+  AlignResult result;
+  result.target_from_source = initial;
+  result.rmse = std::numeric_limits<double>::quiet_NaN();
+
+  Schedule schedule(target, source, options);
+  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.points.rows()), -1);
+  const double resolution = std::max(1e-3 * target.spacing(), 1e-9);
+  Pose pose = initial, best_pose = initial;
+  double best_rmse = std::numeric_limits<double>::infinity();
+  bool at_rest = false;
+
+  for (int iteration = 0; iteration < options.max_iterations && !at_rest; ++iteration) {
+    std::vector<Pair> pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
+    if (pairs.size() < least_pairs(schedule.samples().size())) return result;
+    const double scale = weight_pairs(pairs, options.method, options.robust, resolution);
+    const IcpStep step = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);
+    if (step.rmse < best_rmse) {
+      best_rmse = step.rmse;
+      best_pose = pose;
+    }
+    pose = step.motion * pose;
+    result.iterations = iteration + 1;
+    at_rest = !schedule.advance(step.size, scale, resolution);
+  }
+  if (options.keep_best) pose = best_pose;
+
+  schedule.finish();
+  std::vector<Pair> pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
+  if (pairs.size() < least_pairs(schedule.samples().size())) return result;
+  weight_pairs(pairs, options.method, options.robust, resolution);
+  const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);
+  result.target_from_source = pose;
+  result.status = at_rest ? AlignStatus::converged : AlignStatus::max_iterations;
+  result.num_inliers = static_cast<int>(pairs.size());
+  result.overlap = static_cast<double>(pairs.size()) / static_cast<double>(schedule.samples().size());
+  result.rmse = last.rmse;
+  result.center = last.center;
+  result.information = last.hessian / std::max(last.variance, resolution * resolution);
+  result.weak_directions = last.weak_directions;
+  return result;
+}
+
+double overlap_at(const IcpTarget& target, const IcpSource& source, const Pose& pose, const Gate& gate,
+                  std::size_t max_samples) {
+  if (source.order.empty()) return 0.0;
+  const std::vector<std::int32_t> samples(
+      source.order.begin(),
+      source.order.begin() + static_cast<std::ptrdiff_t>(std::min(source.order.size(), max_samples)));
+  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.points.rows()), -1);
+  return static_cast<double>(target.match(source, samples, pose, gate, nearest).size()) /
+         static_cast<double>(samples.size());
+}
+
+AlignResult align(const AlignCloud& source, const AlignCloud& target, const Pose& initial,
+                  const AlignOptions& options) {
+  options.check();
+  return align_to(IcpTarget(target, options), IcpSource(source, options), initial, options);
+}
+
+}  // namespace nacre

@@ -14,8 +14,9 @@ namespace nacre {
 struct PointModel {
   std::vector<Eigen::Vector3f> points;   ///< world frame [m]
   std::vector<Eigen::Vector3f> normals;  ///< unit length, towards the cameras that saw the point
-  std::vector<Eigen::Vector3f> colors;   ///< red green blue, 0 to 255; empty when no frame had colour
-  std::vector<float> confidence;         ///< frontal observations that the point stands for
+  std::vector<Eigen::Vector3f>
+      colors;                     ///< red green blue, 0 to 255, NaN where never seen; empty when no frame had colour
+  std::vector<float> confidence;  ///< frontal observations that the point stands for
   std::vector<std::int32_t> last_seen;   ///< frame that last observed the point
   std::vector<std::uint8_t> violations;  ///< how often a camera saw through the point since it was last observed
 
@@ -31,6 +32,8 @@ struct FusionOptions {
   double min_confidence = 3.0;   ///< a point below it that is not seen again goes
   int max_age = 10;              ///< after so many frames
   int max_violations = 3;        ///< a point that was seen through so often goes
+
+  double reference_sigma = 0.0;  ///< noise of an observation of weight 1 [m]; 0: the frame's median
 
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };

@@ -38,8 +38,7 @@ struct ModelOptions {
   FoldIn fold_in = FoldIn::fuse;
   FusionOptions fusion;
   ConsolidateOptions consolidation;  ///< its num_points is not used: see max_points
-  NormalOptions normals;             ///< of the frames and the model where fold_in is not fuse
-  bool organized_normals = true;     ///< normals of a frame from its image instead of its k nearest neighbours
+  NormalOptions normals;             ///< of the model, where fold_in is not fuse
   double spacing = 0.0;              ///< distance between model points [m]; 0: twice the first frame's median pixel
   int max_points = 500000;           ///< the model never grows beyond: its spacing is widened instead
   bool predict_motion = true;        ///< start also from the pose that continues the last motion

@@ -1,0 +1,36 @@
+// One step of ICP: the motion that reduces the residuals of given pairs, and what the pairs know about the pose.
+#pragma once
+
+#include <vector>
+
+#include "nacre/registration.hpp"
+
+namespace nacre {
+
+// A source point p, already moved, and the target point q that it is matched with.
+struct Pair {
+  Eigen::Vector3d p, q;
+  Eigen::Vector3d normal;  // direction along which the residual counts; not used by point_to_point
+  double weight;
+};
+
+inline double residual(const Pair& pair, Metric metric) {
+  const Eigen::Vector3d difference = pair.p - pair.q;
+  return metric == Metric::point_to_point ? difference.norm() : difference.dot(pair.normal);
+}
+
+struct IcpStep {
+  Pose motion = Pose::Identity();  // p <- motion * p
+  double size = 0.0;               // how far the motion moves the pairs, root mean square [m]
+  double rmse = 0.0;               // of the residuals before the motion [m]
+  double variance = 0.0;           // weighted mean of the squared residuals before the motion [m^2]
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Matrix6 hessian = Matrix6::Zero();  // of half the weighted squares, for a twist (rotation, translation) about center
+  Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  // scaled unit twists about center
+};
+
+// Directions whose eigenvalue per unit of weight, with rotations in units of the pairs' extent, is below weak_threshold
+// do not move.
+IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, int num_threads);
+
+}  // namespace nacre

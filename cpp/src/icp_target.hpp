@@ -1,0 +1,60 @@
+// The cloud that others are registered to: prepared once, matched many times.
+#pragma once
+
+#include <vector>
+
+#include "icp_step.hpp"
+#include "nacre/kdtree.hpp"
+#include "nacre/registration.hpp"
+
+namespace nacre {
+
+// A source cloud ready for matching: the rows that may be used, in random order, so that any first part of them is a
+// fair sample.
+struct IcpSource {
+  PointsRef points;
+  Points estimated_normals;
+  PointsRef normals;
+  ValuesRef sigma;
+  std::vector<std::int32_t> order;
+
+  IcpSource(const AlignCloud& cloud, const AlignOptions& options);
+  bool has_normals() const { return normals.rows() == points.rows(); }
+};
+
+struct Gate {
+  double distance;   // [m]
+  double cos_angle;  // of the largest angle between matched normals
+};
+
+class IcpTarget {
+ public:
+  IcpTarget(const AlignCloud& cloud, const AlignOptions& options);
+
+  double diameter() const { return diameter_; }  // of the bounding box [m]
+  double spacing() const { return spacing_; }    // median distance of nearest neighbours [m]
+
+  // The source points `samples` moved by a pose, each with its nearest target point if that lies within the gate.
+  // `nearest` holds each source point's last match, -1 for none: a first bound for the search.
+  std::vector<Pair> match(const IcpSource& source, const std::vector<std::int32_t>& samples, const Pose& pose,
+                          const Gate& gate, std::vector<std::int32_t>& nearest) const;
+
+ private:
+  AlignOptions options_;
+  PointsRef points_;
+  Points estimated_normals_;
+  PointsRef normals_;
+  ValuesRef sigma_;
+  KdTree tree_;
+  double diameter_ = 0.0, spacing_ = 0.0;
+};
+
+// align with a prepared target.
+AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial,
+                     const AlignOptions& options);
+
+// The part of up to max_samples source points that find a target point within the gate.
+double overlap_at(const IcpTarget& target, const IcpSource& source, const Pose& pose, const Gate& gate,
+                  std::size_t max_samples);
+
+}  // namespace nacre
