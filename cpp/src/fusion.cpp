@@ -140,9 +140,10 @@ bool same_surface(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, c
 }
 
 struct NewPoint {
-  std::int32_t row;
-  Eigen::Vector3f point, normal, color;  // camera frame; color of the pixels around
-  float weight;
+  std::int32_t row = 0;
+  Eigen::Vector3f point = Eigen::Vector3f::Zero(), normal = point;  // camera frame
+  Eigen::Vector3f color = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+  float weight = 0.0F;
 };
 
 // Moves the model's points by what the frame says about them; returns which pixels they cover.
@@ -208,7 +209,10 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Observer& observ
                                       const std::vector<std::uint8_t>& covered, int num_threads) {
   std::vector<NewPoint> candidates;
   for (const std::int32_t row : frame.valid) {
-    if (!covered[static_cast<std::size_t>(row)]) candidates.push_back({row, {}, {}, {}, 0.0F});
+    if (covered[static_cast<std::size_t>(row)]) continue;
+    NewPoint candidate;
+    candidate.row = row;
+    candidates.push_back(candidate);
   }
   parallel_for(static_cast<std::int64_t>(candidates.size()), 1024, num_threads, [&](std::int64_t index) {
     NewPoint& candidate = candidates[static_cast<std::size_t>(index)];
@@ -219,7 +223,7 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Observer& observ
         observer.observe(candidate.point, candidate.normal, candidate.row, frame.sigma[candidate.row]);
     candidate.point += seen.offset * candidate.normal;
     candidate.normal = seen.normal.normalized();
-    candidate.color = seen.color;
+    if (observer.has_colors()) candidate.color = seen.color;
     candidate.weight = seen.weight;
   });
   candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
@@ -316,10 +320,7 @@ FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, c
   const Observer observer(frame, camera, options, colors);
   const std::vector<std::uint8_t> covered =
       update(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, report, num_threads);
-  std::vector<NewPoint> candidates = find_new_points(frame, observer, covered, num_threads);
-  if (with_colors && !observer.has_colors()) {
-    for (NewPoint& c : candidates) c.color.setConstant(std::numeric_limits<float>::quiet_NaN());
-  }
+  const std::vector<NewPoint> candidates = find_new_points(frame, observer, covered, num_threads);
   insert(model, candidates, frame, world_from_camera, spacing, frame_index, with_colors, report);
   remove_unconfirmed(model, frame_index, options, report);
   return report;
