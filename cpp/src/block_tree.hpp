@@ -1,5 +1,4 @@
-// The k-d tree: points in k-d order in blocks of 16 under a hierarchy of bounding boxes, 8 children each. There are no
-// pointers: child j of group g is the group (or block) 8 g + j one level below.
+// The k-d tree: points in k-d order in blocks of 16 under a hierarchy of bounding boxes, 8 children each.
 //
 // Searches filter in the precision of the coordinates (T) and decide in double: a lane passes where its distance in T
 // is not above a slightly enlarged bound, then its exact distance is compared.
@@ -74,20 +73,17 @@ class BlockTree {
   struct Box {
     T lo[3], hi[3];
     std::uint32_t first_id;
-  };
-  // A box still to visit: child `index` of level `level`; level -1 are the blocks.
-  struct Entry {
-    T d2;
-    int level;
-    std::uint32_t index;
+    void include(const Box& other);
   };
 
   std::vector<Box> build_blocks(const std::vector<IndexedPoint<T>>& points, int num_threads);
-  std::vector<Box> build_level(const std::vector<Box>& children, int num_threads);
-  Found nearest_possible(const Entry& entry, const Eigen::Vector3d& query) const;
+  std::vector<Box> build_groups(const std::vector<Box>& children, std::size_t first_child, int num_threads);
+  Found nearest_possible(std::uint32_t box, const Eigen::Vector3d& query) const;
 
   std::vector<PointBlock<T>> blocks_;
-  std::vector<std::vector<BoxGroup<T>>> levels_;  // the boxes of the blocks first, the root last
+  // Level after level, the groups over the blocks first, the root last. Box j of group g has the number 8 g + j, which
+  // for the blocks' boxes is the number of the block.
+  std::vector<BoxGroup<T>> groups_;
 };
 
 template <class T>
@@ -95,32 +91,41 @@ BlockTree<T>::BlockTree(const Eigen::Ref<const PointMatrix<T>>& points, int num_
   std::vector<IndexedPoint<T>> ordered = finite_points<T>(points);
   kd_order(ordered, num_threads);
   std::vector<Box> boxes = build_blocks(ordered, num_threads);
-  while (boxes.size() > (levels_.empty() ? 0u : 1u)) boxes = build_level(boxes, num_threads);
+  for (std::size_t first_child = 0; boxes.size() > (groups_.empty() ? 0u : 1u);) {
+    const std::size_t first_group = groups_.size();
+    boxes = build_groups(boxes, first_child, num_threads);
+    first_child = first_group;
+  }
 }
 
 template <class T>
+void BlockTree<T>::Box::include(const Box& other) {
+  for (int axis = 0; axis < 3; ++axis) {
+    lo[axis] = std::min(lo[axis], other.lo[axis]);
+    hi[axis] = std::max(hi[axis], other.hi[axis]);
+  }
+  first_id = std::min(first_id, other.first_id);
+}
+
+// Packs the points into blocks and returns the boxes of the blocks.
+template <class T>
 std::vector<typename BlockTree<T>::Box> BlockTree<T>::build_blocks(const std::vector<IndexedPoint<T>>& points,
                                                                    int num_threads) {
+  constexpr T nan = std::numeric_limits<T>::quiet_NaN();
   blocks_.resize((points.size() + block_points - 1) / block_points);
   std::vector<Box> boxes(blocks_.size());
-  parallel_for(static_cast<std::int64_t>(blocks_.size()), 256, num_threads, [&](std::int64_t b) {
-    constexpr T nan = std::numeric_limits<T>::quiet_NaN();
-    const auto first = static_cast<std::size_t>(b) * block_points;
-    PointBlock<T>& block = blocks_[static_cast<std::size_t>(b)];
-    Box& box = boxes[static_cast<std::size_t>(b)];
-    for (int axis = 0; axis < 3; ++axis) box.lo[axis] = box.hi[axis] = points[first].p[axis];
-    box.first_id = points[first].id;
-    for (int lane = 0; lane < block_points; ++lane) {
-      const std::size_t slot = first + static_cast<std::size_t>(lane);
-      const bool used = slot < points.size();
-      for (int axis = 0; axis < 3; ++axis) {
-        block.p[axis][lane] = used ? points[slot].p[axis] : nan;
-        if (!used) continue;
-        box.lo[axis] = std::min(box.lo[axis], points[slot].p[axis]);
-        box.hi[axis] = std::max(box.hi[axis], points[slot].p[axis]);
-      }
-      block.id[lane] = used ? points[slot].id : no_id;
-      box.first_id = std::min(box.first_id, block.id[lane]);
+  parallel_for(static_cast<std::int64_t>(blocks_.size()), 256, num_threads, [&](std::int64_t i) {
+    PointBlock<T>& block = blocks_[static_cast<std::size_t>(i)];
+    const std::size_t first = static_cast<std::size_t>(i) * block_points;
+    const std::size_t count = std::min<std::size_t>(points.size() - first, block_points);
+    for (std::size_t lane = 0; lane < block_points; ++lane) {
+      const IndexedPoint<T> point = lane < count ? points[first + lane] : IndexedPoint<T>{{nan, nan, nan}, no_id};
+      for (int axis = 0; axis < 3; ++axis) block.p[axis][static_cast<int>(lane)] = point.p[axis];
+      block.id[lane] = point.id;
+      if (lane >= count) continue;
+      const Box box = {{point.p[0], point.p[1], point.p[2]}, {point.p[0], point.p[1], point.p[2]}, point.id};
+      if (lane == 0) boxes[static_cast<std::size_t>(i)] = box;
+      boxes[static_cast<std::size_t>(i)].include(box);
     }
   });
   return boxes;
@@ -128,37 +133,37 @@ std::vector<typename BlockTree<T>::Box> BlockTree<T>::build_blocks(const std::ve
 
 // Packs the boxes of one level into groups and returns the boxes of the groups.
 template <class T>
-std::vector<typename BlockTree<T>::Box> BlockTree<T>::build_level(const std::vector<Box>& children, int num_threads) {
-  std::vector<BoxGroup<T>> groups((children.size() + group_boxes - 1) / group_boxes);
-  std::vector<Box> boxes(groups.size());
-  parallel_for(static_cast<std::int64_t>(groups.size()), 256, num_threads, [&](std::int64_t g) {
-    const auto first = static_cast<std::size_t>(g) * group_boxes;
-    BoxGroup<T>& group = groups[static_cast<std::size_t>(g)];
-    Box& box = boxes[static_cast<std::size_t>(g)];
-    box = children[first];
-    group.used = 0;
-    for (int lane = 0; lane < group_boxes; ++lane) {
-      const Box& child = children[std::min(first + static_cast<std::size_t>(lane), children.size() - 1)];
-      if (first + static_cast<std::size_t>(lane) < children.size()) group.used |= 1u << lane;
+std::vector<typename BlockTree<T>::Box> BlockTree<T>::build_groups(const std::vector<Box>& children,
+                                                                   std::size_t first_child, int num_threads) {
+  const std::size_t first_group = groups_.size();
+  std::vector<Box> boxes((children.size() + group_boxes - 1) / group_boxes);
+  groups_.resize(first_group + boxes.size());
+  parallel_for(static_cast<std::int64_t>(boxes.size()), 256, num_threads, [&](std::int64_t i) {
+    BoxGroup<T>& group = groups_[first_group + static_cast<std::size_t>(i)];
+    const std::size_t first = static_cast<std::size_t>(i) * group_boxes;
+    const std::size_t count = std::min<std::size_t>(children.size() - first, group_boxes);
+    Box box = children[first];
+    for (std::size_t lane = 0; lane < group_boxes; ++lane) {
+      const Box& child = children[first + std::min(lane, count - 1)];
       for (int axis = 0; axis < 3; ++axis) {
-        group.lo[axis][lane] = child.lo[axis];
-        group.hi[axis][lane] = child.hi[axis];
-        box.lo[axis] = std::min(box.lo[axis], child.lo[axis]);
-        box.hi[axis] = std::max(box.hi[axis], child.hi[axis]);
+        group.lo[axis][static_cast<int>(lane)] = child.lo[axis];
+        group.hi[axis][static_cast<int>(lane)] = child.hi[axis];
       }
       group.first_id[lane] = child.first_id;
-      box.first_id = std::min(box.first_id, child.first_id);
+      box.include(child);
     }
+    group.first_child = static_cast<std::uint32_t>(first_child + first);
+    group.used = (1u << count) - 1;
+    boxes[static_cast<std::size_t>(i)] = box;
   });
-  levels_.push_back(std::move(groups));
   return boxes;
 }
 
 // No point of the box comes before this one: rounding is monotonic, so the box's distance is not above any of theirs.
 template <class T>
-Found BlockTree<T>::nearest_possible(const Entry& entry, const Eigen::Vector3d& query) const {
-  const BoxGroup<T>& group = levels_[static_cast<std::size_t>(entry.level + 1)][entry.index / group_boxes];
-  const auto lane = static_cast<int>(entry.index % group_boxes);
+Found BlockTree<T>::nearest_possible(std::uint32_t box, const Eigen::Vector3d& query) const {
+  const BoxGroup<T>& group = groups_[box / group_boxes];
+  const auto lane = static_cast<int>(box % group_boxes);
   double outside[3];
   for (int axis = 0; axis < 3; ++axis) {
     outside[axis] = std::max({0.0, group.lo[axis][lane] - query[axis], query[axis] - group.hi[axis][lane]});
@@ -169,7 +174,7 @@ Found BlockTree<T>::nearest_possible(const Entry& entry, const Eigen::Vector3d& 
 template <class T>
 template <class Results>
 void BlockTree<T>::search(const Eigen::Vector3d& query, Results& results) const {
-  if (levels_.empty() || !query.allFinite()) return;
+  if (groups_.empty() || !query.allFinite()) return;
   const T q[3] = {static_cast<T>(query.x()), static_cast<T>(query.y()), static_cast<T>(query.z())};
 
   // A point at distance d of the query is at most d + e from q, e = |query - q|, and for any s > 0
@@ -184,37 +189,45 @@ void BlockTree<T>::search(const Eigen::Vector3d& query, Results& results) const 
   };
   tighten();
 
+  // The boxes still to visit, nearest on top; opening one adds up to 7 more.
   constexpr int max_levels = 10;  // 16 * 8^10 > 2^32
-  Entry stack[max_levels * (group_boxes - 1) + 1];
+  T distance[max_levels * (group_boxes - 1) + 1];
+  std::uint32_t boxes[max_levels * (group_boxes - 1) + 1];
   int size = 0;
-  const int root_level = static_cast<int>(levels_.size()) - 1;
-  stack[size++] = {T(0), root_level, 0};
-  while (size > 0) {
-    const Entry entry = stack[--size];
-    if (!(entry.d2 <= limit)) continue;
-    if (entry.d2 >= tie && entry.level < root_level && !(nearest_possible(entry, query) < results.bound())) continue;
-    if (entry.level >= 0) {
-      const BoxGroup<T>& group = levels_[static_cast<std::size_t>(entry.level)][entry.index];
-      const typename BoxGroup<T>::Lanes d2 = group.squared_distances(q);
-      const int bottom = size;
-      for (unsigned mask = lanes_within(d2, limit) & group.used; mask != 0; mask &= mask - 1) {
-        const int lane = lowest_lane(mask);
-        int place = size++;
-        for (; place > bottom && stack[place - 1].d2 <= d2[lane]; --place) stack[place] = stack[place - 1];
-        stack[place] = {d2[lane], entry.level - 1, entry.index * group_boxes + static_cast<std::uint32_t>(lane)};
+  const auto open = [&](std::size_t index) {
+    const BoxGroup<T>& group = groups_[index];
+    const typename BoxGroup<T>::Lanes d2 = group.squared_distances(q);
+    const int bottom = size;
+    for (unsigned mask = lanes_within(d2, limit) & group.used; mask != 0; mask &= mask - 1) {
+      const int lane = lowest_lane(mask);
+      int place = size++;
+      for (; place > bottom && distance[place - 1] <= d2[lane]; --place) {
+        distance[place] = distance[place - 1];
+        boxes[place] = boxes[place - 1];
       }
-    } else {
-      const PointBlock<T>& block = blocks_[entry.index];
-      const typename PointBlock<T>::Lanes d2 = block.squared_distances(q);
-      for (unsigned mask = lanes_within(d2, limit); mask != 0; mask &= mask - 1) {
-        const int lane = lowest_lane(mask);
-        const double x = block.p[0][lane] - query.x(), y = block.p[1][lane] - query.y(),
-                     z = block.p[2][lane] - query.z();
-        results.add(
-            {x * x + y * y + z * z, block.id[lane], entry.index * block_points + static_cast<std::uint32_t>(lane)});
-      }
-      tighten();
+      distance[place] = d2[lane];
+      boxes[place] = static_cast<std::uint32_t>(index * group_boxes) + static_cast<std::uint32_t>(lane);
     }
+  };
+
+  open(groups_.size() - 1);
+  while (size > 0) {
+    --size;
+    const std::uint32_t box = boxes[size];
+    if (distance[size] > limit) continue;
+    if (distance[size] >= tie && !(nearest_possible(box, query) < results.bound())) continue;
+    if (box >= blocks_.size()) {
+      open(groups_[box / group_boxes].first_child + box % group_boxes);
+      continue;
+    }
+    const PointBlock<T>& block = blocks_[box];
+    const typename PointBlock<T>::Lanes d2 = block.squared_distances(q);
+    for (unsigned mask = lanes_within(d2, limit); mask != 0; mask &= mask - 1) {
+      const int lane = lowest_lane(mask);
+      const double x = block.p[0][lane] - query.x(), y = block.p[1][lane] - query.y(), z = block.p[2][lane] - query.z();
+      results.add({x * x + y * y + z * z, block.id[lane], box * block_points + static_cast<std::uint32_t>(lane)});
+    }
+    tighten();
   }
 }
 

@@ -33,13 +33,13 @@ void require_plausible_median(const DepthRef& depth) {
   throw std::invalid_argument(message.str());
 }
 
-EdgeMarks mark_edges(const DepthRef& depth, const PlanarImage& image, const NoiseModel& noise,
+EdgeMarks mark_edges(const DepthRef& depth, const PlanarImage& image, const WindowFits& fits, const NoiseModel& noise,
                      const DepthOptions& options, int num_threads) {
   switch (options.edge_test) {
     case EdgeTest::gradient:
       return mark_gradient_edges(depth, options, num_threads);
     case EdgeTest::inverse_depth:
-      return mark_planar_edges(image, noise, options, num_threads);
+      return mark_planar_edges(image, fits, noise, options, num_threads);
     case EdgeTest::none:
       break;
   }
@@ -87,8 +87,9 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
 
   // The tests see every measurement, so that range and mask do not make edges where there are none.
   const PlanarImage image(depth, camera, num_threads);
-  const NoiseModel noise = options.noise ? *options.noise : estimate_noise(image, camera, num_threads);
-  EdgeMarks marks = mark_edges(depth, image, noise, options, num_threads);
+  const WindowFits fits = fit_windows(image, num_threads);
+  const NoiseModel noise = options.noise ? *options.noise : estimate_noise(image, fits, camera);
+  EdgeMarks marks = mark_edges(depth, image, fits, noise, options, num_threads);
   const int width = camera.width(), height = camera.height();
   dilate(width, height, options.edge_dilation, num_threads, marks.edge);
   dilate(width, height, options.edge_dilation, num_threads, marks.slanted);

@@ -29,13 +29,14 @@ struct alignas(64) PointBlock {
   }
 };
 
-// The bounding boxes of 8 consecutive children (blocks, or groups of boxes) and their points' smallest ids. Lanes
-// beyond the last child are not set in `used`.
+// The bounding boxes of 8 consecutive children (blocks, or groups of boxes), first_child onwards, and their points'
+// smallest ids. Lanes beyond the last child are not set in `used`.
 template <class T>
 struct alignas(64) BoxGroup {
   using Lanes = Eigen::Array<T, group_boxes, 1>;
   Lanes lo[3], hi[3];
   std::uint32_t first_id[group_boxes];
+  std::uint32_t first_child;
   unsigned used;
 
   // The sum over the axes of max(0, lo - q, q - hi)^2.

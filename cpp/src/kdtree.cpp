@@ -21,22 +21,26 @@ std::variant<BlockTree<float>, BlockTree<double>> make_tree(const Eigen::Ref<con
   return BlockTree<T>(points, num_threads);
 }
 
-// The rows in an order in which each is near the one before, rows that are not finite last.
+// The queries in an order in which each is near the one before, those that are not finite last.
 template <class T>
-std::vector<std::uint32_t> visiting_order(const Eigen::Ref<const PointMatrix<T>>& queries, int num_threads) {
-  std::vector<IndexedPoint<T>> points = finite_points<T>(queries);
-  kd_order(points, num_threads);
-  std::vector<std::uint32_t> order;
-  order.reserve(static_cast<std::size_t>(queries.rows()));
-  for (const IndexedPoint<T>& point : points) order.push_back(point.id);
-  for (Eigen::Index i = 0; i < queries.rows() && order.size() < static_cast<std::size_t>(queries.rows()); ++i) {
-    if (!queries.row(i).allFinite()) order.push_back(static_cast<std::uint32_t>(i));
+std::vector<IndexedPoint<T>> visiting_order(const Eigen::Ref<const PointMatrix<T>>& queries, int num_threads) {
+  require(queries.rows() < static_cast<Eigen::Index>(no_id), "queries", "fewer than 2^32 - 1 points", queries.rows());
+  std::vector<IndexedPoint<T>> order = finite_points<T>(queries);
+  kd_order(order, num_threads);
+  for (Eigen::Index i = 0; order.size() < static_cast<std::size_t>(queries.rows()); ++i) {
+    if (queries.row(i).allFinite()) continue;
+    order.push_back({{queries(i, 0), queries(i, 1), queries(i, 2)}, static_cast<std::uint32_t>(i)});
   }
   return order;
 }
 
-// The k nearest of query after query: the last answer bounds the next, because k points within r of one place are
-// within r + |step| of another.
+template <class T>
+Eigen::Vector3d position(const IndexedPoint<T>& point) {
+  return {point.p[0], point.p[1], point.p[2]};
+}
+
+// The k nearest of query after query. Earlier answers bound the next one: k points within r of one place are within
+// r + |step| of another.
 template <class Tree>
 class WarmSearch {
  public:
@@ -45,14 +49,19 @@ class WarmSearch {
 
   // Returns how many were found.
   int operator()(const Eigen::Vector3d& query) {
-    constexpr double rounding = 1.0 + 1e-12;
-    const double reach = radius_ + (query - last_).norm();
-    KNearest nearest(static_cast<int>(found_.size()),
-                     std::min(max_d2_, reach * reach * rounding + std::numeric_limits<double>::min()), found_.data());
+    constexpr double rounding = 1.0 + 1e-12, tiny = std::numeric_limits<double>::min();
+    const double reach =
+        (((x_ - query.x()).square() + (y_ - query.y()).square() + (z_ - query.z()).square()).sqrt() + radius_)
+            .minCoeff();
+    const double bound = reach * reach * rounding + tiny;
+    KNearest nearest(static_cast<int>(found_.size()), bound < max_d2_ ? bound : max_d2_, found_.data());
     tree_.search(query, nearest);
     if (nearest.size() == static_cast<int>(found_.size())) {
-      radius_ = std::sqrt(found_.back().d2);
-      last_ = query;
+      x_[next_] = query.x();
+      y_[next_] = query.y();
+      z_[next_] = query.z();
+      radius_[next_] = std::sqrt(found_.back().d2);
+      next_ = (next_ + 1) % static_cast<int>(x_.size());
     }
     return nearest.size();
   }
@@ -60,11 +69,14 @@ class WarmSearch {
   const Found& operator[](int rank) const { return found_[static_cast<std::size_t>(rank)]; }
 
  private:
+  using Answers = Eigen::Array<double, 8, 1>;
+
   const Tree& tree_;
   double max_d2_;
   std::vector<Found> found_;
-  double radius_ = KdTree::infinity;
-  Eigen::Vector3d last_ = Eigen::Vector3d::Zero();
+  Answers x_ = Answers::Zero(), y_ = Answers::Zero(), z_ = Answers::Zero();  // the places of the last answers
+  Answers radius_ = Answers::Constant(KdTree::infinity);                     // the distances of their k-th points
+  int next_ = 0;
 };
 
 void require_distance(const char* name, double distance) {
@@ -81,7 +93,7 @@ struct KdTree::Impl {
   Neighbors query(const Eigen::Ref<const PointMatrix<T>>& queries, int k, double max_distance, int num_threads) const {
     require(k >= 1, "k", "at least 1", k);
     require_distance("max_distance", max_distance);
-    const std::vector<std::uint32_t> order = visiting_order<T>(queries, num_threads);
+    const std::vector<IndexedPoint<T>> order = visiting_order<T>(queries, num_threads);
     Neighbors result;
     result.distances.resize(queries.rows(), k);
     result.indices.resize(queries.rows(), k);
@@ -89,12 +101,16 @@ struct KdTree::Impl {
       parallel_blocks(queries.rows(), queries_per_block, num_threads, [&](auto, std::int64_t begin, std::int64_t end) {
         WarmSearch search(blocks, k, max_distance);
         for (std::int64_t i = begin; i < end; ++i) {
-          const std::uint32_t row = order[static_cast<std::size_t>(i)];
-          const int found = search(queries.row(row).transpose().template cast<double>());
-          for (int j = 0; j < k; ++j) {
-            result.distances(row, j) = j < found ? std::sqrt(search[j].d2) : infinity;
-            result.indices(row, j) = j < found ? search[j].id : size;
+          const IndexedPoint<T>& point = order[static_cast<std::size_t>(i)];
+          const int found = search(position(point));
+          double* distances = result.distances.row(point.id).data();
+          std::int64_t* indices = result.indices.row(point.id).data();
+          for (int j = 0; j < found; ++j) {
+            distances[j] = std::sqrt(search[j].d2);
+            indices[j] = search[j].id;
           }
+          std::fill(distances + found, distances + k, infinity);
+          std::fill(indices + found, indices + k, size);
         }
       });
     };
@@ -105,7 +121,7 @@ struct KdTree::Impl {
   template <class T>
   RadiusNeighbors query_radius(const Eigen::Ref<const PointMatrix<T>>& queries, double radius, int num_threads) const {
     require_distance("radius", radius);
-    const std::vector<std::uint32_t> order = visiting_order<T>(queries, num_threads);
+    const std::vector<IndexedPoint<T>> order = visiting_order<T>(queries, num_threads);
     const auto num_queries = static_cast<std::size_t>(queries.rows());
     RadiusNeighbors result;
     result.offsets.assign(num_queries + 1, 0);
@@ -116,12 +132,12 @@ struct KdTree::Impl {
       parallel_blocks(queries.rows(), queries_per_block, num_threads, [&](auto block, auto begin, auto end) {
         std::vector<Found>& found = found_by_block[static_cast<std::size_t>(block)];
         for (std::int64_t i = begin; i < end; ++i) {
-          const std::uint32_t row = order[static_cast<std::size_t>(i)];
+          const IndexedPoint<T>& point = order[static_cast<std::size_t>(i)];
           const std::size_t before = found.size();
           WithinRadius within(radius * radius, found);
-          blocks.search(queries.row(row).transpose().template cast<double>(), within);
+          blocks.search(position(point), within);
           std::sort(found.begin() + static_cast<std::ptrdiff_t>(before), found.end());
-          result.offsets[row + 1] = static_cast<std::int64_t>(found.size() - before);
+          result.offsets[point.id + 1] = static_cast<std::int64_t>(found.size() - before);
         }
       });
     };
@@ -132,7 +148,7 @@ struct KdTree::Impl {
     parallel_blocks(queries.rows(), queries_per_block, num_threads, [&](auto block, auto begin, auto end) {
       auto found = found_by_block[static_cast<std::size_t>(block)].cbegin();
       for (std::int64_t i = begin; i < end; ++i) {
-        const std::uint32_t row = order[static_cast<std::size_t>(i)];
+        const std::uint32_t row = order[static_cast<std::size_t>(i)].id;
         for (auto j = static_cast<std::size_t>(result.offsets[row]);
              j < static_cast<std::size_t>(result.offsets[row + 1]); ++j, ++found) {
           result.indices[j] = found->id;

@@ -12,7 +12,7 @@ constexpr int kMinRadius = 2, kMaxRadius = 5;
 constexpr float kSlopeSigma = 0.07F;   // the window grows until the fitted slope is this certain
 constexpr float kMinFilled = 0.4F;     // of the window
 constexpr float kMinSpread = 0.02F;    // of the squared spread of a full window, in its two directions together
-constexpr float kGateSlope = 3.73F;    // neighbours belong to the surface up to a slant of 75 degrees
+constexpr float kGateSlope = 5.67F;    // neighbours belong to the surface up to a slant of 80 degrees
 constexpr float kGateSigmas = 4.0F;
 
 constexpr int kChunk = 64;  // pixels of a row that are fitted together

@@ -3,31 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre import _core, arrays
-
-if TYPE_CHECKING:
-    from nacre._core import Camera
-
-
-class NoiseLike(Protocol):
-    """What a noise model must have: sigma(z) = constant + quadratic * (z - offset)^2."""
-
-    @property
-    def constant(self) -> float:
-        """[m]."""
-
-    @property
-    def quadratic(self) -> float:
-        """[1/m]."""
-
-    @property
-    def offset(self) -> float:
-        """[m]."""
+from nacre.depth import NoiseModel, as_noise
+from nacre.parameters import to_core
 
 
 @dataclasses.dataclass(frozen=True)
@@ -50,7 +33,9 @@ class RayHits:
 @dataclasses.dataclass(frozen=True)
 class ClosestPoints:
     """
-    The points of a mesh that are nearest to given points, one row per point; NaN and -1 for points that are not finite.
+    The points of a mesh that are nearest to given points, one row per point.
+
+    Rows of points that are not finite are NaN, with triangle -1.
 
     Attributes
     ----------
@@ -70,24 +55,16 @@ class ClosestPoints:
     triangles: npt.NDArray[np.int32]
 
 
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Mesh:
     """
-    A triangle mesh with a search tree, built once, for rays and nearest points.
+    A triangle mesh with a search tree, built once, for rays and nearest points. Immutable.
 
     Parameters
     ----------
     vertices : (V, 3) array_like of real numbers
-        [m]. float64 coordinates far from 0 keep their digits: the tree works in float32 about a nearby origin.
+        [m]. float64 coordinates far from 0 keep their digits: the tree is made about a nearby origin.
     triangles : (T, 3) array_like of integers
         Vertex indices.
-
-    Attributes
-    ----------
-    vertices : (V, 3) float32 or float64, read-only
-        A copy.
-    triangles : (T, 3) int32, read-only
-        A copy.
 
     Raises
     ------
@@ -95,23 +72,13 @@ class Mesh:
         For vertices that are not finite, indices out of range, or no triangle.
     """
 
-    vertices: arrays.FloatArray
-    triangles: npt.NDArray[np.int32]
-
-    def __post_init__(self) -> None:
-        vertices = arrays.as_points("vertices", self.vertices).copy()
-        triangles = arrays.as_triangles("triangles", self.triangles, len(vertices)).copy()
-        local, origin = arrays.localize(vertices)
-        tree = _core.MeshTree(local, triangles)
-        for array in (vertices, triangles, origin):
-            array.flags.writeable = False
-        for name, value in (
-            ("vertices", vertices),
-            ("triangles", triangles),
-            ("_tree", tree),
-            ("_origin", origin),
-        ):
-            object.__setattr__(self, name, value)
+    def __init__(self, vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> None:
+        self._vertices = arrays.as_points("vertices", vertices).copy()
+        self._triangles = arrays.as_triangles("triangles", triangles, len(self._vertices)).copy()
+        self._vertices.flags.writeable = False
+        self._triangles.flags.writeable = False
+        local, self._origin = arrays.localize(self._vertices)
+        self._tree = _core.MeshTree(local, self._triangles)
 
     def __repr__(self) -> str:
         size = " x ".join(f"{side:.4g}" for side in self.bounds[1] - self.bounds[0])
@@ -121,10 +88,20 @@ class Mesh:
         return Mesh, (self.vertices, self.triangles)
 
     @property
+    def vertices(self) -> arrays.FloatArray:
+        """(V, 3) float32 or float64, read-only [m]."""
+        return self._vertices
+
+    @property
+    def triangles(self) -> npt.NDArray[np.int32]:
+        """(T, 3) int32, read-only: vertex indices."""
+        return self._triangles
+
+    @property
     def bounds(self) -> npt.NDArray[np.float64]:
         """(2, 3): the smallest and the largest corner of the box around the triangles [m]."""
-        tree, origin = self._parts()
-        return np.stack([tree.lower, tree.upper]) + origin
+        bounds: npt.NDArray[np.float64] = np.stack([self._tree.lower, self._tree.upper]) + self._origin
+        return bounds
 
     def closest(self, points: npt.ArrayLike, *, num_threads: int = 0) -> ClosestPoints:
         """
@@ -141,22 +118,19 @@ class Mesh:
         -------
         ClosestPoints
         """
-        tree, origin = self._parts()
-        queries = arrays.as_points("points", points).astype(np.float64) - origin
-        nearest, normals, distances, triangles = tree.closest(queries, _threads(num_threads))
-        return ClosestPoints(nearest + origin, normals, distances, triangles)
+        queries = arrays.as_points("points", points).astype(np.float64) - self._origin
+        nearest, normals, distances, triangles = self._tree.closest(queries, num_threads)
+        return ClosestPoints(nearest + self._origin, normals, distances, triangles)
 
     def distance(self, points: npt.ArrayLike, *, num_threads: int = 0) -> npt.NDArray[np.float64]:
-        """Return the unsigned distance of each point to the surface, (N, 3) -> (N,) [m]; see :meth:`closest`."""
+        """Return the unsigned distance of each point to the surface, (N, 3) -> (N,) [m]."""
         return self.closest(points, num_threads=num_threads).distances
 
-    def cast(
-        self, origins: npt.ArrayLike, directions: npt.ArrayLike, *, num_threads: int = 0
-    ) -> RayHits:
+    def cast(self, origins: npt.ArrayLike, directions: npt.ArrayLike, *, num_threads: int = 0) -> RayHits:
         """
         Find the first triangle that each ray hits, from either side.
 
-        Watertight: no ray slips between triangles that share an edge or a vertex (Woop, Benthin and Wald 2013).
+        No ray slips between triangles that share an edge or a vertex (Woop, Benthin and Wald 2013).
 
         Parameters
         ----------
@@ -169,17 +143,16 @@ class Mesh:
         -------
         RayHits
         """
-        tree, origin = self._parts()
-        starts = arrays.as_points("origins", origins).astype(np.float64) - origin
+        starts = arrays.as_points("origins", origins).astype(np.float64) - self._origin
         ways = arrays.as_matching_points("directions", directions, "origins", len(starts)).astype(np.float64)
-        return RayHits(*tree.cast(starts, ways, _threads(num_threads)))
+        return RayHits(*self._tree.cast(starts, ways, num_threads))
 
     def simulate_depth(
         self,
-        camera: Camera,
+        camera: _core.Camera,
         world_from_camera: npt.ArrayLike,
         *,
-        noise: float | Literal["kinect"] | NoiseLike = 0.0,
+        noise: float | Literal["kinect"] | NoiseModel = 0.0,
         edge_mixing: float = 0.0,
         background_depth: float | None = None,
         quantization: float = 0.0,
@@ -188,31 +161,28 @@ class Mesh:
         num_threads: int = 0,
     ) -> npt.NDArray[np.float32]:
         """Return the depth image that a camera sees; see :func:`nacre.simulate_depth`."""
-        tree, origin = self._parts()
         pose = arrays.as_pose("world_from_camera", world_from_camera).copy()
-        pose[:3, 3] -= origin
-        options = _core.SimulationOptions()
-        options.noise.constant, options.noise.quadratic, options.noise.offset = _noise_terms(noise)
-        options.edge_mixing = float(edge_mixing)
-        options.background_depth = _background(background_depth)
-        options.quantization = quantization
-        options.dropout = dropout
-        options.seed = _seed(seed)
-        options.num_threads = _threads(num_threads)
-        image: npt.NDArray[np.float32] = _core.simulate_depth(tree, camera, pose, options)
-        return image
-
-    def _parts(self) -> tuple[Any, npt.NDArray[np.float64]]:
-        return self.__dict__["_tree"], self.__dict__["_origin"]
+        pose[:3, 3] -= self._origin
+        parameters = _Simulation(
+            noise=as_noise("noise", noise) or NoiseModel(),
+            edge_mixing=edge_mixing,
+            background_depth=_background(background_depth),
+            quantization=quantization,
+            dropout=dropout,
+            seed=seed,
+            num_threads=num_threads,
+        )
+        options = to_core(parameters, _core.SimulationOptions())
+        return _core.simulate_depth(self._tree, camera, pose, options)  # type: ignore[no-any-return]
 
 
 def built_in_object() -> Mesh:
     """
     Return nacre's own test object: a snail with the ears of a rabbit, made by formula.
 
-    It is 0.15 m long, looks along +x and stands on the plane y = 0 with y up. The surface is closed and consistently
-    oriented (33 000 vertices, 67 000 triangles). Ears, the lip of the shell and the hem of the foot are sheets 3 mm
-    thick; it has hollows and no symmetry.
+    It is 0.15 m long, looks along +x and stands on the plane y = 0 with y up. The surface is closed and
+    consistently oriented (33 000 vertices, 67 000 triangles). Ears, the lip of the shell and the hem of the
+    foot are sheets 3 mm thick; it has hollows and no symmetry.
 
     Returns
     -------
@@ -221,20 +191,15 @@ def built_in_object() -> Mesh:
     return Mesh(*_core.built_in_object())
 
 
-def _noise_terms(noise: float | str | NoiseLike) -> tuple[float, float, float]:
-    expected = 'noise must be a standard deviation in metres, "kinect" or a NoiseModel'
-    if isinstance(noise, str):
-        if noise != "kinect":
-            raise ValueError(f"{expected}, got {noise!r}")
-        noise = _core.NoiseModel.kinect()
-    if isinstance(noise, (int, float, np.integer, np.floating)):
-        if not (np.isfinite(noise) and noise >= 0):
-            raise ValueError(f"{expected}, got {noise!r}")
-        return float(noise), 0.0, 0.0
-    try:
-        return float(noise.constant), float(noise.quadratic), float(noise.offset)
-    except AttributeError:
-        raise TypeError(f"{expected}, got {type(noise).__name__}") from None
+@dataclasses.dataclass(frozen=True)
+class _Simulation:
+    noise: NoiseModel
+    edge_mixing: float
+    background_depth: float
+    quantization: float
+    dropout: float
+    seed: int
+    num_threads: int
 
 
 def _background(depth: float | None) -> float:
@@ -243,15 +208,3 @@ def _background(depth: float | None) -> float:
     if not (np.isfinite(depth) and depth > 0):
         raise ValueError(f"background_depth must be None or a positive length in metres, got {depth!r}")
     return float(depth)
-
-
-def _seed(seed: int) -> int:
-    if not 0 <= seed < 2**64:
-        raise ValueError(f"seed must be 0 to 2**64 - 1, got {seed!r}")
-    return int(seed)
-
-
-def _threads(num_threads: int) -> int:
-    if num_threads < 0:
-        raise ValueError(f"num_threads must be at least 0, got {num_threads!r}")
-    return int(num_threads)
