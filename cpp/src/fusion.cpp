@@ -63,7 +63,7 @@ class Observer {
   float support(float z, float sigma) const {
     if (options_.support > 0.0) return static_cast<float>(options_.support);
     const auto pixel = static_cast<float>(camera_.footprint(z));
-    return std::clamp(8.0F * sigma, 2.5F * pixel, static_cast<float>(max_window) * pixel);
+    return std::clamp(5.0F * sigma, 2.5F * pixel, static_cast<float>(max_window) * pixel);
   }
 
   // The residual of the symmetric implicit moving-least-squares surface:
