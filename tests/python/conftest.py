@@ -1,4 +1,4 @@
-"""What all tests share: where the repository and the recordings are, and the C++ library built once for the session."""
+"""What all tests share: where things are, and the C++ library, built once for the session."""
 
 import importlib.metadata
 import os

@@ -26,15 +26,34 @@ RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
 HEADERS = sorted((ROOT / "cpp" / "include" / "nacre").glob("*.hpp"))
 SOURCES = sorted((ROOT / "cpp" / "src").rglob("*.[ch]pp"))
 FOLDERS = ("cpp", "python", "tests", "examples", "benchmarks", "docs", "third_party", ".ci", ".github")
-TEXT = {".py", ".pyi", ".cpp", ".hpp", ".cmake", ".txt", ".md", ".toml", ".yml", ".yaml", ".json", ".in", ".sh", ""}
+TEXT = {
+    ".py",
+    ".pyi",
+    ".cpp",
+    ".hpp",
+    ".cmake",
+    ".txt",
+    ".md",
+    ".toml",
+    ".yml",
+    ".yaml",
+    ".json",
+    ".in",
+    ".sh",
+    "",
+}
 
 
 def files(*folders: str, suffixes: set[str] = TEXT) -> list[Path]:
     """List the text files of the repository, caches and this very file left out."""
-    found = [path for path in ROOT.iterdir() if path.is_file() and path.suffix in suffixes] if not folders else []
+    found = (
+        [path for path in ROOT.iterdir() if path.is_file() and path.suffix in suffixes] if not folders else []
+    )
     for folder in folders or FOLDERS:
         found += [path for path in (ROOT / folder).rglob("*") if path.is_file() and path.suffix in suffixes]
-    return sorted(path for path in found if "__pycache__" not in path.parts and path != Path(__file__).resolve())
+    return sorted(
+        path for path in found if "__pycache__" not in path.parts and path != Path(__file__).resolve()
+    )
 
 
 def lines_matching(pattern: str, paths: list[Path]) -> list[str]:
@@ -86,7 +105,9 @@ def test_public_headers_include_eigen_and_the_standard_library_only(path: Path) 
 
 
 def test_only_one_file_knows_openmp() -> None:
-    knowing = [p for p in [*HEADERS, *SOURCES] if re.search(r"#\s*pragma\s+omp|omp\.h|omp_\w+\(", p.read_text())]
+    knowing = [
+        p for p in [*HEADERS, *SOURCES] if re.search(r"#\s*pragma\s+omp|omp\.h|omp_\w+\(", p.read_text())
+    ]
     assert [path.name for path in knowing] == ["parallel.hpp"]
 
 
@@ -126,7 +147,14 @@ def test_the_stub_fits_the_extension_module() -> None:
         pytest.skip("mypy is missing: pip install --group dev")
     if not (ROOT / "python" / "nacre" / "_core.pyi").exists():
         pytest.skip("there is no stub yet")
-    command = [sys.executable, "-m", "mypy.stubtest", "nacre._core", "--mypy-config-file", str(ROOT / "pyproject.toml")]
+    command = [
+        sys.executable,
+        "-m",
+        "mypy.stubtest",
+        "nacre._core",
+        "--mypy-config-file",
+        str(ROOT / "pyproject.toml"),
+    ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
 

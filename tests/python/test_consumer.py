@@ -20,7 +20,10 @@ def kind(request: pytest.FixtureRequest) -> str:
 
 @pytest.fixture(scope="session")
 def installed(
-    kind: str, cmake: Callable[..., str], request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+    kind: str,
+    cmake: Callable[..., str],
+    request: pytest.FixtureRequest,
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> Path:
     """Install the library and then move it: an installed tree works wherever it stands."""
     build = request.getfixturevalue(f"{kind}_build")
@@ -29,18 +32,24 @@ def installed(
     return before.rename(before.parent / "installed")
 
 
-def build_and_run(cmake: Callable[..., str], run: Callable[..., str], name: str, folder: Path, *definitions: str) -> str:
+def build_and_run(
+    cmake: Callable[..., str], run: Callable[..., str], name: str, folder: Path, *definitions: str
+) -> str:
     cmake("-S", CONSUMER / name, "-B", folder, *definitions)
     cmake("--build", folder)
     return run(folder / "consumer")
 
 
-def test_find_package(installed: Path, cmake: Callable[..., str], run: Callable[..., str], tmp_path: Path) -> None:
+def test_find_package(
+    installed: Path, cmake: Callable[..., str], run: Callable[..., str], tmp_path: Path
+) -> None:
     output = build_and_run(cmake, run, "find_package", tmp_path, f"-Dnacre_ROOT={installed}")
     assert "FAILED" not in output
 
 
-def test_add_subdirectory(kind: str, cmake: Callable[..., str], run: Callable[..., str], tmp_path: Path) -> None:
+def test_add_subdirectory(
+    kind: str, cmake: Callable[..., str], run: Callable[..., str], tmp_path: Path
+) -> None:
     shared = "ON" if kind == "shared" else "OFF"
     output = build_and_run(cmake, run, "add_subdirectory", tmp_path, f"-DBUILD_SHARED_LIBS={shared}")
     assert "FAILED" not in output
@@ -70,7 +79,11 @@ def test_pkg_config(
 def test_client_with_other_vector_flags(
     installed: Path, cmake: Callable[..., str], run: Callable[..., str], tmp_path: Path
 ) -> None:
-    definitions = (f"-Dnacre_ROOT={installed}", "-DCMAKE_CXX_FLAGS=-mavx2 -mfma", "-DCMAKE_BUILD_TYPE=Release")
+    definitions = (
+        f"-Dnacre_ROOT={installed}",
+        "-DCMAKE_CXX_FLAGS=-mavx2 -mfma",
+        "-DCMAKE_BUILD_TYPE=Release",
+    )
     assert "FAILED" not in build_and_run(cmake, run, "find_package", tmp_path, *definitions)
 
 

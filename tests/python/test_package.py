@@ -47,13 +47,23 @@ def test_numpy_is_the_only_requirement() -> None:
 def test_all_brings_every_extra_but_the_developers() -> None:
     metadata = importlib.metadata.metadata("nacre")
     extras = set(metadata.get_all("Provides-Extra") or [])
-    (everything,) = (r for r in importlib.metadata.requires("nacre") or [] if re.search(r"""extra == ['"]all""", r))
+    (everything,) = (
+        r for r in importlib.metadata.requires("nacre") or [] if re.search(r"""extra == ['"]all""", r)
+    )
     assert set(re.findall(r"\[(.*?)\]", everything)[0].split(",")) == extras - {"all", "test"}
 
 
 def test_metadata_is_complete() -> None:
     metadata = importlib.metadata.metadata("nacre")
-    for field in ("Summary", "Author", "License-Expression", "Requires-Python", "Description", "Keywords", "Classifier"):
+    for field in (
+        "Summary",
+        "Author",
+        "License-Expression",
+        "Requires-Python",
+        "Description",
+        "Keywords",
+        "Classifier",
+    ):
         assert metadata[field], field
 
 
@@ -81,9 +91,18 @@ def test_source_distribution_can_be_built_from(root: Path, tmp_path: Path) -> No
     (archive,) = tmp_path.glob("*.tar.gz")
     with tarfile.open(archive) as sdist:
         names = {name.partition("/")[2] for name in sdist.getnames()}
-    wanted = [*root.glob("cpp/**/*.*pp"), *root.glob("cpp/*"), *root.glob("python/**/*.py"), *root.glob("python/**/*.?pp")]
+    wanted = [
+        *root.glob("cpp/**/*.*pp"),
+        *root.glob("cpp/*"),
+        *root.glob("python/**/*.py"),
+        *root.glob("python/**/*.?pp"),
+    ]
     wanted += [*root.glob("tests/**/*.*py"), *root.glob("tests/**/*.cpp"), *root.glob("third_party/**/*")]
-    wanted += [root / name for name in ("CMakeLists.txt", "LICENSE", "README.md", "pyproject.toml", "PKG-INFO")]
-    files = {path.relative_to(root).as_posix() for path in wanted if path.is_file() or path.name == "PKG-INFO"}
+    wanted += [
+        root / name for name in ("CMakeLists.txt", "LICENSE", "README.md", "pyproject.toml", "PKG-INFO")
+    ]
+    files = {
+        path.relative_to(root).as_posix() for path in wanted if path.is_file() or path.name == "PKG-INFO"
+    }
     assert files - names == set()
     assert not [name for name in names if name.startswith("build/") or name.endswith((".so", ".pyc"))]
