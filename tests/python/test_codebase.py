@@ -26,33 +26,21 @@ RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
 HEADERS = sorted((ROOT / "cpp" / "include" / "nacre").glob("*.hpp"))
 SOURCES = sorted((ROOT / "cpp" / "src").rglob("*.[ch]pp"))
 FOLDERS = ("cpp", "python", "tests", "examples", "benchmarks", "docs", "third_party", ".ci", ".github")
-TEXT = {
-    ".py",
-    ".pyi",
-    ".cpp",
-    ".hpp",
-    ".cmake",
-    ".txt",
-    ".md",
-    ".toml",
-    ".yml",
-    ".yaml",
-    ".json",
-    ".in",
-    ".sh",
-    "",
-}
+CODE = {".py", ".pyi", ".cpp", ".hpp", ".cmake", ".txt", ".toml", ".yml", ".yaml", ".json", ".in", ".sh", ""}
+TEXT = CODE | {".md"}
 
 
 def files(*folders: str, suffixes: set[str] = TEXT) -> list[Path]:
-    """List the text files of the repository, caches and this very file left out."""
-    found = (
-        [path for path in ROOT.iterdir() if path.is_file() and path.suffix in suffixes] if not folders else []
-    )
-    for folder in folders or FOLDERS:
-        found += [path for path in (ROOT / folder).rglob("*") if path.is_file() and path.suffix in suffixes]
+    """List the text files below some folders, or of the whole repository; not this very file."""
+    found = [path for folder in folders or FOLDERS for path in (ROOT / folder).rglob("*")]
+    found += [] if folders else [path for path in ROOT.iterdir() if path.name != ".git"]
     return sorted(
-        path for path in found if "__pycache__" not in path.parts and path != Path(__file__).resolve()
+        path
+        for path in found
+        if path.is_file()
+        and path.suffix in suffixes
+        and "__pycache__" not in path.parts
+        and path != Path(__file__).resolve()
     )
 
 
@@ -130,7 +118,7 @@ def test_only_the_facade_touches_the_extension_module() -> None:
 
 
 def test_no_build_depends_on_the_machine() -> None:
-    assert lines_matching(r"-march=native|-ffast-math|-Ofast", files(*FOLDERS[:5])) == []
+    assert lines_matching(r"-march=native|-ffast-math|-Ofast", files(suffixes=CODE)) == []
     assert lines_matching(r"""(^|[\s"'(=`])/(home|root|work|tmp|Users)/""", files()) == []
 
 
