@@ -106,8 +106,8 @@ def test_stl_of_several_solids_in_capitals(tmp_path):
 @given(seed=st.integers(0, 2**32 - 1), size=st.integers(0, 30))
 def test_stl_merges_as_a_dictionary_would(tmp_path_factory, seed, size):
     rng = np.random.default_rng(seed)
-    corners = rng.integers(0, 2, (size, 3, 3)) * rng.choice(np.float32([-0.1, 0.1]), (size, 3, 3))  # 0, -0, ...
-    corners = corners.astype(np.float32)
+    signs = rng.choice([-0.1, 0.1], (size, 3, 3))
+    corners = (rng.integers(0, 2, (size, 3, 3)) * signs).astype(np.float32)  # with 0 and -0
     vertices, triangles = read(tmp_path_factory.getbasetemp(), "a.stl", stl_binary(corners))
     np.testing.assert_array_equal(vertices[triangles], corners)
     first_seen = list(dict.fromkeys(map(tuple, (corners + 0).reshape(-1, 3).tolist())))
