@@ -338,6 +338,7 @@ class TestText:
             (1e-9, "fraction", "0.1 %"),
             (20412, "count", f"20{SPACE}412"),
             (41.27, "ms", "41.3 ms"),
+            (3348.2, "ms", "3.35 s"),
             (None, "m", "\N{EN DASH}"),
             (math.nan, "m", "\N{EN DASH}"),
             (np.float32(0.5), "", "0.500"),
