@@ -120,8 +120,10 @@ void consolidate_frame(PointModel& model, const Frame& frame, const Pose& world_
   if (literal) {
     moved = project_samples(as_matrix(samples.points), as_matrix(points.points), consolidation);
   } else {
-    ProjectionHints hints{Eigen::Map<const Values>(points.confidence.data(), points.size()), as_matrix(samples.normals),
-                          &unseen};
+    ProjectionHints hints;
+    hints.point_weights = Eigen::Map<const Values>(points.confidence.data(), points.size());
+    hints.sample_normals = as_matrix(samples.normals);
+    hints.frozen = unseen;
     moved = project_samples(as_matrix(samples.points), as_matrix(points.points), consolidation, hints);
   }
   for (std::size_t i = 0; i < samples.points.size(); ++i) {

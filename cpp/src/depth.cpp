@@ -13,6 +13,9 @@ namespace {
 
 constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
 
+// A pixel beyond the end of the distortion model sees nothing that could be placed.
+bool has_direction(const Ray& ray) { return ray.direction_x == ray.direction_x; }
+
 // A wrong depth_scale shows as a median depth that no depth camera measures. A sample of the pixels tells enough.
 void require_plausible_median(const DepthRef& depth) {
   constexpr std::int64_t max_sample = 1 << 15;
@@ -33,13 +36,13 @@ void require_plausible_median(const DepthRef& depth) {
   throw std::invalid_argument(message.str());
 }
 
-EdgeMarks mark_edges(const DepthRef& depth, const PlanarImage& image, const NoiseModel& noise,
+EdgeMarks mark_edges(const DepthRef& depth, const PlanarImage& image, const WindowFits& fits, const NoiseModel& noise,
                      const DepthOptions& options, int num_threads) {
   switch (options.edge_test) {
     case EdgeTest::gradient:
       return mark_gradient_edges(depth, options, num_threads);
     case EdgeTest::inverse_depth:
-      return mark_planar_edges(image, noise, options, num_threads);
+      return mark_planar_edges(image, fits, noise, options, num_threads);
     case EdgeTest::none:
       break;
   }
@@ -50,7 +53,8 @@ EdgeMarks mark_edges(const DepthRef& depth, const PlanarImage& image, const Nois
 }  // namespace
 
 void DepthOptions::check() const {
-  require(min_depth >= 0.0 && std::isfinite(min_depth), "min_depth", "a finite number of metres, at least 0", min_depth);
+  require(min_depth >= 0.0 && std::isfinite(min_depth), "min_depth", "a finite number of metres, at least 0",
+          min_depth);
   require(max_depth > min_depth, "max_depth", "greater than min_depth", max_depth);
   require(gradient_threshold > 0.0, "gradient_threshold", "a positive depth step in metres", gradient_threshold);
   require(edge_dilation >= 0 && edge_dilation <= 100, "edge_dilation", "0 to 100 pixels", edge_dilation);
@@ -62,7 +66,8 @@ void DepthOptions::check() const {
 }
 
 void NoiseModel::check() const {
-  require(std::isfinite(constant) && constant >= 0.0, "noise.constant", "a finite number of metres, at least 0", constant);
+  require(std::isfinite(constant) && constant >= 0.0, "noise.constant", "a finite number of metres, at least 0",
+          constant);
   require(std::isfinite(quadratic) && quadratic >= 0.0, "noise.quadratic", "finite, at least 0", quadratic);
   require(std::isfinite(offset), "noise.offset", "finite", offset);
 }
@@ -87,12 +92,14 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
 
   // The tests see every measurement, so that range and mask do not make edges where there are none.
   const PlanarImage image(depth, camera, num_threads);
-  const NoiseModel noise = options.noise ? *options.noise : estimate_noise(image, camera, num_threads);
-  EdgeMarks marks = mark_edges(depth, image, noise, options, num_threads);
+  const WindowFits fits = fit_windows(image, num_threads);
+  const NoiseModel noise = options.noise ? *options.noise : estimate_noise(image, fits, camera);
+  EdgeMarks marks = mark_edges(depth, image, fits, noise, options, num_threads);
   const int width = camera.width(), height = camera.height();
   dilate(width, height, options.edge_dilation, num_threads, marks.edge);
   dilate(width, height, options.edge_dilation, num_threads, marks.slanted);
 
+  const Ray* const rays = camera.rays().data();
   DepthReport counts;
   counts.num_pixels = depth.size();
   Marks keep(static_cast<std::size_t>(depth.size()));
@@ -100,7 +107,7 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
     for (std::int64_t u = 0; u < width; ++u, ++i) {
       const float z = depth(v, u);
       const auto pixel = static_cast<std::size_t>(i);
-      if (!is_measurement(z)) {
+      if (!is_measurement(z) || !has_direction(rays[i])) {
         ++counts.num_invalid;
       } else if (z < options.min_depth || z > options.max_depth) {
         ++counts.num_out_of_range;
@@ -136,16 +143,22 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
 
 Points back_project(const DepthRef& depth, const Camera& camera) {
   require_camera_size("depth", depth.rows(), depth.cols(), camera);
-  const auto num_points = depth.unaryExpr([](float z) { return is_measurement(z); }).count();
+  const Ray* const rays = camera.rays().data();
+  const auto seen = [&](Eigen::Index v, Eigen::Index u) {
+    return is_measurement(depth(v, u)) && has_direction(rays[v * depth.cols() + u]);
+  };
+  Eigen::Index num_points = 0;
+  for (Eigen::Index v = 0; v < depth.rows(); ++v) {
+    for (Eigen::Index u = 0; u < depth.cols(); ++u) num_points += seen(v, u);
+  }
   Points points(num_points, 3);
   Eigen::Index next = 0;
-  const Ray* ray = camera.rays().data();
   for (Eigen::Index v = 0; v < depth.rows(); ++v) {
-    for (Eigen::Index u = 0; u < depth.cols(); ++u, ++ray) {
+    for (Eigen::Index u = 0; u < depth.cols(); ++u) {
+      if (!seen(v, u)) continue;
+      const Ray& ray = rays[v * depth.cols() + u];
       const float z = depth(v, u);
-      if (!is_measurement(z)) continue;
-      points.row(next++) << ray->origin_x + z * ray->direction_x, ray->origin_y + z * ray->direction_y,
-          z * ray->direction_z;
+      points.row(next++) << ray.origin_x + z * ray.direction_x, ray.origin_y + z * ray.direction_y, z * ray.direction_z;
     }
   }
   return points;

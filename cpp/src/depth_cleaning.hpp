@@ -5,12 +5,11 @@
 #include <vector>
 
 #include "planar_image.hpp"
+#include "window_fits.hpp"
 
 namespace nacre {
 
 using Marks = std::vector<std::uint8_t>;
-
-NoiseModel estimate_noise(const PlanarImage& image, const Camera& camera, int num_threads);
 
 struct EdgeMarks {
   Marks edge, slanted;
@@ -21,8 +20,8 @@ struct EdgeMarks {
 EdgeMarks mark_gradient_edges(const DepthRef& depth, const DepthOptions& options, int num_threads);
 
 // Second differences of the planar image above the noise, and slants above options.max_slant.
-EdgeMarks mark_planar_edges(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options,
-                            int num_threads);
+EdgeMarks mark_planar_edges(const PlanarImage& image, const WindowFits& fits, const NoiseModel& noise,
+                            const DepthOptions& options, int num_threads);
 
 // Grows the marks by a radius, in both directions of the image.
 void dilate(int width, int height, int radius, int num_threads, Marks& marks);

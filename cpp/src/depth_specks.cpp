@@ -70,7 +70,8 @@ Marks mark_specks(const PlanarImage& image, const NoiseModel& noise, const Depth
       ++run_size[static_cast<std::size_t>(run_of[i])];
       if (v == 0) continue;
       const std::size_t up = i - static_cast<std::size_t>(width);
-      if (!keep[up] || parent[static_cast<std::size_t>(run_of[up])] == parent[static_cast<std::size_t>(run_of[i])]) continue;
+      if (!keep[up] || parent[static_cast<std::size_t>(run_of[up])] == parent[static_cast<std::size_t>(run_of[i])])
+        continue;
       if (!connected(row[u], above[u])) continue;
       const std::int32_t a = find_root(parent, run_of[up]), b = find_root(parent, run_of[i]);
       parent[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
@@ -83,7 +84,8 @@ Marks mark_specks(const PlanarImage& image, const NoiseModel& noise, const Depth
   }
   Marks marks(keep.size());
   for (std::size_t i = 0; i < keep.size(); ++i) {
-    marks[i] = keep[i] && size[static_cast<std::size_t>(parent[static_cast<std::size_t>(run_of[i])])] < options.min_component;
+    marks[i] =
+        keep[i] && size[static_cast<std::size_t>(parent[static_cast<std::size_t>(run_of[i])])] < options.min_component;
   }
   return marks;
 }

@@ -11,7 +11,8 @@ namespace nacre {
 enum class ConsolidationMethod {
   wlop,       ///< Huang et al. 2009, density weights for both sets: the paper's form
   wlop_plus,  ///< repaired for incremental use: tangential, bounded repulsion that fades where there are no neighbours
-  cgal        ///< the kernel of CGAL's wlop_simplify_and_regularize_point_set, for comparison
+  cgal        ///< for comparison, CGAL's wlop_simplify_and_regularize_point_set: means instead of medians, a wider
+              ///< theta (exp(-4 r^2 / h^2)), stronger repulsion (theta / r^2), no density weights of the points
 };
 
 /// The weight of a point at distance r within the support radius h.
@@ -35,24 +36,25 @@ struct ConsolidateOptions {
 
 struct Consolidated {
   Points points;
-  Attributes attributes;              ///< one row a point: means of the input's attributes, weighted as the positions
+  Attributes attributes;              ///< one row a point: means of the input's, with the last attraction's weights
   std::vector<std::int64_t> sources;  ///< the input point that each point started from
 };
 
-/// num_points of the input, chosen at random, moved by project_samples. Input rows that are not finite are ignored.
+/// num_points of the input, chosen at random, moved as project_samples does; in the order of their sources. Input rows
+/// that are not finite are ignored, attribute values that are not finite are left out of the means.
 Consolidated consolidate(const PointsRef& points, const ConsolidateOptions& options = {},
                          const AttributesRef& attributes = Attributes());
 
-/// What project_samples may know besides positions; empty arrays mean "not known".
+/// What project_samples of method wlop_plus may know besides positions; empty means "not known".
 struct ProjectionHints {
-  ValuesRef point_weights;   ///< how many observations each point stands for (wlop_plus)
-  PointsRef sample_normals;  ///< the tangent planes in which samples repel each other (wlop_plus)
-  const std::vector<std::uint8_t>* frozen = nullptr;  ///< samples that stay where they are, and still repel (wlop_plus)
-
-  ProjectionHints();
+  Values point_weights;              ///< how many observations each point stands for: one of weight 2 counts as two
+  Points sample_normals;             ///< the samples repel each other across these; where not finite, estimated
+  std::vector<std::uint8_t> frozen;  ///< not 0: the sample stays where it is, and still repels the others
 };
 
-/// The iteration itself: samples are drawn to the weighted medians of the points around them and repel each other.
+/// The iteration itself: samples are drawn to the weighted medians of the points around them (cgal: means) and repel
+/// each other. Samples with no points within the radius, and rows that are not finite, stay as they are.
+/// options.num_points and options.seed are not used.
 Points project_samples(const PointsRef& samples, const PointsRef& points, const ConsolidateOptions& options = {},
                        const ProjectionHints& hints = {});
 
