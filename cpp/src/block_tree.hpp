@@ -25,6 +25,18 @@ inline bool operator<(const Found& a, const Found& b) { return a.d2 < b.d2 || (a
 
 constexpr std::uint32_t no_id = std::numeric_limits<std::uint32_t>::max();
 
+// The largest square whose root is not above the distance: a point is within a distance where its distance, as
+// reported, is not above it.
+inline double squared_bound(double distance) {
+  double square = distance * distance;
+  while (std::isfinite(square)) {
+    const double next = std::nextafter(square, std::numeric_limits<double>::infinity());
+    if (std::sqrt(next) > distance) break;
+    square = next;
+  }
+  return square;
+}
+
 // The k nearest within a distance, sorted, in the caller's memory.
 class KNearest {
  public:
@@ -59,6 +71,8 @@ class WithinRadius {
   Found bound_;
   std::vector<Found>& found_;
 };
+
+static_assert(leaf_points == block_points && group_boxes == 8, "every block and group is a subtree of the k-d order");
 
 template <class T>
 class BlockTree {

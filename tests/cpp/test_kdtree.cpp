@@ -37,7 +37,7 @@ std::vector<Neighbor> brute_force(const Matrix& points, const Eigen::Vector3d& q
     if (!points.row(i).allFinite()) continue;
     const Eigen::Vector3d step = points.row(i).transpose().template cast<double>() - query;
     const double d2 = step.x() * step.x() + step.y() * step.y() + step.z() * step.z();
-    if (d2 <= max_distance * max_distance) all.push_back({d2, i});
+    if (std::sqrt(d2) <= max_distance) all.push_back({d2, i});
   }
   std::sort(all.begin(), all.end());
   return all;
