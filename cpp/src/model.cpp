@@ -1,0 +1,253 @@
+#include "nacre/model.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "check.hpp"
+#include "consolidation_fold.hpp"
+#include "tracking.hpp"
+
+namespace nacre {
+namespace {
+
+constexpr std::size_t least_pixels = 100;  // a frame with fewer valid pixels cannot be registered
+constexpr double coarsening = 1.25;        // of the spacing, when the model reaches its largest size
+
+// Milliseconds since the last call.
+class StopWatch {
+ public:
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double milliseconds = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+    return milliseconds;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+// Twice the median size of a pixel on the surface.
+double spacing_for(const Frame& frame, const Camera& camera) {
+  std::vector<float> z;
+  z.reserve(frame.valid.size());
+  for (const std::int32_t row : frame.valid) z.push_back(frame.points(row, 2));
+  const auto middle = z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2);
+  std::nth_element(z.begin(), middle, z.end());
+  return 2.0 * camera.footprint(*middle);
+}
+
+void check_extras(const Camera& camera, const FrameExtras& extras) {
+  const Eigen::Index pixels = static_cast<Eigen::Index>(camera.width()) * camera.height();
+  require(extras.colors.rows() == 0 || extras.colors.rows() == pixels, "colors", "one row per pixel",
+          extras.colors.rows());
+  require(!extras.keep_guess || extras.guess.has_value(), "keep_guess", "used with a guess", "no guess");
+}
+
+}  // namespace
+
+const char* to_string(FrameStatus status) {
+  switch (status) {
+    case FrameStatus::tracked:
+      return "TRACKED";
+    case FrameStatus::weak:
+      return "WEAK";
+    case FrameStatus::relocalised:
+      return "RELOCALISED";
+    default:
+      return "LOST";
+  }
+}
+
+ModelOptions ModelOptions::preset(const std::string& name) {
+  ModelOptions options;
+  if (name == "default") return options;
+  if (name != "paper") throw std::invalid_argument("preset must be 'default' or 'paper', got '" + name + "'");
+
+  // Blackburn, Kubacki and Stratton 2010.
+  options.depth.edge_test = EdgeTest::gradient;
+  options.registration.method = Metric::point_to_plane;
+  options.registration.sample_fraction = 0.05;
+  options.registration.max_distance = 0.005;
+  options.registration.final_distance = 0.005;
+  options.registration.gate_decay = 1.0;
+  options.registration.max_angle = 3.141592653589793;
+  options.registration.max_iterations = 15;
+  options.registration.keep_best = true;
+  options.registration.robust = false;
+  options.registration.coarse_samples = 0;
+  options.registration.max_samples = 0;
+  options.registration.weak_threshold = 0.0;
+  options.fold_in = FoldIn::wlop;
+  options.consolidation.radius = 0.008;
+  options.consolidation.mu = 0.4;
+  options.consolidation.iterations = 10;
+  options.normals.max_radius = 0.008;
+  options.max_points = 2000;
+  options.first_fraction = 0.5;
+  options.kept_fraction = 0.9;
+  options.new_fraction = 0.2;
+  options.predict_motion = false;
+  options.min_overlap = 0.0;
+  options.min_consistency = 0.0;
+  return options;
+}
+
+void ModelOptions::check() const {
+  depth.check();
+  registration.check();
+  fusion.check();
+  consolidation.check();
+  require(spacing >= 0.0 && std::isfinite(spacing), "spacing", "0 (automatic) or a positive distance in metres",
+          spacing);
+  require(max_points >= 100, "max_points", "at least 100", max_points);
+  require(min_overlap >= 0.0 && min_overlap <= 1.0, "min_overlap", "in [0, 1]", min_overlap);
+  require(min_consistency >= 0.0 && min_consistency <= 1.0, "min_consistency", "in [0, 1]", min_consistency);
+  require(first_fraction > 0.0 && first_fraction <= 1.0, "first_fraction", "in (0, 1]", first_fraction);
+  require(kept_fraction > 0.0 && kept_fraction <= 1.0, "kept_fraction", "in (0, 1]", kept_fraction);
+  require(new_fraction >= 0.0 && new_fraction <= 1.0, "new_fraction", "in [0, 1]", new_fraction);
+  require(num_threads >= 0, "num_threads", "0 (all) or more", num_threads);
+}
+
+struct Model::Impl {
+  Camera camera;
+  ModelOptions options;
+  PointModel cloud;
+  std::vector<FrameReport> reports;
+  std::vector<Pose> poses;  // of the registered frames, oldest first
+  double spacing = 0.0;
+  bool was_lost = false;
+
+  Impl(const Camera& camera_in, const ModelOptions& options_in) : camera(camera_in), options(options_in) {
+    options.check();
+    options.registration.num_threads = options.num_threads;
+    options.consolidation.num_threads = options.num_threads;
+    options.normals.num_threads = options.num_threads;
+    spacing = options.spacing;
+  }
+
+  FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
+  TrackingResult locate(const Frame& frame, const FrameExtras& extras) const;
+  std::vector<Pose> guesses(const FrameExtras& extras) const;
+  void fold_in(const Frame& frame, const FrameExtras& extras, FrameReport& report);
+};
+
+// The loop: clean the image, make points of it, register them to the model, fold them in, renew the normals.
+FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& extras) {
+  check_extras(camera, extras);
+  StopWatch total, watch;
+  FrameReport report;
+  report.index = static_cast<std::int64_t>(reports.size());
+  report.timestamp = extras.timestamp;
+
+  const DepthImage clean =
+      preprocess_depth(depth, camera, options.depth, extras.mask, &report.depth, options.num_threads);
+  const NoiseModel noise =
+      options.depth.noise ? *options.depth.noise : estimate_noise(clean, camera, options.num_threads);
+  report.milliseconds.preprocess = watch.lap();
+
+  const Frame frame = make_frame(clean, camera, noise, options.num_threads);
+  report.milliseconds.back_project = watch.lap();
+
+  const TrackingResult tracking = locate(frame, extras);
+  report.status = tracking.status;
+  report.reason = tracking.reason;
+  report.world_from_camera = tracking.alignment.target_from_source;
+  report.num_inliers = tracking.alignment.num_inliers;
+  report.overlap = tracking.alignment.overlap;
+  report.consistency = tracking.consistency;
+  report.rmse = tracking.alignment.rmse;
+  report.information = tracking.alignment.information;
+  report.weak_directions = tracking.alignment.weak_directions;
+  report.milliseconds.registration = watch.lap();
+
+  if (report.status == FrameStatus::lost) {
+    report.world_from_camera = poses.empty() ? Pose::Identity() : poses.back();
+  } else {
+    poses.push_back(report.world_from_camera);
+    if (report.status == FrameStatus::tracked) {
+      if (was_lost) report.status = FrameStatus::relocalised;
+      fold_in(frame, extras, report);
+    }
+  }
+  was_lost = report.status == FrameStatus::lost && !poses.empty();
+  report.milliseconds.fold_in = watch.lap() - report.milliseconds.normals;
+  report.num_points = cloud.size();
+  report.spacing = spacing;
+  report.milliseconds.total = total.lap();
+  reports.push_back(report);
+  return report;
+}
+
+TrackingResult Model::Impl::locate(const Frame& frame, const FrameExtras& extras) const {
+  TrackingResult result;
+  result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
+  if (frame.valid.size() < least_pixels) {
+    result.reason = "only " + std::to_string(frame.valid.size()) + " pixels of the frame are usable";
+    return result;
+  }
+  if (cloud.size() == 0 || extras.keep_guess) {
+    result.status = FrameStatus::tracked;
+    result.alignment.target_from_source = extras.guess.value_or(Pose::Identity());
+    result.alignment.rmse = 0.0;
+    result.alignment.overlap = result.consistency = 1.0;
+    return result;
+  }
+  return track(cloud, frame, camera, guesses(extras), options);
+}
+
+std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
+  if (extras.guess) return {*extras.guess};
+  const Pose& last = poses.back();
+  if (!options.predict_motion || poses.size() < 2 || was_lost) return {last};
+  Pose predicted = last * (poses[poses.size() - 2].inverse() * last);
+  predicted.linear() = Eigen::Quaterniond(predicted.linear()).normalized().toRotationMatrix();
+  return {predicted, last};
+}
+
+void Model::Impl::fold_in(const Frame& frame, const FrameExtras& extras, FrameReport& report) {
+  StopWatch watch;
+  if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
+  if (options.fold_in != FoldIn::fuse) {
+    consolidate_frame(cloud, frame, report.world_from_camera, options, spacing,
+                      static_cast<std::int32_t>(report.index));
+    watch.lap();
+    renew_normals(cloud, options);
+    report.milliseconds.normals = watch.lap();
+    return;
+  }
+  report.fusion = fuse(cloud, frame, camera, report.world_from_camera, spacing, static_cast<std::int32_t>(report.index),
+                       options.fusion, extras.colors, options.num_threads);
+  while (cloud.size() > options.max_points) {
+    spacing *= coarsening;
+    thin(cloud, spacing);
+  }
+}
+
+Model::Model(const Camera& camera, const ModelOptions& options) : impl_(std::make_unique<Impl>(camera, options)) {}
+Model::~Model() = default;
+Model::Model(Model&&) noexcept = default;
+Model& Model::operator=(Model&&) noexcept = default;
+
+FrameReport Model::add_frame(const DepthRef& depth, const FrameExtras& extras) {
+  return impl_->add_frame(depth, extras);
+}
+
+const Camera& Model::camera() const { return impl_->camera; }
+const ModelOptions& Model::options() const { return impl_->options; }
+const PointModel& Model::cloud() const { return impl_->cloud; }
+const std::vector<FrameReport>& Model::frames() const { return impl_->reports; }
+double Model::spacing() const { return impl_->spacing; }
+
+PointModel Model::cloud_in_camera() const {
+  PointModel moved = impl_->cloud;
+  if (impl_->poses.empty()) return moved;
+  const Eigen::Isometry3f camera_from_world(impl_->poses.back().inverse().cast<float>());
+  for (Eigen::Vector3f& point : moved.points) point = camera_from_world * point;
+  for (Eigen::Vector3f& normal : moved.normals) normal = camera_from_world.linear() * normal;
+  return moved;
+}
+
+}  // namespace nacre

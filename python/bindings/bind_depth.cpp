@@ -1,3 +1,77 @@
 #include "bindings.hpp"
+#include "nacre/depth.hpp"
 
-void bind_depth(py::module_&) {}
+namespace {
+
+using nacre::Camera;
+using nacre::DepthImage;
+using nacre::DepthOptions;
+using nacre::DepthRef;
+using nacre::DepthReport;
+using nacre::EdgeTest;
+using nacre::Frame;
+using nacre::MaskRef;
+using nacre::NoiseModel;
+
+std::pair<DepthImage, DepthReport> preprocess_depth(const DepthRef& depth, const Camera& camera,
+                                                    const DepthOptions& options, const MaskRef& mask,
+                                                    int num_threads) {
+  std::pair<DepthImage, DepthReport> result;
+  result.first = nacre::preprocess_depth(depth, camera, options, mask, &result.second, num_threads);
+  return result;
+}
+
+}  // namespace
+
+void bind_depth(py::module_& m) {
+  py::enum_<EdgeTest>(m, "EdgeTest")
+      .value("none", EdgeTest::none)
+      .value("gradient", EdgeTest::gradient)
+      .value("inverse_depth", EdgeTest::inverse_depth);
+  py::class_<NoiseModel>(m, "NoiseModel")
+      .def(py::init<>())
+      .def_readwrite("constant", &NoiseModel::constant)
+      .def_readwrite("quadratic", &NoiseModel::quadratic)
+      .def_readwrite("offset", &NoiseModel::offset)
+      .def("sigma", &NoiseModel::sigma, py::arg("z"))
+      .def_static("kinect", &NoiseModel::kinect);
+  py::class_<DepthOptions>(m, "DepthOptions")
+      .def(py::init<>())
+      .def_readwrite("edge_test", &DepthOptions::edge_test)
+      .def_readwrite("min_depth", &DepthOptions::min_depth)
+      .def_readwrite("max_depth", &DepthOptions::max_depth)
+      .def_readwrite("gradient_threshold", &DepthOptions::gradient_threshold)
+      .def_readwrite("edge_dilation", &DepthOptions::edge_dilation)
+      .def_readwrite("edge_sigmas", &DepthOptions::edge_sigmas)
+      .def_readwrite("max_slant", &DepthOptions::max_slant)
+      .def_readwrite("max_missing", &DepthOptions::max_missing)
+      .def_readwrite("min_component", &DepthOptions::min_component)
+      .def_readwrite("noise", &DepthOptions::noise);
+  py::class_<DepthReport>(m, "DepthReport")
+      .def_readonly("num_pixels", &DepthReport::num_pixels)
+      .def_readonly("num_invalid", &DepthReport::num_invalid)
+      .def_readonly("num_out_of_range", &DepthReport::num_out_of_range)
+      .def_readonly("num_masked", &DepthReport::num_masked)
+      .def_readonly("num_edge", &DepthReport::num_edge)
+      .def_readonly("num_slanted", &DepthReport::num_slanted)
+      .def_readonly("num_isolated", &DepthReport::num_isolated)
+      .def_readonly("num_kept", &DepthReport::num_kept);
+  py::class_<Frame>(m, "Frame")
+      .def_readonly("width", &Frame::width)
+      .def_readonly("height", &Frame::height)
+      .def_readonly("points", &Frame::points)
+      .def_readonly("normals", &Frame::normals)
+      .def_readonly("sigma", &Frame::sigma)
+      .def_property_readonly("valid", [](py::object self) {
+        const auto& valid = self.cast<const Frame&>().valid;
+        return py::array_t<std::int32_t>(static_cast<py::ssize_t>(valid.size()), valid.data(), std::move(self));
+      });
+
+  m.def("preprocess_depth", &preprocess_depth, py::arg("depth"), py::arg("camera"), py::arg("options"), py::arg("mask"),
+        py::arg("num_threads"), ReleaseGil());
+  m.def("estimate_noise", &nacre::estimate_noise, py::arg("depth"), py::arg("camera"), py::arg("num_threads"),
+        ReleaseGil());
+  m.def("back_project", &nacre::back_project, py::arg("depth"), py::arg("camera"), ReleaseGil());
+  m.def("make_frame", &nacre::make_frame, py::arg("depth"), py::arg("camera"), py::arg("noise"),
+        py::arg("num_threads"), ReleaseGil());
+}

@@ -1,3 +1,55 @@
 #include "bindings.hpp"
+#include "nacre/kdtree.hpp"
 
-void bind_kdtree(py::module_&) {}
+namespace {
+
+using nacre::KdTree;
+using nacre::PointsDoubleRef;
+using nacre::PointsRef;
+
+// A NumPy array that takes over the vector's memory.
+template <class T>
+py::array_t<T> as_array(std::vector<T>&& values) {
+  auto* owned = new std::vector<T>(std::move(values));
+  const py::capsule free(owned, [](void* vector) { delete static_cast<std::vector<T>*>(vector); });
+  return py::array_t<T>(static_cast<py::ssize_t>(owned->size()), owned->data(), free);
+}
+
+template <class Points>
+py::tuple query(const KdTree& tree, const Points& queries, int k, double max_distance, int num_threads) {
+  nacre::Neighbors found;
+  {
+    const py::gil_scoped_release release;
+    found = tree.query(queries, k, max_distance, num_threads);
+  }
+  return py::make_tuple(std::move(found.distances), std::move(found.indices));
+}
+
+template <class Points>
+py::tuple query_radius(const KdTree& tree, const Points& queries, double radius, int num_threads) {
+  nacre::RadiusNeighbors found;
+  {
+    const py::gil_scoped_release release;
+    found = tree.query_radius(queries, radius, num_threads);
+  }
+  return py::make_tuple(as_array(std::move(found.offsets)), as_array(std::move(found.indices)),
+                        as_array(std::move(found.distances)));
+}
+
+}  // namespace
+
+// The arguments are noconvert, so that each array meets the overload of its own precision.
+void bind_kdtree(py::module_& m) {
+  py::class_<KdTree>(m, "KdTree")
+      .def(py::init<const PointsRef&, int>(), py::arg("points").noconvert(), py::arg("num_threads"), ReleaseGil())
+      .def(py::init<const PointsDoubleRef&, int>(), py::arg("points").noconvert(), py::arg("num_threads"), ReleaseGil())
+      .def("__len__", &KdTree::size)
+      .def("query", &query<PointsRef>, py::arg("queries").noconvert(), py::arg("k"), py::arg("max_distance"),
+           py::arg("num_threads"))
+      .def("query", &query<PointsDoubleRef>, py::arg("queries").noconvert(), py::arg("k"), py::arg("max_distance"),
+           py::arg("num_threads"))
+      .def("query_radius", &query_radius<PointsRef>, py::arg("queries").noconvert(), py::arg("radius"),
+           py::arg("num_threads"))
+      .def("query_radius", &query_radius<PointsDoubleRef>, py::arg("queries").noconvert(), py::arg("radius"),
+           py::arg("num_threads"));
+}

@@ -1,3 +1,119 @@
-#include "bindings.hpp"
+#include <cstring>
 
-void bind_model(py::module_&) {}
+#include "bindings.hpp"
+#include "nacre/model.hpp"
+
+using namespace nacre;
+
+namespace {
+
+py::array_t<float> copy_rows(const std::vector<Eigen::Vector3f>& rows) {
+  py::array_t<float> array({static_cast<py::ssize_t>(rows.size()), static_cast<py::ssize_t>(3)});
+  if (!rows.empty()) std::memcpy(array.mutable_data(), rows.front().data(), rows.size() * sizeof(Eigen::Vector3f));
+  return array;
+}
+
+template <class Value>
+py::array_t<Value> copy_values(const std::vector<Value>& values) {
+  return py::array_t<Value>(static_cast<py::ssize_t>(values.size()), values.data());
+}
+
+py::dict milliseconds(const FrameReport& report) {
+  const StepTimes& times = report.milliseconds;
+  py::dict result;
+  result["preprocess"] = times.preprocess;
+  result["back_project"] = times.back_project;
+  result["registration"] = times.registration;
+  result["fold_in"] = times.fold_in;
+  result["normals"] = times.normals;
+  result["total"] = times.total;
+  return result;
+}
+
+FrameReport add_frame(Model& model, const DepthRef& depth, const MaskRef& mask, const ColorsRef& colors,
+                      std::optional<double> timestamp, const std::optional<PoseMatrix>& guess, bool keep_guess) {
+  FrameExtras extras;
+  extras.mask = mask;
+  extras.colors = colors;
+  extras.timestamp = timestamp;
+  if (guess) extras.guess = to_pose(*guess);
+  extras.keep_guess = keep_guess;
+  return model.add_frame(depth, extras);
+}
+
+}  // namespace
+
+void bind_model(py::module_& m) {
+  py::enum_<FoldIn>(m, "FoldIn")
+      .value("fuse", FoldIn::fuse)
+      .value("wlop", FoldIn::wlop)
+      .value("wlop_plus", FoldIn::wlop_plus);
+
+  py::class_<FusionOptions>(m, "FusionOptions")
+      .def(py::init<>())
+      .def_readwrite("support", &FusionOptions::support)
+      .def_readwrite("max_angle", &FusionOptions::max_angle)
+      .def_readwrite("max_confidence", &FusionOptions::max_confidence)
+      .def_readwrite("min_confidence", &FusionOptions::min_confidence)
+      .def_readwrite("max_age", &FusionOptions::max_age)
+      .def_readwrite("max_violations", &FusionOptions::max_violations)
+      .def_readwrite("reference_sigma", &FusionOptions::reference_sigma);
+
+  py::class_<ModelOptions>(m, "ModelOptions")
+      .def(py::init<>())
+      .def_static("preset", &ModelOptions::preset)
+      .def_readwrite("depth", &ModelOptions::depth)
+      .def_readwrite("registration", &ModelOptions::registration)
+      .def_readwrite("fold_in", &ModelOptions::fold_in)
+      .def_readwrite("fusion", &ModelOptions::fusion)
+      .def_readwrite("consolidation", &ModelOptions::consolidation)
+      .def_readwrite("normals", &ModelOptions::normals)
+      .def_readwrite("spacing", &ModelOptions::spacing)
+      .def_readwrite("max_points", &ModelOptions::max_points)
+      .def_readwrite("predict_motion", &ModelOptions::predict_motion)
+      .def_readwrite("min_overlap", &ModelOptions::min_overlap)
+      .def_readwrite("min_consistency", &ModelOptions::min_consistency)
+      .def_readwrite("first_fraction", &ModelOptions::first_fraction)
+      .def_readwrite("kept_fraction", &ModelOptions::kept_fraction)
+      .def_readwrite("new_fraction", &ModelOptions::new_fraction)
+      .def_readwrite("num_threads", &ModelOptions::num_threads);
+
+  py::class_<PointModel>(m, "PointModel")
+      .def_property_readonly("points", [](const PointModel& cloud) { return copy_rows(cloud.points); })
+      .def_property_readonly("normals", [](const PointModel& cloud) { return copy_rows(cloud.normals); })
+      .def_property_readonly("colors", [](const PointModel& cloud) { return copy_rows(cloud.colors); })
+      .def_property_readonly("confidence", [](const PointModel& cloud) { return copy_values(cloud.confidence); })
+      .def_property_readonly("last_seen", [](const PointModel& cloud) { return copy_values(cloud.last_seen); })
+      .def("__len__", &PointModel::size);
+
+  py::class_<FrameReport>(m, "FrameReport")
+      .def_readonly("index", &FrameReport::index)
+      .def_readonly("timestamp", &FrameReport::timestamp)
+      .def_property_readonly("status", [](const FrameReport& report) { return to_string(report.status); })
+      .def_readonly("reason", &FrameReport::reason)
+      .def_property_readonly("world_from_camera",
+                             [](const FrameReport& report) { return to_matrix(report.world_from_camera); })
+      .def_readonly("num_inliers", &FrameReport::num_inliers)
+      .def_readonly("overlap", &FrameReport::overlap)
+      .def_readonly("consistency", &FrameReport::consistency)
+      .def_readonly("rmse", &FrameReport::rmse)
+      .def_property_readonly("information",
+                             [](const FrameReport& report) { return Eigen::Matrix<double, 6, 6>(report.information); })
+      .def_property_readonly("weak_directions",
+                             [](const FrameReport& report) { return Twists(report.weak_directions.transpose()); })
+      .def_readonly("depth", &FrameReport::depth)
+      .def_property_readonly("num_updated", [](const FrameReport& report) { return report.fusion.num_updated; })
+      .def_property_readonly("num_inserted", [](const FrameReport& report) { return report.fusion.num_inserted; })
+      .def_property_readonly("num_removed", [](const FrameReport& report) { return report.fusion.num_removed; })
+      .def_readonly("num_points", &FrameReport::num_points)
+      .def_readonly("spacing", &FrameReport::spacing)
+      .def_property_readonly("milliseconds", &milliseconds);
+
+  py::class_<Model>(m, "Model")
+      .def(py::init<const Camera&, const ModelOptions&>())
+      .def("add_frame", &add_frame, ReleaseGil())
+      .def_property_readonly("camera", &Model::camera)
+      .def_property_readonly("cloud", &Model::cloud, py::return_value_policy::reference_internal)
+      .def("cloud_in_camera", &Model::cloud_in_camera)
+      .def_property_readonly("spacing", &Model::spacing);
+}

@@ -2,5 +2,71 @@
 
 from nacre._core import Camera, __version__
 from nacre.consolidation import Consolidated, consolidate, project_samples
+from nacre.datasets import Sequence, SequenceFrame, open_sequence, write_recording
+from nacre.depth import (
+    DepthParameters,
+    DepthReport,
+    NoiseModel,
+    back_project,
+    depth_normals,
+    estimate_noise,
+    preprocess_depth,
+)
+from nacre.errors import FileFormatError
+from nacre.io.cameras import CameraFile, read_camera, write_camera
+from nacre.io.cloud import Cloud
+from nacre.io.meshes import read_mesh, write_mesh
+from nacre.io.points import read_points, write_points
+from nacre.io.trajectories import Trajectory, associate, read_trajectory, write_trajectory
+from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
+from nacre.model import FrameReport, Model, ModelParameters
+from nacre.neighbors import KdTree, RadiusNeighbors
+from nacre.registration import AlignResult, RegistrationParameters, align
+from nacre.simulation import default_camera, simulate_depth, turntable_poses
 
-__all__ = ["Camera", "Consolidated", "__version__", "consolidate", "project_samples"]
+__all__ = [
+    "AlignResult",
+    "Camera",
+    "CameraFile",
+    "ClosestPoints",
+    "Cloud",
+    "Consolidated",
+    "DepthParameters",
+    "DepthReport",
+    "FileFormatError",
+    "FrameReport",
+    "KdTree",
+    "Mesh",
+    "Model",
+    "ModelParameters",
+    "NoiseModel",
+    "RadiusNeighbors",
+    "RayHits",
+    "RegistrationParameters",
+    "Sequence",
+    "SequenceFrame",
+    "Trajectory",
+    "__version__",
+    "align",
+    "associate",
+    "back_project",
+    "built_in_object",
+    "consolidate",
+    "default_camera",
+    "depth_normals",
+    "estimate_noise",
+    "open_sequence",
+    "preprocess_depth",
+    "project_samples",
+    "read_camera",
+    "read_mesh",
+    "read_points",
+    "read_trajectory",
+    "simulate_depth",
+    "turntable_poses",
+    "write_camera",
+    "write_mesh",
+    "write_points",
+    "write_recording",
+    "write_trajectory",
+]

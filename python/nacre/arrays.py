@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,9 @@ def as_matching_points(name: str, value: npt.ArrayLike, like_name: str, num_poin
     """Return ``value`` as :func:`as_points` does, with one row for each of the points it belongs to."""
     array = as_points(name, value)
     if len(array) != num_points:
-        raise ValueError(f"{name} must have one row per point of {like_name} ({num_points}), got {len(array)}")
+        raise ValueError(
+            f"{name} must have one row per point of {like_name} ({num_points}), got {len(array)}"
+        )
     return array
 
 
@@ -73,7 +76,9 @@ def as_depth(name: str, value: npt.ArrayLike, depth_scale: float = 1.0) -> npt.N
     if array.ndim != 2:
         raise ValueError(f"{name} must have shape (H, W), got {array.shape}")
     if not (np.isfinite(depth_scale) and depth_scale > 0):
-        raise ValueError(f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}")
+        raise ValueError(
+            f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}"
+        )
     if array.dtype.kind in "bui":
         metres = array.astype(np.float32)
         metres[(array == 0) | (array == 65535)] = np.nan
@@ -105,3 +110,38 @@ def localize(points: FloatArray) -> tuple[npt.NDArray[np.float32], npt.NDArray[n
     finite = points[np.isfinite(points).all(axis=1)]
     origin = np.round(finite.mean(axis=0)) if len(finite) else np.zeros(3)
     return (points - origin).astype(np.float32), origin
+
+
+def as_triangles(name: str, value: npt.ArrayLike, num_vertices: int) -> npt.NDArray[np.int32]:
+    """Return ``value`` as a C-contiguous (N, 3) int32 array of indices of ``num_vertices`` vertices."""
+    array = np.asarray(value)
+    if array.dtype.kind not in "iu" and array.size:
+        raise TypeError(f"{name} must be an array of integers, got dtype {array.dtype}")
+    if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
+        raise ValueError(f"{name} must have shape (N, 3) with at least one row, got {array.shape}")
+    for index in (array.min(), array.max()):
+        if not 0 <= index < num_vertices:
+            raise ValueError(f"{name} must hold indices of the {num_vertices} vertices, got {index}")
+    return np.ascontiguousarray(array, dtype=np.int32)
+
+
+def as_count(name: str, value: Any, *, minimum: int = 0) -> int:
+    """Return ``value`` as an int of at least ``minimum``."""
+    try:
+        count = operator.index(value)
+    except TypeError:
+        raise TypeError(f"{name} must be an integer, got {value!r}") from None
+    if not minimum <= count < 2**31:
+        raise ValueError(f"{name} must be an integer of at least {minimum}, got {count}")
+    return count
+
+
+def as_length(name: str, value: Any) -> float:
+    """Return ``value`` as a float that is not negative and not NaN."""
+    try:
+        length = float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be a number, got {value!r}") from None
+    if not length >= 0:
+        raise ValueError(f"{name} must be at least 0, got {length}")
+    return length

@@ -3,42 +3,76 @@
 from __future__ import annotations
 
 import dataclasses
-import numbers
-import operator
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
 Core = TypeVar("Core")
+Parameters = TypeVar("Parameters")
 
 
 def to_core(parameters: Any, core: Core) -> Core:
-    """Copy every field of a dataclass into the C++ options object ``core`` and return it."""
+    """
+    Copy every field of a dataclass into the C++ options object ``core`` and return it.
+
+    Strings become the enumerator of that name ("wlop+" is ``wlop_plus``); a ValueError lists the names where there is
+    none.
+    """
     for field in dataclasses.fields(parameters):
         value = getattr(parameters, field.name)
+        current = getattr(core, field.name)
         if dataclasses.is_dataclass(value):
-            to_core(value, getattr(core, field.name))
-        else:
+            value = value.to_core() if hasattr(value, "to_core") else to_core(value, current)
+        elif isinstance(value, str):
+            members = type(current).__members__
+            if value.replace("+", "_plus") not in members:
+                names = ", ".join(repr(name.replace("_plus", "+")) for name in members)
+                raise ValueError(f"{field.name} must be one of {names}, got {value!r}")
+            value = members[value.replace("+", "_plus")]
+        try:
             setattr(core, field.name, value)
+        except TypeError:
+            expected = type(current).__name__
+            raise TypeError(f"{field.name} must be of type {expected}, got {value!r}") from None
     return core
 
 
-def as_int(name: str, value: Any, low: int = 0, high: int | None = None) -> int:
-    """Return ``value`` as an int from ``low`` to ``high``; floats are refused."""
-    try:
-        number = operator.index(value)
-    except TypeError:
-        raise TypeError(f"{name} must be an integer, got {value!r}") from None
-    if number < low or (high is not None and number > high):
-        expected = f"at least {low}" if high is None or number < low else f"at most {high}"
-        raise ValueError(f"{name} must be {expected}, got {value!r}")
-    return number
+def from_core(parameters_type: type[Parameters], core: Any) -> Parameters:
+    """Return the dataclass that mirrors the C++ options object ``core``."""
+    defaults = parameters_type()
+    values = {}
+    for field in dataclasses.fields(parameters_type):  # type: ignore[arg-type]
+        value = getattr(core, field.name)
+        default = getattr(defaults, field.name)
+        if value is not None and dataclasses.is_dataclass(default):
+            value = from_core(type(default), value)  # type: ignore[arg-type]
+        elif isinstance(default, str):
+            value = value.name.replace("_plus", "+")
+        values[field.name] = value
+    return parameters_type(**values)
 
 
-def as_number(name: str, value: Any) -> float:
-    """Return a real number as a float."""
-    if not isinstance(value, numbers.Real):
-        raise TypeError(f"{name} must be a number, got {value!r}")
-    return float(value)
+def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
+    """
+    Return parameters with changes by dotted name, such as ``{"registration.max_angle": 0.5}``; nested mappings do too.
+
+    A name that does not exist raises a ValueError that lists those that do.
+    """
+    for name, value in changes.items():
+        head, _, rest = name.partition(".")
+        names = [field.name for field in dataclasses.fields(parameters)]  # type: ignore[arg-type]
+        if head not in names:
+            raise ValueError(
+                f"there is no parameter {name!r} in {type(parameters).__name__}; it has {', '.join(names)}"
+            )
+        current = getattr(parameters, head)
+        if rest:
+            value = updated(current, {rest: value})
+        elif isinstance(value, Mapping) and dataclasses.is_dataclass(current):
+            value = updated(current, value)
+        elif isinstance(current, float) and isinstance(value, int) and not isinstance(value, bool):
+            value = float(value)
+        parameters = dataclasses.replace(parameters, **{head: value})  # type: ignore[type-var]
+    return parameters
 
 
 def as_choice(name: str, value: Any, choices: Mapping[str, Core]) -> Core:

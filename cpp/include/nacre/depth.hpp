@@ -20,6 +20,8 @@ struct NoiseModel {
   double sigma(double z) const { return constant + quadratic * (z - offset) * (z - offset); }
   /// Structured light, Nguyen et al. 2012: 1.2 mm + 1.9 mm (z - 0.4 m)^2.
   static NoiseModel kinect() { return {0.0012, 0.0019, 0.4}; }
+
+  void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };
 
 /// Which pixels at depth edges are noise.

@@ -30,7 +30,8 @@ struct RadiusNeighbors {
 
 /// A k-d tree over a copy of the points. Exact: distances are compared in double precision, equal distances by the
 /// smaller index. Points that are not finite are never found; a query that is not finite finds nothing. Immutable, so
-/// any number of threads may query it.
+/// any number of threads may query it. Batches of queries may come in any order: they are visited in an order of their
+/// own, and answered in the caller's. num_threads = 0 uses all; no result depends on it.
 class KdTree {
  public:
   explicit KdTree(const PointsRef& points, int num_threads = 0);
@@ -45,10 +46,13 @@ class KdTree {
   Neighbors query(const PointsRef& queries, int k, double max_distance = infinity, int num_threads = 0) const;
   Neighbors query(const PointsDoubleRef& queries, int k, double max_distance = infinity, int num_threads = 0) const;
 
+  /// All within the radius (inclusive). Throws std::invalid_argument for a negative radius.
   RadiusNeighbors query_radius(const PointsRef& queries, double radius, int num_threads = 0) const;
   RadiusNeighbors query_radius(const PointsDoubleRef& queries, double radius, int num_threads = 0) const;
 
-  /// The k nearest of one point into caller's memory, for use inside loops; returns how many were found.
+  /// The k nearest of one point within max_distance (inclusive) into the caller's memory, k entries each; returns how
+  /// many were found. For use inside loops: up to k = 32 nothing is allocated, a max_distance that is just large enough
+  /// (the distance to the last neighbour, say) saves most of the search, and so does asking for nearby queries in turn.
   int nearest(const Eigen::Vector3d& query, int k, double max_distance, std::int64_t* indices,
               double* squared_distances) const;
 

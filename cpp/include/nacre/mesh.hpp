@@ -11,15 +11,21 @@ namespace nacre {
 using Triangles = Eigen::Matrix<std::int32_t, Eigen::Dynamic, 3, Eigen::RowMajor>;
 using TrianglesRef = Eigen::Ref<const Triangles>;
 
+using PointsDouble = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+using PointsDoubleRef = Eigen::Ref<const PointsDouble>;
+
 struct Mesh {
   Points vertices;      ///< [m]
-  Triangles triangles;  ///< vertex indices
+  Triangles triangles;  ///< vertex indices, counter-clockwise seen from outside
 };
 
-/// The built-in object, made by formula: bunny-sized (0.15 m), with thin parts and concavities, closed, y up.
+/// The built-in object, made by formula: a snail with the ears of a rabbit, 0.15 m long, y up, z to its right, looking
+/// along +x. Closed, with thin parts (ears, the lip of the shell, the hem of the foot: 3 mm), concavities and no
+/// symmetry.
 Mesh built_in_object();
 
-/// A bounding volume hierarchy over a mesh; immutable.
+/// A bounding volume hierarchy over a mesh; immutable, so any number of threads may ask it. Distances and intersections
+/// are computed in double precision from the float vertices.
 class MeshTree {
  public:
   /// Throws std::invalid_argument for vertices that are not finite, indices out of range, or no triangle.
@@ -32,18 +38,39 @@ class MeshTree {
     double distance = -1.0;  ///< in units of |direction|; negative: nothing was hit
     std::int32_t triangle = -1;
   };
-  /// The first triangle hit in front of the origin, from either side; ties by the smaller triangle index.
+  /// The first triangle hit in front of the origin, from either side; ties by the smaller triangle index. Watertight:
+  /// no ray slips between triangles that share vertices. A ray that is not finite, or has no direction, hits nothing.
   Hit cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
+
+  struct Hits {
+    Eigen::VectorXd distances;                                 ///< NaN: nothing was hit
+    Eigen::Matrix<std::int32_t, Eigen::Dynamic, 1> triangles;  ///< -1: nothing was hit
+  };
+  /// One ray a row.
+  Hits cast(const PointsDoubleRef& origins, const PointsDoubleRef& directions, int num_threads = 0) const;
 
   struct Closest {
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
     std::int32_t triangle = -1;
     double distance = 0.0;  ///< unsigned [m]
   };
+  /// The point of the surface nearest to a point; NaN and triangle -1 for one that is not finite.
   Closest closest(const Eigen::Vector3d& point) const;
+
+  struct ClosestPoints {
+    PointsDouble points;
+    PointsDouble normals;  ///< of the triangles
+    Eigen::VectorXd distances;
+    Eigen::Matrix<std::int32_t, Eigen::Dynamic, 1> triangles;
+  };
+  ClosestPoints closest(const PointsDoubleRef& points, int num_threads = 0) const;
 
   /// Unit normal of a triangle by the right-hand rule; zero for a degenerate one.
   Eigen::Vector3d normal(std::int32_t triangle) const;
+
+  /// The corners of the box around the triangles.
+  const Eigen::Vector3d& lower() const;
+  const Eigen::Vector3d& upper() const;
 
  private:
   struct Impl;

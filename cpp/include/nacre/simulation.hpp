@@ -11,20 +11,26 @@
 namespace nacre {
 
 struct SimulationOptions {
-  NoiseModel noise;               ///< Gaussian, along the depth value; all zero: none
-  double edge_mixing = 0.0;       ///< width of the blur that mixes depths across edges [pixels]; 0: none. The image is
-                                  ///< rendered finer, blurred and sampled down, as the paper did
-  double background_depth = 0.0;  ///< what silhouettes mix with [m]; 0: a little behind the farthest visible point
-  double quantization = 0.0;      ///< depth is rounded to multiples of this [m]; 0: none
-  double dropout = 0.0;           ///< part of the pixels that give no measurement
-  std::uint64_t seed = 0;         ///< of noise and dropout: the same seed gives the same image for any thread count
-  int num_threads = 0;            ///< 0: all
+  NoiseModel noise;          ///< Gaussian, along the depth value; all zero: none
+  double edge_mixing = 0.0;  ///< pixels within this distance of a depth edge see both sides of it [pixels]; 0: none
+  double background_depth = 0.0;  ///< what silhouettes mix with [m]; 0: behind the farthest visible point, by a tenth
+                                  ///< of the diagonal of the mesh's bounding box
+  double quantization = 0.0;  ///< depth is rounded to multiples of this [m]; 0: none
+  double dropout = 0.0;       ///< part of the pixels that give no measurement
+  std::uint64_t seed = 0;     ///< of noise and dropout: the same seed gives the same image for any thread count
+  int num_threads = 0;        ///< 0: all
 
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };
 
-/// The depth image [m] that the camera sees, in the camera's depth kind; NaN where a ray hits nothing. Without noise
-/// and mixing each pixel is exact: the first intersection of its ray with the mesh.
+/// The depth image [m] that the camera sees, in the camera's depth kind; NaN where a ray hits nothing. Each pixel is
+/// exact: the first intersection of its ray with the mesh. Rays start at depth 0, those of an orthographic camera too.
+///
+/// With edge_mixing, a pixel beside a depth edge (a jump that the surfaces on either side do not explain) is what a
+/// finer image gives when it is blurred and sampled down: the mean of rays around it, weighted by a tent of that
+/// radius, where a ray that hits nothing sees the background. Pixels that see nothing but background stay NaN; pixels
+/// away from edges stay exact. Then come noise, quantization and dropout; depths that they make negative or 0 become
+/// NaN.
 DepthImage simulate_depth(const MeshTree& mesh, const Camera& camera, const Pose& world_from_camera,
                           const SimulationOptions& options = {});
 

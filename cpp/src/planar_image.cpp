@@ -1,0 +1,52 @@
+#include "planar_image.hpp"
+
+#include <cmath>
+#include <string>
+
+#include "parallel.hpp"
+
+namespace nacre {
+
+void require_camera_size(const char* name, Eigen::Index rows, Eigen::Index cols, const Camera& camera) {
+  if (rows == camera.height() && cols == camera.width()) return;
+  throw std::invalid_argument(std::string(name) + " must have the camera's size " + std::to_string(camera.width()) +
+                              " x " + std::to_string(camera.height()) + " (width x height), got " +
+                              std::to_string(cols) + " x " + std::to_string(rows));
+}
+
+PlanarImage::PlanarImage(const DepthRef& depth, const Camera& camera, int num_threads)
+    : width_(camera.width()),
+      height_(camera.height()),
+      stride_(camera.width() + 2 * kBorder),
+      inverse_(camera.model() == Camera::Model::pinhole),
+      pixel_(static_cast<float>(1.0 / std::sqrt(std::abs(camera.fx() * camera.fy())))) {
+  require_camera_size("depth", depth.rows(), depth.cols(), camera);
+  constexpr float missing = std::numeric_limits<float>::quiet_NaN();
+  values_.assign(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height_ + 2 * kBorder), missing);
+  const bool radial = camera.depth_kind() == DepthKind::radial;
+  const Ray* const rays = camera.rays().data();
+  parallel_for(height_, 16, num_threads, [&](std::int64_t v) {
+    const float* const source = &depth.coeffRef(v, 0);
+    float* const target = values_.data() + (v + kBorder) * stride_ + kBorder;
+    for (int u = 0; u < width_; ++u) {
+      const float z = radial ? source[u] * rays[v * width_ + u].direction_z : source[u];
+      const float value = inverse_ ? 1.0F / z : z;
+      target[u] = is_measurement(z) && is_measurement(value) ? value : missing;
+    }
+  });
+}
+
+// 1/z changes by (1/z) / f between neighbouring pixels where z changes by z / f.
+Quadratic PlanarImage::unit_slope() const {
+  return inverse_ ? Quadratic{0.0F, pixel_, 0.0F} : Quadratic{pixel_, 0.0F, 0.0F};
+}
+
+// sigma(1/z) = sigma(z) / z^2 to first order.
+Quadratic PlanarImage::sigma(const NoiseModel& noise) const {
+  const auto square = static_cast<float>(noise.quadratic);
+  const auto linear = static_cast<float>(-2.0 * noise.quadratic * noise.offset);
+  const auto constant = static_cast<float>(noise.constant + noise.quadratic * noise.offset * noise.offset);
+  return inverse_ ? Quadratic{square, linear, constant} : Quadratic{constant, linear, square};
+}
+
+}  // namespace nacre

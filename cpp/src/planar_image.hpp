@@ -1,0 +1,53 @@
+// The image in which every plane is an affine function of the pixel: inverse depth 1/z for a pinhole camera, depth for
+// an orthographic one. Edge tests, noise estimate and normals all work on it.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "nacre/camera.hpp"
+#include "nacre/depth.hpp"
+
+namespace nacre {
+
+struct Quadratic {
+  float constant = 0, linear = 0, square = 0;
+
+  float operator()(float x) const { return constant + x * (linear + x * square); }
+  Quadratic operator*(float factor) const { return {constant * factor, linear * factor, square * factor}; }
+};
+
+class PlanarImage {
+ public:
+  static constexpr int kBorder = 5;  // NaN on every side, so that windows need no bounds checks
+
+  // Throws std::invalid_argument when depth and camera differ in size.
+  PlanarImage(const DepthRef& depth, const Camera& camera, int num_threads);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  std::ptrdiff_t stride() const { return stride_; }
+  // The first pixel of row v; columns and rows may be addressed from -kBorder on.
+  const float* row(int v) const { return values_.data() + (v + kBorder) * stride_ + kBorder; }
+
+  // The change of the value between neighbouring pixels on a surface of slope 1 (slanted by 45 degrees), given the
+  // value: a slant s changes it by tan(s) times as much.
+  Quadratic unit_slope() const;
+  // The standard deviation of the value, given the value.
+  Quadratic sigma(const NoiseModel& noise) const;
+  float to_depth(float value) const { return inverse_ ? 1.0F / value : value; }
+
+ private:
+  int width_, height_;
+  std::ptrdiff_t stride_;
+  bool inverse_;
+  float pixel_;  // the side of a pixel at distance 1 (pinhole), or everywhere (orthographic)
+  std::vector<float> values_;
+};
+
+inline bool is_measurement(float depth) { return depth > 0.0F && depth <= std::numeric_limits<float>::max(); }
+
+// Throws std::invalid_argument unless an image of this size belongs to the camera.
+void require_camera_size(const char* name, Eigen::Index rows, Eigen::Index cols, const Camera& camera);
+
+}  // namespace nacre

@@ -1,0 +1,24 @@
+// Where is the camera? Registration of a frame to the model, and the verdict on it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nacre/model.hpp"
+
+namespace nacre {
+
+struct TrackingResult {
+  AlignResult alignment;     // world_from_camera as target_from_source
+  double consistency = 0.0;  // part of the model's points in view that the frame does not see through
+  FrameStatus status = FrameStatus::lost;
+  std::string reason;  // why it is weak or lost
+
+  double score() const { return alignment.overlap * consistency; }
+};
+
+// Tries the guesses (world_from_camera, most trusted first) until one registers the frame.
+TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera,
+                     const std::vector<Pose>& guesses, const ModelOptions& options);
+
+}  // namespace nacre

@@ -1,0 +1,151 @@
+"""Which reader opens a recording."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+from nacre._core import Camera
+from nacre.datasets import icl_nuim, images, plain, redwood, seven_scenes, stanford, tum
+from nacre.datasets.given import Given
+from nacre.datasets.listing import describe, files
+from nacre.datasets.sequence import Sequence, check_first_view
+from nacre.errors import FileFormatError
+from nacre.io.cameras import read_camera
+from nacre.io.images import DEPTH_SUFFIXES
+
+
+class Reader(NamedTuple):
+    """One recorded format."""
+
+    layout: str
+    recognise: Callable[[Path], bool]
+    read: Callable[[Path, Given], Sequence]
+
+
+# The first that recognises a folder opens it.
+READERS = {
+    module.FORMAT: Reader(module.LAYOUT, module.recognise, module.read)
+    for module in (icl_nuim, tum, plain, seven_scenes, stanford, redwood, images)
+}
+
+
+def open_sequence(
+    path: str | os.PathLike[str],
+    *,
+    format: str | None = None,
+    camera: Camera | str | os.PathLike[str] | None = None,
+    depth_scale: float | None = None,
+    max_difference: float = 0.02,
+) -> Sequence:
+    """
+    Open a recording of a depth camera; the format is recognised from the files.
+
+    Parameters
+    ----------
+    path : path-like
+        The folder of the recording, or a single range scan.
+    format : str, optional
+        ``"tum"``, ``"redwood"`` (also Open3D), ``"7-scenes"``, ``"icl-nuim"``, ``"plain"`` (camera.json and
+        depth/), ``"stanford"`` (range scans), or ``"images"`` (a folder of depth images). None recognises it.
+    camera : Camera or path-like, optional
+        The depth camera, or a camera file, in place of what the recording or its format says.
+    depth_scale : float, optional
+        Stored units per metre, in place of what the recording or its format says.
+    max_difference : float
+        How far in time a colour image or a true pose may be from its depth image [s].
+
+    Returns
+    -------
+    Sequence
+        Read view by view when asked for.
+
+    Raises
+    ------
+    FileNotFoundError
+        There is nothing at ``path``.
+    FileFormatError
+        The recording is not recognised or not complete: the message says what was looked for, what was found
+        and what to do. Also when the images have not the camera's size.
+    ImportError
+        The images need a package that is not installed.
+
+    Examples
+    --------
+    >>> sequence = nacre.open_sequence("rgbd_dataset_freiburg3_teddy")  # doctest: +SKIP
+    >>> for frame in sequence:  # doctest: +SKIP
+    ...     model.add_frame(frame.depth, color=frame.color, timestamp=frame.timestamp)
+    """
+    folder = Path(path)
+    if not folder.exists():
+        raise FileNotFoundError(f"no such recording: {folder}")
+    if depth_scale is not None and not (math.isfinite(depth_scale) and depth_scale > 0):
+        raise ValueError(
+            f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}"
+        )
+    if not max_difference >= 0:
+        raise ValueError(f"max_difference must be seconds, 0 or more, got {max_difference!r}")
+    if isinstance(camera, (str, os.PathLike)):
+        found = read_camera(camera)
+        camera, depth_scale = found.camera, depth_scale if depth_scale is not None else found.depth_scale
+    given = Given(camera, depth_scale, max_difference)
+    reader = _named(format) if format is not None else _recognised(folder, given)
+    return check_first_view(reader.read(folder, given))
+
+
+def _named(format: str) -> Reader:
+    key = format.lower().replace("_", "-")
+    if key not in READERS:
+        raise ValueError(f"format must be one of {', '.join(map(repr, READERS))}, got {format!r}")
+    return READERS[key]
+
+
+def _recognised(path: Path, given: Given) -> Reader:
+    if not path.is_dir():
+        if stanford.recognise(path):
+            return READERS[stanford.FORMAT]
+        raise FileFormatError(
+            path, "not a recording: a recording is a folder, or a range scan (.ply with a range_grid)"
+        )
+    for name, reader in READERS.items():
+        if reader.recognise(path) and not (name == images.FORMAT and _needs_more(path, given)):
+            return reader
+    raise FileFormatError(path, _explanation(path))
+
+
+def _needs_more(folder: Path, given: Given) -> bool:
+    return (given.camera is None or given.depth_scale is None) and _hint(folder) is not None
+
+
+def _explanation(folder: Path) -> str:
+    if not any(folder.iterdir()):
+        return "the folder is empty"
+    known = "".join(f"\n  {name}: {reader.layout}" for name, reader in READERS.items())
+    hint = _hint(folder)
+    return (
+        f"no known recording. Found: {describe(folder)}. "
+        + (f"{hint} " if hint is not None else "")
+        + f"Known formats:{known}"
+    )
+
+
+def _hint(folder: Path) -> str | None:
+    """Say what a folder almost is."""
+    depth = files(folder / "depth", DEPTH_SUFFIXES)
+    if depth and (
+        (folder / "groundtruth.txt").is_file()
+        or (folder / "rgb.txt").is_file()
+        or redwood.has_time_names(depth)
+    ):
+        return (
+            "This is almost a TUM recording: depth.txt is missing, the list with a line 'timestamp file' for "
+            "each depth image. (A plain recording needs camera.json instead.)"
+        )
+    inside = [p for p in sorted(folder.iterdir()) if p.is_dir() and not p.name.startswith(".")]
+    names = [p.name for p in inside if any(r.recognise(p) for n, r in READERS.items() if n != images.FORMAT)]
+    if names:
+        return f"Give one of the folders in it: {', '.join(names[:8])}."
+    return None

@@ -1,0 +1,59 @@
+"""A folder of depth images and nothing else: the caller says what the camera is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from nacre.datasets.given import Given
+from nacre.datasets.listing import describe, files, pair
+from nacre.datasets.sequence import FrameSource, Sequence
+from nacre.errors import FileFormatError
+from nacre.io.images import COLOR_SUFFIXES, DEPTH_SUFFIXES
+
+FORMAT = "images"
+LAYOUT = "depth images, in depth/ or directly, with camera=... and depth_scale=... given"
+
+
+def recognise(folder: Path) -> bool:
+    """Say whether a folder looks like this format."""
+    return bool(_depth_images(folder))
+
+
+def read(folder: Path, given: Given) -> Sequence:
+    """Open a folder of this format."""
+    depth = _depth_images(folder)
+    if not depth:
+        raise FileFormatError(folder, f"no depth images in the folder; it holds {describe(folder)}")
+    camera, depth_scale = given.required(
+        folder,
+        "these are depth images without a description. Give camera= and depth_scale= (units per metre), "
+        'or put a camera.json beside depth/: {"model": "pinhole", "width": 640, "height": 480, '
+        '"fx": 525, "fy": 525, "cx": 319.5, "cy": 239.5, "depth_scale": 1000}',
+    )
+    colors: list[Path | None] = [None] * len(depth)
+    for candidates in (
+        _marked(folder, ("color", "rgb")),
+        *(files(folder / n, COLOR_SUFFIXES) for n in ("color", "rgb")),
+    ):
+        if candidates:
+            colors = pair(depth, candidates)
+            break
+    return Sequence(
+        folder,
+        format=FORMAT,
+        camera=camera,
+        depth_scale=depth_scale,
+        sources=[FrameSource(i, path, colors[i]) for i, path in enumerate(depth)],
+    )
+
+
+def _depth_images(folder: Path) -> list[Path]:
+    inside = files(folder / "depth", DEPTH_SUFFIXES)
+    if inside:
+        return inside
+    here = files(folder, DEPTH_SUFFIXES)
+    return [path for path in here if "depth" in path.name.lower()] or here
+
+
+def _marked(folder: Path, words: tuple[str, ...]) -> list[Path]:
+    return [p for p in files(folder, COLOR_SUFFIXES) if any(word in p.name.lower() for word in words)]

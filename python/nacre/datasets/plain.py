@@ -1,0 +1,208 @@
+"""
+The plain recording: camera.json, depth/, optionally color/ (same stems), groundtruth.txt and timestamps.txt.
+
+``timestamps.txt`` has one time [s] for each depth image, in name order. Without it the time is its index.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre import arrays
+from nacre._core import Camera
+from nacre.datasets.given import Given
+from nacre.datasets.listing import describe, files
+from nacre.datasets.sequence import FrameSource, Sequence
+from nacre.datasets.tum import read_truth
+from nacre.errors import FileFormatError
+from nacre.io.atomic import atomic_writer
+from nacre.io.cameras import write_camera
+from nacre.io.images import COLOR_SUFFIXES, DEPTH_SUFFIXES, write_color_png, write_depth_png
+from nacre.io.trajectories import write_trajectory
+
+FORMAT = "plain"
+LAYOUT = "camera.json and depth/, optionally color/, groundtruth.txt and timestamps.txt"
+
+_LARGEST_STORED = 65534
+
+
+def recognise(folder: Path) -> bool:
+    """Say whether a folder looks like this format."""
+    return (folder / "camera.json").is_file()
+
+
+def read(folder: Path, given: Given) -> Sequence:
+    """Open a folder of this format."""
+    if (folder / "camera.json").is_file():
+        given = given.filled_from(folder / "camera.json")
+    camera, depth_scale = given.required(folder, "a plain recording says it in camera.json")
+    depth = files(folder / "depth", DEPTH_SUFFIXES)
+    if not depth:
+        raise FileFormatError(
+            folder, f"a plain recording needs depth images in depth/; the folder holds {describe(folder)}"
+        )
+    colors = {path.stem: path for path in files(folder / "color", COLOR_SUFFIXES)}
+    timestamps = _read_timestamps(folder / "timestamps.txt", len(depth))
+    times = np.arange(len(depth), dtype=np.float64) if timestamps is None else timestamps
+    truth, poses = read_truth(folder / "groundtruth.txt", times, given.max_difference)
+    return Sequence(
+        folder,
+        format=FORMAT,
+        camera=camera,
+        depth_scale=depth_scale,
+        sources=[
+            FrameSource(
+                i, path, colors.get(path.stem), None if timestamps is None else float(times[i]), poses[i]
+            )
+            for i, path in enumerate(depth)
+        ],
+        truth=truth,
+    )
+
+
+def write_recording(
+    path: str | os.PathLike[str],
+    camera: Camera,
+    depth_images: Iterable[npt.ArrayLike],
+    *,
+    depth_scale: float,
+    colors: Iterable[npt.ArrayLike] | None = None,
+    poses: Iterable[npt.ArrayLike] | None = None,
+    timestamps: Iterable[float] | None = None,
+) -> int:
+    """
+    Write a plain recording: ``camera.json``, ``depth/000000.png`` and so on, as 16-bit PNG.
+
+    All iterables are read one view at a time, so a recording may be longer than memory. ``camera.json`` comes
+    last: a recording that was cut short is not taken for a whole one.
+
+    Parameters
+    ----------
+    path : path-like
+        The folder; it is made where it does not exist. A recording that is already there is not touched.
+    camera : Camera
+        The depth camera.
+    depth_images : iterable of (H, W) arrays
+        Metres; 0, negative and not finite values mean no measurement.
+    depth_scale : float
+        Stored units per metre. The depth is rounded to the nearest unit.
+    colors : iterable of (H, W, 3) uint8 arrays, optional
+        RGB, one for each depth image.
+    poses : iterable of (4, 4) arrays, optional
+        True ``world_from_camera``, one for each depth image.
+    timestamps : iterable of float, optional
+        Seconds, one for each depth image.
+
+    Returns
+    -------
+    int
+        How many views were written.
+
+    Raises
+    ------
+    ValueError
+        A depth does not fit 16 bits at this ``depth_scale``, an image has not the camera's size, or the
+        iterables have different lengths.
+    FileExistsError
+        The folder holds a recording already.
+    """
+    folder = Path(path)
+    if not (np.isfinite(depth_scale) and depth_scale > 0):
+        raise ValueError(
+            f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}"
+        )
+    if (folder / "camera.json").exists() or any(folder.glob("depth/*")):
+        raise FileExistsError(f"{folder} holds a recording already; give another folder or remove it first")
+    (folder / "depth").mkdir(parents=True, exist_ok=True)
+    if colors is not None:
+        (folder / "color").mkdir(exist_ok=True)
+
+    given = {"depth_images": depth_images, "colors": colors, "poses": poses, "timestamps": timestamps}
+    iterators = {name: iter(values) for name, values in given.items() if values is not None}
+    times: list[float] = []
+    truth: list[npt.NDArray[np.float64]] = []
+    index = 0
+    while view := _next_view(iterators, index):
+        write_depth_png(
+            folder / "depth" / f"{index:06d}.png", _stored(view["depth_images"], camera, depth_scale, index)
+        )
+        if "colors" in view:
+            color = np.asarray(view["colors"])
+            if color.shape != (camera.height, camera.width, 3):
+                raise ValueError(
+                    f"colors[{index}] must have shape ({camera.height}, {camera.width}, 3), got {color.shape}"
+                )
+            write_color_png(folder / "color" / f"{index:06d}.png", color)
+        times.append(float(view.get("timestamps", index)))
+        if "poses" in view:
+            truth.append(arrays.as_pose(f"poses[{index}]", view["poses"]))
+        index += 1
+
+    if poses is not None and index:
+        write_trajectory(folder / "groundtruth.txt", times, truth)
+    if timestamps is not None:
+        with atomic_writer(folder / "timestamps.txt") as stream:
+            stream.write("".join(f"{time!r}\n" for time in times).encode())
+    write_camera(folder / "camera.json", camera, depth_scale)
+    return index
+
+
+def _next_view(iterators: dict[str, Any], index: int) -> dict[str, Any]:
+    """Return one item of each iterator, or {} when all of them end together."""
+    view = {}
+    for name, iterator in iterators.items():
+        try:
+            view[name] = next(iterator)
+        except StopIteration:
+            continue
+    if view and len(view) < len(iterators):
+        short = next(name for name in iterators if name not in view)
+        raise ValueError(f"{short} must have one item for each view, but it ends after {index}")
+    return view
+
+
+def _stored(depth: Any, camera: Camera, depth_scale: float, index: int) -> npt.NDArray[np.uint16]:
+    metres = np.asarray(depth, dtype=np.float64)
+    name, shape = f"depth_images[{index}]", (camera.height, camera.width)
+    if metres.shape != shape:
+        raise ValueError(f"{name} must have the camera's shape {shape}, got {metres.shape}")
+    valid = np.isfinite(metres) & (metres > 0)
+    units = np.rint(np.where(valid, metres, 0.0) * depth_scale)
+    if units.max() > _LARGEST_STORED:
+        raise ValueError(
+            f"{name} reaches {metres[valid].max():g} m, which does not fit 16 bits at "
+            f"depth_scale={depth_scale:g} (at most {_LARGEST_STORED / depth_scale:g} m); give a smaller one"
+        )
+    if (units[valid] == 0).any():
+        raise ValueError(
+            f"{name} has depths of {metres[valid].min():g} m, which round to 0 (no measurement) at "
+            f"depth_scale={depth_scale:g}; give a larger one"
+        )
+    return units.astype(np.uint16)
+
+
+def _read_timestamps(path: Path, count: int) -> npt.NDArray[np.float64] | None:
+    if not path.is_file():
+        return None
+    lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]
+    times = []
+    for number, line in enumerate(lines, start=1):
+        if not line or line.startswith("#"):
+            continue
+        try:
+            times.append(float(line))
+        except ValueError as error:
+            raise FileFormatError(
+                path, f"expected a time in seconds, got {line[:60]!r}", line=number
+            ) from error
+    if len(times) != count or not np.isfinite(times).all():
+        raise FileFormatError(
+            path, f"expected {count} finite times, one for each depth image, got {len(times)}"
+        )
+    return np.array(times)

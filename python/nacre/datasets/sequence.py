@@ -1,0 +1,254 @@
+"""What every recording looks like once it is open."""
+
+from __future__ import annotations
+
+import collections.abc
+import logging
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre import arrays
+from nacre._core import Camera
+from nacre.errors import FileFormatError
+from nacre.io.images import read_color, read_depth
+from nacre.io.trajectories import Trajectory
+
+_log = logging.getLogger(__name__)
+
+DepthLoader = Callable[[Path], npt.NDArray[np.float32]]
+
+
+@dataclass(frozen=True, eq=False)
+class SequenceFrame:
+    """
+    One view of a recording.
+
+    Attributes
+    ----------
+    index : int
+        The place in the recording, from 0; a slice of a sequence keeps it.
+    depth : (H, W) float32
+        Metres; NaN where nothing was measured.
+    camera : Camera
+        The depth camera.
+    timestamp : float or None
+        Seconds; None where the recording has no time stamps.
+    color : (H, W, 3) uint8 or None
+        RGB.
+    truth : (4, 4) float64 or None
+        ``world_from_camera``, where the recording knows it.
+    """
+
+    index: int
+    depth: npt.NDArray[np.float32]
+    camera: Camera
+    timestamp: float | None
+    color: npt.NDArray[np.uint8] | None
+    truth: npt.NDArray[np.float64] | None
+
+    def __repr__(self) -> str:
+        height, width = self.depth.shape
+        parts = [f"index={self.index}", f"depth={width}x{height}"]
+        if self.timestamp is not None:
+            parts.append(f"timestamp={self.timestamp!r}")
+        parts += [name for name in ("color", "truth") if getattr(self, name) is not None]
+        return f"SequenceFrame({', '.join(parts)})"
+
+
+@dataclass(frozen=True, eq=False)
+class FrameSource:
+    """Where one view comes from: files that are read when the view is asked for."""
+
+    index: int
+    depth: Path
+    color: Path | None = None
+    timestamp: float | None = None
+    truth: npt.NDArray[np.float64] | None = None
+
+
+class Sequence(collections.abc.Sequence[SequenceFrame]):
+    """
+    A recording, read view by view when asked for; memory stays that of one view.
+
+    It has a length, indices and slices, and it can be iterated. A view that cannot be read raises
+    :class:`nacre.FileFormatError` with the file's name; the iterator can then go on with the next one.
+
+    Attributes
+    ----------
+    name : str
+        The recording's name.
+    format : str
+        Which reader opened it, for instance ``"tum"``.
+    path : Path
+        The folder or file.
+    camera : Camera
+        The depth camera, the same for all views.
+    depth_scale : float
+        Stored depth units per metre.
+    truth : Trajectory or None
+        The true trajectory, as recorded.
+    estimate : Trajectory or None
+        A trajectory that came along but is somebody's estimate.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        format: str,
+        camera: Camera,
+        depth_scale: float,
+        sources: collections.abc.Sequence[FrameSource],
+        truth: Trajectory | None = None,
+        estimate: Trajectory | None = None,
+        load_depth: DepthLoader | None = None,
+        name: str | None = None,
+    ) -> None:
+        self.path = path
+        self.name = name if name is not None else path.resolve().name
+        self.format = format
+        self.camera = camera
+        self.depth_scale = depth_scale
+        self.truth = truth
+        self.estimate = estimate
+        self._sources = tuple(sources)
+        self._load_depth = load_depth or partial(load_depth_metres, depth_scale=depth_scale)
+
+    def __len__(self) -> int:
+        return len(self._sources)
+
+    @overload
+    def __getitem__(self, index: int) -> SequenceFrame: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence: ...
+    def __getitem__(self, index: int | slice) -> SequenceFrame | Sequence:
+        if isinstance(index, slice):
+            return self._with_sources(self._sources[index])
+        return self._read(self._sources[index])
+
+    def __iter__(self) -> Iterator[SequenceFrame]:
+        return _FrameIterator(self)
+
+    def __repr__(self) -> str:
+        camera = f"{self.camera.model} {self.camera.width}x{self.camera.height}"
+        extras = "".join(
+            f", {name}"
+            for name, there in (("color", self.has_color), ("truth", self.truth is not None))
+            if there
+        )
+        return (
+            f"Sequence({self.name!r}, format={self.format!r}, frames={len(self)}, camera={camera}, "
+            f"depth_scale={self.depth_scale:g}{extras})"
+        )
+
+    @property
+    def has_color(self) -> bool:
+        """Whether any view has a colour image."""
+        return any(source.color is not None for source in self._sources)
+
+    @property
+    def has_timestamps(self) -> bool:
+        """Whether the views have time stamps."""
+        return bool(self._sources) and all(source.timestamp is not None for source in self._sources)
+
+    def file(self, index: int) -> Path:
+        """Return the depth file of a view."""
+        return self._sources[index].depth
+
+    def without_color(self) -> Sequence:
+        """Return the same recording with ``color`` None in every view."""
+        return self._with_sources(
+            [FrameSource(s.index, s.depth, None, s.timestamp, s.truth) for s in self._sources]
+        )
+
+    def _with_sources(self, sources: collections.abc.Sequence[FrameSource]) -> Sequence:
+        return Sequence(
+            self.path,
+            format=self.format,
+            camera=self.camera,
+            depth_scale=self.depth_scale,
+            sources=sources,
+            truth=self.truth,
+            estimate=self.estimate,
+            load_depth=self._load_depth,
+            name=self.name,
+        )
+
+    def _read(self, source: FrameSource) -> SequenceFrame:
+        depth = _named(self._load_depth, source.depth)
+        check_size(source.depth, depth, self.camera)
+        color = None
+        if source.color is not None:
+            color = _named(read_color, source.color)
+            check_size(source.color, color, self.camera)
+        return SequenceFrame(source.index, depth, self.camera, source.timestamp, color, source.truth)
+
+
+class _FrameIterator(Iterator[SequenceFrame]):
+    """Unlike a generator it survives the view that cannot be read."""
+
+    def __init__(self, sequence: Sequence) -> None:
+        self._sequence = sequence
+        self._next = 0
+
+    def __next__(self) -> SequenceFrame:
+        if self._next >= len(self._sequence):
+            raise StopIteration
+        self._next += 1
+        return self._sequence[self._next - 1]
+
+
+def load_depth_metres(path: Path, depth_scale: float) -> npt.NDArray[np.float32]:
+    """Read a depth image as float32 metres; 0, 65535, negative and not finite values become NaN."""
+    stored = read_depth(path)
+    metres = arrays.as_depth("depth", stored, depth_scale)
+    invalid = ~(metres > 0) | ~np.isfinite(metres) | (stored == 65535)
+    return np.where(invalid, np.float32(np.nan), metres)
+
+
+def check_size(path: Path, image: npt.NDArray[Any], camera: Camera) -> None:
+    """Raise unless an image has the camera's size."""
+    height, width = image.shape[:2]
+    if (width, height) != (camera.width, camera.height):
+        raise FileFormatError(
+            path,
+            f"the image is {width} wide and {height} high, but the camera is {camera.width} by "
+            f"{camera.height}; give the camera that took it",
+        )
+
+
+def check_first_view(sequence: Sequence) -> Sequence:
+    """
+    Compare the sizes of the first readable view with the camera, so that a wrong camera is told at once.
+
+    Colour images of another size cannot be used pixel by pixel: the sequence then comes back without colour.
+    """
+    for source in sequence._sources:
+        try:
+            depth = _named(sequence._load_depth, source.depth)
+        except FileFormatError:
+            continue
+        check_size(source.depth, depth, sequence.camera)
+        if source.color is None:
+            break
+        try:
+            check_size(source.color, _named(read_color, source.color), sequence.camera)
+        except FileFormatError as error:
+            _log.warning("colour is left out: %s", error)
+            return sequence.without_color()
+        break
+    return sequence
+
+
+def _named(read: Callable[[Path], Any], path: Path) -> Any:
+    """Read a file; that it is missing or not readable is said as a FileFormatError too."""
+    try:
+        return read(path)
+    except OSError as error:
+        raise FileFormatError(path, f"cannot be read: {error.strerror or error}") from error

@@ -1,0 +1,42 @@
+"""The errors that a caller may want to catch by name."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+
+class FileFormatError(ValueError):
+    """
+    A file that does not hold what its format or its own header promises.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    reason : str
+        What is wrong, in words.
+    line : int, optional
+        The line of a text, counted from 1, where it is wrong.
+    offset : int, optional
+        The byte, counted from 0, where it is wrong.
+
+    Attributes
+    ----------
+    path, reason, line, offset
+        As given; the message is made of them.
+    """
+
+    def __init__(
+        self, path: str | os.PathLike[str], reason: str, *, line: int | None = None, offset: int | None = None
+    ) -> None:
+        super().__init__(path, reason)
+        self.path = Path(path)
+        self.reason = reason
+        self.line = line
+        self.offset = offset
+
+    def __str__(self) -> str:
+        place = f", line {self.line}" if self.line is not None else ""
+        place += f", byte {self.offset}" if self.offset is not None else ""
+        return f"{self.path}{place}: {self.reason}"

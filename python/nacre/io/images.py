@@ -1,0 +1,184 @@
+"""Depth and colour images, in and out. PNG and JPEG need pillow, EXR needs OpenEXR, PGM and npy nothing."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre.errors import FileFormatError
+from nacre.io.atomic import atomic_writer
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+DEPTH_SUFFIXES = (".png", ".pgm", ".npy", ".exr")
+COLOR_SUFFIXES = (".png", ".jpg", ".jpeg", ".ppm", ".bmp", ".webp")
+
+_EXR_DEPTH_CHANNELS = ("Z", "depth", "Depth", "Y", "R")
+_PGM_GAP = rb"\s+(?:#[^\n]*\n\s*)*"
+_PGM_HEADER = re.compile(_PGM_GAP.join((rb"P5", rb"(\d+)", rb"(\d+)", rb"(\d+)")) + rb"\s")
+
+
+def read_depth(path: str | os.PathLike[str]) -> npt.NDArray[Any]:
+    """
+    Read a depth image as it is stored, without any scaling.
+
+    Parameters
+    ----------
+    path : path-like
+        A 16-bit PNG or PGM image, a ``.npy`` array, or an EXR image (channel Z, Y or R, or its only one).
+
+    Returns
+    -------
+    (H, W) array
+        uint16 for PNG and PGM, the stored type for ``.npy`` and EXR.
+
+    Raises
+    ------
+    FileFormatError
+        The file is damaged, or it is not a depth image (8 bit, colour, not two-dimensional).
+    ImportError
+        The format needs a package that is not installed; the message says how to install it.
+    """
+    path = Path(path)
+    readers = {".png": _read_png, ".pgm": _read_pgm, ".npy": _read_npy, ".exr": _read_exr}
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        raise FileFormatError(path, f"a depth image must be one of {', '.join(DEPTH_SUFFIXES)}")
+    stored = reader(path)
+    if stored.ndim != 2 or stored.size == 0 or stored.dtype.kind not in "uif":
+        raise FileFormatError(
+            path, f"a depth image must be (H, W) numbers, this is {stored.shape} of {stored.dtype}"
+        )
+    return stored
+
+
+def read_color(path: str | os.PathLike[str]) -> npt.NDArray[np.uint8]:
+    """
+    Read a colour image as (H, W, 3) uint8 RGB; grey images are repeated, transparency is dropped.
+
+    Raises
+    ------
+    FileFormatError
+        The file is damaged or has more than 8 bits per channel.
+    ImportError
+        pillow is not installed.
+    """
+    with _open_image(Path(path)) as image:
+        if image.mode.startswith(("I", "F")):
+            raise FileFormatError(
+                path, f"a colour image must have 8 bits per channel, this has mode {image.mode}"
+            )
+        return np.array(image.convert("RGB"), dtype=np.uint8)
+
+
+def write_depth_png(path: str | os.PathLike[str], depth: npt.ArrayLike) -> None:
+    """Write (H, W) uint16 stored depth units as a 16-bit PNG, atomically."""
+    array = np.ascontiguousarray(depth)
+    if array.dtype != np.uint16 or array.ndim != 2:
+        raise ValueError(f"depth must be (H, W) uint16, got {array.shape} of {array.dtype}")
+    _write_png(path, array)
+
+
+def write_color_png(path: str | os.PathLike[str], color: npt.ArrayLike) -> None:
+    """Write an (H, W, 3) uint8 RGB image as a PNG, atomically."""
+    array = np.ascontiguousarray(color)
+    if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3:
+        raise ValueError(f"color must be (H, W, 3) uint8, got {array.shape} of {array.dtype}")
+    _write_png(path, array)
+
+
+def _pillow() -> Any:
+    try:
+        import PIL.Image
+    except ImportError as error:
+        raise ImportError(
+            'PNG and JPEG images need pillow: pip install "nacre[images]"', name="PIL"
+        ) from error
+    return PIL.Image
+
+
+def _write_png(path: str | os.PathLike[str], array: npt.NDArray[Any]) -> None:
+    image = _pillow().fromarray(array)
+    with atomic_writer(path) as stream:
+        image.save(stream, format="PNG")
+
+
+@contextmanager
+def _open_image(path: Path) -> Iterator[Image]:
+    """Open and decode an image; whatever pillow raises for a damaged file becomes a FileFormatError."""
+    pillow = _pillow()
+    with path.open("rb") as stream:
+        try:
+            image = pillow.open(stream)
+            image.load()
+        except pillow.DecompressionBombError as error:
+            raise FileFormatError(path, f"refused: {error}") from error
+        except Exception as error:
+            reason = "not an image" if isinstance(error, pillow.UnidentifiedImageError) else str(error)
+            raise FileFormatError(path, f"the image is damaged or truncated: {reason}") from error
+        with image:
+            yield image
+
+
+def _read_png(path: Path) -> npt.NDArray[Any]:
+    with _open_image(path) as image:
+        if not image.mode.startswith("I"):
+            raise FileFormatError(
+                path, f"a depth image must have 16 bits and one channel, this is 8-bit with mode {image.mode}"
+            )
+        return np.array(image).astype(np.uint16, copy=False)
+
+
+def _read_pgm(path: Path) -> npt.NDArray[Any]:
+    data = path.read_bytes()
+    header = _PGM_HEADER.match(data)
+    if header is None:
+        raise FileFormatError(
+            path, "expected a binary PGM header: P5, width, height, largest value", offset=0
+        )
+    width, height, largest = (int(field) for field in header.groups())
+    if not 255 < largest < 65536:
+        raise FileFormatError(path, f"a depth image must have 16 bits, this PGM's largest value is {largest}")
+    expected = 2 * width * height
+    if len(data) - header.end() < expected:
+        raise FileFormatError(
+            path,
+            f"truncated: {expected} bytes of pixels expected, {len(data) - header.end()} found",
+            offset=len(data),
+        )
+    pixels = np.frombuffer(data, dtype=">u2", count=width * height, offset=header.end())
+    return pixels.reshape(height, width).astype(np.uint16)
+
+
+def _read_npy(path: Path) -> npt.NDArray[Any]:
+    try:
+        with path.open("rb") as stream:
+            array: npt.NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
+    except (ValueError, EOFError) as error:
+        raise FileFormatError(path, f"not a readable .npy array: {error}") from error
+    return array
+
+
+def _read_exr(path: Path) -> npt.NDArray[Any]:
+    try:
+        import OpenEXR  # type: ignore[import-not-found, unused-ignore]
+    except ImportError as error:
+        raise ImportError("EXR images need OpenEXR: pip install OpenEXR", name="OpenEXR") from error
+    path.stat()
+    try:
+        with OpenEXR.File(str(path), separate_channels=True) as image:
+            channels = {name: np.array(channel.pixels) for name, channel in image.channels().items()}
+    except Exception as error:
+        raise FileFormatError(path, f"the image is damaged or truncated: {error}") from error
+    names = [name for name in _EXR_DEPTH_CHANNELS if name in channels] or list(channels)
+    if names[0] not in _EXR_DEPTH_CHANNELS and len(channels) > 1:
+        raise FileFormatError(path, f"no channel Z, depth, Y or R among {', '.join(channels)}")
+    return channels[names[0]]

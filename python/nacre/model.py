@@ -1,0 +1,360 @@
+"""The loop: depth frames in, a growing point model and a camera trajectory out."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre import _core
+from nacre._core import Camera
+from nacre.arrays import as_depth, as_mask, as_pose
+from nacre.depth import DepthParameters, DepthReport
+from nacre.parameters import from_core, to_core, updated
+from nacre.registration import RegistrationParameters
+
+Preset = Literal["default", "paper"]
+
+
+@dataclass(frozen=True)
+class FusionParameters:
+    """
+    How frames are fused into a model. Mirrors the C++ ``FusionOptions``.
+
+    Attributes
+    ----------
+    support : float
+        Observations farther from a model point do not move it [m]; 0: from noise and pixel size.
+    max_angle : float
+        Nor do those whose normal differs more [rad].
+    max_confidence : float
+        Bounds the confidence from above, so that new observations always count.
+    min_confidence, max_age : float, int
+        A point of less confidence that is not seen again for so many frames goes.
+    max_violations : int
+        A point that a camera saw through so often goes.
+    reference_sigma : float
+        Noise of an observation of weight 1 [m]; 0: the frame's median.
+    """
+
+    support: float = 0.0
+    max_angle: float = 1.0471976
+    max_confidence: float = 1e6
+    min_confidence: float = 3.0
+    max_age: int = 10
+    max_violations: int = 3
+    reference_sigma: float = 0.0
+
+
+@dataclass(frozen=True)
+class ConsolidationParameters:
+    """How frames are folded in by WLOP; see :func:`nacre.consolidate`. Mirrors the C++ ``ConsolidateOptions``."""
+
+    method: Literal["wlop", "wlop+", "cgal"] = "wlop"
+    radius: float = 0.008
+    num_points: int = 2000
+    iterations: int = 10
+    mu: float = 0.4
+    theta: Literal["huang", "printed"] = "huang"
+    seed: int = 0
+    num_threads: int = 0
+
+
+@dataclass(frozen=True)
+class NormalParameters:
+    """How normals are estimated; see :func:`nacre.estimate_normals`. Mirrors the C++ ``NormalOptions``."""
+
+    k: int = 16
+    max_radius: float = float("inf")
+    num_threads: int = 0
+
+
+@dataclass(frozen=True)
+class ModelParameters:
+    """
+    All parameters of a model. Mirrors the C++ ``ModelOptions``.
+
+    Attributes
+    ----------
+    depth, registration, fusion, consolidation, normals
+        Of the steps of the loop. ``consolidation`` and ``normals`` (of the model) are used where ``fold_in`` is not
+        "fuse".
+    fold_in : "fuse", "wlop" or "wlop+"
+        How a registered frame becomes part of the model: confidence-weighted fusion, the 2010 paper's WLOP of model and
+        new points, or WLOP repaired for incremental use.
+    spacing : float
+        Distance between model points [m]; 0: twice the first frame's median pixel.
+    max_points : int
+        The model never grows beyond: its spacing is widened instead.
+    predict_motion : bool
+        Start also from the pose that continues the last motion.
+    min_overlap, min_consistency : float
+        A frame of which a smaller part matches the model is lost; so is one that sees through more than the rest of what
+        the model shows there.
+    first_fraction, kept_fraction, new_fraction : float
+        WLOP: part of the first frame that becomes the model; part of the model that is kept at each frame; new points,
+        as a part of the model.
+    num_threads : int
+        0: all.
+    """
+
+    depth: DepthParameters = field(default_factory=DepthParameters)
+    registration: RegistrationParameters = field(default_factory=RegistrationParameters)
+    fold_in: Literal["fuse", "wlop", "wlop+"] = "fuse"
+    fusion: FusionParameters = field(default_factory=FusionParameters)
+    consolidation: ConsolidationParameters = field(default_factory=ConsolidationParameters)
+    normals: NormalParameters = field(default_factory=NormalParameters)
+    spacing: float = 0.0
+    max_points: int = 500000
+    predict_motion: bool = True
+    min_overlap: float = 0.25
+    min_consistency: float = 0.7
+    first_fraction: float = 0.5
+    kept_fraction: float = 0.9
+    new_fraction: float = 0.2
+    num_threads: int = 0
+
+    @classmethod
+    def preset(cls, name: Preset) -> ModelParameters:
+        """Return "default" (what measures best) or "paper" (every number of the 2010 paper)."""
+        return from_core(cls, _core.ModelOptions.preset(name))
+
+
+@dataclass(frozen=True)
+class FrameReport:
+    """
+    What became of one frame.
+
+    Attributes
+    ----------
+    index : int
+        Number of the frame, from 0.
+    timestamp : float or None
+        As given [s].
+    status : str
+        TRACKED: registered and folded in. WEAK: registered, but the data leaves a direction of the pose open; not folded
+        in. LOST: not registered, the model is as it was. RELOCALISED: registered again after being lost.
+    reason : str
+        Why the frame is weak or lost; empty otherwise.
+    world_from_camera : (4, 4) float64
+        The camera's pose; of a lost frame the last known one.
+    num_inliers, overlap, rmse, information, weak_directions
+        Of the registration; see :class:`nacre.AlignResult`.
+    consistency : float
+        Part of the model's points in view that the frame does not see through.
+    depth : DepthReport
+        Pixels that were removed, by reason.
+    num_updated, num_inserted, num_removed : int
+        Points of the model that the frame moved, added and removed.
+    num_points : int
+        Points of the model after the frame.
+    spacing : float
+        Of the model's points [m].
+    milliseconds : dict
+        Wall time by step of the loop, and "total".
+    """
+
+    index: int
+    timestamp: float | None
+    status: str
+    reason: str
+    world_from_camera: npt.NDArray[np.float64]
+    num_inliers: int
+    overlap: float
+    consistency: float
+    rmse: float
+    information: npt.NDArray[np.float64]
+    weak_directions: npt.NDArray[np.float64]
+    depth: DepthReport
+    num_updated: int
+    num_inserted: int
+    num_removed: int
+    num_points: int
+    spacing: float
+    milliseconds: dict[str, float]
+
+    @property
+    def tracked(self) -> bool:
+        """Whether the camera's pose is known: every status but LOST."""
+        return self.status != "LOST"
+
+    @classmethod
+    def _from_core(cls, core: Any) -> FrameReport:
+        values = {f.name: getattr(core, f.name) for f in fields(cls)}
+        values["depth"] = DepthReport._from_core(core.depth)
+        return cls(**values)
+
+    def __repr__(self) -> str:
+        reason = f" ({self.reason})" if self.reason else ""
+        return (
+            f"FrameReport(index={self.index}, {self.status}{reason}, overlap={self.overlap:.2f}, "
+            f"num_points={self.num_points}, {self.milliseconds['total']:.1f} ms)"
+        )
+
+
+class Model:
+    """
+    A 3D model that grows with every depth frame.
+
+    The world is the first camera's frame, unless the first frame comes with a guess of its pose. Frames that cannot be
+    registered change nothing.
+
+    Parameters
+    ----------
+    camera : Camera
+        Of all frames.
+    preset : "default" or "paper"
+        Where the parameters start from.
+    parameters : ModelParameters, optional
+        Takes the place of the preset.
+    depth_scale : float
+        Stored units per metre of the depth images that will come: 1 for metres, 1000 for millimetres, 5000 for TUM.
+    **changes
+        Fields of :class:`ModelParameters` to change, such as ``spacing=0.002``.
+
+    Raises
+    ------
+    TypeError, ValueError
+        Naming the parameter, what was expected and what came.
+
+    Notes
+    -----
+    After Blackburn, Kubacki and Stratton 2010, incremental 3D model generation with depth cameras.
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        preset: Preset = "default",
+        *,
+        parameters: ModelParameters | None = None,
+        depth_scale: float = 1.0,
+        **changes: Any,
+    ) -> None:
+        if not isinstance(camera, Camera):
+            raise TypeError(f"camera must be a nacre.Camera, got {type(camera).__name__}")
+        self.parameters = updated(parameters or ModelParameters.preset(preset), changes)
+        self._depth_scale = depth_scale
+        self._core = _core.Model(camera, to_core(self.parameters, _core.ModelOptions()))
+        self._lock = threading.Lock()
+        self._frames: list[FrameReport] = []
+
+    def add_frame(
+        self,
+        depth: npt.ArrayLike,
+        color: npt.ArrayLike | None = None,
+        mask: npt.ArrayLike | None = None,
+        timestamp: float | None = None,
+        *,
+        guess: npt.ArrayLike | None = None,
+        keep_guess: bool = False,
+    ) -> FrameReport:
+        """
+        Clean a depth image, register it to the model and fold it in.
+
+        Parameters
+        ----------
+        depth : (H, W) real
+            Depth in the camera's kind, in units of 1 / ``depth_scale`` metres; 0, NaN, inf, negative values and 65535
+            of integer images are no measurement. Not copied if it is C-contiguous float32 in metres.
+        color : (H, W, 3) uint8, optional
+            Red, green, blue of each pixel; fused along with the points.
+        mask : (H, W), optional
+            Pixels where it is 0 are not used.
+        timestamp : float, optional
+            [s], kept in the report.
+        guess : (4, 4), optional
+            A pose (world_from_camera) to start the registration from, in place of the last one.
+        keep_guess : bool
+            Take the guess for the pose, without registration.
+
+        Returns
+        -------
+        FrameReport
+            Its ``status`` is "LOST" where the frame could not be registered; then the model is as it was before.
+
+        Raises
+        ------
+        TypeError, ValueError
+            Arrays of the wrong type or shape; a median depth outside 0.05-50 m (the depth scale cannot be right).
+            Nothing is changed.
+        """
+        image = as_depth("depth", depth, self._depth_scale)
+        pixels = as_mask("mask", mask, image.shape)
+        colors = np.zeros((0, 3), np.uint8)
+        if color is not None:
+            array = np.asarray(color)
+            if array.shape != (*image.shape, 3) or array.dtype != np.uint8:
+                raise ValueError(
+                    f"color must be uint8 of shape {(*image.shape, 3)}, got {array.dtype} of shape {array.shape}"
+                )
+            colors = np.ascontiguousarray(array).reshape(-1, 3)
+        pose = None if guess is None else as_pose("guess", guess)
+        with self._lock:
+            core = self._core.add_frame(image, pixels, colors, timestamp, pose, keep_guess)
+            report = FrameReport._from_core(core)
+            self._frames.append(report)
+        return report
+
+    def __len__(self) -> int:
+        """Return the number of points."""
+        return len(self._core.cloud)
+
+    def __repr__(self) -> str:
+        tracked = sum(report.tracked for report in self._frames)
+        return f"Model({len(self)} points, {tracked} of {len(self._frames)} frames tracked, spacing={self.spacing:.4g} m)"
+
+    @property
+    def camera(self) -> Camera:
+        """The camera of all frames."""
+        return self._core.camera
+
+    @property
+    def points(self) -> npt.NDArray[np.float32]:
+        """(N, 3) points in the world frame [m]; a copy."""
+        return self._core.cloud.points
+
+    @property
+    def normals(self) -> npt.NDArray[np.float32]:
+        """(N, 3) unit normals towards the cameras that saw the points; a copy."""
+        return self._core.cloud.normals
+
+    @property
+    def colors(self) -> npt.NDArray[np.uint8] | None:
+        """(N, 3) colours, or None when no frame had any; a copy."""
+        colors = self._core.cloud.colors
+        if len(colors) == 0:
+            return None
+        return np.clip(np.rint(np.nan_to_num(colors)), 0, 255).astype(np.uint8)
+
+    @property
+    def confidence(self) -> npt.NDArray[np.float32]:
+        """(N,) frontal observations that each point stands for; a copy."""
+        return self._core.cloud.confidence
+
+    @property
+    def poses(self) -> npt.NDArray[np.float64]:
+        """(F, 4, 4) world_from_camera of every frame; NaN where the frame is lost."""
+        poses = np.full((len(self._frames), 4, 4), np.nan)
+        for pose, report in zip(poses, self._frames, strict=True):
+            if report.tracked:
+                pose[:] = report.world_from_camera
+        return poses
+
+    @property
+    def frames(self) -> tuple[FrameReport, ...]:
+        """The report of every frame that was added."""
+        return tuple(self._frames)
+
+    @property
+    def spacing(self) -> float:
+        """Distance between neighbouring points [m]; 0 before the first frame."""
+        return self._core.spacing
+
+    def in_camera(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
+        """Return points and normals in the newest registered camera's frame, as the paper keeps its model."""
+        cloud = self._core.cloud_in_camera()
+        return cloud.points, cloud.normals

@@ -1,0 +1,180 @@
+"""Exact nearest neighbours."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre import _core
+from nacre.arrays import FloatArray, as_count, as_length, as_points
+
+IndexArray = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RadiusNeighbors(Sequence[tuple[FloatArray, IndexArray]]):
+    """
+    All neighbours within a radius, each query's after the other's.
+
+    ``result[q]`` is ``(distances, indices)`` of query ``q``, nearest first; both are views.
+
+    Attributes
+    ----------
+    offsets : (Q + 1,) int64
+        Query ``q`` owns the entries ``offsets[q]:offsets[q + 1]``.
+    indices : (M,) int64
+        Rows of the tree's points.
+    distances : (M,) float
+        In the dtype of the queries.
+    """
+
+    offsets: IndexArray
+    indices: IndexArray
+    distances: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.offsets) - 1
+
+    @overload
+    def __getitem__(self, query: int) -> tuple[FloatArray, IndexArray]: ...
+    @overload
+    def __getitem__(self, query: slice) -> list[tuple[FloatArray, IndexArray]]: ...
+    def __getitem__(self, query: Any) -> Any:
+        if isinstance(query, slice):
+            return [self[q] for q in range(*query.indices(len(self)))]
+        row = range(len(self))[query]
+        entries = slice(self.offsets[row], self.offsets[row + 1])
+        return self.distances[entries], self.indices[entries]
+
+    @property
+    def counts(self) -> IndexArray:
+        """The number of neighbours of each query, (Q,) int64."""
+        return np.diff(self.offsets)
+
+    def __repr__(self) -> str:
+        return f"RadiusNeighbors({len(self)} queries, {len(self.indices)} neighbours)"
+
+
+class KdTree:
+    """
+    Nearest neighbours of 3D points, exactly.
+
+    Distances are compared in double precision and equal distances by the smaller index, so the answer is unique and
+    does not depend on the number of threads. Points that are not finite are never found. The tree is immutable and may
+    be queried from any number of threads, and it can be pickled.
+
+    Parameters
+    ----------
+    points : (N, 3) array_like of real numbers
+        Copied. float32 and float64 are kept as they are, other dtypes become float64. N may be 0.
+    num_threads : int
+        0 uses all.
+
+    Examples
+    --------
+    >>> tree = KdTree([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]])
+    >>> tree.query([0.0, 0.5, 0.0], k=2)
+    (array([0.5       , 1.11803399]), array([0, 1]))
+    """
+
+    def __init__(self, points: npt.ArrayLike, *, num_threads: int = 0) -> None:
+        self._points = as_points("points", points).copy()
+        self._points.flags.writeable = False
+        self._core = _core.KdTree(self._points, as_count("num_threads", num_threads))
+
+    @property
+    def points(self) -> FloatArray:
+        """The points of the tree, (N, 3), read-only."""
+        return self._points
+
+    def __len__(self) -> int:
+        return len(self._points)
+
+    def __repr__(self) -> str:
+        return f"KdTree({len(self)} points, {self._points.dtype})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return KdTree, (self._points,)
+
+    def query(
+        self,
+        queries: npt.ArrayLike,
+        k: int = 1,
+        *,
+        max_distance: float = math.inf,
+        num_threads: int = 0,
+    ) -> tuple[Any, Any]:
+        """
+        Find the ``k`` nearest points of each query.
+
+        Queries are answered fastest in batches; their order does not matter.
+
+        Parameters
+        ----------
+        queries : (..., 3) array_like of real numbers
+            A query that is not finite finds nothing.
+        k : int
+            At least 1.
+        max_distance : float
+            Farther points are not found; a point at exactly this distance is.
+        num_threads : int
+            0 uses all.
+
+        Returns
+        -------
+        distances : (..., k) float
+            Nearest first, in the dtype of the queries (float32 or float64); ``inf`` where fewer than k were found.
+        indices : (..., k) int64
+            Rows of the tree's points; the tree's size where fewer than k were found.
+
+        Notes
+        -----
+        As in SciPy, the last axis is dropped for ``k = 1``.
+        """
+        array = _as_queries(queries)
+        distances, indices = self._core.query(
+            array.reshape(-1, 3),
+            as_count("k", k, minimum=1),
+            as_length("max_distance", max_distance),
+            as_count("num_threads", num_threads),
+        )
+        shape = array.shape[:-1] if k == 1 else (*array.shape[:-1], k)
+        return distances.astype(array.dtype, copy=False).reshape(shape)[()], indices.reshape(shape)[()]
+
+    def query_radius(self, queries: npt.ArrayLike, radius: float, *, num_threads: int = 0) -> RadiusNeighbors:
+        """
+        Find all points within ``radius`` of each query.
+
+        Parameters
+        ----------
+        queries : (Q, 3) or (3,) array_like of real numbers
+            A query that is not finite finds nothing.
+        radius : float
+            A point at exactly this distance is found.
+        num_threads : int
+            0 uses all.
+
+        Returns
+        -------
+        RadiusNeighbors
+            Each query's neighbours, nearest first.
+        """
+        array = _as_queries(queries)
+        if array.ndim > 2:
+            raise ValueError(f"queries must have shape (Q, 3) or (3,), got {array.shape}")
+        offsets, indices, distances = self._core.query_radius(
+            array.reshape(-1, 3), as_length("radius", radius), as_count("num_threads", num_threads)
+        )
+        return RadiusNeighbors(offsets, indices, distances.astype(array.dtype, copy=False))
+
+
+def _as_queries(value: npt.ArrayLike) -> FloatArray:
+    array = np.asarray(value)
+    if array.ndim == 0 or array.shape[-1] != 3:
+        raise ValueError(f"queries must have shape (..., 3), got {array.shape}")
+    return as_points("queries", array.reshape(-1, 3)).reshape(array.shape)

@@ -1,0 +1,160 @@
+"""Camera files: the plain recording's camera.json and Open3D's intrinsics."""
+
+import json
+import logging
+
+import hypothesis.strategies as st
+import pytest
+from hypothesis import given
+
+from nacre import Camera, FileFormatError, read_camera, write_camera
+
+PINHOLE = {
+    "model": "pinhole", "width": 640, "height": 480, "fx": 525, "fy": 524.5, "cx": 319.5, "cy": 239.5,
+    "distortion": [0.1, -0.2, 0.001, 0.002, 0.05], "depth": "z", "depth_scale": 1000,
+}  # fmt: skip
+ORTHOGRAPHIC = {
+    "model": "orthographic",
+    "width": 256,
+    "height": 200,
+    "pixel_size": 0.001,
+    "depth_scale": 50000,
+}
+OPEN3D = {"width": 640, "height": 480, "intrinsic_matrix": [617.25, 0, 0, 0, 617.5, 0, 317.4, 246.0, 1]}
+
+
+def write(path, document):
+    path.write_text(document if isinstance(document, str) else json.dumps(document))
+    return path
+
+
+def test_pinhole(tmp_path):
+    found = read_camera(write(tmp_path / "camera.json", PINHOLE))
+    assert found.depth_scale == 1000
+    assert found.camera == Camera(
+        640, 480, 525, 524.5, 319.5, 239.5, distortion=(0.1, -0.2, 0.001, 0.002, 0.05)
+    )
+
+
+def test_pinhole_needs_neither_distortion_nor_depth_nor_scale(tmp_path):
+    short = {k: v for k, v in PINHOLE.items() if k not in ("distortion", "depth", "depth_scale")}
+    found = read_camera(write(tmp_path / "camera.json", short))
+    assert found.camera == Camera(640, 480, 525, 524.5, 319.5, 239.5)
+    assert found.depth_scale is None
+
+
+def test_radial_depth(tmp_path):
+    assert (
+        read_camera(write(tmp_path / "camera.json", {**PINHOLE, "depth": "radial"})).camera.depth == "radial"
+    )
+
+
+def test_orthographic(tmp_path):
+    found = read_camera(write(tmp_path / "camera.json", ORTHOGRAPHIC))
+    assert found.camera == Camera.orthographic(256, 200, 0.001)
+    assert found.depth_scale == 50000
+
+
+def test_open3d_matrix_is_column_by_column(tmp_path):
+    found = read_camera(write(tmp_path / "intrinsic.json", OPEN3D))
+    assert found.camera == Camera(640, 480, 617.25, 617.5, 317.4, 246.0)
+    assert found.depth_scale is None
+    with_scale = read_camera(write(tmp_path / "intrinsic.json", {**OPEN3D, "depth_scale": 4000.0, "fps": 30}))
+    assert with_scale.depth_scale == 4000
+
+
+def test_open3d_matrix_row_by_row_is_refused(tmp_path):
+    rows = {**OPEN3D, "intrinsic_matrix": [617.25, 0, 317.4, 0, 617.5, 246.0, 0, 0, 1]}
+    with pytest.raises(FileFormatError, match=r"intrinsic\.json.*intrinsic_matrix.*column by column"):
+        read_camera(write(tmp_path / "intrinsic.json", rows))
+
+
+@pytest.mark.parametrize("key", ["model", "width", "height", "fx", "fy", "cx", "cy"])
+def test_missing_key_is_named(tmp_path, key):
+    document = {k: v for k, v in PINHOLE.items() if k != key}
+    with pytest.raises(FileFormatError, match=rf"camera\.json.*'{key}' is missing"):
+        read_camera(write(tmp_path / "camera.json", document))
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("model", "fisheye"), ("model", 3), ("width", "640"), ("width", 640.5), ("width", 0), ("width", True),
+        ("height", -1), ("fx", None), ("fx", 0), ("fy", [525]), ("cx", "middle"), ("distortion", [0, 0]),
+        ("distortion", 0), ("distortion", [0, 0, 0, 0, "k3"]), ("depth", "disparity"), ("depth_scale", 0),
+        ("depth_scale", -1000), ("depth_scale", "1000"),
+    ],
+)  # fmt: skip
+def test_wrong_value_is_named(tmp_path, key, value):
+    with pytest.raises(FileFormatError, match=rf"camera\.json.*{key}"):
+        read_camera(write(tmp_path / "camera.json", {**PINHOLE, key: value}))
+
+
+@pytest.mark.parametrize("value", ["NaN", "Infinity", "1e999"])
+def test_numbers_must_be_finite(tmp_path, value):
+    text = json.dumps(PINHOLE).replace("319.5", value)
+    with pytest.raises(FileFormatError, match="cx must be a finite number"):
+        read_camera(write(tmp_path / "camera.json", text))
+
+
+@pytest.mark.parametrize("text", ["", "{", "[1, 2]", "3", '{"model": "pinhole",}'])
+def test_what_is_no_json_object_is_told(tmp_path, text):
+    with pytest.raises(FileFormatError, match=r"camera\.json"):
+        read_camera(write(tmp_path / "camera.json", text))
+
+
+def test_binary_file_is_told(tmp_path):
+    (tmp_path / "camera.json").write_bytes(b"\xff\xfe\x00\x81")
+    with pytest.raises(FileFormatError, match="not text"):
+        read_camera(tmp_path / "camera.json")
+
+
+def test_unknown_keys_are_told_and_ignored(tmp_path, caplog):
+    with caplog.at_level(logging.WARNING, logger="nacre"):
+        read_camera(write(tmp_path / "camera.json", {**PINHOLE, "distorsion": [1, 1, 1, 1, 1]}))
+    assert "distorsion" in caplog.text
+
+
+finite = st.floats(-1e4, 1e4)
+focal = st.floats(1e-2, 1e5)
+
+
+@given(
+    size=st.tuples(st.integers(1, 40), st.integers(1, 40)),
+    focal=st.tuples(focal, focal),
+    centre=st.tuples(finite, finite),
+    distortion=st.lists(st.floats(-1e-3, 1e-3), min_size=5, max_size=5),
+    depth=st.sampled_from(["z", "radial"]),
+    scale=st.none() | st.floats(1e-3, 1e6),
+)
+def test_pinhole_comes_back_exactly(tmp_path_factory, size, focal, centre, distortion, depth, scale):
+    path = tmp_path_factory.mktemp("camera") / "camera.json"
+    camera = Camera(*size, *focal, *centre, distortion=distortion, depth=depth)
+    write_camera(path, camera, scale)
+    again = read_camera(path)
+    assert again.camera == camera
+    assert again.depth_scale == scale
+
+
+@given(pixel_size=st.floats(1e-6, 1.0))
+def test_orthographic_comes_back(tmp_path_factory, pixel_size):
+    path = tmp_path_factory.mktemp("camera") / "camera.json"
+    write_camera(path, Camera.orthographic(8, 6, pixel_size), 1000)
+    again = read_camera(path).camera
+    assert (again.width, again.height) == (8, 6)
+    assert again.pixel_size == pytest.approx(pixel_size, rel=1e-15)
+
+
+def test_written_file_has_the_fixed_spelling(tmp_path):
+    write_camera(tmp_path / "camera.json", Camera(640, 480, 525, 524.5, 319.5, 239.5), 1000)
+    document = json.loads((tmp_path / "camera.json").read_text())
+    assert document == {**PINHOLE, "distortion": [0, 0, 0, 0, 0]}
+    write_camera(tmp_path / "camera.json", Camera.orthographic(256, 200, 0.001), 50000)
+    assert json.loads((tmp_path / "camera.json").read_text()) == ORTHOGRAPHIC
+
+
+@pytest.mark.parametrize("scale", [0, -1, float("nan"), float("inf")])
+def test_written_scale_must_be_positive(tmp_path, scale):
+    with pytest.raises(ValueError, match="depth_scale"):
+        write_camera(tmp_path / "camera.json", Camera(4, 3, 5, 5, 2, 1), scale)
+    assert list(tmp_path.iterdir()) == []

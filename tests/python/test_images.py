@@ -1,0 +1,228 @@
+"""Depth and colour images: what is stored comes back, and what is damaged is named."""
+
+import sys
+import zlib
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from nacre import FileFormatError
+from nacre.io.images import read_color, read_depth, write_color_png, write_depth_png
+
+
+@pytest.fixture
+def depth():
+    image = np.random.default_rng(1).integers(0, 65536, (24, 31), dtype=np.uint16)
+    image[0, :3] = 0, 1, 65535
+    return image
+
+
+def pgm(depth, header=None):
+    height, width = depth.shape
+    return (header or f"P5\n{width} {height}\n65535\n".encode()) + depth.astype(">u2").tobytes()
+
+
+def test_depth_png_comes_back(tmp_path, depth):
+    write_depth_png(tmp_path / "a.png", depth)
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.mode == "I;16"
+    again = read_depth(tmp_path / "a.png")
+    assert again.dtype == np.uint16
+    np.testing.assert_array_equal(again, depth)
+
+
+def test_depth_png_takes_any_layout(tmp_path, depth):
+    write_depth_png(tmp_path / "a.png", depth.T[::-1])
+    np.testing.assert_array_equal(read_depth(tmp_path / "a.png"), depth.T[::-1])
+
+
+@pytest.mark.parametrize(
+    "header",
+    [b"P5\n31 24\n65535\n", b"P5 31 24 9823\n", b"P5\n# a comment 1 2 3\n31 24\n# another\n65535\n"],
+)
+def test_depth_pgm_is_not_scaled(tmp_path, depth, header):
+    (tmp_path / "a.pgm").write_bytes(pgm(depth, header))
+    again = read_depth(tmp_path / "a.pgm")
+    assert again.dtype == np.uint16
+    np.testing.assert_array_equal(again, depth)
+
+
+def test_pgm_pixels_may_look_like_white_space(tmp_path):
+    depth = np.full((2, 2), 0x0A20, dtype=np.uint16)
+    (tmp_path / "a.pgm").write_bytes(pgm(depth))
+    np.testing.assert_array_equal(read_depth(tmp_path / "a.pgm"), depth)
+
+
+@pytest.mark.parametrize("dtype", [np.uint16, np.float32, np.float64, np.float16])
+def test_depth_npy_keeps_its_type(tmp_path, depth, dtype):
+    stored = (depth / 7).astype(dtype)
+    np.save(tmp_path / "a.npy", stored)
+    again = read_depth(tmp_path / "a.npy")
+    assert again.dtype == dtype
+    np.testing.assert_array_equal(again, stored)
+
+
+@pytest.mark.parametrize("channel", ["Z", "Y", "anything"])
+def test_depth_exr(tmp_path, channel):
+    exr = pytest.importorskip("OpenEXR")
+    depth = np.linspace(0.5, 3, 12, dtype=np.float32).reshape(3, 4)
+    with exr.File({"type": exr.scanlineimage}, {channel: depth}) as image:
+        image.write(str(tmp_path / "a.exr"))
+    np.testing.assert_array_equal(read_depth(tmp_path / "a.exr"), depth)
+    (tmp_path / "b.exr").write_bytes((tmp_path / "a.exr").read_bytes()[:100])
+    with pytest.raises(FileFormatError, match=r"b\.exr"):
+        read_depth(tmp_path / "b.exr")
+
+
+def test_color_comes_back(tmp_path):
+    color = np.random.default_rng(2).integers(0, 256, (9, 7, 3), dtype=np.uint8)
+    write_color_png(tmp_path / "c.png", color)
+    again = read_color(tmp_path / "c.png")
+    assert again.dtype == np.uint8
+    assert again.flags.writeable
+    np.testing.assert_array_equal(again, color)
+
+
+@pytest.mark.parametrize("mode", ["L", "RGBA", "P"])
+def test_color_of_other_modes_becomes_rgb(tmp_path, mode):
+    Image.new("RGB", (4, 3), (204, 204, 204)).convert(mode).save(tmp_path / "c.png")
+    np.testing.assert_array_equal(read_color(tmp_path / "c.png"), np.full((3, 4, 3), 204, np.uint8))
+
+
+@pytest.mark.parametrize("mode", ["L", "RGB", "RGBA", "P", "1"])
+def test_eight_bit_image_is_not_depth(tmp_path, mode):
+    Image.new(mode, (4, 3)).save(tmp_path / "d.png")
+    with pytest.raises(FileFormatError, match=r"d\.png.*16 bits"):
+        read_depth(tmp_path / "d.png")
+
+
+def test_eight_bit_pgm_is_not_depth(tmp_path):
+    (tmp_path / "d.pgm").write_bytes(b"P5 2 2 255\n1234")
+    with pytest.raises(FileFormatError, match="largest value is 255"):
+        read_depth(tmp_path / "d.pgm")
+
+
+def test_depth_image_is_not_color(tmp_path, depth):
+    write_depth_png(tmp_path / "d.png", depth)
+    with pytest.raises(FileFormatError, match="8 bits"):
+        read_color(tmp_path / "d.png")
+
+
+@pytest.mark.parametrize("read", [read_depth, read_color])
+@pytest.mark.parametrize("keep", [0, 4, 20, 60, 0.5, 0.9])
+def test_truncated_png_is_named(tmp_path, depth, read, keep):
+    path = tmp_path / "cut.png"
+    if read is read_depth:
+        write_depth_png(path, depth)
+    else:
+        write_color_png(path, np.repeat(depth[:, :, None] % 256, 3, axis=2).astype(np.uint8))
+    data = path.read_bytes()
+    path.write_bytes(data[: keep if isinstance(keep, int) else int(keep * len(data))])
+    with pytest.raises(FileFormatError, match=r"cut\.png.*damaged or truncated"):
+        read(path)
+
+
+def test_flipped_bits_are_told(tmp_path, depth):
+    path = tmp_path / "bad.png"
+    write_depth_png(path, depth)
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    path.write_bytes(bytes(data))
+    with pytest.raises(FileFormatError, match=r"bad\.png"):
+        read_depth(path)
+
+
+def test_gigantic_png_is_refused(tmp_path):
+    def chunk(name, data):
+        return len(data).to_bytes(4, "big") + name + data + zlib.crc32(name + data).to_bytes(4, "big")
+
+    header = (60000).to_bytes(4, "big") * 2 + bytes((16, 0, 0, 0, 0))
+    (tmp_path / "big.png").write_bytes(
+        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", b"") + chunk(b"IEND", b"")
+    )
+    with pytest.raises(FileFormatError, match=r"big\.png: refused"):
+        read_depth(tmp_path / "big.png")
+
+
+@pytest.mark.parametrize(
+    ("name", "data"),
+    [
+        ("a.pgm", b""),
+        ("a.pgm", b"P2 2 2 65535\n1 2 3 4"),
+        ("a.pgm", b"P5 2 2"),
+        ("a.pgm", b"P5 2 2 70000\n" + bytes(8)),
+        ("a.pgm", b"P5 2 2 65535\n" + bytes(7)),
+        ("a.pgm", b"P5 0 2 65535\n"),
+        ("a.pgm", b"P5 99999999 99999999 65535\n"),
+        ("a.npy", b""),
+        ("a.npy", b"\x93NUMPY\x01\x00"),
+        ("a.npy", b"not an array at all"),
+        ("a.tif", b"II*\x00"),
+    ],
+)
+def test_damaged_files_are_named(tmp_path, name, data):
+    (tmp_path / name).write_bytes(data)
+    with pytest.raises(FileFormatError, match=r"a\.(pgm|npy|tif)"):
+        read_depth(tmp_path / name)
+
+
+def test_truncated_npy_is_named(tmp_path, depth):
+    np.save(tmp_path / "a.npy", depth)
+    (tmp_path / "a.npy").write_bytes((tmp_path / "a.npy").read_bytes()[:-1])
+    with pytest.raises(FileFormatError, match=r"a\.npy"):
+        read_depth(tmp_path / "a.npy")
+
+
+@pytest.mark.parametrize(
+    "array", [np.zeros((3, 4, 2)), np.zeros(5), np.zeros((0, 4)), np.zeros((2, 2), complex)]
+)
+def test_npy_must_be_a_depth_image(tmp_path, array):
+    np.save(tmp_path / "a.npy", array)
+    with pytest.raises(FileFormatError, match=r"\(H, W\) numbers"):
+        read_depth(tmp_path / "a.npy")
+
+
+def test_npy_with_objects_is_refused(tmp_path):
+    np.save(tmp_path / "a.npy", np.array([[{}, {}]], dtype=object), allow_pickle=True)
+    with pytest.raises(FileFormatError, match=r"a\.npy"):
+        read_depth(tmp_path / "a.npy")
+
+
+@pytest.mark.parametrize("name", ["x.png", "x.pgm", "x.npy"])
+def test_missing_file_is_missing(tmp_path, name):
+    with pytest.raises(FileNotFoundError):
+        read_depth(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    "bad", [np.zeros((3, 4), np.int32), np.zeros((3, 4)), np.zeros((3, 4, 1), np.uint16)]
+)
+def test_written_depth_must_be_uint16(tmp_path, bad):
+    with pytest.raises(ValueError, match="uint16"):
+        write_depth_png(tmp_path / "a.png", bad)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    "bad", [np.zeros((3, 4), np.uint8), np.zeros((3, 4, 3)), np.zeros((3, 4, 4), np.uint8)]
+)
+def test_written_color_must_be_uint8_rgb(tmp_path, bad):
+    with pytest.raises(ValueError, match="uint8"):
+        write_color_png(tmp_path / "a.png", bad)
+
+
+def test_without_pillow_the_error_says_what_to_install(tmp_path, depth, monkeypatch):
+    write_depth_png(tmp_path / "a.png", depth)
+    monkeypatch.setitem(sys.modules, "PIL.Image", None)
+    with pytest.raises(ImportError, match=r'pip install "nacre\[images\]"'):
+        read_depth(tmp_path / "a.png")
+    (tmp_path / "a.pgm").write_bytes(pgm(depth))
+    np.testing.assert_array_equal(read_depth(tmp_path / "a.pgm"), depth)
+
+
+def test_without_openexr_the_error_says_what_to_install(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "OpenEXR", None)
+    (tmp_path / "a.exr").write_bytes(b"")
+    with pytest.raises(ImportError, match="pip install OpenEXR"):
+        read_depth(tmp_path / "a.exr")

@@ -1,0 +1,322 @@
+"""Meshes in every form that is legal; every other is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import nacre
+from nacre.io.meshes import read_mesh_arrays, write_mesh
+
+DATA = Path(__file__).parents[3] / "shared" / "data"
+needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="no recordings in ../shared/data")
+
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0.5]])
+FAN = [[0, 1, 2], [0, 2, 3]]
+OBJ_SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0.5\nv 0 1 0.5\n"
+OFF_SQUARE = OBJ_SQUARE.replace("v ", "")
+PLY_VERTICES = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+
+
+def read(tmp_path, name, content):
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return read_mesh_arrays(path)
+
+
+def check_square(mesh, triangles=FAN, dtype=np.float64):
+    np.testing.assert_array_equal(mesh[0], SQUARE.astype(dtype), strict=True)
+    np.testing.assert_array_equal(mesh[1], np.array(triangles, dtype=np.int32), strict=True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        OBJ_SQUARE + "f 1 2 3 4\n",
+        OBJ_SQUARE + "f 1/1 2/2 3/3 4/4",
+        OBJ_SQUARE + "f 1//9 2//9 3//9 4//9\n",
+        OBJ_SQUARE + "f 1/5/9 2/6/9 3/7/9 4/8/9\n",
+        OBJ_SQUARE + "f -4 -3 -2 -1\n",
+        OBJ_SQUARE + "f 1 2 3\nf 1 3 4\n",
+        OBJ_SQUARE + "f 1 2 3 \\\n 4\n",
+        "f 1 2 3 4\n" + OBJ_SQUARE,
+        "v 0 0 0\nv 1 0 0\nv 1 1 0.5\nf 1 2 3\nv 0 1 0.5\nf -4 -2 -1\n",
+        "# made by hand\nmtllib a.mtl\no square\n\n"
+        + OBJ_SQUARE
+        + "vn 0 0 1\nvt 0 0\ns off\nusemtl a # b\nf 1 2 3 4\n",
+        (OBJ_SQUARE + "f 1 2 3 4\n").replace("\n", "\r\n"),
+        OBJ_SQUARE.replace("0\n", "0 1.0 1.0 1.0\n").replace("0.5\n", "0.5 1.0\n") + "f 1 2 3 4\n",
+        b"\xef\xbb\xbf" + (OBJ_SQUARE + "f 1 2 3 4\n").encode(),
+        (OBJ_SQUARE + "f 1 2 3 4\n").encode() + b"# caf\xe9\n",
+    ],
+)
+def test_obj(tmp_path, text):
+    check_square(read(tmp_path, "a.obj", text))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"OFF\n4 1 0\n{OFF_SQUARE}4 0 1 2 3\n",
+        f"OFF 4 1 4\n{OFF_SQUARE}4 0 1 2 3",
+        f"OFF\n# by hand\n\n4 2\n{OFF_SQUARE}\n3 0 1 2\n3 0 2 3 255 0 0\n",
+        f"COFF\n4 1 0\n{OFF_SQUARE}".replace("0\n", "0 255 0 0 255\n", 2)
+        .replace("0.5\n", "0.5 1 2 3 4\n")
+        .replace("4 1 0 255 0 0 255", "4 1 0")
+        + "4 0 1 2 3\n",
+        f"NOFF\n4 1 0\n{OFF_SQUARE}".replace("0.5\n", "0.5 0 0 1\n") + "4 0 1 2 3\n",
+    ],
+)
+def test_off(tmp_path, text):
+    check_square(read(tmp_path, "a.off", text))
+
+
+def stl_binary(triangles, header=b"solid like many binary files"):
+    facets = np.zeros(len(triangles), dtype=[("n", "<f4", 3), ("c", "<f4", (3, 3)), ("a", "<u2")])
+    facets["c"] = triangles
+    facets["n"] = np.nan
+    return header.ljust(80, b"\0") + np.uint32(len(triangles)).tobytes() + facets.tobytes()
+
+
+def stl_text(triangles):
+    text = "solid a b\n"
+    for corners in triangles:
+        text += "facet normal nan nan nan\n outer loop\n"
+        text += "".join(f"  vertex {x} {y} {z}\n" for x, y, z in corners.tolist())
+        text += " endloop\nendfacet\n"
+    return (text + "endsolid a b\n").encode()
+
+
+@pytest.mark.parametrize("write", [stl_binary, stl_text])
+def test_stl_corners_are_merged(tmp_path, write):
+    check_square(read(tmp_path, "a.stl", write(SQUARE[FAN])), dtype=np.float32)
+    check_square(read(tmp_path, "a.STL", write(SQUARE[FAN] * [1, 1, 1] + -0.0)), dtype=np.float32)
+    vertices, triangles = read(tmp_path, "b.stl", write(np.empty((0, 3, 3))))
+    assert vertices.shape == triangles.shape == (0, 3)
+
+
+def test_stl_of_several_solids_in_capitals(tmp_path):
+    content = (stl_text(SQUARE[FAN[:1]]) + b"\n" + stl_text(SQUARE[FAN[1:]])).upper()
+    check_square(read(tmp_path, "a.stl", content), dtype=np.float32)
+
+
+@settings(max_examples=50, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 2**32 - 1), size=st.integers(0, 30))
+def test_stl_merges_as_a_dictionary_would(tmp_path_factory, seed, size):
+    corners = np.random.default_rng(seed).integers(-1, 2, (size, 3, 3)).astype(np.float32) * np.float32(0.1)
+    vertices, triangles = read(tmp_path_factory.getbasetemp(), "a.stl", stl_binary(corners))
+    np.testing.assert_array_equal(vertices[triangles], corners)
+    first_seen = list(dict.fromkeys(map(tuple, (corners + 0).reshape(-1, 3).tolist())))
+    assert list(map(tuple, vertices.tolist())) == first_seen
+
+
+@pytest.mark.parametrize(
+    "prop",
+    ["list uchar int vertex_indices", "list uint8 uint32 vertex_index", "list int short vertex_indices"],
+)
+def test_ply(tmp_path, prop):
+    header = f"ply\nformat ascii 1.0\n{PLY_VERTICES}element face 2\nproperty {prop}\nend_header\n"
+    check_square(read(tmp_path, "a.ply", header + OFF_SQUARE + "3 0 1 2\n3 0 2 3\n"), dtype=np.float32)
+    mixed = header.replace("face 2", "face 3").replace("vertex 4", "vertex 5") + OFF_SQUARE + "9 9 9\n"
+    vertices, triangles = read(tmp_path, "a.ply", mixed + "4 0 1 2 3\n3 1 2 3\n5 4 3 2 1 0\n")
+    assert triangles.tolist() == [[0, 1, 2], [0, 2, 3], [1, 2, 3], [4, 3, 2], [4, 2, 1], [4, 1, 0]]
+    assert len(vertices) == 5
+
+
+@settings(max_examples=50, deadline=None, derandomize=True)
+@given(data=st.data(), sizes=st.lists(st.integers(3, 7), max_size=10))
+def test_polygons_become_fans(tmp_path_factory, data, sizes):
+    faces = [data.draw(st.lists(st.integers(0, 3), min_size=size, max_size=size)) for size in sizes]
+    expected = [[face[0], face[i], face[i + 1]] for face in faces for i in range(1, len(face) - 1)]
+    lines = "".join(f"{len(face)} {' '.join(map(str, face))}\n" for face in faces)
+    triangles = read(tmp_path_factory.getbasetemp(), "a.off", f"OFF\n4 {len(faces)} 0\n{OFF_SQUARE}{lines}")[
+        1
+    ]
+    assert triangles.tolist() == expected
+    assert triangles.shape[1] == 3
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("binary", [True, False])
+@pytest.mark.parametrize("index_dtype", [np.int64, np.uint8])
+def test_written_meshes_are_read_again(tmp_path, dtype, binary, index_dtype):
+    vertices = SQUARE.astype(dtype) + dtype(1e6)
+    write_mesh(tmp_path / "a.ply", vertices, np.array(FAN, dtype=index_dtype), comments=["c"], binary=binary)
+    read_vertices, triangles = read_mesh_arrays(tmp_path / "a.ply")
+    np.testing.assert_array_equal(read_vertices, vertices, strict=True)
+    np.testing.assert_array_equal(triangles, np.array(FAN, dtype=np.int32), strict=True)
+
+
+def test_empty_mesh(tmp_path):
+    write_mesh(tmp_path / "a.ply", np.empty((0, 3)), np.empty((0, 3), dtype=int))
+    vertices, triangles = read_mesh_arrays(tmp_path / "a.ply")
+    assert vertices.shape == triangles.shape == (0, 3)
+
+
+@pytest.mark.parametrize(
+    ("name", "vertices", "triangles", "error", "message"),
+    [
+        ("a.obj", SQUARE, FAN, ValueError, r"\.ply"),
+        ("a.ply", SQUARE[:, :2], FAN, ValueError, r"vertices must have shape \(N, 3\)"),
+        ("a.ply", SQUARE, [[0, 1]], ValueError, r"triangles must have shape \(M, 3\)"),
+        ("a.ply", SQUARE, [[0.0, 1, 2]], TypeError, "triangles must be an array of integers"),
+        ("a.ply", SQUARE, [[0, 1, 4]], ValueError, "triangles must be indices from 0 to 3, got 0 to 4"),
+        ("a.ply", SQUARE, [[0, 1, -1]], ValueError, "triangles must be indices from 0 to 3, got -1 to 1"),
+    ],
+)
+def test_illegal_arguments(tmp_path, name, vertices, triangles, error, message):
+    with pytest.raises(error, match=message):
+        write_mesh(tmp_path / name, vertices, triangles)
+    assert not list(tmp_path.iterdir())
+
+
+def test_unknown_suffix(tmp_path):
+    with pytest.raises(ValueError, match=r"\.obj, \.off, \.stl, \.ply, got .*a\.glb"):
+        read_mesh_arrays(tmp_path / "a.glb")
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".off", ".stl", ".ply"])
+def test_missing_files_and_directories(tmp_path, suffix):
+    with pytest.raises(FileNotFoundError):
+        read_mesh_arrays(tmp_path / f"a{suffix}")
+    (tmp_path / f"a{suffix}").mkdir()
+    with pytest.raises(IsADirectoryError):
+        read_mesh_arrays(tmp_path / f"a{suffix}")
+
+
+PLY_HEADER = f"ply\nformat ascii 1.0\n{PLY_VERTICES}element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+STL = stl_binary(SQUARE[FAN])
+STL_LINES = stl_text(SQUARE[FAN]).decode()
+BROKEN = {
+    "empty.obj": ("", "no face"),
+    "points only.obj": (OBJ_SQUARE, "no face"),
+    "coordinate missing.obj": (OBJ_SQUARE + "v 1 2\nf 1 2 3", "line 5: cannot read 'v 1 2'"),
+    "coordinate no number.obj": (OBJ_SQUARE + "v 1 2 z\nf 1 2 3", "line 5: cannot read 'v 1 2 z'"),
+    "coordinate underscore.obj": (OBJ_SQUARE + "v 1 2 1_0\nf 1 2 3", "line 5"),
+    "corner no number.obj": (OBJ_SQUARE + "f 1 2 c", "line 5: cannot read 'f 1 2 c'"),
+    "corner empty.obj": (OBJ_SQUARE + "f 1 2 /3", "line 5"),
+    "corner zero.obj": (OBJ_SQUARE + "f 0 1 2", "line 5: cannot read 'f 0 1 2'"),
+    "corner too large.obj": (OBJ_SQUARE + "f 1 2 3\nf 1 2 5", "face 1 names vertex 4"),
+    "corner too far back.obj": (OBJ_SQUARE + "f -1 -2 -5", "line 5"),
+    "corner enormous.obj": (OBJ_SQUARE + f"f 1 2 {10**30}", "line 5"),
+    "corner of many digits.obj": (OBJ_SQUARE + f"f 1 2 {'9' * 9999}", "line 5"),
+    "two corners.obj": (OBJ_SQUARE + "f 1 2", "face 0 has 2 corners"),
+    "no corners.obj": (OBJ_SQUARE + "f", "face 0 has 0 corners"),
+    "binary.obj": (b"\x7fELF\x02\x01\x01" + bytes(range(256)), "line 1"),
+    "a number first.obj": ("1 2 3\n", "line 1"),
+    "empty.off": ("", "begins with 'OFF'"),
+    "no magic.off": (f"4 1 0\n{OFF_SQUARE}4 0 1 2 3\n", "line 1: .*begins with 'OFF'"),
+    "four dimensions.off": (f"4OFF\n4 1 0\n{OFF_SQUARE}4 0 1 2 3\n", "begins with 'OFF'"),
+    "binary.off": (b"OFF BINARY\n\0\0\0\4\0\0\0\1", "line 1: cannot read 'BINARY'"),
+    "no counts.off": ("OFF\n", "line 1"),
+    "one count.off": ("OFF\n4\n", "line 2"),
+    "negative count.off": (f"OFF\n-4 1 0\n{OFF_SQUARE}4 0 1 2 3\n", "line 2"),
+    "vertices promised.off": (
+        f"OFF\n1000000000000 1 0\n{OFF_SQUARE}",
+        "line 6: .*after 4 of 1000000000000 vertices",
+    ),
+    "faces promised.off": (
+        f"OFF\n4 1000000000000 0\n{OFF_SQUARE}4 0 1 2 3\n",
+        "after 4 of 4 vertices and 1 of 1000000",
+    ),
+    "vertex short.off": (f"OFF\n4 1 0\n0 0\n{OFF_SQUARE}4 0 1 2 3\n", "line 3: cannot read '0 0'"),
+    "face short.off": (f"OFF\n4 1 0\n{OFF_SQUARE}4 0 1 2\n", "line 7: cannot read '4 0 1 2'"),
+    "face of one.off": (f"OFF\n4 1 0\n{OFF_SQUARE}1 0\n", "face 0 has 1 corners"),
+    "corner negative.off": (f"OFF\n4 1 0\n{OFF_SQUARE}3 0 1 -1\n", "line 7"),
+    "corner too large.off": (f"OFF\n4 1 0\n{OFF_SQUARE}3 0 1 4\n", "face 0 names vertex 4"),
+    "corner enormous.off": (f"OFF\n4 1 0\n{OFF_SQUARE}3 0 1 {10**30}\n", "line 7"),
+    "more lines.off": (f"OFF\n4 1 0\n{OFF_SQUARE}3 0 1 2\n3 0 2 3\n", "line 8: more lines"),
+    "empty.stl": ("", "neither a binary STL file nor"),
+    "short.stl": (STL[:83], "line 1"),
+    "cut.stl": (STL.replace(b"solid", b"STL: ")[:-1], "byte 80: .*2 facets has 184 bytes, this one 183"),
+    "longer.stl": (STL.replace(b"solid", b"STL: ") + b"\0", "2 facets has 184 bytes, this one 185"),
+    "cut like text.stl": (STL[:-1], "line 1"),
+    "promises.stl": (STL.replace(b"solid", b"STL: ")[:80] + b"\xff" * 104, "4294967295 facets"),
+    "text cut.stl": (STL_LINES[:-13], "the file ends before 'endsolid'"),
+    "text without facets' end.stl": (STL_LINES.replace("endfacet\n", ""), "cannot read"),
+    "text with two corners.stl": (
+        STL_LINES.replace("  vertex 1.0 0.0 0.0\n", ""),
+        "line 6: cannot read 'endloop'",
+    ),
+    "text with four corners.stl": (
+        STL_LINES.replace(" endloop", "  vertex 1 2 3\n endloop"),
+        "line 7: cannot read",
+    ),
+    "text with a short corner.stl": (
+        STL_LINES.replace("vertex 1.0 0.0 0.0", "vertex 1.0 0.0"),
+        "line 5: cannot read",
+    ),
+    "text with a word.stl": (
+        STL_LINES.replace("vertex 1.0 0.0 0.0", "vertex 1.0 0.0 z"),
+        "line 5: cannot read",
+    ),
+    "text without solid.stl": (STL_LINES.replace("solid a b", "solidus", 1), "line 1: cannot read"),
+    "points only.ply": (f"ply\nformat ascii 1.0\n{PLY_VERTICES}end_header\n{OFF_SQUARE}", "not a mesh"),
+    "face of floats.ply": (PLY_HEADER.replace("int", "float") + OFF_SQUARE + "3 0 1 2\n", "not a mesh"),
+    "face is no list.ply": (PLY_HEADER.replace("list uchar ", "") + OFF_SQUARE + "3\n", "not a mesh"),
+    "corner too large.ply": (PLY_HEADER + OFF_SQUARE + "3 0 1 4\n", "face 0 names vertex 4"),
+    "corner negative.ply": (PLY_HEADER + OFF_SQUARE + "3 0 1 -1\n", "face 0 names vertex -1"),
+    "two corners.ply": (PLY_HEADER + OFF_SQUARE + "2 0 1\n", "face 0 has 2 corners"),
+    "cut.ply": (PLY_HEADER + OFF_SQUARE + "3 0 1", "line 14: the line does not hold 3 values"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_broken_files(tmp_path, name):
+    content, message = BROKEN[name]
+    with pytest.raises(nacre.FileFormatError, match=message) as caught:
+        read(tmp_path, name, content)
+    assert str(tmp_path / name) in str(caught.value)
+
+
+SEEDS = {
+    "a.obj": (OBJ_SQUARE + "f 1/2 2//3 3/4/5 -1\n# end\n").encode(),
+    "a.off": f"COFF\n4 2 0\n{OFF_SQUARE}3 0 1 2 255 0 0\n3 0 2 3\n".encode(),
+    "a.stl": stl_text(SQUARE[FAN]),
+    "b.stl": STL,
+    "a.ply": (PLY_HEADER + OFF_SQUARE + "4 0 1 2 3\n").encode(),
+}
+
+
+@settings(max_examples=400, deadline=None, derandomize=True)
+@given(
+    name=st.sampled_from(sorted(SEEDS)),
+    edits=st.lists(
+        st.tuples(st.integers(0, 600), st.integers(0, 3), st.binary(max_size=4)), min_size=1, max_size=4
+    ),
+)
+def test_damaged_files_give_a_mesh_or_a_format_error(tmp_path_factory, name, edits):
+    content = SEEDS[name]
+    for position, removed, inserted in edits:
+        position %= len(content) + 1
+        content = content[:position] + inserted + content[position + removed :]
+    try:
+        vertices, triangles = read(tmp_path_factory.getbasetemp(), name, content)
+    except nacre.FileFormatError:
+        return
+    assert triangles.size == 0 or (triangles.min() >= 0 and triangles.max() < len(vertices))
+
+
+@needs_data
+@pytest.mark.data
+@pytest.mark.parametrize(
+    ("name", "num_vertices", "num_triangles"),
+    [
+        ("meshes/spot.obj", 2930, 5856),
+        ("meshes/homer.obj", 6002, 12000),
+        ("meshes/libigl_fandisk.off", 7229, 14454),
+        ("stanford-bunny/reconstruction/bun_zipper.ply", 35947, 69451),
+    ],
+)
+def test_real_meshes(name, num_vertices, num_triangles):
+    vertices, triangles = read_mesh_arrays(DATA / name)
+    assert (len(vertices), len(triangles)) == (num_vertices, num_triangles)
+    edges = np.sort(
+        np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), axis=1
+    )
+    counts = np.unique(edges, axis=0, return_counts=True)[1]
+    boundary = np.count_nonzero(counts == 1)
+    assert boundary == (223 if "bun_zipper" in name else 0)
+    assert np.count_nonzero(counts > 2) == 0
