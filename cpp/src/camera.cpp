@@ -1,7 +1,6 @@
 #include "nacre/camera.hpp"
 
 #include <cmath>
-#include <limits>
 
 #include "check.hpp"
 
@@ -22,15 +21,34 @@ Eigen::Vector2d distort(const Eigen::Vector2d& undistorted, const Camera::Distor
           y * radial + k[2] * (r2 + 2.0 * y * y) + 2.0 * k[3] * x * y};
 }
 
-// The inverse of distort, by fixed-point iteration.
-Eigen::Vector2d undistort(const Eigen::Vector2d& distorted, const Camera::Distortion& k) {
+// The r^2 at which r (1 + k1 r^2 + k2 r^4 + k3 r^6) stops growing; infinite where it always grows.
+double turning_point(const Camera::Distortion& k) {
+  constexpr double reach = 100.0, step = 1e-3;  // 84 degrees off the axis
+  const auto growth = [&k](double r2) { return 1.0 + r2 * (3.0 * k[0] + r2 * (5.0 * k[1] + r2 * 7.0 * k[4])); };
+  for (double r2 = 0.0; r2 < reach; r2 += step) {
+    if (growth(r2) <= 0.0) return r2;
+  }
+  return std::numeric_limits<double>::infinity();
+}
+
+// The inverse of distort by Newton's method, which converges from one side below the turning point; NaN beyond it.
+Eigen::Vector2d undistort(const Eigen::Vector2d& distorted, const Camera::Distortion& k, double max_radius_squared) {
   Eigen::Vector2d undistorted = distorted;
   for (int iteration = 0; iteration < 50; ++iteration) {
-    const Eigen::Vector2d step = distorted - distort(undistorted, k);
+    const double x = undistorted.x(), y = undistorted.y(), r2 = x * x + y * y;
+    const double radial = 1.0 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]));
+    const double slope = k[0] + r2 * (2.0 * k[1] + r2 * 3.0 * k[4]);
+    const double mixed = 2.0 * (x * y * slope + k[2] * x + k[3] * y);
+    Eigen::Matrix2d jacobian;
+    jacobian << radial + 2.0 * x * x * slope + 2.0 * k[2] * y + 6.0 * k[3] * x, mixed, mixed,
+        radial + 2.0 * y * y * slope + 6.0 * k[2] * y + 2.0 * k[3] * x;
+    const Eigen::Vector2d step = jacobian.inverse() * (distorted - distort(undistorted, k));
     undistorted += step;
-    if (step.squaredNorm() < 1e-24) break;
+    if (!(step.squaredNorm() > 1e-24 * (1.0 + r2))) break;
   }
-  return undistorted;
+  const bool found = undistorted.squaredNorm() <= max_radius_squared &&
+                     (distort(undistorted, k) - distorted).squaredNorm() <= 1e-18 * (1.0 + distorted.squaredNorm());
+  return found ? undistorted : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
 }
 
 }  // namespace
@@ -56,12 +74,13 @@ Camera Camera::pinhole(int width, int height, double fx, double fy, double cx, d
   camera.depth_kind_ = depth_kind;
 
   const bool distorted = distortion != Distortion{};
+  if (distorted) camera.max_radius_squared_ = turning_point(distortion);
   auto rays = std::make_shared<std::vector<Ray>>();
   rays->reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
   for (int v = 0; v < height; ++v) {
     for (int u = 0; u < width; ++u) {
       Eigen::Vector2d xy((u - cx) / fx, (v - cy) / fy);
-      if (distorted) xy = undistort(xy, distortion);
+      if (distorted) xy = undistort(xy, distortion, camera.max_radius_squared_);
       const double length = depth_kind == DepthKind::radial ? std::sqrt(1.0 + xy.squaredNorm()) : 1.0;
       rays->push_back({0.0F, 0.0F, static_cast<float>(xy.x() / length), static_cast<float>(xy.y() / length),
                        static_cast<float>(1.0 / length)});
@@ -79,6 +98,7 @@ Camera Camera::orthographic(int width, int height, double pixel_size) {
   camera.model_ = Model::orthographic;
   camera.width_ = width;
   camera.height_ = height;
+  camera.pixel_size_ = pixel_size;
   camera.fx_ = camera.fy_ = 1.0 / pixel_size;
   camera.cx_ = (width - 1) / 2.0;
   camera.cy_ = (height - 1) / 2.0;
@@ -97,8 +117,10 @@ Camera Camera::orthographic(int width, int height, double pixel_size) {
 
 Eigen::Vector2d Camera::project(const Eigen::Vector3d& point) const {
   if (model_ == Model::orthographic) return {point.x() * fx_ + cx_, point.y() * fy_ + cy_};
-  if (!(point.z() > 0.0)) return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   Eigen::Vector2d xy(point.x() / point.z(), point.y() / point.z());
+  if (!(point.z() > 0.0 && xy.squaredNorm() <= max_radius_squared_)) {
+    return Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
   if (distortion_ != Distortion{}) xy = distort(xy, distortion_);
   return {xy.x() * fx_ + cx_, xy.y() * fy_ + cy_};
 }

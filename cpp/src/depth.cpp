@@ -13,6 +13,9 @@ namespace {
 
 constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
 
+// A pixel beyond the end of the distortion model sees nothing that could be placed.
+bool has_direction(const Ray& ray) { return ray.direction_x == ray.direction_x; }
+
 // A wrong depth_scale shows as a median depth that no depth camera measures. A sample of the pixels tells enough.
 void require_plausible_median(const DepthRef& depth) {
   constexpr std::int64_t max_sample = 1 << 15;
@@ -96,6 +99,7 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
   dilate(width, height, options.edge_dilation, num_threads, marks.edge);
   dilate(width, height, options.edge_dilation, num_threads, marks.slanted);
 
+  const Ray* const rays = camera.rays().data();
   DepthReport counts;
   counts.num_pixels = depth.size();
   Marks keep(static_cast<std::size_t>(depth.size()));
@@ -103,7 +107,7 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
     for (std::int64_t u = 0; u < width; ++u, ++i) {
       const float z = depth(v, u);
       const auto pixel = static_cast<std::size_t>(i);
-      if (!is_measurement(z)) {
+      if (!is_measurement(z) || !has_direction(rays[i])) {
         ++counts.num_invalid;
       } else if (z < options.min_depth || z > options.max_depth) {
         ++counts.num_out_of_range;
@@ -139,16 +143,22 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
 
 Points back_project(const DepthRef& depth, const Camera& camera) {
   require_camera_size("depth", depth.rows(), depth.cols(), camera);
-  const auto num_points = depth.unaryExpr([](float z) { return is_measurement(z); }).count();
+  const Ray* const rays = camera.rays().data();
+  const auto seen = [&](Eigen::Index v, Eigen::Index u) {
+    return is_measurement(depth(v, u)) && has_direction(rays[v * depth.cols() + u]);
+  };
+  Eigen::Index num_points = 0;
+  for (Eigen::Index v = 0; v < depth.rows(); ++v) {
+    for (Eigen::Index u = 0; u < depth.cols(); ++u) num_points += seen(v, u);
+  }
   Points points(num_points, 3);
   Eigen::Index next = 0;
-  const Ray* ray = camera.rays().data();
   for (Eigen::Index v = 0; v < depth.rows(); ++v) {
-    for (Eigen::Index u = 0; u < depth.cols(); ++u, ++ray) {
+    for (Eigen::Index u = 0; u < depth.cols(); ++u) {
+      if (!seen(v, u)) continue;
+      const Ray& ray = rays[v * depth.cols() + u];
       const float z = depth(v, u);
-      if (!is_measurement(z)) continue;
-      points.row(next++) << ray->origin_x + z * ray->direction_x, ray->origin_y + z * ray->direction_y,
-          z * ray->direction_z;
+      points.row(next++) << ray.origin_x + z * ray.direction_x, ray.origin_y + z * ray.direction_y, z * ray.direction_z;
     }
   }
   return points;

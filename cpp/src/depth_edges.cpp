@@ -25,27 +25,64 @@ struct PlanarLimits {
   float bend_lateral, step_lateral;
 };
 
-// One of the four directions through each pixel of a row: neighbours at -offset and +offset, `length` pixels away.
-void mark_direction(const float* centre, const float* slope, std::ptrdiff_t offset, float length, int width,
-                    const PlanarLimits& limits, std::uint8_t* edge, std::uint8_t* slanted) {
+// To each pixel of row v the slope of the nearest window.
+void spread_slopes(const WindowFits& fits, const std::vector<float>& slopes, int v, std::vector<float>& row) {
+  const auto nearest = [](int pixel, int count) {
+    return std::clamp((pixel - WindowFits::kRadius + WindowFits::kStep / 2) / WindowFits::kStep, 0, count - 1);
+  };
+  const float* const windows = slopes.data() + nearest(v, fits.rows) * fits.cols;
+  for (std::size_t u = 0; u < row.size(); ++u) row[u] = windows[nearest(static_cast<int>(u), fits.cols)];
+}
+
+// The tests of one row; marks are as wide as the values, so that the loops vectorize.
+struct RowTest {
+  explicit RowTest(int width)
+      : slope(static_cast<std::size_t>(width)),
+        bend(slope.size()),
+        step(slope.size()),
+        edge(slope.size()),
+        slanted(slope.size()) {}
+
+  std::vector<float> slope, bend, step;
+  std::vector<std::int32_t> edge, slanted;
+};
+
+// The limits between pixels that are `length` apart.
+void set_limits(const float* centre, const PlanarLimits& limits, float length, RowTest& test) {
+  const PlanarLimits l = limits;
+  const float* const slope = test.slope.data();
+  float* const bend = test.bend.data();
+  float* const step = test.step.data();
+  const std::size_t width = test.slope.size();
+  for (std::size_t u = 0; u < width; ++u) {
+    const float c = centre[u];
+    bend[u] = std::max(l.bend_noise(c), l.bend_crease(c) * length) + l.bend_lateral * slope[u];
+    step[u] = l.step_noise(c) + l.step_slant(c) * length + l.step_lateral * slope[u];
+  }
+}
+
+// One of the four directions through each pixel of a row, with neighbours at -offset and +offset. Comparisons with a
+// missing neighbour (NaN) are false.
+void mark_direction(const float* centre, std::ptrdiff_t offset, RowTest& test) {
   const float* const a = centre - offset;
   const float* const b = centre + offset;
   const float* const beyond_a = a - offset;
   const float* const beyond_b = b + offset;
-  for (int u = 0; u < width; ++u) {
-    const float c = centre[u];
-    const float bend = std::max(limits.bend_noise(c), limits.bend_crease(c) * length) + limits.bend_lateral * slope[u];
-    const float step = limits.step_noise(c) + limits.step_slant(c) * length + limits.step_lateral * slope[u];
-    const float step_a = std::abs(c - a[u]), step_b = std::abs(c - b[u]);
-    // Zero on every plane; comparisons with a missing neighbour (NaN) are false.
-    const int bent = std::abs((a[u] - c) + (b[u] - c)) > bend;
+  const float* const bend = test.bend.data();
+  const float* const step = test.step.data();
+  std::int32_t* const edge = test.edge.data();
+  std::int32_t* const slanted = test.slanted.data();
+  const std::size_t width = test.slope.size();
+  for (std::size_t u = 0; u < width; ++u) {
+    const float from_a = centre[u] - a[u], from_b = centre[u] - b[u];
+    const std::int32_t bent = std::abs(from_a + from_b) > bend[u];
     // At a rim the pixel is held against the plane through its two inner neighbours.
-    const int no_a = a[u] != a[u], no_b = b[u] != b[u];
-    const int bent_a = std::abs((c - a[u]) + (beyond_a[u] - a[u])) > bend;
-    const int bent_b = std::abs((c - b[u]) + (beyond_b[u] - b[u])) > bend;
-    const int steep_a = step_a > step, steep_b = step_b > step;
-    edge[u] = static_cast<std::uint8_t>(edge[u] | bent | (no_a & bent_b) | (no_b & bent_a));
-    slanted[u] = static_cast<std::uint8_t>(slanted[u] | ((steep_a | no_a) & (steep_b | no_b) & (steep_a | steep_b)));
+    const std::int32_t no_a = a[u] != a[u], no_b = b[u] != b[u];
+    const std::int32_t bent_a = std::abs(from_a + (beyond_a[u] - a[u])) > bend[u];
+    const std::int32_t bent_b = std::abs(from_b + (beyond_b[u] - b[u])) > bend[u];
+    const std::int32_t steep_a = std::abs(from_a) > step[u], steep_b = std::abs(from_b) > step[u];
+    edge[u] |= bent | (no_a & bent_b) | (no_b & bent_a);
+    slanted[u] |= (steep_a | no_a) & (steep_b | no_b) & (steep_a | steep_b);
   }
 }
 
@@ -60,26 +97,24 @@ EdgeMarks mark_planar_edges(const PlanarImage& image, const WindowFits& fits, co
                             sigma * step_sigmas,         unit_slope * static_cast<float>(std::tan(options.max_slant)),
                             bend_sigmas * kLateralSigma, step_sigmas * kLateralSigma};
   const std::vector<float> slopes = smooth_slopes(fits);
-  const auto nearest = [](std::int64_t pixel, int count) {
-    return std::clamp<std::int64_t>((pixel - WindowFits::kRadius + WindowFits::kStep / 2) / WindowFits::kStep, 0,
-                                    count - 1);
-  };
-  const std::size_t size = static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height());
+  const auto size = static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height());
   EdgeMarks marks{Marks(size), Marks(size)};
-  const float diagonal = std::sqrt(2.0F);
-  parallel_for(image.height(), kRowBlock, num_threads, [&](std::int64_t v) {
-    const float* const row = image.row(static_cast<int>(v));
-    std::vector<float> slope(static_cast<std::size_t>(image.width()), 0.0F);
-    for (int u = 0; u < image.width() && !slopes.empty(); ++u) {
-      const std::int64_t window = nearest(v, fits.rows) * fits.cols + nearest(u, fits.cols);
-      slope[static_cast<std::size_t>(u)] = slopes[static_cast<std::size_t>(window)];
+  parallel_blocks(image.height(), kRowBlock, num_threads, [&](std::int64_t, std::int64_t begin, std::int64_t end) {
+    RowTest test(image.width());
+    for (std::int64_t v = begin; v < end; ++v) {
+      const float* const row = image.row(static_cast<int>(v));
+      if (!slopes.empty()) spread_slopes(fits, slopes, static_cast<int>(v), test.slope);
+      std::fill(test.edge.begin(), test.edge.end(), 0);
+      std::fill(test.slanted.begin(), test.slanted.end(), 0);
+      set_limits(row, limits, 1.0F, test);
+      mark_direction(row, 1, test);
+      mark_direction(row, image.stride(), test);
+      set_limits(row, limits, std::sqrt(2.0F), test);
+      mark_direction(row, image.stride() + 1, test);
+      mark_direction(row, image.stride() - 1, test);
+      std::copy(test.edge.begin(), test.edge.end(), marks.edge.begin() + v * image.width());
+      std::copy(test.slanted.begin(), test.slanted.end(), marks.slanted.begin() + v * image.width());
     }
-    std::uint8_t* const edge = marks.edge.data() + v * image.width();
-    std::uint8_t* const slanted = marks.slanted.data() + v * image.width();
-    mark_direction(row, slope.data(), 1, 1.0F, image.width(), limits, edge, slanted);
-    mark_direction(row, slope.data(), image.stride(), 1.0F, image.width(), limits, edge, slanted);
-    mark_direction(row, slope.data(), image.stride() + 1, diagonal, image.width(), limits, edge, slanted);
-    mark_direction(row, slope.data(), image.stride() - 1, diagonal, image.width(), limits, edge, slanted);
   });
   return marks;
 }

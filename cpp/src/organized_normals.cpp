@@ -1,6 +1,7 @@
 // Points and normals of a depth image: each normal is one linear fit over a window of the planar image.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "parallel.hpp"
 #include "planar_image.hpp"
@@ -32,37 +33,45 @@ constexpr float full_spread(int radius) {
   return static_cast<float>(full_window(radius) * radius * (radius + 1)) / 3.0F;
 }
 
+// One row of the windows, at dv; the taps du are unrolled so that the loop over pixels vectorizes.
+template <int Radius, int... Tap>
+void sum_window_row(const float* row, const float* centre, int dv, int count, const Gate& gate, Moments& m,
+                    std::integer_sequence<int, Tap...>) {
+  const auto v = static_cast<float>(dv);
+  for (int i = 0; i < count; ++i) {
+    float n = 0, u = 0, uu = 0, w = 0, uw = 0;
+    const float own = centre[i], base = gate.base[i], slope = gate.slope[i];
+    const auto add = [&](int du) {
+      const float difference = row[i + du] - own;
+      const auto distance = static_cast<float>(std::max(std::abs(du), std::abs(dv)));
+      // False where either is missing (NaN).
+      const bool member = std::abs(difference) <= base + distance * slope;
+      const float one = member ? 1.0F : 0.0F, value = member ? difference : 0.0F;
+      n += one;
+      u += static_cast<float>(du) * one;
+      uu += static_cast<float>(du * du) * one;
+      w += value;
+      uw += static_cast<float>(du) * value;
+    };
+    (add(Tap - Radius), ...);
+    m.n[i] += n;
+    m.u[i] += u;
+    m.v[i] += v * n;
+    m.uu[i] += uu;
+    m.uv[i] += v * u;
+    m.vv[i] += v * v * n;
+    m.w[i] += w;
+    m.uw[i] += uw;
+    m.vw[i] += v * w;
+  }
+}
+
 template <int Radius>
 void sum_windows(const float* centre, std::ptrdiff_t stride, int count, const Gate& gate, Moments& m) {
-  std::fill_n(m.n, 9 * kChunk, 0.0F);
+  m = {};
   for (int dv = -Radius; dv <= Radius; ++dv) {
-    const float* const row = centre + dv * stride;
-    const auto v = static_cast<float>(dv);
-    for (int i = 0; i < count; ++i) {
-      float n = 0, u = 0, uu = 0, w = 0, uw = 0;
-#pragma GCC unroll 11
-      for (int du = -Radius; du <= Radius; ++du) {
-        const float difference = row[i + du] - centre[i];
-        const auto distance = static_cast<float>(std::max(std::abs(du), std::abs(dv)));
-        // False where either is missing (NaN).
-        const bool member = std::abs(difference) <= gate.base[i] + distance * gate.slope[i];
-        const float one = member ? 1.0F : 0.0F, value = member ? difference : 0.0F;
-        n += one;
-        u += static_cast<float>(du) * one;
-        uu += static_cast<float>(du * du) * one;
-        w += value;
-        uw += static_cast<float>(du) * value;
-      }
-      m.n[i] += n;
-      m.u[i] += u;
-      m.v[i] += v * n;
-      m.uu[i] += uu;
-      m.uv[i] += v * u;
-      m.vv[i] += v * v * n;
-      m.w[i] += w;
-      m.uw[i] += uw;
-      m.vw[i] += v * w;
-    }
+    sum_window_row<Radius>(centre + dv * stride, centre, dv, count, gate, m,
+                           std::make_integer_sequence<int, 2 * Radius + 1>());
   }
 }
 

@@ -98,6 +98,12 @@ double median_sigma(const Frame& frame) {
   return *middle;
 }
 
+// Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
+bool is_beyond_doubt(const TrackingResult& result, double gate) {
+  return result.status == FrameStatus::tracked && result.alignment.overlap > 0.5 && result.consistency > 0.9 &&
+         result.alignment.rmse < 0.25 * gate;
+}
+
 // Denoised points of the frame, spread over it at random: noise would shift the matches on curved surfaces.
 struct Samples {
   Points points, normals;
@@ -175,8 +181,7 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
                                           options.num_threads);
       judge(result, options);
       if (result.score() >= best.score()) best = result;
-      // A frame that matches almost everywhere needs no second opinion.
-      if (result.status == FrameStatus::tracked && result.score() > 0.8) return best;
+      if (is_beyond_doubt(result, align_options.final_distance)) return result;
     }
   }
   return best;

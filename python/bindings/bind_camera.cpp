@@ -1,4 +1,4 @@
-#include <sstream>
+#include <vector>
 
 #include "bindings.hpp"
 #include "nacre/camera.hpp"
@@ -20,35 +20,58 @@ std::string model_name(const Camera& camera) {
   return camera.model() == Camera::Model::orthographic ? "orthographic" : "pinhole";
 }
 
+// OpenCV's vector of 4 or 5 coefficients; none is no distortion.
+Camera::Distortion parse_distortion(const std::vector<double>& coefficients) {
+  if (!coefficients.empty() && coefficients.size() != 4 && coefficients.size() != 5) {
+    throw std::invalid_argument("distortion must be the 4 or 5 coefficients k1 k2 p1 p2 (k3), got " +
+                                std::to_string(coefficients.size()));
+  }
+  Camera::Distortion distortion{};
+  std::copy(coefficients.begin(), coefficients.end(), distortion.begin());
+  return distortion;
+}
+
 std::string repr(const Camera& camera) {
-  std::ostringstream text;
-  text.precision(10);
+  const auto number = [](double value) { return py::repr(py::float_(value)).cast<std::string>(); };
+  const std::string size = "width=" + std::to_string(camera.width()) + ", height=" + std::to_string(camera.height());
   if (camera.model() == Camera::Model::orthographic) {
-    text << "Camera.orthographic(width=" << camera.width() << ", height=" << camera.height()
-         << ", pixel_size=" << camera.pixel_size() << ")";
-    return text.str();
+    return "Camera.orthographic(" + size + ", pixel_size=" + number(camera.pixel_size()) + ")";
   }
-  text << "Camera(width=" << camera.width() << ", height=" << camera.height() << ", fx=" << camera.fx()
-       << ", fy=" << camera.fy() << ", cx=" << camera.cx() << ", cy=" << camera.cy();
+  std::string text = "Camera(" + size + ", fx=" + number(camera.fx()) + ", fy=" + number(camera.fy()) +
+                     ", cx=" + number(camera.cx()) + ", cy=" + number(camera.cy());
   if (camera.distortion() != Camera::Distortion{}) {
-    text << ", distortion=(";
-    for (std::size_t i = 0; i < camera.distortion().size(); ++i) text << (i ? ", " : "") << camera.distortion()[i];
-    text << ")";
+    text += ", distortion=" + py::repr(py::tuple(py::cast(camera.distortion()))).cast<std::string>();
   }
-  if (camera.depth_kind() == DepthKind::radial) text << ", depth='radial'";
-  text << ")";
-  return text.str();
+  if (camera.depth_kind() == DepthKind::radial) text += ", depth='radial'";
+  return text + ")";
+}
+
+py::array_t<double> project(const Camera& camera,
+                            const py::array_t<double, py::array::c_style | py::array::forcecast>& points) {
+  if (points.ndim() != 2 || points.shape(1) != 3) {
+    throw std::invalid_argument("points must have shape (N, 3), got " +
+                                py::repr(points.attr("shape")).cast<std::string>());
+  }
+  const py::ssize_t count = points.shape(0);
+  py::array_t<double> pixels({count, py::ssize_t{2}});
+  const double* const source = points.data();
+  double* const target = pixels.mutable_data();
+  const py::gil_scoped_release release;
+  for (py::ssize_t i = 0; i < count; ++i) {
+    Eigen::Map<Eigen::Vector2d>(target + 2 * i) = camera.project(Eigen::Map<const Eigen::Vector3d>(source + 3 * i));
+  }
+  return pixels;
 }
 
 py::tuple to_state(const Camera& c) {
   return py::make_tuple(model_name(c), c.width(), c.height(), c.fx(), c.fy(), c.cx(), c.cy(), c.distortion(),
-                        depth_name(c));
+                        depth_name(c), c.pixel_size());
 }
 
 Camera from_state(const py::tuple& state) {
   const int width = state[1].cast<int>(), height = state[2].cast<int>();
   if (state[0].cast<std::string>() == "orthographic") {
-    return Camera::orthographic(width, height, 1.0 / state[3].cast<double>());
+    return Camera::orthographic(width, height, state[9].cast<double>());
   }
   return Camera::pinhole(width, height, state[3].cast<double>(), state[4].cast<double>(), state[5].cast<double>(),
                          state[6].cast<double>(), state[7].cast<Camera::Distortion>(),
@@ -68,8 +91,8 @@ width, height : int
     Size of the image [pixels].
 fx, fy, cx, cy : float
     Focal lengths and principal point [pixels]: x = (u - cx) z / fx.
-distortion : 5 floats
-    Brown-Conrady coefficients k1 k2 p1 p2 k3, in OpenCV's order.
+distortion : 4 or 5 floats
+    Brown-Conrady coefficients k1 k2 p1 p2 (k3), in OpenCV's order.
 depth : "z" or "radial"
     What a depth value measures: the distance along the optical axis, or along the pixel's ray.
 
@@ -78,11 +101,12 @@ Raises
 ValueError
     Names the argument that is out of range.)")
       .def(py::init([](int width, int height, double fx, double fy, double cx, double cy,
-                       const Camera::Distortion& distortion, const std::string& depth) {
-             return Camera::pinhole(width, height, fx, fy, cx, cy, distortion, parse_depth_kind(depth));
+                       const std::vector<double>& distortion, const std::string& depth) {
+             return Camera::pinhole(width, height, fx, fy, cx, cy, parse_distortion(distortion),
+                                    parse_depth_kind(depth));
            }),
            py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
-           py::kw_only(), py::arg("distortion") = Camera::Distortion{}, py::arg("depth") = "z")
+           py::kw_only(), py::arg("distortion") = std::vector<double>(5, 0.0), py::arg("depth") = "z")
       .def_static("orthographic", &Camera::orthographic, py::arg("width"), py::arg("height"), py::arg("pixel_size"),
                   "A camera with parallel rays: x = (u - (width - 1) / 2) pixel_size [m].")
       .def_property_readonly("model", &model_name, "'pinhole' or 'orthographic'")
@@ -94,17 +118,16 @@ ValueError
       .def_property_readonly("cy", &Camera::cy)
       .def_property_readonly("distortion", &Camera::distortion)
       .def_property_readonly("depth", &depth_name, "'z' or 'radial'")
-      .def_property_readonly("pixel_size", &Camera::pixel_size, "[m], of an orthographic camera")
-      .def(
-          "project",
-          [](const Camera& camera,
-             const Eigen::Ref<const Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>>& points) {
-            Eigen::Matrix<double, Eigen::Dynamic, 2, Eigen::RowMajor> pixels(points.rows(), 2);
-            for (Eigen::Index i = 0; i < points.rows(); ++i) pixels.row(i) = camera.project(points.row(i).transpose());
-            return pixels;
+      .def_property_readonly(
+          "pixel_size",
+          [](const Camera& camera) {
+            if (camera.model() == Camera::Model::orthographic) return camera.pixel_size();
+            throw py::attribute_error("pixel_size belongs to an orthographic camera; this one has fx and fy");
           },
-          py::arg("points"),
-          "The pixels (u, v) that see points of the camera frame, (N, 3) -> (N, 2); NaN behind the camera.")
+          "[m], of an orthographic camera")
+      .def("project", &project, py::arg("points"),
+           "The pixels (u, v) that see points of the camera frame, (N, 3) -> (N, 2); NaN behind the camera and where "
+           "the distortion model has ended.")
       .def(
           "__eq__", [](const Camera& a, const Camera& b) { return a == b; }, py::is_operator())
       .def("__hash__", [](const Camera& camera) { return py::hash(to_state(camera)); })

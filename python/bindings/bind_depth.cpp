@@ -14,8 +14,7 @@ using nacre::MaskRef;
 using nacre::NoiseModel;
 
 std::pair<DepthImage, DepthReport> preprocess_depth(const DepthRef& depth, const Camera& camera,
-                                                    const DepthOptions& options, const MaskRef& mask,
-                                                    int num_threads) {
+                                                    const DepthOptions& options, const MaskRef& mask, int num_threads) {
   std::pair<DepthImage, DepthReport> result;
   result.first = nacre::preprocess_depth(depth, camera, options, mask, &result.second, num_threads);
   return result;
@@ -72,6 +71,6 @@ void bind_depth(py::module_& m) {
   m.def("estimate_noise", &nacre::estimate_noise, py::arg("depth"), py::arg("camera"), py::arg("num_threads"),
         ReleaseGil());
   m.def("back_project", &nacre::back_project, py::arg("depth"), py::arg("camera"), ReleaseGil());
-  m.def("make_frame", &nacre::make_frame, py::arg("depth"), py::arg("camera"), py::arg("noise"),
-        py::arg("num_threads"), ReleaseGil());
+  m.def("make_frame", &nacre::make_frame, py::arg("depth"), py::arg("camera"), py::arg("noise"), py::arg("num_threads"),
+        ReleaseGil());
 }

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+
+
+
 from collections.abc import Mapping
 from typing import Any, TypeVar
 

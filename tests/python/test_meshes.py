@@ -149,10 +149,24 @@ def test_written_meshes_are_read_again(tmp_path, dtype, binary, index_dtype):
     np.testing.assert_array_equal(triangles, np.array(FAN, dtype=np.int32), strict=True)
 
 
-def test_empty_mesh(tmp_path):
-    write_mesh(tmp_path / "a.ply", np.empty((0, 3)), np.empty((0, 3), dtype=int))
-    vertices, triangles = read_mesh_arrays(tmp_path / "a.ply")
-    assert vertices.shape == triangles.shape == (0, 3)
+def test_mesh_object(tmp_path):
+    nacre.write_mesh(tmp_path / "a.ply", SQUARE, FAN)
+    mesh = nacre.read_mesh(tmp_path / "a.ply")
+    assert isinstance(mesh, nacre.Mesh)
+    check_square((mesh.vertices, mesh.triangles))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (f"OFF\n4 0 0\n{OFF_SQUARE}", "triangles"),
+        (f"OFF\n4 1 0\n{OFF_SQUARE}3 0 1 2\n".replace("0.5", "nan"), "vertices"),
+    ],
+)
+def test_what_no_mesh_object_can_be_made_of(tmp_path, content, message):
+    assert len(read(tmp_path, "a.off", content)[0]) == 4
+    with pytest.raises(nacre.FileFormatError, match=rf"a\.off.*{message}"):
+        nacre.read_mesh(tmp_path / "a.off")
 
 
 @pytest.mark.parametrize(
@@ -160,10 +174,10 @@ def test_empty_mesh(tmp_path):
     [
         ("a.obj", SQUARE, FAN, ValueError, r"\.ply"),
         ("a.ply", SQUARE[:, :2], FAN, ValueError, r"vertices must have shape \(N, 3\)"),
-        ("a.ply", SQUARE, [[0, 1]], ValueError, r"triangles must have shape \(M, 3\)"),
+        ("a.ply", SQUARE, [[0, 1]], ValueError, r"triangles must have shape \(N, 3\)"),
         ("a.ply", SQUARE, [[0.0, 1, 2]], TypeError, "triangles must be an array of integers"),
-        ("a.ply", SQUARE, [[0, 1, 4]], ValueError, "triangles must be indices from 0 to 3, got 0 to 4"),
-        ("a.ply", SQUARE, [[0, 1, -1]], ValueError, "triangles must be indices from 0 to 3, got -1 to 1"),
+        ("a.ply", SQUARE, [[0, 1, 4]], ValueError, "triangles must hold indices of the 4 vertices, got 4"),
+        ("a.ply", SQUARE, [[0, 1, -1]], ValueError, "triangles must hold indices of the 4 vertices, got -1"),
     ],
 )
 def test_illegal_arguments(tmp_path, name, vertices, triangles, error, message):
@@ -186,7 +200,10 @@ def test_missing_files_and_directories(tmp_path, suffix):
         read_mesh_arrays(tmp_path / f"a{suffix}")
 
 
-PLY_HEADER = f"ply\nformat ascii 1.0\n{PLY_VERTICES}element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+PLY_HEADER = (
+    f"ply\nformat ascii 1.0\n{PLY_VERTICES}element face 1\n"
+    "property list uchar int vertex_indices\nend_header\n"
+)
 STL = stl_binary(SQUARE[FAN])
 STL_LINES = stl_text(SQUARE[FAN]).decode()
 BROKEN = {
@@ -229,6 +246,7 @@ BROKEN = {
     "corner enormous.off": (f"OFF\n4 1 0\n{OFF_SQUARE}3 0 1 {10**30}\n", "line 7"),
     "more lines.off": (f"OFF\n4 1 0\n{OFF_SQUARE}3 0 1 2\n3 0 2 3\n", "line 8: more lines"),
     "empty.stl": ("", "neither a binary STL file nor"),
+    "84 - 50 bytes.stl": (b"STL:" + bytes(30), "neither a binary STL file nor"),
     "short.stl": (STL[:83], "line 1"),
     "cut.stl": (STL.replace(b"solid", b"STL: ")[:-1], "byte 80: .*2 facets has 184 bytes, this one 183"),
     "longer.stl": (STL.replace(b"solid", b"STL: ") + b"\0", "2 facets has 184 bytes, this one 185"),

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <array>
+#include <cmath>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -42,19 +44,20 @@ class Camera {
   double cy() const { return cy_; }
   const Distortion& distortion() const { return distortion_; }
   DepthKind depth_kind() const { return depth_kind_; }
-  double pixel_size() const { return 1.0 / fx_; }  ///< [m], orthographic only
+  double pixel_size() const { return pixel_size_; }  ///< [m]; 0 for a pinhole camera
 
-  /// height * width rays, row by row.
+  /// height * width rays, row by row; NaN where the distortion model ends before the image does.
   const std::vector<Ray>& rays() const { return *rays_; }
 
-  /// The pixel (u, v) that sees a point of the camera frame, distortion included; NaN behind a pinhole camera.
+  /// The pixel (u, v) that sees a point of the camera frame, distortion included; NaN behind a pinhole camera, and
+  /// where the distortion model has ended: beyond its turning point it would fold far-off points back into the image.
   Eigen::Vector2d project(const Eigen::Vector3d& point) const;
 
   /// The depth value of a point of the camera frame, in this camera's depth kind [m].
   double depth_of(const Eigen::Vector3d& point) const;
 
   /// The side of a pixel on a surface that faces the camera at a distance z [m].
-  double footprint(double z) const { return model_ == Model::pinhole ? z / fx_ : 1.0 / fx_; }
+  double footprint(double z) const { return model_ == Model::pinhole ? z / std::abs(fx_) : pixel_size_; }
 
   bool operator==(const Camera& other) const;
   bool operator!=(const Camera& other) const { return !(*this == other); }
@@ -64,8 +67,9 @@ class Camera {
 
   Model model_ = Model::pinhole;
   int width_ = 0, height_ = 0;
-  double fx_ = 0, fy_ = 0, cx_ = 0, cy_ = 0;
+  double fx_ = 0, fy_ = 0, cx_ = 0, cy_ = 0, pixel_size_ = 0;
   Distortion distortion_{};
+  double max_radius_squared_ = std::numeric_limits<double>::infinity();  // of x^2 + y^2, where the distortion turns
   DepthKind depth_kind_ = DepthKind::z;
   std::shared_ptr<const std::vector<Ray>> rays_;
 };
