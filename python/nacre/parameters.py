@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-
-
-
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
