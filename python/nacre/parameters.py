@@ -22,7 +22,7 @@ def to_core(parameters: Any, core: Core) -> Core:
         current = getattr(core, field.name)
         if dataclasses.is_dataclass(value):
             value = value.to_core() if hasattr(value, "to_core") else to_core(value, current)
-        elif isinstance(value, str):
+        elif isinstance(value, str) and hasattr(type(current), "__members__"):
             members = type(current).__members__
             if value.replace("+", "_plus") not in members:
                 names = ", ".join(repr(name.replace("_plus", "+")) for name in members)
