@@ -91,7 +91,7 @@ double consistency_of(const PointModel& model, const Frame& frame, const Camera&
 
 // Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
 bool is_beyond_doubt(const TrackingResult& result, double gate) {
-  return result.status == FrameStatus::tracked && result.alignment.overlap > 0.5 && result.consistency > 0.9 &&
+  return result.status == FrameStatus::tracked && result.alignment.overlap > 0.35 && result.consistency > 0.9 &&
          result.alignment.rmse < 0.25 * gate;
 }
 
