@@ -1,0 +1,2 @@
+def align() -> None:
+    """x."""
