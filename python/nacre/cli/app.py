@@ -57,7 +57,12 @@ for command, example in (
     (consolidate, "nacre consolidate noisy.ply thin.ply --radius 0.008 --num-points 2000"),
     (info, "nacre info rgbd_dataset_freiburg3_teddy"),
 ):
-    app.command(epilog=f"Example: [bold]{example}[/bold]", no_args_is_help=command is not demo)(command)
+    paragraphs = (" ".join(text.split()) for text in (command.__doc__ or "").split("\n\n"))
+    app.command(
+        help="\n\n".join(paragraphs),
+        epilog=f"Example: [bold]{example}[/bold]",
+        no_args_is_help=command is not demo,
+    )(command)
 
 
 def run(arguments: Sequence[str] | None = None) -> int:

@@ -33,7 +33,7 @@ PresetOption = Annotated[
 ]
 ConfigOption = Annotated[
     Path | None,
-    typer.Option("--config", metavar="FILE.toml", help="Parameters from a TOML file, e.g. [registration] max_angle = 0.5"),
+    typer.Option("--config", metavar="FILE.toml", help="Parameters from a TOML file with tables such as \\[registration], \\[depth], \\[fusion]."),
 ]
 SetOption = Annotated[
     list[str] | None,
@@ -96,7 +96,7 @@ def _setting(text: str) -> dict[str, Any]:
 
 def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     for key, value in tree.items():
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and prefix + key != "depth.noise":
             yield from _leaves(value, f"{prefix}{key}.")
         else:
             yield prefix + key, value
@@ -114,9 +114,9 @@ def _checked(parameters: Any, key: str, value: Any) -> Any:
             raise Failure(f"there is no parameter {key!r}{hint}; {known}", 2)
         current, group = getattr(current, part), f"{group}{part}."
     if key == "depth.noise":
-        from nacre.depth import as_noise
+        from nacre.depth import NoiseModel, as_noise
 
-        return as_noise(key, value)
+        return NoiseModel(**value) if isinstance(value, Mapping) else as_noise(key, value)
     if dataclasses.is_dataclass(current):
         raise Failure(f"{key} is a group; set one of {', '.join(f.name for f in dataclasses.fields(current))}", 2)
     kind = type(current)

@@ -14,14 +14,17 @@ from nacre.cli.results import file_rows, trajectory_rows, write_pictures, write_
 from nacre.cli.running import run_frames
 from nacre.cli.terminal import Failure, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
 
+# Surfaces that no camera saw steeper than this count as not seen [degrees].
+_MAX_SLANT = 75
+
 
 def demo(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.")] = Path(
         "nacre-demo"
     ),
     views: Annotated[int, typer.Option(min=1, help="How many depth images.")] = 12,
-    step: Annotated[float, typer.Option(help="Turn of the camera from view to view [degrees].")] = 30.0,
-    noise: Annotated[float, typer.Option(min=0, help="Standard deviation of the depth noise [m].")] = 0.0005,
+    step: Annotated[float, typer.Option(help="Turn of the camera from view to view (degrees).")] = 30.0,
+    noise: Annotated[float, typer.Option(min=0, help="Standard deviation of the depth noise (metres).")] = 0.0005,
     edge_mixing: Annotated[
         bool, typer.Option("--edge-mixing/--no-edge-mixing", help="Mix depths at edges, as real sensors do.")
     ] = True,
@@ -42,6 +45,7 @@ def demo(
     terminal = Terminal(json, quiet, verbose)
     parameters, preset_name = model_parameters(preset, config, settings)
     import nacre
+    from nacre import evaluation
     from nacre.cli.surfaces import evaluate_surface, seen_samples, transformed
     from nacre.reconstruction import Reconstruction
 
@@ -64,9 +68,9 @@ def demo(
     done.evaluate_trajectory()
     figures: dict[str, Any] = {}
     if len(done.model):
-        samples = nacre.evaluation.sample_surface(mesh.vertices, mesh.triangles, 20_000)
+        samples = evaluation.sample_surface(mesh.vertices, mesh.triangles, 20_000)
         points, normals = transformed(poses[0], done.model.points, done.model.normals)
-        seen = seen_samples(mesh, samples, camera, poses)
+        seen = seen_samples(mesh, samples, camera, poses, math.radians(_MAX_SLANT))
         done.evaluation |= evaluate_surface(
             points, normals, mesh, samples=samples, seen=seen, tau=(0.001, 0.002, 0.005)
         )

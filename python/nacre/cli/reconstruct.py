@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def reconstruct(
-    source: Annotated[Path, typer.Argument(help="The recording: a folder.", show_default=False)],
+    source: Annotated[Path, typer.Argument(metavar="SOURCE", help="The recording: a folder.", show_default=False)],
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.", show_default=False)
     ],
@@ -26,10 +26,10 @@ def reconstruct(
     camera: CameraOption = None,
     depth_scale: DepthScaleOption = None,
     min_depth: Annotated[
-        float | None, typer.Option(help="Nearer measurements are not used [m].", show_default=False)
+        float | None, typer.Option(help="Nearer measurements are not used (metres).", show_default=False)
     ] = None,
     max_depth: Annotated[
-        float | None, typer.Option(help="Farther measurements are not used [m].", show_default=False)
+        float | None, typer.Option(help="Farther measurements are not used (metres).", show_default=False)
     ] = None,
     every: Annotated[int, typer.Option(min=1, metavar="N", help="Use every N-th frame.")] = 1,
     first: Annotated[int, typer.Option(min=0, metavar="INDEX", help="The first frame, from 0.")] = 0,

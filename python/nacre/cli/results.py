@@ -78,9 +78,7 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
     ]
     ate: Any = done.evaluation.get("absolute_trajectory_error")
     if ate is not None and ate.num_compared:
-        rows.append(
-            ("trajectory error", f"{quantity(ate.rmse, 'm')} RMS, {quantity(ate.rotation_rmse, 'rad')} (ATE)")
-        )
+        rows.append(("trajectory error", f"{quantity(ate.rmse, 'm')} RMS, {quantity(ate.max, 'm')} at most (ATE)"))
     rpe: Any = done.evaluation.get("relative_pose_error")
     if rpe is not None and rpe.num_pairs:
         text = f"{quantity(rpe.translation_rmse, 'm')}, {quantity(rpe.rotation_rmse, 'rad')}"
