@@ -68,7 +68,7 @@ class FrameRecord:
 
     @property
     def refused(self) -> bool:
-        """Whether the frame was read, but is nothing that the model can use: wrong size or wrong depth scale."""
+        """Whether the frame was read, but the model cannot use it: wrong size or wrong depth scale."""
         return self.error is not None and not isinstance(self.error, FileFormatError)
 
 
@@ -145,11 +145,13 @@ class Reconstruction:
 
     @property
     def trajectory(self) -> Trajectory:
-        """The poses of the tracked frames; their times are the frames' indices where there are no time stamps."""
+        """The poses of the tracked frames, timed by the frames' indices where there are no time stamps."""
         tracked = [frame for frame in self.frames if frame.world_from_camera is not None]
         timed = bool(tracked) and all(frame.timestamp is not None for frame in tracked)
         times = [frame.timestamp if timed else frame.index for frame in tracked]
-        return Trajectory(np.array(times, np.float64), _stacked([frame.world_from_camera for frame in tracked]))
+        return Trajectory(
+            np.array(times, np.float64), _stacked([frame.world_from_camera for frame in tracked])
+        )
 
     @property
     def milliseconds(self) -> npt.NDArray[np.float64]:
@@ -175,7 +177,7 @@ class Reconstruction:
         counts = self.counts
         times = self.milliseconds
         errors = self._frame_errors()
-        return plain_tree(
+        figures: dict[str, Any] = plain_tree(
             {
                 "nacre": __version__,
                 "versions": {
@@ -197,11 +199,10 @@ class Reconstruction:
                 },
                 **{name: result_dict(result) for name, result in self.evaluation.items()},
                 "parameters": self.parameters,
-                "frames": [
-                    _frame_dict(frame, *errors[i]) for i, frame in enumerate(self.frames)
-                ],
+                "frames": [_frame_dict(frame, *errors[i]) for i, frame in enumerate(self.frames)],
             }
         )
+        return figures
 
     def report_data(self, title: str, source: str, figures: Mapping[str, Any] | None = None) -> ReportData:
         """Return what :func:`nacre.report.write_report` shows."""
@@ -250,7 +251,7 @@ class Reconstruction:
 
 
 def plain_tree(value: Any) -> Any:
-    """Turn nested mappings with arrays, numpy scalars and numbers that are not finite into what JSON knows."""
+    """Turn nested mappings with arrays and numbers that are not finite into what JSON knows."""
     if isinstance(value, Mapping):
         return {str(name): plain_tree(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nacre.cli.terminal import Failure, Json, Quiet, Terminal, Verbose, writable_file
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_file
 
 if TYPE_CHECKING:
     import numpy as np
@@ -24,19 +24,28 @@ class Method(str, Enum):
 
 
 def align(
-    source: Annotated[Path, typer.Argument(metavar="SOURCE", help="The points that move (PLY, PCD).", show_default=False)],
-    target: Annotated[Path, typer.Argument(metavar="TARGET", help="The points that stay (PLY, PCD).", show_default=False)],
+    source: Annotated[
+        Path, typer.Argument(metavar="SOURCE", help="The points that move (PLY, PCD).", show_default=False)
+    ],
+    target: Annotated[
+        Path, typer.Argument(metavar="TARGET", help="The points that stay (PLY, PCD).", show_default=False)
+    ],
     out: Annotated[
         Path | None,
         typer.Option("--out", "-o", metavar="OUT.ply", help="Write the moved source.", show_default=False),
     ] = None,
     initial: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="First guess: a text file of 4x4 numbers.", show_default="identity"),
+        typer.Option(
+            metavar="FILE", help="First guess: a text file of 4x4 numbers.", show_default="identity"
+        ),
     ] = None,
     method: Annotated[Method, typer.Option(help="What is minimised.")] = Method.symmetric,
     max_distance: Annotated[
-        float, typer.Option(min=0, help="Pairs farther apart do not count at first (metres).", show_default="automatic")
+        float,
+        typer.Option(
+            min=0, help="Pairs farther apart do not count at first (metres).", show_default="automatic"
+        ),
     ] = 0.0,
     max_iterations: Annotated[int, typer.Option(min=1, help="Largest number of steps.")] = 40,
     json: Json = False,
@@ -46,8 +55,8 @@ def align(
     """
     Find the motion that brings one cloud onto another (ICP), from a first guess.
 
-    Prints the 4x4 matrix that takes points of SOURCE to TARGET. Exit code 1 where the clouds did not come to rest on
-    each other.
+    Prints the 4x4 matrix that takes points of SOURCE to TARGET. Exit code 1 where the clouds did not come to
+    rest on each other.
     """
     terminal = Terminal(json, quiet, verbose)
     import numpy as np
@@ -83,17 +92,20 @@ def align(
         ("overlap", f"{quantity(result.overlap, 'fraction')} ({count(result.num_inliers)} pairs)"),
         ("residual", f"{quantity(result.rmse, 'm')} RMS"),
         ("motion", f"{quantity(float(np.linalg.norm(pose[:3, 3])), 'm')}, {quantity(angle, 'rad')}"),
-        ("weak directions", f"{weak}: the shapes can slide along them, the first guess was kept" if weak else "none"),
+        (
+            "weak directions",
+            f"{weak}: the shapes can slide along them, the first guess was kept" if weak else "none",
+        ),
         *zip(("matrix", "", "", ""), format_matrix(pose).splitlines(), strict=True),
     ]
     terminal.answer(figures, rows)
     if result.status == "too_few_pairs":
-        raise Failure("nothing, or too little, matched; give a better --initial or a larger --max-distance")
+        raise CommandError("too little matched; give a better --initial or a larger --max-distance")
     if out is not None:
         _write_moved(out, moving, pose)
         terminal.say(f"moved source  {out}")
     if not result.converged:
-        raise Failure("still moving after the last step; give more --max-iterations or a better --initial")
+        raise CommandError("still moving after the last step; give more --max-iterations")
 
 
 def read_matrix(path: Path) -> npt.NDArray[np.float64]:

@@ -18,7 +18,7 @@ from nacre.cli.evaluate import evaluate
 from nacre.cli.info import info
 from nacre.cli.reconstruct import reconstruct
 from nacre.cli.simulate import simulate
-from nacre.cli.terminal import Failure, set_verbosity
+from nacre.cli.terminal import CommandError, set_verbosity
 from nacre.errors import FileFormatError
 
 app = typer.Typer(
@@ -39,7 +39,9 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback(epilog="New here? Run [bold]nacre demo[/bold]. Every command explains itself: nacre COMMAND --help.")
+@app.callback(
+    epilog="New here? Run [bold]nacre demo[/bold]. Every command explains itself: nacre COMMAND --help."
+)
 def _nacre(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
@@ -51,7 +53,10 @@ def _nacre(
 for command, example in (
     (demo, "nacre demo -o nacre-demo"),
     (reconstruct, "nacre reconstruct rgbd_dataset_freiburg3_teddy -o teddy"),
-    (simulate, "nacre simulate bunny.ply -o bunny-recording --views 12 --step 30 --noise 0.0005 --orthographic"),
+    (
+        simulate,
+        "nacre simulate bunny.ply -o bunny-recording --views 12 --step 30 --noise 0.0005 --orthographic",
+    ),
     (evaluate, "nacre evaluate out/model.ply bunny.ply"),
     (align, "nacre align scan2.ply scan1.ply -o moved.ply"),
     (consolidate, "nacre consolidate noisy.ply thin.ply --radius 0.008 --num-points 2000"),
@@ -77,6 +82,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
         if logging.getLogger("nacre").isEnabledFor(logging.DEBUG):
             traceback.print_exception(error)
         return code
+    finally:
+        set_verbosity(None)
 
 
 def explain(error: Exception) -> tuple[str, int]:
@@ -89,7 +96,7 @@ def explain(error: Exception) -> tuple[str, int]:
             return "", 0 if context is not None and context.parent is None else 2
         hint = f" (see {context.command_path} --help)" if context is not None else ""
         return message.rstrip(".") + hint, 2
-    if isinstance(error, Failure):
+    if isinstance(error, CommandError):
         return str(error), error.code
     if isinstance(error, FileFormatError):
         return str(error), 1

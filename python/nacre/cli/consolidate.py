@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nacre.cli.terminal import Failure, Json, Quiet, Terminal, Verbose, to_json, writable_file
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, to_json, writable_file
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,11 +25,17 @@ class Method(str, Enum):
 
 
 def consolidate(
-    source: Annotated[Path, typer.Argument(metavar="IN", help="A point file (PLY, PCD).", show_default=False)],
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="The file to write (PLY, PCD).", show_default=False)],
+    source: Annotated[
+        Path, typer.Argument(metavar="IN", help="A point file (PLY, PCD).", show_default=False)
+    ],
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", help="The file to write (PLY, PCD).", show_default=False)
+    ],
     radius: Annotated[
         float | None,
-        typer.Option(help="Support radius, in the unit of the points.", show_default="from the points' density"),
+        typer.Option(
+            help="Support radius, in the unit of the points.", show_default="from the points' density"
+        ),
     ] = None,
     num_points: Annotated[int, typer.Option(min=1, help="Points of the result.")] = 2000,
     iterations: Annotated[int, typer.Option(min=0, help="How often the points move.")] = 10,
@@ -56,11 +62,11 @@ def consolidate(
 
     writable_file(out)
     if out.suffix.lower() not in (".ply", ".pcd"):
-        raise Failure(f"point files end in .ply or .pcd, got {out}", 2)
+        raise CommandError(f"point files end in .ply or .pcd, got {out}", 2)
     cloud = nacre.read_points(source)
     finite = int(np.isfinite(cloud.points).all(axis=1).sum())
     if finite == 0:
-        raise Failure(f"{source}: no point of {len(cloud)} is finite")
+        raise CommandError(f"{source}: no point of {len(cloud)} is finite")
     given = radius is not None
     if radius is None:
         radius = default_radius(cloud.points, num_points)
@@ -101,7 +107,8 @@ def consolidate(
         terminal.say(f"left out (not numbers): {', '.join(left_out)}")
     if json:
         figures: dict[str, Any] = {
-            "out": out, "radius": radius, "radius_given": given, "num_input": len(cloud), "num_points": len(result),
+            "out": out, "radius": radius, "radius_given": given,
+            "num_input": len(cloud), "num_points": len(result),
             "uniformity": after.as_dict(), "uniformity_before": before.as_dict(), "carried": carried,
             "left_out": left_out,
         }  # fmt: skip
@@ -119,7 +126,7 @@ def default_radius(points: npt.NDArray[np.floating[Any]], num_points: int) -> fl
     probes = cloud[:: max(len(cloud) // 5000, 1)]
     reach = float(np.median(nacre.KdTree(cloud).query(probes, k=k)[0].reshape(len(probes), -1)[:, -1]))
     if reach <= 0:
-        raise Failure("the points lie on top of each other; give --radius", 2)
+        raise CommandError("the points lie on top of each other; give --radius", 2)
     density = k / (math.pi * reach**2)  # per area
     kept = min(num_points / len(cloud), 1.0)
     return float(f"{2.5 / math.sqrt(density * kept):.3g}")

@@ -9,10 +9,10 @@ from typing import Annotated, Any, overload
 
 import typer
 
-from nacre.cli.config import ConfigOption, Preset, PresetOption, SetOption, model_parameters
-from nacre.cli.results import file_rows, trajectory_rows, write_pictures, write_results
+from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
+from nacre.cli.results import file_rows, trajectory_rows, write_results
 from nacre.cli.running import run_frames
-from nacre.cli.terminal import Failure, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
 
 # Surfaces that no camera saw steeper than this count as not seen [degrees].
 _MAX_SLANT = 75
@@ -24,7 +24,9 @@ def demo(
     ),
     views: Annotated[int, typer.Option(min=1, help="How many depth images.")] = 12,
     step: Annotated[float, typer.Option(help="Turn of the camera from view to view (degrees).")] = 30.0,
-    noise: Annotated[float, typer.Option(min=0, help="Standard deviation of the depth noise (metres).")] = 0.0005,
+    noise: Annotated[
+        float, typer.Option(min=0, help="Standard deviation of the depth noise (metres).")
+    ] = 0.0005,
     edge_mixing: Annotated[
         bool, typer.Option("--edge-mixing/--no-edge-mixing", help="Mix depths at edges, as real sensors do.")
     ] = True,
@@ -39,8 +41,8 @@ def demo(
     """
     Grow a model of the built-in object from twelve noisy simulated views, and measure it.
 
-    Needs no data. Each view is registered to the model starting from the previous view's pose: the model is not
-    told how the camera moves. OUT gets the model, the trajectory, pictures and a report with every figure.
+    Needs no data. Each view is registered to the model starting from the previous view's pose: the model is
+    not told how the camera moves. OUT gets the model, the trajectory, pictures and a report with every figure.
     """
     terminal = Terminal(json, quiet, verbose)
     parameters, preset_name = model_parameters(preset, config, settings)
@@ -57,8 +59,8 @@ def demo(
     writable_folder(out)
     words = (
         f"the built-in object, {views} views every {step:g} degrees, noise {1000 * noise:g} mm, "
-        f"edge mixing {'on' if edge_mixing else 'off'}, orthographic camera {camera.width} x {camera.height}, "
-        f"{1000 * camera.pixel_size:g} mm per pixel"
+        f"edge mixing {'on' if edge_mixing else 'off'}, "
+        f"orthographic camera {camera.width} x {camera.height}, {1000 * camera.pixel_size:g} mm per pixel"
     )
     start = "the previous pose"
     if parameters.predict_motion:
@@ -87,9 +89,14 @@ def demo(
         **figures,
     }  # fmt: skip
     report = write_results(
-        out, done, title="The built-in object", source=words, document=document, figures=figures
+        out,
+        done,
+        title="The built-in object",
+        source=words,
+        document=document,
+        figures=figures,
+        pictures=True,
     )
-    write_pictures(out / "pictures", done)
     if json:
         print(to_json(report))
     terminal.say()
@@ -99,7 +106,7 @@ def demo(
     if interrupted:
         raise typer.Exit(130)
     if done.num_tracked == 0:
-        raise Failure(f"every frame was lost: {done.frames[0].reason}")
+        raise CommandError(f"every frame was lost: {done.frames[0].reason}")
 
 
 def _pose_error(done: Any) -> dict[str, float] | None:
@@ -123,7 +130,9 @@ def _rows(done: Any, pose_error: dict[str, float] | None) -> list[tuple[str, str
 
     rows = [row for row in trajectory_rows(done) if row[0] in ("frames tracked", "model", "time per frame")]
     if pose_error is not None:
-        worst = f"{quantity(pose_error['translation_max'], 'm')}, {quantity(pose_error['rotation_max'], 'rad')}"
+        worst = (
+            f"{quantity(pose_error['translation_max'], 'm')}, {quantity(pose_error['rotation_max'], 'rad')}"
+        )
         rows.insert(1, ("pose error", f"at most {worst}"))
     accuracy = done.evaluation.get("surface_accuracy")
     if accuracy is not None:
@@ -133,15 +142,21 @@ def _rows(done: Any, pose_error: dict[str, float] | None) -> list[tuple[str, str
             for tau, part in zip(covered.tau, covered.fraction, strict=True)
         ]
         rows[-1:-1] = [
-            ("model to true surface", f"{quantity(accuracy.rms, 'm')} RMS (bias {quantity(accuracy.bias, 'm')})"),
+            (
+                "model to true surface",
+                f"{quantity(accuracy.rms, 'm')} RMS (bias {quantity(accuracy.bias, 'm')})",
+            ),
             ("completeness", f"{', '.join(parts)} of what the cameras saw"),
-            ("uniformity", f"{even.coefficient_of_variation:.3f} (variation of spacing; random points: 0.52)"),
+            (
+                "uniformity",
+                f"{even.coefficient_of_variation:.3f} (variation of spacing; random points: 0.52)",
+            ),
         ]
     return rows
 
 
 class SimulatedViews(collections.abc.Sequence[Any]):
-    """Views of a mesh as a recording, rendered when asked for; view i has the seed of the first one plus i."""
+    """Views of a mesh as a recording, rendered when asked for; their seeds count up."""
 
     def __init__(self, mesh: Any, camera: Any, poses: Any, *, seed: int = 0, **options: Any) -> None:
         self._mesh, self._camera, self._poses = mesh, camera, poses

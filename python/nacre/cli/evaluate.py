@@ -9,7 +9,7 @@ import typer
 
 from nacre.cli.align import format_matrix, read_matrix
 from nacre.cli.surfaces import MESH_SUFFIXES, POINT_SUFFIXES, evaluate_surface, read_surface, transformed
-from nacre.cli.terminal import Failure, Json, Quiet, Terminal, Verbose
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,7 +25,7 @@ def evaluate(
         Path,
         typer.Argument(
             metavar="ESTIMATE",
-            help="A model (PLY, PCD), a trajectory (TUM, Redwood .log), or the OUT folder of a reconstruction.",
+            help="A model (PLY, PCD), a trajectory (TUM, Redwood .log), or a reconstruction's OUT folder.",
             show_default=False,
         ),
     ],
@@ -33,13 +33,16 @@ def evaluate(
         Path | None,
         typer.Argument(
             metavar="[TRUTH]",
-            help="For a model: a mesh or a point file. For a trajectory: a trajectory or a recording that has one.",
+            help="For a model: a mesh or a point file. For a trajectory: a trajectory, or its recording.",
             show_default="what OUT/report.json knows",
         ),
     ] = None,
     tau: Annotated[
         list[float] | None,
-        typer.Option(help="Distance that counts as covered (metres). May be repeated.", show_default="0.002, 0.005, 0.01"),
+        typer.Option(
+            help="Distance that counts as covered (metres). May be repeated.",
+            show_default="0.002, 0.005, 0.01",
+        ),
     ] = None,
     world_from_model: Annotated[
         Path | None,
@@ -52,7 +55,9 @@ def evaluate(
     align: Annotated[
         bool, typer.Option("--align", help="First move the model onto the reference (ICP, rigid).")
     ] = False,
-    scale: Annotated[float, typer.Option(help="Metres per unit of the reference: 0.001 for millimetres.")] = 1.0,
+    scale: Annotated[
+        float, typer.Option(help="Metres per unit of the reference: 0.001 for millimetres.")
+    ] = 1.0,
     max_difference: Annotated[
         float, typer.Option(min=0, help="Poses farther apart in time are not compared (seconds).")
     ] = 0.02,
@@ -63,23 +68,25 @@ def evaluate(
     """
     Measure a model against a reference surface, or a trajectory against the truth.
 
-    A model: distance to the surface, completeness, F-score, uniformity, error of the normals. It must lie in the
-    reference's frame: a reconstruction lies in its first camera's, so give its OUT folder (which moves it where the
-    recording had true poses), --world-from-model or --align.
+    A model: distance to the surface, completeness, F-score, uniformity, error of the normals. It must lie in
+    the reference's frame: a reconstruction lies in its first camera's, so give its OUT folder (which moves it
+    where the recording had true poses), --world-from-model or --align.
 
     A trajectory: absolute error (ATE, after a rigid alignment), relative error (RPE), coverage.
     """
     terminal = Terminal(json, quiet, verbose)
     if not estimate.exists():
-        raise Failure(f"no such file or folder: {estimate}", 2)
+        raise CommandError(f"no such file or folder: {estimate}", 2)
     if truth is not None and not truth.exists():
-        raise Failure(f"no such file or folder: {truth}", 2)
+        raise CommandError(f"no such file or folder: {truth}", 2)
     is_surface = truth is not None and truth.suffix.lower() in MESH_SUFFIXES + POINT_SUFFIXES
     if estimate.is_dir() and not (estimate / "report.json").is_file():
-        raise Failure(f"{estimate}: no report.json; give the OUT folder of nacre reconstruct, or a file", 2)
+        raise CommandError(
+            f"{estimate}: no report.json; give the OUT folder of a reconstruction, or a file", 2
+        )
     if is_surface or (estimate.suffix.lower() in POINT_SUFFIXES and estimate.is_file()):
         if truth is None or not is_surface:
-            raise Failure(f"{estimate} is a model: a mesh or a point file must follow it", 2)
+            raise CommandError(f"{estimate} is a model: a mesh or a point file must follow it", 2)
         figures, rows = _surface(estimate, truth, tau, world_from_model, align, scale)
     else:
         figures, rows = _trajectory(estimate, truth, max_difference)
@@ -101,7 +108,7 @@ def _surface(
 
     cloud = nacre.read_points(estimate / "model.ply" if estimate.is_dir() else estimate)
     if not np.isfinite(cloud.points).all(axis=1).any():
-        raise Failure(f"{estimate}: the model has no points")
+        raise CommandError(f"{estimate}: the model has no points")
     reference, reference_normals = read_surface(truth, scale)
     pose, how = np.eye(4), "the identity"
     if world_from_model is not None:
@@ -112,9 +119,7 @@ def _surface(
         pose = _aligned(cloud.points, cloud.normals, reference, reference_normals, pose)
         how = "ICP" if how == "the identity" else f"{how}, then ICP"
     points, normals = transformed(pose, cloud.points, cloud.normals)
-    results = evaluate_surface(
-        points, normals, reference, reference_normals, tau=tau or (0.002, 0.005, 0.01)
-    )
+    results = evaluate_surface(points, normals, reference, reference_normals, tau=tau or (0.002, 0.005, 0.01))
     figures: dict[str, Any] = {"kind": "surface", "world_from_model": pose, "world_from_model_from": how}
     rows = [("model moved by", how)]
     from nacre.reconstruction import result_dict
@@ -130,13 +135,14 @@ def _surface(
             if not (name == "f_score" and field in ("precision", "recall") and value is None)
         ]
     if align:
-        rows += [("", ""), *zip(("world from model", "", "", ""), format_matrix(pose).splitlines(), strict=True)]
+        rows += [
+            ("", ""),
+            *zip(("world from model", "", "", ""), format_matrix(pose).splitlines(), strict=True),
+        ]
     return figures, rows
 
 
-def _aligned(
-    points: Any, normals: Any, reference: Any, reference_normals: Any, initial: Matrix
-) -> Matrix:
+def _aligned(points: Any, normals: Any, reference: Any, reference_normals: Any, initial: Matrix) -> Matrix:
     import nacre
     from nacre.evaluation import sample_surface
 
@@ -147,7 +153,9 @@ def _aligned(
         points, reference, source_normals=normals, target_normals=reference_normals, initial=initial
     )
     if not result.converged:
-        raise Failure(f"--align: {result.status.replace('_', ' ')}; give a first guess with --world-from-model")
+        raise CommandError(
+            f"--align: {result.status.replace('_', ' ')}; give a first guess with --world-from-model"
+        )
     pose: Matrix = result.target_from_source
     return pose
 
@@ -194,7 +202,7 @@ def _trajectory(
     options: dict[str, Any] = {}
     if truth is None:
         if not estimate.is_dir():
-            raise Failure(f"{estimate}: a true trajectory, or a recording that has one, must follow it", 2)
+            raise CommandError(f"{estimate}: a true trajectory or a recording must follow it", 2)
         missing = np.full((4, 4), np.nan)
 
         def stack(name: str) -> Any:
@@ -202,7 +210,9 @@ def _trajectory(
 
         poses, true_poses = stack("world_from_camera"), stack("truth")
         if not np.isfinite(true_poses).any():
-            raise Failure(f"{estimate}: its recording had no true poses; give a trajectory or a mesh after it", 2)
+            raise CommandError(
+                f"{estimate}: its recording had no true poses; give a trajectory or a mesh after it", 2
+            )
     else:
         found = nacre.read_trajectory(estimate / "trajectory.txt" if estimate.is_dir() else estimate)
         known = _true_trajectory(truth)
@@ -215,7 +225,9 @@ def _trajectory(
     absolute = absolute_trajectory_error(poses, true_poses, num_frames=num_frames, **options)
     relative = relative_pose_error(poses, true_poses, **options)
     if not absolute.num_compared:
-        raise Failure("no pose has a true pose near in time; are these of one recording? See --max-difference")
+        raise CommandError(
+            "no pose has a true pose near in time; are these of one recording? See --max-difference"
+        )
     figures: dict[str, Any] = {"kind": "trajectory"}
     rows: list[tuple[str, str]] = []
     for name, result in (("absolute_trajectory_error", absolute), ("relative_pose_error", relative)):
@@ -240,5 +252,5 @@ def _true_trajectory(path: Path) -> Trajectory:
 
     sequence = open_source(path)
     if sequence.truth is None:
-        raise Failure(f"{path}: the recording has no true poses", 2)
+        raise CommandError(f"{path}: the recording has no true poses", 2)
     return sequence.truth

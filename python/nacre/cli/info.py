@@ -9,13 +9,16 @@ import typer
 
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
 from nacre.cli.surfaces import MESH_SUFFIXES, POINT_SUFFIXES, has_faces
-from nacre.cli.terminal import Failure, Json, Quiet, Terminal, Verbose
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 
 Rows = list[tuple[str, str]]
 
 
 def info(
-    source: Annotated[Path, typer.Argument(metavar="SOURCE", help="A recording, a point file or a mesh.", show_default=False)],
+    source: Annotated[
+        Path,
+        typer.Argument(metavar="SOURCE", help="A recording, a point file or a mesh.", show_default=False),
+    ],
     format: FormatOption = None,
     camera: CameraOption = None,
     depth_scale: DepthScaleOption = None,
@@ -26,10 +29,12 @@ def info(
     """Tell what is in a recording, a point file or a mesh."""
     terminal = Terminal(json, quiet, verbose)
     if not source.exists():
-        raise Failure(f"no such file or folder: {source}", 2)
+        raise CommandError(f"no such file or folder: {source}", 2)
     if source.is_dir() or format is not None:
         figures, rows = _recording(open_source(source, format, camera, depth_scale))
-    elif source.suffix.lower() in POINT_SUFFIXES and not (source.suffix.lower() == ".ply" and has_faces(source)):
+    elif source.suffix.lower() in POINT_SUFFIXES and not (
+        source.suffix.lower() == ".ply" and has_faces(source)
+    ):
         from nacre.datasets.stanford import recognise
 
         figures, rows = _points(source)
@@ -40,7 +45,9 @@ def info(
         figures, rows = _mesh(source)
     else:
         known = ", ".join(dict.fromkeys(POINT_SUFFIXES + MESH_SUFFIXES))
-        raise Failure(f"{source}: neither a recording (a folder) nor a file of points or triangles ({known})", 2)
+        raise CommandError(
+            f"{source}: neither a recording (a folder) nor a file of points or triangles ({known})", 2
+        )
     terminal.answer(figures, rows)
 
 
@@ -91,9 +98,12 @@ def _points(path: Path) -> tuple[dict[str, Any], Rows]:
     words = [*fields, *(f"{name} ({dtype})" for name, dtype in attributes.items())]
     figures = {
         "kind": "points", "path": str(path), "num_points": len(cloud), "dtype": cloud.points.dtype.name,
-        "fields": fields, "attributes": attributes, "shape": cloud.shape, "comments": cloud.comments, **figures,
+        "fields": fields, "attributes": attributes, "shape": cloud.shape,
+        "comments": cloud.comments, **figures,
     }  # fmt: skip
-    organised = [] if cloud.shape is None else [("organised", f"{cloud.shape[0]} rows x {cloud.shape[1]} columns")]
+    organised = (
+        [] if cloud.shape is None else [("organised", f"{cloud.shape[0]} rows x {cloud.shape[1]} columns")]
+    )
     head = [
         ("points", f"{len(cloud):,} ({cloud.points.dtype.name})"),
         ("fields", ", ".join(words) or "coordinates only"),

@@ -7,18 +7,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nacre.cli.config import ConfigOption, Preset, PresetOption, SetOption, model_parameters
+from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
 from nacre.cli.results import file_rows, trajectory_rows, write_results
 from nacre.cli.running import run_frames
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
-from nacre.cli.terminal import Failure, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
 
 
 def reconstruct(
-    source: Annotated[Path, typer.Argument(metavar="SOURCE", help="The recording: a folder.", show_default=False)],
+    source: Annotated[
+        Path, typer.Argument(metavar="SOURCE", help="The recording: a folder.", show_default=False)
+    ],
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.", show_default=False)
     ],
@@ -47,8 +49,9 @@ def reconstruct(
     """
     Make a model from a recording of a depth camera.
 
-    The recording may be TUM RGB-D, Redwood/Open3D, 7-Scenes, ICL-NUIM, Stanford range scans, a plain recording
-    (camera.json and depth/), or a folder of depth images with --camera and --depth-scale; its format is recognised.
+    The recording may be TUM RGB-D, Redwood/Open3D, 7-Scenes, ICL-NUIM, Stanford range scans, a plain
+    recording (camera.json and depth/), or a folder of depth images with --camera and --depth-scale; its
+    format is recognised.
 
     OUT gets model.ply (points with normals, in the first camera's frame), trajectory.txt, report.json and
     report.html. A frame that cannot be read or registered is LOST and changes nothing.
@@ -61,7 +64,7 @@ def reconstruct(
         sequence = sequence.without_color()
     indices = range(len(sequence))[first : None if last is None else last + 1 : every]
     if not indices:
-        raise Failure(f"no frames are left: the recording has {len(sequence)} (0 to {len(sequence) - 1})", 2)
+        raise CommandError(f"no frames are left of {len(sequence)} (0 to {len(sequence) - 1})", 2)
     import nacre
     from nacre.reconstruction import Reconstruction
 
@@ -82,11 +85,14 @@ def reconstruct(
         print(to_json(report))
     terminal.say(table([*trajectory_rows(done), *file_rows(out)]))
     if interrupted:
-        terminal.say(f"interrupted after {len(done.frames)} of {len(indices)} frames; what there is was written")
+        terminal.say(
+            f"interrupted after {len(done.frames)} of {len(indices)} frames; what there is was written"
+        )
         raise typer.Exit(130)
     if done.num_tracked == 0:
         reasons = list(dict.fromkeys(frame.reason for frame in done.frames))
-        raise Failure(f"every frame was lost: {reasons[0]}" + " (and other reasons)" * (len(reasons) > 1))
+        others = " (and other reasons)" * (len(reasons) > 1)
+        raise CommandError(f"every frame was lost: {reasons[0]}{others}")
 
 
 def describe(sequence: Sequence, indices: range) -> str:
@@ -103,7 +109,7 @@ def describe(sequence: Sequence, indices: range) -> str:
 def recording(sequence: Sequence) -> dict[str, Any]:
     """Return what report.json says about the recording."""
     camera = sequence.camera
-    names = ("model", "width", "height", "pixel_size")
+    names: tuple[str, ...] = ("model", "width", "height", "pixel_size")
     if camera.model != "orthographic":
         names = ("model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "depth")
     return {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +12,13 @@ from nacre.cli.terminal import to_json
 
 if TYPE_CHECKING:
     from nacre.reconstruction import Reconstruction
+
+_PICTURE_NAMES = {
+    "the-model": "model",
+    "as-measured": "depth-before",
+    "what-was-removed": "depth-removed",
+    "as-used": "depth-after",
+}
 
 
 def write_results(
@@ -21,11 +29,11 @@ def write_results(
     source: str,
     document: Mapping[str, Any],
     figures: Mapping[str, Any] | None = None,
+    pictures: bool = False,
 ) -> dict[str, Any]:
-    """Write model.ply, trajectory.txt, report.html and report.json; return what the last one holds."""
+    """Write the files of a run and return what report.json, the last one, holds."""
     import nacre
-    from nacre.io.atomic import atomic_writer
-    from nacre.report import write_report
+    from nacre.report import render_page
 
     model = done.model
     nacre.write_points(
@@ -38,30 +46,28 @@ def write_results(
     )
     trajectory = done.trajectory
     nacre.write_trajectory(folder / "trajectory.txt", trajectory.timestamps, trajectory.poses)
-    write_report(folder / "report.html", done.report_data(title, source, figures))
+    page = render_page(done.report_data(title, source, figures))
+    _write(folder / "report.html", page.encode())
+    if pictures:
+        _write_pictures(folder / "pictures", page)
     report = done.as_dict(title=title, source=source, **document)
-    with atomic_writer(folder / "report.json") as stream:
-        stream.write((to_json(report) + "\n").encode())
+    _write(folder / "report.json", (to_json(report) + "\n").encode())
     return report
 
 
-def write_pictures(folder: Path, done: Reconstruction) -> None:
-    """Write PNG pictures of the model from its sides, and of a depth image before and after cleaning."""
+def _write(path: Path, data: bytes) -> None:
     from nacre.io.atomic import atomic_writer
-    from nacre.report.pictures import draw_depth, draw_model
 
-    data = done.report_data("", "")
-    pictures = {}
-    if data.model is not None and (model := draw_model(data.model, data.frames)) is not None:
-        pictures["model"] = model.main
-        pictures |= {f"model-{p.caption.lower().replace(' ', '-')}": p for p in (*model.cameras, *model.sides)}
-    if data.depth is not None:
-        names = ("depth-before", "depth-removed", "depth-after")
-        pictures |= dict(zip(names, draw_depth(data.depth).pictures, strict=True))
+    with atomic_writer(path) as stream:
+        stream.write(data)
+
+
+def _write_pictures(folder: Path, page: str) -> None:
+    """Write the pictures that a page holds as PNG files, named by their captions."""
     folder.mkdir(exist_ok=True)
-    for name, picture in pictures.items():
-        with atomic_writer(folder / f"{name}.png") as stream:
-            stream.write(base64.b64decode(picture.uri.partition(",")[2]))
+    for data, caption in re.findall(r'<img src="data:image/png;base64,([^"]+)" alt="([^"]+)"', page):
+        name = re.sub(r"\W+", "-", caption.lower()).strip("-")
+        _write(folder / f"{_PICTURE_NAMES.get(name, name)}.png", base64.b64decode(data))
 
 
 def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
@@ -78,7 +84,9 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
     ]
     ate: Any = done.evaluation.get("absolute_trajectory_error")
     if ate is not None and ate.num_compared:
-        rows.append(("trajectory error", f"{quantity(ate.rmse, 'm')} RMS, {quantity(ate.max, 'm')} at most (ATE)"))
+        rows.append(
+            ("trajectory error", f"{quantity(ate.rmse, 'm')} RMS, {quantity(ate.max, 'm')} at most (ATE)")
+        )
     rpe: Any = done.evaluation.get("relative_pose_error")
     if rpe is not None and rpe.num_pairs:
         text = f"{quantity(rpe.translation_rmse, 'm')}, {quantity(rpe.rotation_rmse, 'rad')}"
@@ -86,7 +94,9 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
     times = done.milliseconds
     if len(times):
         slow = quantity(float(np.percentile(times, 99)), "ms")
-        rows.append(("time per frame", f"{quantity(float(np.median(times)), 'ms')} (median; 99 % within {slow})"))
+        rows.append(
+            ("time per frame", f"{quantity(float(np.median(times)), 'ms')} (median; 99 % within {slow})")
+        )
     return rows
 
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from nacre.cli.terminal import Failure, Terminal
+from nacre.cli.terminal import CommandError, Terminal
 
 if TYPE_CHECKING:
     from nacre.reconstruction import Reconstruction
@@ -26,7 +26,7 @@ class Interruption:
 
 @contextmanager
 def interruptible() -> Iterator[Interruption]:
-    """Let the first Ctrl-C only be noted, so that what there is can be written; the second one stops at once."""
+    """Note the first Ctrl-C, so that what there is can be written; the second one stops at once."""
     state = Interruption()
     if threading.current_thread() is not threading.main_thread():
         yield state
@@ -50,7 +50,7 @@ def run_frames(terminal: Terminal, done: Reconstruction, indices: Sequence[int])
     with interruptible() as interruption, terminal.progress("frames", len(indices)) as advance:
         for frame in done.run(indices):
             if frame.refused and not accepted:
-                raise Failure(f"frame {frame.index}: {advice(frame.reason)}")
+                raise CommandError(f"frame {frame.index}: {advice(frame.reason)}")
             accepted |= frame.report is not None
             if frame.status in ("LOST", "WEAK"):
                 _log.info("frame %d: %s: %s", frame.index, frame.status, frame.reason)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -9,21 +10,29 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nacre.cli.source import describe_camera
-from nacre.cli.terminal import Failure, Json, Quiet, Terminal, Verbose, to_json, writable_folder
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, to_json, writable_folder
 
 if TYPE_CHECKING:
     from nacre import Camera, Mesh
+
+_log = logging.getLogger(__name__)
 
 BUILT_IN = "built-in"
 
 # What a depth image of a model may hold [m].
 _NEAREST, _FARTHEST = 0.05, 50.0
+_MOST_PIXELS = 4096
 _SCALES = (50000.0, 10000.0, 5000.0, 1000.0)
 
 
 def simulate(
     mesh: Annotated[
-        str, typer.Argument(metavar="MESH", help='A mesh in metres (PLY, OBJ, OFF, STL), or the word "built-in".', show_default=False)
+        str,
+        typer.Argument(
+            metavar="MESH",
+            help='A mesh in metres (PLY, OBJ, OFF, STL), or the word "built-in".',
+            show_default=False,
+        ),
     ],
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the recording.", show_default=False)
@@ -36,24 +45,35 @@ def simulate(
     orthographic: Annotated[
         bool, typer.Option("--orthographic", help="Parallel rays instead of a pinhole camera.")
     ] = False,
-    width: Annotated[int | None, typer.Option(min=1, help="Of the image (pixels).", show_default="640")] = None,
-    height: Annotated[int | None, typer.Option(min=1, help="Of the image (pixels).", show_default="480")] = None,
+    width: Annotated[
+        int | None, typer.Option(min=1, help="Of the image (pixels).", show_default="640")
+    ] = None,
+    height: Annotated[
+        int | None, typer.Option(min=1, help="Of the image (pixels).", show_default="480")
+    ] = None,
     pixel_size: Annotated[
         float | None, typer.Option(help="Of an orthographic camera (metres).", show_default="fits the mesh")
     ] = None,
-    fx: Annotated[float | None, typer.Option(help="Focal length (pixels).", show_default="0.82 width")] = None,
+    fx: Annotated[
+        float | None, typer.Option(help="Focal length (pixels).", show_default="0.82 width")
+    ] = None,
     fy: Annotated[float | None, typer.Option(help="Focal length (pixels).", show_default="fx")] = None,
     cx: Annotated[float | None, typer.Option(help="Principal point (pixels).", show_default="middle")] = None,
     cy: Annotated[float | None, typer.Option(help="Principal point (pixels).", show_default="middle")] = None,
     distance: Annotated[
-        float | None, typer.Option(help="From the camera to the mesh's centre (metres).", show_default="fits the mesh")
+        float | None,
+        typer.Option(help="From the camera to the mesh's centre (metres).", show_default="fits the mesh"),
     ] = None,
     elevation: Annotated[float, typer.Option(help="Of the camera above the centre (degrees).")] = 0.0,
     edge_mixing: Annotated[
         bool, typer.Option("--edge-mixing", help="Mix depths at edges, as real sensors do.")
     ] = False,
-    quantization: Annotated[float, typer.Option(min=0, help="Round depth to multiples of this (metres).")] = 0.0,
-    dropout: Annotated[float, typer.Option(min=0, max=1, help="Part of the pixels without measurement.")] = 0.0,
+    quantization: Annotated[
+        float, typer.Option(min=0, help="Round depth to multiples of this (metres).")
+    ] = 0.0,
+    dropout: Annotated[
+        float, typer.Option(min=0, max=1, help="Part of the pixels without measurement.")
+    ] = 0.0,
     seed: Annotated[int, typer.Option(min=0, help="Of noise and dropout.")] = 0,
     scale: Annotated[
         float, typer.Option(help="Metres per unit of the mesh file: 0.001 for millimetres.")
@@ -69,7 +89,7 @@ def simulate(
     """
     Make a depth recording of a mesh, with a camera that circles around it.
 
-    OUT gets camera.json, depth/ (16-bit PNG) and groundtruth.txt: the camera's true poses, in the mesh's frame.
+    OUT gets camera.json, depth/ (16-bit PNG) and groundtruth.txt, the camera's poses in the mesh's frame.
     """
     terminal = Terminal(json, quiet, verbose)
     import nacre
@@ -111,12 +131,20 @@ def simulate(
 
         count = nacre.write_recording(out, camera, images(), depth_scale=depth_scale, poses=poses)
     if len(empty) == count:
-        raise Failure("no view shows anything of the mesh; see --distance, --scale and the camera's options")
+        raise CommandError("no view shows anything of the mesh; see --distance and the camera's options")
     terminal.say(f"wrote {count} views to {out}, {depth_scale:g} units per metre")
     terminal.say(f"next: nacre reconstruct {out} -o {out}-model")
     if json:
         print(
-            to_json({"out": out, "views": count, "depth_scale": depth_scale, "camera": repr(camera), "empty": empty})
+            to_json(
+                {
+                    "out": out,
+                    "views": count,
+                    "depth_scale": depth_scale,
+                    "camera": repr(camera),
+                    "empty": empty,
+                }
+            )
         )
 
 
@@ -124,7 +152,7 @@ def _mesh(name: str, scale: float) -> Mesh:
     import nacre
 
     if not (math.isfinite(scale) and scale > 0):
-        raise Failure(f"--scale must be a positive number, got {scale}", 2)
+        raise CommandError(f"--scale must be a positive number, got {scale}", 2)
     surface = nacre.built_in_object() if name == BUILT_IN else nacre.read_mesh(name)
     return surface if scale == 1 else nacre.Mesh(scale * surface.vertices, surface.triangles)
 
@@ -137,7 +165,7 @@ def _noise(text: str) -> Any:
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value >= 0):
-        raise Failure(f"--noise must be a length in metres or the word kinect, got {text!r}", 2)
+        raise CommandError(f"--noise must be a length in metres or the word kinect, got {text!r}", 2)
     return value
 
 
@@ -158,13 +186,21 @@ def _camera(
     if orthographic:
         given = [name for name, value in intrinsics.items() if value is not None]
         if given:
-            raise Failure(f"{given[0]} is for a pinhole camera; leave out --orthographic", 2)
+            raise CommandError(f"{given[0]} is for a pinhole camera; leave out --orthographic", 2)
         fitting = nacre.default_camera(surface)
         size = pixel_size if pixel_size is not None else fitting.pixel_size
+        if not (math.isfinite(size) and size > 0):
+            raise CommandError(f"--pixel-size must be a positive length in metres, got {size}", 2)
         pixels = math.ceil(fitting.width * fitting.pixel_size / size)
+        if pixels > _MOST_PIXELS and not (width and height):
+            raise CommandError(
+                f"the mesh is {fitting.width * fitting.pixel_size:.4g} m across, "
+                f"{pixels} pixels of {1000 * size:g} mm; give --scale (metres per unit of the file), a larger --pixel-size, or --width and --height",
+                2,
+            )
         return nacre.Camera.orthographic(width=width or pixels, height=height or pixels, pixel_size=size)
     if pixel_size is not None:
-        raise Failure("--pixel-size is for an orthographic camera; add --orthographic", 2)
+        raise CommandError("--pixel-size is for an orthographic camera; add --orthographic", 2)
     width, height = width or 640, height or 480
     focal = fx if fx is not None else 525 * width / 640
     return nacre.Camera(
@@ -178,7 +214,7 @@ def _camera(
 
 
 def _check_size(surface: Mesh, pose: Any, name: str) -> float:
-    """Return the farthest depth that views may have; an error says that the mesh has another unit than metres."""
+    """Return the farthest depth that views may have, or say that the unit is not metres."""
     import numpy as np
 
     lower, upper = surface.bounds
@@ -187,10 +223,12 @@ def _check_size(surface: Mesh, pose: Any, name: str) -> float:
     if not _NEAREST <= distance <= _FARTHEST:
         sides = " x ".join(f"{side:.4g}" for side in upper - lower)
         guess = "0.001" if distance > _FARTHEST else "1000"
-        raise Failure(
+        raise CommandError(
             f"{name} is {sides} m large and {distance:.4g} m from the camera, where depth cameras see from "
-            f"{_NEAREST:g} to {_FARTHEST:g} m; is its unit another one? Give --scale (metres per unit, such as {guess}) "
-            "or --distance",
+            f"{_NEAREST:g} to {_FARTHEST:g} m; is its unit another one? "
+            f"Give --scale (metres per unit, such as {guess}) or --distance",
             2,
         )
+    if ((pose[:3, 3] > lower) & (pose[:3, 3] < upper)).all():
+        _log.warning("the camera stands inside the box around %s; see --distance and --scale", name)
     return distance + 0.5 * diagonal

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nacre.cli.terminal import Failure
+from nacre.cli.terminal import CommandError
 from nacre.errors import FileFormatError
 
 if TYPE_CHECKING:
@@ -32,7 +32,8 @@ CameraOption = Annotated[
 DepthScaleOption = Annotated[
     float | None,
     typer.Option(
-        help="Stored depth units per metre: 1000 for millimetres, 5000 for TUM.", show_default="the recording's"
+        help="Stored depth units per metre: 1000 for millimetres, 5000 for TUM.",
+        show_default="the recording's",
     ),
 ]
 
@@ -48,13 +49,18 @@ def open_source(
     except FileFormatError as error:
         # About the whole folder: it is no recording, or not without more options.
         code = 2 if error.path == source else 1
-        text = str(error).replace("camera and depth_scale not known", "--camera and --depth-scale are needed")
+        text, *layouts = str(error).split(" Known formats:")
+        if layouts:
+            names = ", ".join(line.split(":")[0].strip() for line in layouts[0].splitlines() if line)
+            text += f" Known formats: {names}; see nacre reconstruct --help."
+        text = text.replace("camera and depth_scale not known", "--camera and --depth-scale are needed")
         text = text.replace("Give camera= and depth_scale=", "Give --camera FILE.json and --depth-scale")
-        text = text.replace("camera=... and depth_scale=... given", "--camera and --depth-scale given")
         for name in ("camera", "depth_scale"):
             option = name.replace("_", "-")
-            text = text.replace(f"{name} not known", f"--{option} is needed").replace(f"{name}=", f"--{option} ")
-        raise Failure(text, code) from error
+            text = text.replace(f"{name} not known", f"--{option} is needed").replace(
+                f"{name}=", f"--{option} "
+            )
+        raise CommandError(text, code) from error
 
 
 def describe_camera(camera: Camera) -> str:

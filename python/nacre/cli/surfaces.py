@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre.cli.terminal import Failure
+from nacre.cli.terminal import CommandError
 
 if TYPE_CHECKING:
     from nacre import Camera, Mesh
@@ -32,7 +32,7 @@ def transformed(pose: Array, points: Array, normals: Array | None) -> tuple[Arra
 def seen_samples(
     mesh: Mesh, samples: SurfaceSamples, camera: Camera, poses: Array, max_slant: float
 ) -> npt.NDArray[np.bool_]:
-    """Return which points of a mesh at least one of several orthographic cameras saw, slanted no more than that."""
+    """Return which points of a mesh some orthographic camera saw, slanted no more than that."""
     points = samples.points
     seen = np.zeros(len(points), dtype=bool)
     half = 0.5 * np.array([camera.width - 1, camera.height - 1]) * camera.pixel_size
@@ -68,7 +68,10 @@ def evaluate_surface(
         "surface_accuracy": accuracy,
         "completeness": covered,
         "f_score": evaluation.FScore(
-            covered.tau, precision, covered.fraction, tuple(2 * p * r / (p + r) if p + r else 0.0 for p, r in pairs)
+            covered.tau,
+            precision,
+            covered.fraction,
+            tuple(2 * p * r / (p + r) if p + r else 0.0 for p, r in pairs),
         ),
         "uniformity": evaluation.uniformity(points),
     }
@@ -88,7 +91,7 @@ def read_surface(path: Path, scale: float = 1.0) -> tuple[Mesh | Array, Array | 
     suffix = path.suffix.lower()
     if suffix not in MESH_SUFFIXES + POINT_SUFFIXES:
         known = ", ".join(dict.fromkeys(MESH_SUFFIXES + POINT_SUFFIXES))
-        raise Failure(f"{path}: a surface is a mesh or a point file ({known})", 2)
+        raise CommandError(f"{path}: a surface is a mesh or a point file ({known})", 2)
     if suffix in MESH_SUFFIXES and has_faces(path):
         mesh = nacre.read_mesh(path)
         return (mesh if scale == 1 else nacre.Mesh(scale * mesh.vertices, mesh.triangles)), None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import logging
+import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ Verbose = Annotated[
 ]
 
 
-class Failure(Exception):
+class CommandError(Exception):
     """An error that is told in one line. Code 1: the data does not allow it; 2: wrong usage."""
 
     def __init__(self, message: str, code: int = 1) -> None:
@@ -32,15 +33,17 @@ class _Format(logging.Formatter):
         return f"{record.levelname.lower()}: {record.getMessage()}"
 
 
-def set_verbosity(level: int) -> None:
-    """Send the package's log to stderr: -1 errors only, 0 warnings, 1 information, 2 everything."""
+def set_verbosity(level: int | None) -> None:
+    """Send the log to stderr: -1 errors, 0 warnings, 1 information, 2 everything; None: no longer."""
     logger = logging.getLogger("nacre")
     for handler in [h for h in logger.handlers if isinstance(h.formatter, _Format)]:
         logger.removeHandler(handler)
+    if level is None:
+        logger.setLevel(logging.NOTSET)
+        return
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(_Format())
     logger.addHandler(handler)
-    logger.propagate = False
     levels = (logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)
     logger.setLevel(levels[max(-1, min(level, 2)) + 1])
 
@@ -90,7 +93,9 @@ def to_json(figures: Mapping[str, Any]) -> str:
     """Return a JSON object; numbers that are not finite are null."""
     from nacre.reconstruction import plain_tree
 
-    return json.dumps(plain_tree(figures), indent=2, allow_nan=False, default=str)
+    text = json.dumps(plain_tree(figures), indent=2, allow_nan=False, default=str)
+    # Lists of numbers on one line; a line break is never part of a string.
+    return re.sub(r"\[\n\s+([^\[\]{}]*?)\n\s+\]", lambda m: "[" + re.sub(r"\n\s+", " ", m[1]) + "]", text)
 
 
 def table(rows: Sequence[tuple[str, str]]) -> str:
@@ -108,8 +113,10 @@ def writable_folder(path: Path) -> Path:
         with tempfile.TemporaryFile(dir=path):
             pass
     except OSError as error:
-        reason = "it is a file" if isinstance(error, (FileExistsError, NotADirectoryError)) else error.strerror
-        raise Failure(f"cannot write to {path}: {reason}; give another folder with -o", 2) from error
+        reason = (
+            "it is a file" if isinstance(error, (FileExistsError, NotADirectoryError)) else error.strerror
+        )
+        raise CommandError(f"cannot write to {path}: {reason}; give another folder with -o", 2) from error
     return path
 
 
@@ -121,7 +128,7 @@ def writable_file(path: Path) -> Path:
         with tempfile.TemporaryFile(dir=path.parent):
             pass
     except OSError as error:
-        raise Failure(f"cannot write {path}: {error.strerror}", 2) from error
+        raise CommandError(f"cannot write {path}: {error.strerror}", 2) from error
     if path.is_dir():
-        raise Failure(f"cannot write {path}: it is a folder", 2)
+        raise CommandError(f"cannot write {path}: it is a folder", 2)
     return path
