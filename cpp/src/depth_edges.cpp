@@ -61,6 +61,15 @@ void set_limits(const float* centre, const PlanarLimits& limits, float length, R
   }
 }
 
+// Surfaces that are too steep as a whole; what is steep pixel by pixel only is found by mark_direction.
+void mark_slanted(const float* centre, const PlanarLimits& limits, RowTest& test) {
+  const Quadratic limit = limits.step_slant;
+  const float* const slope = test.slope.data();
+  std::int32_t* const slanted = test.slanted.data();
+  const std::size_t width = test.slope.size();
+  for (std::size_t u = 0; u < width; ++u) slanted[u] = slope[u] > limit(centre[u]);
+}
+
 // One of the four directions through each pixel of a row, with neighbours at -offset and +offset. Comparisons with a
 // missing neighbour (NaN) are false.
 void mark_direction(const float* centre, std::ptrdiff_t offset, RowTest& test) {
@@ -105,7 +114,7 @@ EdgeMarks mark_planar_edges(const PlanarImage& image, const WindowFits& fits, co
       const float* const row = image.row(static_cast<int>(v));
       if (!slopes.empty()) spread_slopes(fits, slopes, static_cast<int>(v), test.slope);
       std::fill(test.edge.begin(), test.edge.end(), 0);
-      std::fill(test.slanted.begin(), test.slanted.end(), 0);
+      mark_slanted(row, limits, test);
       set_limits(row, limits, 1.0F, test);
       mark_direction(row, 1, test);
       mark_direction(row, image.stride(), test);
