@@ -65,6 +65,15 @@ class BlockTree {
  public:
   BlockTree(const Eigen::Ref<const PointMatrix<T>>& points, int num_threads);
 
+  // The finite points, numbered by their places in the tree.
+  std::int64_t num_points() const { return num_points_; }
+  std::uint32_t id(std::uint32_t slot) const { return blocks_[slot / block_points].id[slot % block_points]; }
+  Eigen::Vector3d position(std::uint32_t slot) const {
+    const PointBlock<T>& block = blocks_[slot / block_points];
+    const int lane = static_cast<int>(slot % block_points);
+    return {block.p[0][lane], block.p[1][lane], block.p[2][lane]};
+  }
+
   // Shows results.add() every point that may be within results.bound(), mostly near ones first.
   template <class Results>
   void search(const Eigen::Vector3d& query, Results& results) const;
@@ -80,6 +89,7 @@ class BlockTree {
   std::vector<Box> build_groups(const std::vector<Box>& children, std::size_t first_child, int num_threads);
   Found nearest_possible(std::uint32_t box, const Eigen::Vector3d& query) const;
 
+  std::int64_t num_points_;
   std::vector<PointBlock<T>> blocks_;
   // Level after level, the groups over the blocks first, the root last. Box j of group g has the number 8 g + j, which
   // for the blocks' boxes is the number of the block.
@@ -89,6 +99,7 @@ class BlockTree {
 template <class T>
 BlockTree<T>::BlockTree(const Eigen::Ref<const PointMatrix<T>>& points, int num_threads) {
   std::vector<IndexedPoint<T>> ordered = finite_points<T>(points);
+  num_points_ = static_cast<std::int64_t>(ordered.size());
   kd_order(ordered, num_threads);
   std::vector<Box> boxes = build_blocks(ordered, num_threads);
   for (std::size_t first_child = 0; boxes.size() > (groups_.empty() ? 0u : 1u);) {

@@ -1,11 +1,12 @@
-// Points sorted by the cubic cell they lie in, for sums over all points within one cell edge of a place. The points of
-// neighbouring cells along x follow each other, so that the 27 cells around a place are at most nine runs of memory.
+// Points sorted by the cubic cell they lie in, for sums over all points within one cell edge of a place.
 #pragma once
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -14,26 +15,25 @@
 
 namespace nacre {
 
+// The cells that hold points are numbered by z, then y, then x, the points by their cells: the 27 cells around one are
+// at most nine ranges of points.
 class CellGrid {
  public:
-  // A cell, ordered by z, then y, then x. Cells farther than a million edges from the origin share the outermost one:
-  // slower there, never wrong.
+  // Where a cell lies. Those farther than a million edges from the origin share the outermost one: slower there, never
+  // wrong.
   using Key = std::uint64_t;
 
   CellGrid(const Eigen::Vector3d& origin, double edge) : origin_(origin), inverse_edge_(1.0 / edge) {}
 
   // Holds the given rows of points. Rows in nearly the right order are sorted faster.
-  void build(const Points& points, const std::vector<std::int64_t>& rows) {
+  void build(const PointsRef& points, const std::vector<std::int64_t>& rows) {
     std::vector<std::pair<Key, std::int64_t>> keyed;
     keyed.reserve(rows.size());
     for (const std::int64_t row : rows) keyed.emplace_back(key_of(points.row(row)), row);
     std::sort(keyed.begin(), keyed.end());
 
-    const std::size_t padded = keyed.size() + pair_lanes - 1;
-    x_.assign(padded, 0.0F);
-    y_.assign(padded, 0.0F);
-    z_.assign(padded, 0.0F);
     rows_.resize(keyed.size());
+    for (std::vector<float>* axis : {&x_, &y_, &z_}) axis->assign(keyed.size() + pair_lanes - 1, 0.0F);
     keys_.clear();
     starts_.clear();
     for (std::size_t i = 0; i < keyed.size(); ++i) {
@@ -44,41 +44,29 @@ class CellGrid {
       z_[i] = points(row, 2);
       if (keys_.empty() || keys_.back() != key) {
         keys_.push_back(key);
-        starts_.push_back(static_cast<std::int64_t>(i));
+        starts_.push_back(i);
       }
     }
-    starts_.push_back(static_cast<std::int64_t>(keyed.size()));
+    starts_.push_back(keyed.size());
   }
 
-  std::int64_t size() const { return static_cast<std::int64_t>(rows_.size()); }
+  std::size_t size() const { return rows_.size(); }
+  std::int64_t row(std::size_t i) const { return rows_[i]; }
   const std::vector<std::int64_t>& rows() const { return rows_; }
-  Eigen::Vector3f point(std::int64_t i) const {
-    const auto k = static_cast<std::size_t>(i);
-    return {x_[k], y_[k], z_[k]};
-  }
+  Eigen::Vector3f point(std::size_t i) const { return {x_[i], y_[i], z_[i]}; }
+
+  std::size_t num_cells() const { return keys_.size(); }
+  Key key(std::size_t cell) const { return keys_[cell]; }
+  std::size_t begin(std::size_t cell) const { return starts_[cell]; }
+  std::size_t end(std::size_t cell) const { return starts_[cell + 1]; }
+
+  // The points with masses, padded_size() of them in their order.
   PairPoints with_mass(const std::vector<float>& mass) const { return {x_.data(), y_.data(), z_.data(), mass.data()}; }
   std::size_t padded_size() const { return x_.size(); }
 
-  // Cells that hold points are numbered in the order of their keys.
-  std::int64_t num_cells() const { return static_cast<std::int64_t>(keys_.size()); }
-  Key key(std::int64_t cell) const { return keys_[static_cast<std::size_t>(cell)]; }
-  std::int64_t begin(std::int64_t cell) const { return starts_[static_cast<std::size_t>(cell)]; }
-
-  // visit(first, last) for each sequence [first, last) of cells around the given one, in order.
-  template <class Visit>
-  void for_each_run(Key center, Visit&& visit) const {
-    for (int dz = -1; dz <= 1; ++dz) {
-      for (int dy = -1; dy <= 1; ++dy) {
-        const Key row = center + static_cast<Key>(dz) * one_z + static_cast<Key>(dy) * one_y;
-        const auto first = std::lower_bound(keys_.begin(), keys_.end(), row - 1);
-        auto last = first;
-        while (last != keys_.end() && *last <= row + 1) ++last;
-        if (first != last) visit(first - keys_.begin(), last - keys_.begin());
-      }
-    }
-  }
-
  private:
+  friend class CellWalk;
+
   static constexpr int bits = 21;
   static constexpr Key one_y = Key{1} << bits, one_z = Key{1} << (2 * bits);
 
@@ -96,8 +84,48 @@ class CellGrid {
   Eigen::Vector3d origin_;
   double inverse_edge_;
   std::vector<float> x_, y_, z_;
-  std::vector<std::int64_t> rows_, starts_;
+  std::vector<std::int64_t> rows_;
+  std::vector<std::size_t> starts_;
   std::vector<Key> keys_;
+};
+
+// Finds what is around a cell; faster where the keys ascend from call to call.
+class CellWalk {
+ public:
+  explicit CellWalk(const CellGrid& grid) : grid_(grid) {}
+
+  // visit(first, last) for each range [first, last) of cells around one, which may be of another grid of the same
+  // origin and edge.
+  template <class Visit>
+  void for_each_range(CellGrid::Key key, Visit&& visit) {
+    const std::vector<CellGrid::Key>& keys = grid_.keys_;
+    const bool onward = last_key_ <= key;
+    last_key_ = key;
+    for (std::size_t i = 0; i < first_.size(); ++i) {
+      const CellGrid::Key row =
+          key - CellGrid::one_z - CellGrid::one_y + (i / 3) * CellGrid::one_z + (i % 3) * CellGrid::one_y;
+      std::size_t& first = first_[i];
+      if (!onward) first = static_cast<std::size_t>(std::lower_bound(keys.begin(), keys.end(), row - 1) - keys.begin());
+      while (first < keys.size() && keys[first] < row - 1) ++first;
+      std::size_t last = first;
+      while (last < keys.size() && keys[last] <= row + 1) ++last;
+      if (last > first) visit(first, last);
+    }
+  }
+
+  // The points around a cell.
+  PairRuns around(CellGrid::Key key) {
+    PairRuns runs;
+    for_each_range(key, [&](std::size_t first, std::size_t last) {
+      runs.ranges[runs.count++] = {grid_.begin(first), grid_.begin(last)};
+    });
+    return runs;
+  }
+
+ private:
+  const CellGrid& grid_;
+  CellGrid::Key last_key_ = std::numeric_limits<CellGrid::Key>::max();
+  std::array<std::size_t, 9> first_{};
 };
 
 }  // namespace nacre

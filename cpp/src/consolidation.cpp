@@ -6,6 +6,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <functional>
 #include <limits>
 #include <queue>
 #include <unordered_set>
@@ -22,17 +24,19 @@ namespace {
 
 using Decay = PairKernel::Decay;
 
-constexpr std::int64_t cells_per_block = 8;
+constexpr std::int64_t cells_per_block = 16;
 
-// The weights of one method.
+// What makes a method.
 struct Form {
-  PairKernel density;           // theta, for v_j and w_i
-  PairKernel first_attraction;  // alpha of the first iteration
-  PairKernel attraction;        // alpha
-  PairKernel repulsion;         // beta
-  bool point_densities;         // whether the points' weights are divided by v_j
-  float least_repulsion;        // lower bound of the sum that the repulsion is divided by
-  float longest_step;
+  PairKernel density;            // theta, for v_j and w_i
+  PairKernel first_attraction;   // alpha of the first iteration
+  PairKernel attraction;         // alpha
+  PairKernel repulsion;          // beta
+  bool point_densities = true;   // whether the mass of a point is divided by its density v_j
+  float lone_density = 1.0F;     // w_i of a sample that has no neighbours
+  bool tangential = false;       // whether samples repel each other along the surface only
+  float least_repulsion = 0.0F;  // lower bound of the sum that the repulsion is divided by
+  float longest_step = std::numeric_limits<float>::infinity();
 };
 
 Form form_of(const ConsolidateOptions& options) {
@@ -46,21 +50,26 @@ Form form_of(const ConsolidateOptions& options) {
   theta.exponent = static_cast<float>(exponent * log2_e);
   theta.reach2 = static_cast<float>(h * h);
   theta.skip2 = -1.0F;
-  // 1 / r has no value at r = 0: such pairs are left out.
   PairKernel theta_over_r = theta;
   theta_over_r.decay = Decay::distance;
-  theta_over_r.skip2 = static_cast<float>(1e-12 * h * h);
+  theta_over_r.skip2 = static_cast<float>(1e-12 * h * h);  // 1 / r has no value at 0
 
-  Form form{theta, theta, theta_over_r, theta_over_r, true, 0.0F, std::numeric_limits<float>::infinity()};
+  Form form;
+  form.density = form.first_attraction = theta;
+  form.attraction = form.repulsion = theta_over_r;
   if (options.method == ConsolidationMethod::wlop_plus) {
     form.attraction.softening2 = form.repulsion.softening2 = static_cast<float>(4e-4 * h * h);
     form.attraction.skip2 = -1.0F;
+    form.tangential = true;
     form.least_repulsion = static_cast<float>(0.1 / h);
     form.longest_step = static_cast<float>(0.25 * h);
   } else if (options.method == ConsolidationMethod::cgal) {
-    form.attraction = theta;
+    // As CGAL 5.5 behaves: a point does not attract a sample at its place, a sample counts itself twice.
+    form.attraction.decay = Decay::none;
+    form.first_attraction = form.attraction;
     form.repulsion.decay = Decay::squared_distance;
     form.point_densities = false;
+    form.lone_density = 2.0F;
   }
   return form;
 }
@@ -75,9 +84,9 @@ std::vector<std::int64_t> finite_rows(const PointsRef& points) {
 }
 
 // The direction in which weighted points with these moments spread least.
-Eigen::Vector3f thinnest_direction(const PairSums<2>& sums) {
-  const Eigen::Vector3d mean = sums.first().cast<double>() / sums.mass();
-  const Eigen::Matrix3d covariance = sums.second().cast<double>() / sums.mass() - mean * mean.transpose();
+Eigen::Vector3f thinnest_direction(const PairSums& sums) {
+  const Eigen::Vector3d mean = sums.first.cast<double>() / sums.mass;
+  const Eigen::Matrix3d covariance = sums.second.cast<double>() / sums.mass - mean * mean.transpose();
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>().computeDirect(covariance).eigenvectors().col(0).cast<float>();
 }
 
@@ -90,24 +99,25 @@ struct Cargo {
 // Moves samples among points that stay.
 class Projection {
  public:
-  Projection(const Points& samples, const PointsRef& points, const ConsolidateOptions& options,
+  Projection(const PointsRef& samples, const PointsRef& points, const ConsolidateOptions& options,
              const ProjectionHints& hints)
       : options_(options),
         form_(form_of(options)),
-        hints_(hints),
+        frozen_(hints.frozen),
         samples_(samples),
+        normals_(hints.sample_normals),
         point_grid_(origin(points), edge(options)),
         sample_grid_(origin(points), edge(options)),
         sample_order_(finite_rows(samples)) {
     point_grid_.build(points, finite_rows(points));
     counts_.assign(point_grid_.padded_size(), 1.0F);
     if (hints.point_weights.size() > 0) {
-      for (std::int64_t j = 0; j < point_grid_.size(); ++j) {
-        counts_[static_cast<std::size_t>(j)] = hints.point_weights[point_grid_.rows()[static_cast<std::size_t>(j)]];
-      }
+      for (std::size_t j = 0; j < point_grid_.size(); ++j) counts_[j] = hints.point_weights[point_grid_.row(j)];
     }
     point_mass_ = counts_;
-    has_density_.assign(static_cast<std::size_t>(point_grid_.num_cells()), 0);
+    has_density_.assign(point_grid_.num_cells(), 0);
+    if (normals_.rows() == 0) normals_ = Points::Constant(samples.rows(), 3, unknown);
+    normals_.array().colwise() /= normals_.rowwise().norm().array();
   }
 
   // One iteration; cargo, if any, is weighted as the attraction is.
@@ -118,14 +128,15 @@ class Projection {
     weigh_samples();
     const PairKernel& attraction = first ? form_.first_attraction : form_.attraction;
     Points moved = samples_;
-    for_each_live_cell([&](std::int64_t cell, const Runs& point_runs) {
-      const Runs sample_runs = runs_around(sample_grid_, sample_grid_.key(cell));
-      for (std::int64_t s = sample_grid_.begin(cell); s < sample_grid_.begin(cell + 1); ++s) {
-        const std::int64_t row = sample_grid_.rows()[static_cast<std::size_t>(s)];
+    for_cells(sample_grid_.num_cells(), [&](std::size_t cell, CellWalk& among_samples, CellWalk& among_points) {
+      if (!is_live(cell)) return;
+      const PairRuns points = among_points.around(sample_grid_.key(cell));
+      const PairRuns others = among_samples.around(sample_grid_.key(cell));
+      for (std::size_t s = sample_grid_.begin(cell); s < sample_grid_.end(cell); ++s) {
+        const std::int64_t row = sample_grid_.row(s);
         if (is_frozen(row)) continue;
-        const Eigen::Vector3f place = sample_grid_.point(s);
-        moved.row(row) += step(place, row, attraction, point_runs, sample_runs).transpose();
-        if (cargo) load(*cargo, row, place, attraction, point_runs);
+        moved.row(row) += step(s, attraction, points, others).transpose();
+        if (cargo) load(*cargo, s, attraction, points);
       }
     });
     samples_ = std::move(moved);
@@ -134,7 +145,7 @@ class Projection {
   const Points& samples() const { return samples_; }
 
  private:
-  using Runs = std::vector<std::pair<std::int64_t, std::int64_t>>;
+  static constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
 
   // A little more than the radius, so that rounding never puts a pair within it two cells apart.
   static double edge(const ConsolidateOptions& options) { return 1.000001 * options.radius; }
@@ -146,145 +157,134 @@ class Projection {
     return Eigen::Vector3d::Zero();
   }
 
-  static Runs runs_around(const CellGrid& grid, CellGrid::Key key) {
-    Runs runs;
-    runs.reserve(9);
-    grid.for_each_run(key, [&](std::int64_t first, std::int64_t last) {
-      runs.emplace_back(grid.begin(first), grid.begin(last));
-    });
-    return runs;
-  }
+  bool is_frozen(std::int64_t row) const { return !frozen_.empty() && frozen_[static_cast<std::size_t>(row)] != 0; }
 
-  bool is_frozen(std::int64_t row) const {
-    return !hints_.frozen.empty() && hints_.frozen[static_cast<std::size_t>(row)] != 0;
-  }
-
-  bool is_live(std::int64_t cell) const {
-    for (std::int64_t s = sample_grid_.begin(cell); s < sample_grid_.begin(cell + 1); ++s) {
-      if (!is_frozen(sample_grid_.rows()[static_cast<std::size_t>(s)])) return true;
+  bool is_live(std::size_t cell) const {
+    for (std::size_t s = sample_grid_.begin(cell); s < sample_grid_.end(cell); ++s) {
+      if (!is_frozen(sample_grid_.row(s))) return true;
     }
     return false;
   }
 
-  // body(cell, runs of points around it) for each cell with a sample that may move.
+  // body(i, walk among samples, walk among points) for each i of [0, count).
   template <class Body>
-  void for_each_live_cell(Body&& body) const {
-    parallel_for(sample_grid_.num_cells(), cells_per_block, options_.num_threads, [&](std::int64_t cell) {
-      if (!is_live(cell)) return;
-      const Runs runs = runs_around(point_grid_, sample_grid_.key(cell));
-      if (!runs.empty()) body(cell, runs);
-    });
+  void for_cells(std::size_t count, Body&& body) const {
+    parallel_blocks(static_cast<std::int64_t>(count), cells_per_block, options_.num_threads,
+                    [&](std::int64_t, std::int64_t begin, std::int64_t end) {
+                      CellWalk among_samples(sample_grid_), among_points(point_grid_);
+                      for (std::int64_t i = begin; i < end; ++i) {
+                        body(static_cast<std::size_t>(i), among_samples, among_points);
+                      }
+                    });
   }
 
-  // v_j = 1 + sum over j' of theta (Huang 2009, eq. 4), for the points that samples have come near to. A point of
-  // weight c counts as c points at one place.
+  // 1 + the sum of theta over the other points of a grid (Huang 2009, section 3), for the points of one cell. A point
+  // of count c stands for c points at one place.
+  void weigh(const CellGrid& grid, std::size_t cell, CellWalk& walk, const std::vector<float>& counts,
+             std::vector<float>& densities) const {
+    const PairRuns around = walk.around(grid.key(cell));
+    for (std::size_t i = grid.begin(cell); i < grid.end(cell); ++i) {
+      densities[i] = sum_pairs<0>(form_.density, grid.with_mass(counts), around, grid.point(i)).mass;
+    }
+  }
+
+  // Divides the mass of each point by its density v_j, once a sample has come near.
   void weigh_points() {
-    std::vector<std::int64_t> cells;
-    for (std::int64_t cell = 0; cell < sample_grid_.num_cells(); ++cell) {
+    std::vector<std::size_t> cells;
+    CellWalk walk(point_grid_);
+    for (std::size_t cell = 0; cell < sample_grid_.num_cells(); ++cell) {
       if (!is_live(cell)) continue;
-      point_grid_.for_each_run(sample_grid_.key(cell), [&](std::int64_t first, std::int64_t last) {
-        for (std::int64_t c = first; c < last; ++c) {
-          if (std::exchange(has_density_[static_cast<std::size_t>(c)], 1) == 0) cells.push_back(c);
+      walk.for_each_range(sample_grid_.key(cell), [&](std::size_t first, std::size_t last) {
+        for (std::size_t c = first; c < last; ++c) {
+          if (std::exchange(has_density_[c], 1) == 0) cells.push_back(c);
         }
       });
     }
-    const PairPoints counted = point_grid_.with_mass(counts_);
-    parallel_for(static_cast<std::int64_t>(cells.size()), cells_per_block, options_.num_threads, [&](std::int64_t i) {
-      const std::int64_t cell = cells[static_cast<std::size_t>(i)];
-      const Runs runs = runs_around(point_grid_, point_grid_.key(cell));
-      for (std::int64_t j = point_grid_.begin(cell); j < point_grid_.begin(cell + 1); ++j) {
-        PairSums<0> sums;
-        for (const auto& [begin, end] : runs) sums.add(form_.density, counted, begin, end, point_grid_.point(j));
-        const auto k = static_cast<std::size_t>(j);
-        point_mass_[k] = counts_[k] > 0.0F ? counts_[k] / sums.mass() : 0.0F;
+    std::sort(cells.begin(), cells.end());
+    for_cells(cells.size(), [&](std::size_t i, CellWalk&, CellWalk& among_points) {
+      weigh(point_grid_, cells[i], among_points, counts_, point_mass_);
+      for (std::size_t j = point_grid_.begin(cells[i]); j < point_grid_.end(cells[i]); ++j) {
+        point_mass_[j] = counts_[j] > 0.0F ? counts_[j] / point_mass_[j] : 0.0F;
       }
     });
   }
 
-  // w_i = 1 + sum over i' of theta (Huang 2009, eq. 4).
+  // The mass of a sample is its density w_i.
   void weigh_samples() {
     sample_mass_.assign(sample_grid_.padded_size(), 0.0F);
     const std::vector<float> ones(sample_grid_.padded_size(), 1.0F);
-    const PairPoints counted = sample_grid_.with_mass(ones);
-    parallel_for(sample_grid_.num_cells(), cells_per_block, options_.num_threads, [&](std::int64_t cell) {
-      const Runs runs = runs_around(sample_grid_, sample_grid_.key(cell));
-      for (std::int64_t s = sample_grid_.begin(cell); s < sample_grid_.begin(cell + 1); ++s) {
-        PairSums<0> sums;
-        for (const auto& [begin, end] : runs) sums.add(form_.density, counted, begin, end, sample_grid_.point(s));
-        sample_mass_[static_cast<std::size_t>(s)] = sums.mass();
+    for_cells(sample_grid_.num_cells(), [&](std::size_t cell, CellWalk& among_samples, CellWalk&) {
+      weigh(sample_grid_, cell, among_samples, ones, sample_mass_);
+      for (std::size_t s = sample_grid_.begin(cell); s < sample_grid_.end(cell); ++s) {
+        sample_mass_[s] += form_.lone_density - 1.0F;
       }
     });
   }
 
-  // Attraction plus mu times repulsion (Huang 2009, eq. 3); zero where there are no points.
-  Eigen::Vector3f step(const Eigen::Vector3f& place, std::int64_t row, const PairKernel& attraction,
-                       const Runs& point_runs, const Runs& sample_runs) const {
-    PairSums<1> attracting;
-    const PairPoints points = point_grid_.with_mass(point_mass_);
-    for (const auto& [begin, end] : point_runs) attracting.add(attraction, points, begin, end, place);
-    if (!(attracting.mass() > 0.0F)) return Eigen::Vector3f::Zero();
-    Eigen::Vector3f step = attracting.first() / attracting.mass();
+  // Attraction plus mu times repulsion (Huang 2009, section 3); zero where there are no points.
+  Eigen::Vector3f step(std::size_t s, const PairKernel& attraction, const PairRuns& points, const PairRuns& others) {
+    const Eigen::Vector3f place = sample_grid_.point(s);
+    auto normal = normals_.row(sample_grid_.row(s));
+    const PairPoints attracting_points = point_grid_.with_mass(point_mass_);
+    PairSums attracting;
+    if (form_.tangential && !normal.allFinite()) {
+      attracting = sum_pairs<2>(attraction, attracting_points, points, place);
+      if (attracting.mass > 0.0F) normal = thinnest_direction(attracting).transpose();
+    } else {
+      attracting = sum_pairs<1>(attraction, attracting_points, points, place);
+    }
+    Eigen::Vector3f step = Eigen::Vector3f::Zero();
+    if (attracting.mass > 0.0F) {
+      step = attracting.first / attracting.mass;
+    } else if (!(sum_pairs<0>(form_.density, attracting_points, points, place).mass > 0.0F)) {
+      return step;  // isolated: not even a point at the sample's own place
+    }
 
-    PairSums<1> repelling;
-    const PairPoints others = sample_grid_.with_mass(sample_mass_);
-    for (const auto& [begin, end] : sample_runs) repelling.add(form_.repulsion, others, begin, end, place);
-    if (repelling.mass() > 0.0F) {
-      Eigen::Vector3f away = -repelling.first() / std::max(repelling.mass(), form_.least_repulsion);
-      if (options_.method == ConsolidationMethod::wlop_plus) {
-        const Eigen::Vector3f normal = normal_at(place, row, point_runs);
-        away -= normal.dot(away) * normal;
-      }
+    const PairSums repelling = sum_pairs<1>(form_.repulsion, sample_grid_.with_mass(sample_mass_), others, place);
+    if (repelling.mass > 0.0F) {
+      Eigen::Vector3f away = -repelling.first / std::max(repelling.mass, form_.least_repulsion);
+      if (form_.tangential) away -= normal.dot(away) * normal.transpose();
       step += static_cast<float>(options_.mu) * away;
     }
     const float length = step.norm();
-    return length > form_.longest_step ? Eigen::Vector3f(step * (form_.longest_step / length)) : step;
+    if (length > form_.longest_step) step *= form_.longest_step / length;
+    return step;
   }
 
-  Eigen::Vector3f normal_at(const Eigen::Vector3f& place, std::int64_t row, const Runs& point_runs) const {
-    if (hints_.sample_normals.rows() > 0 && hints_.sample_normals.row(row).allFinite()) {
-      return hints_.sample_normals.row(row).transpose().normalized();
-    }
-    PairSums<2> sums;
-    const PairPoints points = point_grid_.with_mass(point_mass_);
-    for (const auto& [begin, end] : point_runs) sums.add(form_.density, points, begin, end, place);
-    return thinnest_direction(sums);
-  }
-
-  void load(const Cargo& cargo, std::int64_t row, const Eigen::Vector3f& place, const PairKernel& attraction,
-            const Runs& point_runs) const {
+  // The means of attributes around a sample.
+  void load(const Cargo& cargo, std::size_t s, const PairKernel& attraction, const PairRuns& points) const {
     using Row = Eigen::Array<double, 1, Eigen::Dynamic>;
     const Eigen::Index size = cargo.of_points.cols();
     Row sums = Row::Zero(size), masses = Row::Zero(size);
-    for (const auto& [begin, end] : point_runs) {
-      for (std::int64_t j = begin; j < end; ++j) {
-        const auto k = static_cast<std::size_t>(j);
-        const float weight = pair_weight(attraction, (point_grid_.point(j) - place).squaredNorm()) * point_mass_[k];
-        if (!(weight > 0.0F)) continue;
-        const auto values = cargo.of_points.row(point_grid_.rows()[k]);
+    for (const auto& [begin, end] : points) {
+      for (std::size_t j = begin; j < end; ++j) {
+        const float squared_distance = (point_grid_.point(j) - sample_grid_.point(s)).squaredNorm();
+        const double weight = pair_weight(attraction, squared_distance) * point_mass_[j];
+        if (!(weight > 0.0)) continue;
         for (Eigen::Index a = 0; a < size; ++a) {
-          if (!std::isfinite(values[a])) continue;
-          sums[a] += static_cast<double>(weight) * static_cast<double>(values[a]);
-          masses[a] += static_cast<double>(weight);
+          const double value = cargo.of_points(point_grid_.row(j), a);
+          if (!std::isfinite(value)) continue;
+          sums[a] += weight * value;
+          masses[a] += weight;
         }
       }
     }
     for (Eigen::Index a = 0; a < size; ++a) {
-      if (masses[a] > 0.0) cargo.of_samples(row, a) = static_cast<float>(sums[a] / masses[a]);
+      if (masses[a] > 0.0) cargo.of_samples(sample_grid_.row(s), a) = static_cast<float>(sums[a] / masses[a]);
     }
   }
 
   const ConsolidateOptions& options_;
   const Form form_;
-  const ProjectionHints& hints_;
-  Points samples_;
+  const std::vector<std::uint8_t>& frozen_;
+  Points samples_, normals_;
   CellGrid point_grid_, sample_grid_;
   std::vector<std::int64_t> sample_order_;
-  // In the order of the grids, padded as they are.
-  std::vector<float> counts_, point_mass_, sample_mass_;
-  std::vector<std::uint8_t> has_density_;  // one a cell of points
+  std::vector<float> counts_, point_mass_, sample_mass_;  // in the order of the grids, padded
+  std::vector<std::uint8_t> has_density_;                 // one a cell of points
 };
 
-Points project(const Points& samples, const PointsRef& points, const ConsolidateOptions& options,
+Points project(const PointsRef& samples, const PointsRef& points, const ConsolidateOptions& options,
                const ProjectionHints& hints, const Cargo* cargo) {
   Projection projection(samples, points, options, hints);
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
@@ -331,7 +331,7 @@ std::vector<std::int64_t> choose(const PointsRef& points, int count, std::uint64
 }  // namespace
 
 void ConsolidateOptions::check() const {
-  require(std::isfinite(radius) && radius > 0.0, "radius", "a positive length", radius);
+  require(radius >= 1e-12 && radius <= 1e12, "radius", "a length from 1e-12 to 1e12", radius);
   require(num_points >= 1, "num_points", "at least 1", num_points);
   require(iterations >= 0, "iterations", "at least 0", iterations);
   require(mu >= 0.0 && mu <= 0.5, "mu", "from 0 to 0.5", mu);

@@ -29,14 +29,14 @@ class StopWatch {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
-// Twice the median size of a pixel on the surface.
+// Twice the size of a pixel on the nearer surfaces (the lower quartile of depth).
 double spacing_for(const Frame& frame, const Camera& camera) {
   std::vector<float> z;
   z.reserve(frame.valid.size());
   for (const std::int32_t row : frame.valid) z.push_back(frame.points(row, 2));
-  const auto middle = z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2);
-  std::nth_element(z.begin(), middle, z.end());
-  return 2.0 * camera.footprint(*middle);
+  const auto quartile = z.begin() + static_cast<std::ptrdiff_t>(z.size() / 4);
+  std::nth_element(z.begin(), quartile, z.end());
+  return 2.0 * camera.footprint(*quartile);
 }
 
 void check_extras(const Camera& camera, const FrameExtras& extras) {

@@ -1,6 +1,6 @@
 // The inner loop of consolidation: sums over the points around one place, weighted by their distance. Written in a
-// fixed number of lanes with one expression a lane, so that a compiler can use vectors of any width and every width
-// gives the same bits.
+// fixed number of lanes with the same expression in each, so that a compiler can use vectors of any width and every
+// width gives the same bits.
 #pragma once
 
 #include <Eigen/Core>
@@ -9,17 +9,27 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 
 namespace nacre {
 
-constexpr int pair_lanes = 8;
+constexpr std::size_t pair_lanes = 8;
 
-// Coordinates in separate arrays with a mass each, readable for pair_lanes - 1 entries past the end.
+// Coordinates in separate arrays, with a mass each; readable for pair_lanes - 1 entries past the end.
 struct PairPoints {
   const float* x;
   const float* y;
   const float* z;
   const float* mass;
+};
+
+// Up to nine ranges [begin, end) of points.
+struct PairRuns {
+  std::array<std::pair<std::size_t, std::size_t>, 9> ranges;
+  std::size_t count = 0;
+
+  auto begin() const { return ranges.begin(); }
+  auto end() const { return ranges.begin() + count; }
 };
 
 // The weight of a pair at distance r: theta(r) = 2^(exponent r^2), divided by a power of r.
@@ -72,81 +82,77 @@ inline float pair_weight(const PairKernel& kernel, float squared_distance) {
   }
 }
 
-// Sums of w, w d and w d d^T over pairs, d being the offset from the place to the point, w the pair's weight times the
-// point's mass; moments says up to which of the three.
-template <int moments>
-class PairSums {
-  static constexpr int num_sums = moments == 0 ? 1 : moments == 1 ? 4 : 10;
+// Sums over pairs, d being the offset from the place to the point, w the pair's weight times the point's mass.
+struct PairSums {
+  float mass;              // of w
+  Eigen::Vector3f first;   // of w d
+  Eigen::Matrix3f second;  // of w d d^T
+};
 
- public:
-  void add(const PairKernel& kernel, const PairPoints& points, std::int64_t begin, std::int64_t end,
-           const Eigen::Vector3f& place) {
-    switch (kernel.decay) {
-      case PairKernel::Decay::none:
-        return add<PairKernel::Decay::none>(kernel, points, begin, end, place);
-      case PairKernel::Decay::distance:
-        return add<PairKernel::Decay::distance>(kernel, points, begin, end, place);
-      case PairKernel::Decay::squared_distance:
-        return add<PairKernel::Decay::squared_distance>(kernel, points, begin, end, place);
-    }
-  }
-
-  float mass() const { return total(0); }
-  Eigen::Vector3f first() const { return {total(1), total(2), total(3)}; }
-  Eigen::Matrix3f second() const {
-    Eigen::Matrix3f sums;
-    sums << total(4), total(5), total(6),  //
-        total(5), total(7), total(8),      //
-        total(6), total(8), total(9);
-    return sums;
-  }
-
- private:
-  using Lanes = std::array<float, pair_lanes>;
-
-  template <PairKernel::Decay decay>
-  void add(const PairKernel& kernel_ref, const PairPoints& points, std::int64_t begin, std::int64_t end,
-           const Eigen::Vector3f& place) {
-    const PairKernel kernel = kernel_ref;
-    const float x = place.x(), y = place.y(), z = place.z();
-    std::array<Lanes, num_sums> sums = sums_;
-    for (std::int64_t start = begin; start < end; start += pair_lanes) {
-      const int remaining = static_cast<int>(std::min<std::int64_t>(end - start, pair_lanes));
-      for (int lane = 0; lane < pair_lanes; ++lane) {
-        const auto l = static_cast<std::size_t>(lane);
+// moments says how far the sums go: 0 mass only, 1 also first, 2 all; the others are not set.
+template <int moments, PairKernel::Decay decay>
+PairSums sum_pairs(const PairKernel& kernel_ref, const PairPoints& points, const PairRuns& runs,
+                   const Eigen::Vector3f& place) {
+  constexpr std::size_t num_sums = moments == 0 ? 1 : moments == 1 ? 4 : 10;
+  float lanes[num_sums][pair_lanes] = {};
+  const PairKernel kernel = kernel_ref;
+  const float x = place.x(), y = place.y(), z = place.z();
+  for (const auto& [begin, end] : runs) {
+    for (std::size_t start = begin; start < end; start += pair_lanes) {
+      const int remaining = static_cast<int>(std::min(end - start, pair_lanes));
+      for (std::size_t lane = 0; lane < pair_lanes; ++lane) {
         const float dx = points.x[start + lane] - x;
         const float dy = points.y[start + lane] - y;
         const float dz = points.z[start + lane] - z;
         const float weight = pair_weight<decay>(kernel, dx * dx + dy * dy + dz * dz) * points.mass[start + lane];
-        const float w = lane < remaining ? weight : 0.0F;
-        sums[0][l] += w;
+        const float w = static_cast<int>(lane) < remaining ? weight : 0.0F;
+        lanes[0][lane] += w;
         if constexpr (moments >= 1) {
-          sums[1][l] += w * dx;
-          sums[2][l] += w * dy;
-          sums[3][l] += w * dz;
+          lanes[1][lane] += w * dx;
+          lanes[2][lane] += w * dy;
+          lanes[3][lane] += w * dz;
         }
         if constexpr (moments >= 2) {
-          sums[4][l] += w * dx * dx;
-          sums[5][l] += w * dx * dy;
-          sums[6][l] += w * dx * dz;
-          sums[7][l] += w * dy * dy;
-          sums[8][l] += w * dy * dz;
-          sums[9][l] += w * dz * dz;
+          lanes[4][lane] += w * dx * dx;
+          lanes[5][lane] += w * dx * dy;
+          lanes[6][lane] += w * dx * dz;
+          lanes[7][lane] += w * dy * dy;
+          lanes[8][lane] += w * dy * dz;
+          lanes[9][lane] += w * dz * dz;
         }
       }
     }
-    sums_ = sums;
   }
 
-  float total(std::size_t which) const {
-    Lanes lanes = sums_[which];
+  float total[num_sums];
+  for (std::size_t sum = 0; sum < num_sums; ++sum) {
     for (std::size_t width = pair_lanes / 2; width > 0; width /= 2) {
-      for (std::size_t lane = 0; lane < width; ++lane) lanes[lane] += lanes[lane + width];
+      for (std::size_t lane = 0; lane < width; ++lane) lanes[sum][lane] += lanes[sum][lane + width];
     }
-    return lanes[0];
+    total[sum] = lanes[sum][0];
   }
+  PairSums sums;
+  sums.mass = total[0];
+  if constexpr (moments >= 1) sums.first << total[1], total[2], total[3];
+  if constexpr (moments >= 2) {
+    sums.second << total[4], total[5], total[6],  //
+        total[5], total[7], total[8],             //
+        total[6], total[8], total[9];
+  }
+  return sums;
+}
 
-  std::array<Lanes, num_sums> sums_{};
-};
+template <int moments>
+PairSums sum_pairs(const PairKernel& kernel, const PairPoints& points, const PairRuns& runs,
+                   const Eigen::Vector3f& place) {
+  switch (kernel.decay) {
+    case PairKernel::Decay::none:
+      return sum_pairs<moments, PairKernel::Decay::none>(kernel, points, runs, place);
+    case PairKernel::Decay::distance:
+      return sum_pairs<moments, PairKernel::Decay::distance>(kernel, points, runs, place);
+    default:
+      return sum_pairs<moments, PairKernel::Decay::squared_distance>(kernel, points, runs, place);
+  }
+}
 
 }  // namespace nacre

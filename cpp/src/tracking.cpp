@@ -6,6 +6,8 @@
 
 #include "icp_target.hpp"
 #include "parallel.hpp"
+#include "random.hpp"
+#include "surface_observer.hpp"
 
 namespace nacre {
 namespace {
@@ -96,6 +98,42 @@ double median_sigma(const Frame& frame) {
   return *middle;
 }
 
+// Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
+bool is_beyond_doubt(const TrackingResult& result, double gate) {
+  return result.status == FrameStatus::tracked && result.alignment.overlap > 0.5 && result.consistency > 0.9 &&
+         result.alignment.rmse < 0.25 * gate;
+}
+
+// Denoised points of the frame, spread over it at random: noise would shift the matches on curved surfaces.
+struct Samples {
+  Points points, normals;
+  Values sigma;
+};
+
+Samples sample_frame(const Frame& frame, const Camera& camera, const ModelOptions& options) {
+  const std::int64_t count =
+      options.registration.max_samples > 0
+          ? std::min<std::int64_t>(options.registration.max_samples, static_cast<std::int64_t>(frame.valid.size()))
+          : static_cast<std::int64_t>(frame.valid.size());
+  Samples samples{Points(count, 3), Points(count, 3), Values(count)};
+  const Colors no_colors;
+  const ColorsRef colors(no_colors);
+  const SurfaceObserver observer(frame, camera, options.fusion, colors);
+  const double stride = static_cast<double>(frame.valid.size()) / static_cast<double>(std::max<std::int64_t>(count, 1));
+  parallel_for(count, 256, options.num_threads, [&](std::int64_t i) {
+    // One of every `stride` pixels.
+    const double place =
+        (static_cast<double>(i) + random_uniform(options.registration.seed, static_cast<std::uint64_t>(i))) * stride;
+    const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
+    const Eigen::Vector3f point = frame.points.row(row).transpose(), normal = frame.normals.row(row).transpose();
+    const Observation seen = observer.observe(point, normal, row, frame.sigma[row]);
+    samples.points.row(i) = (point + seen.offset * normal).transpose();
+    samples.normals.row(i) = seen.weight > 0.0F ? seen.normal.normalized().transpose() : normal.transpose();
+    samples.sigma[i] = frame.sigma[row];
+  });
+  return samples;
+}
+
 void judge(TrackingResult& result, const ModelOptions& options) {
   std::ostringstream reason;
   reason.precision(3);
@@ -124,12 +162,13 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
   const bool automatic_gate = !(options.registration.max_distance > 0.0);
 
   // Near: the guess is about right, and a narrow gate is safest. Wide: it is not.
+  const Samples samples = sample_frame(frame, camera, options);
+  const IcpSource source(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration);
   for (const bool wide : {false, true}) {
     if (wide && !automatic_gate) break;
     for (const Pose& guess : guesses) {
       const View view = points_in_view(model, camera, guess);
       const IcpTarget target(AlignCloud(view.points, view.normals), options.registration);
-      const IcpSource source(AlignCloud(frame.points, frame.normals, frame.sigma), options.registration);
       AlignOptions align_options = options.registration;
       if (!(align_options.final_distance > 0.0)) {
         align_options.final_distance = std::max(2.5 * target.spacing(), 4.0 * median_sigma(frame));
@@ -142,8 +181,7 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
                                           options.num_threads);
       judge(result, options);
       if (result.score() >= best.score()) best = result;
-      // A frame that matches almost everywhere needs no second opinion.
-      if (result.status == FrameStatus::tracked && result.score() > 0.8) return best;
+      if (is_beyond_doubt(result, align_options.final_distance)) return result;
     }
   }
   return best;

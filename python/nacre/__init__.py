@@ -21,6 +21,7 @@ from nacre.io.trajectories import Trajectory, associate, read_trajectory, write_
 from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
 from nacre.model import FrameReport, Model, ModelParameters
 from nacre.neighbors import KdTree, RadiusNeighbors
+from nacre.normals import estimate_normals
 from nacre.registration import AlignResult, RegistrationParameters, align
 from nacre.simulation import default_camera, simulate_depth, turntable_poses
 
@@ -55,6 +56,7 @@ __all__ = [
     "default_camera",
     "depth_normals",
     "estimate_noise",
+    "estimate_normals",
     "open_sequence",
     "preprocess_depth",
     "project_samples",

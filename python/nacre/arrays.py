@@ -66,6 +66,24 @@ def as_pose(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
     return array
 
 
+def as_poses(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Return ``value`` as (N, 4, 4) rigid float64 matrices; a row that is not finite stands for a missing pose."""
+    array = np.ascontiguousarray(_real(name, value), dtype=np.float64)
+    if array.ndim != 3 or array.shape[1:] != (4, 4):
+        raise ValueError(f"{name} must have shape (N, 4, 4), got {array.shape}")
+    present = np.flatnonzero(np.isfinite(array).all(axis=(1, 2)))
+    rotation = array[present, :3, :3]
+    is_rigid = (
+        np.isclose(rotation @ rotation.transpose(0, 2, 1), np.eye(3), atol=1e-5).all(axis=(1, 2))
+        & (np.linalg.det(rotation) > 0)
+        & np.isclose(array[present, 3], (0, 0, 0, 1)).all(axis=1)
+    )
+    if not is_rigid.all():
+        bad = present[np.argmin(is_rigid)]
+        raise ValueError(f"{name}[{bad}] must be a rigid transform (rotation and translation), got\n{array[bad]}")
+    return array
+
+
 def as_depth(name: str, value: npt.ArrayLike, depth_scale: float = 1.0) -> npt.NDArray[np.float32]:
     """
     Return a depth image as (H, W) float32 metres; a copy is made unless ``value`` is C-contiguous float32 metres.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -64,40 +65,39 @@ def consolidate(
     """
     Replace a noisy point set by fewer, evenly spread points near its local medians (WLOP).
 
-    ``num_points`` of the input are chosen at random. In each iteration a chosen point x moves to the weighted mean of
-    the input points p within ``radius`` h, weighted by theta(r) / r over the density of the input at p, and ``mu``
-    times away from its chosen neighbours. The points differ from the input: they lie on no surface exactly, and on
-    curved surfaces slightly inside.
+    ``num_points`` of the input are chosen at random. In each iteration a chosen point moves to the weighted
+    mean of the input points within ``radius`` h, with weights theta(r) / r over the density of the input, and
+    ``mu`` times away from its chosen neighbours. On curved surfaces the result lies slightly inside.
 
     Parameters
     ----------
     points : (N, 3) array of any real dtype
         Not changed. Rows that are not finite are ignored.
     radius : float
-        Support radius h, in the unit of the points. The spacing of the result should be at most about h / 2, or the
-        points have no neighbours to spread evenly against.
+        Support radius h, in the unit of the points. The spacing of the result should be at most about h / 2:
+        points without neighbours within h cannot spread evenly.
     num_points : int or None
-        Size of the result, at most the number of finite rows. None keeps that many: points move, none goes away.
+        Size of the result, at most the number of finite rows. None takes them all: points move, none is lost.
         For one seed, the points chosen for a smaller result are among those chosen for a larger one.
     iterations : int
         0 gives the random choice itself.
     mu : float
         Weight of the repulsion, 0 to 0.5.
     method : {"wlop", "wlop+", "cgal"}
-        ``"wlop"``: Huang et al. 2009, literally, with density weights for both sets. ``"wlop+"``: repulsion only along
-        the surface and fading where there are no neighbours, steps of at most h / 4, bounded weights: lower noise,
-        no drift at the rims; the better choice but for comparison. ``"cgal"``: the kernels of CGAL's
-        ``wlop_simplify_and_regularize_point_set``: theta is exp(-4 r^2 / h^2), attraction theta, repulsion theta / r^2,
-        no density weights of the input.
+        ``"wlop"`` is Huang et al. 2009, literally, with density weights for both sets. ``"wlop+"`` repels
+        along the surface only, less where there are no near neighbours, and steps at most h / 4: less noise,
+        no drift at the rims, better for anything but comparison with the paper. ``"cgal"`` is what CGAL's
+        ``wlop_simplify_and_regularize_point_set`` computes by default: theta is exp(-4 r^2 / h^2), the
+        weights are theta, the repulsion's theta / r^2 (there ``mu`` is 0.45 and ``iterations`` 35).
     theta : {"huang", "printed"}
-        exp(-16 r^2 / h^2), or exp(-4 r^2 / h) as printed in a later paper, which depends on the unit of length and is
-        nearly constant within h when h is small. Not used by ``"cgal"``.
+        exp(-16 r^2 / h^2), or exp(-4 r^2 / h) as a later paper prints it, which depends on the unit of length
+        and hardly falls within h when h is small. ``"cgal"`` uses neither.
     attributes : mapping of str to (N,) or (N, A) array, or one such array
-        Values of the points to carry along: normals, colours, intensities. A result's value is the mean over the
-        input points within h, weighted as the attraction of the last iteration weights their positions; values that are not finite
-        are left out. A result with no such value within h has its source's. An array named ``"normals"`` comes back
-        with unit rows, integers come back rounded. Each column is averaged in float32 about its mean. A single array
-        comes back under the name ``"attributes"``.
+        Values to carry along: normals, colours, intensities. Each result has the mean over the input points
+        within h, with the weights that the last iteration drew it by. Values that are not finite are left
+        out; where none remains, the value of the source stays. ``"normals"`` come back with unit length,
+        integers rounded. Each column is averaged in float32 about its mean. A single array comes back as
+        ``"attributes"``.
     seed : int
         Of the random choice, 0 to 2**64 - 1.
     num_threads : int
@@ -115,15 +115,20 @@ def consolidate(
 
     References
     ----------
-    Huang, Li, Zhang, Ascher, Cohen-Or: Consolidation of unorganized point clouds for surface reconstruction. ACM TOG
-    28(5), 2009. Lipman, Cohen-Or, Levin, Tal-Ezer: Parameterization-free projection for geometry reconstruction. ACM
-    TOG 26(3), 2007.
+    Huang, Li, Zhang, Ascher, Cohen-Or: Consolidation of unorganized point clouds for surface reconstruction.
+    ACM TOG 28(5), 2009. Lipman, Cohen-Or, Levin, Tal-Ezer: Parameterization-free projection for geometry
+    reconstruction. ACM TOG 26(3), 2007.
+
+    Examples
+    --------
+    >>> thin = nacre.consolidate(points, radius=0.008, attributes={"normals": normals, "colors": colors})
+    >>> thin.points, thin.attributes["normals"]
     """
     array = as_points("points", points)
     options = _options(radius, iterations, mu, method, theta, num_threads)
-    options.num_points = max(1, len(array)) if num_points is None else as_int("num_points", num_points)
-    options.seed = as_int("seed", seed)
-    options.check()
+    wanted = len(array) if num_points is None else as_int("num_points", num_points, low=1)
+    options.num_points = max(1, min(wanted, len(array)))
+    options.seed = as_int("seed", seed, high=2**64 - 1)
     local, origin = localize(array)
     cargo = _Cargo(attributes, len(array))
     moved, carried, sources = _core.consolidate(local, options, cargo.columns)
@@ -158,8 +163,8 @@ def project_samples(
     point_weights : (N,) array, optional, method "wlop+" only
         How many observations each point stands for: a point of weight 2 counts as two points at its place.
     sample_normals : (K, 3) array, optional, method "wlop+" only
-        The samples repel each other across these directions. Rows that are not finite are estimated, as all are when
-        this is not given.
+        Of the surface at the samples, of any length and sign: the samples repel each other in its tangent
+        planes. Rows that are zero or not finite are estimated from the points, as all are without this.
     frozen : (K,) array, optional, method "wlop+" only
         Samples that stay where they are, and still repel the others, are not 0.
 
@@ -183,13 +188,11 @@ def project_samples(
         normals = as_matching_points("sample_normals", sample_normals, "samples", len(sample_array))
         hints.sample_normals = normals.astype(np.float32)
     if frozen is not None:
-        hints.frozen = _as_column("frozen", frozen, len(sample_array)) != 0
-    if np.float64 in (sample_array.dtype, point_array.dtype):
-        local, origin = localize(point_array.astype(np.float64))
-        local_samples = (sample_array - origin).astype(np.float32)
-    else:
-        local, origin = localize(point_array)
-        local_samples = sample_array
+        hints.frozen = (_as_column("frozen", frozen, len(sample_array)) != 0).astype(np.uint8)
+    local, origin = localize(
+        point_array if sample_array.dtype == np.float32 else point_array.astype(np.float64)
+    )
+    local_samples = (sample_array - origin).astype(np.float32)
     moved = _core.project_samples(local_samples, local, options, hints)
     return _globalize(moved, origin, sample_array.dtype)
 
@@ -199,24 +202,30 @@ def _options(
 ) -> _core.ConsolidateOptions:
     options = _core.ConsolidateOptions()
     options.radius = as_number("radius", radius)
-    options.iterations = as_int("iterations", iterations)
+    options.iterations = as_int("iterations", iterations, high=2**31 - 1)
     options.mu = as_number("mu", mu)
     options.method = as_choice("method", method, _METHODS)
     options.theta = as_choice("theta", theta, _THETAS)
-    options.num_threads = as_int("num_threads", num_threads)
+    options.num_threads = as_int("num_threads", num_threads, high=2**31 - 1)
     return options
 
 
-def _globalize(moved: npt.NDArray[np.float32], origin: npt.NDArray[np.float64], dtype: np.dtype[Any]) -> FloatArray:
-    if dtype == np.float32:
-        return (moved + origin).astype(np.float32) if origin.any() else moved
-    return moved + origin
+def _globalize(
+    local: npt.NDArray[np.float32], origin: npt.NDArray[np.float64], dtype: np.dtype[Any]
+) -> FloatArray:
+    points: FloatArray = local if dtype == np.float32 and not origin.any() else (local + origin).astype(dtype)
+    return points
 
 
-def _as_column(name: str, value: npt.ArrayLike, size: int) -> npt.NDArray[Any]:
+def _real(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
     array = np.asarray(value)
     if array.dtype.kind not in "buif":
         raise TypeError(f"{name} must be an array of real numbers, got dtype {array.dtype}")
+    return array
+
+
+def _as_column(name: str, value: npt.ArrayLike, size: int) -> npt.NDArray[Any]:
+    array = _real(name, value)
     if array.shape != (size,):
         raise ValueError(f"{name} must have shape ({size},), got {array.shape}")
     return array
@@ -225,35 +234,32 @@ def _as_column(name: str, value: npt.ArrayLike, size: int) -> npt.NDArray[Any]:
 class _Cargo:
     """Attributes of any dtype as float32 columns about their means, and back."""
 
-    columns: npt.NDArray[np.float32]
-
-    def __init__(self, attributes: npt.ArrayLike | Mapping[str, npt.ArrayLike] | None, num_points: int) -> None:
+    def __init__(
+        self, attributes: npt.ArrayLike | Mapping[str, npt.ArrayLike] | None, num_points: int
+    ) -> None:
         if attributes is None:
             attributes = {}
         elif not isinstance(attributes, Mapping):
             attributes = {"attributes": attributes}
         self._arrays: dict[str, npt.NDArray[Any]] = {}
         self._means: dict[str, npt.NDArray[np.float64]] = {}
-        columns = [np.zeros((num_points, 0), dtype=np.float32)]
+        blocks = [np.zeros((num_points, 0), dtype=np.float32)]
         for name, value in attributes.items():
-            array = np.asarray(value)
-            label = f"attributes[{name!r}]" if name != "attributes" else "attributes"
-            if array.dtype.kind not in "buif":
-                raise TypeError(f"{label} must be an array of real numbers, got dtype {array.dtype}")
+            label = f"attributes[{name!r}]"
+            array = _real(label, value)
             if array.ndim not in (1, 2) or len(array) != num_points:
-                raise ValueError(
-                    f"{label} must have one row per point, shape ({num_points},) or ({num_points}, A), got {array.shape}"
-                )
+                expected = f"one row per point, ({num_points},) or ({num_points}, A)"
+                raise ValueError(f"{label} must have {expected}, got shape {array.shape}")
             if name == "normals" and (array.dtype.kind != "f" or array.shape[1:] != (3,)):
-                raise ValueError(f"{label} must be floating-point of shape ({num_points}, 3), got {array.dtype} {array.shape}")
-            rows = array.reshape(num_points, -1).astype(np.float64)
+                expected = f"floating-point of shape ({num_points}, 3)"
+                raise ValueError(f"{label} must be {expected}, got {array.dtype} {array.shape}")
+            rows = array.reshape(num_points, math.prod(array.shape[1:])).astype(np.float64)
             finite = np.isfinite(rows)
-            counts = np.maximum(finite.sum(axis=0), 1)
-            mean = np.where(finite, rows, 0.0).sum(axis=0) / counts
+            mean = np.where(finite, rows, 0.0).sum(axis=0) / np.maximum(finite.sum(axis=0), 1)
             self._arrays[name] = array
             self._means[name] = mean
-            columns.append((rows - mean).astype(np.float32))
-        self.columns = np.ascontiguousarray(np.hstack(columns))
+            blocks.append((rows - mean).astype(np.float32))
+        self.columns = np.ascontiguousarray(np.hstack(blocks))
 
     def unpack(
         self, carried: npt.NDArray[np.float32], sources: npt.NDArray[np.int64]
@@ -262,11 +268,11 @@ class _Cargo:
         start = 0
         for name, array in self._arrays.items():
             mean = self._means[name]
-            values = (carried[:, start : start + len(mean)] + mean).reshape(-1, *array.shape[1:])
+            values = (carried[:, start : start + len(mean)] + mean).reshape(len(sources), *array.shape[1:])
             start += len(mean)
             if name == "normals":
                 lengths = np.linalg.norm(values, axis=1, keepdims=True)
-                values = np.where(lengths > 0, values / np.where(lengths > 0, lengths, 1), array[sources])
+                values = np.divide(values, lengths, out=array[sources].astype(np.float64), where=lengths > 0)
             result[name] = _as_dtype(values, array.dtype)
         return result
 

@@ -86,7 +86,7 @@ class ModelParameters:
         How a registered frame becomes part of the model: confidence-weighted fusion, the 2010 paper's WLOP of model and
         new points, or WLOP repaired for incremental use.
     spacing : float
-        Distance between model points [m]; 0: twice the first frame's median pixel.
+        Distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces.
     max_points : int
         The model never grows beyond: its spacing is widened instead.
     predict_motion : bool

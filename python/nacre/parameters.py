@@ -80,12 +80,16 @@ def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
     return parameters
 
 
-def as_int(name: str, value: Any) -> int:
-    """Return ``value`` as an int; floats are refused."""
+def as_int(name: str, value: Any, low: int = 0, high: int | None = None) -> int:
+    """Return ``value`` as an int from ``low`` to ``high``; floats are refused."""
     try:
-        return operator.index(value)
+        number = operator.index(value)
     except TypeError:
         raise TypeError(f"{name} must be an integer, got {value!r}") from None
+    if number < low or (high is not None and number > high):
+        expected = f"at least {low}" if high is None or number < low else f"at most {high}"
+        raise ValueError(f"{name} must be {expected}, got {value!r}")
+    return number
 
 
 def as_number(name: str, value: Any) -> float:

@@ -92,7 +92,7 @@ def stl_text(triangles):
 @pytest.mark.parametrize("write", [stl_binary, stl_text])
 def test_stl_corners_are_merged(tmp_path, write):
     check_square(read(tmp_path, "a.stl", write(SQUARE[FAN])), dtype=np.float32)
-    check_square(read(tmp_path, "a.STL", write(SQUARE[FAN] * [1, 1, 1] + -0.0)), dtype=np.float32)
+    check_square(read(tmp_path, "a.STL", write(SQUARE[FAN])), dtype=np.float32)
     vertices, triangles = read(tmp_path, "b.stl", write(np.empty((0, 3, 3))))
     assert vertices.shape == triangles.shape == (0, 3)
 
@@ -105,7 +105,9 @@ def test_stl_of_several_solids_in_capitals(tmp_path):
 @settings(max_examples=50, deadline=None, derandomize=True)
 @given(seed=st.integers(0, 2**32 - 1), size=st.integers(0, 30))
 def test_stl_merges_as_a_dictionary_would(tmp_path_factory, seed, size):
-    corners = np.random.default_rng(seed).integers(-1, 2, (size, 3, 3)).astype(np.float32) * np.float32(0.1)
+    rng = np.random.default_rng(seed)
+    signs = rng.choice([-0.1, 0.1], (size, 3, 3))
+    corners = (rng.integers(0, 2, (size, 3, 3)) * signs).astype(np.float32)  # with 0 and -0
     vertices, triangles = read(tmp_path_factory.getbasetemp(), "a.stl", stl_binary(corners))
     np.testing.assert_array_equal(vertices[triangles], corners)
     first_seen = list(dict.fromkeys(map(tuple, (corners + 0).reshape(-1, 3).tolist())))
@@ -149,10 +151,24 @@ def test_written_meshes_are_read_again(tmp_path, dtype, binary, index_dtype):
     np.testing.assert_array_equal(triangles, np.array(FAN, dtype=np.int32), strict=True)
 
 
-def test_empty_mesh(tmp_path):
-    write_mesh(tmp_path / "a.ply", np.empty((0, 3)), np.empty((0, 3), dtype=int))
-    vertices, triangles = read_mesh_arrays(tmp_path / "a.ply")
-    assert vertices.shape == triangles.shape == (0, 3)
+def test_mesh_object(tmp_path):
+    nacre.write_mesh(tmp_path / "a.ply", SQUARE, FAN)
+    mesh = nacre.read_mesh(tmp_path / "a.ply")
+    assert isinstance(mesh, nacre.Mesh)
+    check_square((mesh.vertices, mesh.triangles))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (f"OFF\n4 0 0\n{OFF_SQUARE}", "triangles"),
+        (f"OFF\n4 1 0\n{OFF_SQUARE}3 0 1 2\n".replace("0.5", "nan"), "vertices"),
+    ],
+)
+def test_what_no_mesh_object_can_be_made_of(tmp_path, content, message):
+    assert len(read(tmp_path, "a.off", content)[0]) == 4
+    with pytest.raises(nacre.FileFormatError, match=rf"a\.off.*{message}"):
+        nacre.read_mesh(tmp_path / "a.off")
 
 
 @pytest.mark.parametrize(
@@ -160,10 +176,10 @@ def test_empty_mesh(tmp_path):
     [
         ("a.obj", SQUARE, FAN, ValueError, r"\.ply"),
         ("a.ply", SQUARE[:, :2], FAN, ValueError, r"vertices must have shape \(N, 3\)"),
-        ("a.ply", SQUARE, [[0, 1]], ValueError, r"triangles must have shape \(M, 3\)"),
+        ("a.ply", SQUARE, [[0, 1]], ValueError, r"triangles must have shape \(N, 3\)"),
         ("a.ply", SQUARE, [[0.0, 1, 2]], TypeError, "triangles must be an array of integers"),
-        ("a.ply", SQUARE, [[0, 1, 4]], ValueError, "triangles must be indices from 0 to 3, got 0 to 4"),
-        ("a.ply", SQUARE, [[0, 1, -1]], ValueError, "triangles must be indices from 0 to 3, got -1 to 1"),
+        ("a.ply", SQUARE, [[0, 1, 4]], ValueError, "triangles must hold indices of the 4 vertices, got 4"),
+        ("a.ply", SQUARE, [[0, 1, -1]], ValueError, "triangles must hold indices of the 4 vertices, got -1"),
     ],
 )
 def test_illegal_arguments(tmp_path, name, vertices, triangles, error, message):
@@ -186,7 +202,10 @@ def test_missing_files_and_directories(tmp_path, suffix):
         read_mesh_arrays(tmp_path / f"a{suffix}")
 
 
-PLY_HEADER = f"ply\nformat ascii 1.0\n{PLY_VERTICES}element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+PLY_HEADER = (
+    f"ply\nformat ascii 1.0\n{PLY_VERTICES}element face 1\n"
+    "property list uchar int vertex_indices\nend_header\n"
+)
 STL = stl_binary(SQUARE[FAN])
 STL_LINES = stl_text(SQUARE[FAN]).decode()
 BROKEN = {
@@ -229,6 +248,7 @@ BROKEN = {
     "corner enormous.off": (f"OFF\n4 1 0\n{OFF_SQUARE}3 0 1 {10**30}\n", "line 7"),
     "more lines.off": (f"OFF\n4 1 0\n{OFF_SQUARE}3 0 1 2\n3 0 2 3\n", "line 8: more lines"),
     "empty.stl": ("", "neither a binary STL file nor"),
+    "84 - 50 bytes.stl": (b"STL:" + bytes(30), "neither a binary STL file nor"),
     "short.stl": (STL[:83], "line 1"),
     "cut.stl": (STL.replace(b"solid", b"STL: ")[:-1], "byte 80: .*2 facets has 184 bytes, this one 183"),
     "longer.stl": (STL.replace(b"solid", b"STL: ") + b"\0", "2 facets has 184 bytes, this one 185"),

@@ -212,6 +212,11 @@ def test_comments_of_another_encoding(tmp_path):
     assert cloud.comments == ("caf\xe9",)
 
 
+def test_long_and_blank_lines(tmp_path):
+    text = "\n" * 3_000_000 + "0.5" + " " * 3_000_000 + "1.5 -2.25\n3 4 5e-3\n"
+    np.testing.assert_array_equal(read(tmp_path, ascii_ply(text)).points, POINTS)
+
+
 def test_padding_at_the_end(tmp_path):
     np.testing.assert_array_equal(read(tmp_path, ply(FLOATS + b"\n\0\0 ")).points, POINTS)
 

@@ -11,8 +11,8 @@ namespace nacre {
 enum class ConsolidationMethod {
   wlop,       ///< Huang et al. 2009, density weights for both sets: the paper's form
   wlop_plus,  ///< repaired for incremental use: tangential, bounded repulsion that fades where there are no neighbours
-  cgal        ///< for comparison, CGAL's wlop_simplify_and_regularize_point_set: means instead of medians, a wider
-              ///< theta (exp(-4 r^2 / h^2)), stronger repulsion (theta / r^2), no density weights of the points
+  cgal        ///< what CGAL's wlop_simplify_and_regularize_point_set computes, for comparison: means, not medians,
+              ///< theta exp(-4 r^2 / h^2), repulsion theta / r^2, no density weights of the points
 };
 
 /// The weight of a point at distance r within the support radius h.
@@ -23,7 +23,7 @@ enum class Theta {
 
 struct ConsolidateOptions {
   ConsolidationMethod method = ConsolidationMethod::wlop;
-  double radius = 0.008;  ///< support radius h [m]
+  double radius = 0.008;  ///< support radius h [m], of which the samples' spacing should be at most half
   int num_points = 2000;  ///< size of the result, at most the size of the input
   int iterations = 10;
   double mu = 0.4;  ///< weight of the repulsion, 0 to 0.5
@@ -48,7 +48,7 @@ Consolidated consolidate(const PointsRef& points, const ConsolidateOptions& opti
 /// What project_samples of method wlop_plus may know besides positions; empty means "not known".
 struct ProjectionHints {
   Values point_weights;              ///< how many observations each point stands for: one of weight 2 counts as two
-  Points sample_normals;             ///< the samples repel each other across these; where not finite, estimated
+  Points sample_normals;             ///< of the surface, any sign; estimated where not finite or zero
   std::vector<std::uint8_t> frozen;  ///< not 0: the sample stays where it is, and still repels the others
 };
 

@@ -39,7 +39,7 @@ struct ModelOptions {
   FusionOptions fusion;
   ConsolidateOptions consolidation;  ///< its num_points is not used: see max_points
   NormalOptions normals;             ///< of the model, where fold_in is not fuse
-  double spacing = 0.0;              ///< distance between model points [m]; 0: twice the first frame's median pixel
+  double spacing = 0.0;              ///< distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces
   int max_points = 500000;           ///< the model never grows beyond: its spacing is widened instead
   bool predict_motion = true;        ///< start also from the pose that continues the last motion
   double min_overlap = 0.25;         ///< a frame of which a smaller part matches the model is lost

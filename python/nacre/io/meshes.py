@@ -45,7 +45,8 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     Raises
     ------
     FileFormatError
-        When the file is broken: nothing is ever read in part. The error names path, place and reason.
+        When the file is broken, has no triangle or a vertex that is not finite. The error names path, place
+        and reason.
     OSError
         When the file cannot be read (FileNotFoundError, IsADirectoryError, ...).
     ValueError
@@ -53,7 +54,11 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     """
     from nacre.mesh import Mesh
 
-    return Mesh(*read_mesh_arrays(path))
+    vertices, triangles = read_mesh_arrays(path)
+    try:
+        return Mesh(vertices, triangles)
+    except ValueError as error:
+        raise FileFormatError(path, str(error)) from error
 
 
 def read_mesh_arrays(path: str | os.PathLike[str]) -> MeshArrays:
@@ -108,18 +113,10 @@ def write_mesh(
     if Path(path).suffix.lower() != ".ply":
         raise ValueError(f"meshes are written to .ply files, got {os.fspath(path)!r}")
     points = arrays.as_points("vertices", vertices)
-    corners = np.asarray(triangles)
-    if corners.dtype.kind not in "ui":
-        raise TypeError(f"triangles must be an array of integers, got dtype {corners.dtype}")
-    if corners.ndim != 2 or corners.shape[1] != 3:
-        raise ValueError(f"triangles must have shape (M, 3), got {corners.shape}")
-    if corners.size and (corners.min() < 0 or corners.max() >= len(points)):
-        raise ValueError(
-            f"triangles must be indices from 0 to {len(points) - 1}, got {corners.min()} to {corners.max()}"
-        )
+    corners = arrays.as_triangles("triangles", triangles, len(points))
     tables: dict[str, Columns] = {
         "vertex": {name: points[:, i] for i, name in enumerate(("x", "y", "z"))},
-        "face": {"vertex_indices": corners.astype(np.int32)},
+        "face": {"vertex_indices": corners},
     }
     write_ply(path, tables, comments=comments, binary=binary)
 
@@ -275,15 +272,15 @@ def _whole(word: bytes) -> int:
 
 def _read_stl(path: str | os.PathLike[str]) -> MeshArrays:
     data = read_file(path)
-    num_facets = int.from_bytes(data[80:84], "little") if len(data) >= _STL_HEADER_BYTES else -1
-    if len(data) == _STL_HEADER_BYTES + num_facets * _STL_FACET.itemsize:
+    num_facets = int.from_bytes(data[80:84], "little")
+    expected = _STL_HEADER_BYTES + num_facets * _STL_FACET.itemsize
+    if len(data) == expected:
         facets = np.frombuffer(data, _STL_FACET, num_facets, _STL_HEADER_BYTES)
         return _merge(facets["corners"].reshape(-1, 3))
     if data[:5].lower() == b"solid":
         return _merge(_read_stl_text(path, data))
-    if num_facets < 0:
+    if len(data) < _STL_HEADER_BYTES:
         raise FileFormatError(path, "neither a binary STL file nor a text that begins with 'solid'", offset=0)
-    expected = _STL_HEADER_BYTES + num_facets * _STL_FACET.itemsize
     reason = f"a binary STL file of {num_facets} facets has {expected} bytes, this one {len(data)}"
     raise FileFormatError(path, reason, offset=80)
 

@@ -52,11 +52,6 @@ class Element:
     line: int
     """The header's line, counted from 1, that names it."""
 
-    @property
-    def has_lists(self) -> bool:
-        """Whether rows differ in length."""
-        return any(entry.count_dtype is not None for entry in self.properties)
-
 
 @dataclass(frozen=True)
 class Header:

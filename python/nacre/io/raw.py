@@ -18,7 +18,7 @@ from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 
 _BLOCK_BYTES = 1 << 17
-_BYTES_PER_ROW_GUESS = 64
+_BYTES_PER_ROW_GUESS = 32
 _IS_SPACE = np.zeros(256, dtype=bool)
 _IS_SPACE[list(b" \t\n\r\v\f")] = True
 
@@ -39,9 +39,7 @@ def file_writer(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         with atomic_writer(path) as stream:
             yield stream
     except OSError as error:
-        if error.errno is None:
-            raise
-        raise OSError(error.errno, os.strerror(error.errno), os.fspath(path)) from error
+        raise OSError(error.errno, error.strerror, os.fspath(path)) from error
 
 
 def excerpt(text: bytes) -> str:
@@ -156,12 +154,14 @@ class TextTable:
     def blocks(self, num_rows: int, what: str) -> Iterator[TextBlock]:
         """Yield the next ``num_rows`` rows in blocks; ``what`` names them in the error if there are fewer."""
         data, missing = self.data, num_rows
+        num_bytes = missing * _BYTES_PER_ROW_GUESS
         while missing > 0:
             start = self.offset
             if start >= len(data):
                 reason = f"the header promises {num_rows} {what}, the file ends after {num_rows - missing}"
                 raise FileFormatError(self.path, reason, offset=len(data))
-            newline = data.find(b"\n", start + min(missing * _BYTES_PER_ROW_GUESS, _BLOCK_BYTES))
+            num_bytes = min(2 * num_bytes, _BLOCK_BYTES)
+            newline = data.find(b"\n", start + num_bytes)
             end = len(data) if newline < 0 else newline + 1
             codes = np.frombuffer(data, np.uint8, end - start, start)
             is_space = _IS_SPACE[codes]

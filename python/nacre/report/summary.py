@@ -1,0 +1,146 @@
+"""What a report says in words and main figures."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from nacre.evaluation import (
+    AbsoluteTrajectoryError,
+    Completeness,
+    SurfaceAccuracy,
+    absolute_trajectory_error,
+)
+from nacre.report.data import FrameEntry, ReportData
+from nacre.report.text import count, quantity
+
+ResultType = TypeVar("ResultType")
+
+
+@dataclass(frozen=True)
+class Tile:
+    """One main figure."""
+
+    label: str
+    value: str
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Summary:
+    """The main figures of a reconstruction."""
+
+    level: str  #: "ok", "weak" or "lost"
+    sentence: str
+    tiles: tuple[Tile, ...]
+    trajectory: AbsoluteTrajectoryError | None  #: given, or worked out from the poses
+
+
+def is_tracked(frame: FrameEntry) -> bool:
+    """Return whether a frame found its pose."""
+    return frame.status.upper() != "LOST"
+
+
+def total_milliseconds(frame: FrameEntry) -> float:
+    """Return the time of a frame; NaN where it was not measured."""
+    if "total" in frame.milliseconds:
+        return float(frame.milliseconds["total"])
+    return float(sum(frame.milliseconds.values())) if frame.milliseconds else math.nan
+
+
+def find(data: ReportData, kind: type[ResultType]) -> ResultType | None:
+    """Return the first evaluation result of a kind."""
+    return next((result for result in data.evaluation.values() if isinstance(result, kind)), None)
+
+
+def summarize(data: ReportData) -> Summary:
+    """Work out what to say first."""
+    statuses = Counter(frame.status.upper() for frame in data.frames)
+    num_frames, num_lost, num_weak = len(data.frames), statuses["LOST"], statuses["WEAK"]
+    level = "lost" if num_lost else "weak" if num_weak else "ok"
+    sentences, tiles = [], []
+    if num_frames:
+        told = "All" if not num_lost else f"{count(num_frames - num_lost)} of"
+        sentence = (
+            f"{told} {count(num_frames)} frames were tracked" if num_frames > 1 or num_lost else "One frame"
+        )
+        extra = [
+            f"{count(num_lost)} lost" * bool(num_lost),
+            f"{count(num_weak)} with weak geometry" * bool(num_weak),
+        ]
+        extra = [text for text in extra if text]
+        sentences.append(sentence + (f" ({', '.join(extra)})" if extra else ""))
+        tiles.append(
+            Tile("Frames tracked", f"{count(num_frames - num_lost)} / {count(num_frames)}", ", ".join(extra))
+        )
+    if data.model is not None:
+        num_points = int(np.isfinite(np.asarray(data.model.points)).all(axis=1).sum())
+        sentences.append(f"The model has {count(num_points)} points")
+        tiles.append(Tile("Model points", count(num_points), _extent(data)))
+
+    accuracy, covered = find(data, SurfaceAccuracy), find(data, Completeness)
+    if accuracy is not None:
+        rms = quantity(accuracy.rms, "m")
+        sentences.append(f"It lies {rms} (RMS) from the reference surface")
+        tiles.append(Tile("Distance to reference", rms, f"RMS; bias {quantity(accuracy.bias, 'm')}"))
+    if covered is not None:
+        middle = len(covered.tau) // 2
+        part = quantity(covered.fraction[middle], "fraction")
+        tiles.append(Tile("Surface covered", part, f"within {quantity(covered.tau[middle], 'm')}"))
+
+    trajectory = find(data, AbsoluteTrajectoryError) or _trajectory_error(data.frames)
+    if trajectory is not None and trajectory.num_compared:
+        rmse = quantity(trajectory.rmse, "m")
+        sentences.append(f"The camera positions are off by {rmse} (RMS)")
+        tiles.append(
+            Tile(
+                "Trajectory error", rmse, f"ATE RMSE; {quantity(trajectory.rotation_rmse, 'rad')} in rotation"
+            )
+        )
+
+    times = np.array([total_milliseconds(frame) for frame in data.frames])
+    times = times[np.isfinite(times)]
+    if len(times):
+        median = quantity(float(np.median(times)), "ms")
+        sentences.append(f"A frame takes {median}")
+        tiles.append(
+            Tile(
+                "Time per frame",
+                median,
+                f"median; 99 % within {quantity(float(np.percentile(times, 99)), 'ms')}",
+            )
+        )
+    return Summary(level, ". ".join(sentences) + "." * bool(sentences), tuple(tiles), trajectory)
+
+
+def _trajectory_error(frames: Sequence[FrameEntry]) -> AbsoluteTrajectoryError | None:
+    if not any(frame.truth is not None for frame in frames):
+        return None
+    missing = np.full((4, 4), np.nan)
+
+    def stack(poses: Sequence[Any]) -> Any:
+        return np.stack([missing if pose is None else np.asarray(pose, dtype=np.float64) for pose in poses])
+
+    return absolute_trajectory_error(
+        stack([frame.world_from_camera for frame in frames]),
+        stack([frame.truth for frame in frames]),
+        valid=[is_tracked(frame) for frame in frames],
+    )
+
+
+def _extent(data: ReportData) -> str:
+    points = np.asarray(data.model.points if data.model is not None else np.zeros((0, 3)), dtype=np.float64)
+    points = points[np.isfinite(points).all(axis=1)]
+    if not len(points):
+        return ""
+    low, high = np.percentile(points, (0.1, 99.9), axis=0)
+    sides = [quantity(float(side), "m") for side in high - low]
+    units = {side.split(" ")[1] for side in sides}
+    if len(units) == 1:
+        return " \N{MULTIPLICATION SIGN} ".join(side.split(" ")[0] for side in sides) + f" {units.pop()}"
+    return " \N{MULTIPLICATION SIGN} ".join(sides)

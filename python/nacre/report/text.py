@@ -1,0 +1,93 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from nacre.evaluation.result import plain
+from nacre.report.charts import length_unit
+
+_MISSING = "\N{EN DASH}"
+_WORDS = {
+    "rms": "RMS",
+    "rmse": "RMSE",
+    "std": "standard deviation",
+    "tau": "within",
+    "min": "least",
+    "max": "greatest",
+    "p95": "95th percentile",
+    "p99": "99th percentile",
+    "f": "F",
+}
+
+
+def quantity(value: Any, unit: str = "") -> str:
+    """
+    Return a value with its unit, to three digits.
+
+    ``unit`` is "m", "rad" (shown in degrees), "fraction" (shown in percent), "count", "ms" or any other text.
+    """
+    value = plain(value)
+    if value is None:
+        return _MISSING
+    if isinstance(value, (list, tuple)):
+        return ", ".join(quantity(item, unit) for item in value)
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return str(value)
+    if unit in ("m", "rad") and abs(value) < 1e-12:
+        value = 0  # nothing but rounding
+    if unit == "m":
+        name, factor = length_unit(abs(value))
+        return f"{_digits(value * factor)} {name}" if value else "0 mm"
+    if unit == "rad":
+        return f"{_digits(math.degrees(value))}\N{DEGREE SIGN}"
+    if unit == "fraction":
+        return f"{_percent(100 * value)} %"
+    if unit == "count":
+        return count(int(value))
+    return f"{_digits(value)} {unit}".rstrip() if unit != "number" else _digits(value)
+
+
+def count(value: int) -> str:
+    """Return a whole number with its digits in groups of three."""
+    return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+
+
+def label(name: str) -> str:
+    """Return a field's name as words."""
+    words = " ".join(_WORDS.get(word, word) for word in name.split("_") if word != "num")
+    return words[:1].upper() + words[1:]
+
+
+def flatten(parameters: Any, prefix: str = "") -> list[tuple[str, str]]:
+    """Return nested mappings and dataclasses as a list of dotted names and values."""
+    if dataclasses.is_dataclass(parameters) and not isinstance(parameters, type):
+        parameters = {field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)}
+    if isinstance(parameters, Mapping):
+        named = ((f"{prefix}.{name}" if prefix else str(name), value) for name, value in parameters.items())
+        return [row for name, value in named for row in flatten(value, name)]
+    if isinstance(parameters, (float, np.floating)):
+        return [(prefix, _MISSING if math.isnan(parameters) else f"{parameters:.7g}")]
+    return [(prefix, str(parameters))]
+
+
+def _digits(value: float) -> str:
+    if isinstance(value, int):
+        return str(value)
+    if value == 0:
+        return "0"
+    magnitude = math.floor(math.log10(abs(value)))
+    text = f"{value:.{min(max(2 - magnitude, 0), 12)}f}" if magnitude > -4 else f"{value:.2e}"
+    return text.replace("-", "\N{MINUS SIGN}")
+
+
+def _percent(value: float) -> str:
+    """Return a percentage that says 100 only for all and 0 only for none."""
+    if value in (0, 100):
+        return f"{value:.0f}"
+    return f"{min(max(value, 0.1), 99.9):.1f}" if 0 < value < 100 else f"{value:.1f}"

@@ -1,0 +1,153 @@
+"""The rules of the house, read from the source files themselves."""
+
+import importlib.util
+import inspect
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import nacre
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# The public headers from the bottom up: an include may only point to a lower line.
+LAYERS = [
+    ["version", "types"],
+    ["camera"],
+    ["kdtree", "mesh"],
+    ["normals", "depth"],
+    ["registration", "consolidation", "fusion", "simulation"],
+    ["model"],
+]
+RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
+HEADERS = sorted((ROOT / "cpp" / "include" / "nacre").glob("*.hpp"))
+SOURCES = sorted((ROOT / "cpp" / "src").rglob("*.[ch]pp"))
+FOLDERS = ("cpp", "python", "tests", "examples", "benchmarks", "docs", "third_party", ".ci", ".github")
+CODE = {".py", ".pyi", ".cpp", ".hpp", ".cmake", ".txt", ".toml", ".yml", ".yaml", ".json", ".in", ".sh", ""}
+TEXT = CODE | {".md"}
+
+
+def files(*folders: str, suffixes: set[str] = TEXT) -> list[Path]:
+    """List the text files below some folders, or of the whole repository; not this very file."""
+    found = [path for folder in folders or FOLDERS for path in (ROOT / folder).rglob("*")]
+    found += [] if folders else [path for path in ROOT.iterdir() if path.name != ".git"]
+    return sorted(
+        path
+        for path in found
+        if path.is_file()
+        and path.suffix in suffixes
+        and "__pycache__" not in path.parts
+        and path != Path(__file__).resolve()
+    )
+
+
+def lines_matching(pattern: str, paths: list[Path]) -> list[str]:
+    """List the lines that match, as file:line: text."""
+    return [
+        f"{path.relative_to(ROOT)}:{number}: {line.strip()}"
+        for path in paths
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        if re.search(pattern, line)
+    ]
+
+
+def includes(path: Path) -> list[str]:
+    """List the names that a C++ file includes."""
+    return re.findall(r'^\s*#\s*include\s+[<"]([^>"]+)[>"]', path.read_text(encoding="utf-8"), re.MULTILINE)
+
+
+def reachable(path: Path, seen: set[Path]) -> set[Path]:
+    """Collect the files of the library that a file includes, directly or not."""
+    for name in includes(path):
+        candidates = (ROOT / "cpp" / "include" / name, ROOT / "cpp" / "src" / name, path.parent / name)
+        for file in (candidate.resolve() for candidate in candidates if candidate.is_file()):
+            if file not in seen:
+                seen.add(file)
+                reachable(file, seen)
+    return seen
+
+
+def test_every_public_header_has_its_layer() -> None:
+    assert sorted(path.stem for path in HEADERS) == sorted(RANK)
+
+
+@pytest.mark.parametrize("name", RANK)
+def test_includes_point_down(name: str) -> None:
+    for path in (ROOT / "cpp" / "include" / "nacre" / f"{name}.hpp", ROOT / "cpp" / "src" / f"{name}.cpp"):
+        if not path.exists():
+            continue
+        public = {file.stem for file in reachable(path, set()) if file.parent.name == "nacre"} - {name}
+        assert {other for other in public if RANK[other] >= RANK[name]} == set()
+
+
+@pytest.mark.parametrize("path", HEADERS, ids=lambda path: path.stem)
+def test_public_headers_include_eigen_and_the_standard_library_only(path: Path) -> None:
+    for name in includes(path):
+        assert name.startswith(("nacre/", "Eigen/")) or re.fullmatch(r"[a-z_]+", name), name
+        assert name != "iostream"
+        if name.startswith("nacre/"):
+            assert (ROOT / "cpp" / "include" / name).exists(), f"{name} is private"
+
+
+def test_only_one_file_knows_openmp() -> None:
+    knowing = [
+        p for p in [*HEADERS, *SOURCES] if re.search(r"#\s*pragma\s+omp|omp\.h|omp_\w+\(", p.read_text())
+    ]
+    assert [path.name for path in knowing] == ["parallel.hpp"]
+
+
+def test_only_the_bindings_know_pybind11() -> None:
+    paths = files("cpp", "tests", "examples", suffixes={".cpp", ".hpp"})
+    assert lines_matching(r"pybind11", paths) == []
+
+
+def test_the_bindings_include_public_headers_only() -> None:
+    private = {path.name for path in SOURCES}
+    for path in files("python", suffixes={".cpp", ".hpp"}):
+        assert private.isdisjoint(Path(name).name for name in includes(path)), path.name
+
+
+def test_only_the_facade_touches_the_extension_module() -> None:
+    outside = files("examples", "benchmarks", "docs", suffixes={".py", ".md"})
+    for folder in ("cli", "report", "viewer"):
+        outside += files(f"python/nacre/{folder}", suffixes={".py"})
+    assert lines_matching(r"\b_core\b", outside) == []
+
+
+def test_no_build_depends_on_the_machine() -> None:
+    assert lines_matching(r"-march=native|-ffast-math|-Ofast", files(suffixes=CODE)) == []
+    assert lines_matching(r"""(^|[\s"'(=`])/(home|root|work|tmp|Users)/""", files()) == []
+
+
+def test_public_names_are_complete_and_documented() -> None:
+    assert len(nacre.__all__) == len(set(nacre.__all__))
+    for name in nacre.__all__:
+        value = getattr(nacre, name)
+        if inspect.isclass(value) or inspect.isroutine(value):
+            assert inspect.getdoc(value), name
+
+
+def test_the_stub_fits_the_extension_module() -> None:
+    if importlib.util.find_spec("mypy") is None:
+        pytest.skip("mypy is missing: pip install --group dev")
+    if not (ROOT / "python" / "nacre" / "_core.pyi").exists():
+        pytest.skip("there is no stub yet")
+    command = [
+        sys.executable,
+        "-m",
+        "mypy.stubtest",
+        "nacre._core",
+        "--mypy-config-file",
+        str(ROOT / "pyproject.toml"),
+    ]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_continuous_integration_runs_the_readmes_command() -> None:
+    script = (ROOT / ".ci" / "run").read_text()
+    (pattern,) = re.findall(r"grep --max-count=1 '(.+)' README\.md", script)
+    assert len(re.findall(pattern, (ROOT / "README.md").read_text(), re.MULTILINE)) == 1

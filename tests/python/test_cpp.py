@@ -1,0 +1,51 @@
+"""The C++ tests and the C++ example, built and run."""
+
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nacre
+
+TESTS = sorted((Path(__file__).parents[1] / "cpp").glob("test_*.cpp"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [path.stem for path in TESTS])
+def test_cpp(name: str, static_build: Path, run: Callable[..., str]) -> None:
+    assert "SUCCESS!" in run(static_build / "tests" / "cpp" / name)
+
+
+@pytest.mark.slow
+def test_reconstruct_example(static_build: Path, run: Callable[..., str], tmp_path: Path) -> None:
+    camera = nacre.Camera(width=160, height=120, fx=150, fy=150, cx=79.5, cy=59.5)
+    thing = nacre.built_in_object()
+    poses = nacre.turntable_poses(thing, 4, np.radians(10), camera=camera)
+    for index, pose in enumerate(poses):
+        depth = nacre.simulate_depth(thing.vertices, thing.triangles, camera, pose, noise=0.0003, seed=index)
+        stored = np.nan_to_num(10000 * depth, nan=0).round().astype("<u2")
+        stored.tofile(tmp_path / f"{index:03d}.raw")
+    model = tmp_path / "model.ply"
+    intrinsics = (str(value) for value in (160, 120, 150, 150, 79.5, 59.5, 10000))
+    output = run(static_build / "examples" / "cpp" / "reconstruct", tmp_path, model, *intrinsics)
+
+    assert output.count("TRACKED") == 4
+    points = np.loadtxt(model.read_text().split("end_header\n")[1].splitlines())
+    assert len(points) == int(output.split(" points in ")[0].splitlines()[-1]) > 1000
+    assert np.allclose(np.linalg.norm(points[:, 3:], axis=1), 1, atol=1e-4)
+    in_world = points[:, :3] @ poses[0][:3, :3].T + poses[0][:3, 3]
+    assert np.sqrt(np.mean(thing.distance(in_world) ** 2)) < 0.001
+
+
+@pytest.mark.slow
+def test_reconstruct_example_names_what_is_wrong(static_build: Path, tmp_path: Path) -> None:
+    (tmp_path / "000.raw").write_bytes(b"short")
+    program = static_build / "examples" / "cpp" / "reconstruct"
+    words = [program, tmp_path, tmp_path / "model.ply", "160", "120", "150", "150", "79.5", "59.5", "1000"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "000.raw must have 38400 bytes, has 5" in done.stderr
+    assert not (tmp_path / "model.ply").exists()
+    assert subprocess.run(words[:3], capture_output=True, check=False).returncode == 2

@@ -1,0 +1,585 @@
+"""The report: pictures that show what is there, numbers as people read them, a page that stands alone."""
+
+from __future__ import annotations
+
+import math
+import re
+import struct
+import zlib
+from collections.abc import Iterator
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from nacre.evaluation import Completeness, SurfaceAccuracy, absolute_trajectory_error
+from nacre.report import (
+    DepthExample,
+    FrameEntry,
+    ModelCloud,
+    ReportData,
+    View,
+    encode_png,
+    pictures,
+    render_page,
+    render_points,
+    write_report,
+)
+from nacre.report.charts import MAX_VALUES, Mark, Series, grouped, line_chart, map_chart, stacked_chart, ticks
+from nacre.report.colormap import viridis
+from nacre.report.pictures import draw_depth, draw_model
+from nacre.report.text import flatten, label, quantity
+
+SPACE = "\N{NARROW NO-BREAK SPACE}"
+
+
+def sphere(count: int = 6000, radius: float = 0.1) -> np.ndarray:
+    """A Fibonacci lattice: evenly spread, the same everywhere."""
+    i = np.arange(count) + 0.5
+    z = 1 - 2 * i / count
+    angle = np.pi * (1 + 5**0.5) * i
+    rim = np.sqrt(1 - z**2)
+    return radius * np.column_stack([rim * np.cos(angle), rim * np.sin(angle), z])
+
+
+def square(center: Any, half: float, spacing: float = 0.02) -> np.ndarray:
+    """A square across the z axis."""
+    side = np.arange(-half, half + spacing / 2, spacing)
+    grid = np.stack(np.meshgrid(side, side, [0.0]), -1).reshape(-1, 3)
+    return np.asarray(grid + np.asarray(center))
+
+
+def decode_png(data: bytes) -> np.ndarray:
+    """A decoder of its own for what encode_png writes."""
+    assert data[:8] == b"\x89PNG\r\n\x1a\n"
+    position, body = 8, b""
+    while position < len(data):
+        length, kind = struct.unpack(">I4s", data[position : position + 8])
+        chunk = data[position + 8 : position + 8 + length]
+        (checksum,) = struct.unpack(">I", data[position + 8 + length : position + 12 + length])
+        assert checksum == zlib.crc32(kind + chunk)
+        if kind == b"IHDR":
+            width, height, depth, color, *rest = struct.unpack(">IIBBBBB", chunk)
+            assert (depth, rest) == (8, [0, 0, 0])
+        body += chunk if kind == b"IDAT" else b""
+        position += 12 + length
+    channels = {0: 1, 2: 3, 6: 4}[color]
+    lines = np.frombuffer(zlib.decompress(body), np.uint8).reshape(height, 1 + width * channels)
+    image = np.zeros((height, width, channels), np.uint8)
+    for row, line in enumerate(lines):
+        values = line[1:].reshape(width, channels)
+        if line[0] == 1:
+            values = np.cumsum(values, axis=0, dtype=np.uint8)
+        elif line[0] == 2 and row:
+            values = values + image[row - 1]
+        image[row] = values
+    return image[:, :, 0] if channels == 1 else image
+
+
+class TestPng:
+    @settings(max_examples=40, deadline=None)
+    @given(st.integers(1, 9), st.integers(1, 9), st.sampled_from([(), (3,), (4,)]), st.integers(0, 99))
+    def test_round_trip(self, height: int, width: int, channels: tuple[int, ...], seed: int) -> None:
+        image = np.random.default_rng(seed).integers(0, 256, (height, width, *channels), dtype=np.uint8)
+        np.testing.assert_array_equal(decode_png(encode_png(image)), image)
+
+    def test_smooth_pictures_become_small(self) -> None:
+        ramp = np.tile(np.arange(256, dtype=np.uint8), (256, 1))
+        assert len(encode_png(ramp)) < 1500
+        np.testing.assert_array_equal(decode_png(encode_png(ramp)), ramp)
+        np.testing.assert_array_equal(decode_png(encode_png(ramp.T)), ramp.T)
+
+    def test_another_reader_agrees(self, tmp_path: Path) -> None:
+        pillow = pytest.importorskip("PIL.Image")
+        image = np.random.default_rng(1).integers(0, 256, (7, 5, 4), dtype=np.uint8)
+        (tmp_path / "a.png").write_bytes(encode_png(image))
+        np.testing.assert_array_equal(np.asarray(pillow.open(tmp_path / "a.png")), image)
+
+    def test_illegal_input_is_named(self) -> None:
+        with pytest.raises(TypeError, match="image must be uint8"):
+            encode_png(np.zeros((2, 2)))  # type: ignore[arg-type]
+        for shape in ((2,), (2, 2, 2), (0, 3, 3)):
+            with pytest.raises(ValueError, match="image must have shape"):
+                encode_png(np.zeros(shape, np.uint8))
+
+
+class TestRenderPoints:
+    def test_a_sphere_is_a_closed_disk_that_is_lit_from_the_viewer(self) -> None:
+        points = sphere()
+        image = render_points(points, points, size=(200, 160), background=None)
+        assert image.shape == (160, 200, 4)
+        row, column = np.mgrid[:160, :200]
+        distance = np.hypot(row - 79.5, column - 99.5) / (0.46 * 160)
+        assert (image[distance < 0.95, 3] == 255).all()
+        assert (image[distance > 1.1, 3] == 0).all()
+        brightness = image[:, :, 0].astype(float)
+        assert (
+            brightness[distance < 0.3].mean() > 1.5 * brightness[(distance > 0.85) & (distance < 0.95)].mean()
+        )
+
+    def test_what_is_in_front_hides_what_is_behind(self) -> None:
+        front, back = square((0, 0, 0.0), 0.2), square((0, 0, 0.5), 0.4)
+        points = np.concatenate([front, back])
+        normals = np.tile([0, 0, -1.0], (len(points), 1))
+        colors = np.zeros((len(points), 3), np.uint8)
+        colors[: len(front), 0], colors[len(front) :, 1] = 255, 255
+        for order in (slice(None), slice(None, None, -1)):
+            image = render_points(points[order], normals[order], colors[order], size=(100, 100))
+            assert image[50, 50, 0] > 100 > image[50, 50, 1]
+            assert image[15, 50, 1] > 100 > image[15, 50, 0]
+        image = render_points(points, -normals, colors, view_from="back", size=(100, 100))
+        assert image[50, 50, 1] > 100 > image[50, 50, 0]
+
+    @pytest.mark.parametrize(
+        ("side", "right", "down"),
+        [
+            ("front", (1, 0, 0), (0, 1, 0)),
+            ("right", (0, 0, 1), (0, 1, 0)),
+            ("back", (-1, 0, 0), (0, 1, 0)),
+            ("left", (0, 0, -1), (0, 1, 0)),
+            ("top", (1, 0, 0), (0, 0, -1)),
+            ("bottom", (1, 0, 0), (0, 0, 1)),
+            ((0, 0, -3.0), (1, 0, 0), (0, 1, 0)),
+        ],
+    )
+    def test_sides_show_what_a_person_walking_around_sees(self, side: Any, right: Any, down: Any) -> None:
+        markers = np.array([right, down, np.negative(right), np.negative(down)], dtype=float)
+        points = np.concatenate([marker + sphere(200, 0.1) for marker in markers])
+        colors = np.repeat(np.eye(4, 3, dtype=np.uint8) * 255, 200, axis=0)
+        normals = np.tile(sphere(200), (4, 1))
+        image = render_points(points, normals, colors, view_from=side, size=(120, 120)).astype(int)
+        assert image[60, 114, 0] > 90 > image[60, 114, 1]
+        assert image[114, 60, 1] > 90 > image[114, 60, 0]
+        assert image[60, 5, 2] > 90 > image[60, 5, 1]
+
+    def test_reverse_sides_are_brown_or_left_out(self) -> None:
+        points = square((0, 0, 0), 0.2)
+        normals = np.tile([0, 0, 1.0], (len(points), 1))
+        reverse = render_points(points, normals, size=(60, 60))[30, 30].astype(int)
+        front = render_points(points, -normals, size=(60, 60))[30, 30].astype(int)
+        assert reverse[0] - reverse[2] > 40 > front[0] - front[2]
+        assert (render_points(points, normals, size=(60, 60), hide_reverse=True) == 255).all()
+
+    def test_sparse_models_have_no_holes(self) -> None:
+        points = sphere(400)
+        image = render_points(points, points, size=(300, 300), background=None)
+        row, column = np.mgrid[:300, :300]
+        assert (image[np.hypot(row - 149.5, column - 149.5) < 0.9 * 0.46 * 300, 3] == 255).all()
+
+    def test_without_normals_planes_are_fitted(self) -> None:
+        points = sphere()
+        given = render_points(points, points, size=(100, 100)).astype(int)
+        fitted = render_points(points, size=(100, 100)).astype(int)
+        assert np.abs(given - fitted).mean() < 3
+
+    def test_points_that_are_not_finite_are_left_out(self) -> None:
+        points, normals = sphere(), sphere()
+        expected = render_points(points, normals, size=(80, 80))
+        bad = np.concatenate([points, [[np.nan, 0, 0], [0, np.inf, 0]]])
+        image = render_points(bad, np.concatenate([normals, np.ones((2, 3))]), size=(80, 80))
+        np.testing.assert_array_equal(image, expected)
+
+    def test_normals_that_are_not_finite_face_the_viewer(self) -> None:
+        points = square((0, 0, 0), 0.2)
+        image = render_points(points, np.full(points.shape, np.nan), size=(60, 60))
+        np.testing.assert_array_equal(
+            image, render_points(points, np.tile([0, 0, -1.0], (len(points), 1)), size=(60, 60))
+        )
+
+    @pytest.mark.parametrize(
+        "points", [np.zeros((0, 3)), np.full((3, 3), np.nan), np.zeros((1, 3)), np.ones((4, 3))]
+    )
+    def test_hardly_anything_to_draw(self, points: np.ndarray) -> None:
+        image = render_points(
+            points, np.tile([0, 0, -1.0], (len(points), 1)), size=(20, 30), background=(1, 2, 3)
+        )
+        assert image.shape == (30, 20, 3)
+        assert (image[0, 0] == (1, 2, 3)).all()
+
+    def test_far_away_models_and_other_dtypes_look_the_same(self) -> None:
+        points = sphere(2000)
+        expected = render_points(points, points, size=(80, 80)).astype(int)
+        far = render_points(points + 1e6, points, size=(80, 80)).astype(int)
+        assert np.abs(far - expected).mean() < 2
+        single = render_points(
+            np.asfortranarray(points, np.float32), points.astype(np.float32), size=(80, 80)
+        )
+        assert np.abs(single - expected).mean() < 1
+
+    def test_a_camera_sees_near_things_larger(self) -> None:
+        near, far = square((-0.3, 0, 1.0), 0.1, 0.01), square((0.6, 0, 2.0), 0.1, 0.01)
+        points = np.concatenate([near, far, square((0, 0, -1.0), 0.1)])
+        colors = np.zeros((len(points), 3), np.uint8)
+        colors[: len(near), 0], colors[len(near) : len(near) + len(far), 2] = 255, 255
+        view = View.from_camera(points, np.eye(4), size=(200, 150))
+        image = render_points(points, np.tile([0, 0, -1.0], (len(points), 1)), colors, view=view).astype(int)
+        red, blue = (image[:, :, 0] - image[:, :, 2]) > 80, (image[:, :, 2] - image[:, :, 0]) > 80
+        assert red.sum() == pytest.approx(4 * blue.sum(), rel=0.35)
+        assert red[:, :100].sum() == red.sum()
+        assert blue[:, 100:].sum() == blue.sum()
+
+    @pytest.mark.parametrize(
+        ("options", "message"),
+        [
+            ({"view_from": "above"}, "view_from must be one of front"),
+            ({"view_from": (0, 0, 0)}, "view_from must be a side"),
+            ({"size": (0, 10)}, "size must be"),
+            ({"normals": np.zeros((2, 3))}, "normals must have one row"),
+            ({"colors": np.zeros((6000, 3))}, "colors must be uint8"),
+            ({"spacing": 0.0}, "spacing must be positive"),
+        ],
+    )
+    def test_illegal_input_is_named(self, options: Any, message: str) -> None:
+        points = sphere()
+        with pytest.raises(ValueError, match=message):
+            render_points(points, **{"normals": points, **options})
+
+
+class TestCharts:
+    @given(st.floats(-1e6, 1e6), st.floats(1e-6, 1e6), st.integers(2, 8))
+    def test_ticks_are_few_even_and_inside(self, low: float, span: float, count: int) -> None:
+        places = ticks(low, low + span, count)
+        assert len(places) <= count + 1
+        tolerance = 1e-6 * span + 1e-9 * abs(low)
+        assert all(low - tolerance <= place <= low + span + tolerance for place in places)
+        if len(places) > 2:
+            np.testing.assert_allclose(np.diff(places), places[1] - places[0], rtol=1e-3)
+
+    @settings(max_examples=30, deadline=None)
+    @given(st.integers(0, 3 * MAX_VALUES), st.integers(0, 9))
+    def test_groups_keep_the_extremes(self, count: int, seed: int) -> None:
+        values = np.random.default_rng(seed).normal(size=count)
+        low, mean, high = grouped(values)
+        assert len(low) == len(mean) == len(high) <= MAX_VALUES
+        if count:
+            assert low.min() == values.min()
+            assert high.max() == values.max()
+            assert (low <= mean + 1e-12).all()
+            assert (mean <= high + 1e-12).all()
+
+    def test_missing_values_leave_a_gap(self) -> None:
+        svg = line_chart([Series("", np.array([1.0, 2.0, np.nan, 3.0]))], y_label="m")
+        (path,) = re.findall(r'class="line s0" d="([^"]*)"', svg)
+        assert path.count("M") == 2
+        assert path.count("L") == 1
+        assert "nan" not in svg
+
+    def test_bars_reach_the_sum(self) -> None:
+        svg = stacked_chart([Series("a", np.array([1.0])), Series("b", np.array([3.0]), 1)], y_label="ms")
+        bars = re.findall(r"M[\d.]+ ([\d.]+)V([\d.]+)h", svg)
+        (bottom_a, top_a), (bottom_b, top_b) = ((float(a), float(b)) for a, b in bars)
+        assert top_a == bottom_b
+        assert bottom_b - top_b == pytest.approx(3 * (bottom_a - top_a), abs=0.3)
+
+    def test_maps_have_equal_scales(self) -> None:
+        track = np.array([[0, 0], [1, 0], [1, 1.0]])
+        for y_up in (True, False):
+            svg = map_chart([("t", track, 0)], x_label="x", y_label="y", y_up=y_up, unit="m", factor=1)
+            (path,) = re.findall(r'class="line s0" d="([^"]*)"', svg)
+            xy = np.array(re.findall(r"([\d.]+) ([\d.]+)", path), dtype=float)
+            along, across = xy[1] - xy[0], xy[2] - xy[1]
+            assert along[1] == across[0] == 0
+            assert along[0] == pytest.approx(-across[1] if y_up else across[1], abs=0.2)
+
+    def test_names_and_marks(self) -> None:
+        svg = line_chart(
+            [Series("<b>", np.ones(5))], y_label="a<b", marks=[Mark(1, 2, "lost")], indices=[3, 4, 5, 6, 7]
+        )
+        assert 'class="lost"' in svg
+        assert "<b>" not in svg
+        assert "frame 7" in svg
+
+    @pytest.mark.parametrize(
+        "values", [np.zeros(0), np.zeros(3), np.full(3, np.nan), np.array([1e-300]), np.ones(1)]
+    )
+    def test_hardly_anything_to_draw(self, values: np.ndarray) -> None:
+        for svg in (
+            line_chart([Series("", values)], y_label="m"),
+            stacked_chart([Series("", values)], y_label="m"),
+            map_chart(
+                [("t", np.stack([values, values], 1), 0)],
+                x_label="x",
+                y_label="y",
+                y_up=True,
+                unit="m",
+                factor=1,
+            ),
+        ):
+            assert svg.startswith("<svg")
+            assert "nan" not in svg.lower()
+            assert "inf" not in svg.lower()
+
+    def test_colors_are_ordered_by_brightness(self) -> None:
+        colors = viridis(np.linspace(-1, 2, 40)).astype(float)
+        brightness = colors @ [0.2126, 0.7152, 0.0722]
+        assert (np.diff(brightness) >= -0.5).all()
+        assert colors[0].tolist() == [68, 1, 84]
+        assert colors[-1].tolist() == [253, 231, 37]
+
+
+class TestText:
+    @pytest.mark.parametrize(
+        ("value", "unit", "expected"),
+        [
+            (0.00010312, "m", "0.103 mm"),
+            (0.0123, "m", "12.3 mm"),
+            (-0.0123, "m", "\N{MINUS SIGN}12.3 mm"),
+            (1.5, "m", "1500 mm"),
+            (4.25, "m", "4.25 m"),
+            (0.0, "m", "0 mm"),
+            (2e-6, "m", "2.00 µm"),
+            (math.radians(0.07), "rad", "0.0700\N{DEGREE SIGN}"),
+            (0.99999, "fraction", "99.9 %"),
+            (1.0, "fraction", "100 %"),
+            (1e-9, "fraction", "0.1 %"),
+            (20412, "count", f"20{SPACE}412"),
+            (41.27, "ms", "41.3 ms"),
+            (None, "m", "\N{EN DASH}"),
+            (math.nan, "m", "\N{EN DASH}"),
+            (np.float32(0.5), "", "0.500"),
+            ("seconds", "", "seconds"),
+            ((0.001, 0.002), "m", "1.00 mm, 2.00 mm"),
+        ],
+    )
+    def test_quantities(self, value: Any, unit: str, expected: str) -> None:
+        assert quantity(value, unit) == expected
+
+    def test_names(self) -> None:
+        assert label("num_points") == "Points"
+        assert label("rotation_rmse") == "Rotation RMSE"
+
+    def test_parameters_of_any_depth(self) -> None:
+        rows = flatten(
+            {
+                "preset": "default",
+                "depth": {"max": 0.1, "noise": None},
+                "k": 16,
+                "frame": FrameEntry(3, "LOST"),
+            }
+        )
+        assert rows[:4] == [("preset", "default"), ("depth.max", "0.1"), ("depth.noise", "None"), ("k", "16")]
+        assert ("frame.index", "3") in rows
+
+
+class PageCheck(HTMLParser):
+    """Collects what a browser would open, and that every tag is closed."""
+
+    EMPTY = ("meta", "img", "br", "i")
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.tags: list[str] = []
+        self.links: list[str] = []
+        self.text = ""
+        self.feed(page)
+        self.close()
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.links += [value or "" for name, value in attributes if name in ("src", "href", "xlink:href")]
+        if tag not in ("meta", "img", "br"):
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        self.text += data
+
+
+def entries(count: int, lost: tuple[int, ...] = ()) -> list[FrameEntry]:
+    world = np.eye(4)
+    world[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    world[:3, 3] = [5, 6, 7]
+    frames = []
+    for i in range(count):
+        truth, estimated = np.eye(4), np.eye(4)
+        truth[:3, 3] = [math.sin(0.1 * i), 0.1 * math.cos(0.37 * i), 1 - math.cos(0.1 * i)]
+        estimated[:3, 3] = truth[:3, 3] + [0, 0.003 * (-1) ** i, 0]
+        frames.append(
+            FrameEntry(
+                index=i,
+                status="LOST" if i in lost else "TRACKED",
+                reason="<overlap>" if i in lost else "",
+                milliseconds={"preprocess": 2.0, "registration": 8.0 + i % 3, "total": 12.0 + i % 3},
+                num_inliers=1000 + i,
+                overlap=0.8,
+                rmse=0.0004,
+                world_from_camera=None if i in lost else estimated,
+                truth=world @ truth,
+                num_points=100 * i,
+                removed={"edge": 500, "slanted": 20},
+            )
+        )
+    return frames
+
+
+def example_data(**changes: Any) -> ReportData:
+    points = sphere(3000)
+    depth = np.full((12, 16), 0.8)
+    depth[2:5, 3:9] = 0.5
+    after = depth.copy()
+    after[5, :] = np.nan
+    fields: dict[str, Any] = {
+        "title": "Ball <script>alert(1)</script> & more",
+        "source": 'a "made-up" recording',
+        "frames": entries(12, lost=(7,)),
+        "model": ModelCloud(points, points, np.full((3000, 3), 120, np.uint8), np.arange(3000.0)),
+        "depth": DepthExample(depth, after, np.isnan(after).astype(int), ("edge",), 3),
+        "evaluation": {
+            "Surface": SurfaceAccuracy(1.2e-4, 1e-4, 1e-4, 3e-4, 5e-4, -1e-5, 3000, np.zeros(3000)),
+            "Cover": Completeness((0.001, 0.002, 0.005), (0.5, 0.75, 1.0), 1e-3, 2e-3, 3e-3, 1000),
+        },
+        "figures": {"peak memory": "211 <MB>"},
+        "parameters": {"preset": "default", "depth": {"max_depth": math.inf}},
+    }
+    return ReportData(**{**fields, **changes})
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small_pictures() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("_SIZE", "_MAIN_SIZE", "_CAMERA_SIZE"):
+            patch.setattr(pictures, name, (150, 150))
+        yield
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return render_page(example_data())
+
+
+class TestPage:
+    def test_it_stands_alone(self, page: str) -> None:
+        check = PageCheck(page)
+        assert all(link.startswith("data:image/png;base64,") for link in check.links)
+        assert not {"script", "link", "iframe", "object"} & set(check.tags)
+        assert not re.search(r"https?://|url\(|@import", page)
+
+    def test_text_is_escaped(self, page: str) -> None:
+        check = PageCheck(page)
+        for told in (
+            "Ball <script>alert(1)</script> & more",
+            'a "made-up" recording',
+            "211 <MB>",
+            "<overlap>",
+        ):
+            assert told in check.text
+
+    def test_it_says_the_main_figures_first(self, page: str) -> None:
+        text = PageCheck(page).text
+        verdict = text[: text.index("Frames tracked")]
+        assert "11 of 12 frames were tracked (1 lost)" in verdict
+        assert f"3{SPACE}000 points" in verdict
+        assert "0.120 mm (RMS) from the reference" in verdict
+        assert "off by 3.0" in verdict or "off by 2.9" in verdict
+        assert "A frame takes 13.0 ms" in verdict
+        assert "75.0 %" in text
+        assert "max_depth" in text
+
+    def test_errors_come_from_the_poses_unless_they_are_given(self) -> None:
+        frames = entries(10)
+        poses, truth = (
+            np.stack([getattr(f, name) for f in frames]) for name in ("world_from_camera", "truth")
+        )
+        given = absolute_trajectory_error(poses, truth, align="first")
+        told = quantity(given.rmse, "m")
+        assert told not in PageCheck(render_page(ReportData("x", frames=frames))).text
+        assert told in PageCheck(render_page(ReportData("x", frames=frames, evaluation={"ATE": given}))).text
+
+    def test_lost_frames_are_marked(self, page: str) -> None:
+        assert '<rect class="lost"' in page
+        assert 'class="verdict lost"' in page
+        assert 'class="status-LOST"' in page
+        tracked = render_page(ReportData("x", frames=entries(12)))
+        assert '<rect class="lost"' not in tracked
+        assert 'class="verdict ok"' in tracked
+
+    def test_the_same_data_gives_the_same_bytes(self, page: str, tmp_path: Path) -> None:
+        write_report(tmp_path / "report.html", example_data())
+        assert (tmp_path / "report.html").read_bytes() == page.encode()
+        assert [path.name for path in tmp_path.iterdir()] == ["report.html"]
+
+    def test_long_recordings_stay_small(self) -> None:
+        short = render_page(ReportData("x", frames=entries(12)))
+        long = render_page(ReportData("x", frames=entries(2000, lost=tuple(range(0, 2000, 7)))))
+        PageCheck(long)
+        assert len(long) < 600_000
+        assert len(short) < 100_000
+        assert "means over 5 frames" in long
+
+    @pytest.mark.parametrize(
+        "data",
+        [
+            ReportData(""),
+            ReportData("x", frames=[FrameEntry(0, "TRACKED")]),
+            ReportData("x", frames=[FrameEntry(i, "LOST") for i in range(5)]),
+            ReportData(
+                "x",
+                frames=[FrameEntry(0, "TRACKED", truth=np.eye(4)), FrameEntry(1, "lost", truth=np.eye(4))],
+            ),
+            ReportData("x", model=ModelCloud(np.zeros((0, 3)))),
+            ReportData("x", model=ModelCloud(np.full((4, 3), np.nan), np.zeros((4, 3)))),
+            ReportData("x", depth=DepthExample(np.zeros((4, 5)), np.full((4, 5), np.nan))),
+            ReportData("x", parameters={"a": {}}, figures={"b": math.nan}),
+        ],
+    )
+    def test_whatever_is_missing_is_left_out(self, data: ReportData) -> None:
+        text = PageCheck(render_page(data)).text
+        assert "nan" not in text.lower().replace("nacre", "")
+
+    def test_a_folder_that_is_not_there(self, tmp_path: Path) -> None:
+        with pytest.raises(FileNotFoundError):
+            write_report(tmp_path / "missing" / "report.html", ReportData("x"))
+
+
+class TestPictures:
+    def test_removed_pixels_are_counted_by_reason(self) -> None:
+        before = np.full((6, 8), 1.0)
+        before[0, 0] = np.nan
+        after, reasons = before.copy(), np.zeros((6, 8), int)
+        after[1, :], reasons[1, :] = np.nan, 1
+        after[2, :3], reasons[2, :3] = np.nan, 2
+        drawn = draw_depth(DepthExample(before, after, reasons, ("edge", "isolated")))
+        assert [(name, count) for name, _, count in drawn.removed] == [("edge", 8), ("isolated", 3)]
+        assert drawn.num_measured == 47
+        without = draw_depth(DepthExample(before, after))
+        assert [(name, count) for name, _, count in without.removed] == [("removed", 11)]
+
+    def test_illegal_depth_is_named(self) -> None:
+        with pytest.raises(ValueError, match=r"depth\.before and depth\.after"):
+            draw_depth(DepthExample(np.ones((2, 2)), np.ones((2, 3))))
+        with pytest.raises(ValueError, match=r"depth\.reasons"):
+            draw_depth(DepthExample(np.ones((2, 2)), np.full((2, 2), np.nan), np.full((2, 2), 2), ("edge",)))
+
+    def test_a_room_is_also_shown_from_its_cameras(self) -> None:
+        ball = ModelCloud(sphere(3000), sphere(3000))
+        room = ModelCloud(sphere(3000), -sphere(3000))
+        frames = [FrameEntry(i, "TRACKED", world_from_camera=np.eye(4)) for i in range(4)]
+        outside, inside = draw_model(ball, frames), draw_model(room, frames)
+        assert outside is not None
+        assert inside is not None
+        assert not outside.cameras
+        assert [picture.caption for picture in inside.cameras] == [f"As frame {i} saw it" for i in (0, 2, 3)]
+        assert all(picture.note == "" for picture in outside.sides)
+        assert all(picture.note == "reverse sides left out" for picture in inside.sides)
+
+    def test_the_scale_bar_is_true(self) -> None:
+        drawn = draw_model(ModelCloud(sphere(3000), sphere(3000)))
+        assert drawn is not None
+        text, part = drawn.scale_bar
+        assert text == "50 mm"
+        assert part == pytest.approx(0.05 / (0.2 / 0.92), rel=0.02)
+
+    def test_attributes_of_another_length_are_named(self) -> None:
+        with pytest.raises(ValueError, match=r"model\.confidence must have one row per point \(5\), got 4"):
+            draw_model(ModelCloud(np.ones((5, 3)), confidence=np.ones(4)))
