@@ -76,15 +76,16 @@ WindowFits fit_windows(const PlanarImage& image, int num_threads) {
   const auto size = static_cast<std::size_t>(fits.cols) * static_cast<std::size_t>(fits.rows);
   fits.residual.resize(size);
   fits.slope.resize(size);
-  parallel_for(fits.rows, 4, num_threads, [&](std::int64_t row) {
-    for (int col = 0; col < fits.cols; ++col) {
-      const Fit fit = fit_window(image, WindowFits::centre(col), WindowFits::centre(static_cast<int>(row)));
-      const auto i = static_cast<std::size_t>(row * fits.cols + col);
-      // std::max(NaN, 0) is NaN: a window with a missing pixel has no residual.
-      fits.residual[i] = static_cast<float>(std::sqrt(fit.variance));
-      fits.slope[i] = static_cast<float>(fit.slope);
-    }
-  });
+  parallel_for(
+      fits.rows, rows_per_block(fits.cols * WindowFits::kStep * WindowFits::kStep), num_threads, [&](std::int64_t row) {
+        for (int col = 0; col < fits.cols; ++col) {
+          const Fit fit = fit_window(image, WindowFits::centre(col), WindowFits::centre(static_cast<int>(row)));
+          const auto i = static_cast<std::size_t>(row * fits.cols + col);
+          // std::max(NaN, 0) is NaN: a window with a missing pixel has no residual.
+          fits.residual[i] = static_cast<float>(std::sqrt(fit.variance));
+          fits.slope[i] = static_cast<float>(fit.slope);
+        }
+      });
   return fits;
 }
 
