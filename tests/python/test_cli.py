@@ -76,7 +76,10 @@ def recording(made):
 @pytest.fixture(scope="module")
 def reconstructed(recording, tmp_path_factory):
     out = tmp_path_factory.mktemp("cli") / "out"
-    return out, run("reconstruct", recording, "-o", out, "--json")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("nacre.report.pictures._SIZE", (60, 60))
+        patch.setattr("nacre.report.pictures._MAIN_SIZE", (60, 60))
+        return out, run("reconstruct", recording, "-o", out, "--json")
 
 
 @pytest.fixture
@@ -88,7 +91,11 @@ def copied(recording, tmp_path):
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory):
     out = tmp_path_factory.mktemp("cli") / "demo"
-    return out, run("demo", "-o", out, "--views", 3, "--step", 15)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("nacre.report.pictures._SIZE", (60, 60))
+        patch.setattr("nacre.report.pictures._MAIN_SIZE", (60, 60))
+        patch.setattr("nacre.report.pictures._CAMERA_SIZE", (60, 45))
+        return out, run("demo", "-o", out, "--views", 3, "--step", 15)
 
 
 @pytest.fixture(scope="module")

@@ -42,7 +42,7 @@ def demo(
     Grow a model of the built-in object from twelve noisy simulated views, and measure it.
 
     Needs no data. Each view is registered to the model starting from the previous view's pose: the model is
-    not told how the camera moves. OUT gets the model, the trajectory, pictures and a report with every figure.
+    not told how the camera moves. OUT gets the model, its trajectory, pictures and a report.
     """
     terminal = Terminal(json, quiet, verbose)
     parameters, preset_name = model_parameters(preset, config, settings)

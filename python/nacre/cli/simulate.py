@@ -195,7 +195,8 @@ def _camera(
         if pixels > _MOST_PIXELS and not (width and height):
             raise CommandError(
                 f"the mesh is {fitting.width * fitting.pixel_size:.4g} m across, "
-                f"{pixels} pixels of {1000 * size:g} mm; give --scale (metres per unit of the file), a larger --pixel-size, or --width and --height",
+                f"{pixels} pixels of {1000 * size:g} mm; give --scale (metres per unit "
+                "of the file), a larger --pixel-size, or --width and --height",
                 2,
             )
         return nacre.Camera.orthographic(width=width or pixels, height=height or pixels, pixel_size=size)
