@@ -25,6 +25,18 @@ inline bool operator<(const Found& a, const Found& b) { return a.d2 < b.d2 || (a
 
 constexpr std::uint32_t no_id = std::numeric_limits<std::uint32_t>::max();
 
+// The largest square whose root is not above the distance: a point is within a distance where its distance, as
+// reported, is not above it.
+inline double squared_bound(double distance) {
+  double square = distance * distance;
+  while (std::isfinite(square)) {
+    const double next = std::nextafter(square, std::numeric_limits<double>::infinity());
+    if (std::sqrt(next) > distance) break;
+    square = next;
+  }
+  return square;
+}
+
 // The k nearest within a distance, sorted, in the caller's memory.
 class KNearest {
  public:
@@ -59,6 +71,8 @@ class WithinRadius {
   Found bound_;
   std::vector<Found>& found_;
 };
+
+static_assert(leaf_points == block_points && group_boxes == 8, "every block and group is a subtree of the k-d order");
 
 template <class T>
 class BlockTree {
@@ -188,15 +202,15 @@ void BlockTree<T>::search(const Eigen::Vector3d& query, Results& results) const 
   if (groups_.empty() || !query.allFinite()) return;
   const T q[3] = {static_cast<T>(query.x()), static_cast<T>(query.y()), static_cast<T>(query.z())};
 
-  // A point at distance d of the query is at most d + e from q, e = |query - q|, and for any s > 0
-  // (d + e)^2 <= (1 + s) d^2 + (1 + 1/s) e^2. s = 1/256 covers the rounding of distances in T as well.
-  constexpr double s = 1.0 / 256.0;
-  const double slack = (1.0 + 1.0 / s) * (query - Eigen::Vector3d(q[0], q[1], q[2])).squaredNorm() +
-                       static_cast<double>(std::numeric_limits<T>::min());
+  // A point at distance d of the query is at most d + e from q, e being the query's rounding, and for any s > 0
+  // (d + e)^2 <= (1 + s) d^2 + (1 + 1/s) e^2; with s = 1/32 the factors below also cover the rounding of distances.
+  // (e is not measured: GCC 12 takes vectors of double(float(x)) for x.)
+  constexpr double half_ulp = std::numeric_limits<T>::epsilon() / 2.0;
+  const double slack = 40.0 * half_ulp * half_ulp * query.squaredNorm() + std::numeric_limits<T>::min();
   T limit, tie;  // boxes beyond `limit` are out; those beyond `tie` may lose to the smaller ids of equal distances
   const auto tighten = [&] {
-    limit = static_cast<T>((1.0 + s) * results.bound().d2 + slack);
-    tie = static_cast<T>((1.0 - s) * results.bound().d2);
+    limit = static_cast<T>(1.04 * results.bound().d2 + slack);
+    tie = static_cast<T>(0.96 * results.bound().d2 - slack);
   };
   tighten();
 

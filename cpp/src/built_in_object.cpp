@@ -117,20 +117,16 @@ class Shell {
   double operator()(const Vector3d& world) const {
     const Vector3d p = to_local(world);
     const double angle = std::atan2(p.y(), p.x()), from_axis = std::hypot(p.x(), p.y());
-    double outer = 1e9, hollow = 1e9;
+    // How far the tube has come, from its opening inwards, when it first passes through the half plane of p.
+    const double way = opening - angle;
+    const double on_tube = std::max(way, -0.6), in_hollow = std::clamp(way, -0.8, 1.5);
+    const double tube = distance(p, on_tube) - radius(on_tube);
+    const double outer = carve(tube, way * from_axis, 2.0);  // cut at the opening
+    const double hollow = distance(p, in_hollow) - (radius(in_hollow) - wall);
     double whorls = rod(p, Vector3d(0.0, 0.0, height(22.0)), Vector3d(0.0, 0.0, height(0.0) - 4.0), 14.0, 2.0);
-    for (int turn = -1; turn <= 3; ++turn) {
-      // How far the tube has come, from its opening inwards, when it passes through the half plane of p.
-      const double way = opening - angle + 2.0 * pi * turn;
-      const double on_tube = std::clamp(way, -0.6, last);
-      const double tube = distance(p, on_tube) - radius(on_tube);
-      if (turn <= 0) {
-        outer = std::min(outer, carve(tube, way * from_axis, 2.0));  // cut at the opening
-        const double in_hollow = std::clamp(way, -0.8, 1.5);
-        hollow = std::min(hollow, distance(p, in_hollow) - (radius(in_hollow) - wall));
-      } else {
-        whorls = join(whorls, tube, 2.2);
-      }
+    for (int turn = 1; turn <= 3; ++turn) {
+      const double on_whorl = std::min(way + 2.0 * pi * turn, last);
+      whorls = join(whorls, distance(p, on_whorl) - radius(on_whorl), 2.2);
     }
     return join(whorls, carve(outer, hollow, 1.5), 2.2);
   }

@@ -117,7 +117,8 @@ class Projection {
     point_mass_ = counts_;
     has_density_.assign(point_grid_.num_cells(), 0);
     if (normals_.rows() == 0) normals_ = Points::Constant(samples.rows(), 3, unknown);
-    normals_.array().colwise() /= normals_.rowwise().norm().array();
+    const Values lengths = normals_.rowwise().norm();
+    normals_.array().colwise() /= lengths.array();  // 0 / 0: a normal without direction is unknown
   }
 
   // One iteration; cargo, if any, is weighted as the attraction is.

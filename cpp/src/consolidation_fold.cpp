@@ -109,9 +109,11 @@ void consolidate_frame(PointModel& model, const Frame& frame, const Pose& world_
   parallel_for(samples.size(), 256, options.num_threads, [&](std::int64_t i) {
     std::int64_t index = 0;
     double squared_distance = 0.0;
-    const Eigen::Vector3d point = samples.points[static_cast<std::size_t>(i)].cast<double>();
-    unseen[static_cast<std::size_t>(i)] =
-        tree.nearest(point, 1, options.consolidation.radius, &index, &squared_distance) == 0 ? 1 : 0;
+    const auto k = static_cast<std::size_t>(i);
+    const Eigen::Vector3d point = samples.points[k].cast<double>();
+    const int found = tree.nearest(point, 1, options.consolidation.radius, &index, &squared_distance);
+    // Of a thin sheet, the frame observes one side.
+    unseen[k] = found == 0 || fresh.normals[static_cast<std::size_t>(index)].dot(samples.normals[k]) < 0.0F ? 1 : 0;
   });
 
   ConsolidateOptions consolidation = options.consolidation;

@@ -205,7 +205,7 @@ FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, c
   if (with_colors) {
     model.colors.resize(model.points.size(), Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
   }
-  const SurfaceObserver observer(frame, camera, options, colors);
+  const SurfaceObserver observer(frame, camera, options, colors, num_threads);
   const std::vector<std::uint8_t> covered =
       update(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, report, num_threads);
   const std::vector<NewPoint> candidates = find_new_points(frame, observer, covered, num_threads);

@@ -132,7 +132,7 @@ void kd_order_serial(IndexedPoint<T>* begin, IndexedPoint<T>* end) {
 template <class T>
 void kd_order(std::vector<IndexedPoint<T>>& points, int num_threads) {
   constexpr std::int64_t small = 4096;
-  constexpr int max_ranges = 128;
+  constexpr int max_ranges = 32;
   std::vector<IndexedPoint<T>*> bounds = {points.data(), points.data() + points.size()};
   const auto length = [&bounds](std::size_t i) { return bounds[i + 1] - bounds[i]; };
   for (std::size_t ranges = 1; ranges < max_ranges && length(0) > small; ranges = bounds.size() - 1) {

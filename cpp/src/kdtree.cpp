@@ -82,6 +82,7 @@ struct KdTree::Impl {
   template <class T>
   RadiusNeighbors query_radius(const Eigen::Ref<const PointMatrix<T>>& queries, double radius, int num_threads) const {
     require_distance("radius", radius);
+    const double bound = squared_bound(radius);
     const std::vector<IndexedPoint<T>> order = visiting_order<T>(queries, num_threads);
     const auto num_queries = static_cast<std::size_t>(queries.rows());
     RadiusNeighbors result;
@@ -95,7 +96,7 @@ struct KdTree::Impl {
         for (std::int64_t i = begin; i < end; ++i) {
           const IndexedPoint<T>& point = order[static_cast<std::size_t>(i)];
           const std::size_t before = found.size();
-          WithinRadius within(radius * radius, found);
+          WithinRadius within(bound, found);
           blocks.search(position(point), within);
           std::sort(found.begin() + static_cast<std::ptrdiff_t>(before), found.end());
           result.offsets[point.id + 1] = static_cast<std::int64_t>(found.size() - before);
@@ -153,7 +154,7 @@ int KdTree::nearest(const Eigen::Vector3d& query, int k, double max_distance, st
   std::array<Found, small_k> on_stack;
   std::vector<Found> on_heap(k > small_k ? static_cast<std::size_t>(k) : 0);
   Found* found = k > small_k ? on_heap.data() : on_stack.data();
-  KNearest nearest(k, max_distance * max_distance, found);
+  KNearest nearest(k, squared_bound(max_distance), found);
   std::visit([&](const auto& blocks) { blocks.search(query, nearest); }, impl_->tree);
   for (int j = 0; j < nearest.size(); ++j) {
     indices[j] = found[j].id;

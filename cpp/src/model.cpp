@@ -7,6 +7,7 @@
 
 #include "check.hpp"
 #include "consolidation_fold.hpp"
+#include "surface_observer.hpp"
 #include "tracking.hpp"
 
 namespace nacre {
@@ -113,7 +114,7 @@ void ModelOptions::check() const {
 
 struct Model::Impl {
   Camera camera;
-  ModelOptions options;
+  ModelOptions options;  // what the first frame decides is filled in
   PointModel cloud;
   std::vector<FrameReport> reports;
   std::vector<Pose> poses;  // of the registered frames, oldest first
@@ -210,6 +211,7 @@ std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
 void Model::Impl::fold_in(const Frame& frame, const FrameExtras& extras, FrameReport& report) {
   StopWatch watch;
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
+  if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
   if (options.fold_in != FoldIn::fuse) {
     consolidate_frame(cloud, frame, report.world_from_camera, options, spacing,
                       static_cast<std::int32_t>(report.index));

@@ -1,5 +1,6 @@
 #include "nacre/normals.hpp"
 
+#include <cmath>
 #include <limits>
 
 #include "block_tree.hpp"
@@ -21,25 +22,36 @@ constexpr double space_share = 0.22;
 
 const Eigen::Vector3d no_normal = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
 
+// The columns of the adjugate of a symmetric matrix.
+Eigen::Matrix3d adjugate(const Eigen::Matrix3d& c) {
+  Eigen::Matrix3d columns;
+  columns << c.col(1).cross(c.col(2)), c.col(2).cross(c.col(0)), c.col(0).cross(c.col(1));
+  return columns;
+}
+
 // The direction of the least variance, or no_normal where the points are on a line or fill space.
 Eigen::Vector3d plane_normal(const Eigen::Matrix3d& covariance) {
   const double trace = covariance.trace();
   if (!(trace > 0)) return no_normal;
   const Eigen::Matrix3d c = covariance / trace;
+  const Eigen::Matrix3d cofactors = adjugate(c);
+  const double minors = cofactors.trace(), determinant = c.col(0).dot(cofactors.col(0));
+  if (!(minors > line_share)) return no_normal;
 
-  // The adjugate has c's eigenvectors with the eigenvalues v2 v3 >= v1 v3 >= v1 v2 of c's v1 <= v2 <= v3, so that its
-  // powers tend to the projection on the eigenvector of v1; five squarings are the power 32.
-  Eigen::Matrix3d m;
-  m << c.row(1).cross(c.row(2)), c.row(2).cross(c.row(0)), c.row(0).cross(c.row(1));
-  if (!(m.trace() > line_share)) return no_normal;
-  for (int squaring = 0; squaring < 5; ++squaring) {
-    m /= m.trace();
-    m = (m * m).eval();
+  // The least variance is the first root of v^3 - v^2 + minors v - determinant; Newton's steps from 0 approach it from
+  // below, where the cubic has no extremum; towards a double root each halves the distance.
+  double v = 0;
+  for (int i = 0; i < 50; ++i) {
+    const double step = (((v - 1) * v + minors) * v - determinant) / ((3 * v - 2) * v + minors);
+    v -= step;
+    if (!(v <= space_share)) return no_normal;
+    if (std::abs(step) < 1e-15) break;
   }
-  int largest;
-  m.diagonal().maxCoeff(&largest);
-  const Eigen::Vector3d normal = m.col(largest).normalized();
-  return normal.dot(c * normal) > space_share ? no_normal : normal;
+  // (c - v I) has its eigenvector in its kernel, so that every column of the adjugate is a multiple of it.
+  const Eigen::Matrix3d normals = adjugate(c - v * Eigen::Matrix3d::Identity());
+  int longest;
+  normals.diagonal().maxCoeff(&longest);
+  return normals.col(longest).normalized();
 }
 
 template <class T>
@@ -63,7 +75,7 @@ PointMatrix<T> estimate(const Eigen::Ref<const PointMatrix<T>>& points, const No
       for (int j = 0; j < found; ++j) {
         const Eigen::Vector3d step = tree.position(search[j].slot) - point;
         sum += step;
-        products += step * step.transpose();
+        products += step.lazyProduct(step.transpose());
       }
       Eigen::Vector3d normal = plane_normal(products - sum * sum.transpose() / found);
       if (normal.dot(viewpoint - point) < 0) normal = -normal;

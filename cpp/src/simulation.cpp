@@ -59,7 +59,6 @@ class View {
     add(right, top, x * (1.0 - y));
     add(left, bottom, (1.0 - x) * y);
     add(right, bottom, x * y);
-    if (camera_.depth_kind() == DepthKind::radial) direction.normalize();
     return to_world(origin, direction);
   }
 

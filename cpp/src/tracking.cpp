@@ -89,18 +89,9 @@ double consistency_of(const PointModel& model, const Frame& frame, const Camera&
   return judged > 0 ? static_cast<double>(counts.agree) / static_cast<double>(judged) : 0.0;
 }
 
-double median_sigma(const Frame& frame) {
-  std::vector<float> values;
-  values.reserve(frame.valid.size());
-  for (const std::int32_t row : frame.valid) values.push_back(frame.sigma[row]);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
 bool is_beyond_doubt(const TrackingResult& result, double gate) {
-  return result.status == FrameStatus::tracked && result.alignment.overlap > 0.5 && result.consistency > 0.9 &&
+  return result.status == FrameStatus::tracked && result.alignment.overlap > 0.35 && result.consistency > 0.9 &&
          result.alignment.rmse < 0.25 * gate;
 }
 
@@ -118,7 +109,7 @@ Samples sample_frame(const Frame& frame, const Camera& camera, const ModelOption
   Samples samples{Points(count, 3), Points(count, 3), Values(count)};
   const Colors no_colors;
   const ColorsRef colors(no_colors);
-  const SurfaceObserver observer(frame, camera, options.fusion, colors);
+  const SurfaceObserver observer(frame, camera, options.fusion, colors, options.num_threads);
   const double stride = static_cast<double>(frame.valid.size()) / static_cast<double>(std::max<std::int64_t>(count, 1));
   parallel_for(count, 256, options.num_threads, [&](std::int64_t i) {
     // One of every `stride` pixels.
@@ -171,7 +162,7 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
       const IcpTarget target(AlignCloud(view.points, view.normals), options.registration);
       AlignOptions align_options = options.registration;
       if (!(align_options.final_distance > 0.0)) {
-        align_options.final_distance = std::max(2.5 * target.spacing(), 4.0 * median_sigma(frame));
+        align_options.final_distance = std::max(2.5 * target.spacing(), 4.0 * static_cast<double>(median_sigma(frame)));
       }
       if (automatic_gate && !wide) align_options.max_distance = 4.0 * align_options.final_distance;
 

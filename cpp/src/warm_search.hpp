@@ -16,7 +16,7 @@ template <class Tree>
 class WarmSearch {
  public:
   WarmSearch(const Tree& tree, int k, double max_distance)
-      : tree_(tree), max_d2_(max_distance * max_distance), found_(static_cast<std::size_t>(k)) {}
+      : tree_(tree), max_d2_(squared_bound(max_distance)), found_(static_cast<std::size_t>(k)) {}
 
   // Returns how many were found.
   int operator()(const Eigen::Vector3d& query) {

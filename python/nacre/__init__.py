@@ -1,5 +1,6 @@
 """nacre grows a 3D model from depth-camera images, layer by layer."""
 
+from nacre import evaluation
 from nacre._core import Camera, __version__
 from nacre.consolidation import Consolidated, consolidate, project_samples
 from nacre.datasets import Sequence, SequenceFrame, open_sequence, write_recording
@@ -57,6 +58,7 @@ __all__ = [
     "depth_normals",
     "estimate_noise",
     "estimate_normals",
+    "evaluation",
     "open_sequence",
     "preprocess_depth",
     "project_samples",

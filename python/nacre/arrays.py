@@ -67,7 +67,7 @@ def as_pose(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
 
 
 def as_poses(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Return ``value`` as (N, 4, 4) rigid float64 matrices; a row that is not finite stands for a missing pose."""
+    """Return ``value`` as (N, 4, 4) rigid float64 matrices; a pose that is not finite is a missing one."""
     array = np.ascontiguousarray(_real(name, value), dtype=np.float64)
     if array.ndim != 3 or array.shape[1:] != (4, 4):
         raise ValueError(f"{name} must have shape (N, 4, 4), got {array.shape}")
@@ -80,7 +80,7 @@ def as_poses(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
     )
     if not is_rigid.all():
         bad = present[np.argmin(is_rigid)]
-        raise ValueError(f"{name}[{bad}] must be a rigid transform (rotation and translation), got\n{array[bad]}")
+        raise ValueError(f"{name}[{bad}] must be a rigid transform, got\n{array[bad]}")
     return array
 
 

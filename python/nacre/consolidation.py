@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_matching_points, as_points, localize
-from nacre.parameters import as_choice, as_int, as_number
+from nacre.arrays import FloatArray, as_count, as_length, as_matching_points, as_points, localize
+from nacre.parameters import as_choice
 
 _METHODS = {
     "wlop": _core.ConsolidationMethod.wlop,
@@ -99,7 +99,7 @@ def consolidate(
         integers rounded. Each column is averaged in float32 about its mean. A single array comes back as
         ``"attributes"``.
     seed : int
-        Of the random choice, 0 to 2**64 - 1.
+        Of the random choice, not negative.
     num_threads : int
         0 uses all. The result has the same bits for any number.
 
@@ -126,9 +126,9 @@ def consolidate(
     """
     array = as_points("points", points)
     options = _options(radius, iterations, mu, method, theta, num_threads)
-    wanted = len(array) if num_points is None else as_int("num_points", num_points, low=1)
+    wanted = len(array) if num_points is None else as_count("num_points", num_points, minimum=1)
     options.num_points = max(1, min(wanted, len(array)))
-    options.seed = as_int("seed", seed, high=2**64 - 1)
+    options.seed = as_count("seed", seed)
     local, origin = localize(array)
     cargo = _Cargo(attributes, len(array))
     moved, carried, sources = _core.consolidate(local, options, cargo.columns)
@@ -201,12 +201,12 @@ def _options(
     radius: float, iterations: int, mu: float, method: str, theta: str, num_threads: int
 ) -> _core.ConsolidateOptions:
     options = _core.ConsolidateOptions()
-    options.radius = as_number("radius", radius)
-    options.iterations = as_int("iterations", iterations, high=2**31 - 1)
-    options.mu = as_number("mu", mu)
+    options.radius = as_length("radius", radius)
+    options.iterations = as_count("iterations", iterations)
+    options.mu = as_length("mu", mu)
     options.method = as_choice("method", method, _METHODS)
     options.theta = as_choice("theta", theta, _THETAS)
-    options.num_threads = as_int("num_threads", num_threads, high=2**31 - 1)
+    options.num_threads = as_count("num_threads", num_threads)
     return options
 
 

@@ -110,8 +110,8 @@ class ModelParameters:
     spacing: float = 0.0
     max_points: int = 500000
     predict_motion: bool = True
-    min_overlap: float = 0.25
-    min_consistency: float = 0.7
+    min_overlap: float = 0.15
+    min_consistency: float = 0.8
     first_fraction: float = 0.5
     kept_fraction: float = 0.9
     new_fraction: float = 0.2

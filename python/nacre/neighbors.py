@@ -64,9 +64,9 @@ class KdTree:
     """
     Nearest neighbours of 3D points, exactly.
 
-    Distances are compared in double precision and equal distances by the smaller index, so the answer is unique and
-    does not depend on the number of threads. Points that are not finite are never found. The tree is immutable and may
-    be queried from any number of threads, and it can be pickled.
+    Distances are compared in double precision and equal distances by the smaller index, so the answer is
+    unique and does not depend on the number of threads. Points that are not finite are never found. The tree
+    is immutable, may be queried from any number of threads, and can be pickled.
 
     Parameters
     ----------
@@ -128,9 +128,9 @@ class KdTree:
         Returns
         -------
         distances : (..., k) float
-            Nearest first, in the dtype of the queries (float32 or float64); ``inf`` where fewer than k were found.
+            Nearest first, float32 for float32 queries, otherwise float64; ``inf`` where fewer were found.
         indices : (..., k) int64
-            Rows of the tree's points; the tree's size where fewer than k were found.
+            Rows of the tree's points; the tree's size where fewer were found.
 
         Notes
         -----

@@ -39,24 +39,27 @@ def estimate_normals(
     Returns
     -------
     (N, 3) float
-        Unit normals in the dtype of the points (float64 unless they are float32). NaN where no plane is known: fewer than
-        three neighbours; neighbours on a line (their second variance is below 0.5 % of the first); neighbours that fill
-        space (the variance along the normal is above 22 % of the sum, 33 % being isotropic).
+        Unit normals, float32 for float32 points, otherwise float64. NaN where no plane is known: fewer than
+        three neighbours; neighbours on a line (their second variance is below 0.5 % of the first); neighbours
+        that fill space (the variance along the normal is above 22 % of the sum, 33 % being isotropic).
 
     Notes
     -----
-    Principal component analysis as in Hoppe et al., "Surface reconstruction from unorganized points", 1992; the measure of
-    filled space is the surface variation of Pauly, Gross and Kobbelt, "Efficient simplification of point-sampled surfaces",
-    2002.
+    Principal component analysis as in Hoppe et al., "Surface reconstruction from unorganized points", 1992;
+    the measure of filled space is the surface variation of Pauly, Gross and Kobbelt, "Efficient
+    simplification of point-sampled surfaces", 2002.
 
     Examples
     --------
     >>> corners = [[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0], [1.0, 1.0, 1.0]]
-    >>> estimate_normals(corners)[0]
-    array([ 0.,  0., -1.])
+    >>> estimate_normals(corners, viewpoint=(0.0, 0.0, 5.0))[0]
+    array([0., 0., 1.])
     """
     options = _core.NormalOptions()
     options.k = as_count("k", k, minimum=3)
     options.max_radius = as_length("max_radius", max_radius)
     options.num_threads = as_count("num_threads", num_threads)
-    return _core.estimate_normals(as_points("points", points), options, as_vector("viewpoint", viewpoint, 3))
+    normals: FloatArray = _core.estimate_normals(
+        as_points("points", points), options, as_vector("viewpoint", viewpoint, 3)
+    )
+    return normals

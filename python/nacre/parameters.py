@@ -3,11 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-
-
-import numbers
-import operator
-
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
@@ -27,7 +22,7 @@ def to_core(parameters: Any, core: Core) -> Core:
         current = getattr(core, field.name)
         if dataclasses.is_dataclass(value):
             value = value.to_core() if hasattr(value, "to_core") else to_core(value, current)
-        elif isinstance(value, str):
+        elif isinstance(value, str) and hasattr(type(current), "__members__"):
             members = type(current).__members__
             if value.replace("+", "_plus") not in members:
                 names = ", ".join(repr(name.replace("_plus", "+")) for name in members)
@@ -78,25 +73,6 @@ def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
             value = float(value)
         parameters = dataclasses.replace(parameters, **{head: value})  # type: ignore[type-var]
     return parameters
-
-
-def as_int(name: str, value: Any, low: int = 0, high: int | None = None) -> int:
-    """Return ``value`` as an int from ``low`` to ``high``; floats are refused."""
-    try:
-        number = operator.index(value)
-    except TypeError:
-        raise TypeError(f"{name} must be an integer, got {value!r}") from None
-    if number < low or (high is not None and number > high):
-        expected = f"at least {low}" if high is None or number < low else f"at most {high}"
-        raise ValueError(f"{name} must be {expected}, got {value!r}")
-    return number
-
-
-def as_number(name: str, value: Any) -> float:
-    """Return a real number as a float."""
-    if not isinstance(value, numbers.Real):
-        raise TypeError(f"{name} must be a number, got {value!r}")
-    return float(value)
 
 
 def as_choice(name: str, value: Any, choices: Mapping[str, Core]) -> Core:

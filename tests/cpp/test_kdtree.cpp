@@ -37,7 +37,7 @@ std::vector<Neighbor> brute_force(const Matrix& points, const Eigen::Vector3d& q
     if (!points.row(i).allFinite()) continue;
     const Eigen::Vector3d step = points.row(i).transpose().template cast<double>() - query;
     const double d2 = step.x() * step.x() + step.y() * step.y() + step.z() * step.z();
-    if (d2 <= max_distance * max_distance) all.push_back({d2, i});
+    if (std::sqrt(d2) <= max_distance) all.push_back({d2, i});
   }
   std::sort(all.begin(), all.end());
   return all;
@@ -102,6 +102,10 @@ TEST_CASE("tree and queries may differ in precision") {
   const PointsDouble points = random_points(3000, 2), queries = random_points(200, 3);
   check_all(Points(points.cast<float>()), queries, 8, inf);
   check_all(points, Points(queries.cast<float>()), 8, inf);
+
+  // Where floats are as coarse as the points' spacing, a query rounded to float has other neighbours.
+  const Points coarse = (points * 0.01).array().cast<float>() + 4096.0f;
+  check_all(coarse, PointsDouble((queries * 0.01).array() + 4096.0), 4, inf);
 }
 
 TEST_CASE("every query of a batch is answered as if it were alone") {

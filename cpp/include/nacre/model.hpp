@@ -42,8 +42,8 @@ struct ModelOptions {
   double spacing = 0.0;              ///< distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces
   int max_points = 500000;           ///< the model never grows beyond: its spacing is widened instead
   bool predict_motion = true;        ///< start also from the pose that continues the last motion
-  double min_overlap = 0.25;         ///< a frame of which a smaller part matches the model is lost
-  double min_consistency = 0.7;      ///< so is one that sees through more than the rest of what the model shows there
+  double min_overlap = 0.15;         ///< a frame of which a smaller part matches the model is lost
+  double min_consistency = 0.8;      ///< so is one that sees through more than the rest of what the model shows there
   double first_fraction = 0.5;       ///< wlop: part of the first frame that becomes the model
   double kept_fraction = 0.9;        ///< wlop: part of the model that is kept at each frame
   double new_fraction = 0.2;         ///< wlop: new points, as a part of the model

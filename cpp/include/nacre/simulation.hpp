@@ -15,10 +15,10 @@ struct SimulationOptions {
   double edge_mixing = 0.0;  ///< pixels within this distance of a depth edge see both sides of it [pixels]; 0: none
   double background_depth = 0.0;  ///< what silhouettes mix with [m]; 0: behind the farthest visible point, by a tenth
                                   ///< of the diagonal of the mesh's bounding box
-  double quantization = 0.0;  ///< depth is rounded to multiples of this [m]; 0: none
-  double dropout = 0.0;       ///< part of the pixels that give no measurement
-  std::uint64_t seed = 0;     ///< of noise and dropout: the same seed gives the same image for any thread count
-  int num_threads = 0;        ///< 0: all
+  double quantization = 0.0;      ///< depth is rounded to multiples of this [m]; 0: none
+  double dropout = 0.0;           ///< part of the pixels that give no measurement
+  std::uint64_t seed = 0;         ///< of noise and dropout: the same seed gives the same image for any thread count
+  int num_threads = 0;            ///< 0: all
 
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };

@@ -27,7 +27,7 @@ from nacre.report.charts import (
 )
 from nacre.report.colormap import CATEGORIES
 from nacre.report.data import DepthExample, FrameEntry, ReportData
-from nacre.report.pictures import ModelPictures, Picture, draw_depth, draw_model, reason_color
+from nacre.report.pictures import ModelPictures, Picture, draw_depth, draw_model, is_logarithmic, reason_color
 from nacre.report.summary import Summary, is_tracked, summarize, total_milliseconds
 from nacre.report.text import count, flatten, label, quantity
 
@@ -118,7 +118,8 @@ def _model_section(model: ModelPictures | None) -> str:
         parts.append(_pictures(attributes, "two" if len(attributes) == 2 else "four"))
     if model.confidence:
         low, high = model.confidence_range
-        parts.append(f'<p class="note">Confidence {low:.4g}<span class="ramp"></span>{high:.4g}</p>')
+        scale = ", logarithmic" if is_logarithmic(low, high) else ""
+        parts.append(f'<p class="note">Confidence {low:.4g}<span class="ramp"></span>{high:.4g}{scale}</p>')
     return "".join(parts)
 
 
@@ -140,7 +141,7 @@ def _depth_section(example: DepthExample | None, frames: Sequence[FrameEntry]) -
         f"{keys or 'none'}</p>",
         _pictures(drawn.pictures, "three", "depth"),
     ]
-    reasons = list(dict.fromkeys(reason for frame in frames for reason in frame.removed))
+    reasons = list(dict.fromkeys(name for frame in frames for name, num in frame.removed.items() if num))
     if reasons and len(frames) > 1:
         series = [
             Series(

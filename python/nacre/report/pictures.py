@@ -98,7 +98,7 @@ def draw_model(model: ModelCloud, frames: Sequence[FrameEntry] = ()) -> ModelPic
     if model.confidence is not None:
         values = np.nan_to_num(np.asarray(model.confidence, dtype=np.float64).reshape(-1))
         low, high = (float(bound) for bound in np.percentile(values, (2, 98)))
-        shades = viridis((values - low) / (high - low) if high > low else np.ones(len(values)))
+        shades = viridis(_positions(values, low, high))
         confidence = tuple(
             picture(f"Confidence, {name}", view, shades) for name, view in list(views.items())[:2]
         )
@@ -116,6 +116,21 @@ def draw_model(model: ModelCloud, frames: Sequence[FrameEntry] = ()) -> ModelPic
         colors=colors,
         scale_bar=_scale_bar(scale * _SIZE[0]),
     )
+
+
+def is_logarithmic(low: float, high: float) -> bool:
+    """Return whether values between two bounds are coloured by their logarithm."""
+    return 0 < 30 * low < high
+
+
+def _positions(values: npt.NDArray[np.float64], low: float, high: float) -> npt.NDArray[np.float64]:
+    """Return where values lie between two bounds, 0 to 1."""
+    if high <= low:
+        return np.ones(len(values))
+    values = np.clip(values, low, high)
+    if is_logarithmic(low, high):
+        return np.asarray(np.log(values / low) / np.log(high / low))
+    return np.asarray((values - low) / (high - low))
 
 
 def _thinned(model: ModelCloud) -> ModelCloud:

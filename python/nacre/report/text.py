@@ -48,6 +48,8 @@ def quantity(value: Any, unit: str = "") -> str:
         return f"{_digits(math.degrees(value))}\N{DEGREE SIGN}"
     if unit == "fraction":
         return f"{_percent(100 * value)} %"
+    if unit == "ms" and value >= 1000:
+        return f"{_digits(value / 1000)} s"
     if unit == "count":
         return count(int(value))
     return f"{_digits(value)} {unit}".rstrip() if unit != "number" else _digits(value)
