@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -145,10 +146,11 @@ def no_pictures(monkeypatch):
 
 class TestProgram:
     def test_the_installed_entry_works(self):
-        code = "from nacre.cli import main; main()"
-        done = subprocess.run(
-            [sys.executable, "-c", code, "--version"], capture_output=True, text=True, check=True
+        script = Path(sys.executable).with_name("nacre")  # in an environment that nacre is installed into
+        program = (
+            [script] if script.exists() else [sys.executable, "-c", "from nacre.cli import main; main()"]
         )
+        done = subprocess.run([*program, "--version"], capture_output=True, text=True, check=True)
         assert done.stdout == f"nacre {nacre.__version__}\n"
         assert done.stderr == ""
 
