@@ -89,7 +89,7 @@ class AlignResult:
     def __repr__(self) -> str:
         return (
             f"AlignResult({self.status}, iterations={self.iterations}, num_inliers={self.num_inliers}, "
-            f"overlap={self.overlap:.3f}, rmse={self.rmse:.3g} m, {len(self.weak_directions)} weak directions)"
+            f"overlap={self.overlap:.3f}, rmse={self.rmse:.3g} m, {len(self.weak_directions)} weak)"
         )
 
 
