@@ -3,10 +3,12 @@ The C++ core of nacre; use it through the nacre package.
 """
 
 from __future__ import annotations
+
 import collections.abc
+import typing
+
 import numpy
 import numpy.typing
-import typing
 
 __all__: list[str] = [
     "AlignOptions",

@@ -23,8 +23,8 @@ DEPTH_SCALE = 5000.0
 
 _log = logging.getLogger(__name__)
 
-# fx fy cx cy and distortion of the colour camera, to which the depth images are registered, as the benchmark's page
-# gives them; the third camera's images come undistorted.
+# fx fy cx cy and distortion of the colour camera, to which the depth images are registered, as the
+# benchmark's page gives them; the third camera's images come undistorted.
 _NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
 _CALIBRATIONS = {
     "1": ((517.3, 516.5, 318.6, 255.3), (0.2624, -0.9531, -0.0054, 0.0026, 1.1633)),

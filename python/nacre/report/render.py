@@ -137,8 +137,8 @@ def measure_spacing(points: npt.ArrayLike) -> Array:
     """
     Return how far each point's disk must reach to meet the disks around it.
 
-    That is the distance to the fourth neighbour: on a regular lattice all of the ring, at a border still the half of
-    it. Outliers get two medians.
+    That is the distance to the fourth neighbour: on a regular lattice all of the ring, at a border still the
+    half of it. Outliers get two medians.
     """
     from nacre import KdTree
 
