@@ -522,6 +522,7 @@ def test_illegal_parameters() -> None:
         ({"spacing": float("inf")}, "spacing must be .* got inf"),
         ({"max_points": 5}, "max_points must be at least 100, got 5"),
         ({"min_overlap": 1.5}, "min_overlap must be in .* got 1.5"),
+        ({"max_residual": float("nan")}, "max_residual must be .* got nan"),
         ({"min_consistency": float("nan")}, "min_consistency must be in .* got nan"),
         ({"first_fraction": 0.0}, "first_fraction must be in .* got 0"),
         ({"kept_fraction": -0.1}, "kept_fraction must be in .* got -0.1"),

@@ -150,6 +150,7 @@ PAPER: dict[str, Any] = {
     "predict_motion": False,
     "min_overlap": 0.0,
     "min_consistency": 0.0,
+    "max_residual": 1.0,
 }
 
 
