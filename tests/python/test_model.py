@@ -353,10 +353,6 @@ def test_max_points_is_never_exceeded() -> None:
 # Frames that must change nothing
 
 
-def some_noise() -> Array:
-    return np.random.default_rng(5).uniform(0.05, 0.4, (224, 224))
-
-
 def few_pixels() -> Array:
     depth = np.full((224, 224), np.nan)
     depth[100:105, 100:110] = 0.3
@@ -380,7 +376,6 @@ HOPELESS: dict[str, Callable[[], Array]] = {
     "zeros": lambda: np.zeros((224, 224)),
     "inf": lambda: np.full((224, 224), np.inf),
     "negative": lambda: np.full((224, 224), -1.0),
-    "noise": some_noise,
     "50 pixels": few_pixels,
     "a plane": random_plane,
     "another object": other_object,

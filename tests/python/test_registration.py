@@ -62,7 +62,7 @@ def errors(pose: Array, truth: Array, center: npt.ArrayLike = CENTER) -> tuple[f
 
 @functools.cache
 def built_in_triangles() -> tuple[Array, Array]:
-    """Return the corners of the built-in object's triangles about CENTER, normals as long as the areas."""
+    """Return the corners of the built-in object's triangles about CENTER, and normals as long as areas."""
     thing = nacre.built_in_object()
     corners = thing.vertices[thing.triangles] - thing.bounds.mean(axis=0) + CENTER
     return corners, 0.5 * np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
