@@ -10,42 +10,6 @@ import typing
 import numpy
 import numpy.typing
 
-__all__: list[str] = [
-    "AlignOptions",
-    "AlignResult",
-    "Camera",
-    "ConsolidateOptions",
-    "ConsolidationMethod",
-    "DepthOptions",
-    "DepthReport",
-    "EdgeTest",
-    "FoldIn",
-    "Frame",
-    "FrameReport",
-    "FusionOptions",
-    "KdTree",
-    "MeshTree",
-    "Metric",
-    "Model",
-    "ModelOptions",
-    "NoiseModel",
-    "NormalOptions",
-    "PointModel",
-    "ProjectionHints",
-    "SimulationOptions",
-    "Theta",
-    "align",
-    "back_project",
-    "built_in_object",
-    "consolidate",
-    "estimate_noise",
-    "estimate_normals",
-    "make_frame",
-    "preprocess_depth",
-    "project_samples",
-    "simulate_depth",
-]
-
 class Camera:
     """
     An immutable camera model. Pixel centres are integers; axes are OpenCV's (x right, y down, z forward).
