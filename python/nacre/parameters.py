@@ -44,7 +44,7 @@ def from_core(parameters_type: type[Parameters], core: Any) -> Parameters:
         value = getattr(core, field.name)
         default = getattr(defaults, field.name)
         if value is not None and dataclasses.is_dataclass(default):
-            value = from_core(type(default), value)  # type: ignore[arg-type]
+            value = from_core(type(default), value)
         elif isinstance(default, str):
             value = value.name.replace("_plus", "+")
         values[field.name] = value

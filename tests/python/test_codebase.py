@@ -133,8 +133,6 @@ def test_public_names_are_complete_and_documented() -> None:
 def test_the_stub_fits_the_extension_module() -> None:
     if importlib.util.find_spec("mypy") is None:
         pytest.skip("mypy is missing: pip install --group dev")
-    if not (ROOT / "python" / "nacre" / "_core.pyi").exists():
-        pytest.skip("there is no stub yet")
     command = [
         sys.executable,
         "-m",
@@ -144,7 +142,18 @@ def test_the_stub_fits_the_extension_module() -> None:
         str(ROOT / "pyproject.toml"),
     ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+    # Stubs cannot say that pybind11 classes have a metaclass, and that some have no constructor.
+    unsayable = (
+        "is inconsistent, metaclass differs",
+        '__init__ is inconsistent, stub does not have *args parameter "args"',
+    )
+    errors = [
+        line
+        for line in done.stdout.splitlines()
+        if line.startswith("error:") and not line.endswith(unsayable)
+    ]
+    assert "checked 1 module" in done.stdout, done.stdout + done.stderr
+    assert errors == [], done.stdout
 
 
 def test_continuous_integration_runs_the_readmes_command() -> None:
