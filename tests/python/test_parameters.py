@@ -151,6 +151,8 @@ PAPER: dict[str, Any] = {
     "min_overlap": 0.0,
     "min_consistency": 0.0,
     "max_residual": 1.0,
+    "relocalise": False,
+    "denoise_samples": False,
 }
 
 
