@@ -435,6 +435,32 @@ def test_relocalised_after_lost() -> None:
     assert rms(off_thing(model.points)) < 0.0003
 
 
+@pytest.mark.parametrize(("least", "status"), [(0.3, "TRACKED"), (0.97, "LOST")])
+def test_min_overlap_decides(least: float, status: str) -> None:
+    """Some of the second view is new, and matches nothing."""
+    model = object_model(1, min_overlap=least, relocalise=False)
+    report = model.add_frame(view(1))
+    assert 0.3 < report.overlap < 0.97
+    assert report.status == status
+    assert report.reason == ("" if status == "TRACKED" else f"overlap {report.overlap:.3g} is below 0.97")
+
+
+@pytest.mark.parametrize(("least", "status"), [(0.1, "TRACKED"), (0.9, "LOST")])
+def test_min_consistency_decides(least: float, status: str) -> None:
+    """Something in front of half of a wall has gone: the camera sees through it."""
+    x, y = flat_grid()
+    wall = relief() + 0.1
+    front = 0.3 + 0.004 * np.cos(170 * x + 2) * np.sin(130 * y + 60 * x)
+    model = nacre.Model(FLAT, min_consistency=least, relocalise=False)
+    model.add_frame(np.where(x < 0, front, wall))
+    report = model.add_frame(wall)
+    assert 0.1 < report.consistency < 0.9
+    assert report.status == status
+    assert report.reason == (
+        "" if status == "TRACKED" else f"consistency {report.consistency:.3g} is below 0.9"
+    )
+
+
 @pytest.mark.parametrize("index", [0, 1, 3])
 def test_a_lost_camera_is_found_at_earlier_poses(index: int) -> None:
     """It was last seen up to 150 degrees away."""
