@@ -1,4 +1,4 @@
-.PHONY: install editable test lint format cpp
+.PHONY: install editable test lint format stub cpp
 
 install:  # into the active environment
 	pip install ".[all]"
@@ -18,6 +18,10 @@ format:
 	ruff check --fix .
 	ruff format .
 	find cpp python tests examples -name '*.[ch]pp' -exec clang-format -i {} +
+
+stub:  # _core.pyi, from the installed extension module
+	pip install pybind11-stubgen
+	python python/make_stub.py
 
 cpp:  # the C++ library, its tests and examples, without Python
 	cmake --preset default

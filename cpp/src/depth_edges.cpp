@@ -8,8 +8,6 @@
 namespace nacre {
 namespace {
 
-constexpr std::int64_t kRowBlock = 16;
-
 // A crease between two surfaces is an edge of the second difference as well. Up to a bend of this slope it is kept.
 constexpr float kCreaseSlope = 3.0F;
 
@@ -61,6 +59,15 @@ void set_limits(const float* centre, const PlanarLimits& limits, float length, R
   }
 }
 
+// Surfaces that are too steep as a whole; what is steep pixel by pixel only is found by mark_direction.
+void mark_slanted(const float* centre, const PlanarLimits& limits, RowTest& test) {
+  const Quadratic limit = limits.step_slant;
+  const float* const slope = test.slope.data();
+  std::int32_t* const slanted = test.slanted.data();
+  const std::size_t width = test.slope.size();
+  for (std::size_t u = 0; u < width; ++u) slanted[u] = slope[u] > limit(centre[u]);
+}
+
 // One of the four directions through each pixel of a row, with neighbours at -offset and +offset. Comparisons with a
 // missing neighbour (NaN) are false.
 void mark_direction(const float* centre, std::ptrdiff_t offset, RowTest& test) {
@@ -99,34 +106,37 @@ EdgeMarks mark_planar_edges(const PlanarImage& image, const WindowFits& fits, co
   const std::vector<float> slopes = smooth_slopes(fits);
   const auto size = static_cast<std::size_t>(image.width()) * static_cast<std::size_t>(image.height());
   EdgeMarks marks{Marks(size), Marks(size)};
-  parallel_blocks(image.height(), kRowBlock, num_threads, [&](std::int64_t, std::int64_t begin, std::int64_t end) {
-    RowTest test(image.width());
-    for (std::int64_t v = begin; v < end; ++v) {
-      const float* const row = image.row(static_cast<int>(v));
-      if (!slopes.empty()) spread_slopes(fits, slopes, static_cast<int>(v), test.slope);
-      std::fill(test.edge.begin(), test.edge.end(), 0);
-      std::fill(test.slanted.begin(), test.slanted.end(), 0);
-      set_limits(row, limits, 1.0F, test);
-      mark_direction(row, 1, test);
-      mark_direction(row, image.stride(), test);
-      set_limits(row, limits, std::sqrt(2.0F), test);
-      mark_direction(row, image.stride() + 1, test);
-      mark_direction(row, image.stride() - 1, test);
-      std::copy(test.edge.begin(), test.edge.end(), marks.edge.begin() + v * image.width());
-      std::copy(test.slanted.begin(), test.slanted.end(), marks.slanted.begin() + v * image.width());
-    }
-  });
+  parallel_blocks(image.height(), rows_per_block(image.width()), num_threads,
+                  [&](std::int64_t, std::int64_t begin, std::int64_t end) {
+                    RowTest test(image.width());
+                    for (std::int64_t v = begin; v < end; ++v) {
+                      const float* const row = image.row(static_cast<int>(v));
+                      if (!slopes.empty()) spread_slopes(fits, slopes, static_cast<int>(v), test.slope);
+                      std::fill(test.edge.begin(), test.edge.end(), 0);
+                      mark_slanted(row, limits, test);
+                      set_limits(row, limits, 1.0F, test);
+                      mark_direction(row, 1, test);
+                      mark_direction(row, image.stride(), test);
+                      set_limits(row, limits, std::sqrt(2.0F), test);
+                      mark_direction(row, image.stride() + 1, test);
+                      mark_direction(row, image.stride() - 1, test);
+                      std::copy(test.edge.begin(), test.edge.end(), marks.edge.begin() + v * image.width());
+                      std::copy(test.slanted.begin(), test.slanted.end(), marks.slanted.begin() + v * image.width());
+                    }
+                  });
   return marks;
 }
 
-EdgeMarks mark_gradient_edges(const DepthRef& depth, const DepthOptions& options, int num_threads) {
-  const std::int64_t width = depth.cols(), height = depth.rows();
+EdgeMarks mark_gradient_edges(const DepthRef& measured, const DepthOptions& options, int num_threads) {
+  const std::int64_t width = measured.cols(), height = measured.rows();
+  const DepthImage depth =
+      measured.unaryExpr([](float z) { return is_measurement(z) ? z : std::numeric_limits<float>::quiet_NaN(); });
   const auto limit = static_cast<float>(8.0 * options.gradient_threshold);
   EdgeMarks marks{Marks(static_cast<std::size_t>(width * height)), Marks(static_cast<std::size_t>(width * height))};
-  parallel_for(height, kRowBlock, num_threads, [&](std::int64_t v) {
-    const float* const above = &depth.coeffRef(std::max<std::int64_t>(v - 1, 0), 0);
-    const float* const here = &depth.coeffRef(v, 0);
-    const float* const below = &depth.coeffRef(std::min(v + 1, height - 1), 0);
+  parallel_for(height, rows_per_block(width), num_threads, [&](std::int64_t v) {
+    const float* const above = &depth(std::max<std::int64_t>(v - 1, 0), 0);
+    const float* const here = &depth(v, 0);
+    const float* const below = &depth(std::min(v + 1, height - 1), 0);
     std::uint8_t* const edge = marks.edge.data() + v * width;
     for (std::int64_t u = 0; u < width; ++u) {
       const std::int64_t l = std::max<std::int64_t>(u - 1, 0), r = std::min(u + 1, width - 1);
@@ -141,7 +151,7 @@ EdgeMarks mark_gradient_edges(const DepthRef& depth, const DepthOptions& options
 void dilate(int width, int height, int radius, int num_threads, Marks& marks) {
   for (int step = 0; step < radius; ++step) {
     Marks grown(marks);
-    parallel_for(height, kRowBlock, num_threads, [&](std::int64_t v) {
+    parallel_for(height, rows_per_block(width), num_threads, [&](std::int64_t v) {
       std::uint8_t* const target = grown.data() + v * width;
       const auto add = [&](const std::uint8_t* source, int begin, int end) {
         for (int u = begin; u < end; ++u) target[u] = target[u] | source[u];

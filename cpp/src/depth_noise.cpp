@@ -10,6 +10,9 @@ namespace {
 
 constexpr std::size_t kMinSamples = 8;
 
+constexpr double kMinStepped = 0.1;     // of the windows of a coarsely quantised image cross from plateau to plateau
+constexpr float kMaxStepPixels = 3.0F;  // orthographic: a larger step is an edge
+
 struct Fit {
   double variance, slope;
 };
@@ -37,6 +40,26 @@ Fit fit_window(const PlanarImage& image, int u, int v) {
   return {std::max(squares - explained, 0.0) / (49 - 6), std::hypot(sum_u, sum_v) / 196};
 }
 
+// The smallest step from one plateau to the next along a window's central row and column; 0 where there are not
+// both: plateaus, and steps.
+float plateau_step(const PlanarImage& image, int u, int v) {
+  int num_flat = 0;
+  float smallest = std::numeric_limits<float>::infinity();
+  const auto add = [&](float step) {
+    if (step == 0.0F) {
+      ++num_flat;
+    } else {
+      smallest = std::min(smallest, step);
+    }
+  };
+  const float* const pixel = image.row(v) + u;
+  for (int d = -WindowFits::kRadius; d < WindowFits::kRadius; ++d) {
+    add(std::abs(pixel[d + 1] - pixel[d]));
+    add(std::abs(pixel[(d + 1) * image.stride()] - pixel[d * image.stride()]));
+  }
+  return num_flat >= 2 * WindowFits::kRadius && std::isfinite(smallest) ? smallest : 0.0F;
+}
+
 float quantile(std::vector<float>& values, double part) {
   const auto nth = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
   std::nth_element(values.begin(), nth, values.end());
@@ -53,15 +76,16 @@ WindowFits fit_windows(const PlanarImage& image, int num_threads) {
   const auto size = static_cast<std::size_t>(fits.cols) * static_cast<std::size_t>(fits.rows);
   fits.residual.resize(size);
   fits.slope.resize(size);
-  parallel_for(fits.rows, 4, num_threads, [&](std::int64_t row) {
-    for (int col = 0; col < fits.cols; ++col) {
-      const Fit fit = fit_window(image, WindowFits::centre(col), WindowFits::centre(static_cast<int>(row)));
-      const auto i = static_cast<std::size_t>(row * fits.cols + col);
-      // std::max(NaN, 0) is NaN: a window with a missing pixel has no residual.
-      fits.residual[i] = static_cast<float>(std::sqrt(fit.variance));
-      fits.slope[i] = static_cast<float>(fit.slope);
-    }
-  });
+  parallel_for(
+      fits.rows, rows_per_block(fits.cols * WindowFits::kStep * WindowFits::kStep), num_threads, [&](std::int64_t row) {
+        for (int col = 0; col < fits.cols; ++col) {
+          const Fit fit = fit_window(image, WindowFits::centre(col), WindowFits::centre(static_cast<int>(row)));
+          const auto i = static_cast<std::size_t>(row * fits.cols + col);
+          // std::max(NaN, 0) is NaN: a window with a missing pixel has no residual.
+          fits.residual[i] = static_cast<float>(std::sqrt(fit.variance));
+          fits.slope[i] = static_cast<float>(fit.slope);
+        }
+      });
   return fits;
 }
 
@@ -92,29 +116,32 @@ NoiseModel estimate_noise(const PlanarImage& image, const WindowFits& fits, cons
   const NoiseModel shape = pinhole ? NoiseModel::kinect() : NoiseModel{1.0, 0.0, 0.0};
   const Quadratic shape_sigma = image.sigma(shape), unit_slope = image.unit_slope();
 
-  // In units of the shape: the residuals, the steps between neighbours, the side of a pixel.
+  // In units of the shape: the residuals, the steps of plateaus, the side of a pixel. A step that no sensor's unit of
+  // depth explains is an edge: the worst, Kinect v1, has half of max_step.
+  const float max_step = std::sqrt(12.0F);
   std::vector<float> residuals, steps, pixels;
   for (int row = 0; row < fits.rows; ++row) {
     for (int col = 0; col < fits.cols; ++col) {
       const float residual = fits.residual[static_cast<std::size_t>(row * fits.cols + col)];
       if (!(residual >= 0.0F)) continue;
-      const float* const pixel = image.row(WindowFits::centre(row)) + WindowFits::centre(col);
-      const float unit = 1.0F / shape_sigma(*pixel);
-      pixels.push_back(unit_slope(*pixel) * unit);
-      if (residual > 0.0F) residuals.push_back(residual * unit);
-      const float step = std::abs(pixel[1] - pixel[0]);
-      if (step > 0.0F) steps.push_back(step * unit);
+      const int u = WindowFits::centre(col), v = WindowFits::centre(row);
+      const float value = image.row(v)[u], unit = 1.0F / shape_sigma(value), pixel = unit_slope(value) * unit;
+      residuals.push_back(residual * unit);
+      pixels.push_back(pixel);
+      const float step = plateau_step(image, u, v) * unit;
+      if (step > 0.0F && step <= (pinhole ? max_step : kMaxStepPixels * pixel)) steps.push_back(step);
     }
   }
 
   // Nothing to measure: the sensor's prior, or a tenth of a pixel.
   if (pixels.size() < kMinSamples) return pinhole ? shape : NoiseModel{0.1 * camera.pixel_size(), 0.0, 0.0};
 
-  double scale = 1e-3 * quantile(pixels, 0.5);
-  // Below the median: edges and fine structure leave more over than noise does.
-  if (residuals.size() >= kMinSamples) scale = std::max<double>(scale, quantile(residuals, 0.4));
-  // Plateaus of a coarsely quantised image leave nothing over; there the smallest steps are one unit of depth.
-  if (steps.size() >= kMinSamples) scale = std::max<double>(scale, quantile(steps, 0.1) / std::sqrt(12.0));
+  // Below the median of the residuals: edges and fine structure leave more over than noise does.
+  double scale = std::max(1e-3 * quantile(pixels, 0.5), static_cast<double>(quantile(residuals, 0.4)));
+  // Plateaus leave nothing over.
+  if (static_cast<double>(steps.size()) > kMinStepped * static_cast<double>(pixels.size())) {
+    scale = std::max(scale, quantile(steps, 0.5) / std::sqrt(12.0));
+  }
   return {shape.constant * scale, shape.quadratic * scale, shape.offset};
 }
 

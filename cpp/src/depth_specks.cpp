@@ -24,7 +24,7 @@ Marks mark_lonely(int width, int height, const Marks& keep, double max_missing, 
   constexpr int radius = 2;
   Marks marks(keep.size());
   const auto pixel = [width](std::int64_t v, std::int64_t u) { return static_cast<std::size_t>(v * width + u); };
-  parallel_blocks(height, 16, num_threads, [&](std::int64_t, std::int64_t begin, std::int64_t end) {
+  parallel_blocks(height, rows_per_block(width), num_threads, [&](std::int64_t, std::int64_t begin, std::int64_t end) {
     std::vector<int> column(static_cast<std::size_t>(width + 2 * radius));
     for (std::int64_t v = begin; v < end; ++v) {
       const std::int64_t top = std::max<std::int64_t>(v - radius, 0);

@@ -93,6 +93,7 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.predict_motion = false;
   options.min_overlap = 0.0;
   options.min_consistency = 0.0;
+  options.max_residual = 1.0;
   return options;
 }
 
@@ -106,6 +107,7 @@ void ModelOptions::check() const {
   require(max_points >= 100, "max_points", "at least 100", max_points);
   require(min_overlap >= 0.0 && min_overlap <= 1.0, "min_overlap", "in [0, 1]", min_overlap);
   require(min_consistency >= 0.0 && min_consistency <= 1.0, "min_consistency", "in [0, 1]", min_consistency);
+  require(max_residual > 0.0, "max_residual", "positive", max_residual);
   require(first_fraction > 0.0 && first_fraction <= 1.0, "first_fraction", "in (0, 1]", first_fraction);
   require(kept_fraction > 0.0 && kept_fraction <= 1.0, "kept_fraction", "in (0, 1]", kept_fraction);
   require(new_fraction >= 0.0 && new_fraction <= 1.0, "new_fraction", "in [0, 1]", new_fraction);
@@ -196,7 +198,7 @@ TrackingResult Model::Impl::locate(const Frame& frame, const FrameExtras& extras
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, guesses(extras), options);
+  return track(cloud, frame, camera, guesses(extras), was_lost, options);
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {

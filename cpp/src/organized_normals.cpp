@@ -174,7 +174,7 @@ Frame make_frame(const DepthRef& depth, const Camera& camera, const NoiseModel& 
   frame.normals.setConstant(size, 3, std::numeric_limits<float>::quiet_NaN());
   frame.sigma.resize(size);
 
-  parallel_for(height, 8, num_threads, [&](std::int64_t row) {
+  parallel_for(height, rows_per_block(width), num_threads, [&](std::int64_t row) {
     const int v = static_cast<int>(row);
     const Ray* const rays = camera.rays().data() + row * width;
     for (int u = 0; u < width; ++u) {

@@ -25,7 +25,7 @@ PlanarImage::PlanarImage(const DepthRef& depth, const Camera& camera, int num_th
   values_.assign(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height_ + 2 * kBorder), missing);
   const bool radial = camera.depth_kind() == DepthKind::radial;
   const Ray* const rays = camera.rays().data();
-  parallel_for(height_, 16, num_threads, [&](std::int64_t v) {
+  parallel_for(height_, rows_per_block(width_), num_threads, [&](std::int64_t v) {
     const float* const source = &depth.coeffRef(v, 0);
     float* const target = values_.data() + (v + kBorder) * stride_ + kBorder;
     for (int u = 0; u < width_; ++u) {

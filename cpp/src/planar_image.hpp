@@ -2,7 +2,10 @@
 // an orthographic one. Edge tests, noise estimate and normals all work on it.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "nacre/camera.hpp"
@@ -44,6 +47,11 @@ class PlanarImage {
   float pixel_;  // the side of a pixel at distance 1 (pinhole), or everywhere (orthographic)
   std::vector<float> values_;
 };
+
+// Rows that are worth a thread's while, for images of this width.
+inline std::int64_t rows_per_block(std::int64_t width) {
+  return std::max<std::int64_t>(1, 8192 / std::max<std::int64_t>(1, width));
+}
 
 inline bool is_measurement(float depth) { return depth > 0.0F && depth <= std::numeric_limits<float>::max(); }
 

@@ -161,7 +161,9 @@ AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pos
     }
     pose = step.motion * pose;
     result.iterations = iteration + 1;
-    at_rest = !schedule.advance(step.size, scale, resolution);
+    // The accuracy that these residuals allow: six unknowns from so many pairs.
+    const double accuracy = scale * std::sqrt(6.0 / static_cast<double>(pairs.size()));
+    at_rest = !schedule.advance(step.size, scale, std::max(resolution, 0.2 * accuracy));
   }
   if (options.keep_best) pose = best_pose;
 

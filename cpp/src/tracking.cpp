@@ -89,12 +89,6 @@ double consistency_of(const PointModel& model, const Frame& frame, const Camera&
   return judged > 0 ? static_cast<double>(counts.agree) / static_cast<double>(judged) : 0.0;
 }
 
-// Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
-bool is_beyond_doubt(const TrackingResult& result, double gate) {
-  return result.status == FrameStatus::tracked && result.alignment.overlap > 0.5 && result.consistency > 0.9 &&
-         result.alignment.rmse < 0.25 * gate;
-}
-
 // Denoised points of the frame, spread over it at random: noise would shift the matches on curved surfaces.
 struct Samples {
   Points points, normals;
@@ -125,7 +119,13 @@ Samples sample_frame(const Frame& frame, const Camera& camera, const ModelOption
   return samples;
 }
 
-void judge(TrackingResult& result, const ModelOptions& options) {
+// Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
+bool is_beyond_doubt(const TrackingResult& result, double gate) {
+  return result.alignment.overlap > 0.35 && result.consistency > 0.9 && result.alignment.rmse < 0.25 * gate;
+}
+
+// After a loss the guess is poor, and only a registration beyond doubt is believed.
+void judge(TrackingResult& result, const ModelOptions& options, double gate, bool was_lost) {
   std::ostringstream reason;
   reason.precision(3);
   result.status = FrameStatus::lost;
@@ -135,6 +135,11 @@ void judge(TrackingResult& result, const ModelOptions& options) {
     reason << "overlap " << result.alignment.overlap << " is below " << options.min_overlap;
   } else if (result.consistency < options.min_consistency) {
     reason << "consistency " << result.consistency << " is below " << options.min_consistency;
+  } else if (result.alignment.rmse > options.max_residual * gate) {
+    reason << "residuals of " << result.alignment.rmse << " m are above " << options.max_residual * gate;
+  } else if (was_lost && !is_beyond_doubt(result, gate)) {
+    reason << "not sure enough after a loss: overlap " << result.alignment.overlap << ", consistency "
+           << result.consistency << ", residuals " << result.alignment.rmse << " m";
   } else if (result.alignment.weak_directions.cols() > 0) {
     result.status = FrameStatus::weak;
     reason << result.alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
@@ -147,7 +152,7 @@ void judge(TrackingResult& result, const ModelOptions& options) {
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera,
-                     const std::vector<Pose>& guesses, const ModelOptions& options) {
+                     const std::vector<Pose>& guesses, bool was_lost, const ModelOptions& options) {
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
   const bool automatic_gate = !(options.registration.max_distance > 0.0);
@@ -170,9 +175,9 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
       result.alignment = align_to(target, source, guess, align_options);
       result.consistency = consistency_of(model, frame, camera, result.alignment.target_from_source, target.spacing(),
                                           options.num_threads);
-      judge(result, options);
-      if (result.score() >= best.score()) best = result;
-      if (is_beyond_doubt(result, align_options.final_distance)) return result;
+      judge(result, options, align_options.final_distance, was_lost);
+      if (result.rank() >= best.rank()) best = result;
+      if (result.status == FrameStatus::tracked && is_beyond_doubt(result, align_options.final_distance)) return result;
     }
   }
   return best;

@@ -14,11 +14,12 @@ struct TrackingResult {
   FrameStatus status = FrameStatus::lost;
   std::string reason;  // why it is weak or lost
 
-  double score() const { return alignment.overlap * consistency; }
+  // A frame that is not lost before one that is, then by how much agrees.
+  double rank() const { return (status == FrameStatus::lost ? 0.0 : 1.0) + alignment.overlap * consistency; }
 };
 
 // Tries the guesses (world_from_camera, most trusted first) until one registers the frame.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera,
-                     const std::vector<Pose>& guesses, const ModelOptions& options);
+                     const std::vector<Pose>& guesses, bool was_lost, const ModelOptions& options);
 
 }  // namespace nacre

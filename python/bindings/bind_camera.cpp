@@ -31,6 +31,8 @@ Camera::Distortion parse_distortion(const std::vector<double>& coefficients) {
   return distortion;
 }
 
+py::tuple distortion_tuple(const Camera& camera) { return py::tuple(py::cast(camera.distortion())); }
+
 std::string repr(const Camera& camera) {
   const auto number = [](double value) { return py::repr(py::float_(value)).cast<std::string>(); };
   const std::string size = "width=" + std::to_string(camera.width()) + ", height=" + std::to_string(camera.height());
@@ -40,7 +42,7 @@ std::string repr(const Camera& camera) {
   std::string text = "Camera(" + size + ", fx=" + number(camera.fx()) + ", fy=" + number(camera.fy()) +
                      ", cx=" + number(camera.cx()) + ", cy=" + number(camera.cy());
   if (camera.distortion() != Camera::Distortion{}) {
-    text += ", distortion=" + py::repr(py::tuple(py::cast(camera.distortion()))).cast<std::string>();
+    text += ", distortion=" + py::repr(distortion_tuple(camera)).cast<std::string>();
   }
   if (camera.depth_kind() == DepthKind::radial) text += ", depth='radial'";
   return text + ")";
@@ -64,7 +66,7 @@ py::array_t<double> project(const Camera& camera,
 }
 
 py::tuple to_state(const Camera& c) {
-  return py::make_tuple(model_name(c), c.width(), c.height(), c.fx(), c.fy(), c.cx(), c.cy(), c.distortion(),
+  return py::make_tuple(model_name(c), c.width(), c.height(), c.fx(), c.fy(), c.cx(), c.cy(), distortion_tuple(c),
                         depth_name(c), c.pixel_size());
 }
 
@@ -116,7 +118,7 @@ ValueError
       .def_property_readonly("fy", &Camera::fy)
       .def_property_readonly("cx", &Camera::cx)
       .def_property_readonly("cy", &Camera::cy)
-      .def_property_readonly("distortion", &Camera::distortion)
+      .def_property_readonly("distortion", &distortion_tuple, "k1 k2 p1 p2 k3")
       .def_property_readonly("depth", &depth_name, "'z' or 'radial'")
       .def_property_readonly(
           "pixel_size",

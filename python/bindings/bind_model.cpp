@@ -73,6 +73,7 @@ void bind_model(py::module_& m) {
       .def_readwrite("predict_motion", &ModelOptions::predict_motion)
       .def_readwrite("min_overlap", &ModelOptions::min_overlap)
       .def_readwrite("min_consistency", &ModelOptions::min_consistency)
+      .def_readwrite("max_residual", &ModelOptions::max_residual)
       .def_readwrite("first_fraction", &ModelOptions::first_fraction)
       .def_readwrite("kept_fraction", &ModelOptions::kept_fraction)
       .def_readwrite("new_fraction", &ModelOptions::new_fraction)

@@ -3,46 +3,12 @@ The C++ core of nacre; use it through the nacre package.
 """
 
 from __future__ import annotations
+
 import collections.abc
-import numpy
-import numpy.typing
 import typing
 
-__all__: list[str] = [
-    "AlignOptions",
-    "AlignResult",
-    "Camera",
-    "ConsolidateOptions",
-    "ConsolidationMethod",
-    "DepthOptions",
-    "DepthReport",
-    "EdgeTest",
-    "FoldIn",
-    "Frame",
-    "FrameReport",
-    "FusionOptions",
-    "KdTree",
-    "MeshTree",
-    "Metric",
-    "Model",
-    "ModelOptions",
-    "NoiseModel",
-    "NormalOptions",
-    "PointModel",
-    "ProjectionHints",
-    "SimulationOptions",
-    "Theta",
-    "align",
-    "back_project",
-    "built_in_object",
-    "consolidate",
-    "estimate_noise",
-    "estimate_normals",
-    "make_frame",
-    "preprocess_depth",
-    "project_samples",
-    "simulate_depth",
-]
+import numpy
+import numpy.typing
 
 class Camera:
     """
@@ -73,8 +39,8 @@ class Camera:
         """
         A camera with parallel rays: x = (u - (width - 1) / 2) pixel_size [m].
         """
-    def __eq__(self, arg0: Camera) -> bool: ...
-    def __getstate__(self) -> tuple: ...
+    def __eq__(self, arg0: object) -> bool: ...
+    def __getstate__(self) -> tuple[typing.Any, ...]: ...
     def __hash__(self) -> int: ...
     def __init__(
         self,
@@ -95,7 +61,7 @@ class Camera:
         depth: str = "z",
     ) -> None: ...
     def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: tuple) -> None: ...
+    def __setstate__(self, arg0: tuple[typing.Any, ...]) -> None: ...
     def project(
         self, points: typing.Annotated[numpy.typing.ArrayLike, numpy.float64]
     ) -> numpy.typing.NDArray[numpy.float64]:
@@ -112,7 +78,10 @@ class Camera:
         'z' or 'radial'
         """
     @property
-    def distortion(self) -> typing.Annotated[list[float], "FixedSize(5)"]: ...
+    def distortion(self) -> tuple[typing.Any, ...]:
+        """
+        k1 k2 p1 p2 k3
+        """
     @property
     def fx(self) -> float: ...
     @property
@@ -276,7 +245,7 @@ class KdTree:
         k: typing.SupportsInt | typing.SupportsIndex,
         max_distance: typing.SupportsFloat | typing.SupportsIndex,
         num_threads: typing.SupportsInt | typing.SupportsIndex,
-    ) -> tuple: ...
+    ) -> tuple[typing.Any, ...]: ...
     @typing.overload
     def query(
         self,
@@ -284,21 +253,21 @@ class KdTree:
         k: typing.SupportsInt | typing.SupportsIndex,
         max_distance: typing.SupportsFloat | typing.SupportsIndex,
         num_threads: typing.SupportsInt | typing.SupportsIndex,
-    ) -> tuple: ...
+    ) -> tuple[typing.Any, ...]: ...
     @typing.overload
     def query_radius(
         self,
         queries: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
         radius: typing.SupportsFloat | typing.SupportsIndex,
         num_threads: typing.SupportsInt | typing.SupportsIndex,
-    ) -> tuple: ...
+    ) -> tuple[typing.Any, ...]: ...
     @typing.overload
     def query_radius(
         self,
         queries: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"],
         radius: typing.SupportsFloat | typing.SupportsIndex,
         num_threads: typing.SupportsInt | typing.SupportsIndex,
-    ) -> tuple: ...
+    ) -> tuple[typing.Any, ...]: ...
 
 class NormalOptions:
     def __init__(self) -> None: ...
@@ -550,12 +519,12 @@ class MeshTree:
         origins: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"],
         directions: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"],
         num_threads: typing.SupportsInt | typing.SupportsIndex,
-    ) -> tuple: ...
+    ) -> tuple[typing.Any, ...]: ...
     def closest(
         self,
         points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"],
         num_threads: typing.SupportsInt | typing.SupportsIndex,
-    ) -> tuple: ...
+    ) -> tuple[typing.Any, ...]: ...
     @property
     def lower(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[3, 1]"]: ...
     @property
@@ -680,6 +649,10 @@ class ModelOptions:
     @max_points.setter
     def max_points(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
+    def max_residual(self) -> float: ...
+    @max_residual.setter
+    def max_residual(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
     def min_consistency(self) -> float: ...
     @min_consistency.setter
     def min_consistency(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
@@ -723,7 +696,7 @@ class FrameReport:
     @property
     def information(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[6, 6]"]: ...
     @property
-    def milliseconds(self) -> dict: ...
+    def milliseconds(self) -> dict[str, typing.Any]: ...
     @property
     def num_inliers(self) -> int: ...
     @property
@@ -784,7 +757,7 @@ def back_project(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]"]: ...
-def built_in_object() -> tuple: ...
+def built_in_object() -> tuple[typing.Any, ...]: ...
 def consolidate(
     points: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
     options: ConsolidateOptions,

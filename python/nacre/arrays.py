@@ -22,7 +22,8 @@ def as_points(name: str, value: npt.ArrayLike) -> FloatArray:
     """
     Return ``value`` as a C-contiguous (N, 3) array of float32 or float64.
 
-    float32 and float64 arrays that are already C-contiguous are returned as they are; other real dtypes become float64.
+    float32 and float64 arrays that are already C-contiguous are returned as they are; other real dtypes
+    become float64.
     """
     array = _real(name, value)
     if array.ndim != 2 or array.shape[1] != 3:
@@ -86,7 +87,9 @@ def as_poses(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
 
 def as_depth(name: str, value: npt.ArrayLike, depth_scale: float = 1.0) -> npt.NDArray[np.float32]:
     """
-    Return a depth image as (H, W) float32 metres; a copy is made unless ``value`` is C-contiguous float32 metres.
+    Return a depth image as (H, W) float32 metres.
+
+    A copy is made unless ``value`` is C-contiguous float32 in metres.
 
     ``depth_scale`` is in stored units per metre. 0 and 65535 of integer images become NaN.
     """
@@ -119,7 +122,9 @@ def as_mask(name: str, value: npt.ArrayLike | None, shape: tuple[int, int]) -> n
 
 def localize(points: FloatArray) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float64]]:
     """
-    Split points into float32 coordinates about an origin and the origin, so that far-away coordinates keep their digits.
+    Split points into float32 coordinates about an origin and the origin.
+
+    So far-away coordinates keep their digits.
 
     float32 points come back as they are, with origin 0.
     """

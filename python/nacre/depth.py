@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import numbers
 from dataclasses import dataclass, fields
 from typing import Any, Literal, overload
 
@@ -15,8 +16,6 @@ from nacre.parameters import to_core
 
 DepthArray = npt.NDArray[np.float32]
 EdgeTest = Literal["inverse_depth", "gradient", "none"]
-
-EDGE_TESTS: tuple[EdgeTest, ...] = ("inverse_depth", "gradient", "none")
 
 
 @dataclass(frozen=True)
@@ -49,6 +48,10 @@ class NoiseModel:
         """Structured light, Nguyen et al. 2012: 1.2 mm + 1.9 mm (z - 0.4 m)^2."""
         return cls._from_core(_core.NoiseModel.kinect())
 
+    def to_core(self) -> Any:
+        """Return the C++ model with these values."""
+        return to_core(self, _core.NoiseModel())
+
     @classmethod
     def _from_core(cls, core: Any) -> NoiseModel:
         return cls(*(getattr(core, field.name) for field in fields(cls)))
@@ -76,18 +79,6 @@ class DepthParameters:
     min_component: int = 20
     noise: NoiseModel | None = None
 
-    def to_core(self) -> Any:
-        """Return the C++ options with these values; a ValueError lists the edge tests where the name is none."""
-        if self.edge_test not in EDGE_TESTS:
-            raise ValueError(f"edge_test must be one of {', '.join(map(repr, EDGE_TESTS))}, got {self.edge_test!r}")
-        core = _core.DepthOptions()
-        for field in fields(self):
-            if field.name not in ("edge_test", "noise"):
-                setattr(core, field.name, getattr(self, field.name))
-        core.edge_test = getattr(_core.EdgeTest, self.edge_test)
-        core.noise = None if self.noise is None else to_core(self.noise, _core.NoiseModel())
-        return core
-
 
 @dataclass(frozen=True)
 class DepthReport:
@@ -108,17 +99,16 @@ class DepthReport:
 
 
 def as_noise(name: str, value: Noise) -> NoiseModel | None:
-    """Return a noise argument as a model: a number is a constant [m], "kinect" is the Kinect's, None stays None."""
+    """Return a noise argument as a model: a number is a constant [m]; None stays None."""
+    expected = f"{name} must be a NoiseModel, a number of metres, 'kinect' or None"
     if value is None or isinstance(value, NoiseModel):
         return value
     if isinstance(value, str):
         if value != "kinect":
-            raise ValueError(f"{name} must be a NoiseModel, a number of metres, 'kinect' or None, got {value!r}")
+            raise ValueError(f"{expected}, got {value!r}")
         return NoiseModel.kinect()
-    if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
-        raise TypeError(
-            f"{name} must be a NoiseModel, a number of metres, 'kinect' or None, got {type(value).__name__}"
-        )
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise TypeError(f"{expected}, got {type(value).__name__}")
     return NoiseModel(constant=float(value))
 
 
@@ -184,8 +174,9 @@ def preprocess_depth(
     """
     Return a copy of a depth image in metres in which noise is NaN.
 
-    Pixels go, in this order: without a measurement (0, negative, NaN, inf; 65535 of integer images); outside the
-    depth range; outside the mask; at depth edges, where a pixel mixes two surfaces; isolated ones.
+    Pixels go, in this order: without a measurement (0, negative, NaN, inf; 65535 of integer images); outside
+    the depth range; outside the mask; at depth edges, where a pixel mixes two surfaces; on surfaces seen too
+    steeply; isolated ones.
 
     Parameters
     ----------
@@ -198,10 +189,11 @@ def preprocess_depth(
     depth_scale : float
         Stored units per metre: 1000 for millimetres, 5000 for TUM RGB-D.
     edge_test : {"inverse_depth", "gradient", "none"}
-        ``"gradient"`` is the strong-edge test of the paper: the gradient of the depth (3 x 3 Sobel) exceeds
-        ``gradient_threshold``; a missing neighbour is a strong edge. ``"inverse_depth"`` asks whether the second
-        difference of inverse depth (of depth for an orthographic camera), which is zero on any plane, exceeds its
-        noise, and so keeps slanted surfaces.
+        ``"gradient"`` removes strong edges: the gradient of the depth (3 x 3 Sobel) exceeds
+        ``gradient_threshold``; a missing neighbour is a strong edge. ``"inverse_depth"`` removes pixels where
+        the second difference of inverse depth (of depth for an orthographic camera), which is zero on any
+        plane, exceeds its noise, and so keeps slanted surfaces; a pixel beside a missing one is held against
+        the plane through its two inner neighbours.
     min_depth, max_depth : float
         Nearer and farther measurements are removed [m].
     gradient_threshold : float
@@ -217,7 +209,8 @@ def preprocess_depth(
     min_component : int
         Connected specks of fewer pixels go.
     noise : NoiseModel, float, "kinect" or None
-        The noise of the depth; a number is a constant standard deviation [m]; None measures it from the image.
+        The noise of the depth; a number is a constant standard deviation [m]; None measures it from the
+        image.
     return_report : bool
         Also return a :class:`DepthReport`.
     num_threads : int
@@ -233,8 +226,8 @@ def preprocess_depth(
     Raises
     ------
     ValueError
-        Depth, camera or mask differ in size; the median depth lies outside 0.05-50 m (a wrong ``depth_scale``);
-        an option is out of its range.
+        Depth, camera or mask differ in size; the median depth lies outside 0.05-50 m (a wrong
+        ``depth_scale``); an option is out of its range.
     """
     image = as_depth("depth", depth, depth_scale)
     parameters = DepthParameters(
@@ -251,12 +244,18 @@ def preprocess_depth(
     )
     shape = (image.shape[0], image.shape[1])
     clean, report = _core.preprocess_depth(
-        image, camera, parameters.to_core(), as_mask("mask", mask, shape), num_threads
+        image,
+        camera,
+        to_core(parameters, _core.DepthOptions()),
+        as_mask("mask", mask, shape),
+        num_threads,
     )
     return (clean, DepthReport._from_core(report)) if return_report else clean
 
 
-def back_project(depth: npt.ArrayLike, camera: _core.Camera, *, depth_scale: float = 1.0) -> npt.NDArray[np.float32]:
+def back_project(
+    depth: npt.ArrayLike, camera: _core.Camera, *, depth_scale: float = 1.0
+) -> npt.NDArray[np.float32]:
     """
     Return the valid pixels of a depth image as points of the camera's frame, row by row.
 
@@ -294,8 +293,9 @@ def depth_normals(
     """
     Return the normals of a depth image: the fast path for organised points.
 
-    A plane is affine in inverse depth over the image of a pinhole camera, and affine in depth for an orthographic
-    one, so a normal is one linear fit over a window. The window grows with the noise, from 5 x 5 to 11 x 11.
+    A plane is affine in inverse depth over the image of a pinhole camera, and affine in depth for an
+    orthographic one, so a normal is one linear fit over a window. The window grows with the noise, from 5 x 5
+    to 11 x 11; pixels across a depth edge do not count.
 
     Parameters
     ----------
@@ -306,7 +306,8 @@ def depth_normals(
     depth_scale : float
         Stored units per metre.
     noise : NoiseModel, float, "kinect" or None
-        The noise of the depth; a number is a constant standard deviation [m]; None measures it from the image.
+        The noise of the depth; a number is a constant standard deviation [m]; None measures it from the
+        image.
     num_threads : int
         0 uses every processor. The result does not depend on it.
 
@@ -322,7 +323,7 @@ def depth_normals(
     """
     image = as_depth("depth", depth, depth_scale)
     model = as_noise("noise", noise) or estimate_noise(image, camera, num_threads=num_threads)
-    frame = _core.make_frame(image, camera, to_core(model, _core.NoiseModel()), num_threads)
+    frame = _core.make_frame(image, camera, model.to_core(), num_threads)
     normals: npt.NDArray[np.float32] = frame.normals.reshape(*image.shape, 3)
     return normals
 
@@ -347,9 +348,9 @@ def estimate_noise(
     Returns
     -------
     noise : NoiseModel
-        For a pinhole camera the Kinect's curve scaled to the image, for an orthographic camera a constant. A clean
-        image gives a small positive floor; an image without a single smooth patch the Kinect's curve itself, or
-        for an orthographic camera a tenth of a pixel.
+        For a pinhole camera the Kinect's curve scaled to the image, for an orthographic camera a constant. A
+        clean image gives a small positive floor; an image without smooth patches the Kinect's curve itself,
+        or a tenth of a pixel for an orthographic camera.
 
     Raises
     ------

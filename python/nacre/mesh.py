@@ -173,7 +173,7 @@ class Mesh:
             num_threads=num_threads,
         )
         options = to_core(parameters, _core.SimulationOptions())
-        return _core.simulate_depth(self._tree, camera, pose, options)  # type: ignore[no-any-return]
+        return _core.simulate_depth(self._tree, camera, pose, options)
 
 
 def built_in_object() -> Mesh:

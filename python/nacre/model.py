@@ -51,7 +51,7 @@ class FusionParameters:
 
 @dataclass(frozen=True)
 class ConsolidationParameters:
-    """How frames are folded in by WLOP; see :func:`nacre.consolidate`. Mirrors the C++ ``ConsolidateOptions``."""
+    """How WLOP folds frames in; see :func:`nacre.consolidate`. Mirrors the C++ ``ConsolidateOptions``."""
 
     method: Literal["wlop", "wlop+", "cgal"] = "wlop"
     radius: float = 0.008
@@ -80,11 +80,11 @@ class ModelParameters:
     Attributes
     ----------
     depth, registration, fusion, consolidation, normals
-        Of the steps of the loop. ``consolidation`` and ``normals`` (of the model) are used where ``fold_in`` is not
-        "fuse".
+        Of the steps of the loop. ``consolidation`` and ``normals`` (of the model) are used where ``fold_in``
+        is not "fuse".
     fold_in : "fuse", "wlop" or "wlop+"
-        How a registered frame becomes part of the model: confidence-weighted fusion, the 2010 paper's WLOP of model and
-        new points, or WLOP repaired for incremental use.
+        How a registered frame becomes part of the model: confidence-weighted fusion, the 2010 paper's WLOP of
+        model and new points, or WLOP repaired for incremental use.
     spacing : float
         Distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces.
     max_points : int
@@ -92,11 +92,13 @@ class ModelParameters:
     predict_motion : bool
         Start also from the pose that continues the last motion.
     min_overlap, min_consistency : float
-        A frame of which a smaller part matches the model is lost; so is one that sees through more than the rest of what
-        the model shows there.
+        A frame of which a smaller part matches the model is lost; so is one that sees through more than the
+        rest of what the model shows there.
+    max_residual : float
+        So is one whose residuals exceed this part of the last gate on distances; chance gives 0.58.
     first_fraction, kept_fraction, new_fraction : float
-        WLOP: part of the first frame that becomes the model; part of the model that is kept at each frame; new points,
-        as a part of the model.
+        WLOP: part of the first frame that becomes the model; part of the model that is kept at each frame;
+        new points, as a part of the model.
     num_threads : int
         0: all.
     """
@@ -110,8 +112,9 @@ class ModelParameters:
     spacing: float = 0.0
     max_points: int = 500000
     predict_motion: bool = True
-    min_overlap: float = 0.25
-    min_consistency: float = 0.7
+    min_overlap: float = 0.15
+    min_consistency: float = 0.8
+    max_residual: float = 0.35
     first_fraction: float = 0.5
     kept_fraction: float = 0.9
     new_fraction: float = 0.2
@@ -135,8 +138,9 @@ class FrameReport:
     timestamp : float or None
         As given [s].
     status : str
-        TRACKED: registered and folded in. WEAK: registered, but the data leaves a direction of the pose open; not folded
-        in. LOST: not registered, the model is as it was. RELOCALISED: registered again after being lost.
+        TRACKED: registered and folded in. WEAK: registered, but the data leaves a direction of the pose open;
+        not folded in. LOST: not registered, the model is as it was. RELOCALISED: registered again after being
+        lost.
     reason : str
         Why the frame is weak or lost; empty otherwise.
     world_from_camera : (4, 4) float64
@@ -199,8 +203,8 @@ class Model:
     """
     A 3D model that grows with every depth frame.
 
-    The world is the first camera's frame, unless the first frame comes with a guess of its pose. Frames that cannot be
-    registered change nothing.
+    The world is the first camera's frame, unless the first frame comes with a guess of its pose. Frames that
+    cannot be registered change nothing.
 
     Parameters
     ----------
@@ -211,7 +215,8 @@ class Model:
     parameters : ModelParameters, optional
         Takes the place of the preset.
     depth_scale : float
-        Stored units per metre of the depth images that will come: 1 for metres, 1000 for millimetres, 5000 for TUM.
+        Stored units per metre of the depth images that will come: 1 for metres, 1000 for millimetres, 5000
+        for TUM.
     **changes
         Fields of :class:`ModelParameters` to change, such as ``spacing=0.002``.
 
@@ -258,8 +263,9 @@ class Model:
         Parameters
         ----------
         depth : (H, W) real
-            Depth in the camera's kind, in units of 1 / ``depth_scale`` metres; 0, NaN, inf, negative values and 65535
-            of integer images are no measurement. Not copied if it is C-contiguous float32 in metres.
+            Depth in the camera's kind, in units of 1 / ``depth_scale`` metres; 0, NaN, inf, negative values
+            and 65535 of integer images are no measurement. Not copied if it is C-contiguous float32 in
+            metres.
         color : (H, W, 3) uint8, optional
             Red, green, blue of each pixel; fused along with the points.
         mask : (H, W), optional
@@ -274,13 +280,14 @@ class Model:
         Returns
         -------
         FrameReport
-            Its ``status`` is "LOST" where the frame could not be registered; then the model is as it was before.
+            Its ``status`` is "LOST" where the frame could not be registered; then the model is as it was
+            before.
 
         Raises
         ------
         TypeError, ValueError
-            Arrays of the wrong type or shape; a median depth outside 0.05-50 m (the depth scale cannot be right).
-            Nothing is changed.
+            Arrays of the wrong type or shape; a median depth outside 0.05-50 m (the depth scale cannot be
+            right). Nothing is changed.
         """
         image = as_depth("depth", depth, self._depth_scale)
         pixels = as_mask("mask", mask, image.shape)
@@ -289,7 +296,7 @@ class Model:
             array = np.asarray(color)
             if array.shape != (*image.shape, 3) or array.dtype != np.uint8:
                 raise ValueError(
-                    f"color must be uint8 of shape {(*image.shape, 3)}, got {array.dtype} of shape {array.shape}"
+                    f"color must be uint8 of shape {(*image.shape, 3)}, got {array.dtype} {array.shape}"
                 )
             colors = np.ascontiguousarray(array).reshape(-1, 3)
         pose = None if guess is None else as_pose("guess", guess)
@@ -305,7 +312,8 @@ class Model:
 
     def __repr__(self) -> str:
         tracked = sum(report.tracked for report in self._frames)
-        return f"Model({len(self)} points, {tracked} of {len(self._frames)} frames tracked, spacing={self.spacing:.4g} m)"
+        frames = f"{tracked} of {len(self._frames)} frames tracked"
+        return f"Model({len(self)} points, {frames}, spacing={self.spacing:.4g} m)"
 
     @property
     def camera(self) -> Camera:

@@ -1,4 +1,4 @@
-"""Parameters as frozen dataclasses. Each mirrors the C++ struct of the same meaning; a test compares the defaults."""
+"""Parameters as frozen dataclasses, each the mirror of a C++ struct; a test compares the defaults."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ def to_core(parameters: Any, core: Core) -> Core:
     """
     Copy every field of a dataclass into the C++ options object ``core`` and return it.
 
-    Strings become the enumerator of that name ("wlop+" is ``wlop_plus``); a ValueError lists the names where there is
-    none.
+    Strings become the enumerator of that name ("wlop+" is ``wlop_plus``); a ValueError lists the names where
+    there is none.
     """
     for field in dataclasses.fields(parameters):
         value = getattr(parameters, field.name)
@@ -44,7 +44,7 @@ def from_core(parameters_type: type[Parameters], core: Any) -> Parameters:
         value = getattr(core, field.name)
         default = getattr(defaults, field.name)
         if value is not None and dataclasses.is_dataclass(default):
-            value = from_core(type(default), value)  # type: ignore[arg-type]
+            value = from_core(type(default), value)
         elif isinstance(default, str):
             value = value.name.replace("_plus", "+")
         values[field.name] = value
@@ -53,7 +53,9 @@ def from_core(parameters_type: type[Parameters], core: Any) -> Parameters:
 
 def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
     """
-    Return parameters with changes by dotted name, such as ``{"registration.max_angle": 0.5}``; nested mappings do too.
+    Return parameters with changes by dotted name, such as ``{"registration.max_angle": 0.5}``.
+
+    Nested mappings do too.
 
     A name that does not exist raises a ValueError that lists those that do.
     """

@@ -58,14 +58,15 @@ class AlignResult:
     overlap : float
         ``num_inliers`` divided by the number of source points that were used.
     rmse : float
-        Root mean square of the inliers' residuals along the normals (of their distances, for "point_to_point") [m];
-        NaN where nothing matched.
+        Root mean square of the inliers' residuals along the normals (of their distances, for
+        "point_to_point") [m]; NaN where nothing matched.
     information : (6, 6) float64
-        Inverse covariance of the pose, for a twist (rotation [rad], translation [m]) about ``center`` in the target's
-        frame. It takes the residuals for independent, so it is optimistic.
+        Inverse covariance of the pose, for a twist (rotation [rad], translation [m]) about ``center`` in the
+        target's frame. It takes the residuals for independent, so it is optimistic.
     weak_directions : (K, 6) float64
-        Unit twists about ``center``, rotations in units of the inliers' extent, that the data does not determine; the
-        pose keeps its initial value along them. K is 0 for a well determined pose, 3 for a plane.
+        Unit twists about ``center``, rotations in units of the inliers' extent, that the data does not
+        determine; the pose keeps its initial value along them. K is 0 for a well determined pose, 3 for a
+        plane.
     center : (3,) float64
         Centroid of the inliers, in the target's frame [m].
     """
@@ -88,7 +89,7 @@ class AlignResult:
     def __repr__(self) -> str:
         return (
             f"AlignResult({self.status}, iterations={self.iterations}, num_inliers={self.num_inliers}, "
-            f"overlap={self.overlap:.3f}, rmse={self.rmse:.3g} m, weak_directions={len(self.weak_directions)})"
+            f"overlap={self.overlap:.3f}, rmse={self.rmse:.3g} m, {len(self.weak_directions)} weak)"
         )
 
 
@@ -98,7 +99,9 @@ def _cloud(
     points = as_points(name, points)
     rows = np.zeros((0, 3), np.float32)
     if normals is not None:
-        rows = as_matching_points(f"{name}_normals", normals, name, len(points)).astype(np.float32, copy=False)
+        rows = as_matching_points(f"{name}_normals", normals, name, len(points)).astype(
+            np.float32, copy=False
+        )
     values = np.zeros(0, np.float32)
     if sigma is not None:
         values = np.ascontiguousarray(sigma, dtype=np.float32)
@@ -109,7 +112,9 @@ def _cloud(
     return points, rows, values
 
 
-def _shifted(pose: npt.NDArray[np.float64], source: npt.NDArray[Any], target: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+def _shifted(
+    pose: npt.NDArray[np.float64], source: npt.NDArray[Any], target: npt.NDArray[Any]
+) -> npt.NDArray[np.float64]:
     """Return a motion between frames as one between frames about the given origins."""
     moved = pose.copy()
     moved[:3, 3] += pose[:3, :3] @ source - target
@@ -143,18 +148,18 @@ def align(
     """
     Find the rigid motion that brings one cloud onto another, from a first guess.
 
-    Iterative closest point: each source point is paired with its nearest target point, pairs that are too far apart or
-    whose normals disagree are dropped, the motion that reduces the residuals of the rest is applied, and again. The
-    gate on distances starts wide and shrinks; the points become more as it does.
+    Iterative closest point: each source point is paired with its nearest target point, pairs that are too far
+    apart or whose normals disagree are dropped, the motion that reduces the residuals of the rest is applied,
+    and again. The gate on distances starts wide and shrinks; the points become more as it does.
 
     Parameters
     ----------
     source, target : (N, 3), (M, 3) real
-        Points [m]. Rows that are not finite are ignored. float32 and float64 arrays that are C-contiguous are not copied,
-        but float64 is converted to float32 about its centre.
+        Points [m]. Rows that are not finite are ignored. float32 and float64 arrays that are C-contiguous are
+        not copied, but float64 is converted to float32 about its centre.
     source_normals, target_normals : (N, 3), (M, 3) real, optional
-        Unit normals. Estimated from the 16 nearest neighbours where the method needs them and they are not given; then
-        their sides are ignored.
+        Unit normals. Estimated from the 16 nearest neighbours where the method needs them and they are not
+        given; then their sides are ignored.
     source_sigma, target_sigma : (N,), (M,) real, optional
         Standard deviation of each point along its normal [m]; pairs count by 1 / (sum of squares).
     initial : (4, 4), optional
@@ -189,7 +194,8 @@ def align(
     Returns
     -------
     AlignResult
-        With ``converged`` False, and the initial motion, where the data allows no answer (empty, disjoint, NaN).
+        With ``converged`` False, and the initial motion, where the data allows no answer (empty, disjoint,
+        NaN).
 
     Raises
     ------

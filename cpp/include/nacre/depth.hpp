@@ -27,8 +27,11 @@ struct NoiseModel {
 /// Which pixels at depth edges are noise.
 enum class EdgeTest {
   none,
-  gradient,      ///< the paper's: strong gradients of depth (3 x 3 Sobel), dilated
-  inverse_depth  ///< second difference of inverse depth, zero on any plane, and a slope cap: keeps slanted surfaces
+  /// The paper's: strong gradients of depth (3 x 3 Sobel), dilated. A missing neighbour is a strong gradient.
+  gradient,
+  /// Second difference of inverse depth, zero on any plane, against its noise, which grows with the slant; a pixel
+  /// beside a missing one is held against its two inner neighbours. And a slope cap. Keeps slanted surfaces.
+  inverse_depth
 };
 
 /// What preprocess_depth removes. Every pixel that is removed becomes NaN.
@@ -37,7 +40,7 @@ struct DepthOptions {
   double min_depth = 0.0;                                      ///< nearer values are removed [m]
   double max_depth = std::numeric_limits<double>::infinity();  ///< farther values are removed [m]
   double gradient_threshold = 0.005;                           ///< gradient test: depth step across one pixel [m]
-  int edge_dilation = 1;                                       ///< both tests: an edge grows by so many pixels
+  int edge_dilation = 1;            ///< both tests: an edge grows by so many pixels to its 4 neighbours
   double edge_sigmas = 4.0;         ///< inverse-depth test: threshold in standard deviations of the second difference
   double max_slant = 1.3962634;     ///< inverse-depth test: steeper surfaces are removed [rad]; 80 degrees
   double max_missing = 0.6;         ///< a pixel goes where more than this part of its 5 x 5 neighbours is missing
@@ -64,8 +67,10 @@ DepthImage depth_from_raw(
     const Eigen::Ref<const Eigen::Array<std::uint16_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>& raw,
     double depth_scale);
 
-/// The noise of a depth image, from the residuals of local plane fits (robust): for a pinhole camera the Kinect's
-/// curve scaled to the residuals, for an orthographic camera a constant. A clean image gives a small positive floor.
+/// The noise of a depth image, from the residuals of local surface fits (robust) and, where the image is quantised to
+/// plateaus, from their steps: for a pinhole camera the Kinect's curve scaled to them, for an orthographic camera a
+/// constant. A clean image gives a small positive floor, one without smooth patches the Kinect's curve (orthographic: a
+/// tenth of a pixel).
 NoiseModel estimate_noise(const DepthRef& depth, const Camera& camera, int num_threads = 0);
 
 /// A copy of a depth image in which noise is NaN. Throws std::invalid_argument when depth and camera or mask differ in
@@ -87,7 +92,7 @@ struct Frame {
 
 /// Points and normals of a cleaned depth image. A plane is affine in inverse depth over the image of a pinhole camera
 /// and affine in depth for an orthographic one, so a normal is one linear fit over a window; the window (5 x 5 to
-/// 11 x 11) grows with the noise.
+/// 11 x 11) grows with the noise, and pixels across a depth edge are left out of it.
 Frame make_frame(const DepthRef& depth, const Camera& camera, const NoiseModel& noise, int num_threads = 0);
 
 }  // namespace nacre

@@ -39,15 +39,16 @@ struct ModelOptions {
   FusionOptions fusion;
   ConsolidateOptions consolidation;  ///< its num_points is not used: see max_points
   NormalOptions normals;             ///< of the model, where fold_in is not fuse
-  double spacing = 0.0;              ///< distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces
-  int max_points = 500000;           ///< the model never grows beyond: its spacing is widened instead
-  bool predict_motion = true;        ///< start also from the pose that continues the last motion
-  double min_overlap = 0.25;         ///< a frame of which a smaller part matches the model is lost
-  double min_consistency = 0.7;      ///< so is one that sees through more than the rest of what the model shows there
-  double first_fraction = 0.5;       ///< wlop: part of the first frame that becomes the model
-  double kept_fraction = 0.9;        ///< wlop: part of the model that is kept at each frame
-  double new_fraction = 0.2;         ///< wlop: new points, as a part of the model
-  int num_threads = 0;               ///< 0: all
+  double spacing = 0.0;  ///< distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces
+  int max_points = 500000;       ///< the model never grows beyond: its spacing is widened instead
+  bool predict_motion = true;    ///< start also from the pose that continues the last motion
+  double min_overlap = 0.15;     ///< a frame of which a smaller part matches the model is lost
+  double min_consistency = 0.8;  ///< so is one that sees through more than the rest of what the model shows there
+  double max_residual = 0.35;    ///< and one whose residuals exceed this part of the last gate; by chance it is 0.58
+  double first_fraction = 0.5;   ///< wlop: part of the first frame that becomes the model
+  double kept_fraction = 0.9;    ///< wlop: part of the model that is kept at each frame
+  double new_fraction = 0.2;     ///< wlop: new points, as a part of the model
+  int num_threads = 0;           ///< 0: all
 
   /// "default" (what measures best) or "paper" (every number of the 2010 paper); std::invalid_argument otherwise.
   static ModelOptions preset(const std::string& name);

@@ -23,12 +23,15 @@ DEPTH_SCALE = 5000.0
 
 _log = logging.getLogger(__name__)
 
-_INTRINSICS = {
-    "1": (517.3, 516.5, 318.6, 255.3),
-    "2": (520.9, 521.0, 325.1, 249.7),
-    "3": (535.4, 539.2, 320.1, 247.6),
+# fx fy cx cy and distortion of the colour camera, to which the depth images are registered, as the
+# benchmark's page gives them; the third camera's images come undistorted.
+_NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
+_CALIBRATIONS = {
+    "1": ((517.3, 516.5, 318.6, 255.3), (0.2624, -0.9531, -0.0054, 0.0026, 1.1633)),
+    "2": ((520.9, 521.0, 325.1, 249.7), (0.2312, -0.7849, -0.0033, -0.0001, 0.9172)),
+    "3": ((535.4, 539.2, 320.1, 247.6), _NO_DISTORTION),
 }
-_ROS_DEFAULT = (525.0, 525.0, 319.5, 239.5)
+_ROS_DEFAULT = ((525.0, 525.0, 319.5, 239.5), _NO_DISTORTION)
 
 
 def recognise(folder: Path) -> bool:
@@ -101,8 +104,8 @@ def poses_at(
 
 def _default_camera(folder: Path) -> Camera:
     number = _freiburg(folder)
-    fx, fy, cx, cy = _INTRINSICS[number] if number is not None else _ROS_DEFAULT
-    camera = Camera(width=640, height=480, fx=fx, fy=fy, cx=cx, cy=cy)
+    (fx, fy, cx, cy), distortion = _CALIBRATIONS[number] if number is not None else _ROS_DEFAULT
+    camera = Camera(width=640, height=480, fx=fx, fy=fy, cx=cx, cy=cy, distortion=distortion)
     if number is None:
         _log.warning("%s: nothing says freiburg1, 2 or 3; assumed the driver's default, %r", folder, camera)
     return camera

@@ -137,8 +137,8 @@ def measure_spacing(points: npt.ArrayLike) -> Array:
     """
     Return how far each point's disk must reach to meet the disks around it.
 
-    That is the distance to the sixth neighbour, where a regular lattice has its ring; outliers get three
-    medians.
+    That is the distance to the fourth neighbour: on a regular lattice all of the ring, at a border still the
+    half of it. Outliers get two medians.
     """
     from nacre import KdTree
 
@@ -147,10 +147,10 @@ def measure_spacing(points: npt.ArrayLike) -> Array:
     finite = np.isfinite(cloud).all(axis=1)
     usable = cloud[finite]
     if len(usable) > 1:
-        distance = np.asarray(KdTree(usable).query(usable, k=min(7, len(usable)))[0], dtype=np.float64)[:, -1]
+        distance = np.asarray(KdTree(usable).query(usable, k=min(5, len(usable)))[0], dtype=np.float64)[:, -1]
         typical = float(np.median(distance))
         if typical > 0:
-            spacing[finite] = np.clip(distance, 0.05 * typical, 3 * typical)
+            spacing[finite] = np.clip(distance, 0.05 * typical, 2 * typical)
     return spacing
 
 

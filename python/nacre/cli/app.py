@@ -1,0 +1,116 @@
+"""The commands, and what happens to their errors."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+from nacre.cli.align import align
+from nacre.cli.consolidate import consolidate
+from nacre.cli.demo import demo
+from nacre.cli.evaluate import evaluate
+from nacre.cli.info import info
+from nacre.cli.reconstruct import reconstruct
+from nacre.cli.simulate import simulate
+from nacre.cli.terminal import CommandError, set_verbosity
+from nacre.errors import FileFormatError
+
+app = typer.Typer(
+    name="nacre",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        import nacre
+
+        print(f"nacre {nacre.__version__}")
+        raise typer.Exit
+
+
+@app.callback(
+    epilog="New here? Run [bold]nacre demo[/bold]. Every command explains itself: nacre COMMAND --help."
+)
+def _nacre(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """Grow a 3D model of an object or a scene from depth-camera images."""
+
+
+for command, example in (
+    (demo, "nacre demo -o nacre-demo"),
+    (reconstruct, "nacre reconstruct rgbd_dataset_freiburg3_teddy -o teddy"),
+    (
+        simulate,
+        "nacre simulate bunny.ply -o bunny-recording --views 12 --step 30 --noise 0.0005 --orthographic",
+    ),
+    (evaluate, "nacre evaluate out/model.ply bunny.ply"),
+    (align, "nacre align scan2.ply scan1.ply -o moved.ply"),
+    (consolidate, "nacre consolidate noisy.ply thin.ply --radius 0.008 --num-points 2000"),
+    (info, "nacre info rgbd_dataset_freiburg3_teddy"),
+):
+    paragraphs = (" ".join(text.split()) for text in (command.__doc__ or "").split("\n\n"))
+    app.command(
+        help="\n\n".join(paragraphs),
+        epilog=f"Example: [bold]{example}[/bold]",
+        no_args_is_help=command is not demo,
+    )(command)
+
+
+def run(arguments: Sequence[str] | None = None) -> int:
+    """Run a command and return its exit code; whatever goes wrong is told in one line."""
+    set_verbosity(0)
+    try:
+        return app(arguments, prog_name="nacre", standalone_mode=False) or 0
+    except Exception as error:
+        message, code = explain(error)
+        if message:
+            print(f"error: {message}", file=sys.stderr)
+        if logging.getLogger("nacre").isEnabledFor(logging.DEBUG):
+            traceback.print_exception(error)
+        return code
+    finally:
+        set_verbosity(None)
+
+
+def explain(error: Exception) -> tuple[str, int]:
+    """Return what to say about an error, and the exit code."""
+    if hasattr(error, "format_message"):  # the parser's: wrong usage, or help where arguments are missing
+        context = getattr(error, "ctx", None)
+        message = error.format_message()
+        if type(error).__name__ == "NoArgsIsHelpError":
+            print(message)
+            return "", 0 if context is not None and context.parent is None else 2
+        hint = f" (see {context.command_path} --help)" if context is not None else ""
+        return message.rstrip(".") + hint, 2
+    if isinstance(error, CommandError):
+        return str(error), error.code
+    if isinstance(error, FileFormatError):
+        return str(error), 1
+    if isinstance(error, OSError):
+        name = f": {os.fspath(error.filename)}" if error.filename is not None else ""
+        text = f"{error.strerror[:1].lower()}{error.strerror[1:]}{name}" if error.strerror else str(error)
+        wrong_usage = (
+            FileNotFoundError,
+            FileExistsError,
+            IsADirectoryError,
+            NotADirectoryError,
+            PermissionError,
+        )
+        return text, 2 if isinstance(error, wrong_usage) else 1
+    if isinstance(error, (ImportError, ValueError, TypeError)):
+        return str(error), 2
+    return f"{type(error).__name__}: {error} (this should not happen; -v -v shows where)", 1

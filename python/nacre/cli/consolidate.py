@@ -1,0 +1,132 @@
+"""``nacre consolidate``: fewer, evenly spread points in place of many noisy ones."""
+
+from __future__ import annotations
+
+import math
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, to_json, writable_file
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+
+class Method(str, Enum):
+    """Which form of WLOP."""
+
+    wlop = "wlop"
+    wlop_plus = "wlop+"
+    cgal = "cgal"
+
+
+def consolidate(
+    source: Annotated[
+        Path, typer.Argument(metavar="IN", help="A point file (PLY, PCD).", show_default=False)
+    ],
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", help="The file to write (PLY, PCD).", show_default=False)
+    ],
+    radius: Annotated[
+        float | None,
+        typer.Option(
+            help="Support radius, in the unit of the points.", show_default="from the points' density"
+        ),
+    ] = None,
+    num_points: Annotated[int, typer.Option(min=1, help="Points of the result.")] = 2000,
+    iterations: Annotated[int, typer.Option(min=0, help="How often the points move.")] = 10,
+    mu: Annotated[float, typer.Option(min=0, max=0.5, help="Weight of the repulsion.")] = 0.4,
+    method: Annotated[
+        Method, typer.Option(help="wlop: Huang et al. 2009; wlop+: repaired; cgal: with CGAL's kernel.")
+    ] = Method.wlop,
+    seed: Annotated[int, typer.Option(min=0, help="Of the choice of points.")] = 0,
+    json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+) -> None:
+    """
+    Replace a noisy point set by fewer, evenly spread, denoised points (WLOP).
+
+    Normals, colours and every other field of the file are carried along.
+    """
+    terminal = Terminal(json, quiet, verbose)
+    import numpy as np
+
+    import nacre
+    from nacre.evaluation import uniformity
+    from nacre.report.text import count
+
+    writable_file(out)
+    if out.suffix.lower() not in (".ply", ".pcd"):
+        raise CommandError(f"point files end in .ply or .pcd, got {out}", 2)
+    cloud = nacre.read_points(source)
+    finite = int(np.isfinite(cloud.points).all(axis=1).sum())
+    if finite == 0:
+        raise CommandError(f"{source}: no point of {len(cloud)} is finite")
+    given = radius is not None
+    if radius is None:
+        radius = default_radius(cloud.points, num_points)
+    attributes = dict(cloud.attributes)
+    left_out = [name for name, array in attributes.items() if array.dtype.kind not in "buif"]
+    for name in left_out:
+        del attributes[name]
+    cargo = dict(attributes)
+    own = {"normals": cloud.normals, "colors": cloud.colors}
+    cargo |= {name: array for name, array in own.items() if array is not None}
+    result = nacre.consolidate(
+        cloud.points,
+        radius=radius,
+        num_points=num_points,
+        iterations=iterations,
+        mu=mu,
+        method=method.value,
+        attributes=cargo,
+        seed=seed,
+    )
+    nacre.write_points(
+        out,
+        result.points,
+        normals=result.attributes.get("normals") if cloud.normals is not None else None,
+        colors=result.attributes.get("colors") if cloud.colors is not None else None,
+        attributes={name: result.attributes[name] for name in attributes},
+    )
+    before, after = uniformity(cloud.points), uniformity(result.points)
+    carried = [*(name for name, array in own.items() if array is not None), *attributes]
+    terminal.say(f"radius {radius:.4g} ({'given' if given else 'from the density of the points'})")
+    terminal.say(f"{count(len(cloud))} points to {count(len(result))} in {out}")
+    terminal.say(
+        f"uniformity {before.coefficient_of_variation:.3f} to {after.coefficient_of_variation:.3f} "
+        "(variation of spacing; random points: 0.52)"
+    )
+    terminal.say(f"carried along: {', '.join(carried) or 'nothing else was there'}")
+    if left_out:
+        terminal.say(f"left out (not numbers): {', '.join(left_out)}")
+    if json:
+        figures: dict[str, Any] = {
+            "out": out, "radius": radius, "radius_given": given,
+            "num_input": len(cloud), "num_points": len(result),
+            "uniformity": after.as_dict(), "uniformity_before": before.as_dict(), "carried": carried,
+            "left_out": left_out,
+        }  # fmt: skip
+        print(to_json(figures))
+
+
+def default_radius(points: npt.NDArray[np.floating[Any]], num_points: int) -> float:
+    """Return 2.5 times the distance that so many points will have, which the neighbours' density tells."""
+    import numpy as np
+
+    import nacre
+
+    cloud = points[np.isfinite(points).all(axis=1)]
+    k = min(17, len(cloud))
+    probes = cloud[:: max(len(cloud) // 5000, 1)]
+    reach = float(np.median(nacre.KdTree(cloud).query(probes, k=k)[0].reshape(len(probes), -1)[:, -1]))
+    if reach <= 0:
+        raise CommandError("the points lie on top of each other; give --radius", 2)
+    density = k / (math.pi * reach**2)  # per area
+    kept = min(num_points / len(cloud), 1.0)
+    return float(f"{2.5 / math.sqrt(density * kept):.3g}")

@@ -1,0 +1,147 @@
+"""``nacre info``: what is in a recording, a point file or a mesh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
+from nacre.cli.surfaces import MESH_SUFFIXES, POINT_SUFFIXES, has_faces
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
+
+Rows = list[tuple[str, str]]
+
+
+def info(
+    source: Annotated[
+        Path,
+        typer.Argument(metavar="SOURCE", help="A recording, a point file or a mesh.", show_default=False),
+    ],
+    format: FormatOption = None,
+    camera: CameraOption = None,
+    depth_scale: DepthScaleOption = None,
+    json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+) -> None:
+    """Tell what is in a recording, a point file or a mesh."""
+    terminal = Terminal(json, quiet, verbose)
+    if not source.exists():
+        raise CommandError(f"no such file or folder: {source}", 2)
+    if source.is_dir() or format is not None:
+        figures, rows = _recording(open_source(source, format, camera, depth_scale))
+    elif source.suffix.lower() in POINT_SUFFIXES and not (
+        source.suffix.lower() == ".ply" and has_faces(source)
+    ):
+        from nacre.datasets.stanford import recognise
+
+        figures, rows = _points(source)
+        if recognise(source):
+            rows.append(("range scan", "yes: nacre reconstruct takes it, and folders of such scans"))
+            figures["range_scan"] = True
+    elif source.suffix.lower() in MESH_SUFFIXES:
+        figures, rows = _mesh(source)
+    else:
+        known = ", ".join(dict.fromkeys(POINT_SUFFIXES + MESH_SUFFIXES))
+        raise CommandError(
+            f"{source}: neither a recording (a folder) nor a file of points or triangles ({known})", 2
+        )
+    terminal.answer(figures, rows)
+
+
+def _recording(sequence: Any) -> tuple[dict[str, Any], Rows]:
+    import numpy as np
+
+    from nacre.cli.reconstruct import recording
+    from nacre.errors import FileFormatError
+
+    figures = {"kind": "recording", **recording(sequence), "timestamps": sequence.has_timestamps}
+    rows = [
+        ("recording", sequence.name),
+        ("format", sequence.format),
+        ("frames", str(len(sequence))),
+        ("camera", describe_camera(sequence.camera)),
+        ("depth scale", f"{sequence.depth_scale:g} stored units per metre"),
+    ]
+    figures["first_frame"] = None
+    for i in range(min(len(sequence), 10)):
+        try:
+            depth = sequence[i].depth
+        except FileFormatError as error:
+            rows.append((f"frame {i}", f"cannot be read: {error}"))
+            continue
+        valid = depth[np.isfinite(depth)]
+        if len(valid):
+            low, middle, high = (float(value) for value in np.percentile(valid, (0, 50, 100)))
+            part = len(valid) / depth.size
+            figures["first_frame"] = {"index": i, "min": low, "median": middle, "max": high, "measured": part}
+            text = f"{low:.3f} to {high:.3f} m, median {middle:.3f} m; {100 * part:.1f} % of the pixels"
+            rows.append((f"depth of frame {i}", text))
+            break
+    rows += [
+        ("colour", "yes" if sequence.has_color else "no"),
+        ("time stamps", "yes" if sequence.has_timestamps else "no"),
+        ("true poses", f"yes, {len(sequence.truth)}" if sequence.truth is not None else "no"),
+    ]
+    return figures, rows
+
+
+def _points(path: Path) -> tuple[dict[str, Any], Rows]:
+    import nacre
+
+    cloud = nacre.read_points(path)
+    figures, rows = _geometry(cloud.points)
+    fields = [name for name in ("normals", "colors") if getattr(cloud, name) is not None]
+    attributes = {name: array.dtype.name for name, array in cloud.attributes.items()}
+    words = [*fields, *(f"{name} ({dtype})" for name, dtype in attributes.items())]
+    figures = {
+        "kind": "points", "path": str(path), "num_points": len(cloud), "dtype": cloud.points.dtype.name,
+        "fields": fields, "attributes": attributes, "shape": cloud.shape,
+        "comments": cloud.comments, **figures,
+    }  # fmt: skip
+    organised = (
+        [] if cloud.shape is None else [("organised", f"{cloud.shape[0]} rows x {cloud.shape[1]} columns")]
+    )
+    head = [
+        ("points", f"{len(cloud):,} ({cloud.points.dtype.name})"),
+        ("fields", ", ".join(words) or "coordinates only"),
+    ]
+    return figures, [*head, *organised, *rows, *(("comment", text) for text in cloud.comments[:5])]
+
+
+def _mesh(path: Path) -> tuple[dict[str, Any], Rows]:
+    import nacre
+
+    mesh = nacre.read_mesh(path)
+    figures, rows = _geometry(mesh.vertices)
+    figures = {
+        "kind": "mesh", "path": str(path), "num_vertices": len(mesh.vertices),
+        "num_triangles": len(mesh.triangles), **figures,
+    }  # fmt: skip
+    head = [("mesh", f"{len(mesh.vertices):,} vertices, {len(mesh.triangles):,} triangles")]
+    return figures, head + rows
+
+
+def _geometry(points: Any) -> tuple[dict[str, Any], Rows]:
+    import numpy as np
+
+    from nacre.evaluation import uniformity
+
+    finite = points[np.isfinite(points).all(axis=1)]
+    figures: dict[str, Any] = {"num_finite": len(finite), "lower": None, "upper": None, "spacing": None}
+    if not len(finite):
+        return figures, [("finite", "no point is finite")]
+    lower, upper = finite.min(axis=0), finite.max(axis=0)
+    spacing = uniformity(finite)
+    figures |= {"lower": lower, "upper": upper, "spacing": spacing.as_dict()}
+    rows = [
+        ("size", " x ".join(f"{side:.4g}" for side in upper - lower)),
+        ("bounds", f"({', '.join(f'{x:.4g}' for x in lower)}) to ({', '.join(f'{x:.4g}' for x in upper)})"),
+    ]
+    if len(finite) > 1:
+        rows.append(("spacing", f"{spacing.mean:.4g} mean, variation {spacing.coefficient_of_variation:.3f}"))
+    if len(finite) < len(points):
+        rows.append(("not finite", f"{len(points) - len(finite):,} points"))
+    return figures, rows

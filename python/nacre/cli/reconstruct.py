@@ -1,0 +1,124 @@
+"""``nacre reconstruct``: a recording becomes a model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
+from nacre.cli.results import file_rows, trajectory_rows, write_results
+from nacre.cli.running import run_frames
+from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
+
+if TYPE_CHECKING:
+    from nacre.datasets import Sequence
+
+
+def reconstruct(
+    source: Annotated[
+        Path, typer.Argument(metavar="SOURCE", help="The recording: a folder.", show_default=False)
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.", show_default=False)
+    ],
+    format: FormatOption = None,
+    camera: CameraOption = None,
+    depth_scale: DepthScaleOption = None,
+    min_depth: Annotated[
+        float | None, typer.Option(help="Nearer measurements are not used (metres).", show_default=False)
+    ] = None,
+    max_depth: Annotated[
+        float | None, typer.Option(help="Farther measurements are not used (metres).", show_default=False)
+    ] = None,
+    every: Annotated[int, typer.Option(min=1, metavar="N", help="Use every N-th frame.")] = 1,
+    first: Annotated[int, typer.Option(min=0, metavar="INDEX", help="The first frame, from 0.")] = 0,
+    last: Annotated[
+        int | None, typer.Option(min=0, metavar="INDEX", help="The last frame.", show_default="all")
+    ] = None,
+    color: Annotated[bool, typer.Option("--color/--no-color", help="Give the model colours.")] = True,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+) -> None:
+    """
+    Make a model from a recording of a depth camera.
+
+    The recording may be TUM RGB-D, Redwood/Open3D, 7-Scenes, ICL-NUIM, Stanford range scans, a plain
+    recording (camera.json and depth/), or a folder of depth images with --camera and --depth-scale; its
+    format is recognised.
+
+    OUT gets model.ply (points with normals, in the first camera's frame), trajectory.txt, report.json and
+    report.html. A frame that cannot be read or registered is LOST and changes nothing.
+    """
+    terminal = Terminal(json, quiet, verbose)
+    more = {"depth.min_depth": min_depth, "depth.max_depth": max_depth}
+    parameters, preset_name = model_parameters(preset, config, settings, **more)
+    sequence = open_source(source, format, camera, depth_scale)
+    if not color:
+        sequence = sequence.without_color()
+    indices = range(len(sequence))[first : None if last is None else last + 1 : every]
+    if not indices:
+        raise CommandError(f"no frames are left of {len(sequence)} (0 to {len(sequence) - 1})", 2)
+    import nacre
+    from nacre.reconstruction import Reconstruction
+
+    done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
+    writable_folder(out)
+    words = describe(sequence, indices)
+    terminal.say(f"{sequence.name}: {words}")
+    interrupted = run_frames(terminal, done, indices)
+    done.evaluate_trajectory()
+    report = write_results(
+        out,
+        done,
+        title=sequence.name,
+        source=words,
+        document={"recording": recording(sequence), "preset": preset_name, "interrupted": interrupted},
+    )
+    if json:
+        print(to_json(report))
+    terminal.say(table([*trajectory_rows(done), *file_rows(out)]))
+    if interrupted:
+        terminal.say(
+            f"interrupted after {len(done.frames)} of {len(indices)} frames; what there is was written"
+        )
+        raise typer.Exit(130)
+    if done.num_tracked == 0:
+        reasons = list(dict.fromkeys(frame.reason for frame in done.frames))
+        others = " (and other reasons)" * (len(reasons) > 1)
+        raise CommandError(f"every frame was lost: {reasons[0]}{others}")
+
+
+def describe(sequence: Sequence, indices: range) -> str:
+    """Return in words where the frames come from."""
+    step = f", every {indices.step} frames" if indices.step > 1 else ""
+    part = "" if len(indices) == len(sequence) else f" (frames {indices[0]} to {indices[-1]}{step})"
+    truth = ", with true poses" if sequence.truth is not None else ""
+    return (
+        f"{len(indices)} of {len(sequence)} frames{part}, {sequence.format} format, "
+        f"{describe_camera(sequence.camera)}{truth}"
+    )
+
+
+def recording(sequence: Sequence) -> dict[str, Any]:
+    """Return what report.json says about the recording."""
+    camera = sequence.camera
+    names: tuple[str, ...] = ("model", "width", "height", "pixel_size")
+    if camera.model != "orthographic":
+        names = ("model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "depth")
+    return {
+        "path": str(sequence.path),
+        "name": sequence.name,
+        "format": sequence.format,
+        "num_frames": len(sequence),
+        "camera": {name: getattr(camera, name) for name in names},
+        "depth_scale": sequence.depth_scale,
+        "color": sequence.has_color,
+        "truth": sequence.truth is not None,
+    }

@@ -1,0 +1,110 @@
+"""The files of ``OUT/``."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nacre.cli.terminal import to_json
+
+if TYPE_CHECKING:
+    from nacre.reconstruction import Reconstruction
+
+_PICTURE_NAMES = {
+    "the-model": "model",
+    "as-measured": "depth-before",
+    "what-was-removed": "depth-removed",
+    "as-used": "depth-after",
+}
+
+
+def write_results(
+    folder: Path,
+    done: Reconstruction,
+    *,
+    title: str,
+    source: str,
+    document: Mapping[str, Any],
+    figures: Mapping[str, Any] | None = None,
+    pictures: bool = False,
+) -> dict[str, Any]:
+    """Write the files of a run and return what report.json, the last one, holds."""
+    import nacre
+    from nacre.report import render_page
+
+    model = done.model
+    nacre.write_points(
+        folder / "model.ply",
+        model.points,
+        normals=model.normals,
+        colors=model.colors,
+        attributes={"confidence": model.confidence},
+        comments=[f"nacre {nacre.__version__}", "metres; the world is the first camera's frame"],
+    )
+    trajectory = done.trajectory
+    nacre.write_trajectory(folder / "trajectory.txt", trajectory.timestamps, trajectory.poses)
+    page = render_page(done.report_data(title, source, figures))
+    _write(folder / "report.html", page.encode())
+    if pictures:
+        _write_pictures(folder / "pictures", page)
+    report = done.as_dict(title=title, source=source, **document)
+    _write(folder / "report.json", (to_json(report) + "\n").encode())
+    return report
+
+
+def _write(path: Path, data: bytes) -> None:
+    from nacre.io.atomic import atomic_writer
+
+    with atomic_writer(path) as stream:
+        stream.write(data)
+
+
+def _write_pictures(folder: Path, page: str) -> None:
+    """Write the pictures that a page holds as PNG files, named by their captions."""
+    folder.mkdir(exist_ok=True)
+    for data, caption in re.findall(r'<img src="data:image/png;base64,([^"]+)" alt="([^"]+)"', page):
+        name = re.sub(r"\W+", "-", caption.lower()).strip("-")
+        _write(folder / f"{_PICTURE_NAMES.get(name, name)}.png", base64.b64decode(data))
+
+
+def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
+    """Return what a person wants to know of a run, in words."""
+    import numpy as np
+
+    from nacre.report.text import count, quantity
+
+    counts = {name.lower(): number for name, number in done.counts.items() if number and name != "TRACKED"}
+    extra = f" ({', '.join(f'{number} {name}' for name, number in counts.items())})" if counts else ""
+    rows = [
+        ("frames tracked", f"{done.num_tracked} of {len(done.frames)}{extra}"),
+        ("model", f"{count(len(done.model))} points, {quantity(done.model.spacing, 'm')} apart"),
+    ]
+    ate: Any = done.evaluation.get("absolute_trajectory_error")
+    if ate is not None and ate.num_compared:
+        rows.append(
+            ("trajectory error", f"{quantity(ate.rmse, 'm')} RMS, {quantity(ate.max, 'm')} at most (ATE)")
+        )
+    rpe: Any = done.evaluation.get("relative_pose_error")
+    if rpe is not None and rpe.num_pairs:
+        text = f"{quantity(rpe.translation_rmse, 'm')}, {quantity(rpe.rotation_rmse, 'rad')}"
+        rows.append(("drift per frame", f"{text} RMS (RPE)"))
+    times = done.milliseconds
+    if len(times):
+        slow = quantity(float(np.percentile(times, 99)), "ms")
+        rows.append(
+            ("time per frame", f"{quantity(float(np.median(times)), 'ms')} (median; 99 % within {slow})")
+        )
+    return rows
+
+
+def file_rows(folder: Path) -> list[tuple[str, str]]:
+    """Return where the files are."""
+    return [
+        ("model", str(folder / "model.ply")),
+        ("trajectory", str(folder / "trajectory.txt")),
+        ("figures", str(folder / "report.json")),
+        ("report", str(folder / "report.html")),
+    ]

@@ -1,0 +1,66 @@
+"""Running a recording through a model, with a progress bar, until it ends or Ctrl-C."""
+
+from __future__ import annotations
+
+import logging
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from nacre.cli.terminal import CommandError, Terminal
+
+if TYPE_CHECKING:
+    from nacre.reconstruction import Reconstruction
+
+_log = logging.getLogger(__name__)
+
+
+class Interruption:
+    """Whether Ctrl-C was pressed."""
+
+    def __init__(self) -> None:
+        self.wanted = False
+
+
+@contextmanager
+def interruptible() -> Iterator[Interruption]:
+    """Note the first Ctrl-C, so that what there is can be written; the second one stops at once."""
+    state = Interruption()
+    if threading.current_thread() is not threading.main_thread():
+        yield state
+        return
+
+    def note(number: int, frame: object) -> None:
+        if state.wanted:
+            raise KeyboardInterrupt
+        state.wanted = True
+
+    before = signal.signal(signal.SIGINT, note)
+    try:
+        yield state
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def run_frames(terminal: Terminal, done: Reconstruction, indices: Sequence[int]) -> bool:
+    """Run the frames of a recording; return whether Ctrl-C stopped it."""
+    accepted = False
+    with interruptible() as interruption, terminal.progress("frames", len(indices)) as advance:
+        for frame in done.run(indices):
+            if frame.refused and not accepted:
+                raise CommandError(f"frame {frame.index}: {advice(frame.reason)}")
+            accepted |= frame.report is not None
+            if frame.status in ("LOST", "WEAK"):
+                _log.info("frame %d: %s: %s", frame.index, frame.status, frame.reason)
+            lost = done.counts["LOST"]
+            advance(f"{len(done.model):,} points" + f", {lost} lost" * bool(lost))
+            if interruption.wanted:
+                break
+    return interruption.wanted
+
+
+def advice(reason: str) -> str:
+    """Return a message of the library in the words of the command line."""
+    return reason.replace("check depth_scale,", "give --depth-scale,").replace("depth_scale", "--depth-scale")

@@ -1,0 +1,109 @@
+"""Measuring a model against a surface."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre.cli.terminal import CommandError
+
+if TYPE_CHECKING:
+    from nacre import Camera, Mesh
+    from nacre.evaluation import SurfaceSamples
+    from nacre.evaluation.result import Result
+
+Array = npt.NDArray[Any]
+
+MESH_SUFFIXES = (".ply", ".obj", ".off", ".stl")
+POINT_SUFFIXES = (".ply", ".pcd")
+
+
+def transformed(pose: Array, points: Array, normals: Array | None) -> tuple[Array, Array | None]:
+    """Return points and normals in another frame, as float64."""
+    rotation = pose[:3, :3].T
+    return points @ rotation + pose[:3, 3], None if normals is None else normals @ rotation
+
+
+def seen_samples(
+    mesh: Mesh, samples: SurfaceSamples, camera: Camera, poses: Array, max_slant: float
+) -> npt.NDArray[np.bool_]:
+    """Return which points of a mesh some orthographic camera saw, slanted no more than that."""
+    points = samples.points
+    seen = np.zeros(len(points), dtype=bool)
+    half = 0.5 * np.array([camera.width - 1, camera.height - 1]) * camera.pixel_size
+    for pose in poses:
+        local = (points - pose[:3, 3]) @ pose[:3, :3]
+        facing = -(samples.normals @ pose[:3, 2]) > math.cos(max_slant)
+        rows = np.flatnonzero(~seen & facing & (np.abs(local[:, :2]) <= half).all(axis=1) & (local[:, 2] > 0))
+        starts = points[rows] - local[rows, 2:] * pose[:3, 2]
+        hits = mesh.cast(starts, np.broadcast_to(pose[:3, 2], starts.shape))
+        seen[rows] = np.abs(hits.distances - local[rows, 2]) < 1e-3 * camera.pixel_size
+    return seen
+
+
+def evaluate_surface(
+    points: Array,
+    normals: Array | None,
+    reference: Mesh | Array,
+    reference_normals: Array | None = None,
+    *,
+    tau: Sequence[float],
+    samples: SurfaceSamples | None = None,
+    seen: npt.NDArray[np.bool_] | None = None,
+) -> dict[str, Result]:
+    """Return every figure of a model against a mesh or a cloud, by name."""
+    from nacre import KdTree, Mesh, evaluation
+
+    surface = reference if samples is None else samples.points
+    accuracy = evaluation.surface_accuracy(points, reference, reference_normals=reference_normals)
+    covered = evaluation.completeness(points, surface, tau=tau, seen=seen)
+    precision = tuple(float((accuracy.distances <= t).mean()) for t in covered.tau)
+    pairs = zip(precision, covered.fraction, strict=True)
+    results: dict[str, Result] = {
+        "surface_accuracy": accuracy,
+        "completeness": covered,
+        "f_score": evaluation.FScore(
+            covered.tau,
+            precision,
+            covered.fraction,
+            tuple(2 * p * r / (p + r) if p + r else 0.0 for p, r in pairs),
+        ),
+        "uniformity": evaluation.uniformity(points),
+    }
+    if normals is not None:
+        if isinstance(reference, Mesh):
+            results["normal_error"] = evaluation.normal_error(normals, reference.closest(points).normals)
+        elif reference_normals is not None:
+            nearest = KdTree(reference).query(points, k=1)[1]
+            results["normal_error"] = evaluation.normal_error(normals, reference_normals[nearest])
+    return results
+
+
+def read_surface(path: Path, scale: float = 1.0) -> tuple[Mesh | Array, Array | None]:
+    """Read a mesh, or a point file with its normals."""
+    import nacre
+
+    suffix = path.suffix.lower()
+    if suffix not in MESH_SUFFIXES + POINT_SUFFIXES:
+        known = ", ".join(dict.fromkeys(MESH_SUFFIXES + POINT_SUFFIXES))
+        raise CommandError(f"{path}: a surface is a mesh or a point file ({known})", 2)
+    if suffix in MESH_SUFFIXES and has_faces(path):
+        mesh = nacre.read_mesh(path)
+        return (mesh if scale == 1 else nacre.Mesh(scale * mesh.vertices, mesh.triangles)), None
+    cloud = nacre.read_points(path)
+    return scale * cloud.points, cloud.normals
+
+
+def has_faces(path: Path) -> bool:
+    """Return whether a file that may hold a mesh does."""
+    if path.suffix.lower() != ".ply":
+        return True
+    from nacre.io.ply_header import read_header
+
+    header = read_header(path, path.read_bytes())
+    return any(element.name == "face" and element.num_rows > 0 for element in header.elements)

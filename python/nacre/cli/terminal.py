@@ -1,0 +1,134 @@
+"""What a command says: results on stdout, progress, log and errors on stderr."""
+
+from __future__ import annotations
+
+import json
+import logging
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, for programs.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no summary, no warnings.")]
+Verbose = Annotated[
+    int, typer.Option("--verbose", "-v", count=True, show_default=False, help="Say more; twice: everything.")
+]
+
+
+class CommandError(Exception):
+    """An error that is told in one line. Code 1: the data does not allow it; 2: wrong usage."""
+
+    def __init__(self, message: str, code: int = 1) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+class _Format(logging.Formatter):
+    def format(self, record: logging.LogRecord) -> str:
+        return f"{record.levelname.lower()}: {record.getMessage()}"
+
+
+def set_verbosity(level: int | None) -> None:
+    """Send the log to stderr: -1 errors, 0 warnings, 1 information, 2 everything; None: no longer."""
+    logger = logging.getLogger("nacre")
+    for handler in [h for h in logger.handlers if isinstance(h.formatter, _Format)]:
+        logger.removeHandler(handler)
+    if level is None:
+        logger.setLevel(logging.NOTSET)
+        return
+    handler = logging.StreamHandler(sys.stderr)
+    handler.setFormatter(_Format())
+    logger.addHandler(handler)
+    levels = (logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)
+    logger.setLevel(levels[max(-1, min(level, 2)) + 1])
+
+
+class Terminal:
+    """How one run of a command talks."""
+
+    def __init__(self, json: bool = False, quiet: bool = False, verbose: int = 0) -> None:
+        self.json = json
+        self.quiet = quiet
+        set_verbosity(-1 if quiet else verbose)
+
+    def say(self, text: str = "") -> None:
+        """Print a line that a person likes to see but that is not the command's answer."""
+        if not (self.json or self.quiet):
+            print(text)
+
+    def answer(self, figures: Mapping[str, Any], rows: Sequence[tuple[str, str]]) -> None:
+        """Print what the command is for: as JSON, or as lines of a name and a value."""
+        if self.json:
+            print(to_json(figures))
+        else:
+            print(table(rows))
+
+    @contextmanager
+    def progress(self, description: str, total: int) -> Iterator[Callable[[str], None]]:
+        """Show a bar on stderr, where that is a terminal; yields what advances it."""
+        if self.quiet or not sys.stderr.isatty():
+            yield lambda note: None
+            return
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            TextColumn("{task.fields[note]}"),
+        )
+        with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+            task = bar.add_task(description, total=total, note="")
+            yield lambda note: bar.update(task, advance=1, note=note)
+
+
+def to_json(figures: Mapping[str, Any]) -> str:
+    """Return a JSON object; numbers that are not finite are null."""
+    from nacre.reconstruction import plain_tree
+
+    text = json.dumps(plain_tree(figures), indent=2, allow_nan=False, default=str)
+    # Lists of numbers on one line; a line break is never part of a string.
+    return re.sub(r"\[\n\s+([^\[\]{}]*?)\n\s+\]", lambda m: "[" + re.sub(r"\n\s+", " ", m[1]) + "]", text)
+
+
+def table(rows: Sequence[tuple[str, str]]) -> str:
+    """Return names and values in two columns."""
+    width = max((len(name) for name, _ in rows), default=0)
+    return "\n".join(f"{name:<{width}}  {value}".rstrip() for name, value in rows)
+
+
+def writable_folder(path: Path) -> Path:
+    """Make a folder for results, or say at once that nothing can be written there."""
+    import tempfile
+
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        reason = (
+            "it is a file" if isinstance(error, (FileExistsError, NotADirectoryError)) else error.strerror
+        )
+        raise CommandError(f"cannot write to {path}: {reason}; give another folder with -o", 2) from error
+    return path
+
+
+def writable_file(path: Path) -> Path:
+    """Say at once that a file cannot be written."""
+    import tempfile
+
+    try:
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise CommandError(f"cannot write {path}: {error.strerror}", 2) from error
+    if path.is_dir():
+        raise CommandError(f"cannot write {path}: it is a folder", 2)
+    return path

@@ -1,0 +1,325 @@
+"""A recording run through a model, with all that its reports need."""
+
+from __future__ import annotations
+
+import collections.abc
+import dataclasses
+import platform
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre._core import __version__
+from nacre.datasets.sequence import SequenceFrame
+from nacre.depth import preprocess_depth
+from nacre.errors import FileFormatError
+from nacre.evaluation import absolute_trajectory_error, relative_pose_error
+from nacre.evaluation.result import Result, plain
+from nacre.io.trajectories import Trajectory
+from nacre.model import FrameReport, Model
+
+if TYPE_CHECKING:
+    from nacre.report import FrameEntry, ReportData
+
+STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
+
+# Fields of evaluation results that hold one value per frame or point; the frames have them already.
+_LONG = {"errors", "rotation_errors", "distances"}
+
+
+@dataclass(frozen=True, eq=False)
+class FrameRecord:
+    """
+    What became of one frame of a recording.
+
+    Attributes
+    ----------
+    index : int
+        Its place in the recording, from 0.
+    timestamp : float or None
+        [s].
+    status, reason : str
+        The model's, or LOST and why for a frame that never came to the model.
+    report : FrameReport or None
+        The model's; None for a frame that could not be read or that the model refused.
+    truth : (4, 4) float64 or None
+        The true ``world_from_camera``.
+    error : Exception or None
+        What reading the frame, or handing it to the model, raised.
+    """
+
+    index: int
+    timestamp: float | None
+    status: str
+    reason: str
+    report: FrameReport | None
+    truth: npt.NDArray[np.float64] | None
+    error: Exception | None = None
+
+    @property
+    def world_from_camera(self) -> npt.NDArray[np.float64] | None:
+        """The camera's pose; None where it is not known."""
+        return self.report.world_from_camera if self.report is not None and self.report.tracked else None
+
+    @property
+    def refused(self) -> bool:
+        """Whether the frame was read, but the model cannot use it: wrong size or wrong depth scale."""
+        return self.error is not None and not isinstance(self.error, FileFormatError)
+
+
+class Reconstruction:
+    """
+    A recording run through a model.
+
+    Parameters
+    ----------
+    sequence : sequence of SequenceFrame
+        The recording. A frame that cannot be read is LOST, with the reason, and the run goes on.
+    model : Model
+        Grows with every frame.
+
+    Attributes
+    ----------
+    sequence, model
+        As given.
+    frames : list of FrameRecord
+        Those that are done.
+    evaluation : dict of str to a result of ``nacre.evaluation``
+        What is known beyond the trajectory's errors, by name; may be added to.
+    """
+
+    def __init__(self, sequence: collections.abc.Sequence[SequenceFrame], model: Model) -> None:
+        self.sequence = sequence
+        self.model = model
+        self.frames: list[FrameRecord] = []
+        self.evaluation: dict[str, Result] = {}
+        self._example: tuple[int, npt.NDArray[np.float32]] | None = None
+
+    def run(self, indices: Iterable[int] | None = None) -> Iterator[FrameRecord]:
+        """Add frames to the model, those with the given indices or all, and yield each when it is done."""
+        for index in range(len(self.sequence)) if indices is None else indices:
+            record = self._add(index)
+            self.frames.append(record)
+            yield record
+
+    def _add(self, index: int) -> FrameRecord:
+        try:
+            frame = self.sequence[index]
+        except (FileFormatError, OSError) as error:
+            return FrameRecord(index, None, "LOST", str(error), None, None, error)
+        try:
+            report = self.model.add_frame(frame.depth, color=frame.color, timestamp=frame.timestamp)
+        except ValueError as error:
+            return FrameRecord(index, frame.timestamp, "LOST", str(error), None, frame.truth, error)
+        if self._example is None and report.tracked:
+            self._example = index, frame.depth
+        return FrameRecord(index, frame.timestamp, report.status, report.reason, report, frame.truth)
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many frames have each status."""
+        found = Counter(frame.status for frame in self.frames)
+        return {status: found[status] for status in STATUSES}
+
+    @property
+    def num_tracked(self) -> int:
+        """How many frames have a pose."""
+        return sum(frame.world_from_camera is not None for frame in self.frames)
+
+    @property
+    def poses(self) -> npt.NDArray[np.float64]:
+        """(F, 4, 4) ``world_from_camera``; NaN where it is not known."""
+        return _stacked([frame.world_from_camera for frame in self.frames])
+
+    @property
+    def truths(self) -> npt.NDArray[np.float64] | None:
+        """(F, 4, 4) true poses, NaN where they are not known; None where none is."""
+        if all(frame.truth is None for frame in self.frames):
+            return None
+        return _stacked([frame.truth for frame in self.frames])
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The poses of the tracked frames, timed by the frames' indices where there are no time stamps."""
+        tracked = [frame for frame in self.frames if frame.world_from_camera is not None]
+        timed = bool(tracked) and all(frame.timestamp is not None for frame in tracked)
+        times = [frame.timestamp if timed else frame.index for frame in tracked]
+        return Trajectory(
+            np.array(times, np.float64), _stacked([frame.world_from_camera for frame in tracked])
+        )
+
+    @property
+    def milliseconds(self) -> npt.NDArray[np.float64]:
+        """The model's time for each frame that it got."""
+        return np.array([f.report.milliseconds["total"] for f in self.frames if f.report is not None])
+
+    def evaluate_trajectory(self) -> None:
+        """Add the errors of the trajectory to ``evaluation``, where the recording knows the truth."""
+        truths = self.truths
+        if truths is None:
+            return
+        poses = self.poses
+        self.evaluation["absolute_trajectory_error"] = absolute_trajectory_error(poses, truths)
+        self.evaluation["relative_pose_error"] = relative_pose_error(poses, truths)
+
+    @cached_property
+    def parameters(self) -> dict[str, Any]:
+        """The model's parameters as nested mappings."""
+        return dataclasses.asdict(self.model.parameters)
+
+    def as_dict(self, **more: Any) -> dict[str, Any]:
+        """Return every figure as plain values that JSON can hold (NaN and inf become None)."""
+        counts = self.counts
+        times = self.milliseconds
+        errors = self._frame_errors()
+        figures: dict[str, Any] = plain_tree(
+            {
+                "nacre": __version__,
+                "versions": {
+                    "nacre": __version__,
+                    "python": platform.python_version(),
+                    "numpy": np.__version__,
+                },
+                **more,
+                "num_frames": len(self.frames),
+                "num_tracked": self.num_tracked,
+                **{f"num_{name.lower()}": counts[name] for name in STATUSES[1:]},
+                "coverage": self.num_tracked / len(self.frames) if self.frames else None,
+                "num_points": len(self.model),
+                "spacing": self.model.spacing,
+                "milliseconds": {
+                    "mean": times.mean() if len(times) else None,
+                    "median": np.median(times) if len(times) else None,
+                    "p99": np.percentile(times, 99) if len(times) else None,
+                },
+                **{name: result_dict(result) for name, result in self.evaluation.items()},
+                "parameters": self.parameters,
+                "frames": [_frame_dict(frame, *errors[i]) for i, frame in enumerate(self.frames)],
+            }
+        )
+        return figures
+
+    def report_data(self, title: str, source: str, figures: Mapping[str, Any] | None = None) -> ReportData:
+        """Return what :func:`nacre.report.write_report` shows."""
+        from nacre.report import ModelCloud, ReportData
+        from nacre.report.text import label
+
+        errors = self._frame_errors()
+        model = None
+        if len(self.model):
+            model = ModelCloud(
+                self.model.points, self.model.normals, self.model.colors, self.model.confidence
+            )
+        return ReportData(
+            title=title,
+            source=source,
+            frames=[_entry(frame, *errors[i]) for i, frame in enumerate(self.frames)],
+            model=model,
+            depth=self._depth_example(),
+            evaluation={label(name): result for name, result in self.evaluation.items()},
+            figures=figures or {},
+            parameters=self.parameters,
+        )
+
+    def _depth_example(self) -> Any:
+        from nacre.report import DepthExample
+
+        if self._example is None:
+            return None
+        index, before = self._example
+        options = self.model.parameters.depth
+        after = preprocess_depth(
+            before,
+            self.model.camera,
+            **{field.name: getattr(options, field.name) for field in dataclasses.fields(options)},
+        )
+        return DepthExample(before, after, index=index)
+
+    def _frame_errors(self) -> list[tuple[float | None, float | None]]:
+        ate: Any = self.evaluation.get("absolute_trajectory_error")
+        if ate is None:
+            return [(None, None)] * len(self.frames)
+        return [
+            (float(t), float(r)) if np.isfinite(t) else (None, None)
+            for t, r in zip(ate.errors, ate.rotation_errors, strict=True)
+        ]
+
+
+def plain_tree(value: Any) -> Any:
+    """Turn nested mappings with arrays and numbers that are not finite into what JSON knows."""
+    if isinstance(value, Mapping):
+        return {str(name): plain_tree(item) for name, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain_tree(item) for item in value]
+    return plain(value)
+
+
+def result_dict(result: Result) -> dict[str, Any]:
+    """Return the figures of an evaluation result, without those for each frame or point."""
+    return {name: value for name, value in result.as_dict().items() if name not in _LONG}
+
+
+def _stacked(poses: collections.abc.Sequence[npt.NDArray[np.float64] | None]) -> npt.NDArray[np.float64]:
+    missing = np.full((4, 4), np.nan)
+    return np.array([missing if pose is None else pose for pose in poses]).reshape(-1, 4, 4)
+
+
+def _removed(report: FrameReport | None) -> dict[str, int]:
+    if report is None:
+        return {}
+    depth = dataclasses.asdict(report.depth)
+    return {
+        name.removeprefix("num_"): count
+        for name, count in depth.items()
+        if name not in ("num_pixels", "num_invalid", "num_kept")
+    }
+
+
+def _frame_dict(
+    frame: FrameRecord, translation_error: float | None, rotation_error: float | None
+) -> dict[str, Any]:
+    report = frame.report
+    figures: dict[str, Any] = {
+        "index": frame.index,
+        "status": frame.status,
+        "reason": frame.reason,
+        "timestamp": frame.timestamp,
+        "world_from_camera": frame.world_from_camera,
+        "truth": frame.truth,
+        "translation_error": translation_error,
+        "rotation_error": rotation_error,
+    }
+    for name in (
+        "num_inliers", "overlap", "consistency", "rmse", "weak_directions",
+        "num_updated", "num_inserted", "num_removed", "num_points", "spacing", "milliseconds",
+    ):  # fmt: skip
+        figures[name] = None if report is None else getattr(report, name)
+    figures["depth"] = None if report is None else dataclasses.asdict(report.depth)
+    figures["removed"] = _removed(report)
+    return figures
+
+
+def _entry(frame: FrameRecord, translation_error: float | None, rotation_error: float | None) -> FrameEntry:
+    from nacre.report import FrameEntry
+
+    report = frame.report
+    return FrameEntry(
+        index=frame.index,
+        status=frame.status,
+        reason=frame.reason,
+        milliseconds={} if report is None else report.milliseconds,
+        num_inliers=None if report is None else report.num_inliers,
+        overlap=None if report is None else report.overlap,
+        rmse=None if report is None or not np.isfinite(report.rmse) else report.rmse,
+        world_from_camera=frame.world_from_camera,
+        truth=frame.truth,
+        translation_error=translation_error,
+        rotation_error=rotation_error,
+        num_points=None if report is None else report.num_points,
+        removed=_removed(report),
+    )

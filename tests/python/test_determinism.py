@@ -1,0 +1,162 @@
+"""The same bits for any number of threads, and every time."""
+
+import functools
+import hashlib
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nacre
+
+THREADS = [1, 2, 3, 4, 7, 8]
+
+
+def digest(*arrays: Any) -> str:
+    """Return the SHA-256 of arrays: their types, shapes and bytes."""
+    total = hashlib.sha256()
+    for value in arrays:
+        array = np.ascontiguousarray(value)
+        total.update(f"{array.dtype}{array.shape}".encode())
+        total.update(array.tobytes())
+    return total.hexdigest()
+
+
+@functools.cache
+def camera() -> nacre.Camera:
+    return nacre.default_camera(thing())
+
+
+@functools.cache
+def thing() -> nacre.Mesh:
+    return nacre.built_in_object()
+
+
+@functools.cache
+def depth(index: int) -> Any:
+    pose = nacre.turntable_poses(thing(), 24, np.radians(15))[index]
+    return thing().simulate_depth(camera(), pose, noise=0.0005, edge_mixing=1.0, seed=index, num_threads=1)
+
+
+@functools.cache
+def points(index: int) -> Any:
+    clean = nacre.preprocess_depth(depth(index), camera(), num_threads=1)
+    return nacre.back_project(clean, camera())
+
+
+def of_align(method: Any, num_threads: int) -> str:
+    result = nacre.align(points(1), points(0), method=method, num_threads=num_threads)
+    return digest(
+        result.target_from_source,
+        result.information,
+        result.weak_directions,
+        result.center,
+        [result.rmse, result.overlap, result.iterations, result.num_inliers],
+    )
+
+
+def of_consolidate(method: Any, num_threads: int) -> str:
+    thin = nacre.consolidate(
+        points(0), num_points=800, method=method, iterations=5, attributes=points(0), num_threads=num_threads
+    )
+    return digest(thin.points, thin.attributes["attributes"], thin.sources)
+
+
+def of_tree(num_threads: int) -> str:
+    found = []
+    for dtype in (np.float32, np.float64):
+        tree = nacre.KdTree(points(0).astype(dtype), num_threads=num_threads)
+        found += tree.query(points(1).astype(dtype), k=7, num_threads=num_threads)
+        near = tree.query_radius(points(1).astype(dtype), 0.004, num_threads=num_threads)
+        found += [near.offsets, near.indices, near.distances]
+    return digest(*found)
+
+
+def of_model(preset: Any, num_threads: int) -> str:
+    model = nacre.Model(camera(), preset, num_threads=num_threads)
+    for index in range(3):
+        model.add_frame(depth(index), np.full((*depth(0).shape, 3), 40 * index, np.uint8))
+    colors = model.colors
+    return digest(
+        model.points,
+        model.normals,
+        model.confidence,
+        model.poses,
+        np.zeros(0) if colors is None else colors,
+        [report.num_points for report in model.frames],
+        [report.information for report in model.frames],
+        [report.rmse for report in model.frames],
+    )
+
+
+def of_simulation(num_threads: int) -> str:
+    pose = nacre.turntable_poses(thing())[1]
+    return digest(
+        thing().simulate_depth(
+            camera(),
+            pose,
+            noise="kinect",
+            edge_mixing=1.5,
+            quantization=0.0001,
+            dropout=0.1,
+            seed=5,
+            num_threads=num_threads,
+        )
+    )
+
+
+def of_preprocessing(edge_test: Any, num_threads: int) -> str:
+    clean, report = nacre.preprocess_depth(
+        depth(0), camera(), edge_test=edge_test, return_report=True, num_threads=num_threads
+    )
+    noise = nacre.estimate_noise(clean, camera(), num_threads=num_threads)
+    normals = nacre.depth_normals(clean, camera(), num_threads=num_threads)
+    return digest(clean, normals, [noise.constant, noise.quadratic, noise.offset], [report.num_edge])
+
+
+def of_normals(num_threads: int) -> str:
+    return digest(
+        *(
+            nacre.estimate_normals(points(0).astype(t), k=12, num_threads=num_threads)
+            for t in (np.float32, np.float64)
+        )
+    )
+
+
+WORK: dict[str, Callable[[int], str]] = {
+    "align symmetric": functools.partial(of_align, "symmetric"),
+    "align point_to_plane": functools.partial(of_align, "point_to_plane"),
+    "align point_to_point": functools.partial(of_align, "point_to_point"),
+    "consolidate wlop": functools.partial(of_consolidate, "wlop"),
+    "consolidate wlop+": functools.partial(of_consolidate, "wlop+"),
+    "consolidate cgal": functools.partial(of_consolidate, "cgal"),
+    "KdTree": of_tree,
+    "estimate_normals": of_normals,
+    "preprocess inverse_depth": functools.partial(of_preprocessing, "inverse_depth"),
+    "preprocess gradient": functools.partial(of_preprocessing, "gradient"),
+    "simulate_depth": of_simulation,
+    "Model default": functools.partial(of_model, "default"),
+    "Model paper": functools.partial(of_model, "paper"),
+}
+
+
+@pytest.mark.parametrize("work", WORK)
+def test_same_bits_for_any_number_of_threads(work: str) -> None:
+    expected = WORK[work](1)
+    assert {threads: WORK[work](threads) for threads in THREADS} == dict.fromkeys(THREADS, expected)
+
+
+@pytest.mark.parametrize("work", WORK)
+def test_same_bits_with_all_threads(work: str) -> None:
+    assert WORK[work](0) == WORK[work](1)
+
+
+def test_digest_tells_a_single_bit() -> None:
+    """Or the tests above could not fail."""
+    array = np.ones((3, 3), np.float32)
+    other = array.copy()
+    other[1, 1] = np.nextafter(other[1, 1], np.float32(2))
+    assert digest(array) != digest(other)
+    assert digest(array) != digest(array.reshape(9))
+    assert digest(array) == digest(np.asfortranarray(array))
