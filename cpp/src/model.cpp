@@ -91,6 +91,8 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.kept_fraction = 0.9;
   options.new_fraction = 0.2;
   options.predict_motion = false;
+  options.relocalise = false;
+  options.denoise_samples = false;
   options.min_overlap = 0.0;
   options.min_consistency = 0.0;
   options.max_residual = 1.0;
@@ -134,6 +136,7 @@ struct Model::Impl {
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
   TrackingResult locate(const Frame& frame, const FrameExtras& extras) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
+  std::vector<Pose> key_poses() const;
   void fold_in(const Frame& frame, const FrameExtras& extras, FrameReport& report);
 };
 
@@ -198,7 +201,7 @@ TrackingResult Model::Impl::locate(const Frame& frame, const FrameExtras& extras
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, guesses(extras), was_lost, options);
+  return track(cloud, frame, camera, guesses(extras), key_poses(), was_lost, options);
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
@@ -208,6 +211,21 @@ std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
   Pose predicted = last * (poses[poses.size() - 2].inverse() * last);
   predicted.linear() = Eigen::Quaterniond(predicted.linear()).normalized().toRotationMatrix();
   return {predicted, last};
+}
+
+// Some of the newest poses from which the camera looked in different directions.
+std::vector<Pose> Model::Impl::key_poses() const {
+  constexpr std::size_t most = 8;
+  constexpr double least_angle = 0.35;
+  std::vector<Pose> chosen;
+  if (!options.relocalise) return chosen;
+  for (auto pose = poses.rbegin(); pose != poses.rend() && chosen.size() < most; ++pose) {
+    const bool is_new = std::all_of(chosen.begin(), chosen.end(), [&](const Pose& other) {
+      return Eigen::AngleAxisd(other.linear().transpose() * pose->linear()).angle() > least_angle;
+    });
+    if (is_new) chosen.push_back(*pose);
+  }
+  return chosen;
 }
 
 void Model::Impl::fold_in(const Frame& frame, const FrameExtras& extras, FrameReport& report) {

@@ -105,13 +105,14 @@ Samples sample_frame(const Frame& frame, const Camera& camera, const ModelOption
   const ColorsRef colors(no_colors);
   const SurfaceObserver observer(frame, camera, options.fusion, colors, options.num_threads);
   const double stride = static_cast<double>(frame.valid.size()) / static_cast<double>(std::max<std::int64_t>(count, 1));
-  parallel_for(count, 256, options.num_threads, [&](std::int64_t i) {
+  parallel_for(count, 2048, options.num_threads, [&](std::int64_t i) {
     // One of every `stride` pixels.
     const double place =
         (static_cast<double>(i) + random_uniform(options.registration.seed, static_cast<std::uint64_t>(i))) * stride;
     const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
     const Eigen::Vector3f point = frame.points.row(row).transpose(), normal = frame.normals.row(row).transpose();
-    const Observation seen = observer.observe(point, normal, row, frame.sigma[row]);
+    const Observation seen =
+        options.denoise_samples ? observer.observe(point, normal, row, frame.sigma[row]) : Observation();
     samples.points.row(i) = (point + seen.offset * normal).transpose();
     samples.normals.row(i) = seen.weight > 0.0F ? seen.normal.normalized().transpose() : normal.transpose();
     samples.sigma[i] = frame.sigma[row];
@@ -119,16 +120,13 @@ Samples sample_frame(const Frame& frame, const Camera& camera, const ModelOption
   return samples;
 }
 
-// Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
-bool is_beyond_doubt(const TrackingResult& result, double gate) {
-  return result.alignment.overlap > 0.35 && result.consistency > 0.9 && result.alignment.rmse < 0.25 * gate;
-}
-
-// After a loss the guess is poor, and only a registration beyond doubt is believed.
-void judge(TrackingResult& result, const ModelOptions& options, double gate, bool was_lost) {
+// Strict, for guesses that may be far off: only a registration beyond doubt is believed.
+void judge(TrackingResult& result, const ModelOptions& options, double gate, bool strict) {
   std::ostringstream reason;
   reason.precision(3);
   result.status = FrameStatus::lost;
+  const bool is_close =
+      result.alignment.overlap > 0.35 && result.consistency > 0.9 && result.alignment.rmse < 0.25 * gate;
   if (result.alignment.status == AlignStatus::too_few_pairs) {
     reason << "too few points of the frame match the model";
   } else if (result.alignment.overlap < options.min_overlap) {
@@ -137,48 +135,114 @@ void judge(TrackingResult& result, const ModelOptions& options, double gate, boo
     reason << "consistency " << result.consistency << " is below " << options.min_consistency;
   } else if (result.alignment.rmse > options.max_residual * gate) {
     reason << "residuals of " << result.alignment.rmse << " m are above " << options.max_residual * gate;
-  } else if (was_lost && !is_beyond_doubt(result, gate)) {
-    reason << "not sure enough after a loss: overlap " << result.alignment.overlap << ", consistency "
-           << result.consistency << ", residuals " << result.alignment.rmse << " m";
+  } else if (strict && !is_close) {
+    reason << "not sure enough: overlap " << result.alignment.overlap << ", consistency " << result.consistency
+           << ", residuals " << result.alignment.rmse << " m";
   } else if (result.alignment.weak_directions.cols() > 0) {
     result.status = FrameStatus::weak;
     reason << result.alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
   } else {
     result.status = FrameStatus::tracked;
+    result.is_beyond_doubt = is_close;
   }
   result.reason = reason.str();
 }
 
+// What stays the same while one frame is registered from several guesses.
+struct Search {
+  const PointModel& model;
+  const Frame& frame;
+  const Camera& camera;
+  const ModelOptions& options;
+  IcpSource source;
+
+  bool has_automatic_gate() const { return !(options.registration.max_distance > 0.0); }
+
+  // Near: the guess is about right, and a narrow gate is safest. Wide: it is not. Strict: see judge.
+  TrackingResult register_from(const Pose& guess, bool wide, bool strict) const {
+    const View view = points_in_view(model, camera, guess);
+    const IcpTarget target(AlignCloud(view.points, view.normals), options.registration);
+    AlignOptions align_options = options.registration;
+    if (!(align_options.final_distance > 0.0)) {
+      align_options.final_distance = std::max(2.5 * target.spacing(), 4.0 * static_cast<double>(median_sigma(frame)));
+    }
+    if (has_automatic_gate() && !wide) align_options.max_distance = 4.0 * align_options.final_distance;
+
+    TrackingResult result;
+    result.alignment = align_to(target, source, guess, align_options);
+    result.consistency = consistency_of(model, frame, camera, result.alignment.target_from_source, target.spacing(),
+                                        options.num_threads);
+    judge(result, options, align_options.final_distance, strict);
+    return result;
+  }
+
+  // Cameras around what a known camera saw: it turned about each of its axes, one way and the other.
+  std::vector<Pose> around(const Pose& pose) const {
+    const View view = points_in_view(model, camera, pose);
+    std::vector<Pose> poses = {pose};
+    if (view.points.rows() == 0) return poses;
+    const Eigen::Vector3d center = view.points.colwise().mean().transpose().cast<double>();
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double angle : {-0.75, 0.75}) {
+        Pose turn = Pose::Identity();
+        turn.linear() = Eigen::AngleAxisd(angle, pose.linear().col(axis)).toRotationMatrix();
+        turn.translation() = center - turn.linear() * center;
+        poses.push_back(turn * pose);
+      }
+    }
+    return poses;
+  }
+
+  // From every place where a camera has been, and around it: a few points each, then the best with all.
+  TrackingResult relocalise(const std::vector<Pose>& key_poses) const {
+    constexpr std::size_t num_finalists = 3;
+    const PointsRef points = Eigen::Map<const Points>(model.points.front().data(), model.size(), 3);
+    const PointsRef normals = Eigen::Map<const Points>(model.normals.front().data(), model.size(), 3);
+    const IcpTarget whole(AlignCloud(points, normals), options.registration);
+    AlignOptions coarse = options.registration;
+    coarse.max_samples = coarse.coarse_samples = 300;
+    coarse.max_iterations = 15;
+    const IcpSource few(AlignCloud(source.points, source.normals, source.sigma), coarse);
+
+    std::vector<std::pair<double, Pose>> candidates;
+    for (const Pose& key_pose : key_poses) {
+      for (const Pose& guess : around(key_pose)) {
+        const AlignResult result = align_to(whole, few, guess, coarse);
+        candidates.emplace_back(result.overlap, result.target_from_source);
+      }
+    }
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const auto& a, const auto& b) { return a.first > b.first; });
+    TrackingResult best;
+    for (std::size_t i = 0; i < std::min(num_finalists, candidates.size()); ++i) {
+      const TrackingResult result = register_from(candidates[i].second, false, true);
+      if (result.rank() >= best.rank()) best = result;
+    }
+    return best;
+  }
+};
+
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera,
-                     const std::vector<Pose>& guesses, bool was_lost, const ModelOptions& options) {
+                     const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
+                     const ModelOptions& options) {
+  const Samples samples = sample_frame(frame, camera, options);
+  const Search search{model, frame, camera, options,
+                      IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration)};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
-  const bool automatic_gate = !(options.registration.max_distance > 0.0);
-
-  // Near: the guess is about right, and a narrow gate is safest. Wide: it is not.
-  const Samples samples = sample_frame(frame, camera, options);
-  const IcpSource source(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration);
   for (const bool wide : {false, true}) {
-    if (wide && !automatic_gate) break;
+    if (wide && !search.has_automatic_gate()) break;
     for (const Pose& guess : guesses) {
-      const View view = points_in_view(model, camera, guess);
-      const IcpTarget target(AlignCloud(view.points, view.normals), options.registration);
-      AlignOptions align_options = options.registration;
-      if (!(align_options.final_distance > 0.0)) {
-        align_options.final_distance = std::max(2.5 * target.spacing(), 4.0 * static_cast<double>(median_sigma(frame)));
-      }
-      if (automatic_gate && !wide) align_options.max_distance = 4.0 * align_options.final_distance;
-
-      TrackingResult result;
-      result.alignment = align_to(target, source, guess, align_options);
-      result.consistency = consistency_of(model, frame, camera, result.alignment.target_from_source, target.spacing(),
-                                          options.num_threads);
-      judge(result, options, align_options.final_distance, was_lost);
+      const TrackingResult result = search.register_from(guess, wide, was_lost);
       if (result.rank() >= best.rank()) best = result;
-      if (result.status == FrameStatus::tracked && is_beyond_doubt(result, align_options.final_distance)) return result;
+      if (result.is_beyond_doubt) return result;
     }
+  }
+  if (best.status == FrameStatus::lost && !key_poses.empty()) {
+    const TrackingResult found = search.relocalise(key_poses);
+    if (found.status != FrameStatus::lost) return found;
   }
   return best;
 }

@@ -13,13 +13,17 @@ struct TrackingResult {
   double consistency = 0.0;  // part of the model's points in view that the frame does not see through
   FrameStatus status = FrameStatus::lost;
   std::string reason;  // why it is weak or lost
+  // Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
+  bool is_beyond_doubt = false;
 
   // A frame that is not lost before one that is, then by how much agrees.
   double rank() const { return (status == FrameStatus::lost ? 0.0 : 1.0) + alignment.overlap * consistency; }
 };
 
-// Tries the guesses (world_from_camera, most trusted first) until one registers the frame.
+// Tries the guesses (world_from_camera, most trusted first) until one registers the frame; when none does, searches
+// around the key poses, unless there are none.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera,
-                     const std::vector<Pose>& guesses, bool was_lost, const ModelOptions& options);
+                     const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
+                     const ModelOptions& options);
 
 }  // namespace nacre

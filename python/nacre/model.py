@@ -91,6 +91,10 @@ class ModelParameters:
         The model never grows beyond: its spacing is widened instead.
     predict_motion : bool
         Start also from the pose that continues the last motion.
+    relocalise : bool
+        Search around earlier poses where the guesses fail.
+    denoise_samples : bool
+        Register surface points averaged over their pixels, not single pixels.
     min_overlap, min_consistency : float
         A frame of which a smaller part matches the model is lost; so is one that sees through more than the
         rest of what the model shows there.
@@ -112,6 +116,8 @@ class ModelParameters:
     spacing: float = 0.0
     max_points: int = 500000
     predict_motion: bool = True
+    relocalise: bool = True
+    denoise_samples: bool = True
     min_overlap: float = 0.15
     min_consistency: float = 0.8
     max_residual: float = 0.35

@@ -42,6 +42,8 @@ struct ModelOptions {
   double spacing = 0.0;  ///< distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces
   int max_points = 500000;       ///< the model never grows beyond: its spacing is widened instead
   bool predict_motion = true;    ///< start also from the pose that continues the last motion
+  bool relocalise = true;        ///< search around earlier poses where the guesses fail
+  bool denoise_samples = true;   ///< register surface points averaged over their pixels, not single pixels
   double min_overlap = 0.15;     ///< a frame of which a smaller part matches the model is lost
   double min_consistency = 0.8;  ///< so is one that sees through more than the rest of what the model shows there
   double max_residual = 0.35;    ///< and one whose residuals exceed this part of the last gate; by chance it is 0.58
