@@ -9,7 +9,7 @@
 namespace nacre {
 namespace {
 
-constexpr std::int64_t block_size = 256;
+constexpr std::int64_t block_size = 2048;
 
 struct Centroids {
   double weight = 0.0, squares = 0.0, weighted_squares = 0.0;

@@ -100,7 +100,7 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, const std::vector<st
   const bool oriented = estimated_normals_.rows() == 0 && source.estimated_normals.rows() == 0;
 
   std::vector<Pair> pairs(samples.size());
-  parallel_for(static_cast<std::int64_t>(samples.size()), 64, options_.num_threads, [&](std::int64_t i) {
+  parallel_for(static_cast<std::int64_t>(samples.size()), 1024, options_.num_threads, [&](std::int64_t i) {
     Pair& pair = pairs[static_cast<std::size_t>(i)];
     pair.weight = 0.0;
     const std::int32_t row = samples[static_cast<std::size_t>(i)];

@@ -105,7 +105,7 @@ Samples sample_frame(const Frame& frame, const Camera& camera, const ModelOption
   const ColorsRef colors(no_colors);
   const SurfaceObserver observer(frame, camera, options.fusion, colors, options.num_threads);
   const double stride = static_cast<double>(frame.valid.size()) / static_cast<double>(std::max<std::int64_t>(count, 1));
-  parallel_for(count, 256, options.num_threads, [&](std::int64_t i) {
+  parallel_for(count, 2048, options.num_threads, [&](std::int64_t i) {
     // One of every `stride` pixels.
     const double place =
         (static_cast<double>(i) + random_uniform(options.registration.seed, static_cast<std::uint64_t>(i))) * stride;
