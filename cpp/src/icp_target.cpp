@@ -37,10 +37,14 @@ std::vector<std::int32_t> choose(const std::vector<std::int32_t>& rows, std::siz
 }
 
 double median_spacing(const KdTree& tree, const PointsRef& points) {
-  constexpr Eigen::Index num_probes = 500;
-  const Eigen::Index stride = std::max<Eigen::Index>(1, points.rows() / num_probes);
+  constexpr std::size_t num_probes = 500;
+  std::vector<Eigen::Index> finite;
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    if (points.row(i).allFinite()) finite.push_back(i);
+  }
   std::vector<double> distances;
-  for (Eigen::Index i = 0; i < points.rows(); i += stride) {
+  for (std::size_t probe = 0; probe < finite.size(); probe += std::max<std::size_t>(1, finite.size() / num_probes)) {
+    const Eigen::Index i = finite[probe];
     std::int64_t indices[2];
     double squared[2];
     if (tree.nearest(points.row(i).transpose().cast<double>(), 2, KdTree::infinity, indices, squared) == 2) {
@@ -134,9 +138,11 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, const std::vector<st
     double variance = 0.0;
     if (source.sigma.size() > 0) variance += static_cast<double>(source.sigma[row]) * source.sigma[row];
     if (sigma_.size() > 0) variance += static_cast<double>(sigma_[match]) * sigma_[match];
-    pair.weight = variance > 0.0 ? 1.0 / variance : 1.0;
+    const bool has_sigma = source.sigma.size() > 0 || sigma_.size() > 0;
+    pair.weight = has_sigma ? 1.0 / variance : 1.0;
   });
-  pairs.erase(std::remove_if(pairs.begin(), pairs.end(), [](const Pair& pair) { return !(pair.weight > 0.0); }),
+  pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
+                             [](const Pair& pair) { return !(pair.weight > 0.0 && std::isfinite(pair.weight)); }),
               pairs.end());
   return pairs;
 }

@@ -104,6 +104,8 @@ void ModelOptions::check() const {
   registration.check();
   fusion.check();
   consolidation.check();
+  require(normals.k >= 3, "normals.k", "at least 3", normals.k);
+  require(normals.max_radius > 0.0, "normals.max_radius", "a positive distance in metres", normals.max_radius);
   require(spacing >= 0.0 && std::isfinite(spacing), "spacing", "0 (automatic) or a positive distance in metres",
           spacing);
   require(max_points >= 100, "max_points", "at least 100", max_points);

@@ -89,7 +89,8 @@ class Schedule {
     at_smallest_ = options_.gate_decay >= 1.0 || decayed <= smallest;
     // Normals of a source that is still far off may differ by a third more.
     const double widening = options_.gate_decay < 1.0 ? gate_.distance / first_ / 3.0 : 0.0;
-    gate_.cos_angle = std::cos(std::min(options_.max_angle * (1.0 + widening), 3.141592653589793));
+    const double angle = options_.max_angle * (1.0 + widening);
+    gate_.cos_angle = angle < 3.14159 ? std::cos(angle) : -2.0;  // every angle passes, rounding or not
   }
 
   const AlignOptions& options_;
@@ -102,6 +103,12 @@ class Schedule {
   Gate gate_{0.0, -1.0};
   std::vector<std::int32_t> samples_;
 };
+
+double rmse_of(const std::vector<Pair>& pairs, Metric metric) {
+  double squares = 0.0;
+  for (const Pair& pair : pairs) squares += residual(pair, metric) * residual(pair, metric);
+  return std::sqrt(squares / static_cast<double>(pairs.size()));
+}
 
 std::size_t least_pairs(std::size_t num_samples) { return std::max<std::size_t>(6, num_samples / 100); }
 
@@ -120,8 +127,10 @@ const char* to_string(AlignStatus status) {
 
 void AlignOptions::check() const {
   require(max_iterations >= 1, "max_iterations", "at least 1", max_iterations);
-  require(max_distance >= 0.0, "max_distance", "0 (automatic) or a positive distance in metres", max_distance);
-  require(final_distance >= 0.0, "final_distance", "0 (automatic) or a positive distance in metres", final_distance);
+  require(max_distance >= 0.0 && std::isfinite(max_distance), "max_distance",
+          "0 (automatic) or a positive distance in metres", max_distance);
+  require(final_distance >= 0.0 && std::isfinite(final_distance), "final_distance",
+          "0 (automatic) or a positive distance in metres", final_distance);
   require(gate_decay > 0.0 && gate_decay <= 1.0, "gate_decay", "in (0, 1]", gate_decay);
   require(max_angle > 0.0, "max_angle", "a positive angle in radians", max_angle);
   require(sample_fraction > 0.0 && sample_fraction <= 1.0, "sample_fraction", "in (0, 1]", sample_fraction);
@@ -165,10 +174,13 @@ AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pos
     const double accuracy = scale * std::sqrt(6.0 / static_cast<double>(pairs.size()));
     at_rest = !schedule.advance(step.size, scale, std::max(resolution, 0.2 * accuracy));
   }
-  if (options.keep_best) pose = best_pose;
 
   schedule.finish();
   std::vector<Pair> pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
+  if (options.keep_best && !(rmse_of(pairs, options.method) <= best_rmse)) {
+    pose = best_pose;
+    pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
+  }
   if (pairs.size() < least_pairs(schedule.samples().size())) return result;
   weight_pairs(pairs, options.method, options.robust, resolution);
   const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);

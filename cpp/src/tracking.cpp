@@ -12,6 +12,8 @@
 namespace nacre {
 namespace {
 
+constexpr double far_turn = 0.35;  // from the guess [rad]: a registration that turned farther must be beyond doubt
+
 // The model's points that a camera near a pose may see, as a cloud to register to.
 struct View {
   Points points, normals;
@@ -164,7 +166,9 @@ struct Search {
     const IcpTarget target(AlignCloud(view.points, view.normals), options.registration);
     AlignOptions align_options = options.registration;
     if (!(align_options.final_distance > 0.0)) {
-      align_options.final_distance = std::max(2.5 * target.spacing(), 4.0 * static_cast<double>(median_sigma(frame)));
+      // Noise that is large against the surface would match anything.
+      align_options.final_distance = std::min(
+          std::max(2.5 * target.spacing(), 4.0 * static_cast<double>(median_sigma(frame))), 0.05 * target.diameter());
     }
     if (has_automatic_gate() && !wide) align_options.max_distance = 4.0 * align_options.final_distance;
 
@@ -172,7 +176,9 @@ struct Search {
     result.alignment = align_to(target, source, guess, align_options);
     result.consistency = consistency_of(model, frame, camera, result.alignment.target_from_source, target.spacing(),
                                         options.num_threads);
-    judge(result, options, align_options.final_distance, strict);
+    const double turned =
+        Eigen::AngleAxisd(guess.linear().transpose() * result.alignment.target_from_source.linear()).angle();
+    judge(result, options, align_options.final_distance, strict || turned > far_turn);
     return result;
   }
 

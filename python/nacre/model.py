@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 import threading
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
@@ -247,7 +248,15 @@ class Model:
     ) -> None:
         if not isinstance(camera, Camera):
             raise TypeError(f"camera must be a nacre.Camera, got {type(camera).__name__}")
-        self.parameters = updated(parameters or ModelParameters.preset(preset), changes)
+        if parameters is None:
+            if not isinstance(preset, str):
+                raise TypeError(f"preset must be 'default' or 'paper', got {preset!r}")
+            parameters = ModelParameters.preset(preset)
+        elif not isinstance(parameters, ModelParameters):
+            raise TypeError(f"parameters must be nacre.ModelParameters, got {type(parameters).__name__}")
+        if not (np.isfinite(depth_scale) and depth_scale > 0):
+            raise ValueError(f"depth_scale must be positive (stored units per metre), got {depth_scale!r}")
+        self.parameters = updated(parameters, changes)
         self._depth_scale = depth_scale
         self._core = _core.Model(camera, to_core(self.parameters, _core.ModelOptions()))
         self._lock = threading.Lock()
@@ -306,6 +315,8 @@ class Model:
                 )
             colors = np.ascontiguousarray(array).reshape(-1, 3)
         pose = None if guess is None else as_pose("guess", guess)
+        if timestamp is not None and not isinstance(timestamp, numbers.Real):
+            raise TypeError(f"timestamp must be a number of seconds or None, got {timestamp!r}")
         with self._lock:
             core = self._core.add_frame(image, pixels, colors, timestamp, pose, keep_guess)
             report = FrameReport._from_core(core)
@@ -314,7 +325,8 @@ class Model:
 
     def __len__(self) -> int:
         """Return the number of points."""
-        return len(self._core.cloud)
+        with self._lock:
+            return len(self._core.cloud)
 
     def __repr__(self) -> str:
         tracked = sum(report.tracked for report in self._frames)
@@ -329,17 +341,20 @@ class Model:
     @property
     def points(self) -> npt.NDArray[np.float32]:
         """(N, 3) points in the world frame [m]; a copy."""
-        return self._core.cloud.points
+        with self._lock:
+            return self._core.cloud.points
 
     @property
     def normals(self) -> npt.NDArray[np.float32]:
         """(N, 3) unit normals towards the cameras that saw the points; a copy."""
-        return self._core.cloud.normals
+        with self._lock:
+            return self._core.cloud.normals
 
     @property
     def colors(self) -> npt.NDArray[np.uint8] | None:
         """(N, 3) colours, or None when no frame had any; a copy."""
-        colors = self._core.cloud.colors
+        with self._lock:
+            colors = self._core.cloud.colors
         if len(colors) == 0:
             return None
         return np.clip(np.rint(np.nan_to_num(colors)), 0, 255).astype(np.uint8)
@@ -347,7 +362,8 @@ class Model:
     @property
     def confidence(self) -> npt.NDArray[np.float32]:
         """(N,) frontal observations that each point stands for; a copy."""
-        return self._core.cloud.confidence
+        with self._lock:
+            return self._core.cloud.confidence
 
     @property
     def poses(self) -> npt.NDArray[np.float64]:
@@ -366,9 +382,11 @@ class Model:
     @property
     def spacing(self) -> float:
         """Distance between neighbouring points [m]; 0 before the first frame."""
-        return self._core.spacing
+        with self._lock:
+            return self._core.spacing
 
     def in_camera(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
         """Return points and normals in the newest registered camera's frame, as the paper keeps its model."""
-        cloud = self._core.cloud_in_camera()
+        with self._lock:
+            cloud = self._core.cloud_in_camera()
         return cloud.points, cloud.normals

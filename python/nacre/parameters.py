@@ -59,10 +59,14 @@ def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
 
     A name that does not exist raises a ValueError that lists those that do.
     """
+    if not dataclasses.is_dataclass(parameters):
+        raise TypeError(
+            f"{', '.join(changes)} cannot be changed: {parameters!r} is not a group of parameters"
+        )
     for name, value in changes.items():
-        head, _, rest = name.partition(".")
+        head, dot, rest = name.partition(".")
         names = [field.name for field in dataclasses.fields(parameters)]  # type: ignore[arg-type]
-        if head not in names:
+        if head not in names or (dot and not rest):
             raise ValueError(
                 f"there is no parameter {name!r} in {type(parameters).__name__}; it has {', '.join(names)}"
             )

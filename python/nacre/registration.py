@@ -104,11 +104,16 @@ def _cloud(
         )
     values = np.zeros(0, np.float32)
     if sigma is not None:
-        values = np.ascontiguousarray(sigma, dtype=np.float32)
+        given = np.asarray(sigma)
+        if given.dtype.kind not in "buif":
+            raise TypeError(f"{name}_sigma must be an array of real numbers, got dtype {given.dtype}")
+        values = np.ascontiguousarray(given, dtype=np.float32)
         if values.shape != (len(points),):
             raise ValueError(
                 f"{name}_sigma must have one value per point of {name} ({len(points)}), got {values.shape}"
             )
+        if (values <= 0).any():
+            raise ValueError(f"{name}_sigma must be positive (NaN: not used), got {values[values <= 0][0]}")
     return points, rows, values
 
 
