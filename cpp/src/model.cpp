@@ -93,9 +93,7 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.predict_motion = false;
   options.relocalise = false;
   options.denoise_samples = false;
-  options.min_overlap = 0.0;
-  options.min_consistency = 0.0;
-  options.max_residual = 1.0;
+  options.verify = false;
   return options;
 }
 

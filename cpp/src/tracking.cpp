@@ -131,6 +131,8 @@ void judge(TrackingResult& result, const ModelOptions& options, double gate, boo
       result.alignment.overlap > 0.35 && result.consistency > 0.9 && result.alignment.rmse < 0.25 * gate;
   if (result.alignment.status == AlignStatus::too_few_pairs) {
     reason << "too few points of the frame match the model";
+  } else if (!options.verify) {
+    result.status = FrameStatus::tracked;
   } else if (result.alignment.overlap < options.min_overlap) {
     reason << "overlap " << result.alignment.overlap << " is below " << options.min_overlap;
   } else if (result.consistency < options.min_consistency) {

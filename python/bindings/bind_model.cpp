@@ -73,6 +73,7 @@ void bind_model(py::module_& m) {
       .def_readwrite("predict_motion", &ModelOptions::predict_motion)
       .def_readwrite("relocalise", &ModelOptions::relocalise)
       .def_readwrite("denoise_samples", &ModelOptions::denoise_samples)
+      .def_readwrite("verify", &ModelOptions::verify)
       .def_readwrite("min_overlap", &ModelOptions::min_overlap)
       .def_readwrite("min_consistency", &ModelOptions::min_consistency)
       .def_readwrite("max_residual", &ModelOptions::max_residual)

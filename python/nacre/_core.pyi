@@ -627,12 +627,15 @@ class FusionOptions:
 
 class ModelOptions:
     consolidation: ConsolidateOptions
+    denoise_samples: bool
     depth: DepthOptions
     fold_in: FoldIn
     fusion: FusionOptions
     normals: NormalOptions
     predict_motion: bool
     registration: AlignOptions
+    relocalise: bool
+    verify: bool
     @staticmethod
     def preset(arg0: str) -> ModelOptions: ...
     def __init__(self) -> None: ...

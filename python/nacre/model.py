@@ -96,6 +96,8 @@ class ModelParameters:
         Search around earlier poses where the guesses fail.
     denoise_samples : bool
         Register surface points averaged over their pixels, not single pixels.
+    verify : bool
+        Judge registrations, by the three bounds below and by what is beyond doubt.
     min_overlap, min_consistency : float
         A frame of which a smaller part matches the model is lost; so is one that sees through more than the
         rest of what the model shows there.
@@ -119,6 +121,7 @@ class ModelParameters:
     predict_motion: bool = True
     relocalise: bool = True
     denoise_samples: bool = True
+    verify: bool = True
     min_overlap: float = 0.15
     min_consistency: float = 0.8
     max_residual: float = 0.35

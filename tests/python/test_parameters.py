@@ -148,9 +148,7 @@ PAPER: dict[str, Any] = {
     "kept_fraction": 0.9,
     "new_fraction": 0.2,
     "predict_motion": False,
-    "min_overlap": 0.0,
-    "min_consistency": 0.0,
-    "max_residual": 1.0,
+    "verify": False,
     "relocalise": False,
     "denoise_samples": False,
 }

@@ -44,6 +44,7 @@ struct ModelOptions {
   bool predict_motion = true;    ///< start also from the pose that continues the last motion
   bool relocalise = true;        ///< search around earlier poses where the guesses fail
   bool denoise_samples = true;   ///< register surface points averaged over their pixels, not single pixels
+  bool verify = true;            ///< judge registrations, by the three bounds below and by what is beyond doubt
   double min_overlap = 0.15;     ///< a frame of which a smaller part matches the model is lost
   double min_consistency = 0.8;  ///< so is one that sees through more than the rest of what the model shows there
   double max_residual = 0.35;    ///< and one whose residuals exceed this part of the last gate; by chance it is 0.58
