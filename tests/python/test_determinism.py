@@ -42,7 +42,7 @@ def depth(index: int) -> Any:
 @functools.cache
 def points(index: int) -> Any:
     clean = nacre.preprocess_depth(depth(index), camera(), num_threads=1)
-    return nacre.back_project(clean, camera())
+    return nacre.back_project(clean, camera())[::3]
 
 
 def of_align(method: Any, num_threads: int) -> str:
@@ -58,7 +58,7 @@ def of_align(method: Any, num_threads: int) -> str:
 
 def of_consolidate(method: Any, num_threads: int) -> str:
     thin = nacre.consolidate(
-        points(0), num_points=800, method=method, iterations=5, attributes=points(0), num_threads=num_threads
+        points(0), num_points=400, method=method, iterations=5, attributes=points(0), num_threads=num_threads
     )
     return digest(thin.points, thin.attributes["attributes"], thin.sources)
 

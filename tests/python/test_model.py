@@ -435,6 +435,16 @@ def test_relocalised_after_lost() -> None:
     assert rms(off_thing(model.points)) < 0.0003
 
 
+@pytest.mark.parametrize("index", [0, 1, 3])
+def test_a_lost_camera_is_found_at_earlier_poses(index: int) -> None:
+    """It was last seen up to 150 degrees away."""
+    model = object_model(6)
+    model.add_frame(HOPELESS["NaN"]())
+    report = model.add_frame(view(index))
+    assert report.status == "RELOCALISED"
+    assert np.allclose(report.world_from_camera, true_pose(index), atol=0.004)
+
+
 def test_a_bare_plane_leaves_the_pose_open() -> None:
     """Only the distance to a plane is known. What is not known keeps the guess."""
     rng = np.random.default_rng(6)
@@ -522,6 +532,7 @@ def test_illegal_parameters() -> None:
         ({"spacing": float("inf")}, "spacing must be .* got inf"),
         ({"max_points": 5}, "max_points must be at least 100, got 5"),
         ({"min_overlap": 1.5}, "min_overlap must be in .* got 1.5"),
+        ({"max_residual": float("nan")}, "max_residual must be .* got nan"),
         ({"min_consistency": float("nan")}, "min_consistency must be in .* got nan"),
         ({"first_fraction": 0.0}, "first_fraction must be in .* got 0"),
         ({"kept_fraction": -0.1}, "kept_fraction must be in .* got -0.1"),

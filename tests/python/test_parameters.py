@@ -150,6 +150,9 @@ PAPER: dict[str, Any] = {
     "predict_motion": False,
     "min_overlap": 0.0,
     "min_consistency": 0.0,
+    "max_residual": 1.0,
+    "relocalise": False,
+    "denoise_samples": False,
 }
 
 

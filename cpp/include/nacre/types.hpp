@@ -5,6 +5,11 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 
+// Memory of Eigen objects passes between the library and its client, so both must allocate it alike, whatever vector
+// flags each is built with. CMake and pkg-config give the definitions.
+static_assert(EIGEN_MAX_ALIGN_BYTES <= 16 && EIGEN_MALLOC_ALREADY_ALIGNED,
+              "to use nacre, compile with -DEIGEN_MAX_ALIGN_BYTES=16 -DEIGEN_MALLOC_ALREADY_ALIGNED=1");
+
 namespace nacre {
 
 /// N x 3 float coordinates [m], one point a row, contiguous: the layout of a NumPy array.
