@@ -94,7 +94,8 @@ def build_library(cmake: Callable[..., str], name: str, *definitions: str) -> Pa
     """Configure and build the repository's C++ part in ``build/NAME`` and return that folder."""
     folder = ROOT / "build" / name
     strict = "ON" if os.environ.get("CI") else "OFF"  # a stranger's newer compiler may know newer warnings
-    cmake("-S", ROOT, "-B", folder, f"-DNACRE_WARNINGS_AS_ERRORS={strict}", *definitions)
+    # Fresh: the folder may remember the tools of an environment that is gone. What is compiled stays.
+    cmake("--fresh", "-S", ROOT, "-B", folder, f"-DNACRE_WARNINGS_AS_ERRORS={strict}", *definitions)
     cmake("--build", folder)
     return folder
 
