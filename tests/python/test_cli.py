@@ -515,7 +515,7 @@ class TestDemo:
         out, _ = demo
         report = strict_json(out / "report.json")
         assert report["surface_accuracy"]["rms"] < 0.001
-        assert report["completeness"]["tau"] == [0.001, 0.002, 0.005]
+        assert report["completeness"]["tau"] == [0.002, 0.003, 0.005]
         assert report["pose_error"]["translation_max"] < 0.005
         assert report["num_tracked"] == 3
         names = {path.stem for path in (out / "pictures").glob("*.png")}
