@@ -131,7 +131,7 @@ def localize(points: FloatArray) -> tuple[npt.NDArray[np.float32], npt.NDArray[n
     if points.dtype == np.float32:
         return points, np.zeros(3)  # type: ignore[return-value]
     finite = points[np.isfinite(points).all(axis=1)]
-    origin = np.round(finite.mean(axis=0)) if len(finite) else np.zeros(3)
+    origin = np.round(finite.mean(axis=0, dtype=np.float64)) if len(finite) else np.zeros(3)
     return (points - origin).astype(np.float32), origin
 
 
