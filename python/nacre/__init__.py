@@ -1,6 +1,8 @@
 """nacre grows a 3D model from depth-camera images, layer by layer."""
 
-from nacre import evaluation
+import importlib
+from typing import TYPE_CHECKING, Any
+
 from nacre._core import Camera, __version__
 from nacre.consolidation import Consolidated, consolidate, project_samples
 from nacre.datasets import Sequence, SequenceFrame, open_sequence, write_recording
@@ -25,6 +27,9 @@ from nacre.neighbors import KdTree, RadiusNeighbors
 from nacre.normals import estimate_normals
 from nacre.registration import AlignResult, RegistrationParameters, align
 from nacre.simulation import default_camera, simulate_depth, turntable_poses
+
+if TYPE_CHECKING:
+    from nacre import evaluation
 
 __all__ = [
     "AlignResult",
@@ -74,3 +79,10 @@ __all__ = [
     "write_recording",
     "write_trajectory",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import ``nacre.evaluation`` when it is first asked for: most programs never do."""
+    if name == "evaluation":
+        return importlib.import_module("nacre.evaluation")
+    raise AttributeError(f"module 'nacre' has no attribute {name!r}")
