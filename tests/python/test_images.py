@@ -224,5 +224,5 @@ def test_without_pillow_the_error_says_what_to_install(tmp_path, depth, monkeypa
 def test_without_openexr_the_error_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "OpenEXR", None)
     (tmp_path / "a.exr").write_bytes(b"")
-    with pytest.raises(ImportError, match="pip install OpenEXR"):
+    with pytest.raises(ImportError, match=r'pip install "nacre\[exr\]"'):
         read_depth(tmp_path / "a.exr")

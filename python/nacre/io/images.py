@@ -171,7 +171,7 @@ def _read_exr(path: Path) -> npt.NDArray[Any]:
     try:
         import OpenEXR  # type: ignore[import-not-found, unused-ignore]
     except ImportError as error:
-        raise ImportError("EXR images need OpenEXR: pip install OpenEXR", name="OpenEXR") from error
+        raise ImportError('EXR images need OpenEXR: pip install "nacre[exr]"', name="OpenEXR") from error
     path.stat()
     try:
         with OpenEXR.File(str(path), separate_channels=True) as image:
