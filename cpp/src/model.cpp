@@ -7,7 +7,7 @@
 
 #include "check.hpp"
 #include "consolidation_fold.hpp"
-#include "surface_observer.hpp"
+#include "fusion_step.hpp"
 #include "tracking.hpp"
 
 namespace nacre {
@@ -134,10 +134,10 @@ struct Model::Impl {
   }
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
-  TrackingResult locate(const Frame& frame, const FrameExtras& extras) const;
+  TrackingResult locate(const Frame& frame, const SurfaceObserver& observer, const FrameExtras& extras) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   std::vector<Pose> key_poses() const;
-  void fold_in(const Frame& frame, const FrameExtras& extras, FrameReport& report);
+  void fold_in(const Frame& frame, const SurfaceObserver& observer, FrameReport& report);
 };
 
 // The loop: clean the image, make points of it, register them to the model, fold them in, renew the normals.
@@ -155,9 +155,12 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   report.milliseconds.preprocess = watch.lap();
 
   const Frame frame = make_frame(clean, camera, noise, options.num_threads);
+  if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
+  const ColorsRef colors(extras.colors);
+  const SurfaceObserver observer(frame, camera, options.fusion, colors, options.num_threads);
   report.milliseconds.back_project = watch.lap();
 
-  const TrackingResult tracking = locate(frame, extras);
+  const TrackingResult tracking = locate(frame, observer, extras);
   report.status = tracking.status;
   report.reason = tracking.reason;
   report.world_from_camera = tracking.alignment.target_from_source;
@@ -175,7 +178,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     poses.push_back(report.world_from_camera);
     if (report.status == FrameStatus::tracked) {
       if (was_lost) report.status = FrameStatus::relocalised;
-      fold_in(frame, extras, report);
+      fold_in(frame, observer, report);
     }
   }
   was_lost = report.status == FrameStatus::lost && !poses.empty();
@@ -187,7 +190,8 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   return report;
 }
 
-TrackingResult Model::Impl::locate(const Frame& frame, const FrameExtras& extras) const {
+TrackingResult Model::Impl::locate(const Frame& frame, const SurfaceObserver& observer,
+                                   const FrameExtras& extras) const {
   TrackingResult result;
   result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
   if (frame.valid.size() < least_pixels) {
@@ -201,7 +205,7 @@ TrackingResult Model::Impl::locate(const Frame& frame, const FrameExtras& extras
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, guesses(extras), key_poses(), was_lost, options);
+  return track(cloud, frame, camera, observer, guesses(extras), key_poses(), was_lost, options);
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
@@ -228,10 +232,9 @@ std::vector<Pose> Model::Impl::key_poses() const {
   return chosen;
 }
 
-void Model::Impl::fold_in(const Frame& frame, const FrameExtras& extras, FrameReport& report) {
+void Model::Impl::fold_in(const Frame& frame, const SurfaceObserver& observer, FrameReport& report) {
   StopWatch watch;
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
-  if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
   if (options.fold_in != FoldIn::fuse) {
     consolidate_frame(cloud, frame, report.world_from_camera, options, spacing,
                       static_cast<std::int32_t>(report.index));
@@ -240,8 +243,8 @@ void Model::Impl::fold_in(const Frame& frame, const FrameExtras& extras, FrameRe
     report.milliseconds.normals = watch.lap();
     return;
   }
-  report.fusion = fuse(cloud, frame, camera, report.world_from_camera, spacing, static_cast<std::int32_t>(report.index),
-                       options.fusion, extras.colors, options.num_threads);
+  report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing,
+                                static_cast<std::int32_t>(report.index), options.fusion, options.num_threads);
   while (cloud.size() > options.max_points) {
     spacing *= coarsening;
     thin(cloud, spacing);

@@ -1,18 +1,50 @@
-// What a depth frame says about a point of a surface: the symmetric implicit moving-least-squares residual.
+// What a depth frame says about points of a surface: the symmetric implicit moving-least-squares residual.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "nacre/fusion.hpp"
+#include "simd/surface_window.hpp"
 
 namespace nacre {
 
 // What the pixels around a surface point say about it.
 struct Observation {
-  float weight = 0.0F;
-  float offset = 0.0F;  // along the point's normal [m]
-  Eigen::Vector3f normal = Eigen::Vector3f::Zero();
-  Eigen::Vector3f color = Eigen::Vector3f::Zero();
+  float weight;
+  float offset;            // along the point's normal [m]
+  Eigen::Vector3f normal;  // not normalised
+  Eigen::Vector3f color;   // 0 without colours
+};
+
+// Points of the camera frame to observe together, and then what was observed.
+class ObservationBlock {
+ public:
+  static constexpr int capacity = 256;
+
+  int size() const { return count_; }
+  Observation operator[](int i) const {
+    return {weight_[i],
+            offset_[i],
+            {seen_normal_x_[i], seen_normal_y_[i], seen_normal_z_[i]},
+            {red_[i], green_[i], blue_[i]}};
+  }
+
+ private:
+  friend class SurfaceObserver;
+  template <class T>
+  using Column = T[capacity];
+
+  int count_ = 0;
+  Column<float> x_, y_, z_, normal_x_, normal_y_, normal_z_, radius_, largest_offset_;
+  Column<std::int32_t> u_, v_, window_;
+  Column<float> weight_, offset_, seen_normal_x_, seen_normal_y_, seen_normal_z_, red_, green_, blue_;
+};
+
+// Where a point is in the image.
+struct Projection {
+  bool is_inside;
+  std::int32_t nearest_pixel;  // also of points outside; -1 where the point has no projection
 };
 
 // The median of the noise over a frame's valid pixels [m]; 0 when there are none.
@@ -24,40 +56,32 @@ class SurfaceObserver {
   SurfaceObserver(const Frame& frame, const Camera& camera, const FusionOptions& options, const ColorsRef& colors,
                   int num_threads);
 
-  bool has_colors() const { return colors_.rows() > 0; }
+  bool has_colors() const { return image_.red != nullptr; }
 
-  // The pixel nearest to the projection of a point, or -1.
-  std::int32_t pixel_of(const Eigen::Vector3f& point) const;
+  Projection project(const Eigen::Vector3f& point) const;
 
   Eigen::Vector3f towards_camera(const Eigen::Vector3f& point) const;
 
-  // offset = sum of w (n_i + n_j) / 2 . (q_j - x_i) / sum of w over the pixels j around `pixel`, where x_i is the
-  // point; it vanishes to second order on constant curvature. The weights fall to 0 at the support's radius.
-  Observation observe(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, std::int32_t pixel,
-                      float sigma) const;
+  // Adds a point, whose noise is about sigma, to a block that is not full; pixel is where it projects to.
+  void add(ObservationBlock& block, const Eigen::Vector3f& point, const Eigen::Vector3f& normal, std::int32_t pixel,
+           float sigma) const;
+  // offset = sum of w (n_i + n_j) / 2 . (q_j - x_i) / sum of w over the pixels j around each point x_i of the block; it
+  // vanishes to second order on constant curvature. The weights fall to 0 at the support's radius.
+  void observe(ObservationBlock& block) const;
 
   // Whether every pixel around measures something farther than a margin behind a point.
   bool sees_through(const Eigen::Vector3f& point, std::int32_t pixel, float margin) const;
 
  private:
-  // One pixel in one half of a cache line.
-  struct alignas(32) Pixel {
-    float x, y, z;
-    float normal_x, normal_y, normal_z;
-    float weight;  // information relative to a frontal measurement of the reference noise; 0 where there is none
-  };
-
   // Radius of the kernel at a depth: wide enough to average the noise, narrow enough to keep the shape.
-  float support(float z, float sigma) const;
-
-  static constexpr int max_window = 4;  // pixels on each side of a point that may observe it
+  float support(float sigma, float footprint) const;
 
   const Camera& camera_;
   const FusionOptions& options_;
-  const ColorsRef& colors_;
   int width_, height_;
-  std::vector<Pixel> pixels_;
-  float cos_max_angle_;
+  std::vector<float> planes_;
+  simd::SurfaceImage image_;
+  float least_cosine_;
 };
 
 }  // namespace nacre

@@ -97,27 +97,33 @@ struct Samples {
   Values sigma;
 };
 
-Samples sample_frame(const Frame& frame, const Camera& camera, const ModelOptions& options) {
+Samples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
   const std::int64_t count =
       options.registration.max_samples > 0
           ? std::min<std::int64_t>(options.registration.max_samples, static_cast<std::int64_t>(frame.valid.size()))
           : static_cast<std::int64_t>(frame.valid.size());
   Samples samples{Points(count, 3), Points(count, 3), Values(count)};
-  const Colors no_colors;
-  const ColorsRef colors(no_colors);
-  const SurfaceObserver observer(frame, camera, options.fusion, colors, options.num_threads);
   const double stride = static_cast<double>(frame.valid.size()) / static_cast<double>(std::max<std::int64_t>(count, 1));
-  parallel_for(count, 2048, options.num_threads, [&](std::int64_t i) {
-    // One of every `stride` pixels.
-    const double place =
-        (static_cast<double>(i) + random_uniform(options.registration.seed, static_cast<std::uint64_t>(i))) * stride;
-    const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
-    const Eigen::Vector3f point = frame.points.row(row).transpose(), normal = frame.normals.row(row).transpose();
-    const Observation seen =
-        options.denoise_samples ? observer.observe(point, normal, row, frame.sigma[row]) : Observation();
-    samples.points.row(i) = (point + seen.offset * normal).transpose();
-    samples.normals.row(i) = seen.weight > 0.0F ? seen.normal.normalized().transpose() : normal.transpose();
-    samples.sigma[i] = frame.sigma[row];
+  parallel_blocks(count, ObservationBlock::capacity, options.num_threads, [&](auto, auto begin, auto end) {
+    ObservationBlock block;
+    for (std::int64_t i = begin; i < end; ++i) {
+      // One of every `stride` pixels.
+      const double place =
+          (static_cast<double>(i) + random_uniform(options.registration.seed, static_cast<std::uint64_t>(i))) * stride;
+      const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
+      samples.points.row(i) = frame.points.row(row);
+      samples.normals.row(i) = frame.normals.row(row);
+      samples.sigma[i] = frame.sigma[row];
+      observer.add(block, samples.points.row(i).transpose(), samples.normals.row(i).transpose(), row, frame.sigma[row]);
+    }
+    if (!options.denoise_samples) return;
+    observer.observe(block);
+    for (std::int64_t i = begin; i < end; ++i) {
+      const Observation seen = block[static_cast<int>(i - begin)];
+      if (!(seen.weight > 0.0F)) continue;
+      samples.points.row(i) += seen.offset * samples.normals.row(i);
+      samples.normals.row(i) = seen.normal.normalized().transpose();
+    }
   });
   return samples;
 }
@@ -233,9 +239,9 @@ struct Search {
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera,
-                     const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
+                     const SurfaceObserver& observer, const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
                      const ModelOptions& options) {
-  const Samples samples = sample_frame(frame, camera, options);
+  const Samples samples = sample_frame(frame, observer, options);
   const Search search{model, frame, camera, options,
                       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration)};
   TrackingResult best;

@@ -358,4 +358,25 @@ NACRE_INLINE Mask operator>(F32 a, F32 b) { return b < a; }
 NACRE_INLINE Mask operator>=(F32 a, F32 b) { return b <= a; }
 NACRE_INLINE F32& operator+=(F32& a, F32 b) { return a = a + b; }
 
+// The sum of 16 values in a fixed order, whatever the number of lanes: i with i + 8, then i with i + 4, 2 and 1.
+NACRE_INLINE float sum_lanes(const F32 (&v)[16 / lanes]) {
+#if defined(__AVX512F__) && defined(__AVX512VL__)
+  const __m256 eight = _mm256_add_ps(_mm512_castps512_ps256(v[0].v),
+                                     _mm256_castpd_ps(_mm512_extractf64x4_pd(_mm512_castps_pd(v[0].v), 1)));
+  const __m128 four = _mm_add_ps(_mm256_castps256_ps128(eight), _mm256_extractf128_ps(eight, 1));
+#elif defined(__AVX2__) && defined(__FMA__)
+  const __m256 eight = _mm256_add_ps(v[0].v, v[1].v);
+  const __m128 four = _mm_add_ps(_mm256_castps256_ps128(eight), _mm256_extractf128_ps(eight, 1));
+#elif defined(NACRE_SSE2)
+  const __m128 four = ((v[0] + v[2]) + (v[1] + v[3])).v;
+#else
+  const F32 four = (v[0] + v[2]) + (v[1] + v[3]);
+  return (four.v[0] + four.v[2]) + (four.v[1] + four.v[3]);
+#endif
+#if defined(__AVX2__) || defined(NACRE_SSE2)
+  const __m128 two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+  return _mm_cvtss_f32(_mm_add_ss(two, _mm_shuffle_ps(two, two, 1)));
+#endif
+}
+
 }  // namespace nacre::simd::NACRE_ISA
