@@ -54,14 +54,6 @@ SurfaceObserver::SurfaceObserver(const Frame& frame, const Camera& camera, const
   });
 }
 
-Projection SurfaceObserver::project(const Eigen::Vector3f& point) const {
-  const Eigen::Vector2d pixel = camera_.project(point.cast<double>());
-  if (!pixel.allFinite()) return {false, -1};
-  const double u = std::clamp(pixel.x(), 0.0, width_ - 1.0), v = std::clamp(pixel.y(), 0.0, height_ - 1.0);
-  const bool is_inside = std::abs(pixel.x() - u) < 0.5 && std::abs(pixel.y() - v) < 0.5;
-  return {is_inside, static_cast<std::int32_t>(v + 0.5) * width_ + static_cast<std::int32_t>(u + 0.5)};
-}
-
 Eigen::Vector3f SurfaceObserver::towards_camera(const Eigen::Vector3f& point) const {
   if (camera_.model() == Camera::Model::orthographic) return {0.0F, 0.0F, -1.0F};
   return -point.normalized();
@@ -69,13 +61,13 @@ Eigen::Vector3f SurfaceObserver::towards_camera(const Eigen::Vector3f& point) co
 
 float SurfaceObserver::support(float sigma, float footprint) const {
   if (options_.support > 0.0) return static_cast<float>(options_.support);
-  return std::clamp(6.0F * sigma, 3.0F * footprint, static_cast<float>(simd::largest_window) * footprint);
+  return std::clamp(6.0F * sigma, 3.0F * footprint, 4.0F * footprint);
 }
 
 void SurfaceObserver::add(ObservationBlock& block, const Eigen::Vector3f& point, const Eigen::Vector3f& normal,
-                          std::int32_t pixel, float sigma) const {
+                          std::int32_t pixel, float sigma, float spacing) const {
   const auto footprint = static_cast<float>(camera_.footprint(point.z()));
-  const float radius = support(sigma, footprint);
+  const float radius = support(sigma, footprint), reach = std::max(radius, spacing);
   const int i = block.count_++;
   block.x_[i] = point.x();
   block.y_[i] = point.y();
@@ -83,14 +75,32 @@ void SurfaceObserver::add(ObservationBlock& block, const Eigen::Vector3f& point,
   block.normal_x_[i] = normal.x();
   block.normal_y_[i] = normal.y();
   block.normal_z_[i] = normal.z();
+  block.sigma_[i] = sigma;
   block.u_[i] = pixel % width_;
   block.v_[i] = pixel / width_;
   block.radius_[i] = radius;
   block.largest_offset_[i] = std::max(radius, 4.0F * sigma);
-  block.window_[i] = std::clamp(static_cast<int>(std::ceil(radius / footprint)), 1, simd::largest_window);
+  block.spacing_[i] = spacing;
+  block.window_[i] = std::clamp(static_cast<int>(std::ceil(reach / footprint)), 1, simd::largest_window);
 }
 
-void SurfaceObserver::observe(ObservationBlock& b) const {
+PixelWindow ObservationBlock::cover(int i) const {
+  PixelWindow window{u_[i] - window_[i], v_[i] - window_[i], 2 * window_[i] + 1, {}};
+  std::copy_n(cover_rows_ + PixelWindow::size * i, window.num_rows, window.rows);
+  return window;
+}
+
+void SurfaceObserver::observe(ObservationBlock& block) const { observe(block, nullptr); }
+
+void SurfaceObserver::observe_and_cover(ObservationBlock& block, float least_cosine) const {
+  for (int i = 0; i < block.count_; ++i) {
+    block.cover_offset_[i] = std::max(block.spacing_[i], 3.0F * block.sigma_[i]);
+  }
+  const simd::WindowCover cover = {block.spacing_, block.cover_offset_, least_cosine, block.cover_rows_};
+  observe(block, &cover);
+}
+
+void SurfaceObserver::observe(ObservationBlock& b, const simd::WindowCover* cover) const {
   const bool colored = has_colors();
   if (!colored) {
     std::fill_n(b.red_, b.count_, 0.0F);
@@ -102,7 +112,8 @@ void SurfaceObserver::observe(ObservationBlock& b) const {
                            b.radius_, b.largest_offset_},
                           least_cosine_,
                           {b.weight_, b.offset_, b.seen_normal_x_, b.seen_normal_y_, b.seen_normal_z_, b.red_,
-                           b.green_, b.blue_});
+                           b.green_, b.blue_},
+                          cover);
 }
 
 bool SurfaceObserver::sees_through(const Eigen::Vector3f& point, std::int32_t pixel, float margin) const {
