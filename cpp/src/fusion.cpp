@@ -38,6 +38,16 @@ struct NewPoint {
   PixelWindow cover;
 };
 
+template <class T>
+std::vector<T> concatenate(const std::vector<std::vector<T>>& parts) {
+  std::size_t size = 0;
+  for (const std::vector<T>& part : parts) size += part.size();
+  std::vector<T> all;
+  all.reserve(size);
+  for (const std::vector<T>& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
 // A set of pixels.
 class PixelSet {
  public:
@@ -80,14 +90,24 @@ PixelSet update(PointModel& model, const Frame& frame, const Camera& camera, con
     const auto first = static_cast<std::size_t>(begin);
     ModelView::Block points;
     view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin), points);
+    const auto note_violation = [&](int j, float sigma) {
+      const float margin = std::max(static_cast<float>(2.0 * spacing), 4.0F * sigma);
+      if (!observer.sees_through(points.point(j), points.pixel[j], margin)) return;
+      std::uint8_t& violations = model.violations[first + static_cast<std::size_t>(j)];
+      violations = static_cast<std::uint8_t>(std::min(255, violations + 1));
+    };
     ObservationBlock block;
     int seen[block_size];  // of the points
     for (int j = 0; j < static_cast<int>(end - begin); ++j) {
       if (!points.inside[j] || !(points.facing[j] > least_facing)) continue;
-      const float sigma = frame.sigma[points.pixel[j]];
+      const float measured_sigma = frame.sigma[points.pixel[j]];
+      const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
+      if (!observer.may_observe(points.point(j), points.pixel[j], sigma, least_weight)) {
+        note_violation(j, sigma);
+        continue;
+      }
       seen[block.size()] = j;
-      observer.add(block, points.point(j), points.normal(j), points.pixel[j], std::isfinite(sigma) ? sigma : 0.0F,
-                   static_cast<float>(spacing));
+      observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma, static_cast<float>(spacing));
     }
     observer.observe_and_cover(block, sheet_cosine);
     for (int k = 0; k < block.size(); ++k) {
@@ -107,9 +127,8 @@ PixelSet update(PointModel& model, const Frame& frame, const Camera& camera, con
         model.last_seen[i] = frame_index;
         model.violations[i] = 0;
         covers[static_cast<std::size_t>(number)].push_back(block.cover(k));
-      } else if (observer.sees_through(points.point(j), points.pixel[j],
-                                       std::max(static_cast<float>(2.0 * spacing), 4.0F * block.sigma(k)))) {
-        model.violations[i] = static_cast<std::uint8_t>(std::min(255, model.violations[i] + 1));
+      } else {
+        note_violation(j, block.sigma(k));
       }
     }
   });
@@ -125,12 +144,16 @@ PixelSet update(PointModel& model, const Frame& frame, const Camera& camera, con
 // The frame's surface where the model does not cover it, denoised.
 std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
                                       const PixelSet& covered, double spacing, int num_threads) {
-  std::vector<std::int32_t> rows;
-  for (const std::int32_t row : frame.valid) {
-    if (observer.weight(row) > least_pixel_weight && !covered.contains(row % frame.width, row / frame.width)) {
-      rows.push_back(row);
+  std::vector<std::vector<std::int32_t>> uncovered(static_cast<std::size_t>(frame.height));
+  parallel_for(frame.height, 16, num_threads, [&](std::int64_t v) {
+    const auto first = static_cast<std::int32_t>(v) * frame.width;
+    for (int u = 0; u < frame.width; ++u) {
+      if (observer.weight(u, static_cast<int>(v)) > least_pixel_weight && !covered.contains(u, static_cast<int>(v))) {
+        uncovered[static_cast<std::size_t>(v)].push_back(first + u);
+      }
     }
-  }
+  });
+  const std::vector<std::int32_t> rows = concatenate(uncovered);
   constexpr std::int64_t block_size = ObservationBlock::capacity;
   const auto count = static_cast<std::int64_t>(rows.size());
   std::vector<std::vector<NewPoint>> found(static_cast<std::size_t>((count + block_size - 1) / block_size));
@@ -164,9 +187,7 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
     }
     candidates.resize(kept);
   });
-  std::vector<NewPoint> all;
-  for (const std::vector<NewPoint>& candidates : found) all.insert(all.end(), candidates.begin(), candidates.end());
-  return all;
+  return concatenate(found);
 }
 
 // Adds points, one after the other, where neither the model nor a point before covers the surface.

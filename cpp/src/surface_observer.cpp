@@ -6,6 +6,11 @@
 #include "parallel.hpp"
 
 namespace nacre {
+namespace {
+
+constexpr int border = simd::largest_window;
+
+}  // namespace
 
 float median_sigma(const Frame& frame) {
   if (frame.valid.empty()) return 0.0F;
@@ -23,8 +28,9 @@ SurfaceObserver::SurfaceObserver(const Frame& frame, const Camera& camera, const
       options_(options),
       width_(frame.width),
       height_(frame.height),
+      tiles_across_((frame.width + tile_size - 1) / tile_size),
       least_cosine_(static_cast<float>(std::cos(options.max_angle))) {
-  constexpr int border = simd::largest_window, right_border = 16;
+  constexpr int right_border = border + tile_size + 2;
   const std::int64_t stride = border + width_ + right_border, rows = height_ + 2 * border;
   const int num_planes = colors.rows() > 0 ? 10 : 7;
   planes_.assign(static_cast<std::size_t>(num_planes * rows * stride), 0.0F);
@@ -52,6 +58,32 @@ SurfaceObserver::SurfaceObserver(const Frame& frame, const Camera& camera, const
       for (int channel = 0; channel < 3; ++channel) plane(7 + channel)[to + u] = colors(first + u, channel);
     }
   });
+  tiles_ = summarise(num_threads);
+}
+
+std::vector<SurfaceObserver::Tile> SurfaceObserver::summarise(int num_threads) const {
+  const int tiles_down = (height_ + tile_size - 1) / tile_size;
+  std::vector<Tile> tiles(static_cast<std::size_t>(tiles_across_ * tiles_down));
+  parallel_for(tiles_down, 1, num_threads, [&](std::int64_t row) {
+    for (int column = 0; column < tiles_across_; ++column) {
+      Tile& tile = tiles[static_cast<std::size_t>(row * tiles_across_ + column)];
+      const int first_u = column * tile_size - border, first_v = static_cast<int>(row) * tile_size - border;
+      const int last_v = std::min(first_v + tile_size + 2 * border, height_ + border);
+      simd::summarise_pixels()(image_, first_v * image_.stride + first_u, tile_size + 2 * border, last_v - first_v,
+                               &tile.nearest, &tile.farthest, &tile.largest_weight);
+    }
+  });
+  return tiles;
+}
+
+bool SurfaceObserver::may_observe(const Eigen::Vector3f& point, std::int32_t pixel, float sigma,
+                                  float least_weight) const {
+  const Tile& tile = tiles_[static_cast<std::size_t>(pixel / width_ / tile_size * tiles_across_ +
+                                                     pixel % width_ / tile_size)];
+  const float radius = support(sigma, static_cast<float>(camera_.footprint(point.z())));
+  const float reach = radius + std::max(radius, 4.0F * sigma);
+  return point.z() > tile.nearest - reach && point.z() < tile.farthest + reach &&
+         static_cast<float>(PixelWindow::size * PixelWindow::size) * tile.largest_weight > least_weight;
 }
 
 Eigen::Vector3f SurfaceObserver::towards_camera(const Eigen::Vector3f& point) const {

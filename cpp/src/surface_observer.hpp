@@ -64,10 +64,13 @@ class SurfaceObserver {
                   int num_threads);
 
   // Of a pixel: information relative to a frontal measurement of the reference noise.
-  float weight(std::int32_t pixel) const { return image_.weight[pixel / width_ * image_.stride + pixel % width_]; }
+  float weight(int u, int v) const { return image_.weight[v * image_.stride + u]; }
 
   bool has_colors() const { return image_.red != nullptr; }
 
+
+  // Whether a window around a point can say more than `least_weight` about it; false is certain.
+  bool may_observe(const Eigen::Vector3f& point, std::int32_t pixel, float sigma, float least_weight) const;
 
   Eigen::Vector3f towards_camera(const Eigen::Vector3f& point) const;
 
@@ -93,8 +96,18 @@ class SurfaceObserver {
   const Camera& camera_;
   const FusionOptions& options_;
   int width_, height_;
+  // What the windows around the pixels of a tile may see.
+  struct Tile {
+    float nearest, farthest;  // depth [m]
+    float largest_weight;
+  };
+  static constexpr int tile_size = 16;  // [pixels]
+  std::vector<Tile> summarise(int num_threads) const;
+
+  int tiles_across_;
   std::vector<float> planes_;
   simd::SurfaceImage image_;
+  std::vector<Tile> tiles_;
   float least_cosine_;
 };
 

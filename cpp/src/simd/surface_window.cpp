@@ -117,6 +117,34 @@ void fill_surface_row(const FrameRow& row, float reference_sigma, bool orthograp
   }
 }
 
+void summarise_pixels(const SurfaceImage& image, int64_t start, int width, int rows, float* nearest, float* farthest,
+                      float* largest_weight) {
+  const F32 infinity = broadcast(HUGE_VALF), zero = broadcast(0.0F);
+  F32 near = infinity, far = zero - infinity, weight = zero;
+  for (int row = 0; row < rows; ++row) {
+    for (int u = 0; u < width; u += lanes) {
+      const int64_t pixel = start + row * image.stride + u;
+      const F32 z = load(image.z + pixel), w = select(first_lanes(width - u), load(image.weight + pixel), zero);
+      const Mask counts = w > zero;
+      near = min(near, select(counts, z, infinity));
+      far = max(far, select(counts, z, zero - infinity));
+      weight = max(weight, w);
+    }
+  }
+  float lane[3][lanes];
+  store(lane[0], near);
+  store(lane[1], far);
+  store(lane[2], weight);
+  for (int i = 1; i < lanes; ++i) {
+    lane[0][0] = lane[0][i] < lane[0][0] ? lane[0][i] : lane[0][0];
+    lane[1][0] = lane[1][i] > lane[1][0] ? lane[1][i] : lane[1][0];
+    lane[2][0] = lane[2][i] > lane[2][0] ? lane[2][i] : lane[2][0];
+  }
+  *nearest = lane[0][0];
+  *farthest = lane[1][0];
+  *largest_weight = lane[2][0];
+}
+
 void observe_windows(const SurfaceImage& image, const WindowQueries& queries, float least_cosine,
                      const WindowSums& sums, const WindowCover* cover) {
   image.red ? observe<true>(image, queries, least_cosine, sums, cover)

@@ -11,7 +11,7 @@ namespace nacre::simd {
 constexpr int largest_window = 7;  // pixels on each side of a point: a row is at most 16 lanes
 
 // Planes of one row stride, from pixel (0, 0) on. Around the image is a border of zeros that windows may reach into:
-// largest_window rows above and below, as many pixels to the left, and 16 to the right.
+// largest_window rows above and below, as many pixels to the left, and 25 to the right.
 struct SurfaceImage {
   const float *x, *y, *z;                       // points [m]; 0 where there is no measurement
   const float *normal_x, *normal_y, *normal_z;  // unit length, or 0
@@ -34,6 +34,12 @@ struct SurfaceRow {
 // reference noise.
 using FillSurfaceRow = void(const FrameRow& row, float reference_sigma, bool orthographic, const SurfaceRow& out);
 NACRE_DECLARE_KERNEL(FillSurfaceRow, fill_surface_row)
+
+// The range of depth and the largest weight of the pixels that have one, in `rows` rows of `width` <= 32 pixels from
+// `start` on; infinity, -infinity and 0 where there are none.
+using SummarisePixels = void(const SurfaceImage& image, int64_t start, int width, int rows, float* nearest,
+                             float* farthest, float* largest_weight);
+NACRE_DECLARE_KERNEL(SummarisePixels, summarise_pixels)
 
 // `count` points with what limits their windows, array by array.
 struct WindowQueries {
