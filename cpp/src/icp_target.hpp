@@ -24,9 +24,9 @@ struct IcpSource {
 };
 
 struct Gate {
-  double distance;   // [m]
-  double cos_angle;  // of the largest angle between matched normals
-  double residual;   // along the normals [m]
+  double distance;                                            // [m]
+  double cos_angle;                                           // of the largest angle between matched normals
+  double residual = std::numeric_limits<double>::infinity();  // along the normals [m]
 };
 
 class IcpTarget {
@@ -51,8 +51,8 @@ class IcpTarget {
   double diameter_ = 0.0, spacing_ = 0.0;
 };
 
-// align with a prepared target. With the last gate, pairs with larger residuals than `last_residual` are rejected: for a
-// target that is sparser than its surface is known, where near points may lie far along the surface, but not across.
+// align with a prepared target. With the last gate, pairs with larger residuals than `last_residual` are rejected: for
+// a target that is sparser than its surface is known, where near points may lie far along the surface, but not across.
 AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
                      double last_residual = std::numeric_limits<double>::infinity());
 

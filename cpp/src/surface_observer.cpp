@@ -36,8 +36,8 @@ SurfaceObserver::SurfaceObserver(const Frame& frame, const Camera& camera, const
   planes_.assign(static_cast<std::size_t>(num_planes * rows * stride), 0.0F);
   const auto plane = [&](int index) { return planes_.data() + (index * rows + border) * stride + border; };
   const simd::SurfaceRow out = {plane(0), plane(1), plane(2), plane(3), plane(4), plane(5), plane(6)};
-  image_ = {out.x, out.y, out.z, out.normal_x, out.normal_y, out.normal_z, out.weight, nullptr, nullptr, nullptr,
-            stride};
+  image_ = {out.x,      out.y,   out.z,   out.normal_x, out.normal_y, out.normal_z,
+            out.weight, nullptr, nullptr, nullptr,      stride};
   if (colors.rows() > 0) {
     image_.red = plane(7);
     image_.green = plane(8);
@@ -49,10 +49,10 @@ SurfaceObserver::SurfaceObserver(const Frame& frame, const Camera& camera, const
   const auto fill_row = simd::fill_surface_row();
   parallel_for(height_, 16, num_threads, [&](std::int64_t v) {
     const std::int64_t first = v * width_, to = v * stride;
-    fill_row({width_, frame.points.data() + 3 * first, frame.normals.data() + 3 * first, frame.sigma.data() + first},
-             reference, camera.model() == Camera::Model::orthographic,
-             {out.x + to, out.y + to, out.z + to, out.normal_x + to, out.normal_y + to, out.normal_z + to,
-              out.weight + to});
+    fill_row(
+        {width_, frame.points.data() + 3 * first, frame.normals.data() + 3 * first, frame.sigma.data() + first},
+        reference, camera.model() == Camera::Model::orthographic,
+        {out.x + to, out.y + to, out.z + to, out.normal_x + to, out.normal_y + to, out.normal_z + to, out.weight + to});
     if (colors.rows() == 0) return;
     for (std::int64_t u = 0; u < width_; ++u) {
       for (int channel = 0; channel < 3; ++channel) plane(7 + channel)[to + u] = colors(first + u, channel);
@@ -78,12 +78,14 @@ std::vector<SurfaceObserver::Tile> SurfaceObserver::summarise(int num_threads) c
 
 bool SurfaceObserver::may_observe(const Eigen::Vector3f& point, std::int32_t pixel, float sigma,
                                   float least_weight) const {
-  const Tile& tile = tiles_[static_cast<std::size_t>(pixel / width_ / tile_size * tiles_across_ +
-                                                     pixel % width_ / tile_size)];
+  const Tile& tile =
+      tiles_[static_cast<std::size_t>(pixel / width_ / tile_size * tiles_across_ + pixel % width_ / tile_size)];
   const float radius = support(sigma, static_cast<float>(camera_.footprint(point.z())));
   const float reach = radius + std::max(radius, 4.0F * sigma);
-  return point.z() > tile.nearest - reach && point.z() < tile.farthest + reach &&
-         static_cast<float>(PixelWindow::size * PixelWindow::size) * tile.largest_weight > least_weight;
+  return point.z() > tile.nearest - reach &&
+         point.z()<tile.farthest +
+                   reach&& static_cast<float>(PixelWindow::size * PixelWindow::size) * tile.largest_weight>
+             least_weight;
 }
 
 Eigen::Vector3f SurfaceObserver::towards_camera(const Eigen::Vector3f& point) const {
@@ -139,13 +141,12 @@ void SurfaceObserver::observe(ObservationBlock& b, const simd::WindowCover* cove
     std::fill_n(b.green_, b.count_, 0.0F);
     std::fill_n(b.blue_, b.count_, 0.0F);
   }
-  simd::observe_windows()(image_,
-                          {b.count_, b.x_, b.y_, b.z_, b.normal_x_, b.normal_y_, b.normal_z_, b.u_, b.v_, b.window_,
-                           b.radius_, b.largest_offset_},
-                          least_cosine_,
-                          {b.weight_, b.offset_, b.seen_normal_x_, b.seen_normal_y_, b.seen_normal_z_, b.red_,
-                           b.green_, b.blue_},
-                          cover);
+  simd::observe_windows()(
+      image_,
+      {b.count_, b.x_, b.y_, b.z_, b.normal_x_, b.normal_y_, b.normal_z_, b.u_, b.v_, b.window_, b.radius_,
+       b.largest_offset_},
+      least_cosine_,
+      {b.weight_, b.offset_, b.seen_normal_x_, b.seen_normal_y_, b.seen_normal_z_, b.red_, b.green_, b.blue_}, cover);
 }
 
 bool SurfaceObserver::sees_through(const Eigen::Vector3f& point, std::int32_t pixel, float margin) const {

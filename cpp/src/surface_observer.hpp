@@ -68,14 +68,13 @@ class SurfaceObserver {
 
   bool has_colors() const { return image_.red != nullptr; }
 
-
   // Whether a window around a point can say more than `least_weight` about it; false is certain.
   bool may_observe(const Eigen::Vector3f& point, std::int32_t pixel, float sigma, float least_weight) const;
 
   Eigen::Vector3f towards_camera(const Eigen::Vector3f& point) const;
 
-  // Adds a point, whose noise is about sigma and whose neighbours are a spacing away, to a block that is not full; pixel
-  // is where it projects to.
+  // Adds a point, whose noise is about sigma and whose neighbours are a spacing away, to a block that is not full;
+  // pixel is where it projects to.
   void add(ObservationBlock& block, const Eigen::Vector3f& point, const Eigen::Vector3f& normal, std::int32_t pixel,
            float sigma, float spacing = 0.0F) const;
   // offset = sum of w (n_i + n_j) / 2 . (q_j - x_i) / sum of w over the pixels j around each point x_i of the block; it
