@@ -272,7 +272,8 @@ FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, c
   options.check();
   require(spacing > 0.0, "spacing", "a positive distance in metres", spacing);
   require(colors.rows() == 0 || colors.rows() == frame.points.rows(), "colors", "one row per pixel", colors.rows());
-  const SurfaceObserver observer(frame, camera, options, colors, num_threads);
+  SurfaceObserver observer(camera, options);
+  observer.look_at(frame, colors, num_threads);
   return fuse_observed(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, num_threads);
 }
 
