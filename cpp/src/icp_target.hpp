@@ -10,17 +10,24 @@
 
 namespace nacre {
 
-// A source cloud ready for matching: the rows that may be used, in random order, so that any first part of them is a
+// What is used of a cloud: finite points, at most options.max_points of them where the gate is automatic, with the
+// normals that the method needs; estimated ones are NaN where no plane fits.
+struct IcpCloud {
+  Points points, normals;
+  Values sigma;
+  bool has_estimated_normals;
+
+  IcpCloud(const AlignCloud& cloud, const AlignOptions& options, bool is_target);
+  bool has_normals() const { return normals.rows() == points.rows(); }
+};
+
+// A source cloud ready for matching: the rows that are samples, in random order, so that any first part of them is a
 // fair sample.
 struct IcpSource {
-  PointsRef points;
-  Points estimated_normals;
-  PointsRef normals;
-  ValuesRef sigma;
+  IcpCloud cloud;
   std::vector<std::int32_t> order;
 
   IcpSource(const AlignCloud& cloud, const AlignOptions& options);
-  bool has_normals() const { return normals.rows() == points.rows(); }
 };
 
 struct Gate {
@@ -43,10 +50,7 @@ class IcpTarget {
 
  private:
   AlignOptions options_;
-  PointsRef points_;
-  Points estimated_normals_;
-  PointsRef normals_;
-  ValuesRef sigma_;
+  IcpCloud cloud_;
   KdTree tree_;
   double diameter_ = 0.0, spacing_ = 0.0;
 };

@@ -79,6 +79,7 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.registration.keep_best = true;
   options.registration.robust = false;
   options.registration.coarse_samples = 0;
+  options.registration.max_points = 0;
   options.registration.max_samples = 0;
   options.registration.weak_threshold = 0.0;
   options.fold_in = FoldIn::wlop;

@@ -136,6 +136,7 @@ void AlignOptions::check() const {
   require(gate_decay > 0.0 && gate_decay <= 1.0, "gate_decay", "in (0, 1]", gate_decay);
   require(max_angle > 0.0, "max_angle", "a positive angle in radians", max_angle);
   require(sample_fraction > 0.0 && sample_fraction <= 1.0, "sample_fraction", "in (0, 1]", sample_fraction);
+  require(max_points >= 0, "max_points", "0 (no limit) or more", max_points);
   require(max_samples >= 0, "max_samples", "0 (no limit) or more", max_samples);
   require(coarse_samples >= 0, "coarse_samples", "0 (no limit) or more", coarse_samples);
   require(weak_threshold >= 0.0, "weak_threshold", "at least 0", weak_threshold);
@@ -155,7 +156,7 @@ AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pos
   result.rmse = std::numeric_limits<double>::quiet_NaN();
 
   Schedule schedule(target, source, options, last_residual);
-  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.points.rows()), -1);
+  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), -1);
   const double resolution = std::max(1e-3 * target.spacing(), 1e-9);
   Pose pose = initial, best_pose = initial;
   double best_rmse = std::numeric_limits<double>::infinity();

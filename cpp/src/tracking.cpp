@@ -236,7 +236,7 @@ struct Search {
     AlignOptions coarse = options.registration;
     coarse.max_samples = coarse.coarse_samples = 300;
     coarse.max_iterations = 15;
-    const IcpSource few(AlignCloud(source.points, source.normals, source.sigma), coarse);
+    const IcpSource few(AlignCloud(source.cloud.points, source.cloud.normals, source.cloud.sigma), coarse);
 
     std::vector<std::pair<double, Pose>> candidates;
     for (const Pose& key_pose : key_poses) {
