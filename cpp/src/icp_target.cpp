@@ -137,6 +137,7 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, const std::vector<st
     last = static_cast<std::int32_t>(match);
     pair.q = cloud_.points.row(match).transpose().cast<double>();
 
+    pair.half_difference.setConstant(std::numeric_limits<double>::quiet_NaN());
     if (cloud_.has_normals()) {
       const Eigen::Vector3d target_normal = cloud_.normals.row(match).transpose().cast<double>();
       if (!target_normal.allFinite()) return;
@@ -149,6 +150,7 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, const std::vector<st
           source_normal = -source_normal;
         }
         if (cosine < gate.cos_angle) return;
+        pair.half_difference = 0.5 * (source_normal - target_normal);
         if (options_.method == Metric::symmetric) pair.normal = 0.5 * (source_normal + target_normal);
       }
     }

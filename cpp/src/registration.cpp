@@ -65,7 +65,7 @@ class Schedule {
     const bool is_last = level_ + 1 == levels_.size();
     const bool at_rest = step_size < resting_size;
     if (at_rest && is_last) return false;
-    if (!is_last && (at_rest || iterations_at_level_ >= 4)) set_level(level_ + 1);
+    if (!is_last && (at_rest || iterations_at_level_ >= 8)) set_level(level_ + 1);
     return true;
   }
 
@@ -114,6 +114,57 @@ double rmse_of(const std::vector<Pair>& pairs, Metric metric) {
 
 std::size_t least_pairs(std::size_t num_samples) { return std::max<std::size_t>(6, num_samples / 100); }
 
+// hold_weak: whether directions that the pairs do not determine stay as they are in each step.
+AlignResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
+                    double last_residual, bool hold_weak) {
+  AlignResult result;
+  result.target_from_source = initial;
+  result.rmse = std::numeric_limits<double>::quiet_NaN();
+
+  Schedule schedule(target, source, options, last_residual);
+  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), -1);
+  const double resolution = std::max(1e-3 * target.spacing(), 1e-9);
+  Pose pose = initial, best_pose = initial;
+  double best_rmse = std::numeric_limits<double>::infinity();
+  bool at_rest = false;
+
+  for (int iteration = 0; iteration < options.max_iterations && !at_rest; ++iteration) {
+    std::vector<Pair> pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
+    if (pairs.size() < least_pairs(schedule.samples().size())) return result;
+    const double scale = weight_pairs(pairs, options.method, options.robust, resolution);
+    const double weak_threshold = hold_weak ? options.weak_threshold : 0.0;
+    const IcpStep step = solve_step(pairs, options.method, weak_threshold, options.num_threads);
+    if (step.rmse < best_rmse) {
+      best_rmse = step.rmse;
+      best_pose = pose;
+    }
+    pose = step.motion * pose;
+    result.iterations = iteration + 1;
+    // The accuracy that these residuals allow: six unknowns from so many pairs.
+    const double accuracy = scale * std::sqrt(6.0 / static_cast<double>(pairs.size()));
+    at_rest = !schedule.advance(step.size, scale, std::max(resolution, 0.2 * accuracy));
+  }
+
+  schedule.finish();
+  std::vector<Pair> pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
+  if (options.keep_best && !(rmse_of(pairs, options.method) <= best_rmse)) {
+    pose = best_pose;
+    pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
+  }
+  if (pairs.size() < least_pairs(schedule.samples().size())) return result;
+  weight_pairs(pairs, options.method, options.robust, resolution);
+  const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);
+  result.target_from_source = pose;
+  result.status = at_rest ? AlignStatus::converged : AlignStatus::max_iterations;
+  result.num_inliers = static_cast<int>(pairs.size());
+  result.overlap = static_cast<double>(pairs.size()) / static_cast<double>(schedule.samples().size());
+  result.rmse = last.rmse;
+  result.center = last.center;
+  result.information = last.hessian / std::max(last.variance, resolution * resolution);
+  result.weak_directions = last.weak_directions;
+  return result;
+}
+
 }  // namespace
 
 const char* to_string(AlignStatus status) {
@@ -151,51 +202,10 @@ AlignCloud::AlignCloud(const PointsRef& points_in, const PointsRef& normals_in, 
 
 AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
                      double last_residual) {
-  AlignResult result;
-  result.target_from_source = initial;
-  result.rmse = std::numeric_limits<double>::quiet_NaN();
-
-  Schedule schedule(target, source, options, last_residual);
-  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), -1);
-  const double resolution = std::max(1e-3 * target.spacing(), 1e-9);
-  Pose pose = initial, best_pose = initial;
-  double best_rmse = std::numeric_limits<double>::infinity();
-  bool at_rest = false;
-
-  for (int iteration = 0; iteration < options.max_iterations && !at_rest; ++iteration) {
-    std::vector<Pair> pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
-    if (pairs.size() < least_pairs(schedule.samples().size())) return result;
-    const double scale = weight_pairs(pairs, options.method, options.robust, resolution);
-    const IcpStep step = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);
-    if (step.rmse < best_rmse) {
-      best_rmse = step.rmse;
-      best_pose = pose;
-    }
-    pose = step.motion * pose;
-    result.iterations = iteration + 1;
-    // The accuracy that these residuals allow: six unknowns from so many pairs.
-    const double accuracy = scale * std::sqrt(6.0 / static_cast<double>(pairs.size()));
-    at_rest = !schedule.advance(step.size, scale, std::max(resolution, 0.2 * accuracy));
-  }
-
-  schedule.finish();
-  std::vector<Pair> pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
-  if (options.keep_best && !(rmse_of(pairs, options.method) <= best_rmse)) {
-    pose = best_pose;
-    pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
-  }
-  if (pairs.size() < least_pairs(schedule.samples().size())) return result;
-  weight_pairs(pairs, options.method, options.robust, resolution);
-  const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);
-  result.target_from_source = pose;
-  result.status = at_rest ? AlignStatus::converged : AlignStatus::max_iterations;
-  result.num_inliers = static_cast<int>(pairs.size());
-  result.overlap = static_cast<double>(pairs.size()) / static_cast<double>(schedule.samples().size());
-  result.rmse = last.rmse;
-  result.center = last.center;
-  result.information = last.hessian / std::max(last.variance, resolution * resolution);
-  result.weak_directions = last.weak_directions;
-  return result;
+  // What pairs know of a direction shows at the end only: while source and target are apart their normals disagree.
+  const AlignResult free = iterate(target, source, initial, options, last_residual, false);
+  if (free.status != AlignStatus::too_few_pairs && free.weak_directions.cols() == 0) return free;
+  return iterate(target, source, initial, options, last_residual, true);
 }
 
 AlignResult align(const AlignCloud& source, const AlignCloud& target, const Pose& initial,

@@ -35,7 +35,7 @@ class RegistrationParameters:
     max_samples: int = 5000
     coarse_samples: int = 600
     keep_best: bool = False
-    weak_threshold: float = 0.01
+    weak_threshold: float = 0.002
     seed: int = 0
     num_threads: int = 0
 
@@ -148,7 +148,7 @@ def align(
     max_samples: int = 5000,
     coarse_samples: int = 600,
     keep_best: bool = False,
-    weak_threshold: float = 0.01,
+    weak_threshold: float = 0.002,
     seed: int = 0,
     num_threads: int = 0,
 ) -> AlignResult:
