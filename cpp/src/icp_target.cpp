@@ -98,12 +98,28 @@ IcpCloud::IcpCloud(const AlignCloud& cloud, const AlignOptions& options, bool is
   normals = estimate_normals(points, normal_options);
 }
 
+void IcpCloud::keep(const std::vector<std::int32_t>& rows) {
+  points = rows_of<Points>(points, rows);
+  normals = rows_of<Points>(normals, rows);
+  sigma = rows_of<Values>(sigma, rows);
+}
+
 IcpSource::IcpSource(const AlignCloud& cloud_in, const AlignOptions& options) : cloud(cloud_in, options, false) {
-  order = finite_rows(cloud.points, cloud.normals);
-  auto count = static_cast<std::size_t>(std::ceil(options.sample_fraction * static_cast<double>(order.size())));
-  if (options.max_samples > 0) count = std::min(count, static_cast<std::size_t>(options.max_samples));
-  order = choose(order, count, options.seed);
-  shuffle(order, options.seed);
+  std::vector<std::int32_t> rows = finite_rows(cloud.points, cloud.normals);
+  auto all = static_cast<std::int64_t>(std::ceil(options.sample_fraction * static_cast<double>(rows.size())));
+  if (options.max_samples > 0) all = std::min<std::int64_t>(all, options.max_samples);
+  const std::int64_t few = options.coarse_samples > 0 ? options.coarse_samples : all;
+  levels = {std::min(few, all), std::min(5 * few, all), all};
+  rows = choose(rows, static_cast<std::size_t>(all), options.seed);
+  shuffle(rows, options.seed);
+  // The samples that each level adds are in the order of the cloud: neighbours in memory are neighbours in space.
+  auto begin = rows.begin();
+  for (const std::int64_t level : levels) {
+    const auto end = rows.begin() + level;
+    std::sort(begin, end);
+    begin = end;
+  }
+  cloud.keep(rows);
 }
 
 IcpTarget::IcpTarget(const AlignCloud& cloud, const AlignOptions& options)
@@ -113,21 +129,20 @@ IcpTarget::IcpTarget(const AlignCloud& cloud, const AlignOptions& options)
       diameter_(bounding_diameter(cloud_.points)),
       spacing_(median_spacing(tree_, cloud_.points)) {}
 
-std::vector<Pair> IcpTarget::match(const IcpSource& source, const std::vector<std::int32_t>& samples, const Pose& pose,
-                                   const Gate& gate, std::vector<std::int32_t>& nearest) const {
+std::vector<Pair> IcpTarget::match(const IcpSource& source, std::int64_t count, const Pose& pose, const Gate& gate,
+                                   std::vector<std::int32_t>& nearest) const {
   const IcpCloud& from = source.cloud;
   const bool compare_normals = cloud_.has_normals() && from.has_normals();
   // Normals that were estimated point to an arbitrary side.
   const bool oriented = !cloud_.has_estimated_normals && !from.has_estimated_normals;
 
-  std::vector<Pair> pairs(samples.size());
-  parallel_for(static_cast<std::int64_t>(samples.size()), 1024, options_.num_threads, [&](std::int64_t i) {
+  std::vector<Pair> pairs(static_cast<std::size_t>(count));
+  parallel_for(count, 512, options_.num_threads, [&](std::int64_t i) {
     Pair& pair = pairs[static_cast<std::size_t>(i)];
     pair.weight = 0.0;
-    const std::int32_t row = samples[static_cast<std::size_t>(i)];
-    pair.p = pose * from.points.row(row).transpose().cast<double>();
+    pair.p = pose * from.points.row(i).transpose().cast<double>();
 
-    std::int32_t& last = nearest[static_cast<std::size_t>(row)];
+    std::int32_t& last = nearest[static_cast<std::size_t>(i)];
     double bound = gate.distance;
     if (last >= 0)
       bound = std::min(bound, (cloud_.points.row(last).transpose().cast<double>() - pair.p).norm() * (1 + 1e-12));
@@ -143,7 +158,7 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, const std::vector<st
       if (!target_normal.allFinite()) return;
       pair.normal = target_normal;
       if (compare_normals) {
-        Eigen::Vector3d source_normal = pose.linear() * from.normals.row(row).transpose().cast<double>();
+        Eigen::Vector3d source_normal = pose.linear() * from.normals.row(i).transpose().cast<double>();
         double cosine = source_normal.dot(target_normal);
         if (!oriented && cosine < 0.0) {
           cosine = -cosine;
@@ -156,7 +171,7 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, const std::vector<st
     }
     if (std::abs(nacre::residual(pair, options_.method)) > gate.residual) return;
     double variance = 0.0;
-    if (from.sigma.size() > 0) variance += static_cast<double>(from.sigma[row]) * from.sigma[row];
+    if (from.sigma.size() > 0) variance += static_cast<double>(from.sigma[i]) * from.sigma[i];
     if (cloud_.sigma.size() > 0) variance += static_cast<double>(cloud_.sigma[match]) * cloud_.sigma[match];
     const bool has_sigma = from.sigma.size() > 0 || cloud_.sigma.size() > 0;
     pair.weight = has_sigma ? 1.0 / variance : 1.0;

@@ -1,6 +1,7 @@
 // The cloud that others are registered to: prepared once, matched many times.
 #pragma once
 
+#include <array>
 #include <limits>
 #include <vector>
 
@@ -18,14 +19,14 @@ struct IcpCloud {
   bool has_estimated_normals;
 
   IcpCloud(const AlignCloud& cloud, const AlignOptions& options, bool is_target);
+  void keep(const std::vector<std::int32_t>& rows);  // in this order
   bool has_normals() const { return normals.rows() == points.rows(); }
 };
 
-// A source cloud ready for matching: the rows that are samples, in random order, so that any first part of them is a
-// fair sample.
+// A source cloud ready for matching: samples of it, of which the first levels[i] are a fair sample, too.
 struct IcpSource {
   IcpCloud cloud;
-  std::vector<std::int32_t> order;
+  std::array<std::int64_t, 3> levels;  // few, more, all
 
   IcpSource(const AlignCloud& cloud, const AlignOptions& options);
 };
@@ -43,10 +44,10 @@ class IcpTarget {
   double diameter() const { return diameter_; }  // of the bounding box [m]
   double spacing() const { return spacing_; }    // median distance of nearest neighbours [m]
 
-  // The source points `samples` moved by a pose, each with its nearest target point if that lies within the gate.
-  // `nearest` holds each source point's last match, -1 for none: a first bound for the search.
-  std::vector<Pair> match(const IcpSource& source, const std::vector<std::int32_t>& samples, const Pose& pose,
-                          const Gate& gate, std::vector<std::int32_t>& nearest) const;
+  // The first `count` source samples moved by a pose, each with its nearest target point if that lies within the gate.
+  // `nearest` holds each sample's last match, -1 for none: a first bound for the search.
+  std::vector<Pair> match(const IcpSource& source, std::int64_t count, const Pose& pose, const Gate& gate,
+                          std::vector<std::int32_t>& nearest) const;
 
  private:
   AlignOptions options_;
