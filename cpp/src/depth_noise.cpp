@@ -1,6 +1,7 @@
 // How noisy a depth image is, told by the image itself.
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "parallel.hpp"
 #include "window_fits.hpp"
@@ -13,57 +14,27 @@ constexpr std::size_t kMinSamples = 8;
 constexpr double kMinStepped = 0.1;     // of the windows of a coarsely quantised image cross from plateau to plateau
 constexpr float kMaxStepPixels = 3.0F;  // orthographic: a larger step is an edge
 
-struct Fit {
-  double variance, slope;
-};
-
-// Orthogonal polynomials on -3..3: 1, u, v, u v, u^2 - 4, v^2 - 4. The quadratic ones take up smooth curvature.
-Fit fit_window(const PlanarImage& image, int u, int v) {
-  static_assert(WindowFits::kRadius == 3);
-  double sum = 0, sum_u = 0, sum_v = 0, sum_uv = 0, sum_uu = 0, sum_vv = 0, squares = 0;
-  const double centre = image.row(v)[u];
-  for (int dv = -3; dv <= 3; ++dv) {
-    const float* const row = image.row(v + dv) + u;
-    for (int du = -3; du <= 3; ++du) {
-      const double value = row[du] - centre;
-      sum += value;
-      sum_u += du * value;
-      sum_v += dv * value;
-      sum_uv += du * dv * value;
-      sum_uu += (du * du - 4) * value;
-      sum_vv += (dv * dv - 4) * value;
-      squares += value * value;
-    }
-  }
-  const double explained = sum * sum / 49 + (sum_u * sum_u + sum_v * sum_v) / 196 + sum_uv * sum_uv / 784 +
-                           (sum_uu * sum_uu + sum_vv * sum_vv) / 588;
-  return {std::max(squares - explained, 0.0) / (49 - 6), std::hypot(sum_u, sum_v) / 196};
-}
-
-// The smallest step from one plateau to the next along a window's central row and column; 0 where there are not
-// both: plateaus, and steps.
-float plateau_step(const PlanarImage& image, int u, int v) {
-  int num_flat = 0;
-  float smallest = std::numeric_limits<float>::infinity();
-  const auto add = [&](float step) {
-    if (step == 0.0F) {
-      ++num_flat;
-    } else {
-      smallest = std::min(smallest, step);
-    }
+// The value that would stand at `part` of the way if the values, none of them negative, were sorted.
+float quantile(const std::vector<float>& values, double part) {
+  // Floats that are not negative are ordered as their bits are: a histogram of the upper bits leaves few to sort.
+  constexpr int shift = 20;
+  const auto bin_of = [](float value) {
+    std::uint32_t bits;
+    std::memcpy(&bits, &value, sizeof bits);
+    return bits >> shift;
   };
-  const float* const pixel = image.row(v) + u;
-  for (int d = -WindowFits::kRadius; d < WindowFits::kRadius; ++d) {
-    add(std::abs(pixel[d + 1] - pixel[d]));
-    add(std::abs(pixel[(d + 1) * image.stride()] - pixel[d * image.stride()]));
+  std::vector<std::int32_t> histogram(std::size_t{1} << (32 - shift));
+  for (const float value : values) ++histogram[bin_of(value)];
+  auto place = static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
+  std::uint32_t bin = 0;
+  while (place >= histogram[bin]) place -= histogram[bin++];
+  std::vector<float> candidates;
+  candidates.reserve(static_cast<std::size_t>(histogram[bin]));
+  for (const float value : values) {
+    if (bin_of(value) == bin) candidates.push_back(value);
   }
-  return num_flat >= 2 * WindowFits::kRadius && std::isfinite(smallest) ? smallest : 0.0F;
-}
-
-float quantile(std::vector<float>& values, double part) {
-  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
+  std::nth_element(candidates.begin(), candidates.begin() + place, candidates.end());
+  return candidates[static_cast<std::size_t>(place)];
 }
 
 }  // namespace
@@ -76,34 +47,15 @@ WindowFits fit_windows(const PlanarImage& image, int num_threads) {
   const auto size = static_cast<std::size_t>(fits.cols) * static_cast<std::size_t>(fits.rows);
   fits.residual.resize(size);
   fits.slope.resize(size);
+  fits.step.resize(size);
+  const auto fit_row = simd::fit_windows();
   parallel_for(
       fits.rows, rows_per_block(fits.cols * WindowFits::kStep * WindowFits::kStep), num_threads, [&](std::int64_t row) {
-        for (int col = 0; col < fits.cols; ++col) {
-          const Fit fit = fit_window(image, WindowFits::centre(col), WindowFits::centre(static_cast<int>(row)));
-          const auto i = static_cast<std::size_t>(row * fits.cols + col);
-          // std::max(NaN, 0) is NaN: a window with a missing pixel has no residual.
-          fits.residual[i] = static_cast<float>(std::sqrt(fit.variance));
-          fits.slope[i] = static_cast<float>(fit.slope);
-        }
+        const std::int64_t first = row * fits.cols;
+        fit_row(image.row(WindowFits::centre(static_cast<int>(row))) + WindowFits::centre(0), image.stride(), fits.cols,
+                {fits.residual.data() + first, fits.slope.data() + first, fits.step.data() + first});
       });
   return fits;
-}
-
-std::vector<float> smooth_slopes(const WindowFits& fits) {
-  std::vector<float> slopes(fits.slope.size());
-  for (int row = 0; row < fits.rows; ++row) {
-    for (int col = 0; col < fits.cols; ++col) {
-      float least = std::numeric_limits<float>::infinity();
-      for (int r = std::max(row - 1, 0); r <= std::min(row + 1, fits.rows - 1); ++r) {
-        for (int c = std::max(col - 1, 0); c <= std::min(col + 1, fits.cols - 1); ++c) {
-          const float slope = fits.slope[static_cast<std::size_t>(r * fits.cols + c)];
-          if (slope < least) least = slope;
-        }
-      }
-      slopes[static_cast<std::size_t>(row * fits.cols + col)] = std::isfinite(least) ? least : 0.0F;
-    }
-  }
-  return slopes;
 }
 
 NoiseModel estimate_noise(const DepthRef& depth, const Camera& camera, int num_threads) {
@@ -120,15 +72,17 @@ NoiseModel estimate_noise(const PlanarImage& image, const WindowFits& fits, cons
   // depth explains is an edge: the worst, Kinect v1, has half of max_step.
   const float max_step = std::sqrt(12.0F);
   std::vector<float> residuals, steps, pixels;
+  for (std::vector<float>* const values : {&residuals, &steps, &pixels}) values->reserve(fits.residual.size());
   for (int row = 0; row < fits.rows; ++row) {
+    const float* const values = image.row(WindowFits::centre(row));
     for (int col = 0; col < fits.cols; ++col) {
-      const float residual = fits.residual[static_cast<std::size_t>(row * fits.cols + col)];
-      if (!(residual >= 0.0F)) continue;
-      const int u = WindowFits::centre(col), v = WindowFits::centre(row);
-      const float value = image.row(v)[u], unit = 1.0F / shape_sigma(value), pixel = unit_slope(value) * unit;
-      residuals.push_back(residual * unit);
+      const auto i = static_cast<std::size_t>(row * fits.cols + col);
+      if (!(fits.residual[i] >= 0.0F)) continue;
+      const float value = values[WindowFits::centre(col)];
+      const float unit = 1.0F / evaluate(shape_sigma, value), pixel = evaluate(unit_slope, value) * unit;
+      residuals.push_back(fits.residual[i] * unit);
       pixels.push_back(pixel);
-      const float step = plateau_step(image, u, v) * unit;
+      const float step = fits.step[i] * unit;
       if (step > 0.0F && step <= (pinhole ? max_step : kMaxStepPixels * pixel)) steps.push_back(step);
     }
   }

@@ -5,16 +5,16 @@
 #include <vector>
 
 #include "planar_image.hpp"
+#include "simd/window_row.hpp"
 
 namespace nacre {
 
 struct WindowFits {
-  static constexpr int kRadius = 3;  // windows of 7 x 7
-  static constexpr int kStep = 5;    // from window to window
+  static constexpr int kRadius = simd::fit_radius, kStep = simd::fit_step;
 
   int cols = 0, rows = 0;
-  std::vector<float> residual;  // standard deviation of the planar image about the surface; NaN: a pixel is missing
-  std::vector<float> slope;     // of the surface, in the planar image, per pixel
+  // Of each window, row by row: see simd::WindowRow.
+  std::vector<float> residual, slope, step;
 
   // The image column or row of a window's centre.
   static int centre(int index) { return kRadius + index * kStep; }
@@ -23,9 +23,5 @@ struct WindowFits {
 WindowFits fit_windows(const PlanarImage& image, int num_threads);
 
 NoiseModel estimate_noise(const PlanarImage& image, const WindowFits& fits, const Camera& camera);
-
-// For each window of the grid the smallest slope among it and its neighbours, so that edges do not count; 0 where
-// there is none.
-std::vector<float> smooth_slopes(const WindowFits& fits);
 
 }  // namespace nacre

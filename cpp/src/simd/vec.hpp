@@ -58,6 +58,8 @@ NACRE_INLINE F32 operator-(F32 a, F32 b) { return {_mm512_sub_ps(a.v, b.v)}; }
 NACRE_INLINE F32 operator*(F32 a, F32 b) { return {_mm512_mul_ps(a.v, b.v)}; }
 NACRE_INLINE F32 operator/(F32 a, F32 b) { return {_mm512_div_ps(a.v, b.v)}; }
 NACRE_INLINE F32 mul_add(F32 a, F32 b, F32 c) { return {_mm512_fmadd_ps(a.v, b.v, c.v)}; }
+// a + b where the mask is set, a elsewhere.
+NACRE_INLINE F32 add_where(Mask m, F32 a, F32 b) { return {_mm512_mask_add_ps(a.v, m.v, a.v, b.v)}; }
 NACRE_INLINE F32 sqrt(F32 a) { return {_mm512_sqrt_ps(a.v)}; }
 // Where a comparison with NaN decides, the second argument.
 NACRE_INLINE F32 min(F32 a, F32 b) { return {_mm512_min_ps(a.v, b.v)}; }
@@ -121,6 +123,7 @@ NACRE_INLINE F32 operator-(F32 a, F32 b) { return {_mm256_sub_ps(a.v, b.v)}; }
 NACRE_INLINE F32 operator*(F32 a, F32 b) { return {_mm256_mul_ps(a.v, b.v)}; }
 NACRE_INLINE F32 operator/(F32 a, F32 b) { return {_mm256_div_ps(a.v, b.v)}; }
 NACRE_INLINE F32 mul_add(F32 a, F32 b, F32 c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
+NACRE_INLINE F32 add_where(Mask m, F32 a, F32 b) { return {_mm256_add_ps(a.v, _mm256_and_ps(m.v, b.v))}; }
 NACRE_INLINE F32 sqrt(F32 a) { return {_mm256_sqrt_ps(a.v)}; }
 NACRE_INLINE F32 min(F32 a, F32 b) { return {_mm256_min_ps(a.v, b.v)}; }
 NACRE_INLINE F32 max(F32 a, F32 b) { return {_mm256_max_ps(a.v, b.v)}; }
@@ -183,6 +186,7 @@ NACRE_INLINE F32 operator-(F32 a, F32 b) { return {_mm_sub_ps(a.v, b.v)}; }
 NACRE_INLINE F32 operator*(F32 a, F32 b) { return {_mm_mul_ps(a.v, b.v)}; }
 NACRE_INLINE F32 operator/(F32 a, F32 b) { return {_mm_div_ps(a.v, b.v)}; }
 NACRE_INLINE F32 mul_add(F32 a, F32 b, F32 c) { return a * b + c; }
+NACRE_INLINE F32 add_where(Mask m, F32 a, F32 b) { return {_mm_add_ps(a.v, _mm_and_ps(m.v, b.v))}; }
 NACRE_INLINE F32 sqrt(F32 a) { return {_mm_sqrt_ps(a.v)}; }
 NACRE_INLINE F32 min(F32 a, F32 b) { return {_mm_min_ps(a.v, b.v)}; }
 NACRE_INLINE F32 max(F32 a, F32 b) { return {_mm_max_ps(a.v, b.v)}; }
@@ -266,6 +270,9 @@ NACRE_INLINE F32 operator/(F32 a, F32 b) {
   return each_lane<F32>([=](int i) { return a.v[i] / b.v[i]; });
 }
 NACRE_INLINE F32 mul_add(F32 a, F32 b, F32 c) { return a * b + c; }
+NACRE_INLINE F32 add_where(Mask m, F32 a, F32 b) {
+  return each_lane<F32>([=](int i) { return m.v[i] ? a.v[i] + b.v[i] : a.v[i]; });
+}
 NACRE_INLINE F32 sqrt(F32 a) {
   return each_lane<F32>([=](int i) { return ::sqrtf(a.v[i]); });
 }
@@ -357,6 +364,8 @@ NACRE_INLINE I32 select(Mask m, I32 a, I32 b) {
 NACRE_INLINE Mask operator>(F32 a, F32 b) { return b < a; }
 NACRE_INLINE Mask operator>=(F32 a, F32 b) { return b <= a; }
 NACRE_INLINE F32& operator+=(F32& a, F32 b) { return a = a + b; }
+NACRE_INLINE bool all(Mask a) { return bits(a) == (1U << lanes) - 1U; }
+NACRE_INLINE bool any(Mask a) { return bits(a) != 0; }
 
 // The sum of 16 values in a fixed order, whatever the number of lanes: i with i + 8, then i with i + 4, 2 and 1.
 NACRE_INLINE float sum_lanes(const F32 (&v)[16 / lanes]) {

@@ -1,0 +1,27 @@
+// The edge tests of a row of the planar image.
+#pragma once
+
+#include <stdint.h>
+
+#include "isa.hpp"
+#include "normal_row.hpp"
+#include "quadratic.hpp"
+
+namespace nacre::simd {
+
+constexpr uint8_t edge_mark = 1, slanted_mark = 2;
+
+// Limits of second differences (bend) and first differences (step) between neighbours, given the value; lateral: per
+// slope of the surface.
+struct EdgeLimits {
+  Quadratic bend_noise, bend_crease, step_noise, step_slant;
+  float bend_lateral, step_lateral;
+};
+
+// Marks pixels where a second difference in one of the four directions through the pixel exceeds its limit; at a rim
+// the pixel is held against the plane through its two inner neighbours. And pixels where both first differences do, or
+// the slope of the surface as a whole. `slope`: the surface's change per pixel, readable 15 beyond the row's end.
+using MarkEdges = void(const PlanarRow& row, const EdgeLimits& limits, const float* slope, uint8_t* marks);
+NACRE_DECLARE_KERNEL(MarkEdges, mark_edges)
+
+}  // namespace nacre::simd

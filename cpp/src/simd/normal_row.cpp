@@ -1,0 +1,190 @@
+// Each vector of pixels looks at its windows tap by tap: about 8 operations a tap.
+#include "normal_row.hpp"
+
+#include "vec.hpp"
+
+namespace nacre::simd::NACRE_ISA {
+namespace {
+
+constexpr int chunk = 64;  // pixels
+static_assert(chunk % lanes == 0);
+
+NACRE_INLINE F32 evaluate(const Quadratic& q, F32 x) {
+  return broadcast(q.constant) + x * (broadcast(q.linear) + x * broadcast(q.square));
+}
+
+constexpr float full_window(int radius) { return static_cast<float>((2 * radius + 1) * (2 * radius + 1)); }
+// Sum of du^2 over a full window.
+constexpr float full_spread(int radius) {
+  return static_cast<float>((2 * radius + 1) * (2 * radius + 1) * radius * (radius + 1)) / 3.0F;
+}
+
+struct Pixels {
+  F32 value, gate_base, gate_slope;
+};
+
+// Sums over the members of each pixel's window: du and dv from the pixel, w the value minus the pixel's own.
+struct Moments {
+  F32 n, u, v, uu, uv, vv, w, uw, vw;
+};
+
+struct RowSums {
+  F32 n, u, uu, w, uw;
+};
+
+template <int radius, int du>
+NACRE_INLINE void add_taps(const float* row, const F32& own, const F32* limits, const F32& row_limit, RowSums& sums) {
+  const F32 difference = load(row + du) - own;
+  constexpr int distance = du < 0 ? -du : du;
+  // False where either is missing (NaN).
+  const Mask member = abs(difference) <= max(limits[distance], row_limit);
+  sums.n = add_where(member, sums.n, broadcast(1.0F));
+  sums.u = add_where(member, sums.u, broadcast(static_cast<float>(du)));
+  sums.uu = add_where(member, sums.uu, broadcast(static_cast<float>(du * du)));
+  sums.w = add_where(member, sums.w, difference);
+  sums.uw = add_where(member, sums.uw, broadcast(static_cast<float>(du)) * difference);
+  if constexpr (du < radius) add_taps<radius, du + 1>(row, own, limits, row_limit, sums);
+}
+
+template <int radius>
+NACRE_INLINE Moments sum_members(const float* pixel, ptrdiff_t stride, const Pixels& p) {
+  const F32 zero = broadcast(0.0F);
+  F32 limits[radius + 1];
+  for (int d = 0; d <= radius; ++d) limits[d] = p.gate_base + broadcast(static_cast<float>(d)) * p.gate_slope;
+  Moments m = {zero, zero, zero, zero, zero, zero, zero, zero, zero};
+  for (int dv = -radius; dv <= radius; ++dv) {
+    RowSums row = {zero, zero, zero, zero, zero};
+    add_taps<radius, -radius>(pixel + dv * stride, p.value, limits, limits[dv < 0 ? -dv : dv], row);
+    const F32 v = broadcast(static_cast<float>(dv));
+    m.n += row.n;
+    m.u += row.u;
+    m.v += v * row.n;
+    m.uu += row.uu;
+    m.uv += v * row.u;
+    m.vv += v * v * row.n;
+    m.w += row.w;
+    m.uw += row.uw;
+    m.vw += v * row.w;
+  }
+  return m;
+}
+
+struct Planes {
+  F32 w, at_u, at_v;
+  Mask found;
+};
+
+NACRE_INLINE Planes fit(const Moments& m, float min_count, float min_determinant) {
+  const F32 mean_u = m.u / m.n, mean_v = m.v / m.n, mean_w = m.w / m.n;
+  const F32 uu = m.uu - mean_u * m.u, uv = m.uv - mean_u * m.v, vv = m.vv - mean_v * m.v;
+  const F32 uw = m.uw - mean_u * m.w, vw = m.vw - mean_v * m.w;
+  const F32 determinant = uu * vv - uv * uv;
+  const F32 scale = broadcast(1.0F) / determinant;
+  const F32 at_u = (vv * uw - uv * vw) * scale, at_v = (uu * vw - uv * uw) * scale;
+  return {mean_w - mean_u * at_u - mean_v * at_v, at_u, at_v,
+          (m.n >= broadcast(min_count)) & (determinant >= broadcast(min_determinant))};
+}
+
+struct Normals {
+  F32 x, y, z;
+};
+
+NACRE_INLINE Normals normalised(F32 x, F32 y, F32 z) {
+  const F32 length = sqrt(x * x + (y * y + z * z));
+  return {x / length, y / length, z / length};
+}
+
+NACRE_INLINE Normals normals_of(const Planes& planes, F32 value, const NormalRule& rule, const RayRow& rays, int u,
+                                bool is_inverse) {
+  F32 a = planes.at_u * broadcast(rule.fx), b = planes.at_v * broadcast(rule.fy);
+  if (!is_inverse) return normalised(a, b, broadcast(-1.0F));
+  if (rays.pixel_from_ray[0] != nullptr) {
+    a = load(rays.pixel_from_ray[0] + u) * planes.at_u + load(rays.pixel_from_ray[2] + u) * planes.at_v;
+    b = load(rays.pixel_from_ray[1] + u) * planes.at_u + load(rays.pixel_from_ray[3] + u) * planes.at_v;
+  }
+  const F32 z = load(rays.z + u), x = load(rays.x + u) / z;
+  const F32 y = (rays.y != nullptr ? load(rays.y + u) : broadcast(rays.row_y)) / z;
+  const F32 c = value + planes.w - (a * x + b * y);
+  const Normals away = normalised(a, b, c);
+  const F32 minus = broadcast(-1.0F);
+  return {minus * away.x, minus * away.y, minus * away.z};
+}
+
+template <int radius>
+NACRE_INLINE void fit_radius(const PlanarRow& row, const NormalRule& rule, const RayRow& rays, int u, const Pixels& p,
+                             F32 wanted, Normals& normals) {
+  const Mask here = wanted == broadcast(static_cast<float>(radius));
+  if (!any(here)) return;
+  const Moments m = sum_members<radius>(row.values + u, row.stride, p);
+  const float spread = full_spread(radius);
+  const Planes planes = fit(m, rule.min_filled * full_window(radius), rule.min_spread * spread * spread);
+  const Normals found = normals_of(planes, p.value, rule, rays, u, row.is_inverse);
+  const Mask set = here & planes.found;
+  normals.x = select(set, found.x, normals.x);
+  normals.y = select(set, found.y, normals.y);
+  normals.z = select(set, found.z, normals.z);
+}
+
+// The radius that each pixel needs: the slope of a fit over a full window has the standard deviation
+// sigma / unit_slope / sqrt(full_spread). NaN where there is no measurement.
+NACRE_INLINE F32 window_radius(const NormalRule& rule, F32 value) {
+  const F32 sigma = evaluate(rule.sigma, value);
+  const F32 slope = broadcast(rule.slope_sigma) * evaluate(rule.unit_slope, value);
+  F32 radius = broadcast(static_cast<float>(least_window)) + (value - value);
+  for (int r = least_window; r < largest_normal_window; ++r) {
+    radius = select(sigma > slope * broadcast(::sqrtf(full_spread(r))), broadcast(static_cast<float>(r + 1)), radius);
+  }
+  return select(value == value, radius, value);
+}
+
+NACRE_INLINE int list_valid(const float* x, int count, int32_t first, int32_t* valid) {
+  int num_missing = 0;
+  for (int i = 0; i < count; ++i) num_missing += x[i] != x[i];
+  if (num_missing == count) return 0;
+  if (num_missing == 0) {
+    for (int i = 0; i < count; ++i) valid[i] = first + i;
+    return count;
+  }
+  int num_valid = 0;
+  for (int i = 0; i < count; ++i) {
+    valid[num_valid] = first + i;
+    num_valid += x[i] == x[i];
+  }
+  return num_valid;
+}
+
+}  // namespace
+
+int fit_normals(const PlanarRow& row, const NormalRule& rule, const RayRow& rays, float* normals, int32_t first,
+                int32_t* valid) {
+  const F32 missing = as_float(broadcast(0x7FC00000));
+  float x[chunk], y[chunk], z[chunk];
+  int num_valid = 0;
+  for (int begin = 0; begin < row.width; begin += chunk) {
+    const int count = row.width - begin < chunk ? row.width - begin : chunk;
+    for (int i = 0; i < count; i += lanes) {
+      const int u = begin + i;
+      const F32 value = load(row.values + u);
+      const Pixels p = {value, evaluate(rule.gate_base, value), evaluate(rule.gate_slope, value)};
+      const F32 radius = window_radius(rule, value);
+      Normals n = {missing, missing, missing};
+      fit_radius<2>(row, rule, rays, u, p, radius, n);
+      fit_radius<3>(row, rule, rays, u, p, radius, n);
+      fit_radius<4>(row, rule, rays, u, p, radius, n);
+      fit_radius<5>(row, rule, rays, u, p, radius, n);
+      store(x + i, n.x);
+      store(y + i, n.y);
+      store(z + i, n.z);
+    }
+    float* const out = normals + 3 * begin;
+    for (int i = 0; i < count; ++i) {
+      out[3 * i] = x[i];
+      out[3 * i + 1] = y[i];
+      out[3 * i + 2] = z[i];
+    }
+    if (valid != nullptr) num_valid += list_valid(x, count, first + begin, valid + num_valid);
+  }
+  return num_valid;
+}
+
+}  // namespace nacre::simd::NACRE_ISA
