@@ -24,7 +24,7 @@ inline Quadratic operator*(const Quadratic& q, float factor) {
 class PlanarImage {
  public:
   // NaN on every side, so that windows need no bounds checks, and on the right so many more that vectors need none.
-  static constexpr int kBorder = simd::largest_normal_window, kOverhang = 15;
+  static constexpr int kBorder = simd::largest_normal_window, kOverhang = 31;
 
   // Throws std::invalid_argument when depth and camera differ in size.
   PlanarImage(const DepthRef& depth, const Camera& camera, int num_threads);

@@ -1,4 +1,5 @@
-// Each vector of pixels looks at its windows tap by tap: about 8 operations a tap.
+// Groups of 16 pixels. Where all their windows are complete, sums over columns first and then over rows: about
+// 6 (2 r + 1) operations each. Else the windows are looked at tap by tap: 10 operations a tap.
 #include "normal_row.hpp"
 
 #include "vec.hpp"
@@ -6,8 +7,9 @@
 namespace nacre::simd::NACRE_ISA {
 namespace {
 
-constexpr int chunk = 64;  // pixels
-static_assert(chunk % lanes == 0);
+constexpr int group = 16;  // pixels that go the same way, whatever the number of lanes
+constexpr int parts = group / lanes;
+constexpr int chunk = 64;  // pixels that are written together
 
 NACRE_INLINE F32 evaluate(const Quadratic& q, F32 x) {
   return broadcast(q.constant) + x * (broadcast(q.linear) + x * broadcast(q.square));
@@ -110,19 +112,107 @@ NACRE_INLINE Normals normals_of(const Planes& planes, F32 value, const NormalRul
   return {minus * away.x, minus * away.y, minus * away.z};
 }
 
+// Sums over the columns of the windows of a group, of the values about an origin; their least and largest.
 template <int radius>
-NACRE_INLINE void fit_radius(const PlanarRow& row, const NormalRule& rule, const RayRow& rays, int u, const Pixels& p,
-                             F32 wanted, Normals& normals) {
-  const Mask here = wanted == broadcast(static_cast<float>(radius));
-  if (!any(here)) return;
-  const Moments m = sum_members<radius>(row.values + u, row.stride, p);
-  const float spread = full_spread(radius);
-  const Planes planes = fit(m, rule.min_filled * full_window(radius), rule.min_spread * spread * spread);
-  const Normals found = normals_of(planes, p.value, rule, rays, u, row.is_inverse);
-  const Mask set = here & planes.found;
-  normals.x = select(set, found.x, normals.x);
-  normals.y = select(set, found.y, normals.y);
-  normals.z = select(set, found.z, normals.z);
+struct ColumnSums {
+  static constexpr int columns = (group + 2 * radius + lanes - 1) / lanes * lanes;
+  float w[columns], vw[columns], least[columns], most[columns];
+};
+
+template <int radius>
+NACRE_INLINE void sum_columns(const float* pixel, ptrdiff_t stride, ColumnSums<radius>& sums) {
+  const F32 origin = broadcast(pixel[group / 2]);
+  for (int i = 0; i < ColumnSums<radius>::columns; i += lanes) {
+    const float* const column = pixel - radius + i;
+    const F32 centre = load(column) - origin;
+    F32 w = centre, vw = broadcast(0.0F), least = centre, most = centre;
+    for (int dv = 1; dv <= radius; ++dv) {
+      const F32 above = load(column - dv * stride) - origin, below = load(column + dv * stride) - origin;
+      w += above + below;
+      vw += broadcast(static_cast<float>(dv)) * (below - above);
+      least = min(least, min(above, below));
+      most = max(most, max(above, below));
+    }
+    store(sums.w + i, w);
+    store(sums.vw + i, vw);
+    store(sums.least + i, least);
+    store(sums.most + i, most);
+  }
+}
+
+struct Group {
+  Pixels pixels[parts];
+  F32 radius[parts];
+  Normals normals[parts];
+};
+
+// The sums of complete windows. False where one of the pixels with this radius has a window that is not: a member is
+// missing, or might differ too much; or where the origin lies too far off for exact sums.
+template <int radius>
+NACRE_INLINE bool sum_complete(const ColumnSums<radius>& columns, float group_origin, const Group& g,
+                               Moments (&moments)[parts]) {
+  constexpr float far_gates = 4.0F;
+  const F32 origin = broadcast(group_origin);
+  const F32 zero = broadcast(0.0F), count = broadcast(full_window(radius)), spread = broadcast(full_spread(radius));
+  for (int part = 0; part < parts; ++part) {
+    const int middle = part * lanes + radius;
+    const F32 own = g.pixels[part].value - origin, gate = g.pixels[part].gate_base + g.pixels[part].gate_slope;
+    F32 w = load(columns.w + middle), uw = zero, vw = load(columns.vw + middle);
+    F32 least = load(columns.least + middle), most = load(columns.most + middle);
+    for (int du = 1; du <= radius; ++du) {
+      const F32 left = load(columns.w + middle - du), right = load(columns.w + middle + du);
+      w += left + right;
+      uw += broadcast(static_cast<float>(du)) * (right - left);
+      vw += load(columns.vw + middle - du) + load(columns.vw + middle + du);
+      least = min(least, min(load(columns.least + middle - du), load(columns.least + middle + du)));
+      most = max(most, max(load(columns.most + middle - du), load(columns.most + middle + du)));
+    }
+    // The sum is NaN where a member is missing.
+    const Mask complete = (w == w) & (most - own <= gate) & (own - least <= gate) & (abs(own) <= gate * broadcast(far_gates));
+    const Mask here = g.radius[part] == broadcast(static_cast<float>(radius));
+    if (any(here & (!complete))) return false;
+    moments[part] = {count, zero, zero, spread, zero, spread, w - count * own, uw, vw};
+  }
+  return true;
+}
+
+template <int radius>
+NACRE_INLINE bool is_wanted(const Group& g) {
+  for (const F32& wanted : g.radius) {
+    if (any(wanted == broadcast(static_cast<float>(radius)))) return true;
+  }
+  return false;
+}
+
+template <int radius>
+NACRE_INLINE void fit_radius(const PlanarRow& row, const NormalRule& rule, const RayRow& rays, int begin, Group* groups,
+                             int num_groups) {
+  ColumnSums<radius> columns[chunk / group];
+  bool wanted[chunk / group];
+  for (int k = 0; k < num_groups; ++k) {
+    wanted[k] = is_wanted<radius>(groups[k]);
+    if (wanted[k]) sum_columns<radius>(row.values + begin + k * group, row.stride, columns[k]);
+  }
+  for (int k = 0; k < num_groups; ++k) {
+    if (!wanted[k]) continue;
+    Group& g = groups[k];
+    const int u = begin + k * group;
+    Moments moments[parts];
+    if (!sum_complete<radius>(columns[k], row.values[u + group / 2], g, moments)) {
+      for (int part = 0; part < parts; ++part) {
+        moments[part] = sum_members<radius>(row.values + u + part * lanes, row.stride, g.pixels[part]);
+      }
+    }
+    const float spread = full_spread(radius);
+    for (int part = 0; part < parts; ++part) {
+      const Planes planes =
+          fit(moments[part], rule.min_filled * full_window(radius), rule.min_spread * spread * spread);
+      const Normals found = normals_of(planes, g.pixels[part].value, rule, rays, u + part * lanes, row.is_inverse);
+      const Mask set = (g.radius[part] == broadcast(static_cast<float>(radius))) & planes.found;
+      Normals& n = g.normals[part];
+      n = {select(set, found.x, n.x), select(set, found.y, n.y), select(set, found.z, n.z)};
+    }
+  }
 }
 
 // The radius that each pixel needs: the slope of a fit over a full window has the standard deviation
@@ -162,19 +252,27 @@ int fit_normals(const PlanarRow& row, const NormalRule& rule, const RayRow& rays
   int num_valid = 0;
   for (int begin = 0; begin < row.width; begin += chunk) {
     const int count = row.width - begin < chunk ? row.width - begin : chunk;
-    for (int i = 0; i < count; i += lanes) {
-      const int u = begin + i;
-      const F32 value = load(row.values + u);
-      const Pixels p = {value, evaluate(rule.gate_base, value), evaluate(rule.gate_slope, value)};
-      const F32 radius = window_radius(rule, value);
-      Normals n = {missing, missing, missing};
-      fit_radius<2>(row, rule, rays, u, p, radius, n);
-      fit_radius<3>(row, rule, rays, u, p, radius, n);
-      fit_radius<4>(row, rule, rays, u, p, radius, n);
-      fit_radius<5>(row, rule, rays, u, p, radius, n);
-      store(x + i, n.x);
-      store(y + i, n.y);
-      store(z + i, n.z);
+    const int num_groups = (count + group - 1) / group;
+    Group groups[chunk / group];
+    for (int k = 0; k < num_groups; ++k) {
+      for (int part = 0; part < parts; ++part) {
+        const F32 value = load(row.values + begin + k * group + part * lanes);
+        groups[k].pixels[part] = {value, evaluate(rule.gate_base, value), evaluate(rule.gate_slope, value)};
+        groups[k].radius[part] = window_radius(rule, value);
+        groups[k].normals[part] = {missing, missing, missing};
+      }
+    }
+    fit_radius<2>(row, rule, rays, begin, groups, num_groups);
+    fit_radius<3>(row, rule, rays, begin, groups, num_groups);
+    fit_radius<4>(row, rule, rays, begin, groups, num_groups);
+    fit_radius<5>(row, rule, rays, begin, groups, num_groups);
+    for (int k = 0; k < num_groups; ++k) {
+      for (int part = 0; part < parts; ++part) {
+        const int i = k * group + part * lanes;
+        store(x + i, groups[k].normals[part].x);
+        store(y + i, groups[k].normals[part].y);
+        store(z + i, groups[k].normals[part].z);
+      }
     }
     float* const out = normals + 3 * begin;
     for (int i = 0; i < count; ++i) {

@@ -95,6 +95,17 @@ NACRE_INLINE Mask first_lanes(int count) {
   return {static_cast<__mmask16>(count >= 16 ? 0xFFFFU : (1U << count) - 1U)};
 }
 NACRE_INLINE F32 select(Mask m, F32 a, F32 b) { return {_mm512_mask_blend_ps(m.v, b.v, a.v)}; }
+// x0 y0 z0 x1 y1 z1 ...: 3 lanes vectors. As 3 and the number of lanes have no common divisor, one permutation brings
+// all lanes of a vector to their places in the three that are stored.
+NACRE_INLINE void store_interleaved(float* p, F32 x, F32 y, F32 z) {
+  const __m512 a = _mm512_permutexvar_ps(_mm512_setr_epi32(0, 11, 6, 1, 12, 7, 2, 13, 8, 3, 14, 9, 4, 15, 10, 5), x.v);
+  const __m512 b = _mm512_permutexvar_ps(_mm512_setr_epi32(5, 0, 11, 6, 1, 12, 7, 2, 13, 8, 3, 14, 9, 4, 15, 10), y.v);
+  const __m512 c = _mm512_permutexvar_ps(_mm512_setr_epi32(10, 5, 0, 11, 6, 1, 12, 7, 2, 13, 8, 3, 14, 9, 4, 15), z.v);
+  constexpr __mmask16 first = 0x9249, second = 0x2492;
+  _mm512_storeu_ps(p, _mm512_mask_blend_ps(first, _mm512_mask_blend_ps(second, c, b), a));
+  _mm512_storeu_ps(p + 16, _mm512_mask_blend_ps(first, _mm512_mask_blend_ps(second, a, c), b));
+  _mm512_storeu_ps(p + 32, _mm512_mask_blend_ps(first, _mm512_mask_blend_ps(second, b, a), c));
+}
 NACRE_INLINE I32 select(Mask m, I32 a, I32 b) { return {_mm512_mask_blend_epi32(m.v, b.v, a.v)}; }
 
 #elif defined(__AVX2__) && defined(__FMA__)

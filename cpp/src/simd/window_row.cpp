@@ -32,33 +32,52 @@ NACRE_INLINE double sum_u(const double* c) { return 3.0 * (c[6] - c[0]) + 2.0 * 
 
 // Orthogonal polynomials on -3..3: 1, u, v, u v, u^2 - 4, v^2 - 4. The quadratic ones take up smooth curvature.
 NACRE_INLINE void fit(const ColumnSums& sums, int count, float* residual, float* slope) {
+  double left_over[tile], gradient[tile];
   for (int j = 0; j < count; ++j) {
     const int i = fit_step * j;
     const double* const one = sums.one + i;
     const double s = sum(one), u = sum_u(one), v = sum(sums.v + i), uv = sum_u(sums.v + i);
     const double uu = 5.0 * (one[0] + one[6]) - 3.0 * (one[2] + one[4]) - 4.0 * one[3], vv = sum(sums.vv + i);
-    const double squares = sum(sums.squares + i);
-    const double gradient = u * u + v * v;
-    const double explained = s * s / 49 + gradient / 196 + uv * uv / 784 + (uu * uu + vv * vv) / 588;
-    const double left = squares - explained;
-    residual[j] = static_cast<float>(::sqrt((left < 0.0 ? 0.0 : left) / (49 - 6)));
-    slope[j] = squares == squares ? static_cast<float>(::sqrt(gradient) / 196) : NAN;
+    gradient[j] = u * u + v * v;
+    left_over[j] = sum(sums.squares + i) - (s * s * (1.0 / 49) + gradient[j] * (1.0 / 196) + uv * uv * (1.0 / 784) +
+                                            (uu * uu + vv * vv) * (1.0 / 588));
+  }
+  for (int j = 0; j < count; ++j) {
+    const double variance = left_over[j] < 0.0 ? 0.0 : left_over[j] * (1.0 / (49 - 6));
+    residual[j] = static_cast<float>(::sqrt(variance));
+    slope[j] = variance == variance ? static_cast<float>(::sqrt(gradient[j]) * (1.0 / 196)) : NAN;
   }
 }
 
+struct Steps {
+  float num_flat, smallest;
+};
+
+// NaN is no step.
+NACRE_INLINE Steps add_step(const Steps& steps, float difference) {
+  const float step = ::fabsf(difference), candidate = step == 0.0F ? INFINITY : step;
+  return {steps.num_flat + (step == 0.0F ? 1.0F : 0.0F), candidate < steps.smallest ? candidate : steps.smallest};
+}
+
 NACRE_INLINE void find_steps(const float* centre, ptrdiff_t stride, int count, float* steps) {
+  float across_flat[columns], across_smallest[columns];
+  for (int i = 0; i < fit_step * (count - 1) + 1; ++i) {
+    const float* const p = centre + i;
+    Steps across = {0.0F, INFINITY};
+    across = add_step(across, p[-2 * stride] - p[-3 * stride]);
+    across = add_step(across, p[-stride] - p[-2 * stride]);
+    across = add_step(across, p[0] - p[-stride]);
+    across = add_step(across, p[stride] - p[0]);
+    across = add_step(across, p[2 * stride] - p[stride]);
+    across = add_step(across, p[3 * stride] - p[2 * stride]);
+    across_flat[i] = across.num_flat;
+    across_smallest[i] = across.smallest;
+  }
   for (int j = 0; j < count; ++j) {
     const float* const p = centre + fit_step * j;
-    int num_flat = 0;
-    float smallest = INFINITY;
-    for (int d = -fit_radius; d < fit_radius; ++d) {
-      const float along = ::fabsf(p[d + 1] - p[d]);
-      const float across = ::fabsf(p[(d + 1) * stride] - p[d * stride]);
-      num_flat += (along == 0.0F) + (across == 0.0F);
-      smallest = along > 0.0F && along < smallest ? along : smallest;
-      smallest = across > 0.0F && across < smallest ? across : smallest;
-    }
-    steps[j] = num_flat >= 2 * fit_radius && smallest < INFINITY ? smallest : 0.0F;
+    Steps all = {across_flat[fit_step * j], across_smallest[fit_step * j]};
+    for (int d = -fit_radius; d < fit_radius; ++d) all = add_step(all, p[d + 1] - p[d]);
+    steps[j] = all.num_flat >= 2.0F * fit_radius && all.smallest < INFINITY ? all.smallest : 0.0F;
   }
 }
 
