@@ -135,6 +135,7 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, const std::vector<st
         if (options_.method == Metric::symmetric) pair.normal = 0.5 * (source_normal + target_normal);
       }
     }
+    if (std::abs(nacre::residual(pair, options_.method)) > gate.residual) return;
     double variance = 0.0;
     if (source.sigma.size() > 0) variance += static_cast<double>(source.sigma[row]) * source.sigma[row];
     if (sigma_.size() > 0) variance += static_cast<double>(sigma_[match]) * sigma_[match];

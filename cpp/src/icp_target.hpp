@@ -1,6 +1,7 @@
 // The cloud that others are registered to: prepared once, matched many times.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "icp_step.hpp"
@@ -25,6 +26,7 @@ struct IcpSource {
 struct Gate {
   double distance;   // [m]
   double cos_angle;  // of the largest angle between matched normals
+  double residual;   // along the normals [m]
 };
 
 class IcpTarget {
@@ -49,12 +51,9 @@ class IcpTarget {
   double diameter_ = 0.0, spacing_ = 0.0;
 };
 
-// align with a prepared target.
-AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial,
-                     const AlignOptions& options);
-
-// The part of up to max_samples source points that find a target point within the gate.
-double overlap_at(const IcpTarget& target, const IcpSource& source, const Pose& pose, const Gate& gate,
-                  std::size_t max_samples);
+// align with a prepared target. With the last gate, pairs with larger residuals than `last_residual` are rejected: for a
+// target that is sparser than its surface is known, where near points may lie far along the surface, but not across.
+AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
+                     double last_residual = std::numeric_limits<double>::infinity());
 
 }  // namespace nacre

@@ -205,7 +205,7 @@ TrackingResult Model::Impl::locate(const Frame& frame, const SurfaceObserver& ob
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), key_poses(), was_lost, options);
+  return track(cloud, frame, camera, observer, guesses(extras), key_poses(), was_lost, spacing, options);
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {

@@ -6,6 +6,11 @@
 #include "parallel.hpp"
 
 namespace nacre {
+namespace {
+
+constexpr int border = simd::largest_window;
+
+}  // namespace
 
 float median_sigma(const Frame& frame) {
   if (frame.valid.empty()) return 0.0F;
@@ -23,8 +28,9 @@ SurfaceObserver::SurfaceObserver(const Frame& frame, const Camera& camera, const
       options_(options),
       width_(frame.width),
       height_(frame.height),
+      tiles_across_((frame.width + tile_size - 1) / tile_size),
       least_cosine_(static_cast<float>(std::cos(options.max_angle))) {
-  constexpr int border = simd::largest_window, right_border = 16;
+  constexpr int right_border = border + tile_size + 2;
   const std::int64_t stride = border + width_ + right_border, rows = height_ + 2 * border;
   const int num_planes = colors.rows() > 0 ? 10 : 7;
   planes_.assign(static_cast<std::size_t>(num_planes * rows * stride), 0.0F);
@@ -52,14 +58,32 @@ SurfaceObserver::SurfaceObserver(const Frame& frame, const Camera& camera, const
       for (int channel = 0; channel < 3; ++channel) plane(7 + channel)[to + u] = colors(first + u, channel);
     }
   });
+  tiles_ = summarise(num_threads);
 }
 
-Projection SurfaceObserver::project(const Eigen::Vector3f& point) const {
-  const Eigen::Vector2d pixel = camera_.project(point.cast<double>());
-  if (!pixel.allFinite()) return {false, -1};
-  const double u = std::clamp(pixel.x(), 0.0, width_ - 1.0), v = std::clamp(pixel.y(), 0.0, height_ - 1.0);
-  const bool is_inside = std::abs(pixel.x() - u) < 0.5 && std::abs(pixel.y() - v) < 0.5;
-  return {is_inside, static_cast<std::int32_t>(v + 0.5) * width_ + static_cast<std::int32_t>(u + 0.5)};
+std::vector<SurfaceObserver::Tile> SurfaceObserver::summarise(int num_threads) const {
+  const int tiles_down = (height_ + tile_size - 1) / tile_size;
+  std::vector<Tile> tiles(static_cast<std::size_t>(tiles_across_ * tiles_down));
+  parallel_for(tiles_down, 1, num_threads, [&](std::int64_t row) {
+    for (int column = 0; column < tiles_across_; ++column) {
+      Tile& tile = tiles[static_cast<std::size_t>(row * tiles_across_ + column)];
+      const int first_u = column * tile_size - border, first_v = static_cast<int>(row) * tile_size - border;
+      const int last_v = std::min(first_v + tile_size + 2 * border, height_ + border);
+      simd::summarise_pixels()(image_, first_v * image_.stride + first_u, tile_size + 2 * border, last_v - first_v,
+                               &tile.nearest, &tile.farthest, &tile.largest_weight);
+    }
+  });
+  return tiles;
+}
+
+bool SurfaceObserver::may_observe(const Eigen::Vector3f& point, std::int32_t pixel, float sigma,
+                                  float least_weight) const {
+  const Tile& tile = tiles_[static_cast<std::size_t>(pixel / width_ / tile_size * tiles_across_ +
+                                                     pixel % width_ / tile_size)];
+  const float radius = support(sigma, static_cast<float>(camera_.footprint(point.z())));
+  const float reach = radius + std::max(radius, 4.0F * sigma);
+  return point.z() > tile.nearest - reach && point.z() < tile.farthest + reach &&
+         static_cast<float>(PixelWindow::size * PixelWindow::size) * tile.largest_weight > least_weight;
 }
 
 Eigen::Vector3f SurfaceObserver::towards_camera(const Eigen::Vector3f& point) const {
@@ -69,13 +93,13 @@ Eigen::Vector3f SurfaceObserver::towards_camera(const Eigen::Vector3f& point) co
 
 float SurfaceObserver::support(float sigma, float footprint) const {
   if (options_.support > 0.0) return static_cast<float>(options_.support);
-  return std::clamp(6.0F * sigma, 3.0F * footprint, static_cast<float>(simd::largest_window) * footprint);
+  return std::clamp(6.0F * sigma, 3.0F * footprint, 4.0F * footprint);
 }
 
 void SurfaceObserver::add(ObservationBlock& block, const Eigen::Vector3f& point, const Eigen::Vector3f& normal,
-                          std::int32_t pixel, float sigma) const {
+                          std::int32_t pixel, float sigma, float spacing) const {
   const auto footprint = static_cast<float>(camera_.footprint(point.z()));
-  const float radius = support(sigma, footprint);
+  const float radius = support(sigma, footprint), reach = std::max(radius, spacing);
   const int i = block.count_++;
   block.x_[i] = point.x();
   block.y_[i] = point.y();
@@ -83,14 +107,32 @@ void SurfaceObserver::add(ObservationBlock& block, const Eigen::Vector3f& point,
   block.normal_x_[i] = normal.x();
   block.normal_y_[i] = normal.y();
   block.normal_z_[i] = normal.z();
+  block.sigma_[i] = sigma;
   block.u_[i] = pixel % width_;
   block.v_[i] = pixel / width_;
   block.radius_[i] = radius;
   block.largest_offset_[i] = std::max(radius, 4.0F * sigma);
-  block.window_[i] = std::clamp(static_cast<int>(std::ceil(radius / footprint)), 1, simd::largest_window);
+  block.spacing_[i] = spacing;
+  block.window_[i] = std::clamp(static_cast<int>(std::ceil(reach / footprint)), 1, simd::largest_window);
 }
 
-void SurfaceObserver::observe(ObservationBlock& b) const {
+PixelWindow ObservationBlock::cover(int i) const {
+  PixelWindow window{u_[i] - window_[i], v_[i] - window_[i], 2 * window_[i] + 1, {}};
+  std::copy_n(cover_rows_ + PixelWindow::size * i, window.num_rows, window.rows);
+  return window;
+}
+
+void SurfaceObserver::observe(ObservationBlock& block) const { observe(block, nullptr); }
+
+void SurfaceObserver::observe_and_cover(ObservationBlock& block, float least_cosine) const {
+  for (int i = 0; i < block.count_; ++i) {
+    block.cover_offset_[i] = std::max(block.spacing_[i], 3.0F * block.sigma_[i]);
+  }
+  const simd::WindowCover cover = {block.spacing_, block.cover_offset_, least_cosine, block.cover_rows_};
+  observe(block, &cover);
+}
+
+void SurfaceObserver::observe(ObservationBlock& b, const simd::WindowCover* cover) const {
   const bool colored = has_colors();
   if (!colored) {
     std::fill_n(b.red_, b.count_, 0.0F);
@@ -102,7 +144,8 @@ void SurfaceObserver::observe(ObservationBlock& b) const {
                            b.radius_, b.largest_offset_},
                           least_cosine_,
                           {b.weight_, b.offset_, b.seen_normal_x_, b.seen_normal_y_, b.seen_normal_z_, b.red_,
-                           b.green_, b.blue_});
+                           b.green_, b.blue_},
+                          cover);
 }
 
 bool SurfaceObserver::sees_through(const Eigen::Vector3f& point, std::int32_t pixel, float margin) const {

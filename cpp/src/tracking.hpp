@@ -25,6 +25,7 @@ struct TrackingResult {
 // around the key poses, unless there are none.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera,
                      const SurfaceObserver& observer, const std::vector<Pose>& guesses,
-                     const std::vector<Pose>& key_poses, bool was_lost, const ModelOptions& options);
+                     const std::vector<Pose>& key_poses, bool was_lost, double spacing,
+                     const ModelOptions& options);
 
 }  // namespace nacre

@@ -71,45 +71,46 @@ NACRE_INLINE Moments sum_members(const float* pixel, ptrdiff_t stride, const Pix
   return m;
 }
 
+// value = own + w + du at_u + dv at_v
 struct Planes {
   F32 w, at_u, at_v;
   Mask found;
 };
 
+// The normal equations times the number of members, so that the matrix is of integers.
 NACRE_INLINE Planes fit(const Moments& m, float min_count, float min_determinant) {
-  const F32 mean_u = m.u / m.n, mean_v = m.v / m.n, mean_w = m.w / m.n;
-  const F32 uu = m.uu - mean_u * m.u, uv = m.uv - mean_u * m.v, vv = m.vv - mean_v * m.v;
-  const F32 uw = m.uw - mean_u * m.w, vw = m.vw - mean_v * m.w;
-  const F32 determinant = uu * vv - uv * uv;
-  const F32 scale = broadcast(1.0F) / determinant;
+  const F32 uu = m.n * m.uu - m.u * m.u, uv = m.n * m.uv - m.u * m.v, vv = m.n * m.vv - m.v * m.v;
+  const F32 uw = m.n * m.uw - m.u * m.w, vw = m.n * m.vw - m.v * m.w;
+  const F32 determinant = uu * vv - uv * uv, scale = broadcast(1.0F) / determinant;
   const F32 at_u = (vv * uw - uv * vw) * scale, at_v = (uu * vw - uv * uw) * scale;
-  return {mean_w - mean_u * at_u - mean_v * at_v, at_u, at_v,
-          (m.n >= broadcast(min_count)) & (determinant >= broadcast(min_determinant))};
+  return {(m.w - m.u * at_u - m.v * at_v) / m.n, at_u, at_v,
+          (m.n >= broadcast(min_count)) & (determinant >= broadcast(min_determinant) * (m.n * m.n))};
 }
 
 struct Normals {
   F32 x, y, z;
 };
 
-NACRE_INLINE Normals normalised(F32 x, F32 y, F32 z) {
-  const F32 length = sqrt(x * x + (y * y + z * z));
-  return {x / length, y / length, z / length};
+NACRE_INLINE Normals scaled(F32 x, F32 y, F32 z, float length) {
+  const F32 scale = broadcast(length) / sqrt(x * x + (y * y + z * z));
+  return {x * scale, y * scale, z * scale};
 }
 
 NACRE_INLINE Normals normals_of(const Planes& planes, F32 value, const NormalRule& rule, const RayRow& rays, int u,
                                 bool is_inverse) {
   F32 a = planes.at_u * broadcast(rule.fx), b = planes.at_v * broadcast(rule.fy);
-  if (!is_inverse) return normalised(a, b, broadcast(-1.0F));
+  if (!is_inverse) return scaled(a, b, broadcast(-1.0F), 1.0F);
   if (rays.pixel_from_ray[0] != nullptr) {
     a = load(rays.pixel_from_ray[0] + u) * planes.at_u + load(rays.pixel_from_ray[2] + u) * planes.at_v;
     b = load(rays.pixel_from_ray[1] + u) * planes.at_u + load(rays.pixel_from_ray[3] + u) * planes.at_v;
   }
-  const F32 z = load(rays.z + u), x = load(rays.x + u) / z;
-  const F32 y = (rays.y != nullptr ? load(rays.y + u) : broadcast(rays.row_y)) / z;
-  const F32 c = value + planes.w - (a * x + b * y);
-  const Normals away = normalised(a, b, c);
-  const F32 minus = broadcast(-1.0F);
-  return {minus * away.x, minus * away.y, minus * away.z};
+  F32 x = load(rays.x + u), y = broadcast(rays.row_y);
+  if (rays.y != nullptr) {  // else z is 1
+    const F32 z = load(rays.z + u);
+    x = x / z;
+    y = load(rays.y + u) / z;
+  }
+  return scaled(a, b, value + planes.w - (a * x + b * y), -1.0F);
 }
 
 // Sums over the columns of the windows of a group, of the values about an origin; their least and largest.
@@ -146,18 +147,18 @@ struct Group {
   Normals normals[parts];
 };
 
-// The sums of complete windows. False where one of the pixels with this radius has a window that is not: a member is
+// The planes of complete windows. False where one of the pixels with this radius has a window that is not: a member is
 // missing, or might differ too much; or where the origin lies too far off for exact sums.
 template <int radius>
-NACRE_INLINE bool sum_complete(const ColumnSums<radius>& columns, float group_origin, const Group& g,
-                               Moments (&moments)[parts]) {
+NACRE_INLINE bool fit_complete(const ColumnSums<radius>& columns, float group_origin, const Group& g,
+                               Planes (&planes)[parts]) {
   constexpr float far_gates = 4.0F;
   const F32 origin = broadcast(group_origin);
-  const F32 zero = broadcast(0.0F), count = broadcast(full_window(radius)), spread = broadcast(full_spread(radius));
+  const F32 per_pixel = broadcast(1.0F / full_window(radius)), per_spread = broadcast(1.0F / full_spread(radius));
   for (int part = 0; part < parts; ++part) {
     const int middle = part * lanes + radius;
     const F32 own = g.pixels[part].value - origin, gate = g.pixels[part].gate_base + g.pixels[part].gate_slope;
-    F32 w = load(columns.w + middle), uw = zero, vw = load(columns.vw + middle);
+    F32 w = load(columns.w + middle), uw = broadcast(0.0F), vw = load(columns.vw + middle);
     F32 least = load(columns.least + middle), most = load(columns.most + middle);
     for (int du = 1; du <= radius; ++du) {
       const F32 left = load(columns.w + middle - du), right = load(columns.w + middle + du);
@@ -171,7 +172,7 @@ NACRE_INLINE bool sum_complete(const ColumnSums<radius>& columns, float group_or
     const Mask complete = (w == w) & (most - own <= gate) & (own - least <= gate) & (abs(own) <= gate * broadcast(far_gates));
     const Mask here = g.radius[part] == broadcast(static_cast<float>(radius));
     if (any(here & (!complete))) return false;
-    moments[part] = {count, zero, zero, spread, zero, spread, w - count * own, uw, vw};
+    planes[part] = {w * per_pixel - own, uw * per_spread, vw * per_spread, complete};
   }
   return true;
 }
@@ -197,18 +198,17 @@ NACRE_INLINE void fit_radius(const PlanarRow& row, const NormalRule& rule, const
     if (!wanted[k]) continue;
     Group& g = groups[k];
     const int u = begin + k * group;
-    Moments moments[parts];
-    if (!sum_complete<radius>(columns[k], row.values[u + group / 2], g, moments)) {
+    Planes planes[parts];
+    if (!fit_complete<radius>(columns[k], row.values[u + group / 2], g, planes)) {
+      constexpr float spread = full_spread(radius);
       for (int part = 0; part < parts; ++part) {
-        moments[part] = sum_members<radius>(row.values + u + part * lanes, row.stride, g.pixels[part]);
+        planes[part] = fit(sum_members<radius>(row.values + u + part * lanes, row.stride, g.pixels[part]),
+                           rule.min_filled * full_window(radius), rule.min_spread * spread * spread);
       }
     }
-    const float spread = full_spread(radius);
     for (int part = 0; part < parts; ++part) {
-      const Planes planes =
-          fit(moments[part], rule.min_filled * full_window(radius), rule.min_spread * spread * spread);
-      const Normals found = normals_of(planes, g.pixels[part].value, rule, rays, u + part * lanes, row.is_inverse);
-      const Mask set = (g.radius[part] == broadcast(static_cast<float>(radius))) & planes.found;
+      const Normals found = normals_of(planes[part], g.pixels[part].value, rule, rays, u + part * lanes, row.is_inverse);
+      const Mask set = (g.radius[part] == broadcast(static_cast<float>(radius))) & planes[part].found;
       Normals& n = g.normals[part];
       n = {select(set, found.x, n.x), select(set, found.y, n.y), select(set, found.z, n.z)};
     }
@@ -247,8 +247,7 @@ NACRE_INLINE int list_valid(const float* x, int count, int32_t first, int32_t* v
 
 int fit_normals(const PlanarRow& row, const NormalRule& rule, const RayRow& rays, float* normals, int32_t first,
                 int32_t* valid) {
-  const F32 missing = as_float(broadcast(0x7FC00000));
-  float x[chunk], y[chunk], z[chunk];
+  const F32 missing = broadcast(NAN);
   int num_valid = 0;
   for (int begin = 0; begin < row.width; begin += chunk) {
     const int count = row.width - begin < chunk ? row.width - begin : chunk;
@@ -266,20 +265,16 @@ int fit_normals(const PlanarRow& row, const NormalRule& rule, const RayRow& rays
     fit_radius<3>(row, rule, rays, begin, groups, num_groups);
     fit_radius<4>(row, rule, rays, begin, groups, num_groups);
     fit_radius<5>(row, rule, rays, begin, groups, num_groups);
+    float x[chunk], all[3 * chunk];
     for (int k = 0; k < num_groups; ++k) {
       for (int part = 0; part < parts; ++part) {
+        const Normals& n = groups[k].normals[part];
         const int i = k * group + part * lanes;
-        store(x + i, groups[k].normals[part].x);
-        store(y + i, groups[k].normals[part].y);
-        store(z + i, groups[k].normals[part].z);
+        store(x + i, n.x);
+        store_interleaved(all + 3 * i, n.x, n.y, n.z);
       }
     }
-    float* const out = normals + 3 * begin;
-    for (int i = 0; i < count; ++i) {
-      out[3 * i] = x[i];
-      out[3 * i + 1] = y[i];
-      out[3 * i + 2] = z[i];
-    }
+    memcpy(normals + 3 * begin, all, sizeof(float) * 3 * static_cast<size_t>(count));
     if (valid != nullptr) num_valid += list_valid(x, count, first + begin, valid + num_valid);
   }
   return num_valid;

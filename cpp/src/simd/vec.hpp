@@ -165,6 +165,15 @@ NACRE_INLINE Mask operator!(Mask a) { return {_mm256_xor_ps(a.v, _mm256_castsi25
 NACRE_INLINE unsigned bits(Mask a) { return static_cast<unsigned>(_mm256_movemask_ps(a.v)); }
 NACRE_INLINE Mask first_lanes(int count) { return I32{_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)} < broadcast(count); }
 NACRE_INLINE F32 select(Mask m, F32 a, F32 b) { return {_mm256_blendv_ps(b.v, a.v, m.v)}; }
+NACRE_INLINE void store_interleaved(float* p, F32 x, F32 y, F32 z) {
+  const __m256 a = _mm256_permutevar8x32_ps(x.v, _mm256_setr_epi32(0, 3, 6, 1, 4, 7, 2, 5));
+  const __m256 b = _mm256_permutevar8x32_ps(y.v, _mm256_setr_epi32(5, 0, 3, 6, 1, 4, 7, 2));
+  const __m256 c = _mm256_permutevar8x32_ps(z.v, _mm256_setr_epi32(2, 5, 0, 3, 6, 1, 4, 7));
+  constexpr int first = 0x49, second = 0x92;
+  _mm256_storeu_ps(p, _mm256_blend_ps(_mm256_blend_ps(c, b, second), a, first));
+  _mm256_storeu_ps(p + 8, _mm256_blend_ps(_mm256_blend_ps(b, a, second), c, first));
+  _mm256_storeu_ps(p + 16, _mm256_blend_ps(_mm256_blend_ps(a, c, second), b, first));
+}
 NACRE_INLINE I32 select(Mask m, I32 a, I32 b) { return {_mm256_blendv_epi8(b.v, a.v, _mm256_castps_si256(m.v))}; }
 
 #elif defined(NACRE_SSE2)
@@ -229,6 +238,16 @@ NACRE_INLINE unsigned bits(Mask a) { return static_cast<unsigned>(_mm_movemask_p
 NACRE_INLINE Mask first_lanes(int count) { return I32{_mm_setr_epi32(0, 1, 2, 3)} < broadcast(count); }
 NACRE_INLINE F32 select(Mask m, F32 a, F32 b) { return {_mm_or_ps(_mm_and_ps(m.v, a.v), _mm_andnot_ps(m.v, b.v))}; }
 NACRE_INLINE I32 select(Mask m, I32 a, I32 b) { return as_int(select(m, as_float(a), as_float(b))); }
+NACRE_INLINE void store_interleaved(float* p, F32 x, F32 y, F32 z) {
+  const F32 a = {_mm_shuffle_ps(x.v, x.v, _MM_SHUFFLE(1, 2, 3, 0))};
+  const F32 b = {_mm_shuffle_ps(y.v, y.v, _MM_SHUFFLE(2, 3, 0, 1))};
+  const F32 c = {_mm_shuffle_ps(z.v, z.v, _MM_SHUFFLE(3, 0, 1, 2))};
+  const Mask first = {_mm_castsi128_ps(_mm_setr_epi32(-1, 0, 0, -1))};
+  const Mask second = {_mm_castsi128_ps(_mm_setr_epi32(0, -1, 0, 0))};
+  store(p, select(first, a, select(second, b, c)));
+  store(p + 4, select(first, b, select(second, c, a)));
+  store(p + 8, select(first, c, select(second, a, b)));
+}
 
 #else  // plain loops, which a compiler for NEON and the like makes vectors of
 
@@ -368,6 +387,13 @@ NACRE_INLINE F32 select(Mask m, F32 a, F32 b) {
 }
 NACRE_INLINE I32 select(Mask m, I32 a, I32 b) {
   return each_lane<I32>([=](int i) { return m.v[i] ? a.v[i] : b.v[i]; });
+}
+NACRE_INLINE void store_interleaved(float* p, F32 x, F32 y, F32 z) {
+  for (int i = 0; i < lanes; ++i) {
+    p[3 * i] = x.v[i];
+    p[3 * i + 1] = y.v[i];
+    p[3 * i + 2] = z.v[i];
+  }
 }
 
 #endif
