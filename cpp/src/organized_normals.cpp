@@ -62,13 +62,15 @@ void make_frame(const DepthRef& depth, const Camera& camera, const std::optional
   frame.sigma.resize(size);
   frame.valid.resize(static_cast<std::size_t>(size));
   std::vector<int> num_valid(static_cast<std::size_t>(height));
+  const simd::SigmaCurve curve = {static_cast<float>(model.constant), static_cast<float>(model.quadratic),
+                                  static_cast<float>(model.offset)};
   const auto fill_points = simd::fill_point_row();
   const auto fit_normals = simd::fit_normals();
   parallel_for(height, rows_per_block(width), num_threads, [&](std::int64_t row) {
     const int v = static_cast<int>(row);
     const std::int64_t first = row * width;
     const simd::RayRow rays = camera.ray_table().row(v);
-    fill_points(&depth.coeffRef(row, 0), rays, {model.constant, model.quadratic, model.offset}, width,
+    fill_points(&depth.coeffRef(row, 0), rays, curve, width,
                 frame.points.data() + 3 * first, frame.sigma.data() + first);
     num_valid[static_cast<std::size_t>(row)] =
         fit_normals(image.planar_row(v), rule, rays, frame.normals.data() + 3 * first, static_cast<std::int32_t>(first),

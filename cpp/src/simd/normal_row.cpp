@@ -30,87 +30,71 @@ struct Moments {
   F32 n, u, v, uu, uv, vv, w, uw, vw;
 };
 
+// The sums over the members in one row of the windows. Three counts are packed in one integer:
+// n + 2^8 sum (du + radius) + 2^16 sum du^2.
 struct RowSums {
-  F32 n, u, uu, w, uw;
+  I32 counts;
+  F32 w;
 };
 
 template <int radius, int du>
-NACRE_INLINE void add_taps(const float* row, const F32& own, const F32* limits, const F32& row_limit, RowSums& sums) {
-  const F32 difference = load(row + du) - own;
+NACRE_INLINE void add_taps(const float* row, F32 own, const F32 (&limits)[radius + 1], RowSums& sums,
+                           F32 (&odd_w)[radius]) {
   constexpr int distance = du < 0 ? -du : du;
+  const F32 difference = load(row + du) - own;
   // False where either is missing (NaN).
-  const Mask member = abs(difference) <= max(limits[distance], row_limit);
-  sums.n = add_where(member, sums.n, broadcast(1.0F));
-  sums.u = add_where(member, sums.u, broadcast(static_cast<float>(du)));
-  sums.uu = add_where(member, sums.uu, broadcast(static_cast<float>(du * du)));
+  const Mask member = abs(difference) <= limits[distance];
+  sums.counts = add_where(member, sums.counts, broadcast(1 + (du + radius) * (1 << 8) + du * du * (1 << 16)));
   sums.w = add_where(member, sums.w, difference);
-  sums.uw = add_where(member, sums.uw, broadcast(static_cast<float>(du)) * difference);
-  if constexpr (du < radius) add_taps<radius, du + 1>(row, own, limits, row_limit, sums);
+  if constexpr (du < 0) odd_w[distance - 1] = sub_where(member, odd_w[distance - 1], difference);
+  if constexpr (du > 0) odd_w[distance - 1] = add_where(member, odd_w[distance - 1], difference);
+  if constexpr (du < radius) add_taps<radius, du + 1>(row, own, limits, sums, odd_w);
 }
 
 template <int radius>
 NACRE_INLINE Moments sum_members(const float* pixel, ptrdiff_t stride, const Pixels& p) {
-  const F32 zero = broadcast(0.0F);
-  F32 limits[radius + 1];
-  for (int d = 0; d <= radius; ++d) limits[d] = p.gate_base + broadcast(static_cast<float>(d)) * p.gate_slope;
+  const F32 zero = broadcast(0.0F), shift = broadcast(static_cast<float>(radius));
+  const I32 byte = broadcast(255);
   Moments m = {zero, zero, zero, zero, zero, zero, zero, zero, zero};
+  F32 odd_w[radius];  // sums of w at du minus w at -du
+  for (F32& w : odd_w) w = zero;
   for (int dv = -radius; dv <= radius; ++dv) {
-    RowSums row = {zero, zero, zero, zero, zero};
-    add_taps<radius, -radius>(pixel + dv * stride, p.value, limits, limits[dv < 0 ? -dv : dv], row);
-    const F32 v = broadcast(static_cast<float>(dv));
-    m.n += row.n;
-    m.u += row.u;
-    m.v += v * row.n;
-    m.uu += row.uu;
-    m.uv += v * row.u;
-    m.vv += v * v * row.n;
+    F32 limits[radius + 1];
+    for (int du = 0; du <= radius; ++du) {
+      const int distance = dv < 0 ? (-dv > du ? -dv : du) : (dv > du ? dv : du);
+      limits[du] = p.gate_base + broadcast(static_cast<float>(distance)) * p.gate_slope;
+    }
+    RowSums row = {broadcast(0), zero};
+    add_taps<radius, -radius>(pixel + dv * stride, p.value, limits, row, odd_w);
+    const F32 n = to_float(row.counts & byte), v = broadcast(static_cast<float>(dv));
+    const F32 u = to_float(shift_right<8>(row.counts) & byte) - shift * n;
+    m.n += n;
+    m.u += u;
+    m.v += v * n;
+    m.uu += to_float(shift_right<16>(row.counts));
+    m.uv += v * u;
+    m.vv += v * v * n;
     m.w += row.w;
-    m.uw += row.uw;
     m.vw += v * row.w;
   }
+  for (int du = 1; du <= radius; ++du) m.uw += broadcast(static_cast<float>(du)) * odd_w[du - 1];
   return m;
 }
 
-// value = own + w + du at_u + dv at_v
+// value = own + w + du at_u + dv at_v; NaN where there is no plane.
 struct Planes {
   F32 w, at_u, at_v;
-  Mask found;
 };
 
 // The normal equations times the number of members, so that the matrix is of integers.
 NACRE_INLINE Planes fit(const Moments& m, float min_count, float min_determinant) {
   const F32 uu = m.n * m.uu - m.u * m.u, uv = m.n * m.uv - m.u * m.v, vv = m.n * m.vv - m.v * m.v;
   const F32 uw = m.n * m.uw - m.u * m.w, vw = m.n * m.vw - m.v * m.w;
-  const F32 determinant = uu * vv - uv * uv, scale = broadcast(1.0F) / determinant;
-  const F32 at_u = (vv * uw - uv * vw) * scale, at_v = (uu * vw - uv * uw) * scale;
-  return {(m.w - m.u * at_u - m.v * at_v) / m.n, at_u, at_v,
-          (m.n >= broadcast(min_count)) & (determinant >= broadcast(min_determinant) * (m.n * m.n))};
-}
-
-struct Normals {
-  F32 x, y, z;
-};
-
-NACRE_INLINE Normals scaled(F32 x, F32 y, F32 z, float length) {
-  const F32 scale = broadcast(length) / sqrt(x * x + (y * y + z * z));
-  return {x * scale, y * scale, z * scale};
-}
-
-NACRE_INLINE Normals normals_of(const Planes& planes, F32 value, const NormalRule& rule, const RayRow& rays, int u,
-                                bool is_inverse) {
-  F32 a = planes.at_u * broadcast(rule.fx), b = planes.at_v * broadcast(rule.fy);
-  if (!is_inverse) return scaled(a, b, broadcast(-1.0F), 1.0F);
-  if (rays.pixel_from_ray[0] != nullptr) {
-    a = load(rays.pixel_from_ray[0] + u) * planes.at_u + load(rays.pixel_from_ray[2] + u) * planes.at_v;
-    b = load(rays.pixel_from_ray[1] + u) * planes.at_u + load(rays.pixel_from_ray[3] + u) * planes.at_v;
-  }
-  F32 x = load(rays.x + u), y = broadcast(rays.row_y);
-  if (rays.y != nullptr) {  // else z is 1
-    const F32 z = load(rays.z + u);
-    x = x / z;
-    y = load(rays.y + u) / z;
-  }
-  return scaled(a, b, value + planes.w - (a * x + b * y), -1.0F);
+  const F32 determinant = uu * vv - uv * uv;
+  const Mask found = (m.n >= broadcast(min_count)) & (determinant >= broadcast(min_determinant) * (m.n * m.n));
+  const F32 inverse = broadcast(1.0F) / (determinant * m.n), scale = inverse * m.n;
+  const F32 at_u = select(found, (vv * uw - uv * vw) * scale, broadcast(NAN)), at_v = (uu * vw - uv * uw) * scale;
+  return {(m.w - m.u * at_u - m.v * at_v) * (inverse * determinant), at_u, at_v};
 }
 
 // Sums over the columns of the windows of a group, of the values about an origin; their least and largest.
@@ -143,9 +127,37 @@ NACRE_INLINE void sum_columns(const float* pixel, ptrdiff_t stride, ColumnSums<r
 
 struct Group {
   Pixels pixels[parts];
-  F32 radius[parts];
-  Normals normals[parts];
+  F32 radius[parts];  // NaN where there is no measurement
+  Planes planes[parts];
 };
+
+template <int radius>
+NACRE_INLINE Mask has_radius(const Group& g, int part) {
+  return g.radius[part] == broadcast(static_cast<float>(radius));
+}
+
+template <int radius>
+NACRE_INLINE bool is_wanted(const Group& g) {
+  for (int part = 0; part < parts; ++part) {
+    if (any(has_radius<radius>(g, part))) return true;
+  }
+  return false;
+}
+
+// Whether the corners of the windows are members: most windows that are not complete lack one.
+template <int radius>
+NACRE_INLINE bool may_be_complete(const float* pixel, ptrdiff_t stride, const Group& g) {
+  for (int part = 0; part < parts; ++part) {
+    const Pixels& p = g.pixels[part];
+    const F32 gate = p.gate_base + p.gate_slope;
+    const auto is_member = [&](ptrdiff_t offset) { return abs(load(pixel + part * lanes + offset) - p.value) <= gate; };
+    const ptrdiff_t down = radius * stride;
+    const Mask members =
+        is_member(-down - radius) & is_member(-down + radius) & is_member(down - radius) & is_member(down + radius);
+    if (any(has_radius<radius>(g, part) & (!members))) return false;
+  }
+  return true;
+}
 
 // The planes of complete windows. False where one of the pixels with this radius has a window that is not: a member is
 // missing, or might differ too much; or where the origin lies too far off for exact sums.
@@ -169,48 +181,41 @@ NACRE_INLINE bool fit_complete(const ColumnSums<radius>& columns, float group_or
       most = max(most, max(load(columns.most + middle - du), load(columns.most + middle + du)));
     }
     // The sum is NaN where a member is missing.
-    const Mask complete = (w == w) & (most - own <= gate) & (own - least <= gate) & (abs(own) <= gate * broadcast(far_gates));
-    const Mask here = g.radius[part] == broadcast(static_cast<float>(radius));
-    if (any(here & (!complete))) return false;
-    planes[part] = {w * per_pixel - own, uw * per_spread, vw * per_spread, complete};
+    const Mask complete =
+        (w == w) & (most - own <= gate) & (own - least <= gate) & (abs(own) <= gate * broadcast(far_gates));
+    if (any(has_radius<radius>(g, part) & (!complete))) return false;
+    planes[part] = {w * per_pixel - own, uw * per_spread, vw * per_spread};
   }
   return true;
 }
 
 template <int radius>
-NACRE_INLINE bool is_wanted(const Group& g) {
-  for (const F32& wanted : g.radius) {
-    if (any(wanted == broadcast(static_cast<float>(radius)))) return true;
-  }
-  return false;
-}
-
-template <int radius>
-NACRE_INLINE void fit_radius(const PlanarRow& row, const NormalRule& rule, const RayRow& rays, int begin, Group* groups,
-                             int num_groups) {
+NACRE_INLINE void fit_radius(const PlanarRow& row, const NormalRule& rule, int begin, Group* groups, int num_groups) {
   ColumnSums<radius> columns[chunk / group];
-  bool wanted[chunk / group];
+  bool wanted[chunk / group], complete[chunk / group];
   for (int k = 0; k < num_groups; ++k) {
+    const float* const pixel = row.values + begin + k * group;
     wanted[k] = is_wanted<radius>(groups[k]);
-    if (wanted[k]) sum_columns<radius>(row.values + begin + k * group, row.stride, columns[k]);
+    complete[k] = wanted[k] && may_be_complete<radius>(pixel, row.stride, groups[k]);
+    if (complete[k]) sum_columns<radius>(pixel, row.stride, columns[k]);
   }
   for (int k = 0; k < num_groups; ++k) {
     if (!wanted[k]) continue;
     Group& g = groups[k];
-    const int u = begin + k * group;
+    const float* const pixel = row.values + begin + k * group;
     Planes planes[parts];
-    if (!fit_complete<radius>(columns[k], row.values[u + group / 2], g, planes)) {
+    if (!complete[k] || !fit_complete<radius>(columns[k], pixel[group / 2], g, planes)) {
       constexpr float spread = full_spread(radius);
       for (int part = 0; part < parts; ++part) {
-        planes[part] = fit(sum_members<radius>(row.values + u + part * lanes, row.stride, g.pixels[part]),
+        planes[part] = fit(sum_members<radius>(pixel + part * lanes, row.stride, g.pixels[part]),
                            rule.min_filled * full_window(radius), rule.min_spread * spread * spread);
       }
     }
     for (int part = 0; part < parts; ++part) {
-      const Normals found = normals_of(planes[part], g.pixels[part].value, rule, rays, u + part * lanes, row.is_inverse);
-      const Mask set = (g.radius[part] == broadcast(static_cast<float>(radius))) & planes[part].found;
-      Normals& n = g.normals[part];
-      n = {select(set, found.x, n.x), select(set, found.y, n.y), select(set, found.z, n.z)};
+      const Mask here = has_radius<radius>(g, part);
+      Planes& kept = g.planes[part];
+      kept = {select(here, planes[part].w, kept.w), select(here, planes[part].at_u, kept.at_u),
+              select(here, planes[part].at_v, kept.at_v)};
     }
   }
 }
@@ -227,20 +232,43 @@ NACRE_INLINE F32 window_radius(const NormalRule& rule, F32 value) {
   return select(value == value, radius, value);
 }
 
-NACRE_INLINE int list_valid(const float* x, int count, int32_t first, int32_t* valid) {
-  int num_missing = 0;
-  for (int i = 0; i < count; ++i) num_missing += x[i] != x[i];
-  if (num_missing == count) return 0;
-  if (num_missing == 0) {
-    for (int i = 0; i < count; ++i) valid[i] = first + i;
-    return count;
+struct Normals {
+  F32 x, y, z;
+};
+
+NACRE_INLINE Normals scaled(F32 x, F32 y, F32 z, float length) {
+  const F32 scale = broadcast(length) * inverse_sqrt(x * x + (y * y + z * z));
+  return {x * scale, y * scale, z * scale};
+}
+
+NACRE_INLINE Normals normals_of(const Planes& planes, F32 value, const NormalRule& rule, const RayRow& rays, int u,
+                                bool is_inverse) {
+  F32 a = planes.at_u * broadcast(rule.fx), b = planes.at_v * broadcast(rule.fy);
+  if (!is_inverse) return scaled(a, b, broadcast(-1.0F), 1.0F);
+  if (rays.pixel_from_ray[0] != nullptr) {
+    a = load(rays.pixel_from_ray[0] + u) * planes.at_u + load(rays.pixel_from_ray[2] + u) * planes.at_v;
+    b = load(rays.pixel_from_ray[1] + u) * planes.at_u + load(rays.pixel_from_ray[3] + u) * planes.at_v;
   }
-  int num_valid = 0;
-  for (int i = 0; i < count; ++i) {
-    valid[num_valid] = first + i;
-    num_valid += x[i] == x[i];
+  F32 x = load(rays.x + u), y = broadcast(rays.row_y);
+  if (rays.y != nullptr) {  // else z is 1
+    const F32 z = load(rays.z + u);
+    x = x / z;
+    y = load(rays.y + u) / z;
   }
-  return num_valid;
+  return scaled(a, b, value + planes.w - (a * x + b * y), -1.0F);
+}
+
+// The pixels that are set, of `count`; returns how many.
+NACRE_INLINE int list_pixels(Mask set, int first, int count, int32_t* list) {
+  unsigned left = bits(set & first_lanes(count));
+  int number = 0;
+  if (left == (1U << lanes) - 1U) {
+    for (; number < lanes; ++number) list[number] = first + number;
+  }
+  for (int i = 0; number < lanes && left != 0; ++i, left >>= 1U) {
+    if ((left & 1U) != 0) list[number++] = first + i;
+  }
+  return number;
 }
 
 }  // namespace
@@ -258,24 +286,28 @@ int fit_normals(const PlanarRow& row, const NormalRule& rule, const RayRow& rays
         const F32 value = load(row.values + begin + k * group + part * lanes);
         groups[k].pixels[part] = {value, evaluate(rule.gate_base, value), evaluate(rule.gate_slope, value)};
         groups[k].radius[part] = window_radius(rule, value);
-        groups[k].normals[part] = {missing, missing, missing};
+        groups[k].planes[part] = {missing, missing, missing};
       }
     }
-    fit_radius<2>(row, rule, rays, begin, groups, num_groups);
-    fit_radius<3>(row, rule, rays, begin, groups, num_groups);
-    fit_radius<4>(row, rule, rays, begin, groups, num_groups);
-    fit_radius<5>(row, rule, rays, begin, groups, num_groups);
-    float x[chunk], all[3 * chunk];
-    for (int k = 0; k < num_groups; ++k) {
-      for (int part = 0; part < parts; ++part) {
-        const Normals& n = groups[k].normals[part];
-        const int i = k * group + part * lanes;
-        store(x + i, n.x);
-        store_interleaved(all + 3 * i, n.x, n.y, n.z);
+    fit_radius<2>(row, rule, begin, groups, num_groups);
+    fit_radius<3>(row, rule, begin, groups, num_groups);
+    fit_radius<4>(row, rule, begin, groups, num_groups);
+    fit_radius<5>(row, rule, begin, groups, num_groups);
+    for (int i = 0; i < count; i += lanes) {
+      const Group& g = groups[i / group];
+      const int part = i % group / lanes, u = begin + i, left = count - i;
+      Normals n = normals_of(g.planes[part], g.pixels[part].value, rule, rays, u, row.is_inverse);
+      const Mask found = n.x == n.x;
+      n = {select(found, n.x, missing), select(found, n.y, missing), select(found, n.z, missing)};
+      if (left >= lanes) {
+        store_interleaved(normals + 3 * u, n.x, n.y, n.z);
+      } else {
+        float last[3 * lanes];
+        store_interleaved(last, n.x, n.y, n.z);
+        memcpy(normals + 3 * u, last, sizeof(float) * 3 * static_cast<size_t>(left));
       }
+      if (valid != nullptr) num_valid += list_pixels(found, first + u, left, valid + num_valid);
     }
-    memcpy(normals + 3 * begin, all, sizeof(float) * 3 * static_cast<size_t>(count));
-    if (valid != nullptr) num_valid += list_valid(x, count, first + begin, valid + num_valid);
   }
   return num_valid;
 }

@@ -13,7 +13,7 @@ NACRE_DECLARE_KERNEL(FillPlanarRow, fill_planar_row)
 
 // sigma(z) = constant + quadratic (z - offset)^2
 struct SigmaCurve {
-  double constant, quadratic, offset;
+  float constant, quadratic, offset;
 };
 
 // Points, three floats a pixel, and the standard deviations of their depths; NaN where there is no measurement.
