@@ -20,7 +20,7 @@ constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
 // A wrong depth_scale shows as a median depth that no depth camera measures. A sample of the pixels tells enough.
 void require_plausible_median(const DepthRef& depth) {
   constexpr float nearest = 0.05F, farthest = 50.0F;
-  constexpr std::int64_t max_sample = 1 << 15;
+  constexpr std::int64_t max_sample = 1 << 13;
   const std::int64_t stride = std::max<std::int64_t>(1, depth.size() / max_sample);
   std::vector<float> sample;
   sample.reserve(static_cast<std::size_t>(depth.size() / stride + 1));
@@ -53,7 +53,9 @@ ByteImage mark_edges(const DepthRef& depth, const PlanarImage& image, const Wind
     case EdgeTest::none:
       break;
   }
-  return ByteImage(image.width(), image.height());
+  ByteImage none(image.width(), image.height());
+  std::fill(none.row(0), none.row(image.height()), std::uint8_t{0});
+  return none;
 }
 
 // The nearest floats that are not beyond a limit.
@@ -132,29 +134,33 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
 
   // The tests see every measurement, so that range and mask do not make edges where there are none.
   const PlanarImage image(depth, camera, num_threads);
-  const WindowFits fits = fit_windows(image, num_threads);
-  const NoiseModel noise = options.noise ? *options.noise : estimate_noise(image, fits, camera);
+  const WindowFits fits = fit_windows(image, camera, num_threads);
+  const NoiseModel noise = options.noise ? *options.noise : estimate_noise(fits, camera, num_threads);
   ByteImage marks = mark_edges(depth, image, fits, noise, options, num_threads);
   dilate(options.edge_dilation, num_threads, marks);
 
   DepthReport counts;
-  counts.num_pixels = counts.num_kept = depth.size();
   ByteImage keep = keep_pixels(depth, camera, options, mask, marks, num_threads, counts);
-  counts.num_isolated = drop_lonely(options.max_missing, num_threads, keep);
-  counts.num_isolated += drop_specks(image, noise, options, num_threads, keep);
-  for (const std::int64_t gone : {counts.num_invalid, counts.num_out_of_range, counts.num_masked, counts.num_edge,
-                                  counts.num_slanted, counts.num_isolated}) {
-    counts.num_kept -= gone;
-  }
-  if (report != nullptr) *report = counts;
+  drop_lonely(options.max_missing, num_threads, keep);
+  drop_specks(image, noise, options, num_threads, keep);
 
   DepthImage clean(depth.rows(), depth.cols());
-  parallel_for(clean.rows(), rows_per_block(clean.cols()), num_threads, [&](std::int64_t v) {
-    const std::uint8_t* const kept = keep.row(v);
-    const float* const source = &depth.coeffRef(v, 0);
-    float* const target = &clean(v, 0);
-    for (std::int64_t u = 0; u < clean.cols(); ++u) target[u] = kept[u] ? source[u] : kMissing;
-  });
+  const auto select_row = simd::select_kept();
+  counts.num_kept = block_reduce(clean.rows(), rows_per_block(clean.cols()), num_threads, std::int64_t{0},
+                                 [&](std::int64_t begin, std::int64_t end) {
+                                   std::int64_t count = 0;
+                                   for (std::int64_t v = begin; v < end; ++v) {
+                                     count +=
+                                         select_row(&depth.coeffRef(v, 0), keep.row(v), camera.width(), &clean(v, 0));
+                                   }
+                                   return count;
+                                 });
+  counts.num_pixels = counts.num_isolated = depth.size();
+  for (const std::int64_t others : {counts.num_invalid, counts.num_out_of_range, counts.num_masked, counts.num_edge,
+                                    counts.num_slanted, counts.num_kept}) {
+    counts.num_isolated -= others;
+  }
+  if (report != nullptr) *report = counts;
   return clean;
 }
 

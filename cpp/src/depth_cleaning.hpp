@@ -1,8 +1,6 @@
 // The steps of preprocess_depth.
 #pragma once
 
-#include <cstdint>
-
 #include "byte_image.hpp"
 #include "planar_image.hpp"
 #include "window_fits.hpp"
@@ -21,12 +19,12 @@ ByteImage mark_planar_edges(const PlanarImage& image, const WindowFits& fits, co
 // Grows the marks by a radius, in both directions of the image.
 void dilate(int radius, int num_threads, ByteImage& marks);
 
-// Drops kept pixels (1) with more than max_missing of their 5 x 5 neighbours missing; returns how many.
-std::int64_t drop_lonely(double max_missing, int num_threads, ByteImage& keep);
+// Drops kept pixels (1) with more than max_missing of their 5 x 5 neighbours missing.
+void drop_lonely(double max_missing, int num_threads, ByteImage& keep);
 
 // Drops kept pixels (1) in 4-connected components of fewer than min_component pixels; neighbours are connected when the
-// surface between them is not steeper than max_slant. Returns how many.
-std::int64_t drop_specks(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options,
-                         int num_threads, ByteImage& keep);
+// surface between them is not steeper than max_slant.
+void drop_specks(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options, int num_threads,
+                 ByteImage& keep);
 
 }  // namespace nacre

@@ -90,22 +90,26 @@ ByteImage mark_planar_edges(const PlanarImage& image, const WindowFits& fits, co
 
 ByteImage mark_gradient_edges(const DepthRef& measured, const DepthOptions& options, int num_threads) {
   const std::int64_t width = measured.cols(), height = measured.rows();
-  const DepthImage depth =
-      measured.unaryExpr([](float z) { return is_measurement(z) ? z : std::numeric_limits<float>::quiet_NaN(); });
+  // A copy of the outer pixels on either side, and room for vectors beyond.
+  const std::int64_t stride = 1 + width + 16;
+  const Scratch<float> depth(static_cast<std::size_t>(height * stride));
+  const auto row = [&](std::int64_t v) { return depth.data() + v * stride + 1; };
+  parallel_for(height, rows_per_block(width), num_threads, [&](std::int64_t v) {
+    const float* const source = &measured.coeffRef(v, 0);
+    float* const target = row(v);
+    for (std::int64_t u = 0; u < width; ++u) {
+      target[u] = is_measurement(source[u]) ? source[u] : std::numeric_limits<float>::quiet_NaN();
+    }
+    target[-1] = target[0];
+    std::fill(target + width, target + width + 16, target[width - 1]);
+  });
   const auto limit = static_cast<float>(8.0 * options.gradient_threshold);
   ByteImage marks(static_cast<int>(width), static_cast<int>(height));
+  const auto mark_gradients = simd::mark_gradients();
   parallel_for(height, rows_per_block(width), num_threads, [&](std::int64_t v) {
-    const float* const above = &depth(std::max<std::int64_t>(v - 1, 0), 0);
-    const float* const here = &depth(v, 0);
-    const float* const below = &depth(std::min(v + 1, height - 1), 0);
-    std::uint8_t* const mark = marks.row(v);
-    for (std::int64_t u = 0; u < width; ++u) {
-      const std::int64_t l = std::max<std::int64_t>(u - 1, 0), r = std::min(u + 1, width - 1);
-      const float du = (above[r] - above[l]) + 2.0F * (here[r] - here[l]) + (below[r] - below[l]);
-      const float dv = (below[l] - above[l]) + 2.0F * (below[u] - above[u]) + (below[r] - above[r]);
-      const bool is_edge = !(du * du + dv * dv <= limit * limit);  // true for NaN
-      mark[u] = is_edge ? simd::edge_mark : 0;
-    }
+    mark_gradients(
+        {row(std::max<std::int64_t>(v - 1, 0)), row(v), row(std::min(v + 1, height - 1)), static_cast<int>(width)},
+        limit * limit, marks.row(v));
   });
   return marks;
 }

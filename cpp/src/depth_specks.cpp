@@ -60,7 +60,7 @@ class PixelLinks {
 
  private:
   std::size_t num_words_;
-  std::vector<Word> words_;
+  Scratch<Word> words_;
 };
 
 class Components {
@@ -97,13 +97,12 @@ class Components {
         });
   }
 
-  // Clears the pixels of components with fewer than min_size; returns how many.
-  std::int64_t drop_small(std::int32_t min_size, ByteImage& keep) {
+  // Clears the pixels of components with fewer than min_size.
+  void drop_small(std::int32_t min_size, ByteImage& keep) {
     for (Run& run : runs_) {
       run.parent = root(run.parent);
       runs_[static_cast<std::size_t>(run.parent)].size += run.last - run.first + 1;
     }
-    std::int64_t num_dropped = 0;
     row_begin_.push_back(runs_.size());
     for (std::size_t v = 0; v + 1 < row_begin_.size(); ++v) {
       std::uint8_t* const row = keep.row(static_cast<std::int64_t>(v));
@@ -111,10 +110,8 @@ class Components {
         const Run& run = runs_[i];
         if (runs_[static_cast<std::size_t>(run.parent)].size >= min_size) continue;
         std::fill(row + run.first, row + run.last + 1, std::uint8_t{0});
-        num_dropped += run.last - run.first + 1;
       }
     }
-    return num_dropped;
   }
 
  private:
@@ -148,37 +145,33 @@ std::uint8_t least_kept(int window, double max_missing) {
 
 }  // namespace
 
-std::int64_t drop_lonely(double max_missing, int num_threads, ByteImage& keep) {
-  constexpr int radius = 2;
+void drop_lonely(double max_missing, int num_threads, ByteImage& keep) {
+  constexpr int radius = 2, side = 2 * radius + 1;
   const int width = keep.width(), height = keep.height();
   const auto span = [](std::int64_t i, int size) {
     return static_cast<int>(std::min<std::int64_t>(i + radius, size - 1) - std::max<std::int64_t>(i - radius, 0) + 1);
   };
-  std::array<std::vector<std::uint8_t>, 2 * radius + 2> least;  // by the number of the window's rows
-  for (int rows = 1; rows <= 2 * radius + 1; ++rows) {
-    std::vector<std::uint8_t>& of_column = least[static_cast<std::size_t>(rows)];
-    of_column.resize(static_cast<std::size_t>(width), least_kept(rows * (2 * radius + 1), max_missing));
+  std::array<std::vector<std::uint8_t>, side + 1> least;  // of each column, by the number of the window's rows
+  for (int rows = 1; rows <= side; ++rows) {
+    std::vector<std::uint8_t>& columns = least[static_cast<std::size_t>(rows)];
+    columns.assign(static_cast<std::size_t>(width), least_kept(rows * side, max_missing));
     for (int u = 0; u < width; ++u) {
-      if (span(u, width) <= 2 * radius)
-        of_column[static_cast<std::size_t>(u)] = least_kept(rows * span(u, width), max_missing);
+      if (u >= radius && u + radius < width) u = width - radius;
+      columns[static_cast<std::size_t>(u)] = least_kept(rows * span(u, width), max_missing);
     }
   }
   ByteImage still_kept(width, height);
-  std::vector<int> num_dropped(static_cast<std::size_t>(height));
   const auto drop_in_row = simd::drop_lonely();
   parallel_for(height, rows_per_block(width), num_threads, [&](std::int64_t v) {
-    num_dropped[static_cast<std::size_t>(v)] = drop_in_row(
-        keep.row(v), keep.stride(), least[static_cast<std::size_t>(span(v, height))].data(), width, still_kept.row(v));
+    drop_in_row(keep.row(v), keep.stride(), least[static_cast<std::size_t>(span(v, height))].data(), width,
+                still_kept.row(v));
   });
   keep = std::move(still_kept);
-  std::int64_t total = 0;
-  for (const int number : num_dropped) total += number;
-  return total;
 }
 
-std::int64_t drop_specks(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options,
-                         int num_threads, ByteImage& keep) {
-  if (options.min_component <= 1) return 0;
+void drop_specks(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options, int num_threads,
+                 ByteImage& keep) {
+  if (options.min_component <= 1) return;
   const simd::LinkRule rule = {image.sigma(noise) * (3.0F * std::sqrt(2.0F)),
                                image.unit_slope() * static_cast<float>(std::tan(options.max_slant))};
   PixelLinks links(keep.width(), keep.height());
@@ -192,7 +185,7 @@ std::int64_t drop_specks(const PlanarImage& image, const NoiseModel& noise, cons
     const simd::Links row = links.row(v), above = links.row(std::max(v - 1, 0));
     components.add_row(row, v > 0 ? &above : nullptr, links.num_words());
   }
-  return components.drop_small(options.min_component, keep);
+  components.drop_small(options.min_component, keep);
 }
 
 }  // namespace nacre

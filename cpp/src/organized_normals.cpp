@@ -35,7 +35,7 @@ void compact(const std::vector<int>& counts, std::size_t width, std::vector<std:
 
 NoiseModel noise_of(const std::optional<NoiseModel>& given, const PlanarImage& image, const Camera& camera,
                     int num_threads) {
-  if (!given) return estimate_noise(image, fit_windows(image, num_threads), camera);
+  if (!given) return estimate_noise(fit_windows(image, camera, num_threads), camera, num_threads);
   given->check();
   return *given;
 }
@@ -70,8 +70,8 @@ void make_frame(const DepthRef& depth, const Camera& camera, const std::optional
     const int v = static_cast<int>(row);
     const std::int64_t first = row * width;
     const simd::RayRow rays = camera.ray_table().row(v);
-    fill_points(&depth.coeffRef(row, 0), rays, curve, width,
-                frame.points.data() + 3 * first, frame.sigma.data() + first);
+    fill_points(&depth.coeffRef(row, 0), rays, curve, width, frame.points.data() + 3 * first,
+                frame.sigma.data() + first);
     num_valid[static_cast<std::size_t>(row)] =
         fit_normals(image.planar_row(v), rule, rays, frame.normals.data() + 3 * first, static_cast<std::int32_t>(first),
                     frame.valid.data() + first);

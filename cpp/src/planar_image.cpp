@@ -21,15 +21,15 @@ PlanarImage::PlanarImage(const DepthRef& depth, const Camera& camera, int num_th
       height_(camera.height()),
       stride_(camera.width() + 2 * kBorder + kOverhang),
       inverse_(camera.model() == Camera::Model::pinhole),
-      pixel_(static_cast<float>(1.0 / std::sqrt(std::abs(camera.fx() * camera.fy())))) {
+      pixel_(static_cast<float>(1.0 / std::sqrt(std::abs(camera.fx() * camera.fy())))),
+      values_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(camera.height() + 2 * kBorder)) {
   require_camera_size("depth", depth.rows(), depth.cols(), camera);
   constexpr float missing = std::numeric_limits<float>::quiet_NaN();
-  const std::ptrdiff_t num_rows = height_ + 2 * kBorder;
-  values_.reset(new float[static_cast<std::size_t>(stride_ * num_rows)]);
+  const std::int64_t num_rows = height_ + 2 * kBorder;
   const bool is_radial = camera.depth_kind() == DepthKind::radial;
   const auto fill_row = simd::fill_planar_row();
   parallel_for(num_rows, rows_per_block(width_), num_threads, [&](std::int64_t row) {
-    float* const start = values_.get() + row * stride_;
+    float* const start = values_.data() + row * stride_;
     const std::int64_t v = row - kBorder;
     if (v < 0 || v >= height_) {
       std::fill(start, start + stride_, missing);

@@ -6,10 +6,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <memory>
 
 #include "nacre/camera.hpp"
 #include "nacre/depth.hpp"
+#include "scratch.hpp"
 #include "simd/normal_row.hpp"
 
 namespace nacre {
@@ -33,7 +33,7 @@ class PlanarImage {
   int height() const { return height_; }
   std::ptrdiff_t stride() const { return stride_; }
   // The first pixel of row v; columns and rows may be addressed from -kBorder on.
-  const float* row(int v) const { return values_.get() + (v + kBorder) * stride_ + kBorder; }
+  const float* row(int v) const { return values_.data() + (v + kBorder) * stride_ + kBorder; }
 
   simd::PlanarRow planar_row(int v) const { return {row(v), stride_, width_, inverse_}; }
 
@@ -42,14 +42,13 @@ class PlanarImage {
   Quadratic unit_slope() const;
   // The standard deviation of the value, given the value.
   Quadratic sigma(const NoiseModel& noise) const;
-  float to_depth(float value) const { return inverse_ ? 1.0F / value : value; }
 
  private:
   int width_, height_;
   std::ptrdiff_t stride_;
   bool inverse_;
   float pixel_;  // the side of a pixel at distance 1 (pinhole), or everywhere (orthographic)
-  std::unique_ptr<float[]> values_;
+  Scratch<float> values_;
 };
 
 // Rows that are worth a thread's while, for images of this width.

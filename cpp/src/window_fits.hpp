@@ -14,14 +14,18 @@ struct WindowFits {
 
   int cols = 0, rows = 0;
   // Of each window, row by row: see simd::WindowRow.
-  std::vector<float> residual, slope, step;
+  std::vector<float> residual, pixel, step, slope;
 
   // The image column or row of a window's centre.
   static int centre(int index) { return kRadius + index * kStep; }
 };
 
-WindowFits fit_windows(const PlanarImage& image, int num_threads);
+// Residuals, pixels and steps are in units of the noise of `sensor_prior`.
+WindowFits fit_windows(const PlanarImage& image, const Camera& camera, int num_threads);
 
-NoiseModel estimate_noise(const PlanarImage& image, const WindowFits& fits, const Camera& camera);
+// The Kinect's curve; for an orthographic camera a constant.
+NoiseModel sensor_prior(const Camera& camera);
+
+NoiseModel estimate_noise(const WindowFits& fits, const Camera& camera, int num_threads);
 
 }  // namespace nacre

@@ -52,6 +52,17 @@ NACRE_INLINE Found test(const float* pixel, ptrdiff_t stride, const EdgeLimits& 
   return found;
 }
 
+NACRE_INLINE Mask exceeds(const DepthRows& rows, int u, F32 squared_limit) {
+  const F32 above_left = load(rows.above + u - 1), above_right = load(rows.above + u + 1);
+  const F32 below_left = load(rows.below + u - 1), below_right = load(rows.below + u + 1);
+  const F32 two = broadcast(2.0F);
+  const F32 du = (above_right - above_left) + two * (load(rows.here + u + 1) - load(rows.here + u - 1)) +
+                 (below_right - below_left);
+  const F32 dv =
+      (below_left - above_left) + two * (load(rows.below + u) - load(rows.above + u)) + (below_right - above_right);
+  return !(du * du + dv * dv <= squared_limit);
+}
+
 }  // namespace
 
 void mark_edges(const PlanarRow& row, const EdgeLimits& limits, const float* slope, uint8_t* marks) {
@@ -64,6 +75,18 @@ void mark_edges(const PlanarRow& row, const EdgeLimits& limits, const float* slo
       const I32 zero = broadcast(0);
       store(found_marks + i, select(found.edge, broadcast(int32_t{edge_mark}), zero) |
                                  select(found.slanted, broadcast(int32_t{slanted_mark}), zero));
+    }
+    for (int i = 0; i < count; ++i) marks[begin + i] = static_cast<uint8_t>(found_marks[i]);
+  }
+}
+
+void mark_gradients(const DepthRows& rows, float squared_limit, uint8_t* marks) {
+  int32_t found_marks[chunk];
+  for (int begin = 0; begin < rows.width; begin += chunk) {
+    const int count = rows.width - begin < chunk ? rows.width - begin : chunk;
+    for (int i = 0; i < count; i += lanes) {
+      const Mask found = exceeds(rows, begin + i, broadcast(squared_limit));
+      store(found_marks + i, select(found, broadcast(int32_t{edge_mark}), broadcast(0)));
     }
     for (int i = 0; i < count; ++i) marks[begin + i] = static_cast<uint8_t>(found_marks[i]);
   }

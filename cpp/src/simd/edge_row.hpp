@@ -24,4 +24,13 @@ struct EdgeLimits {
 using MarkEdges = void(const PlanarRow& row, const EdgeLimits& limits, const float* slope, uint8_t* marks);
 NACRE_DECLARE_KERNEL(MarkEdges, mark_edges)
 
+// Marks pixels where the gradient of the depth, by Sobel's 3 x 3 operator, exceeds a limit (squared, of 8 times the
+// gradient) or is unknown (NaN). Rows are readable one pixel to the left and 16 beyond their end.
+struct DepthRows {
+  const float *above, *here, *below;
+  int width;
+};
+using MarkGradients = void(const DepthRows& rows, float squared_limit, uint8_t* marks);
+NACRE_DECLARE_KERNEL(MarkGradients, mark_gradients)
+
 }  // namespace nacre::simd

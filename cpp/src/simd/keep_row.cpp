@@ -15,9 +15,8 @@ NACRE_INLINE F32 evaluate(const Quadratic& q, F32 x) {
   return broadcast(q.constant) + x * (broadcast(q.linear) + x * broadcast(q.square));
 }
 
-// The values of kept pixels, NaN elsewhere.
-NACRE_INLINE void select_kept(const float* values, const uint8_t* keep, int count, float* kept) {
-  for (int i = 0; i < count; ++i) kept[i] = keep[i] ? values[i] : NAN;
+NACRE_INLINE void select_values(const float* values, const uint8_t* keep, int count, float* kept) {
+  for (int i = 0; i < count; ++i) kept[i] = values[i] + (keep[i] != 0 ? 0.0F : NAN);
 }
 
 }  // namespace
@@ -42,29 +41,32 @@ KeepCounts keep_pixels(const KeepRow& row, uint8_t* keep) {
   return counts;
 }
 
-int drop_lonely(const uint8_t* keep, ptrdiff_t stride, const uint8_t* least, int width, uint8_t* still_kept) {
-  int num_dropped = 0;
-  for (int begin = 0; begin < width; begin += chunk) {
-    const int count = width - begin < chunk ? width - begin : chunk;
+void drop_lonely(const uint8_t* keep, ptrdiff_t stride, const uint8_t* least, int width, uint8_t* still_kept) {
+  constexpr int tile = 252;  // pixels, of 256 columns
+  for (int begin = 0; begin < width; begin += tile) {
+    const int count = width - begin < tile ? width - begin : tile;
     const uint8_t* const first = keep + begin - 2;
-    uint8_t column[chunk + 4];
+    uint8_t column[tile + 4];
     for (int i = 0; i < count + 4; ++i) {
       column[i] = static_cast<uint8_t>(first[i - 2 * stride] + first[i - stride] + first[i] + first[i + stride] +
                                        first[i + 2 * stride]);
     }
-    int num_kept = 0, num_still_kept = 0;
+    const uint8_t* const own = keep + begin;
+    const uint8_t* const needed = least + begin;
+    uint8_t* const stays = still_kept + begin;
     for (int i = 0; i < count; ++i) {
       const auto window =
           static_cast<uint8_t>(column[i] + column[i + 1] + column[i + 2] + column[i + 3] + column[i + 4]);
-      const uint8_t own = keep[begin + i];
-      const auto stays = static_cast<uint8_t>(own & (window >= least[begin + i]));
-      still_kept[begin + i] = stays;
-      num_kept += own;
-      num_still_kept += stays;
+      stays[i] = static_cast<uint8_t>(own[i] & (window >= needed[i]));
     }
-    num_dropped += num_kept - num_still_kept;
   }
-  return num_dropped;
+}
+
+int select_kept(const float* values, const uint8_t* keep, int width, float* kept) {
+  select_values(values, keep, width, kept);
+  int count = 0;
+  for (int u = 0; u < width; ++u) count += keep[u];
+  return count;
 }
 
 void link_pixels(const PlanarRow& row, const LinkRule& rule, const uint8_t* keep, ptrdiff_t keep_stride,
@@ -74,8 +76,8 @@ void link_pixels(const PlanarRow& row, const LinkRule& rule, const uint8_t* keep
     const int count = row.width - begin < chunk ? row.width - begin : chunk;
     const float* const values = row.values + begin;
     float own_and_left[chunk + 1], above[chunk];
-    select_kept(values - 1, keep + begin - 1, count + 1, own_and_left);
-    select_kept(values - row.stride, keep + begin - keep_stride, count, above);
+    select_values(values - 1, keep + begin - 1, count + 1, own_and_left);
+    select_values(values - row.stride, keep + begin - keep_stride, count, above);
     for (int i = count; i < chunk; ++i) own_and_left[i + 1] = NAN;
     uint64_t kept = 0, to_left = 0, to_above = 0;
     for (int i = 0; i < chunk; i += lanes) {

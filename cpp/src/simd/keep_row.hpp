@@ -26,9 +26,13 @@ using KeepPixels = KeepCounts(const KeepRow& row, uint8_t* keep);
 NACRE_DECLARE_KERNEL(KeepPixels, keep_pixels)
 
 // Keeps pixels with at least `least` kept ones in their window of 5 x 5, themselves included. Around the image `keep`
-// is 0 for two pixels. Returns how many went.
-using DropLonely = int(const uint8_t* keep, ptrdiff_t stride, const uint8_t* least, int width, uint8_t* still_kept);
+// is 0 for two pixels.
+using DropLonely = void(const uint8_t* keep, ptrdiff_t stride, const uint8_t* least, int width, uint8_t* still_kept);
 NACRE_DECLARE_KERNEL(DropLonely, drop_lonely)
+
+// The values of kept pixels, NaN elsewhere; returns how many are kept.
+using SelectKept = int(const float* values, const uint8_t* keep, int width, float* kept);
+NACRE_DECLARE_KERNEL(SelectKept, select_kept)
 
 // Bit u % 64 of word u / 64 says of pixel u: it is kept; it is connected to its left neighbour; to the one above. Two
 // kept pixels a, b are connected where |a - b| <= noise(a) + slant(a).
