@@ -6,10 +6,10 @@
 
 #include "check.hpp"
 #include "fusion_step.hpp"
+#include "image_index.hpp"
 #include "parallel.hpp"
 #include "point_grid.hpp"
 #include "view_of_model.hpp"
-
 
 namespace nacre {
 namespace {
@@ -17,9 +17,9 @@ namespace {
 constexpr float least_weight = 0.05F;     // less observation than this is none
 constexpr float insertion_weight = 2.0F;  // a new point must be seen by so many pixels of its frame
 constexpr float least_pixel_weight = insertion_weight / 20.0F;  // no window of such pixels weighs enough
-constexpr double least_pixels = 1.5;  // between new points, in the image that they come from
-constexpr float sheet_cosine = 0.3F;      // normals that differ more belong to different sheets
-constexpr float least_facing = 0.1F;      // surfaces that are seen at a smaller cosine are not judged
+constexpr double least_pixels = 1.5;                            // between new points, in the image that they come from
+constexpr float sheet_cosine = 0.3F;                            // normals that differ more belong to different sheets
+constexpr float least_facing = 0.1F;  // surfaces that are seen at a smaller cosine are not judged
 
 // Whether a point with a normal stands for the same piece of surface as another.
 bool same_surface(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, const Eigen::Vector3f& other,
@@ -30,11 +30,18 @@ bool same_surface(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, c
          normal.dot(other_normal) > sheet_cosine;
 }
 
+// What of the image the model knows.
+struct Known {
+  PixelSet covered;  // pixels whose surface the model has
+  PixelIndex points;
+};
+
 struct NewPoint {
   std::int32_t row = 0;
   Eigen::Vector3f point = Eigen::Vector3f::Zero(), normal = point;  // camera frame
   Eigen::Vector3f color = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
   float weight = 0.0F;
+  float spacing = 0.0F;  // to its neighbours [m]
   PixelWindow cover;
 };
 
@@ -48,97 +55,78 @@ std::vector<T> concatenate(const std::vector<std::vector<T>>& parts) {
   return all;
 }
 
-// A set of pixels.
-class PixelSet {
- public:
-  PixelSet(int width, int height)
-      : height_(height), words_(static_cast<std::size_t>(width + 2 * border) / 64 + 2),
-        bits_(words_ * static_cast<std::size_t>(height), 0) {}
-
-  void insert(const PixelWindow& window) {
-    const auto shift = static_cast<std::size_t>(window.first_u + border);
-    for (int row = std::max(0, -window.first_v); row < window.num_rows && window.first_v + row < height_; ++row) {
-      const std::uint64_t pixels = window.rows[row];
-      std::uint64_t* const words = &bits_[static_cast<std::size_t>(window.first_v + row) * words_ + shift / 64];
-      words[0] |= pixels << (shift % 64);
-      words[1] |= (pixels >> 1) >> (63 - shift % 64);
-    }
-  }
-  bool contains(int u, int v) const {
-    const auto bit = static_cast<std::size_t>(u + border);
-    return (bits_[static_cast<std::size_t>(v) * words_ + bit / 64] >> (bit % 64) & 1U) != 0;
-  }
-
- private:
-  static constexpr int border = simd::largest_window;  // windows may begin left of the image
-  int height_;
-  std::size_t words_;  // per row
-  std::vector<std::uint64_t> bits_;
-};
-
-// Moves the model's points by what the frame says about them. Returns the pixels whose surface the model has.
-PixelSet update(PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                   const Pose& world_from_camera, double spacing, std::int32_t frame_index,
-                   const FusionOptions& options, FusionReport& report, int num_threads) {
+// Moves the model's points by what the frame says about them.
+Known update(PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
+             const Pose& world_from_camera, double spacing, std::int32_t frame_index, const FusionOptions& options,
+             FusionReport& report, int num_threads) {
   const ModelView view(camera, world_from_camera);
   const Eigen::Matrix3f world_rotation = world_from_camera.linear().cast<float>();
   constexpr std::int64_t block_size = ModelView::capacity;
   static_assert(ModelView::capacity <= ObservationBlock::capacity);
-  std::vector<std::vector<PixelWindow>> covers(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
+  struct Cover {
+    std::size_t point;
+    std::int32_t pixel;
+    PixelWindow window;
+  };
+  std::vector<std::vector<Cover>> covers(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
 
-  parallel_blocks(model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
-    const auto first = static_cast<std::size_t>(begin);
-    ModelView::Block points;
-    view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin), points);
-    const auto note_violation = [&](int j, float sigma) {
-      const float margin = std::max(static_cast<float>(2.0 * spacing), 4.0F * sigma);
-      if (!observer.sees_through(points.point(j), points.pixel[j], margin)) return;
-      std::uint8_t& violations = model.violations[first + static_cast<std::size_t>(j)];
-      violations = static_cast<std::uint8_t>(std::min(255, violations + 1));
-    };
-    ObservationBlock block;
-    int seen[block_size];  // of the points
-    for (int j = 0; j < static_cast<int>(end - begin); ++j) {
-      if (!points.inside[j] || !(points.facing[j] > least_facing)) continue;
-      const float measured_sigma = frame.sigma[points.pixel[j]];
-      const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
-      if (!observer.may_observe(points.point(j), points.pixel[j], sigma, least_weight)) {
-        note_violation(j, sigma);
-        continue;
-      }
-      seen[block.size()] = j;
-      observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma, static_cast<float>(spacing));
-    }
-    observer.observe_and_cover(block, sheet_cosine);
-    for (int k = 0; k < block.size(); ++k) {
-      const int j = seen[k];
-      const std::size_t i = first + static_cast<std::size_t>(j);
-      const Observation observed = block[k];
-      if (observed.weight > least_weight) {
-        const float gain = observed.weight / (model.confidence[i] + observed.weight);
-        model.points[i] += world_rotation * (gain * observed.offset * points.normal(j));
-        model.normals[i] = (model.confidence[i] * model.normals[i] + world_rotation * observed.normal).normalized();
-        if (observer.has_colors()) {
-          Eigen::Vector3f& color = model.colors[i];
-          color = color.allFinite() ? Eigen::Vector3f(color + gain * (observed.color - color)) : observed.color;
+  parallel_blocks(
+      model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
+        const auto first = static_cast<std::size_t>(begin);
+        ModelView::Block points;
+        view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin), points);
+        const auto note_violation = [&](int j, float sigma) {
+          const float margin = std::max(static_cast<float>(2.0 * spacing), 4.0F * sigma);
+          if (!observer.sees_through(points.point(j), points.pixel[j], margin)) return;
+          std::uint8_t& violations = model.violations[first + static_cast<std::size_t>(j)];
+          violations = static_cast<std::uint8_t>(std::min(255, violations + 1));
+        };
+        ObservationBlock block;
+        int seen[block_size];  // of the points
+        for (int j = 0; j < static_cast<int>(end - begin); ++j) {
+          if (!points.inside[j] || !(points.facing[j] > least_facing)) continue;
+          const float measured_sigma = frame.sigma[points.pixel[j]];
+          const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
+          if (!observer.may_observe(points.point(j), points.pixel[j], sigma, least_weight)) {
+            note_violation(j, sigma);
+            continue;
+          }
+          seen[block.size()] = j;
+          observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma, static_cast<float>(spacing));
         }
-        model.confidence[i] =
-            std::min(model.confidence[i] + observed.weight, static_cast<float>(options.max_confidence));
-        model.last_seen[i] = frame_index;
-        model.violations[i] = 0;
-        covers[static_cast<std::size_t>(number)].push_back(block.cover(k));
-      } else {
-        note_violation(j, block.sigma(k));
-      }
-    }
-  });
+        observer.observe_and_cover(block, sheet_cosine);
+        for (int k = 0; k < block.size(); ++k) {
+          const int j = seen[k];
+          const std::size_t i = first + static_cast<std::size_t>(j);
+          const Observation observed = block[k];
+          if (observed.weight > least_weight) {
+            const float gain = observed.weight / (model.confidence[i] + observed.weight);
+            model.points[i] += world_rotation * (gain * observed.offset * points.normal(j));
+            model.normals[i] = (model.confidence[i] * model.normals[i] + world_rotation * observed.normal).normalized();
+            if (observer.has_colors()) {
+              Eigen::Vector3f& color = model.colors[i];
+              color = color.allFinite() ? Eigen::Vector3f(color + gain * (observed.color - color)) : observed.color;
+            }
+            model.confidence[i] =
+                std::min(model.confidence[i] + observed.weight, static_cast<float>(options.max_confidence));
+            model.last_seen[i] = frame_index;
+            model.violations[i] = 0;
+            covers[static_cast<std::size_t>(number)].push_back({i, points.pixel[j], block.cover(k)});
+          } else {
+            note_violation(j, block.sigma(k));
+          }
+        }
+      });
 
-  PixelSet covered(frame.width, frame.height);
-  for (const std::vector<PixelWindow>& block : covers) {
+  Known known{PixelSet(frame.width, frame.height), PixelIndex(frame.width, frame.height)};
+  for (const std::vector<Cover>& block : covers) {
     report.num_updated += static_cast<std::int64_t>(block.size());
-    for (const PixelWindow& window : block) covered.insert(window);
+    for (const Cover& cover : block) {
+      known.covered.insert(cover.window);
+      known.points.add(cover.pixel, cover.point);
+    }
   }
-  return covered;
+  return known;
 }
 
 // The frame's surface where the model does not cover it, denoised.
@@ -167,9 +155,8 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
       candidate.point = frame.points.row(row).transpose();
       candidate.normal = frame.normals.row(row).transpose();
       if (!(candidate.normal.dot(observer.towards_camera(candidate.point)) > least_facing)) continue;
-      const double pixels_apart = least_pixels * camera.footprint(candidate.point.z());
-      observer.add(block, candidate.point, candidate.normal, row, frame.sigma[row],
-                   static_cast<float>(std::max(spacing, pixels_apart)));
+      candidate.spacing = static_cast<float>(std::max(spacing, least_pixels * camera.footprint(candidate.point.z())));
+      observer.add(block, candidate.point, candidate.normal, row, frame.sigma[row], candidate.spacing);
       candidates.push_back(candidate);
     }
     observer.observe_and_cover(block, sheet_cosine);
@@ -190,15 +177,24 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
   return concatenate(found);
 }
 
-// Adds points, one after the other, where neither the model nor a point before covers the surface.
-void insert(PointModel& model, const std::vector<NewPoint>& candidates, PixelSet& covered, int width,
+// Adds points, one after the other, where neither the model nor a point before stands for the surface. The covered
+// pixels rule most of them out at once, by what was measured; the others are compared as they are, without the noise.
+void insert(PointModel& model, const std::vector<NewPoint>& candidates, Known& known, const Frame& frame,
             const Pose& world_from_camera, std::int32_t frame_index, bool with_colors, FusionReport& report) {
   const Eigen::Isometry3f to_world(world_from_camera.cast<float>());
   for (const NewPoint& candidate : candidates) {
-    if (covered.contains(candidate.row % width, candidate.row / width)) continue;
-    covered.insert(candidate.cover);
-    model.points.push_back(to_world * candidate.point);
-    model.normals.push_back(to_world.linear() * candidate.normal);
+    if (known.covered.contains(candidate.row % frame.width, candidate.row / frame.width)) continue;
+    known.covered.insert(candidate.cover);
+    const Eigen::Vector3f point = to_world * candidate.point;
+    const Eigen::Vector3f normal = to_world.linear() * candidate.normal;
+    const float largest_offset = std::max(candidate.spacing, 3.0F * frame.sigma[candidate.row]);
+    const bool is_known = known.points.any_near(candidate.row, candidate.cover.num_rows / 2 + 1, [&](std::size_t i) {
+      return same_surface(point, normal, model.points[i], model.normals[i], candidate.spacing, largest_offset);
+    });
+    if (is_known) continue;
+    known.points.add(candidate.row, model.points.size());
+    model.points.push_back(point);
+    model.normals.push_back(normal);
     if (with_colors) model.colors.push_back(candidate.color);
     model.confidence.push_back(candidate.weight);
     model.last_seen.push_back(frame_index);
@@ -261,11 +257,11 @@ FusionReport fuse_observed(PointModel& model, const Frame& frame, const Camera& 
   if (with_colors) {
     model.colors.resize(model.points.size(), Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
   }
-  PixelSet covered =
+  Known known =
       update(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, report, num_threads);
   const std::vector<NewPoint> candidates =
-      find_new_points(frame, camera, observer, covered, spacing, num_threads);
-  insert(model, candidates, covered, frame.width, world_from_camera, frame_index, with_colors, report);
+      find_new_points(frame, camera, observer, known.covered, spacing, num_threads);
+  insert(model, candidates, known, frame, world_from_camera, frame_index, with_colors, report);
   remove_unconfirmed(model, frame_index, options, report);
   return report;
 }
@@ -276,7 +272,8 @@ FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, c
   options.check();
   require(spacing > 0.0, "spacing", "a positive distance in metres", spacing);
   require(colors.rows() == 0 || colors.rows() == frame.points.rows(), "colors", "one row per pixel", colors.rows());
-  const SurfaceObserver observer(frame, camera, options, colors, num_threads);
+  SurfaceObserver observer(camera, options);
+  observer.look_at(frame, colors, num_threads);
   return fuse_observed(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, num_threads);
 }
 

@@ -14,30 +14,33 @@ constexpr int border = simd::largest_window;
 
 float median_sigma(const Frame& frame) {
   if (frame.valid.empty()) return 0.0F;
+  constexpr std::size_t num_probes = 5000;
+  const std::size_t step = std::max<std::size_t>(1, frame.valid.size() / num_probes);
   std::vector<float> values;
-  values.reserve(frame.valid.size());
-  for (const std::int32_t row : frame.valid) values.push_back(frame.sigma[row]);
+  for (std::size_t i = 0; i < frame.valid.size(); i += step) values.push_back(frame.sigma[frame.valid[i]]);
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
 
-SurfaceObserver::SurfaceObserver(const Frame& frame, const Camera& camera, const FusionOptions& options,
-                                 const ColorsRef& colors, int num_threads)
+SurfaceObserver::SurfaceObserver(const Camera& camera, const FusionOptions& options)
     : camera_(camera),
       options_(options),
-      width_(frame.width),
-      height_(frame.height),
-      tiles_across_((frame.width + tile_size - 1) / tile_size),
-      least_cosine_(static_cast<float>(std::cos(options.max_angle))) {
+      width_(camera.width()),
+      height_(camera.height()),
+      tiles_across_((camera.width() + tile_size - 1) / tile_size),
+      least_cosine_(static_cast<float>(std::cos(options.max_angle))) {}
+
+void SurfaceObserver::look_at(const Frame& frame, const ColorsRef& colors, int num_threads) {
   constexpr int right_border = border + tile_size + 2;
   const std::int64_t stride = border + width_ + right_border, rows = height_ + 2 * border;
   const int num_planes = colors.rows() > 0 ? 10 : 7;
-  planes_.assign(static_cast<std::size_t>(num_planes * rows * stride), 0.0F);
+  // The borders are zeros from the first frame on.
+  planes_.resize(static_cast<std::size_t>(num_planes * rows * stride), 0.0F);
   const auto plane = [&](int index) { return planes_.data() + (index * rows + border) * stride + border; };
   const simd::SurfaceRow out = {plane(0), plane(1), plane(2), plane(3), plane(4), plane(5), plane(6)};
-  image_ = {out.x, out.y, out.z, out.normal_x, out.normal_y, out.normal_z, out.weight, nullptr, nullptr, nullptr,
-            stride};
+  image_ = {out.x,      out.y,   out.z,   out.normal_x, out.normal_y, out.normal_z,
+            out.weight, nullptr, nullptr, nullptr,      stride};
   if (colors.rows() > 0) {
     image_.red = plane(7);
     image_.green = plane(8);
@@ -45,45 +48,46 @@ SurfaceObserver::SurfaceObserver(const Frame& frame, const Camera& camera, const
   }
 
   const float reference =
-      options.reference_sigma > 0.0 ? static_cast<float>(options.reference_sigma) : median_sigma(frame);
+      options_.reference_sigma > 0.0 ? static_cast<float>(options_.reference_sigma) : median_sigma(frame);
   const auto fill_row = simd::fill_surface_row();
   parallel_for(height_, 16, num_threads, [&](std::int64_t v) {
     const std::int64_t first = v * width_, to = v * stride;
-    fill_row({width_, frame.points.data() + 3 * first, frame.normals.data() + 3 * first, frame.sigma.data() + first},
-             reference, camera.model() == Camera::Model::orthographic,
-             {out.x + to, out.y + to, out.z + to, out.normal_x + to, out.normal_y + to, out.normal_z + to,
-              out.weight + to});
+    fill_row(
+        {width_, frame.points.data() + 3 * first, frame.normals.data() + 3 * first, frame.sigma.data() + first},
+        reference, camera_.model() == Camera::Model::orthographic,
+        {out.x + to, out.y + to, out.z + to, out.normal_x + to, out.normal_y + to, out.normal_z + to, out.weight + to});
     if (colors.rows() == 0) return;
     for (std::int64_t u = 0; u < width_; ++u) {
       for (int channel = 0; channel < 3; ++channel) plane(7 + channel)[to + u] = colors(first + u, channel);
     }
   });
-  tiles_ = summarise(num_threads);
+  summarise(num_threads);
 }
 
-std::vector<SurfaceObserver::Tile> SurfaceObserver::summarise(int num_threads) const {
+void SurfaceObserver::summarise(int num_threads) {
   const int tiles_down = (height_ + tile_size - 1) / tile_size;
-  std::vector<Tile> tiles(static_cast<std::size_t>(tiles_across_ * tiles_down));
+  tiles_.resize(static_cast<std::size_t>(tiles_across_ * tiles_down));
   parallel_for(tiles_down, 1, num_threads, [&](std::int64_t row) {
     for (int column = 0; column < tiles_across_; ++column) {
-      Tile& tile = tiles[static_cast<std::size_t>(row * tiles_across_ + column)];
+      Tile& tile = tiles_[static_cast<std::size_t>(row * tiles_across_ + column)];
       const int first_u = column * tile_size - border, first_v = static_cast<int>(row) * tile_size - border;
       const int last_v = std::min(first_v + tile_size + 2 * border, height_ + border);
       simd::summarise_pixels()(image_, first_v * image_.stride + first_u, tile_size + 2 * border, last_v - first_v,
                                &tile.nearest, &tile.farthest, &tile.largest_weight);
     }
   });
-  return tiles;
 }
 
 bool SurfaceObserver::may_observe(const Eigen::Vector3f& point, std::int32_t pixel, float sigma,
                                   float least_weight) const {
-  const Tile& tile = tiles_[static_cast<std::size_t>(pixel / width_ / tile_size * tiles_across_ +
-                                                     pixel % width_ / tile_size)];
+  const Tile& tile =
+      tiles_[static_cast<std::size_t>(pixel / width_ / tile_size * tiles_across_ + pixel % width_ / tile_size)];
   const float radius = support(sigma, static_cast<float>(camera_.footprint(point.z())));
   const float reach = radius + std::max(radius, 4.0F * sigma);
-  return point.z() > tile.nearest - reach && point.z() < tile.farthest + reach &&
-         static_cast<float>(PixelWindow::size * PixelWindow::size) * tile.largest_weight > least_weight;
+  return point.z() > tile.nearest - reach &&
+         point.z()<tile.farthest +
+                   reach&& static_cast<float>(PixelWindow::size * PixelWindow::size) * tile.largest_weight>
+             least_weight;
 }
 
 Eigen::Vector3f SurfaceObserver::towards_camera(const Eigen::Vector3f& point) const {
@@ -139,13 +143,12 @@ void SurfaceObserver::observe(ObservationBlock& b, const simd::WindowCover* cove
     std::fill_n(b.green_, b.count_, 0.0F);
     std::fill_n(b.blue_, b.count_, 0.0F);
   }
-  simd::observe_windows()(image_,
-                          {b.count_, b.x_, b.y_, b.z_, b.normal_x_, b.normal_y_, b.normal_z_, b.u_, b.v_, b.window_,
-                           b.radius_, b.largest_offset_},
-                          least_cosine_,
-                          {b.weight_, b.offset_, b.seen_normal_x_, b.seen_normal_y_, b.seen_normal_z_, b.red_,
-                           b.green_, b.blue_},
-                          cover);
+  simd::observe_windows()(
+      image_,
+      {b.count_, b.x_, b.y_, b.z_, b.normal_x_, b.normal_y_, b.normal_z_, b.u_, b.v_, b.window_, b.radius_,
+       b.largest_offset_},
+      least_cosine_,
+      {b.weight_, b.offset_, b.seen_normal_x_, b.seen_normal_y_, b.seen_normal_z_, b.red_, b.green_, b.blue_}, cover);
 }
 
 bool SurfaceObserver::sees_through(const Eigen::Vector3f& point, std::int32_t pixel, float margin) const {

@@ -57,25 +57,27 @@ class ObservationBlock {
 // The median of the noise over a frame's valid pixels [m]; 0 when there are none.
 float median_sigma(const Frame& frame);
 
-// A frame, ready to be asked about points of the camera frame. Keeps references to its arguments.
+// Frames of a camera, each ready to be asked about points of the camera frame.
 class SurfaceObserver {
  public:
-  SurfaceObserver(const Frame& frame, const Camera& camera, const FusionOptions& options, const ColorsRef& colors,
-                  int num_threads);
+  // Keeps references to its arguments.
+  SurfaceObserver(const Camera& camera, const FusionOptions& options);
+
+  // What is asked from now on is asked about this frame. colors has a row per pixel, or none.
+  void look_at(const Frame& frame, const ColorsRef& colors, int num_threads);
 
   // Of a pixel: information relative to a frontal measurement of the reference noise.
   float weight(int u, int v) const { return image_.weight[v * image_.stride + u]; }
 
   bool has_colors() const { return image_.red != nullptr; }
 
-
   // Whether a window around a point can say more than `least_weight` about it; false is certain.
   bool may_observe(const Eigen::Vector3f& point, std::int32_t pixel, float sigma, float least_weight) const;
 
   Eigen::Vector3f towards_camera(const Eigen::Vector3f& point) const;
 
-  // Adds a point, whose noise is about sigma and whose neighbours are a spacing away, to a block that is not full; pixel
-  // is where it projects to.
+  // Adds a point, whose noise is about sigma and whose neighbours are a spacing away, to a block that is not full;
+  // pixel is where it projects to.
   void add(ObservationBlock& block, const Eigen::Vector3f& point, const Eigen::Vector3f& normal, std::int32_t pixel,
            float sigma, float spacing = 0.0F) const;
   // offset = sum of w (n_i + n_j) / 2 . (q_j - x_i) / sum of w over the pixels j around each point x_i of the block; it
@@ -102,11 +104,11 @@ class SurfaceObserver {
     float largest_weight;
   };
   static constexpr int tile_size = 16;  // [pixels]
-  std::vector<Tile> summarise(int num_threads) const;
+  void summarise(int num_threads);
 
   int tiles_across_;
   std::vector<float> planes_;
-  simd::SurfaceImage image_;
+  simd::SurfaceImage image_ = {};
   std::vector<Tile> tiles_;
   float least_cosine_;
 };

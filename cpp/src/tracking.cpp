@@ -13,7 +13,7 @@ namespace nacre {
 namespace {
 
 constexpr double far_turn = 0.35;  // from the guess [rad]: a registration that turned farther must be beyond doubt
-std::size_t max_target_points = getenv("MT") ? atoi(getenv("MT")) : 30000;   // that a frame is registered to
+constexpr std::size_t max_target_points = 30000;  // that a frame is registered to
 
 // Model points that a camera near a pose may see, as a cloud to register to.
 struct View {
@@ -202,8 +202,8 @@ struct Search {
 
     TrackingResult result;
     result.alignment = align_to(target, source, guess, align_options, verdict_gate);
-    result.consistency = consistency_of(view, frame, camera, result.alignment.target_from_source, spacing,
-                                        options.num_threads);
+    result.consistency =
+        consistency_of(view, frame, camera, result.alignment.target_from_source, spacing, options.num_threads);
     const double turned =
         Eigen::AngleAxisd(guess.linear().transpose() * result.alignment.target_from_source.linear()).angle();
     judge(result, options, verdict_gate, strict || turned > far_turn);
@@ -236,7 +236,7 @@ struct Search {
     AlignOptions coarse = options.registration;
     coarse.max_samples = coarse.coarse_samples = 300;
     coarse.max_iterations = 15;
-    const IcpSource few(AlignCloud(source.points, source.normals, source.sigma), coarse);
+    const IcpSource few(AlignCloud(source.cloud.points, source.cloud.normals, source.cloud.sigma), coarse);
 
     std::vector<std::pair<double, Pose>> candidates;
     for (const Pose& key_pose : key_poses) {
@@ -258,9 +258,9 @@ struct Search {
 
 }  // namespace
 
-TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera,
-                     const SurfaceObserver& observer, const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost, double spacing,
-                     const ModelOptions& options) {
+TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
+                     const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
+                     double spacing, const ModelOptions& options) {
   const Samples samples = sample_frame(frame, observer, options);
   const Search search{model,
                       frame,

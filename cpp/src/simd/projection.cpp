@@ -10,9 +10,9 @@ template <bool orthographic>
 NACRE_INLINE void project(const View& view, const float* __restrict points, const float* __restrict normals, int count,
                           const ProjectedPoints& out) {
   const View c = view;
-  float *__restrict x = out.x, *__restrict y = out.y, *__restrict z = out.z;
-  float *__restrict nx = out.normal_x, *__restrict ny = out.normal_y, *__restrict nz = out.normal_z;
-  float *__restrict u = out.u, *__restrict v = out.v, *__restrict facing = out.facing;
+  float* __restrict x = out.x, * __restrict y = out.y, * __restrict z = out.z;
+  float* __restrict nx = out.normal_x, * __restrict ny = out.normal_y, * __restrict nz = out.normal_z;
+  float* __restrict u = out.u, * __restrict v = out.v, * __restrict facing = out.facing;
   const float* r = c.rotation;
   for (int i = 0; i < count; ++i) {
     const float px = points[3 * i], py = points[3 * i + 1], pz = points[3 * i + 2];
@@ -33,8 +33,7 @@ NACRE_INLINE void project(const View& view, const float* __restrict points, cons
       const float inverse_z = 1.0F / z[i];
       u[i] = x[i] * inverse_z * c.fx + c.cx;
       v[i] = y[i] * inverse_z * c.fy + c.cy;
-      facing[i] =
-          -(nx[i] * x[i] + ny[i] * y[i] + nz[i] * z[i]) / ::sqrtf(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+      facing[i] = -(nx[i] * x[i] + ny[i] * y[i] + nz[i] * z[i]) / ::sqrtf(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
     }
   }
 }

@@ -18,7 +18,7 @@ struct View {
 struct ProjectedPoints {
   float *x, *y, *z, *normal_x, *normal_y, *normal_z;  // camera frame
   float *u, *v;                                       // [pixels]; of no meaning where z <= 0 (pinhole)
-  float* facing;  // cosine between the normal and the direction to the camera
+  float* facing;                                      // cosine between the normal and the direction to the camera
 };
 
 // The pixel nearest to each place, of those of the image: -1 for NaN. inside: whether the place is in the image.

@@ -37,8 +37,8 @@ NACRE_INLINE unsigned add_pixels(const SurfaceImage& image, int64_t start, Mask 
   const F32 cosine = nx * p.normal_x + ny * p.normal_y + nz * p.normal_z;
   const F32 offset = abs(along);
   const Mask measured = in_window & (pixel_weight > broadcast(0.0F));
-  const Mask counts = measured & (squared_across < p.squared_radius) & (offset < p.largest_offset) &
-                      (cosine > p.least_cosine);
+  const Mask counts =
+      measured & (squared_across < p.squared_radius) & (offset < p.largest_offset) & (cosine > p.least_cosine);
 
   const F32 falloff = broadcast(1.0F) - squared_across * p.inverse_squared_radius;
   const F32 w = select(counts, pixel_weight * falloff * falloff, broadcast(0.0F));
@@ -61,11 +61,11 @@ void observe(const SurfaceImage& image, const WindowQueries& queries, float leas
              const WindowCover* asked) {
   for (int i = 0; i < queries.count; ++i) {
     const float squared_radius = queries.radius[i] * queries.radius[i];
-    const Point p = {broadcast(queries.x[i]),        broadcast(queries.y[i]),
-                     broadcast(queries.z[i]),        broadcast(queries.normal_x[i]),
-                     broadcast(queries.normal_y[i]), broadcast(queries.normal_z[i]),
-                     broadcast(squared_radius),      broadcast(1.0F / squared_radius),
-                     broadcast(queries.largest_offset[i]), broadcast(least_cosine)};
+    const Point p = {
+        broadcast(queries.x[i]),        broadcast(queries.y[i]),          broadcast(queries.z[i]),
+        broadcast(queries.normal_x[i]), broadcast(queries.normal_y[i]),   broadcast(queries.normal_z[i]),
+        broadcast(squared_radius),      broadcast(1.0F / squared_radius), broadcast(queries.largest_offset[i]),
+        broadcast(least_cosine)};
     const Cover cover = {broadcast(asked ? asked->spacing[i] * asked->spacing[i] : 0.0F),
                          broadcast(asked ? asked->largest_offset[i] : 0.0F),
                          broadcast(asked ? asked->least_cosine : 0.0F)};
@@ -103,8 +103,7 @@ void fill_surface_row(const FrameRow& row, float reference_sigma, bool orthograp
     const float x = row.points[3 * u], y = row.points[3 * u + 1], z = row.points[3 * u + 2];
     const float nx = row.normals[3 * u], ny = row.normals[3 * u + 1], nz = row.normals[3 * u + 2];
     const float ratio = reference_sigma / row.sigma[u];
-    const float facing =
-        orthographic ? -nz : -(nx * x + ny * y + nz * z) / ::sqrtf(x * x + y * y + z * z);
+    const float facing = orthographic ? -nz : -(nx * x + ny * y + nz * z) / ::sqrtf(x * x + y * y + z * z);
     const float weight = facing * ratio * ratio;
     const bool counts = weight > 0.0F;  // not where a value is NaN
     out.x[u] = counts ? x : 0.0F;

@@ -46,15 +46,15 @@ struct WindowQueries {
   int count;
   const float *x, *y, *z, *normal_x, *normal_y, *normal_z;
   const int32_t *pixel_u, *pixel_v;  // inside the image
-  const int32_t *window;             // 1 to largest_window
-  const float *radius;               // of the support, along the surface [m]
-  const float *largest_offset;       // along the normal [m]
+  const int32_t* window;             // 1 to largest_window
+  const float* radius;               // of the support, along the surface [m]
+  const float* largest_offset;       // along the normal [m]
 };
 
 struct WindowSums {
-  float *weight, *offset;                         // offset: already divided by the weight
-  float *normal_x, *normal_y, *normal_z;          // not normalised
-  float *red, *green, *blue;                      // divided by the weight; null without colours
+  float *weight, *offset;                 // offset: already divided by the weight
+  float *normal_x, *normal_y, *normal_z;  // not normalised
+  float *red, *green, *blue;              // divided by the weight; null without colours
 };
 
 // Which pixels of each window show the point's own surface: bit b of rows[9 i + r] is the pixel b to the right of the
