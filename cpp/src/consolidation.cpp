@@ -296,13 +296,14 @@ class Projection {
 
 // The iterations; the places of `samples`, in the order `sample_order` and the rows of `moved`.
 template <class Cloud, class Matrix>
-Matrix project(const Cloud& samples, const SpatialOrder& sample_order, const Cloud& points,
-               const SpatialOrder& point_order, const CellLattice& lattice, const ConsolidateOptions& options,
-               const ProjectionHints& hints, const Cargo* cargo) {
+Matrix project(const Cloud& samples, SpatialOrder sample_order, const Cloud& points, const SpatialOrder& point_order,
+               const CellLattice& lattice, const ConsolidateOptions& options, const ProjectionHints& hints,
+               const Cargo* cargo) {
   const Form form = form_of(options);
   const Scaling scaling{lattice.center, form.scale};
   const PointBlocks point_blocks(points, point_order, scaling, options.num_threads);
-  PointBlocks blocks(samples, sample_order, scaling, options.num_threads);
+  halve_cubes(samples, sample_order, PointBlocks::size, options.num_threads);
+  const PointBlocks blocks(samples, sample_order, scaling, options.num_threads);
   PointBlocks moved = blocks;
   Projection projection(moved, point_blocks, options, form, hints);
   for (int iteration = 0; iteration < options.iterations; ++iteration) {

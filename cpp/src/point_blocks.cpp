@@ -5,13 +5,14 @@
 #include <limits>
 
 #include "parallel.hpp"
+#include "simd/block_fit.hpp"
 
 namespace nacre {
 namespace {
 
 constexpr float far_away = 1e18F;
 constexpr float infinity = std::numeric_limits<float>::infinity();
-constexpr std::int64_t nodes_per_task = 16;
+constexpr std::int64_t nodes_per_task = 4;
 
 std::size_t as_size(std::int64_t i) { return static_cast<std::size_t>(i); }
 
@@ -35,36 +36,39 @@ PointBlocks::PointBlocks(const Cloud& points, const SpatialOrder& order, const S
   const auto count = static_cast<std::int64_t>(starts.size());
   starts.push_back(static_cast<std::uint32_t>(num_points));
 
-  counts_.resize(as_size(count));
-  rows_.resize(as_size(count * size));
-  for (std::vector<float>& axis : axes_) axis.resize(as_size(count * size));
-  origins_.resize(as_size(3 * count));
-  radii_.resize(as_size(count));
   std::int64_t num_nodes = count;
   while (num_nodes > 0 && (levels_.empty() || num_nodes > 1)) {
     num_nodes = (num_nodes + size - 1) / size;
     levels_.emplace_back(as_size(num_nodes * simd::node_floats));
   }
+  const std::int64_t room = levels_.empty() ? 0 : static_cast<std::int64_t>(levels_[0].size()) / 6;  // for full nodes
+  counts_.resize(as_size(count));
+  rows_.resize(as_size(count * size));
+  for (std::vector<float>& axis : axes_) axis.resize(as_size(room * size));
+  origins_.resize(as_size(3 * room));
+  radii_.resize(as_size(room));
 
+  using Scalar = typename Cloud::Scalar;
+  const Scalar* const data = points.data();
+  const std::int64_t stride = points.outerStride();
   parallel_for(count, size * nodes_per_task, num_threads, [&](std::int64_t block) {
     const std::uint32_t first = starts[as_size(block)], last = starts[as_size(block) + 1];
-    const std::size_t at = as_size(block * size);
     counts_[as_size(block)] = static_cast<std::uint8_t>(last - first);
-    Eigen::Vector3d places[size];
-    Eigen::AlignedBox3d box;
-    for (std::uint32_t i = first; i < last; ++i) {
-      const std::uint32_t row = order.rows[i];
-      Eigen::Vector3d& place = places[i - first];
-      place = (points.row(row).template cast<double>().transpose() - scaling.center) * scaling.scale;
-      box.extend(place);
-      rows_[at + i - first] = row;
+    double places[3][size];
+    for (std::int64_t i = 0; i < size; ++i) {  // places that are left over repeat the last point for now
+      const std::uint32_t row = order.rows[std::min<std::size_t>(first + as_size(i), last - 1)];
+      rows_[as_size(block * size + i)] = row;
+      const Scalar* const point = data + row * stride;
+      for (int axis = 0; axis < 3; ++axis) places[axis][i] = static_cast<double>(point[axis]);
     }
-    const Eigen::Vector3d origin = box.center();
     for (int axis = 0; axis < 3; ++axis) {
-      origins_[as_size(3 * block + axis)] = origin[axis];
-      float* const to = axes_[axis].data() + at;
-      std::fill(to, to + size, far_away);
-      for (std::uint32_t i = 0; i < last - first; ++i) to[i] = static_cast<float>(places[i][axis] - origin[axis]);
+      double* const place = places[axis];
+      for (int i = 0; i < size; ++i) place[i] = (place[i] - scaling.center[axis]) * scaling.scale;
+      const double origin = 0.5 * (*std::min_element(place, place + size) + *std::max_element(place, place + size));
+      origins_[as_size(3 * block + axis)] = origin;
+      float* const to = axes_[axis].data() + block * size;
+      for (int i = 0; i < size; ++i) to[i] = static_cast<float>(place[i] - origin);
+      std::fill(to + (last - first), to + size, far_away);
     }
   });
   refit(num_threads);
@@ -73,32 +77,26 @@ PointBlocks::PointBlocks(const Cloud& points, const SpatialOrder& order, const S
 void PointBlocks::refit(int num_threads) {
   if (levels_.empty()) return;
   const std::int64_t num_nodes = static_cast<std::int64_t>(levels_[0].size()) / simd::node_floats;
-  parallel_for(num_nodes * size, size * nodes_per_task, num_threads, [&](std::int64_t block) { fit_block(block); });
+  parallel_for(num_nodes, nodes_per_task, num_threads, [&](std::int64_t node) { fit_node(node); });
   fit_upper_levels();
 }
 
-// The block's box and radius; no box where there is no block.
-void PointBlocks::fit_block(std::int64_t block) {
-  float* const node = levels_[0].data() + block / size * simd::node_floats + block % size;
-  const bool exists = block < num_blocks();
-  float squared_distances[size] = {};
-  for (int axis = 0; axis < 3; ++axis) {
-    float& lower = node[axis * size];
-    float& upper = node[(3 + axis) * size];
-    lower = infinity;
-    upper = -infinity;
-    if (!exists) continue;
-    const float* const from = axes_[axis].data() + block * size;
-    for (int i = 0; i < count(block); ++i) {
-      lower = std::min(lower, from[i]);
-      upper = std::max(upper, from[i]);
-      squared_distances[i] += from[i] * from[i];
+// The boxes and radii of the blocks under a node; no box where there is no block.
+void PointBlocks::fit_node(std::int64_t node) {
+  const float* places[3];
+  for (int axis = 0; axis < 3; ++axis) places[axis] = axes_[axis].data() + node * size * size;
+  simd::BlockFit fit;
+  simd::fit_blocks()(places, fit);
+  float* const boxes = levels_[0].data() + node * simd::node_floats;
+  for (std::int64_t i = 0; i < size; ++i) {
+    const std::int64_t block = node * size + i;
+    const bool exists = block < num_blocks();
+    for (int axis = 0; axis < 3; ++axis) {
+      const double origin = origins_[as_size(3 * block + axis)];
+      boxes[axis * size + i] = exists ? round_down(origin + static_cast<double>(fit.lower[axis][i])) : infinity;
+      boxes[(3 + axis) * size + i] = exists ? round_up(origin + static_cast<double>(fit.upper[axis][i])) : -infinity;
     }
-    lower = round_down(origins_[as_size(3 * block + axis)] + lower);
-    upper = round_up(origins_[as_size(3 * block + axis)] + upper);
-  }
-  if (exists) {
-    radii_[as_size(block)] = 1.000001F * std::sqrt(*std::max_element(squared_distances, squared_distances + size));
+    radii_[as_size(block)] = 1.000001F * std::sqrt(fit.squared_radius[i]);
   }
 }
 

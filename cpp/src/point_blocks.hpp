@@ -32,6 +32,7 @@ class PointBlocks {
 
   // Coordinates relative to the origin of the block.
   std::vector<float>& axis(int axis) { return axes_[axis]; }
+  const std::vector<float>& axis(int axis) const { return axes_[axis]; }
   // After the coordinates have changed.
   void refit(int num_threads);
 
@@ -39,12 +40,12 @@ class PointBlocks {
   simd::PairTargets block(std::int64_t block) const;
 
  private:
-  void fit_block(std::int64_t block);
+  void fit_node(std::int64_t node);
   void fit_upper_levels();
 
   std::vector<std::uint32_t> rows_;
   std::vector<std::uint8_t> counts_;
-  std::vector<float> axes_[3];
+  std::vector<float> axes_[3];  // with room for full nodes, as the next two
   std::vector<double> origins_;
   std::vector<float> radii_;
   std::vector<std::vector<float>> levels_;  // nodes of the box tree, level 0 first

@@ -49,7 +49,22 @@ constexpr HilbertTable make_hilbert_table() {
   return table;
 }
 
+// Two levels at once: for a state and an octant of an octant, 64 times the state there, plus the place on the curve.
+using DoubleTable = std::array<std::uint16_t, 24 * 64>;
+
+constexpr DoubleTable make_double_table(const HilbertTable& table) {
+  DoubleTable twice{};
+  for (unsigned state = 0; state < 24; ++state) {
+    for (unsigned octants = 0; octants < 64; ++octants) {
+      const unsigned outer = table[8 * state + octants / 8], inner = table[(outer & ~7U) + octants % 8];
+      twice[64 * state + octants] = static_cast<std::uint16_t>(64 * (inner / 8) + 8 * (outer % 8) + inner % 8);
+    }
+  }
+  return twice;
+}
+
 constexpr HilbertTable hilbert_table = make_hilbert_table();
+constexpr DoubleTable double_table = make_double_table(hilbert_table);
 constexpr int most_bits = 21;
 constexpr int cube_bits = 5;  // of a coordinate within a cube
 constexpr std::int64_t least_chunk = 4096;
@@ -131,6 +146,16 @@ std::uint64_t key_of(const Scalar* point, const CellLattice& lattice) {
     cell[axis] = static_cast<std::uint32_t>(std::min(std::max(place, 0.0), most));
   }
   return hilbert_index(cell, lattice.num_bits);
+}
+
+// The lowest 21 bits, with two zeros above each.
+std::uint64_t every_third(std::uint64_t bits) {
+  bits &= 0x1FFFFFU;
+  bits = (bits | (bits << 32U)) & 0x001F00000000FFFFU;
+  bits = (bits | (bits << 16U)) & 0x001F0000FF0000FFU;
+  bits = (bits | (bits << 8U)) & 0x100F00F00F00F00FU;
+  bits = (bits | (bits << 4U)) & 0x10C30C30C30C30C3U;
+  return (bits | (bits << 2U)) & 0x1249249249249249U;
 }
 
 // A row with its place on the curve: in one word where that suffices.
@@ -224,16 +249,48 @@ SpatialOrder order_rows(const Rows<Scalar>& rows, const CellLattice& lattice, in
   return order;
 }
 
+struct Place {
+  float point[3];
+  std::uint32_t row;
+};
+
+// Halves along the longest side of the box, over and over, into blocks of at most so many; all but the last are full.
+void halve(Place* first, Place* last, std::int64_t block_size) {
+  const std::int64_t num_blocks = (last - first + block_size - 1) / block_size;
+  if (num_blocks <= 1) return;
+  int longest = 0;
+  float length = -1.0F;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto less = [axis](const Place& a, const Place& b) { return a.point[axis] < b.point[axis]; };
+    const auto ends = std::minmax_element(first, last, less);
+    if (!(ends.second->point[axis] - ends.first->point[axis] > length)) continue;
+    length = ends.second->point[axis] - ends.first->point[axis];
+    longest = axis;
+  }
+  Place* const middle = first + num_blocks / 2 * block_size;
+  std::nth_element(first, middle, last,
+                   [longest](const Place& a, const Place& b) { return a.point[longest] < b.point[longest]; });
+  halve(first, middle, block_size);
+  halve(middle, last, block_size);
+}
+
 }  // namespace
 
 std::uint64_t hilbert_index(const std::uint32_t (&cell)[3], int num_bits) {
+  const std::uint64_t octants = every_third(cell[0]) | (every_third(cell[1]) << 1U) | (every_third(cell[2]) << 2U);
   std::uint64_t index = 0;
-  unsigned state = 0;
-  for (int bit = num_bits - 1; bit >= 0; --bit) {
-    const unsigned octant = ((cell[0] >> bit) & 1U) | (((cell[1] >> bit) & 1U) << 1U) | (((cell[2] >> bit) & 1U) << 2U);
-    const unsigned entry = hilbert_table[state + octant];
-    index = (index << 3U) | (entry & 7U);
-    state = entry & ~7U;
+  unsigned state = 0, shift = 3 * static_cast<unsigned>(num_bits);
+  if (num_bits % 2 != 0) {
+    shift -= 3;
+    const unsigned entry = hilbert_table[(octants >> shift) & 7U];
+    index = entry & 7U;
+    state = entry / 8 * 64;
+  }
+  while (shift > 0) {
+    shift -= 6;
+    const unsigned entry = double_table[state + ((octants >> shift) & 63U)];
+    index = (index << 6U) | (entry & 63U);
+    state = entry & ~63U;
   }
   return index;
 }
@@ -276,9 +333,39 @@ SpatialOrder spatial_order(const Cloud& points, const CellLattice& lattice, int 
                                     : order_rows<LongItem>(rows, lattice, num_threads);
 }
 
+template <class Cloud>
+void halve_cubes(const Cloud& points, SpatialOrder& order, std::int64_t block_size, int num_threads) {
+  std::vector<std::size_t> starts;
+  for (std::size_t i = 0; i < order.rows.size(); ++i) {
+    if (i == 0 || order.cubes[i] != order.cubes[i - 1]) starts.push_back(i);
+  }
+  const auto num_cubes = static_cast<std::int64_t>(starts.size());
+  starts.push_back(order.rows.size());
+  const auto rows = rows_of(points);
+  parallel_blocks(num_cubes, 8, num_threads, [&](std::int64_t, std::int64_t begin, std::int64_t end) {
+    std::vector<Place> places;
+    for (std::int64_t cube = begin; cube < end; ++cube) {
+      const std::size_t first = starts[static_cast<std::size_t>(cube)],
+                        last = starts[static_cast<std::size_t>(cube) + 1];
+      places.clear();
+      for (std::size_t i = first; i < last; ++i) {
+        const auto* const point = rows[order.rows[i]];
+        const auto* const corner = rows[order.rows[first]];
+        places.push_back({{static_cast<float>(point[0] - corner[0]), static_cast<float>(point[1] - corner[1]),
+                           static_cast<float>(point[2] - corner[2])},
+                          order.rows[i]});
+      }
+      halve(places.data(), places.data() + places.size(), block_size);
+      for (std::size_t i = first; i < last; ++i) order.rows[i] = places[i - first].row;
+    }
+  });
+}
+
 template CellLattice cell_lattice(std::initializer_list<const PointsRef*>, double, int);
 template CellLattice cell_lattice(std::initializer_list<const PointsDoubleRef*>, double, int);
 template SpatialOrder spatial_order(const PointsRef&, const CellLattice&, int);
 template SpatialOrder spatial_order(const PointsDoubleRef&, const CellLattice&, int);
+template void halve_cubes(const PointsRef&, SpatialOrder&, std::int64_t, int);
+template void halve_cubes(const PointsDoubleRef&, SpatialOrder&, std::int64_t, int);
 
 }  // namespace nacre

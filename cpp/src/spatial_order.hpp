@@ -31,6 +31,11 @@ struct SpatialOrder {
 template <class Cloud>
 SpatialOrder spatial_order(const Cloud& points, const CellLattice& lattice, int num_threads);
 
+// Orders the points of each cube by halving instead, for blocks of so many that are more compact and take longer to
+// make.
+template <class Cloud>
+void halve_cubes(const Cloud& points, SpatialOrder& order, std::int64_t block_size, int num_threads);
+
 // The place of a cell on a curve through 2^num_bits cells in each direction; num_bits is at most 21.
 std::uint64_t hilbert_index(const std::uint32_t (&cell)[3], int num_bits);
 

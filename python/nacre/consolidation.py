@@ -189,10 +189,10 @@ def project_samples(
     if frozen is not None:
         hints.frozen = (_as_column("frozen", frozen, len(sample_array)) != 0).astype(np.uint8)
     common = np.promote_types(sample_array.dtype, point_array.dtype)
-    moved: FloatArray = _core.project_samples(
+    moved = _core.project_samples(
         sample_array.astype(common, copy=False), point_array.astype(common, copy=False), options, hints
-    ).astype(sample_array.dtype, copy=False)
-    return moved
+    )
+    return moved.astype(np.float32) if sample_array.dtype == np.float32 else moved
 
 
 def _options(

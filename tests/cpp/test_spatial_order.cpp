@@ -98,6 +98,39 @@ TEST_CASE("strays do not coarsen the cells of the others") {
   CHECK(after.size() == 3000);
 }
 
+TEST_CASE("halving keeps the points of each cube and makes compact blocks, the same for any number of threads") {
+  const PointsDouble points = random_points<PointsDouble>(20000, 1.0);
+  const PointsDoubleRef ref(points);
+  const CellLattice lattice = cell_lattice<PointsDoubleRef>({&ref}, 0.01, 1);
+  const SpatialOrder before = spatial_order(ref, lattice, 1);
+  const auto diagonals = [&](const SpatialOrder& order) {
+    double sum = 0.0;
+    for (std::size_t i = 0; i + 16 <= order.rows.size(); i += 16) {
+      Eigen::AlignedBox3d box;
+      for (std::size_t j = i; j < i + 16; ++j) box.extend(Eigen::Vector3d(points.row(order.rows[j]).transpose()));
+      sum += box.diagonal().norm();
+    }
+    return sum;
+  };
+  SpatialOrder halved = before;
+  halve_cubes(ref, halved, 16, 1);
+  CHECK(halved.cubes == before.cubes);
+  for (std::size_t first = 0, last; first < before.rows.size(); first = last) {
+    for (last = first; last < before.rows.size() && before.cubes[last] == before.cubes[first];) ++last;
+    const auto at = [](const SpatialOrder& order, std::size_t i) {
+      return order.rows.begin() + static_cast<std::ptrdiff_t>(i);
+    };
+    CHECK(std::set<std::uint32_t>(at(before, first), at(before, last)) ==
+          std::set<std::uint32_t>(at(halved, first), at(halved, last)));
+  }
+  CHECK(diagonals(halved) < 0.95 * diagonals(before));
+  for (const int threads : {2, 3, 4, 7, 8}) {
+    SpatialOrder again = before;
+    halve_cubes(ref, again, 16, threads);
+    CHECK(again.rows == halved.rows);
+  }
+}
+
 TEST_CASE("no points, one point, a row stride") {
   CHECK(order_of(PointsDouble(0, 3), 1.0).rows.empty());
   CHECK(order_of(PointsDouble::Constant(3, 3, std::numeric_limits<double>::quiet_NaN()), 1.0).rows.empty());
