@@ -160,6 +160,7 @@ class Projection {
 
   // Divides the mass of each point that is near a sample by its density v_j.
   void weigh_points() {
+    if (num_weighed_ == points_.num_blocks()) return;
     for_blocks(samples_.num_blocks(), [&](std::int64_t block) {
       if (!is_live(block)) return;
       const auto mark = [](void* is_near, std::int32_t near_block) {
@@ -174,6 +175,7 @@ class Projection {
       has_density_[as_size(block)] = 1;
       fresh.push_back(block);
     }
+    num_weighed_ += static_cast<std::int64_t>(fresh.size());
     const bool weighted = hints_.point_weights.size() > 0;
     for_blocks(static_cast<std::int64_t>(fresh.size()), [&](std::int64_t k) {
       const std::int64_t block = fresh[as_size(k)];
@@ -292,6 +294,7 @@ class Projection {
   Points normals_;
   std::unique_ptr<std::atomic<bool>[]> is_near_;  // one a block of points
   std::vector<std::uint8_t> has_density_;
+  std::int64_t num_weighed_ = 0;  // blocks that have
 };
 
 // The iterations; the places of `samples`, in the order `sample_order` and the rows of `moved`.

@@ -46,7 +46,7 @@ PointBlocks::PointBlocks(const Cloud& points, const SpatialOrder& order, const S
   rows_.resize(as_size(count * size));
   for (std::vector<float>& axis : axes_) axis.resize(as_size(room * size));
   origins_.resize(as_size(3 * room));
-  radii_.resize(as_size(room));
+  halves_.resize(as_size(3 * room));
 
   using Scalar = typename Cloud::Scalar;
   const Scalar* const data = points.data();
@@ -81,7 +81,7 @@ void PointBlocks::refit(int num_threads) {
   fit_upper_levels();
 }
 
-// The boxes and radii of the blocks under a node; no box where there is no block.
+// The boxes of the blocks under a node; no box where there is no block.
 void PointBlocks::fit_node(std::int64_t node) {
   const float* places[3];
   for (int axis = 0; axis < 3; ++axis) places[axis] = axes_[axis].data() + node * size * size;
@@ -94,9 +94,9 @@ void PointBlocks::fit_node(std::int64_t node) {
     for (int axis = 0; axis < 3; ++axis) {
       const double origin = origins_[as_size(3 * block + axis)];
       boxes[axis * size + i] = exists ? round_down(origin + static_cast<double>(fit.lower[axis][i])) : infinity;
+      halves_[as_size(3 * block + axis)] = std::max(std::abs(fit.lower[axis][i]), std::abs(fit.upper[axis][i]));
       boxes[(3 + axis) * size + i] = exists ? round_up(origin + static_cast<double>(fit.upper[axis][i])) : -infinity;
     }
-    radii_[as_size(block)] = 1.000001F * std::sqrt(fit.squared_radius[i]);
   }
 }
 
@@ -125,7 +125,7 @@ simd::PairPoints PointBlocks::view(const float* mass) const {
   view.z = axes_[2].data();
   view.mass = mass;
   view.origin = origins_.data();
-  view.radius = radii_.data();
+  view.halves = halves_.data();
   view.tree.num_levels = static_cast<int>(levels_.size());
   for (std::size_t level = 0; level < levels_.size(); ++level) view.tree.nodes[level] = levels_[level].data();
   return view;

@@ -47,7 +47,7 @@ class PointBlocks {
   std::vector<std::uint8_t> counts_;
   std::vector<float> axes_[3];  // with room for full nodes, as the next two
   std::vector<double> origins_;
-  std::vector<float> radii_;
+  std::vector<float> halves_;
   std::vector<std::vector<float>> levels_;  // nodes of the box tree, level 0 first
 };
 

@@ -199,13 +199,17 @@ void radix_sort(Buffer<Item>& items, std::int64_t count, int num_bits, int num_t
       std::fill(counts, counts + num_bins, 0);
       for (std::int64_t i = begin; i < end; ++i) ++counts[bin_of(items[static_cast<std::size_t>(i)])];
     });
-    std::int64_t total = 0;
-    for (std::int64_t bin = 0; bin < num_bins; ++bin) {
+    std::vector<std::int64_t> place(static_cast<std::size_t>(num_bins), 0);  // where a bin of the next chunk starts
+    const auto for_counts = [&](auto&& body) {
       for (std::int64_t chunk = 0; chunk < chunks.count; ++chunk) {
-        std::int64_t& start = starts[static_cast<std::size_t>(chunk * num_bins + bin)];
-        total += std::exchange(start, total);
+        for (std::int64_t bin = 0; bin < num_bins; ++bin) {
+          body(starts[static_cast<std::size_t>(chunk * num_bins + bin)], place[static_cast<std::size_t>(bin)]);
+        }
       }
-    }
+    };
+    for_counts([](std::int64_t& start, std::int64_t& total) { total += start; });
+    std::exclusive_scan(place.begin(), place.end(), place.begin(), std::int64_t{0});
+    for_counts([](std::int64_t& start, std::int64_t& next) { next += std::exchange(start, next); });
     parallel_blocks(count, chunks.size, num_threads, [&](std::int64_t chunk, std::int64_t begin, std::int64_t end) {
       std::int64_t* const next = starts.data() + chunk * num_bins;
       for (std::int64_t i = begin; i < end; ++i) {

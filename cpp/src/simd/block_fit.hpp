@@ -7,11 +7,10 @@
 
 namespace nacre::simd {
 
-// For 16 blocks of 16 points, one after the other: the lowest and highest coordinate of each, and the largest squared
-// distance from the blocks' origins. Points of 1e18 and more do not count; every block has a point that does.
+// The lowest and highest coordinates in each of 16 blocks of 16 points, one after the other. Points of 1e18 and more do
+// not count.
 struct BlockFit {
   float lower[3][16], upper[3][16];
-  float squared_radius[16];
 };
 
 using FitBlocks = void(const float* const* coordinates, BlockFit& fit);

@@ -1,5 +1,5 @@
 // The blocks near a block of targets are copied next to each other in the targets' frame, into the first-level cache.
-// Spheres around them tell which targets they may reach: each such pair of a target, in all lanes, and a block, whose
+// Boxes around them tell which targets they may reach: each such pair of a target, in all lanes, and a block, whose
 // points are in the lanes, is one round of a single long loop. Sums are kept in 16 lanes whatever the width of a
 // vector; multiplications and additions are fused where the instruction set can, so that the baseline rounds
 // differently. About 35 operations a round, of 16 pairs of points.
@@ -150,12 +150,12 @@ struct Chunk {
   int32_t pairs[(chunk_blocks + 1) * block_size];  // 16 times the block, plus the target
 
   template <bool with_mass>
-  NACRE_INLINE void add(const PairPoints& points, int32_t block, const PairTargets& targets, float reach) {
+  NACRE_INLINE void add(const PairPoints& points, int32_t block, const PairTargets& targets, float reach2) {
     const double* origin = points.origin + 3 * static_cast<int64_t>(block);
     const F32 shift_x = broadcast(static_cast<float>(origin[0] - targets.origin[0]));
     const F32 shift_y = broadcast(static_cast<float>(origin[1] - targets.origin[1]));
     const F32 shift_z = broadcast(static_cast<float>(origin[2] - targets.origin[2]));
-    const float range = reach + points.radius[block];
+    const float* halves = points.halves + 3 * static_cast<int64_t>(block);
     for (int part = 0; part < block_size; part += lanes) {
       const int64_t from = static_cast<int64_t>(block) * block_size + part;
       const int to = num_blocks * block_size + part;
@@ -164,10 +164,11 @@ struct Chunk {
       store(z + to, load(points.z + from) + shift_z);
       if constexpr (with_mass) store(mass + to, load(points.mass + from));
 
-      const F32 dx = load(targets.x + part) - shift_x, dy = load(targets.y + part) - shift_y;
-      const F32 dz = load(targets.z + part) - shift_z;
-      const F32 squared_distance = mul_add(dz, dz, mul_add(dy, dy, dx * dx));
-      const Mask near = (squared_distance < broadcast(range * range)) & first_lanes(targets.count - part);
+      const F32 gap_x = max(abs(load(targets.x + part) - shift_x) - broadcast(halves[0]), broadcast(0.0F));
+      const F32 gap_y = max(abs(load(targets.y + part) - shift_y) - broadcast(halves[1]), broadcast(0.0F));
+      const F32 gap_z = max(abs(load(targets.z + part) - shift_z) - broadcast(halves[2]), broadcast(0.0F));
+      const F32 squared_gap = mul_add(gap_z, gap_z, mul_add(gap_y, gap_y, gap_x * gap_x));
+      const Mask near = (squared_gap < broadcast(reach2)) & first_lanes(targets.count - part);
       store_chosen(pairs + num_pairs, near, load(numbers + part) + broadcast(num_blocks * block_size));
       num_pairs += count(bits(near));
     }
@@ -224,9 +225,9 @@ void sum(const PairKernel& pair_kernel, const PairTargets& targets, const PairPo
     chunk.num_blocks = chunk.num_pairs = 0;
   };
 
-  const float reach = 1.000001F * ::sqrtf(pair_kernel.reach2);
-  for_near_blocks(points.tree, targets, reach * reach, [&](const int32_t* blocks, int num_blocks) {
-    for (int k = 0; k < num_blocks; ++k) chunk.add<with_mass>(points, blocks[k], targets, reach);
+  const float reach2 = 1.000002F * pair_kernel.reach2;
+  for_near_blocks(points.tree, targets, reach2, [&](const int32_t* blocks, int num_blocks) {
+    for (int k = 0; k < num_blocks; ++k) chunk.add<with_mass>(points, blocks[k], targets, reach2);
     add_pairs();
   });
 

@@ -25,7 +25,7 @@ struct PairPoints {
   const float *x, *y, *z;
   const float* mass;     // null: all are 1
   const double* origin;  // 3 a block
-  const float* radius;   // of a sphere around the block's origin that holds its points
+  const float* halves;   // 3 a block: how far its points reach from its origin along each axis
   BoxTree tree;
 };
 
