@@ -6,6 +6,7 @@
 #include "block_tree.hpp"
 #include "check.hpp"
 #include "parallel.hpp"
+#include "rows.hpp"
 #include "warm_search.hpp"
 
 namespace nacre {
@@ -61,7 +62,7 @@ PointMatrix<T> estimate(const Eigen::Ref<const PointMatrix<T>>& points, const No
   require(options.max_radius > 0, "max_radius", "positive", options.max_radius);
   require(viewpoint.allFinite(), "viewpoint", "finite", viewpoint.transpose());
 
-  const BlockTree<T> tree(points, options.num_threads);
+  const BlockTree<T> tree(Rows<T>(points).data(), points.rows(), options.num_threads);
   PointMatrix<T> normals = PointMatrix<T>::Constant(points.rows(), 3, std::numeric_limits<T>::quiet_NaN());
   parallel_blocks(tree.num_points(), 256, options.num_threads, [&](std::int64_t, std::int64_t begin, std::int64_t end) {
     WarmSearch search(tree, options.k, options.max_radius);
