@@ -11,12 +11,44 @@
 
 namespace nacre {
 
+inline void nearest_group(const BlockTreeView<float>& tree, const simd::NearestTask& task, simd::QueryGroup& group) {
+  simd::nearest_group_f32()(tree, task, group);
+}
+inline void nearest_group(const BlockTreeView<double>& tree, const simd::NearestTask& task, simd::QueryGroup& group) {
+  simd::nearest_group_f64()(tree, task, group);
+}
+inline void nearest_group(const BlockTreeView<float>& tree, const simd::NearestSlotsTask& task,
+                          simd::QueryGroup& group) {
+  simd::nearest_slots_f32()(tree, task, group);
+}
+inline void nearest_group(const BlockTreeView<double>& tree, const simd::NearestSlotsTask& task,
+                          simd::QueryGroup& group) {
+  simd::nearest_slots_f64()(tree, task, group);
+}
+
+inline void write_answer(const simd::NearestTask& task, std::uint32_t row, const Found* found, int count) {
+  const std::int64_t start = static_cast<std::int64_t>(row) * task.k;
+  for (int j = 0; j < task.k; ++j) {
+    const double distance = j < count ? std::sqrt(found[j].d2) : std::numeric_limits<double>::infinity();
+    task.indices[start + j] = j < count ? found[j].id : task.missing;
+    if (task.distances != nullptr) {
+      task.distances[start + j] = distance;
+    } else {
+      task.float_distances[start + j] = static_cast<float>(distance);
+    }
+  }
+}
+inline void write_answer(const simd::NearestSlotsTask& task, std::uint32_t row, const Found* found, int count) {
+  for (int j = 0; j < count; ++j) task.slots[static_cast<std::int64_t>(row) * task.k + j] = found[j].slot;
+  task.counts[row] = count;
+}
+
 // Answers group after group of queries that are close together. The radius within which a group finds its neighbours is
 // not known before: it is guessed from the group before, and enlarged for queries that it is too small for.
-template <class T>
+template <class T, class Task>
 class GroupQueries {
  public:
-  GroupQueries(const BlockTree<T>& tree, const simd::NearestTask& task)
+  GroupQueries(const BlockTree<T>& tree, const Task& task)
       : tree_(tree),
         task_(task),
         // Whatever is within the largest distance is within this radius, in spite of rounding.
@@ -43,7 +75,7 @@ class GroupQueries {
     constexpr int most_attempts = 8;
     for (int attempt = 0; group.size > 0 && attempt < most_attempts; ++attempt) {
       group.radius2 = std::min(radius2, largest2_);
-      find_nearest(group);
+      nearest_group(tree_.view(), task_, group);
       farthest2_ = std::max(farthest2_, group.farthest2);
       if (group.crowded) {
         if (group.size == 1) break;
@@ -56,14 +88,6 @@ class GroupQueries {
       radius2 *= 2.5;
     }
     for (int i = 0; i < group.size; ++i) answer_alone(group, i);
-  }
-
-  void find_nearest(simd::QueryGroup& group) const {
-    if constexpr (std::is_same_v<T, float>) {
-      simd::nearest_group_f32()(tree_.view(), task_, group);
-    } else {
-      simd::nearest_group_f64()(tree_.view(), task_, group);
-    }
   }
 
   static simd::QueryGroup part(const simd::QueryGroup& group, int begin, int end) {
@@ -81,21 +105,11 @@ class GroupQueries {
     tree_.search({group.p[0][i], group.p[1][i], group.p[2][i]}, nearest);
     const int count = nearest.size();
     if (count == task_.k) farthest2_ = std::max(farthest2_, found_[static_cast<std::size_t>(count) - 1].d2);
-    const std::int64_t start = static_cast<std::int64_t>(group.row[i]) * task_.k;
-    for (int j = 0; j < task_.k; ++j) {
-      const Found& found = found_[static_cast<std::size_t>(j)];
-      const double distance = j < count ? std::sqrt(found.d2) : std::numeric_limits<double>::infinity();
-      task_.indices[start + j] = j < count ? found.id : task_.missing;
-      if (task_.distances != nullptr) {
-        task_.distances[start + j] = distance;
-      } else {
-        task_.float_distances[start + j] = static_cast<float>(distance);
-      }
-    }
+    write_answer(task_, group.row[i], found_.data(), count);
   }
 
   const BlockTree<T>& tree_;
-  const simd::NearestTask& task_;
+  const Task& task_;
   double largest2_;
   std::vector<Found> found_;
   double last2_ = 0, farthest2_ = 0;  // the largest squared distances to a k-th neighbour, of the last group and this

@@ -139,7 +139,7 @@ struct KdTree::Impl {
     const std::int64_t num_finite = in_tree_order ? blocks.num_points() : static_cast<std::int64_t>(order.size());
     const std::int64_t per_block = std::clamp<std::int64_t>(num_finite / 64 / 16 * 16, 128, 2048);
     parallel_blocks(num_finite, per_block, num_threads, [&](auto, std::int64_t begin, std::int64_t end) {
-      GroupQueries<T> search(blocks, task);
+      GroupQueries search(blocks, task);
       for (std::int64_t first = begin; first < end; first += 16) {
         simd::QueryGroup group;
         group.size = static_cast<int>(std::min<std::int64_t>(16, end - first));

@@ -8,7 +8,7 @@ namespace {
 
 struct Row {
   alignas(64) double d2[most_near];
-  uint32_t id[most_near];
+  uint32_t id[most_near], slot[most_near];
 };
 
 // The exact squared distances of the first candidates in the ranking, put in order.
@@ -27,20 +27,23 @@ NACRE_INLINE void exact_row(const BlockTreeView<T>& tree, const Candidates& cand
     const double d2 = dx * dx + dy * dy + dz * dz;
     row.d2[rank] = d2;
     row.id[rank] = block.id[lane];
+    row.slot[rank] = slot;
     in_order &= last < d2;
     last = d2;
   }
   if (in_order) return;
   for (int rank = 1; rank < count; ++rank) {
     const double d2 = row.d2[rank];
-    const uint32_t id = row.id[rank];
+    const uint32_t id = row.id[rank], slot = row.slot[rank];
     int place = rank;
     for (; place > 0 && (d2 < row.d2[place - 1] || (d2 == row.d2[place - 1] && id < row.id[place - 1])); --place) {
       row.d2[place] = row.d2[place - 1];
       row.id[place] = row.id[place - 1];
+      row.slot[place] = row.slot[place - 1];
     }
     row.d2[place] = d2;
     row.id[place] = id;
+    row.slot[place] = slot;
   }
 }
 
@@ -56,10 +59,42 @@ NACRE_INLINE void write_row(const Row& row, int count, int k, int64_t missing, i
   }
 }
 
+void write(const NearestTask& task, const Row& row, int count, uint32_t to) {
+  const int64_t start = static_cast<int64_t>(to) * task.k;
+  if (task.distances != nullptr) {
+    write_row(row, count, task.k, task.missing, task.indices + start, task.distances + start);
+  } else {
+    write_row(row, count, task.k, task.missing, task.indices + start, task.float_distances + start);
+  }
+}
+
+void write(const NearestSlotsTask& task, const Row& row, int count, uint32_t to) {
+  for (int rank = 0; rank < count; ++rank) task.slots[static_cast<int64_t>(to) * task.k + rank] = row.slot[rank];
+  task.counts[to] = count;
+}
+
+// The rows to write are anywhere in memory: asked for now, they have arrived when the answers are known.
+NACRE_INLINE void prefetch(const void* begin, const void* end) {
+#if !defined(_MSC_VER) || defined(__clang__)
+  for (const char* p = static_cast<const char*>(begin); p < end; p += 64) __builtin_prefetch(p, 1);
+  __builtin_prefetch(static_cast<const char*>(end) - 1, 1);
+#endif
+}
+NACRE_INLINE void prefetch_row(const NearestTask& task, uint32_t row) {
+  const int64_t start = static_cast<int64_t>(row) * task.k;
+  prefetch(task.indices + start, task.indices + start + task.k);
+  if (task.distances != nullptr) {
+    prefetch(task.distances + start, task.distances + start + task.k);
+  } else {
+    prefetch(task.float_distances + start, task.float_distances + start + task.k);
+  }
+}
+NACRE_INLINE void prefetch_row(const NearestSlotsTask&, uint32_t) {}
+
 // Writes the answer if it is certain: everything that was not looked at is farther than the last neighbour, or than the
 // largest distance.
-template <class T>
-NACRE_INLINE bool write_answer(const GroupFrame<T>& frame, const Ranking& ranking, const NearestTask& task, int query,
+template <class T, class Task>
+NACRE_INLINE bool write_answer(const GroupFrame<T>& frame, const Ranking& ranking, const Task& task, int query,
                                int looked_at, const Row& row, QueryGroup& group) {
   if (looked_at < 0) return false;
   int n = looked_at < task.k ? looked_at : task.k;
@@ -69,35 +104,12 @@ NACRE_INLINE bool write_answer(const GroupFrame<T>& frame, const Ranking& rankin
   if (!(last2 * scale * scale < beyond_rank(frame, ranking, query, looked_at))) return false;
   while (n > 0 && row.d2[n - 1] > task.max_distance2) --n;
   if (n == task.k && last2 > group.farthest2) group.farthest2 = last2;
-  const int64_t start = static_cast<int64_t>(group.row[query]) * task.k;
-  if (task.distances != nullptr) {
-    write_row(row, n, task.k, task.missing, task.indices + start, task.distances + start);
-  } else {
-    write_row(row, n, task.k, task.missing, task.indices + start, task.float_distances + start);
-  }
+  write(task, row, n, group.row[query]);
   return true;
 }
 
-// The rows to write are anywhere in memory: asked for now, they have arrived when the answers are known.
-NACRE_INLINE void prefetch_row(const NearestTask& task, uint32_t row) {
-#if !defined(_MSC_VER) || defined(__clang__)
-  const int64_t start = static_cast<int64_t>(row) * task.k;
-  for (int rank = 0; rank < task.k; rank += 8) {
-    __builtin_prefetch(task.indices + start + rank, 1);
-    if (task.distances != nullptr) __builtin_prefetch(task.distances + start + rank, 1);
-  }
-  __builtin_prefetch(task.indices + start + task.k - 1, 1);
-  if (task.distances != nullptr) {
-    __builtin_prefetch(task.distances + start + task.k - 1, 1);
-  } else {
-    for (int rank = 0; rank < task.k; rank += 16) __builtin_prefetch(task.float_distances + start + rank, 1);
-    __builtin_prefetch(task.float_distances + start + task.k - 1, 1);
-  }
-#endif
-}
-
-template <class T>
-void nearest(const BlockTreeView<T>& tree, const NearestTask& task, QueryGroup& group) {
+template <class T, class Task>
+void nearest(const BlockTreeView<T>& tree, const Task& task, QueryGroup& group) {
   group.farthest2 = 0;
   group.crowded = false;
   for (int query = 0; query < group.size; ++query) prefetch_row(task, group.row[query]);
@@ -134,6 +146,13 @@ void nearest_group_f32(const BlockTreeView<float>& tree, const NearestTask& task
   nearest(tree, task, group);
 }
 void nearest_group_f64(const BlockTreeView<double>& tree, const NearestTask& task, QueryGroup& group) {
+  nearest(tree, task, group);
+}
+
+void nearest_slots_f32(const BlockTreeView<float>& tree, const NearestSlotsTask& task, QueryGroup& group) {
+  nearest(tree, task, group);
+}
+void nearest_slots_f64(const BlockTreeView<double>& tree, const NearestSlotsTask& task, QueryGroup& group) {
   nearest(tree, task, group);
 }
 

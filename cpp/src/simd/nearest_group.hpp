@@ -20,6 +20,14 @@ struct NearestTask {
   float* float_distances;
 };
 
+// The same for those who go on with the neighbours: their places in the tree, k entries for each row, and how many.
+struct NearestSlotsTask {
+  int k;
+  double max_distance2;
+  uint32_t* slots;
+  int* counts;
+};
+
 struct QueryGroup {
   double p[3][16];
   uint32_t row[16];
@@ -35,5 +43,10 @@ template <class T>
 using NearestGroup = void(const BlockTreeView<T>& tree, const NearestTask& task, QueryGroup& group);
 NACRE_DECLARE_KERNEL(NearestGroup<float>, nearest_group_f32)
 NACRE_DECLARE_KERNEL(NearestGroup<double>, nearest_group_f64)
+
+template <class T>
+using NearestSlots = void(const BlockTreeView<T>& tree, const NearestSlotsTask& task, QueryGroup& group);
+NACRE_DECLARE_KERNEL(NearestSlots<float>, nearest_slots_f32)
+NACRE_DECLARE_KERNEL(NearestSlots<double>, nearest_slots_f64)
 
 }  // namespace nacre::simd
