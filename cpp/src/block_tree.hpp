@@ -3,13 +3,16 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
 #include "buffer.hpp"
 #include "simd/block_layout.hpp"
+#include "simd/near_points.hpp"
 
 namespace nacre {
 
@@ -39,6 +42,7 @@ inline double squared_bound(double distance) {
 // The k nearest within a distance, sorted, in the caller's memory.
 class KNearest {
  public:
+  static constexpr bool bound_shrinks = true;
   KNearest(int k, double bound_d2, Found* found)
       : bound_{bound_d2, no_id, no_id}, begin_(found), end_(found), full_(found + k) {}
   int size() const { return static_cast<int>(end_ - begin_); }
@@ -60,6 +64,7 @@ class KNearest {
 // Everything within a distance, unsorted.
 class WithinRadius {
  public:
+  static constexpr bool bound_shrinks = false;
   WithinRadius(double bound_d2, std::vector<Found>& found) : bound_{bound_d2, no_id, no_id}, found_(found) {}
   const Found& bound() const { return bound_; }
   void add(const Found& point) {
@@ -87,18 +92,19 @@ class BlockTree {
   }
   const BlockTreeView<T>& view() const { return view_; }
 
-  // Shows results.add() every point that may be within results.bound(), mostly near ones first.
+  // Shows results.add() every point that may be within results.bound().
   template <class Results>
   void search(const Eigen::Vector3d& query, Results& results) const;
 
  private:
-  using Lanes = Eigen::Array<T, group_boxes, 1>;
-  using LanesMap = Eigen::Map<const Lanes, Eigen::Aligned16>;
-
   void build_blocks(const T* points, std::int64_t count, int num_threads);
   void build_groups(int num_threads);
-  static Lanes squared_distances(const BoxGroup<T>& group, const T* q);
-  static Lanes squared_distances(const PointBlock<T>& block, const T* q);
+  template <class Results>
+  bool search_within_bound(const Eigen::Vector3d& query, Results& results) const;
+  template <class Results>
+  void search_nearest_first(const Eigen::Vector3d& query, Results& results) const;
+  template <class Results>
+  void show(const Eigen::Vector3d& query, std::uint32_t slot, Results& results) const;
   static Found nearest_possible(const BoxGroup<T>& group, int lane, const Eigen::Vector3d& query);
 
   std::int64_t num_points_ = 0;
@@ -117,27 +123,51 @@ Found BlockTree<T>::nearest_possible(const BoxGroup<T>& group, int lane, const E
   return {outside[0] * outside[0] + outside[1] * outside[1] + outside[2] * outside[2], group.first_id[lane], no_id};
 }
 
-// The sum over the axes of max(0, lo - q, q - hi)^2.
 template <class T>
-typename BlockTree<T>::Lanes BlockTree<T>::squared_distances(const BoxGroup<T>& group, const T* q) {
-  const auto gap = [&](int axis) {
-    return (LanesMap(group.lo[axis]) - q[axis]).max(q[axis] - LanesMap(group.hi[axis])).max(T(0));
-  };
-  return gap(0).square() + gap(1).square() + gap(2).square();
+template <class Results>
+void BlockTree<T>::search(const Eigen::Vector3d& query, Results& results) const {
+  if (num_points_ == 0 || !query.allFinite()) return;
+  if (Results::bound_shrinks || !search_within_bound(query, results)) search_nearest_first(query, results);
 }
 
 template <class T>
-typename BlockTree<T>::Lanes BlockTree<T>::squared_distances(const PointBlock<T>& block, const T* q) {
-  const auto step = [&](int axis) { return q[axis] - LanesMap(block.p[axis]); };
-  return step(0).square() + step(1).square() + step(2).square();
+template <class Results>
+void BlockTree<T>::show(const Eigen::Vector3d& query, std::uint32_t slot, Results& results) const {
+  const PointBlock<T>& block = blocks_[slot / block_points];
+  const auto lane = slot % block_points;
+  const double x = block.p[0][lane] - query.x(), y = block.p[1][lane] - query.y(), z = block.p[2][lane] - query.z();
+  results.add({x * x + y * y + z * z, block.id[lane], slot});
+}
+
+// False where there are too many points within it.
+template <class T>
+template <class Results>
+bool BlockTree<T>::search_within_bound(const Eigen::Vector3d& query, Results& results) const {
+  std::uint32_t slots[simd::most_near_points + 16];
+  int size;
+  if constexpr (std::is_same_v<T, float>) {
+    size = simd::near_points_f32()(view_, query.data(), results.bound().d2, slots);
+  } else {
+    size = simd::near_points_f64()(view_, query.data(), results.bound().d2, slots);
+  }
+  for (int i = 0; i < size; ++i) show(query, slots[i], results);
+  return size >= 0;
 }
 
 // Filters in the precision of the coordinates and decides in double: a lane passes where its distance in T is not above
 // a slightly enlarged bound, then its exact distance is compared.
 template <class T>
 template <class Results>
-void BlockTree<T>::search(const Eigen::Vector3d& query, Results& results) const {
-  if (num_points_ == 0 || !query.allFinite()) return;
+void BlockTree<T>::search_nearest_first(const Eigen::Vector3d& query, Results& results) const {
+  simd::NearBoxes<T>* near_boxes;
+  simd::PointDistances<T>* point_distances;
+  if constexpr (std::is_same_v<T, float>) {
+    near_boxes = simd::near_boxes_f32();
+    point_distances = simd::point_distances_f32();
+  } else {
+    near_boxes = simd::near_boxes_f64();
+    point_distances = simd::point_distances_f64();
+  }
   const T q[3] = {static_cast<T>(query.x()), static_cast<T>(query.y()), static_cast<T>(query.z())};
 
   // A point at distance d of the query is at most d + e from q, e being the query's rounding, and for any s > 0
@@ -152,43 +182,34 @@ void BlockTree<T>::search(const Eigen::Vector3d& query, Results& results) const 
   };
   tighten();
 
-  // The boxes still to visit, nearest on top; opening one adds up to 15 more.
-  struct Visit {
-    T d2;
-    int level;  // of its group
-    std::uint32_t box;
-  };
-  Visit visits[BlockTreeView<T>::most_levels * (group_boxes - 1) + 1];
+  // The boxes still to visit, the nearest of each group on top of the others; opening one adds up to 15 more.
+  // Above its number is a box's level.
+  constexpr int level_bits = 28, room = BlockTreeView<T>::most_levels * (group_boxes - 1) + 1 + group_boxes;
+  T distances[room];
+  std::uint32_t boxes[room];
   int size = 0;
   const auto open = [&](int level, std::uint32_t number) {
-    const Lanes d2 = squared_distances(view_.levels[level][number], q);
-    const int bottom = size;
-    for (int lane = 0; lane < group_boxes; ++lane) {
-      if (!(d2[lane] <= limit)) continue;
-      int place = size++;
-      for (; place > bottom && visits[place - 1].d2 <= d2[lane]; --place) visits[place] = visits[place - 1];
-      visits[place] = {d2[lane], level, number * group_boxes + static_cast<std::uint32_t>(lane)};
-    }
+    const auto first = static_cast<std::uint32_t>(level) << level_bits | number * group_boxes;
+    size += near_boxes(view_.levels[level][number], q, limit, first, boxes + size, distances + size);
   };
 
   open(view_.num_levels - 1, 0);
   while (size > 0) {
-    const Visit visit = visits[--size];
-    if (visit.d2 > limit) continue;
-    if (visit.d2 >= tie) {
-      const BoxGroup<T>& group = view_.levels[visit.level][visit.box / group_boxes];
-      if (!(nearest_possible(group, static_cast<int>(visit.box % group_boxes), query) < results.bound())) continue;
+    --size;
+    const T distance = distances[size];
+    if (distance > limit) continue;
+    const auto level = static_cast<int>(boxes[size] >> level_bits);
+    const std::uint32_t box = boxes[size] & ((1U << level_bits) - 1);
+    if (distance >= tie) {
+      const BoxGroup<T>& group = view_.levels[level][box / group_boxes];
+      if (!(nearest_possible(group, static_cast<int>(box % group_boxes), query) < results.bound())) continue;
     }
-    if (visit.level > 0) {
-      open(visit.level - 1, visit.box);
+    if (level > 0) {
+      open(level - 1, box);
       continue;
     }
-    const PointBlock<T>& block = blocks_[visit.box];
-    const Lanes d2 = squared_distances(block, q);
-    for (int lane = 0; lane < block_points; ++lane) {
-      if (!(d2[lane] <= limit)) continue;
-      const double x = block.p[0][lane] - query.x(), y = block.p[1][lane] - query.y(), z = block.p[2][lane] - query.z();
-      results.add({x * x + y * y + z * z, block.id[lane], visit.box * block_points + static_cast<std::uint32_t>(lane)});
+    for (unsigned mask = point_distances(blocks_[box], q, limit); mask != 0; mask &= mask - 1) {
+      show(query, box * block_points + static_cast<std::uint32_t>(simd::lowest_bit(mask)), results);
     }
     tighten();
   }

@@ -79,7 +79,7 @@ SpatialOrder<T>::SpatialOrder(const T* points, std::int64_t count, int num_threa
     widen_box(points + 3 * begin, end - begin, boxes[static_cast<std::size_t>(chunk)]);
   });
   CurveBox<T> box = empty_box<T>();
-  for (const CurveBox<T>& part : boxes) widen_box(part.lo, 2, box);  // its two corners
+  for (const CurveBox<T>& part : boxes) widen_box(part.lo, 2, box);  // by two corners
   const CurveCube<T> cube = cube_around(box);
 
   int stretch_bits = 0;

@@ -13,33 +13,41 @@ constexpr int width = 16;
 constexpr int axis_bits = curve_bits / 3;
 
 template <class T>
-void widen(const T* points, int64_t count, CurveBox<T>& box) {
-  // 16 rows are 48 numbers; number i belongs to axis i % 3.
-  constexpr int period = 3 * width;
-  T lo[period], hi[period];
-  for (int i = 0; i < period; ++i) {
-    lo[i] = box.lo[i % 3];
-    hi[i] = box.hi[i % 3];
+NACRE_INLINE void widen_by_16(const T* points, T (&lo)[3][width], T (&hi)[3][width]) {
+  for (int i = 0; i < width; ++i) {
+    const T x = points[3 * i], y = points[3 * i + 1], z = points[3 * i + 2];
+    const bool finite = (x - x) + (y - y) + (z - z) == 0;
+    lo[0][i] = finite && x < lo[0][i] ? x : lo[0][i];
+    lo[1][i] = finite && y < lo[1][i] ? y : lo[1][i];
+    lo[2][i] = finite && z < lo[2][i] ? z : lo[2][i];
+    hi[0][i] = finite && x > hi[0][i] ? x : hi[0][i];
+    hi[1][i] = finite && y > hi[1][i] ? y : hi[1][i];
+    hi[2][i] = finite && z > hi[2][i] ? z : hi[2][i];
   }
-  const int64_t size = 3 * count;
-  int64_t start = 0;
-  for (; start + period <= size; start += period) {
-    for (int i = 0; i < period; ++i) {
-      const T v = points[start + i];
-      const bool finite = v - v == 0;
-      lo[i] = finite && v < lo[i] ? v : lo[i];
-      hi[i] = finite && v > hi[i] ? v : hi[i];
+}
+
+template <class T>
+void widen(const T* points, int64_t count, CurveBox<T>& box) {
+  T lo[3][width], hi[3][width];
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int i = 0; i < width; ++i) {
+      lo[axis][i] = box.lo[axis];
+      hi[axis][i] = box.hi[axis];
     }
   }
-  for (int i = 0; start + i < size; ++i) {
-    const T v = points[start + i];
-    const bool finite = v - v == 0;
-    lo[i] = finite && v < lo[i] ? v : lo[i];
-    hi[i] = finite && v > hi[i] ? v : hi[i];
+  int64_t start = 0;
+  for (; start + width <= count; start += width) widen_by_16(points + 3 * start, lo, hi);
+  if (start < count) {
+    T rest[3 * width];
+    for (T& missing : rest) missing = NAN;
+    memcpy(rest, points + 3 * start, 3 * static_cast<size_t>(count - start) * sizeof(T));
+    widen_by_16(rest, lo, hi);
   }
-  for (int i = 0; i < period; ++i) {
-    box.lo[i % 3] = lo[i] < box.lo[i % 3] ? lo[i] : box.lo[i % 3];
-    box.hi[i % 3] = hi[i] > box.hi[i % 3] ? hi[i] : box.hi[i % 3];
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int i = 0; i < width; ++i) {
+      box.lo[axis] = lo[axis][i] < box.lo[axis] ? lo[axis][i] : box.lo[axis];
+      box.hi[axis] = hi[axis][i] > box.hi[axis] ? hi[axis][i] : box.hi[axis];
+    }
   }
 }
 

@@ -10,7 +10,7 @@ namespace nacre::simd {
 constexpr int curve_bits = 30;  // 10 an axis
 constexpr uint32_t no_key = 0xFFFFFFFF;
 
-// The box of finite coordinates; infinity to -infinity where there are none.
+// A box of points; infinity to -infinity without any.
 template <class T>
 struct CurveBox {
   T lo[3], hi[3];
@@ -22,7 +22,7 @@ struct CurveCube {
   T lo[3], cells_per_unit;
 };
 
-// Widens the box by `count` rows of three coordinates.
+// Widens the box by those of `count` rows whose three coordinates are finite.
 template <class T>
 using WidenBox = void(const T* points, int64_t count, CurveBox<T>& box);
 NACRE_DECLARE_KERNEL(WidenBox<float>, widen_box_f32)

@@ -29,16 +29,40 @@ struct GroupFrame {
   alignas(64) float q[3][group_queries];
 };
 
+// The power of 2 that brings a square to 2^19 or up to four times that.
+NACRE_INLINE double scale_for(double square) {
+  int64_t bits;
+  memcpy(&bits, &square, sizeof bits);
+  const int64_t exponent = (bits >> 52) - 1023;  // square = 2^exponent to below twice that
+  bits = (1023 + ((20 - exponent) >> 1)) << 52;
+  double scale;
+  memcpy(&scale, &bits, sizeof scale);
+  return scale;
+}
+
+template <class T>
+NACRE_INLINE bool is_in_range(double square) {
+  constexpr bool is_double = sizeof(T) == 8;
+  return square > (is_double ? 1e-280 : 1e-60) && square < (is_double ? 1e280 : 1e60);
+}
+
+// Every local coordinate within reach has an error of at most 2 units in the last place of half + radius; an error e of
+// a distance is one of 2 d e + e^2 of its square.
+template <class T>
+NACRE_INLINE void set_reach(double radius2, float squared_half, GroupFrame<T>& frame) {
+  frame.radius2 = static_cast<float>(radius2);
+  const float radius = sqrtf(frame.radius2), extent = sqrtf(squared_half) + 2.0F * radius;
+  const float error = 2.5e-7F * extent, reach = radius + 1e-6F * extent;
+  frame.reach2 = reach * reach;
+  frame.margin = (2.0F * radius + error) * error + 3e-7F * frame.radius2;
+}
+
 // Lays out the frame of the first queries; false where radius2 is beyond what the kernels handle.
 template <class T>
 NACRE_INLINE bool make_frame(const double (&queries)[3][group_queries], int size, double radius2,
                              GroupFrame<T>& frame) {
-  const bool is_double = sizeof(T) == 8;
-  if (!(radius2 > (is_double ? 1e-280 : 1e-60) && radius2 < (is_double ? 1e280 : 1e60))) return false;
-  int exponent;
-  frexp(radius2, &exponent);
-  const double scale = ldexp(1.0, (exponent < 21 ? 21 - exponent : 20 - exponent) / 2);
-  const double local2 = radius2 * scale * scale;
+  if (!is_in_range<T>(radius2)) return false;
+  const double scale = scale_for(radius2);
   float squared_half = 0.0F;
   for (int axis = 0; axis < 3; ++axis) {
     double q[group_queries], lo[8], hi[8];
@@ -64,17 +88,32 @@ NACRE_INLINE bool make_frame(const double (&queries)[3][group_queries], int size
     frame.half[axis] = half;
     squared_half += half * half;
   }
-  // Every local coordinate within reach has an error of at most 2 units in the last place of half + radius, an error e
-  // of a distance is one of 2 d e + e^2 of its square.
-  const float radius = sqrtf(static_cast<float>(local2)), extent = sqrtf(squared_half) + 2.0F * radius;
-  const float error = 2.5e-7F * extent, reach = radius + 1e-6F * extent;
+  set_reach(radius2 * scale * scale, squared_half, frame);
   frame.scale = static_cast<T>(scale);
-  frame.radius2 = static_cast<float>(local2);
-  frame.reach2 = reach * reach;
-  frame.margin = (2.0F * radius + error) * error + 3e-7F * frame.radius2;
-  return extent < 1e15F;
+  return squared_half < 1e30F;
 }
 
+// Lays out the frame of one query.
+template <class T>
+NACRE_INLINE bool make_frame(const double* query, double radius2, GroupFrame<T>& frame) {
+  if (!is_in_range<T>(radius2)) return false;
+  const double scale = scale_for(radius2);
+  float squared_half = 0.0F;
+  for (int axis = 0; axis < 3; ++axis) {
+    frame.origin[axis] = static_cast<T>(query[axis]);
+    frame.q[axis][0] = static_cast<float>((query[axis] - static_cast<double>(frame.origin[axis])) * scale);
+    frame.half[axis] = fabsf(frame.q[axis][0]);
+    squared_half += frame.half[axis] * frame.half[axis];
+  }
+  set_reach(radius2 * scale * scale, squared_half, frame);
+  frame.scale = static_cast<T>(scale);
+  return squared_half < 1e30F;
+}
+
+// What to collect of a point besides its place.
+enum class Position { local, own, none };
+
+// In order of their places in the tree.
 struct Candidates {
   alignas(64) float p[3][most_candidates + 16];
   alignas(64) int32_t slot[most_candidates + 16];
@@ -98,7 +137,7 @@ NACRE_INLINE F32 local_lanes(const double* p, double origin, double scale) {
 }
 
 // Collects the points within reach of the queries' box; false where there are too many.
-template <class T>
+template <Position position, class T>
 NACRE_INLINE bool collect(const BlockTreeView<T>& tree, const GroupFrame<T>& frame, Candidates& out) {
   constexpr int most_boxes = 512;
   int32_t lists[2][most_boxes + group_boxes];
@@ -144,14 +183,19 @@ NACRE_INLINE bool collect(const BlockTreeView<T>& tree, const GroupFrame<T>& fra
         d2 += gap * gap;
       }
       const Mask near = (d2 <= reach2) & (p[0] == p[0]);
-      for (int axis = 0; axis < 3; ++axis) store_chosen(out.p[axis] + n, near, p[axis]);
+      for (int axis = 0; axis < 3; ++axis) {
+        if constexpr (position == Position::local) store_chosen(out.p[axis] + n, near, p[axis]);
+        if constexpr (position == Position::own) store_chosen(out.p[axis] + n, near, load(block.p[axis] + lane));
+      }
       store_chosen(out.slot + n, near, lane_numbers() + broadcast(boxes[i] * block_points + lane));
       n += simd::NACRE_ISA::count(near);
     }
     if (n > most_candidates) return false;
   }
   out.count = n;
-  for (int lane = 0; lane < 16; lane += lanes) store(out.p[0] + n + lane, broadcast(1e18F));
+  if constexpr (position == Position::local) {
+    for (int lane = 0; lane < 16; lane += lanes) store(out.p[0] + n + lane, broadcast(1e18F));
+  }
   return true;
 }
 

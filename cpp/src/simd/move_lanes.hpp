@@ -5,15 +5,16 @@
 
 namespace nacre::simd::NACRE_ISA {
 
-NACRE_INLINE int count(Mask m) {
+NACRE_INLINE int count_bits(unsigned mask) {
 #if defined(_MSC_VER) && !defined(__clang__)
   int n = 0;
-  for (unsigned b = bits(m); b != 0; b &= b - 1) ++n;
+  for (; mask != 0; mask &= mask - 1) ++n;
   return n;
 #else
-  return __builtin_popcount(bits(m));
+  return __builtin_popcount(mask);
 #endif
 }
+NACRE_INLINE int count(Mask m) { return count_bits(bits(m)); }
 
 // 0, 1, 2, ...
 NACRE_INLINE I32 lane_numbers() {
@@ -25,6 +26,8 @@ NACRE_INLINE I32 lane_numbers() {
 
 NACRE_INLINE I32 min(I32 a, I32 b) { return {_mm512_min_epi32(a.v, b.v)}; }
 NACRE_INLINE I32 max(I32 a, I32 b) { return {_mm512_max_epi32(a.v, b.v)}; }
+
+NACRE_INLINE int32_t least_lane(I32 a) { return _mm512_reduce_min_epi32(a.v); }
 
 // The chosen lanes, one after the other; what follows them, up to a vector in all, is overwritten. (In a register
 // first: compressing to memory is slow on some processors.)
@@ -65,6 +68,12 @@ NACRE_INLINE void transpose(const int32_t* rows, ptrdiff_t row_stride, int32_t* 
 NACRE_INLINE I32 min(I32 a, I32 b) { return {_mm256_min_epi32(a.v, b.v)}; }
 NACRE_INLINE I32 max(I32 a, I32 b) { return {_mm256_max_epi32(a.v, b.v)}; }
 
+NACRE_INLINE int32_t least_lane(I32 a) {
+  __m128i four = _mm_min_epi32(_mm256_castsi256_si128(a.v), _mm256_extracti128_si256(a.v, 1));
+  four = _mm_min_epi32(four, _mm_shuffle_epi32(four, 0x4E));
+  return _mm_cvtsi128_si32(_mm_min_epi32(four, _mm_shuffle_epi32(four, 0xB1)));
+}
+
 // The n-th byte is the place of the n-th bit that is set.
 NACRE_INLINE __m256i chosen_lanes(Mask m) {
   const uint64_t whole = _pdep_u64(bits(m), 0x0101010101010101U) * 0xFF;
@@ -101,6 +110,13 @@ NACRE_INLINE void transpose(const int32_t* rows, ptrdiff_t row_stride, int32_t* 
 NACRE_INLINE I32 min(I32 a, I32 b) { return select(a < b, a, b); }
 NACRE_INLINE I32 max(I32 a, I32 b) { return select(a < b, b, a); }
 
+NACRE_INLINE int32_t least_lane(I32 a) {
+  int32_t values[lanes];
+  store(values, a);
+  for (int i = 1; i < lanes; ++i) values[0] = values[i] < values[0] ? values[i] : values[0];
+  return values[0];
+}
+
 template <class Value, class Vector>
 NACRE_INLINE void store_chosen_lanes(Value* p, Mask m, Vector a) {
   Value values[lanes];
@@ -120,5 +136,13 @@ NACRE_INLINE void transpose(const int32_t* rows, ptrdiff_t row_stride, int32_t* 
 }
 
 #endif
+
+// Of numbers that are not negative, whose bits are in their order.
+NACRE_INLINE float least_of(F32 a) {
+  const int32_t least_bits = least_lane(as_int(a));
+  float least;
+  memcpy(&least, &least_bits, sizeof least);
+  return least;
+}
 
 }  // namespace nacre::simd::NACRE_ISA

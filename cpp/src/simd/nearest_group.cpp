@@ -116,7 +116,7 @@ void nearest(const BlockTreeView<T>& tree, const Task& task, QueryGroup& group) 
   GroupFrame<T> frame;
   if (!make_frame(group.p, group.size, group.radius2, frame)) return;
   Candidates candidates;
-  if (!collect(tree, frame, candidates)) {
+  if (!collect<Position::local>(tree, frame, candidates)) {
     group.crowded = true;
     return;
   }
