@@ -10,6 +10,8 @@ namespace nacre {
 namespace {
 
 constexpr std::int64_t block_size = 2048;
+constexpr double damping = 1e-9;          // information per pair, so that there always is a solution
+constexpr double unknown_chance = 0.008;  // information that normals off by 5 degrees feign
 
 struct Centroids {
   double weight = 0.0, squares = 0.0, weighted_squares = 0.0;
@@ -46,17 +48,30 @@ Centroids sum_centroids(const std::vector<Pair>& pairs, Metric metric, int num_t
 struct NormalEquations {
   Matrix6 hessian = Matrix6::Zero();
   Vector6 gradient = Vector6::Zero();
+  Matrix6 chance = Matrix6::Zero();                      // the part of the hessian that noise in the normals feigns
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // sum of w q~ p~^T
 
   NormalEquations& operator+=(const NormalEquations& other) {
     hessian += other.hessian;
     gradient += other.gradient;
+    chance += other.chance;
     covariance += other.covariance;
     return *this;
   }
   void add(const Vector6& row, double right_side, double weight) {
     hessian.noalias() += weight * row * row.transpose();
     gradient.noalias() += weight * right_side * row;
+  }
+  // With rows c(n) for a normal n, normals n +- d of the two points whose errors are independent agree on
+  // c(n + d) c(n - d)^T, symmetrised c(n) c(n)^T - c(d) c(d)^T: noise cancels there and not in c(n) c(n)^T.
+  void add_chance(const Eigen::Vector3d& place, double extent, const Pair& pair) {
+    if (!pair.half_difference.allFinite()) {
+      chance.diagonal().array() += unknown_chance * pair.weight;
+      return;
+    }
+    Vector6 row;
+    row << place.cross(pair.half_difference) / extent, pair.half_difference;
+    chance.noalias() += pair.weight * row * row.transpose();
   }
 };
 
@@ -85,10 +100,12 @@ NormalEquations build_equations(const std::vector<Pair>& pairs, Metric metric, c
         sum.add(row, (pair.q - pair.p).dot(pair.normal), pair.weight);
       } else {
         // Rusinkiewicz 2019, eq. 9, with the total rotation 2 a~ as the unknown.
+        const Eigen::Vector3d middle = 0.5 * (p + q);
         Vector6 row;
-        row << (0.5 * (p + q)).cross(pair.normal) / extent, pair.normal;
+        row << middle.cross(pair.normal) / extent, pair.normal;
         sum.add(row, (pair.q - pair.p).dot(pair.normal), pair.weight);
       }
+      sum.add_chance(0.5 * (p + q), extent, pair);
     }
     return sum;
   });
@@ -133,29 +150,23 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   const double extent = std::sqrt(std::max(squared_extent / sums.weight, 1e-24));
 
   const NormalEquations equations = build_equations(pairs, metric, p_mean, q_mean, extent, num_threads);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(equations.hessian);
-  Vector6 solution = Vector6::Zero();
-  std::vector<int> weak;
-  for (int i = 0; i < 6; ++i) {
-    const Vector6 direction = eigen.eigenvectors().col(i);
-    if (eigen.eigenvalues()[i] < weak_threshold * sums.weight) {
-      weak.push_back(i);
-    } else {
-      solution += direction * (direction.dot(equations.gradient) / eigen.eigenvalues()[i]);
-    }
-  }
-  step.weak_directions.resize(6, static_cast<Eigen::Index>(weak.size()));
-  for (std::size_t i = 0; i < weak.size(); ++i) {
-    step.weak_directions.col(static_cast<Eigen::Index>(i)) = eigen.eigenvectors().col(weak[i]);
-  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(equations.hessian - equations.chance);
+  const Eigen::Index num_weak =
+      weak_threshold > 0.0 ? (eigen.eigenvalues().array() < weak_threshold * sums.weight).count() : 0;
+  step.weak_directions = eigen.eigenvectors().leftCols(num_weak);
+  const Eigen::Matrix<double, 6, Eigen::Dynamic> sure = eigen.eigenvectors().rightCols(6 - num_weak);
+  Matrix6 damped = equations.hessian;
+  damped.diagonal().array() += damping * sums.weight;
+  const Vector6 solution =
+      sure * (sure.transpose() * damped * sure).ldlt().solve(sure.transpose() * equations.gradient);
   Vector6 scale;
   scale << extent, extent, extent, 1.0, 1.0, 1.0;
   step.hessian = scale.asDiagonal() * equations.hessian * scale.asDiagonal();
 
   const Eigen::Vector3d rotation_vector = solution.head<3>() / extent, translation = solution.tail<3>();
-  if (metric == Metric::point_to_point && weak.empty()) {
+  if (metric == Metric::point_to_point && num_weak == 0) {
     step.motion = motion_about(p_mean, closest_rotation(equations.covariance), q_mean);
-  } else if (metric == Metric::symmetric && weak.empty()) {
+  } else if (metric == Metric::symmetric && num_weak == 0) {
     // Rusinkiewicz 2019, section 3: half the rotation, the translation t cos(theta), half the rotation.
     const double half_angle = std::atan(0.5 * rotation_vector.norm());
     const Eigen::Matrix3d half = rotation(rotation_vector, half_angle);

@@ -10,7 +10,8 @@ namespace nacre {
 // A source point p, already moved, and the target point q that it is matched with.
 struct Pair {
   Eigen::Vector3d p, q;
-  Eigen::Vector3d normal;  // direction along which the residual counts; not used by point_to_point
+  Eigen::Vector3d normal;           // direction along which the residual counts; not used by point_to_point
+  Eigen::Vector3d half_difference;  // of the two points' normals; NaN where only one is known
   double weight;
 };
 
@@ -29,8 +30,8 @@ struct IcpStep {
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  // scaled unit twists about center
 };
 
-// Directions whose eigenvalue per unit of weight, with rotations in units of the pairs' extent, is below weak_threshold
-// do not move.
+// Directions in which the normals of source and target agree on less information than weak_threshold, per unit of
+// weight and with rotations in units of the pairs' extent, do not move.
 IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, int num_threads);
 
 }  // namespace nacre

@@ -79,6 +79,7 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.registration.keep_best = true;
   options.registration.robust = false;
   options.registration.coarse_samples = 0;
+  options.registration.max_points = 0;
   options.registration.max_samples = 0;
   options.registration.weak_threshold = 0.0;
   options.fold_in = FoldIn::wlop;
@@ -119,6 +120,7 @@ void ModelOptions::check() const {
 struct Model::Impl {
   Camera camera;
   ModelOptions options;  // what the first frame decides is filled in
+  SurfaceObserver observer{camera, options.fusion};  // of the newest frame
   PointModel cloud;
   std::vector<FrameReport> reports;
   std::vector<Pose> poses;  // of the registered frames, oldest first
@@ -134,10 +136,10 @@ struct Model::Impl {
   }
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
-  TrackingResult locate(const Frame& frame, const SurfaceObserver& observer, const FrameExtras& extras) const;
+  TrackingResult locate(const Frame& frame, const FrameExtras& extras) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   std::vector<Pose> key_poses() const;
-  void fold_in(const Frame& frame, const SurfaceObserver& observer, FrameReport& report);
+  void fold_in(const Frame& frame, FrameReport& report);
 };
 
 // The loop: clean the image, make points of it, register them to the model, fold them in, renew the normals.
@@ -157,10 +159,10 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   const Frame frame = make_frame(clean, camera, noise, options.num_threads);
   if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
   const ColorsRef colors(extras.colors);
-  const SurfaceObserver observer(frame, camera, options.fusion, colors, options.num_threads);
+  observer.look_at(frame, colors, options.num_threads);
   report.milliseconds.back_project = watch.lap();
 
-  const TrackingResult tracking = locate(frame, observer, extras);
+  const TrackingResult tracking = locate(frame, extras);
   report.status = tracking.status;
   report.reason = tracking.reason;
   report.world_from_camera = tracking.alignment.target_from_source;
@@ -178,7 +180,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     poses.push_back(report.world_from_camera);
     if (report.status == FrameStatus::tracked) {
       if (was_lost) report.status = FrameStatus::relocalised;
-      fold_in(frame, observer, report);
+      fold_in(frame, report);
     }
   }
   was_lost = report.status == FrameStatus::lost && !poses.empty();
@@ -190,8 +192,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   return report;
 }
 
-TrackingResult Model::Impl::locate(const Frame& frame, const SurfaceObserver& observer,
-                                   const FrameExtras& extras) const {
+TrackingResult Model::Impl::locate(const Frame& frame, const FrameExtras& extras) const {
   TrackingResult result;
   result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
   if (frame.valid.size() < least_pixels) {
@@ -205,7 +206,7 @@ TrackingResult Model::Impl::locate(const Frame& frame, const SurfaceObserver& ob
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), key_poses(), was_lost, options);
+  return track(cloud, frame, camera, observer, guesses(extras), key_poses(), was_lost, spacing, options);
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
@@ -232,7 +233,7 @@ std::vector<Pose> Model::Impl::key_poses() const {
   return chosen;
 }
 
-void Model::Impl::fold_in(const Frame& frame, const SurfaceObserver& observer, FrameReport& report) {
+void Model::Impl::fold_in(const Frame& frame, FrameReport& report) {
   StopWatch watch;
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
   if (options.fold_in != FoldIn::fuse) {

@@ -41,19 +41,16 @@ double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double
 // few points; then it stays, and the points become more until the pose is at rest.
 class Schedule {
  public:
-  Schedule(const IcpTarget& target, const IcpSource& source, const AlignOptions& options)
-      : options_(options), source_(source) {
+  Schedule(const IcpTarget& target, const IcpSource& source, const AlignOptions& options, double last_residual)
+      : options_(options), source_(source), last_residual_(last_residual) {
     first_ = options.max_distance > 0.0 ? options.max_distance : 0.25 * target.diameter();
     smallest_ = options.final_distance > 0.0 ? options.final_distance : 2.5 * target.spacing();
-    const std::size_t all = source.order.size();
-    const std::size_t few = options.coarse_samples > 0 ? static_cast<std::size_t>(options.coarse_samples) : all;
-    levels_ = {std::min(few, all), std::min(5 * few, all), all};
     set_level(0);
     update_gate(0.0);
   }
 
   const Gate& gate() const { return gate_; }
-  const std::vector<std::int32_t>& samples() const { return samples_; }
+  std::int64_t num_samples() const { return source_.levels[level_]; }
 
   // After a step: returns false when the pose is at rest with the last gate and all points.
   bool advance(double step_size, double residual_scale, double resting_size) {
@@ -62,23 +59,21 @@ class Schedule {
     const bool shrinking = !at_smallest_;
     update_gate(residual_scale);
     if (shrinking) return true;
-    const bool is_last = level_ + 1 == levels_.size();
+    const bool is_last = level_ + 1 == source_.levels.size();
     const bool at_rest = step_size < resting_size;
     if (at_rest && is_last) return false;
-    if (!is_last && (at_rest || iterations_at_level_ >= 4)) set_level(level_ + 1);
+    if (!is_last && (at_rest || iterations_at_level_ >= 8)) set_level(level_ + 1);
     return true;
   }
 
   // The last gate with all points, to judge the final pose.
-  void finish() { set_level(levels_.size() - 1); }
+  void finish() { set_level(source_.levels.size() - 1); }
 
  private:
   void set_level(std::size_t level) {
-    while (level + 1 < levels_.size() && levels_[level + 1] == levels_[level]) ++level;
+    while (level + 1 < source_.levels.size() && source_.levels[level + 1] == source_.levels[level]) ++level;
     level_ = level;
     iterations_at_level_ = 0;
-    samples_.assign(source_.order.begin(), source_.order.begin() + static_cast<std::ptrdiff_t>(levels_[level]));
-    std::sort(samples_.begin(), samples_.end());  // neighbours in memory are neighbours in space
   }
 
   void update_gate(double residual_scale) {
@@ -87,6 +82,7 @@ class Schedule {
     const double decayed = first_ * std::pow(options_.gate_decay, iteration_);
     gate_.distance = std::max(smallest, decayed);
     at_smallest_ = options_.gate_decay >= 1.0 || decayed <= smallest;
+    gate_.residual = at_smallest_ ? last_residual_ : std::numeric_limits<double>::infinity();
     // Normals of a source that is still far off may differ by a third more.
     const double widening = options_.gate_decay < 1.0 ? gate_.distance / first_ / 3.0 : 0.0;
     const double angle = options_.max_angle * (1.0 + widening);
@@ -95,13 +91,12 @@ class Schedule {
 
   const AlignOptions& options_;
   const IcpSource& source_;
-  std::vector<std::size_t> levels_;
   std::size_t level_ = 0;
   int iteration_ = 0, iterations_at_level_ = 0;
   double first_ = 0.0, smallest_ = 0.0;
   bool at_smallest_ = false;
-  Gate gate_{0.0, -1.0};
-  std::vector<std::int32_t> samples_;
+  double last_residual_;
+  Gate gate_{};
 };
 
 double rmse_of(const std::vector<Pair>& pairs, Metric metric) {
@@ -110,7 +105,60 @@ double rmse_of(const std::vector<Pair>& pairs, Metric metric) {
   return std::sqrt(squares / static_cast<double>(pairs.size()));
 }
 
-std::size_t least_pairs(std::size_t num_samples) { return std::max<std::size_t>(6, num_samples / 100); }
+std::size_t least_pairs(std::int64_t num_samples) {
+  return static_cast<std::size_t>(std::max<std::int64_t>(6, num_samples / 100));
+}
+
+// hold_weak: whether directions that the pairs do not determine stay as they are in each step.
+AlignResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
+                    double last_residual, bool hold_weak) {
+  AlignResult result;
+  result.target_from_source = initial;
+  result.rmse = std::numeric_limits<double>::quiet_NaN();
+
+  Schedule schedule(target, source, options, last_residual);
+  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), -1);
+  const double resolution = std::max(1e-3 * target.spacing(), 1e-9);
+  Pose pose = initial, best_pose = initial;
+  double best_rmse = std::numeric_limits<double>::infinity();
+  bool at_rest = false;
+
+  for (int iteration = 0; iteration < options.max_iterations && !at_rest; ++iteration) {
+    std::vector<Pair> pairs = target.match(source, schedule.num_samples(), pose, schedule.gate(), nearest);
+    if (pairs.size() < least_pairs(schedule.num_samples())) return result;
+    const double scale = weight_pairs(pairs, options.method, options.robust, resolution);
+    const double weak_threshold = hold_weak ? options.weak_threshold : 0.0;
+    const IcpStep step = solve_step(pairs, options.method, weak_threshold, options.num_threads);
+    if (step.rmse < best_rmse) {
+      best_rmse = step.rmse;
+      best_pose = pose;
+    }
+    pose = step.motion * pose;
+    result.iterations = iteration + 1;
+    // The accuracy that these residuals allow: six unknowns from so many pairs.
+    const double accuracy = scale * std::sqrt(6.0 / static_cast<double>(pairs.size()));
+    at_rest = !schedule.advance(step.size, scale, std::max(resolution, 0.2 * accuracy));
+  }
+
+  schedule.finish();
+  std::vector<Pair> pairs = target.match(source, schedule.num_samples(), pose, schedule.gate(), nearest);
+  if (options.keep_best && !(rmse_of(pairs, options.method) <= best_rmse)) {
+    pose = best_pose;
+    pairs = target.match(source, schedule.num_samples(), pose, schedule.gate(), nearest);
+  }
+  if (pairs.size() < least_pairs(schedule.num_samples())) return result;
+  weight_pairs(pairs, options.method, options.robust, resolution);
+  const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);
+  result.target_from_source = pose;
+  result.status = at_rest ? AlignStatus::converged : AlignStatus::max_iterations;
+  result.num_inliers = static_cast<int>(pairs.size());
+  result.overlap = static_cast<double>(pairs.size()) / static_cast<double>(schedule.num_samples());
+  result.rmse = last.rmse;
+  result.center = last.center;
+  result.information = last.hessian / std::max(last.variance, resolution * resolution);
+  result.weak_directions = last.weak_directions;
+  return result;
+}
 
 }  // namespace
 
@@ -134,6 +182,7 @@ void AlignOptions::check() const {
   require(gate_decay > 0.0 && gate_decay <= 1.0, "gate_decay", "in (0, 1]", gate_decay);
   require(max_angle > 0.0, "max_angle", "a positive angle in radians", max_angle);
   require(sample_fraction > 0.0 && sample_fraction <= 1.0, "sample_fraction", "in (0, 1]", sample_fraction);
+  require(max_points >= 0, "max_points", "0 (no limit) or more", max_points);
   require(max_samples >= 0, "max_samples", "0 (no limit) or more", max_samples);
   require(coarse_samples >= 0, "coarse_samples", "0 (no limit) or more", coarse_samples);
   require(weak_threshold >= 0.0, "weak_threshold", "at least 0", weak_threshold);
@@ -146,64 +195,12 @@ AlignCloud::AlignCloud(const PointsRef& points_in, const PointsRef& normals_in, 
   require(sigma.size() == 0 || sigma.size() == points.rows(), "sigma", "one value per point", sigma.size());
 }
 
-AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial,
-                     const AlignOptions& options) {
-  AlignResult result;
-  result.target_from_source = initial;
-  result.rmse = std::numeric_limits<double>::quiet_NaN();
-
-  Schedule schedule(target, source, options);
-  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.points.rows()), -1);
-  const double resolution = std::max(1e-3 * target.spacing(), 1e-9);
-  Pose pose = initial, best_pose = initial;
-  double best_rmse = std::numeric_limits<double>::infinity();
-  bool at_rest = false;
-
-  for (int iteration = 0; iteration < options.max_iterations && !at_rest; ++iteration) {
-    std::vector<Pair> pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
-    if (pairs.size() < least_pairs(schedule.samples().size())) return result;
-    const double scale = weight_pairs(pairs, options.method, options.robust, resolution);
-    const IcpStep step = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);
-    if (step.rmse < best_rmse) {
-      best_rmse = step.rmse;
-      best_pose = pose;
-    }
-    pose = step.motion * pose;
-    result.iterations = iteration + 1;
-    // The accuracy that these residuals allow: six unknowns from so many pairs.
-    const double accuracy = scale * std::sqrt(6.0 / static_cast<double>(pairs.size()));
-    at_rest = !schedule.advance(step.size, scale, std::max(resolution, 0.2 * accuracy));
-  }
-
-  schedule.finish();
-  std::vector<Pair> pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
-  if (options.keep_best && !(rmse_of(pairs, options.method) <= best_rmse)) {
-    pose = best_pose;
-    pairs = target.match(source, schedule.samples(), pose, schedule.gate(), nearest);
-  }
-  if (pairs.size() < least_pairs(schedule.samples().size())) return result;
-  weight_pairs(pairs, options.method, options.robust, resolution);
-  const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);
-  result.target_from_source = pose;
-  result.status = at_rest ? AlignStatus::converged : AlignStatus::max_iterations;
-  result.num_inliers = static_cast<int>(pairs.size());
-  result.overlap = static_cast<double>(pairs.size()) / static_cast<double>(schedule.samples().size());
-  result.rmse = last.rmse;
-  result.center = last.center;
-  result.information = last.hessian / std::max(last.variance, resolution * resolution);
-  result.weak_directions = last.weak_directions;
-  return result;
-}
-
-double overlap_at(const IcpTarget& target, const IcpSource& source, const Pose& pose, const Gate& gate,
-                  std::size_t max_samples) {
-  if (source.order.empty()) return 0.0;
-  const std::vector<std::int32_t> samples(
-      source.order.begin(),
-      source.order.begin() + static_cast<std::ptrdiff_t>(std::min(source.order.size(), max_samples)));
-  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.points.rows()), -1);
-  return static_cast<double>(target.match(source, samples, pose, gate, nearest).size()) /
-         static_cast<double>(samples.size());
+AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
+                     double last_residual) {
+  // What pairs know of a direction shows at the end only: while source and target are apart their normals disagree.
+  const AlignResult free = iterate(target, source, initial, options, last_residual, false);
+  if (free.status != AlignStatus::too_few_pairs && free.weak_directions.cols() == 0) return free;
+  return iterate(target, source, initial, options, last_residual, true);
 }
 
 AlignResult align(const AlignCloud& source, const AlignCloud& target, const Pose& initial,

@@ -278,12 +278,10 @@ TEST_CASE("matches are the nearest points, whatever was matched before") {
   AlignOptions options;
   const IcpTarget icp_target(target.view(), options);
   const IcpSource icp_source(source.view(), options);
-  std::vector<std::int32_t> samples(600);
-  for (std::size_t i = 0; i < 600; ++i) samples[i] = static_cast<std::int32_t>(i);
   std::vector<std::int32_t> nearest(600, -1);
   for (const double size : {0.3, 0.1, 0.0}) {
     const Pose pose = motion({size, 0.0, -size}, {0.0, 0.02 * size, 0.0});
-    const std::vector<Pair> pairs = icp_target.match(icp_source, samples, pose, Gate{1.0, -2.0}, nearest);
+    const std::vector<Pair> pairs = icp_target.match(icp_source, 600, pose, Gate{1.0, -2.0}, nearest);
     REQUIRE(pairs.size() == 600);
     for (const Pair& pair : pairs) {
       const double least = (target.points.cast<double>().rowwise() - pair.p.transpose()).rowwise().norm().minCoeff();
