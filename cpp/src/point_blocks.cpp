@@ -23,7 +23,7 @@ float round_up(double x) { return static_cast<float>(x + std::abs(x) * 1.2e-7); 
 }  // namespace
 
 template <class Cloud>
-PointBlocks::PointBlocks(const Cloud& points, const SpatialOrder& order, const Scaling& scaling, int num_threads) {
+PointBlocks::PointBlocks(const Cloud& points, const CellOrder& order, const Scaling& scaling, int num_threads) {
   std::vector<std::uint32_t> starts;  // of the blocks, in the order
   const std::size_t num_points = order.rows.size();
   starts.reserve(num_points / size + num_points / 64 + 2);
@@ -146,7 +146,7 @@ simd::PairTargets PointBlocks::block(std::int64_t block) const {
   return targets;
 }
 
-template PointBlocks::PointBlocks(const PointsRef&, const SpatialOrder&, const Scaling&, int);
-template PointBlocks::PointBlocks(const PointsDoubleRef&, const SpatialOrder&, const Scaling&, int);
+template PointBlocks::PointBlocks(const PointsRef&, const CellOrder&, const Scaling&, int);
+template PointBlocks::PointBlocks(const PointsDoubleRef&, const CellOrder&, const Scaling&, int);
 
 }  // namespace nacre

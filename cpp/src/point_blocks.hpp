@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "simd/pair_sums.hpp"
-#include "spatial_order.hpp"
+#include "cell_order.hpp"
 
 namespace nacre {
 
@@ -21,7 +21,7 @@ class PointBlocks {
 
   // Blocks of points in their order; a block never spans two cubes of it. Defined for Points and PointsDouble.
   template <class Cloud>
-  PointBlocks(const Cloud& points, const SpatialOrder& order, const Scaling& scaling, int num_threads);
+  PointBlocks(const Cloud& points, const CellOrder& order, const Scaling& scaling, int num_threads);
 
   std::int64_t num_blocks() const { return static_cast<std::int64_t>(counts_.size()); }
   int count(std::int64_t block) const { return counts_[static_cast<std::size_t>(block)]; }
