@@ -11,19 +11,24 @@ import numpy.typing as npt
 Array = npt.NDArray[Any]
 
 
-def bumps(directions: Array, seed: int = 7) -> tuple[Array, Array]:
+def bumps(directions: Array, frequencies: tuple[float, float], seed: int = 7) -> tuple[Array, Array]:
     """Return a smooth function on the sphere, about -1 to 1, and its gradient in space."""
     rng = np.random.default_rng(seed)
     waves = rng.normal(size=(12, 3))
-    waves *= rng.uniform(3, 9, size=(12, 1)) / np.linalg.norm(waves, axis=1, keepdims=True)
+    waves *= rng.uniform(*frequencies, size=(12, 1)) / np.linalg.norm(waves, axis=1, keepdims=True)
     phases = rng.uniform(0, 2 * np.pi, 12)
     angles = directions @ waves.T + phases
     return np.sin(angles).sum(axis=1) / 6, np.cos(angles) @ waves / 6
 
 
-def bumpy_surface(directions: Array, radius: float = 0.075, height: float = 0.1) -> tuple[Array, Array]:
+def bumpy_surface(
+    directions: Array,
+    radius: float = 0.075,
+    height: float = 0.06,
+    frequencies: tuple[float, float] = (3, 9),
+) -> tuple[Array, Array]:
     """Return points, and their normals, of a closed surface without symmetry, in the given directions."""
-    values, gradients = bumps(directions)
+    values, gradients = bumps(directions, frequencies)
     lengths = radius * (1 + height * values)[:, None]
     slopes = radius * height * (gradients - (gradients * directions).sum(axis=1, keepdims=True) * directions)
     normals = directions - slopes / lengths

@@ -126,7 +126,7 @@ class Workload:
 
 def all_workloads() -> dict[str, Workload]:
     """Return every workload by name, in the order of the report."""
-    from suite.workloads import neighbors, normals
+    from suite.workloads import consolidation, depth, loop, neighbors, normals, registration
 
-    modules = (neighbors, normals)
+    modules = (neighbors, normals, registration, consolidation, depth, loop)
     return {workload.name: workload for module in modules for workload in module.WORKLOADS}

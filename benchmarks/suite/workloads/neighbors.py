@@ -162,7 +162,7 @@ def self_query(size: int, ordered: bool, goal: float | None = None) -> Workload:
         limits={"distance error": 1e-5, "index error": 1e-6},
         goal=goal,
         quick=size <= 100_000,
-        most_threads_only=alone,
+        most_threads_only=alone or (ordered and size > 100_000),
         bound=Bound(
             "12 B read, 16 B of tree written and read, 16 (4 + 8) B of answer written; "
             "16 distances of 8 operations",
