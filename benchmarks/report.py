@@ -40,7 +40,7 @@ def summary(run: dict[str, Any]) -> str:
     """Return one line a workload: nacre against the fastest peer."""
     heads = ["work"]
     for threads in run["threads"]:
-        heads += [f"nacre, {plural(threads)}", "fastest peer", "times faster"]
+        heads += [f"nacre, {plural(threads)} [ms]", "fastest peer [ms]", "times faster"]
     rows = []
     for name, about in run["workloads"].items():
         row = [f"[{about['title']}](#{name})"]
@@ -49,12 +49,12 @@ def summary(run: dict[str, Any]) -> str:
             row += [
                 time_of(median(ours["seconds"]), about) if ours else "-",
                 f"{best['contender']}: {time_of(median(best['seconds']), about)}" if best else "-",
-                f"**{ratio(best, ours):.1f}**" if ours and best else "-",
+                f"**{times(ratio(best, ours))}**" if ours and best else "-",
             ]
         if about["goal"]:
-            row[-1] += f" (goal {about['goal']:g})"
+            row[-1] += f" (goal {about['goal']:.3g})"
         if about["milliseconds"]:
-            row[-3] += f" (goal {about['milliseconds']:g})"
+            row[-3] += f" (goal {about['milliseconds']:.3g})"
         rows.append(row)
     return f"## Summary\n\n{table(heads, rows)}"
 
@@ -105,12 +105,12 @@ def workload(run: dict[str, Any], name: str) -> str:
             failures.append(f"- {contender}: {failed}")
             continue
         ours, _ = leaders(run, name, counts[-1])
-        slower = f"{ratio(last, ours):.2f}" if ours else "-"
+        slower = times(ratio(last, ours)) if ours else "-"
         line = [contender, *(spread(own[threads]["seconds"], about) for threads in counts)]
         line += [slower if accepted(last, about) else f"({slower})"]
         if stages:
-            times = {key: median(value) for key, value in last["stages"].items()}
-            line += [", ".join(f"{key} {time_of(value, about)}" for key, value in times.items())]
+            spent = {key: median(value) for key, value in last["stages"].items()}
+            line += [", ".join(f"{key} {time_of(value, about)}" for key, value in spent.items())]
         line += [figure(last["errors"].get(key)) for key in errors]
         line += [f"{last['memory'] / about['items']:,.0f}" if last["memory"] is not None else "-"]
         lines.append(line)
@@ -174,7 +174,7 @@ A kernel's bound is what it must move over the bandwidth, or what it must comput
 longer. Searching, sorting and waiting for loads are not counted, so no kernel can reach 1.
 
 {table(heads, rows)}
-Counted, per point:
+Counted, for each point or pixel:
 
 {chr(10).join(f"- {text}: {', '.join(names)}" for text, names in formulas.items())}
 """
@@ -215,9 +215,14 @@ def spread(seconds: list[float], about: dict[str, Any]) -> str:
     return text if len(seconds) >= 5 else f"{text} n={len(seconds)}"
 
 
+def times(value: float) -> str:
+    """Return a ratio with two digits or one behind the point."""
+    return f"{value:.1f}" if value >= 1 else f"{value:.2g}"
+
+
 def figure(value: float | None) -> str:
-    """Return an error with two or three digits."""
-    return "-" if value is None else f"{value:.3g}"
+    """Return an error with three digits, a count with all."""
+    return "-" if value is None else f"{value:,.0f}" if value >= 1000 else f"{value:.3g}"
 
 
 if __name__ == "__main__":

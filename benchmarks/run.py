@@ -20,7 +20,7 @@ from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
-NEEDED = ["numpy", "scipy", "cmake", "ninja"]
+NEEDED = ["numpy", "scipy", "pillow", "cmake", "ninja"]
 PYTHON_PEERS = ["pykdtree", "small_gicp", "open3d", "opencv-contrib-python-headless"]
 DEBIAN_PACKAGES = {
     "nanoflann": ["libnanoflann-dev"],

@@ -52,8 +52,8 @@ def main() -> int:
     chosen = [w for w in workloads if any(fnmatch(w.name, p) for p in patterns)] if patterns else workloads
     if options["quick"]:
         chosen = [workload for workload in chosen if workload.quick]
-    start = time.perf_counter()
-    results = {
+    start, others = time.perf_counter(), machine.Others()
+    results: dict[str, Any] = {
         "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d %H:%M UTC"),
         "quick": options["quick"],
         "threads": options["threads"],
@@ -65,11 +65,14 @@ def main() -> int:
         "results": contest.run(chosen, options["threads"], options["repeats"], tell),
     }
     results["minutes"] = (time.perf_counter() - start) / 60
+    results["machine"]["taken by other processes"] = f"{100 * others.share():.0f} % of the processors' time"
     folder = Path(options["output"])
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "results.json").write_text(json.dumps(results, indent=1) + "\n")
     (folder / "results.md").write_text(report.markdown(results))
     tell(f"{results['minutes']:.1f} minutes; see {folder / 'results.md'}")
+    if others.share() > 0.05:
+        tell("other processes kept the machine busy: the times say little")
     return 0
 
 

@@ -84,9 +84,9 @@ class Workers:
         return self._processes[peer]
 
     def _stop(self, peer: str) -> int:
-        process = self._processes.pop(peer)
-        process.kill()
-        return process.wait()
+        with self._processes.pop(peer) as process:
+            process.kill()
+        return process.returncode
 
 
 def contend(workload: Workload, threads: int, repeats: int, turn: Turn) -> list[dict[str, Any]]:
@@ -139,11 +139,25 @@ def run(
         for workload in workloads:
             start = time.perf_counter()
             with tempfile.TemporaryDirectory(prefix="nacre-benchmark-") as folder:
-                for key, array in workload.data().items():
-                    np.save(Path(folder) / f"{key}.npy", array)
+                error = _save(workload, Path(folder))
                 for team in teams:
                     if not workload.most_threads_only or team.threads == max(thread_counts):
-                        turn = partial(team.turn, workload.name, folder)
+                        turn: Turn = partial(team.turn, workload.name, folder)
+                        if error is not None:
+                            turn = partial(_fail, error)
                         results += contend(workload, team.threads, repeats, turn)
             tell(f"{workload.name}: {time.perf_counter() - start:.1f} s")
     return results
+
+
+def _save(workload: Workload, folder: Path) -> str | None:
+    try:
+        for key, array in workload.data().items():
+            np.save(folder / f"{key}.npy", array)
+    except Exception as error:
+        return f"no data: {type(error).__name__}: {error}"
+    return None
+
+
+def _fail(error: str, contender: Contender, first: bool) -> dict[str, Any]:
+    return {"failed": error}

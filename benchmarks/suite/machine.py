@@ -6,6 +6,7 @@ import ctypes
 import importlib.metadata
 import os
 import platform
+import resource
 import statistics
 import subprocess
 import sys
@@ -43,7 +44,6 @@ def describe() -> dict[str, str]:
         "memory": f"{memory:.0f} GiB",
         "system": f"{release.get('PRETTY_NAME', '').strip(chr(34))}, Linux {platform.release()}",
         "compiler": compiler[0] if compiler else "none",
-        "load at the start": f"{os.getloadavg()[0]:.1f}",
     }
 
 
@@ -58,6 +58,29 @@ def _output(*command: str) -> str:
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
     except (OSError, subprocess.CalledProcessError):
         return ""
+
+
+class Others:
+    """Measures the part of the processors' time that other processes take."""
+
+    def __init__(self) -> None:
+        self._start = self._now()
+
+    def share(self) -> float:
+        """Return the part since the start; workers that have ended count as ours."""
+        busy, own, total = (now - then for now, then in zip(self._now(), self._start, strict=True))
+        return max(0.0, busy - own) / total
+
+    @staticmethod
+    def _now() -> tuple[float, float, float]:
+        line = Path("/proc/stat").read_text().splitlines()[0].split()[1:9]
+        user, nice, system, idle, wait, *rest = (int(value) / os.sysconf("SC_CLK_TCK") for value in line)
+        busy = user + nice + system + sum(rest)
+        own = sum(
+            usage.ru_utime + usage.ru_stime
+            for usage in map(resource.getrusage, (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+        )
+        return busy, own, busy + idle + wait
 
 
 def versions() -> dict[str, str]:

@@ -66,7 +66,7 @@ def joined(parts: list[tuple[Array, Array]]) -> Mesh:
 @cache
 def object_mesh() -> Mesh:
     """Return a bumpy object of a metre."""
-    return joined([bumpy_mesh(0.5, 0.06, 500, (10, 25))])
+    return joined([bumpy_mesh(0.5, 0.06, 300, (10, 25))])
 
 
 @cache

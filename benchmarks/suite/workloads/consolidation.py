@@ -85,12 +85,12 @@ def workload(of: int, percent: int, goal: float, **rest: Any) -> Workload:
         limits={},
         goal=goal,
         bound=Bound(
-            f"per sample and iteration {NEIGHBORS} points and, for density and repulsion, twice the samples "
-            "among them; 20 operations each",
+            f"for each sample and iteration {NEIGHBORS} points and, for density and repulsion, twice "
+            "the samples among them; 20 operations each",
             operations=20 * pairs,
         ),
-        note=f"About {NEIGHBORS} neighbours, {ITERATIONS} iterations. Each chooses its samples at random; then nacre "
-        "starts from CGAL's, and the results are compared.",
+        note=f"About {NEIGHBORS} neighbours, {ITERATIONS} iterations. Each chooses its samples at random; "
+        "then nacre starts from CGAL's, and the results are compared.",
         **rest,
     )
 

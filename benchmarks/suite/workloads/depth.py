@@ -196,10 +196,12 @@ WORKLOADS = [
         "normals",
         "normals",
         bound=Bound(
-            "4 B read and 12 B written; a window of 25 pixels with 3 moments each", PIXELS * 16, PIXELS * 150
+            "4 B read and 12 B written; a window of 25 pixels with 3 moments each",
+            PIXELS * 16,
+            PIXELS * 150,
         ),
-        note="nacre fits a plane to a window of at least 5 x 5 pixels of the depth image, and makes the points "
-        "on the way; OpenCV's FALS (5 x 5) and Open3D's cross product of differences are given the points.",
+        note="nacre fits a plane to a window of at least 5 x 5 pixels of the depth image, and makes points "
+        "on the way. OpenCV's FALS (5 x 5) and Open3D's cross product of differences are given the points.",
     ),
     workload(
         "clean",
