@@ -7,10 +7,6 @@ install(TARGETS nacre EXPORT nacre-targets COMPONENT development
 install(DIRECTORY include/nacre TYPE INCLUDE COMPONENT development FILES_MATCHING PATTERN "*.hpp")
 
 set(nacre_cmake_dir "${CMAKE_INSTALL_LIBDIR}/cmake/nacre")
-set(nacre_needs_openmp OFF)
-if(NOT BUILD_SHARED_LIBS AND NACRE_USE_OPENMP AND TARGET OpenMP::OpenMP_CXX)
-  set(nacre_needs_openmp ON)
-endif()
 install(EXPORT nacre-targets NAMESPACE nacre:: DESTINATION "${nacre_cmake_dir}" COMPONENT development)
 configure_package_config_file(nacre-config.cmake.in nacre-config.cmake INSTALL_DESTINATION "${nacre_cmake_dir}")
 write_basic_package_version_file(nacre-config-version.cmake COMPATIBILITY SameMinorVersion)
@@ -18,10 +14,6 @@ install(FILES "${CMAKE_CURRENT_BINARY_DIR}/nacre-config.cmake" "${CMAKE_CURRENT_
   DESTINATION "${nacre_cmake_dir}" COMPONENT development)
 
 # pkg-config: paths relative to the .pc file, so that the installed tree can be moved.
-set(nacre_pc_libs_private "")
-if(nacre_needs_openmp)
-  set(nacre_pc_libs_private "${OpenMP_CXX_FLAGS}")
-endif()
 cmake_path(ABSOLUTE_PATH CMAKE_INSTALL_LIBDIR BASE_DIRECTORY "${CMAKE_INSTALL_PREFIX}" OUTPUT_VARIABLE nacre_libdir)
 file(RELATIVE_PATH nacre_pc_prefix "${nacre_libdir}/pkgconfig" "${CMAKE_INSTALL_PREFIX}")
 string(REGEX REPLACE "/$" "" nacre_pc_prefix "${nacre_pc_prefix}")

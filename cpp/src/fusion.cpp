@@ -5,17 +5,21 @@
 #include <limits>
 
 #include "check.hpp"
+#include "fusion_step.hpp"
+#include "image_index.hpp"
 #include "parallel.hpp"
 #include "point_grid.hpp"
-#include "surface_observer.hpp"
+#include "view_of_model.hpp"
 
 namespace nacre {
 namespace {
 
 constexpr float least_weight = 0.05F;     // less observation than this is none
 constexpr float insertion_weight = 2.0F;  // a new point must be seen by so many pixels of its frame
-constexpr float sheet_cosine = 0.3F;      // normals that differ more belong to different sheets
-constexpr float least_facing = 0.1F;      // surfaces that are seen at a smaller cosine are not judged
+constexpr float least_pixel_weight = insertion_weight / 20.0F;  // no window of such pixels weighs enough
+constexpr double least_pixels = 1.5;                            // between new points, in the image that they come from
+constexpr float sheet_cosine = 0.3F;                            // normals that differ more belong to different sheets
+constexpr float least_facing = 0.1F;  // surfaces that are seen at a smaller cosine are not judged
 
 // Whether a point with a normal stands for the same piece of surface as another.
 bool same_surface(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, const Eigen::Vector3f& other,
@@ -26,118 +30,169 @@ bool same_surface(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, c
          normal.dot(other_normal) > sheet_cosine;
 }
 
+// What of the image the model knows.
+struct Known {
+  PixelSet covered;  // pixels whose surface the model has
+  PixelIndex points;
+};
+
 struct NewPoint {
   std::int32_t row = 0;
   Eigen::Vector3f point = Eigen::Vector3f::Zero(), normal = point;  // camera frame
   Eigen::Vector3f color = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
   float weight = 0.0F;
+  float spacing = 0.0F;  // to its neighbours [m]
+  PixelWindow cover;
 };
 
-// Moves the model's points by what the frame says about them; returns which pixels they cover.
-std::vector<std::uint8_t> update(PointModel& model, const Frame& frame, const Camera& camera,
-                                 const SurfaceObserver& observer, const Pose& world_from_camera, double spacing,
-                                 std::int32_t frame_index, const FusionOptions& options, FusionReport& report,
-                                 int num_threads) {
-  const Eigen::Isometry3f camera_from_world(world_from_camera.inverse().cast<float>());
+template <class T>
+std::vector<T> concatenate(const std::vector<std::vector<T>>& parts) {
+  std::size_t size = 0;
+  for (const std::vector<T>& part : parts) size += part.size();
+  std::vector<T> all;
+  all.reserve(size);
+  for (const std::vector<T>& part : parts) all.insert(all.end(), part.begin(), part.end());
+  return all;
+}
+
+// Moves the model's points by what the frame says about them.
+Known update(PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
+             const Pose& world_from_camera, double spacing, std::int32_t frame_index, const FusionOptions& options,
+             FusionReport& report, int num_threads) {
+  const ModelView view(camera, world_from_camera);
   const Eigen::Matrix3f world_rotation = world_from_camera.linear().cast<float>();
-  const std::int64_t count = model.size();
-  std::vector<float> cover(static_cast<std::size_t>(count), 0.0F);  // radius of the covered disc [pixels]
-  std::vector<std::int32_t> pixels(static_cast<std::size_t>(count), -1);
+  constexpr std::int64_t block_size = ModelView::capacity;
+  static_assert(ModelView::capacity <= ObservationBlock::capacity);
+  struct Cover {
+    std::size_t point;
+    std::int32_t pixel;
+    PixelWindow window;
+  };
+  std::vector<std::vector<Cover>> covers(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
 
-  parallel_for(count, 1024, num_threads, [&](std::int64_t index) {
-    const auto i = static_cast<std::size_t>(index);
-    const Eigen::Vector3f point = camera_from_world * model.points[i];
-    const Eigen::Vector3f normal = camera_from_world.linear() * model.normals[i];
-    const float facing = normal.dot(observer.towards_camera(point));
-    if (!(facing > least_facing)) return;
-    const std::int32_t pixel = observer.pixel_of(point);
-    if (pixel < 0) return;
-    const float measured_sigma = frame.sigma[pixel];
-    const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
-    const Observation seen = observer.observe(point, normal, pixel, sigma);
-    if (seen.weight > least_weight) {
-      const float gain = seen.weight / (model.confidence[i] + seen.weight);
-      model.points[i] += world_rotation * (gain * seen.offset * normal);
-      model.normals[i] = (model.confidence[i] * model.normals[i] + world_rotation * seen.normal).normalized();
-      if (observer.has_colors()) {
-        Eigen::Vector3f& color = model.colors[i];
-        color = color.allFinite() ? Eigen::Vector3f(color + gain * (seen.color - color)) : seen.color;
-      }
-      model.confidence[i] = std::min(model.confidence[i] + seen.weight, static_cast<float>(options.max_confidence));
-      model.last_seen[i] = frame_index;
-      model.violations[i] = 0;
-      pixels[i] = pixel;
-      cover[i] = 0.7F * static_cast<float>(spacing / camera.footprint(point.z())) * facing;
-    } else if (observer.sees_through(point, pixel, std::max(static_cast<float>(2.0 * spacing), 4.0F * sigma))) {
-      model.violations[i] = static_cast<std::uint8_t>(std::min(255, model.violations[i] + 1));
-    }
-  });
-
-  std::vector<std::uint8_t> covered(static_cast<std::size_t>(frame.points.rows()), 0);
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    if (pixels[i] < 0) continue;
-    ++report.num_updated;
-    const int u = pixels[i] % frame.width, v = pixels[i] / frame.width;
-    const int reach = static_cast<int>(cover[i]);
-    for (int y = std::max(0, v - reach); y <= std::min(frame.height - 1, v + reach); ++y) {
-      for (int x = std::max(0, u - reach); x <= std::min(frame.width - 1, u + reach); ++x) {
-        const auto dx = static_cast<float>(x - u), dy = static_cast<float>(y - v);
-        if (dx * dx + dy * dy <= cover[i] * cover[i]) {
-          covered[static_cast<std::size_t>(y) * static_cast<std::size_t>(frame.width) + static_cast<std::size_t>(x)] =
-              1;
+  parallel_blocks(
+      model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
+        const auto first = static_cast<std::size_t>(begin);
+        ModelView::Block points;
+        view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin), points);
+        const auto note_violation = [&](int j, float sigma) {
+          const float margin = std::max(static_cast<float>(2.0 * spacing), 4.0F * sigma);
+          if (!observer.sees_through(points.point(j), points.pixel[j], margin)) return;
+          std::uint8_t& violations = model.violations[first + static_cast<std::size_t>(j)];
+          violations = static_cast<std::uint8_t>(std::min(255, violations + 1));
+        };
+        ObservationBlock block;
+        int seen[block_size];  // of the points
+        for (int j = 0; j < static_cast<int>(end - begin); ++j) {
+          if (!points.inside[j] || !(points.facing[j] > least_facing)) continue;
+          const float measured_sigma = frame.sigma[points.pixel[j]];
+          const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
+          if (!observer.may_observe(points.point(j), points.pixel[j], sigma, least_weight)) {
+            note_violation(j, sigma);
+            continue;
+          }
+          seen[block.size()] = j;
+          observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma, static_cast<float>(spacing));
         }
-      }
+        observer.observe_and_cover(block, sheet_cosine);
+        for (int k = 0; k < block.size(); ++k) {
+          const int j = seen[k];
+          const std::size_t i = first + static_cast<std::size_t>(j);
+          const Observation observed = block[k];
+          if (observed.weight > least_weight) {
+            const float gain = observed.weight / (model.confidence[i] + observed.weight);
+            model.points[i] += world_rotation * (gain * observed.offset * points.normal(j));
+            model.normals[i] = (model.confidence[i] * model.normals[i] + world_rotation * observed.normal).normalized();
+            if (observer.has_colors()) {
+              Eigen::Vector3f& color = model.colors[i];
+              color = color.allFinite() ? Eigen::Vector3f(color + gain * (observed.color - color)) : observed.color;
+            }
+            model.confidence[i] =
+                std::min(model.confidence[i] + observed.weight, static_cast<float>(options.max_confidence));
+            model.last_seen[i] = frame_index;
+            model.violations[i] = 0;
+            covers[static_cast<std::size_t>(number)].push_back({i, points.pixel[j], block.cover(k)});
+          } else {
+            note_violation(j, block.sigma(k));
+          }
+        }
+      });
+
+  Known known{PixelSet(frame.width, frame.height), PixelIndex(frame.width, frame.height)};
+  for (const std::vector<Cover>& block : covers) {
+    report.num_updated += static_cast<std::int64_t>(block.size());
+    for (const Cover& cover : block) {
+      known.covered.insert(cover.window);
+      known.points.add(cover.pixel, cover.point);
     }
   }
-  return covered;
+  return known;
 }
 
 // The frame's surface where the model does not cover it, denoised.
-std::vector<NewPoint> find_new_points(const Frame& frame, const SurfaceObserver& observer,
-                                      const std::vector<std::uint8_t>& covered, int num_threads) {
-  std::vector<NewPoint> candidates;
-  for (const std::int32_t row : frame.valid) {
-    if (covered[static_cast<std::size_t>(row)]) continue;
-    NewPoint candidate;
-    candidate.row = row;
-    candidates.push_back(candidate);
-  }
-  parallel_for(static_cast<std::int64_t>(candidates.size()), 1024, num_threads, [&](std::int64_t index) {
-    NewPoint& candidate = candidates[static_cast<std::size_t>(index)];
-    candidate.point = frame.points.row(candidate.row).transpose();
-    candidate.normal = frame.normals.row(candidate.row).transpose();
-    if (!(candidate.normal.dot(observer.towards_camera(candidate.point)) > least_facing)) return;
-    const Observation seen =
-        observer.observe(candidate.point, candidate.normal, candidate.row, frame.sigma[candidate.row]);
-    candidate.point += seen.offset * candidate.normal;
-    candidate.normal = seen.normal.normalized();
-    if (observer.has_colors()) candidate.color = seen.color;
-    candidate.weight = seen.weight;
+std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
+                                      const PixelSet& covered, double spacing, int num_threads) {
+  std::vector<std::vector<std::int32_t>> uncovered(static_cast<std::size_t>(frame.height));
+  parallel_for(frame.height, 16, num_threads, [&](std::int64_t v) {
+    const auto first = static_cast<std::int32_t>(v) * frame.width;
+    for (int u = 0; u < frame.width; ++u) {
+      if (observer.weight(u, static_cast<int>(v)) > least_pixel_weight && !covered.contains(u, static_cast<int>(v))) {
+        uncovered[static_cast<std::size_t>(v)].push_back(first + u);
+      }
+    }
   });
-  candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
-                                  [](const NewPoint& c) { return !(c.weight > insertion_weight); }),
-                   candidates.end());
-  return candidates;
+  const std::vector<std::int32_t> rows = concatenate(uncovered);
+  constexpr std::int64_t block_size = ObservationBlock::capacity;
+  const auto count = static_cast<std::int64_t>(rows.size());
+  std::vector<std::vector<NewPoint>> found(static_cast<std::size_t>((count + block_size - 1) / block_size));
+  parallel_blocks(count, block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
+    ObservationBlock block;
+    std::vector<NewPoint>& candidates = found[static_cast<std::size_t>(number)];
+    for (std::int64_t i = begin; i < end; ++i) {
+      const std::int32_t row = rows[static_cast<std::size_t>(i)];
+      NewPoint candidate;
+      candidate.row = row;
+      candidate.point = frame.points.row(row).transpose();
+      candidate.normal = frame.normals.row(row).transpose();
+      if (!(candidate.normal.dot(observer.towards_camera(candidate.point)) > least_facing)) continue;
+      candidate.spacing = static_cast<float>(std::max(spacing, least_pixels * camera.footprint(candidate.point.z())));
+      observer.add(block, candidate.point, candidate.normal, row, frame.sigma[row], candidate.spacing);
+      candidates.push_back(candidate);
+    }
+    observer.observe_and_cover(block, sheet_cosine);
+    std::size_t kept = 0;
+    for (int k = 0; k < block.size(); ++k) {
+      const Observation observed = block[k];
+      if (!(observed.weight > insertion_weight)) continue;
+      NewPoint candidate = candidates[static_cast<std::size_t>(k)];
+      candidate.point += observed.offset * candidate.normal;
+      candidate.normal = observed.normal.normalized();
+      if (observer.has_colors()) candidate.color = observed.color;
+      candidate.weight = observed.weight;
+      candidate.cover = block.cover(k);
+      candidates[kept++] = candidate;
+    }
+    candidates.resize(kept);
+  });
+  return concatenate(found);
 }
 
-void insert(PointModel& model, const std::vector<NewPoint>& candidates, const Frame& frame,
-            const Pose& world_from_camera, double spacing, std::int32_t frame_index, bool with_colors,
-            FusionReport& report) {
-  if (candidates.empty()) return;
-  PointGrid grid(spacing, model.points.size() + candidates.size());
-  for (const Eigen::Vector3f& point : model.points) grid.add(point);
+// Adds points, one after the other, where neither the model nor a point before stands for the surface. The covered
+// pixels rule most of them out at once, by what was measured; the others are compared as they are, without the noise.
+void insert(PointModel& model, const std::vector<NewPoint>& candidates, Known& known, const Frame& frame,
+            const Pose& world_from_camera, std::int32_t frame_index, bool with_colors, FusionReport& report) {
   const Eigen::Isometry3f to_world(world_from_camera.cast<float>());
   for (const NewPoint& candidate : candidates) {
+    if (known.covered.contains(candidate.row % frame.width, candidate.row / frame.width)) continue;
+    known.covered.insert(candidate.cover);
     const Eigen::Vector3f point = to_world * candidate.point;
     const Eigen::Vector3f normal = to_world.linear() * candidate.normal;
-    const float largest_offset = std::max(static_cast<float>(spacing), 3.0F * frame.sigma[candidate.row]);
-    const bool is_known = grid.any_near(point, [&](std::int32_t i) {
-      const auto k = static_cast<std::size_t>(i);
-      return same_surface(point, normal, model.points[k], model.normals[k], static_cast<float>(spacing),
-                          largest_offset);
+    const float largest_offset = std::max(candidate.spacing, 3.0F * frame.sigma[candidate.row]);
+    const bool is_known = known.points.any_near(candidate.row, candidate.cover.num_rows / 2 + 1, [&](std::size_t i) {
+      return same_surface(point, normal, model.points[i], model.normals[i], candidate.spacing, largest_offset);
     });
     if (is_known) continue;
-    grid.add(point);
+    known.points.add(candidate.row, model.points.size());
     model.points.push_back(point);
     model.normals.push_back(normal);
     if (with_colors) model.colors.push_back(candidate.color);
@@ -194,24 +249,32 @@ void FusionOptions::check() const {
   require(reference_sigma >= 0.0, "reference_sigma", "0 (automatic) or positive metres", reference_sigma);
 }
 
+FusionReport fuse_observed(PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
+                           const Pose& world_from_camera, double spacing, std::int32_t frame_index,
+                           const FusionOptions& options, int num_threads) {
+  FusionReport report;
+  const bool with_colors = observer.has_colors() || !model.colors.empty();
+  if (with_colors) {
+    model.colors.resize(model.points.size(), Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
+  }
+  Known known =
+      update(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, report, num_threads);
+  const std::vector<NewPoint> candidates =
+      find_new_points(frame, camera, observer, known.covered, spacing, num_threads);
+  insert(model, candidates, known, frame, world_from_camera, frame_index, with_colors, report);
+  remove_unconfirmed(model, frame_index, options, report);
+  return report;
+}
+
 FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, const Pose& world_from_camera,
                   double spacing, std::int32_t frame_index, const FusionOptions& options, const ColorsRef& colors,
                   int num_threads) {
   options.check();
   require(spacing > 0.0, "spacing", "a positive distance in metres", spacing);
   require(colors.rows() == 0 || colors.rows() == frame.points.rows(), "colors", "one row per pixel", colors.rows());
-  FusionReport report;
-  const bool with_colors = colors.rows() > 0 || !model.colors.empty();
-  if (with_colors) {
-    model.colors.resize(model.points.size(), Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
-  }
-  const SurfaceObserver observer(frame, camera, options, colors, num_threads);
-  const std::vector<std::uint8_t> covered =
-      update(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, report, num_threads);
-  const std::vector<NewPoint> candidates = find_new_points(frame, observer, covered, num_threads);
-  insert(model, candidates, frame, world_from_camera, spacing, frame_index, with_colors, report);
-  remove_unconfirmed(model, frame_index, options, report);
-  return report;
+  SurfaceObserver observer(camera, options);
+  observer.look_at(frame, colors, num_threads);
+  return fuse_observed(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, num_threads);
 }
 
 void thin(PointModel& model, double spacing) {

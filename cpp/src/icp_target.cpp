@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "nacre/normals.hpp"
 #include "parallel.hpp"
@@ -15,36 +14,50 @@ bool needs_normals(const AlignOptions& options, bool is_target) {
   return options.method == Metric::symmetric || (options.method == Metric::point_to_plane && is_target);
 }
 
-Points normals_if_needed(const AlignCloud& cloud, const AlignOptions& options, bool is_target) {
-  if (cloud.normals.rows() == cloud.points.rows() || !needs_normals(options, is_target)) return Points();
-  NormalOptions normal_options;
-  normal_options.num_threads = options.num_threads;
-  return estimate_normals(cloud.points, normal_options);
+std::vector<std::int32_t> finite_rows(const PointsRef& points, const PointsRef& normals) {
+  std::vector<std::int32_t> rows;
+  rows.reserve(static_cast<std::size_t>(points.rows()));
+  for (Eigen::Index i = 0; i < points.rows(); ++i) {
+    // A sum is finite where its terms are (values near the largest float are no coordinates).
+    const float sum = points(i, 0) + points(i, 1) + points(i, 2) +
+                      (normals.rows() > 0 ? normals(i, 0) + normals(i, 1) + normals(i, 2) : 0.0F);
+    if (std::isfinite(sum)) rows.push_back(static_cast<std::int32_t>(i));
+  }
+  return rows;
 }
 
-// `count` of the rows, chosen and ordered by random numbers that depend on the seed and the row only.
+// One row at random of each of `count` equal parts.
 std::vector<std::int32_t> choose(const std::vector<std::int32_t>& rows, std::size_t count, std::uint64_t seed) {
-  std::vector<std::pair<std::uint64_t, std::int32_t>> keyed;
-  keyed.reserve(rows.size());
-  for (const std::int32_t row : rows) keyed.emplace_back(random_bits(seed, static_cast<std::uint64_t>(row)), row);
-  count = std::min(count, keyed.size());
-  const auto end = keyed.begin() + static_cast<std::ptrdiff_t>(count);
-  std::nth_element(keyed.begin(), end, keyed.end());
-  std::sort(keyed.begin(), end);
+  if (count >= rows.size()) return rows;
   std::vector<std::int32_t> chosen(count);
-  for (std::size_t i = 0; i < count; ++i) chosen[i] = keyed[i].second;
+  const double part = static_cast<double>(rows.size()) / static_cast<double>(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double place = (static_cast<double>(i) + random_uniform(seed, i)) * part;
+    chosen[i] = rows[std::min(rows.size() - 1, static_cast<std::size_t>(place))];
+  }
+  return chosen;
+}
+
+// In an order that depends on the seed only.
+void shuffle(std::vector<std::int32_t>& rows, std::uint64_t seed) {
+  std::vector<std::pair<std::uint64_t, std::int32_t>> keyed(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i) keyed[i] = {random_bits(seed, i), rows[i]};
+  std::sort(keyed.begin(), keyed.end());
+  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = keyed[i].second;
+}
+
+template <class Matrix>
+Matrix rows_of(const Eigen::Ref<const Matrix>& values, const std::vector<std::int32_t>& rows) {
+  if (values.rows() == 0) return Matrix(0, values.cols());
+  Matrix chosen(static_cast<Eigen::Index>(rows.size()), values.cols());
+  for (std::size_t i = 0; i < rows.size(); ++i) chosen.row(static_cast<Eigen::Index>(i)) = values.row(rows[i]);
   return chosen;
 }
 
 double median_spacing(const KdTree& tree, const PointsRef& points) {
-  constexpr std::size_t num_probes = 500;
-  std::vector<Eigen::Index> finite;
-  for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    if (points.row(i).allFinite()) finite.push_back(i);
-  }
+  constexpr Eigen::Index num_probes = 500;
   std::vector<double> distances;
-  for (std::size_t probe = 0; probe < finite.size(); probe += std::max<std::size_t>(1, finite.size() / num_probes)) {
-    const Eigen::Index i = finite[probe];
+  for (Eigen::Index i = 0; i < points.rows(); i += std::max<Eigen::Index>(1, points.rows() / num_probes)) {
     std::int64_t indices[2];
     double squared[2];
     if (tree.nearest(points.row(i).transpose().cast<double>(), 2, KdTree::infinity, indices, squared) == 2) {
@@ -61,7 +74,6 @@ double bounding_diameter(const PointsRef& points) {
   Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
     const Eigen::Vector3f p = points.row(i).transpose();
-    if (!p.allFinite()) continue;
     low = low.cwiseMin(p);
     high = high.cwiseMax(p);
   }
@@ -70,62 +82,67 @@ double bounding_diameter(const PointsRef& points) {
 
 }  // namespace
 
-IcpSource::IcpSource(const AlignCloud& cloud, const AlignOptions& options)
-    : points(cloud.points),
-      estimated_normals(normals_if_needed(cloud, options, false)),
-      normals(estimated_normals.rows() > 0 ? PointsRef(estimated_normals) : cloud.normals),
-      sigma(cloud.sigma) {
-  std::vector<std::int32_t> usable;
-  for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    if (points.row(i).allFinite() && (!has_normals() || normals.row(i).allFinite())) {
-      usable.push_back(static_cast<std::int32_t>(i));
-    }
-  }
-  auto count = static_cast<std::size_t>(std::ceil(options.sample_fraction * static_cast<double>(usable.size())));
+IcpCloud::IcpCloud(const AlignCloud& cloud, const AlignOptions& options, bool is_target)
+    : has_estimated_normals(needs_normals(options, is_target) && cloud.normals.rows() == 0) {
+  std::vector<std::int32_t> rows = finite_rows(cloud.points, cloud.normals);
+  // A gate that somebody has set is meant for the cloud as it is.
+  const bool may_thin_out = options.max_points > 0 && !(options.final_distance > 0.0);
+  if (may_thin_out) rows = choose(rows, static_cast<std::size_t>(options.max_points), options.seed);
+  points = rows_of<Points>(cloud.points, rows);
+  normals = rows_of<Points>(cloud.normals, rows);
+  sigma = rows_of<Values>(cloud.sigma, rows);
+  if (!has_estimated_normals) return;
+
+  NormalOptions normal_options;
+  normal_options.num_threads = options.num_threads;
+  normals = estimate_normals(points, normal_options);
+}
+
+IcpSource::IcpSource(const AlignCloud& cloud_in, const AlignOptions& options) : cloud(cloud_in, options, false) {
+  order = finite_rows(cloud.points, cloud.normals);
+  auto count = static_cast<std::size_t>(std::ceil(options.sample_fraction * static_cast<double>(order.size())));
   if (options.max_samples > 0) count = std::min(count, static_cast<std::size_t>(options.max_samples));
-  order = choose(usable, count, options.seed);
+  order = choose(order, count, options.seed);
+  shuffle(order, options.seed);
 }
 
 IcpTarget::IcpTarget(const AlignCloud& cloud, const AlignOptions& options)
     : options_(options),
-      points_(cloud.points),
-      estimated_normals_(normals_if_needed(cloud, options, true)),
-      normals_(estimated_normals_.rows() > 0 ? PointsRef(estimated_normals_) : cloud.normals),
-      sigma_(cloud.sigma),
-      tree_(points_, options.num_threads),
-      diameter_(bounding_diameter(points_)),
-      spacing_(median_spacing(tree_, points_)) {}
+      cloud_(cloud, options, true),
+      tree_(cloud_.points, options.num_threads),
+      diameter_(bounding_diameter(cloud_.points)),
+      spacing_(median_spacing(tree_, cloud_.points)) {}
 
 std::vector<Pair> IcpTarget::match(const IcpSource& source, const std::vector<std::int32_t>& samples, const Pose& pose,
                                    const Gate& gate, std::vector<std::int32_t>& nearest) const {
-  const bool target_has_normals = normals_.rows() == points_.rows();
-  const bool compare_normals = target_has_normals && source.has_normals();
-  // Normals that were estimated here point to an arbitrary side.
-  const bool oriented = estimated_normals_.rows() == 0 && source.estimated_normals.rows() == 0;
+  const IcpCloud& from = source.cloud;
+  const bool compare_normals = cloud_.has_normals() && from.has_normals();
+  // Normals that were estimated point to an arbitrary side.
+  const bool oriented = !cloud_.has_estimated_normals && !from.has_estimated_normals;
 
   std::vector<Pair> pairs(samples.size());
   parallel_for(static_cast<std::int64_t>(samples.size()), 1024, options_.num_threads, [&](std::int64_t i) {
     Pair& pair = pairs[static_cast<std::size_t>(i)];
     pair.weight = 0.0;
     const std::int32_t row = samples[static_cast<std::size_t>(i)];
-    pair.p = pose * source.points.row(row).transpose().cast<double>();
+    pair.p = pose * from.points.row(row).transpose().cast<double>();
 
     std::int32_t& last = nearest[static_cast<std::size_t>(row)];
     double bound = gate.distance;
     if (last >= 0)
-      bound = std::min(bound, (points_.row(last).transpose().cast<double>() - pair.p).norm() * (1 + 1e-12));
+      bound = std::min(bound, (cloud_.points.row(last).transpose().cast<double>() - pair.p).norm() * (1 + 1e-12));
     std::int64_t match = -1;
     double squared_distance = 0.0;
     if (tree_.nearest(pair.p, 1, bound, &match, &squared_distance) == 0) return;
     last = static_cast<std::int32_t>(match);
-    pair.q = points_.row(match).transpose().cast<double>();
+    pair.q = cloud_.points.row(match).transpose().cast<double>();
 
-    if (target_has_normals) {
-      const Eigen::Vector3d target_normal = normals_.row(match).transpose().cast<double>();
+    if (cloud_.has_normals()) {
+      const Eigen::Vector3d target_normal = cloud_.normals.row(match).transpose().cast<double>();
       if (!target_normal.allFinite()) return;
       pair.normal = target_normal;
       if (compare_normals) {
-        Eigen::Vector3d source_normal = pose.linear() * source.normals.row(row).transpose().cast<double>();
+        Eigen::Vector3d source_normal = pose.linear() * from.normals.row(row).transpose().cast<double>();
         double cosine = source_normal.dot(target_normal);
         if (!oriented && cosine < 0.0) {
           cosine = -cosine;
@@ -135,10 +152,11 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, const std::vector<st
         if (options_.method == Metric::symmetric) pair.normal = 0.5 * (source_normal + target_normal);
       }
     }
+    if (std::abs(nacre::residual(pair, options_.method)) > gate.residual) return;
     double variance = 0.0;
-    if (source.sigma.size() > 0) variance += static_cast<double>(source.sigma[row]) * source.sigma[row];
-    if (sigma_.size() > 0) variance += static_cast<double>(sigma_[match]) * sigma_[match];
-    const bool has_sigma = source.sigma.size() > 0 || sigma_.size() > 0;
+    if (from.sigma.size() > 0) variance += static_cast<double>(from.sigma[row]) * from.sigma[row];
+    if (cloud_.sigma.size() > 0) variance += static_cast<double>(cloud_.sigma[match]) * cloud_.sigma[match];
+    const bool has_sigma = from.sigma.size() > 0 || cloud_.sigma.size() > 0;
     pair.weight = has_sigma ? 1.0 / variance : 1.0;
   });
   pairs.erase(std::remove_if(pairs.begin(), pairs.end(),

@@ -1,6 +1,7 @@
 // The cloud that others are registered to: prepared once, matched many times.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "icp_step.hpp"
@@ -9,22 +10,30 @@
 
 namespace nacre {
 
-// A source cloud ready for matching: the rows that may be used, in random order, so that any first part of them is a
-// fair sample.
-struct IcpSource {
-  PointsRef points;
-  Points estimated_normals;
-  PointsRef normals;
-  ValuesRef sigma;
-  std::vector<std::int32_t> order;
+// What is used of a cloud: finite points, at most options.max_points of them where the gate is automatic, with the
+// normals that the method needs; estimated ones are NaN where no plane fits.
+struct IcpCloud {
+  Points points, normals;
+  Values sigma;
+  bool has_estimated_normals;
 
-  IcpSource(const AlignCloud& cloud, const AlignOptions& options);
+  IcpCloud(const AlignCloud& cloud, const AlignOptions& options, bool is_target);
   bool has_normals() const { return normals.rows() == points.rows(); }
 };
 
+// A source cloud ready for matching: the rows that are samples, in random order, so that any first part of them is a
+// fair sample.
+struct IcpSource {
+  IcpCloud cloud;
+  std::vector<std::int32_t> order;
+
+  IcpSource(const AlignCloud& cloud, const AlignOptions& options);
+};
+
 struct Gate {
-  double distance;   // [m]
-  double cos_angle;  // of the largest angle between matched normals
+  double distance;                                            // [m]
+  double cos_angle;                                           // of the largest angle between matched normals
+  double residual = std::numeric_limits<double>::infinity();  // along the normals [m]
 };
 
 class IcpTarget {
@@ -41,20 +50,14 @@ class IcpTarget {
 
  private:
   AlignOptions options_;
-  PointsRef points_;
-  Points estimated_normals_;
-  PointsRef normals_;
-  ValuesRef sigma_;
+  IcpCloud cloud_;
   KdTree tree_;
   double diameter_ = 0.0, spacing_ = 0.0;
 };
 
-// align with a prepared target.
-AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial,
-                     const AlignOptions& options);
-
-// The part of up to max_samples source points that find a target point within the gate.
-double overlap_at(const IcpTarget& target, const IcpSource& source, const Pose& pose, const Gate& gate,
-                  std::size_t max_samples);
+// align with a prepared target. With the last gate, pairs with larger residuals than `last_residual` are rejected: for
+// a target that is sparser than its surface is known, where near points may lie far along the surface, but not across.
+AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
+                     double last_residual = std::numeric_limits<double>::infinity());
 
 }  // namespace nacre

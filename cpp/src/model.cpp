@@ -7,7 +7,7 @@
 
 #include "check.hpp"
 #include "consolidation_fold.hpp"
-#include "surface_observer.hpp"
+#include "fusion_step.hpp"
 #include "tracking.hpp"
 
 namespace nacre {
@@ -79,6 +79,7 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.registration.keep_best = true;
   options.registration.robust = false;
   options.registration.coarse_samples = 0;
+  options.registration.max_points = 0;
   options.registration.max_samples = 0;
   options.registration.weak_threshold = 0.0;
   options.fold_in = FoldIn::wlop;
@@ -119,6 +120,7 @@ void ModelOptions::check() const {
 struct Model::Impl {
   Camera camera;
   ModelOptions options;  // what the first frame decides is filled in
+  SurfaceObserver observer{camera, options.fusion};  // of the newest frame
   PointModel cloud;
   std::vector<FrameReport> reports;
   std::vector<Pose> poses;  // of the registered frames, oldest first
@@ -137,7 +139,7 @@ struct Model::Impl {
   TrackingResult locate(const Frame& frame, const FrameExtras& extras) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   std::vector<Pose> key_poses() const;
-  void fold_in(const Frame& frame, const FrameExtras& extras, FrameReport& report);
+  void fold_in(const Frame& frame, FrameReport& report);
 };
 
 // The loop: clean the image, make points of it, register them to the model, fold them in, renew the normals.
@@ -155,6 +157,9 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   report.milliseconds.preprocess = watch.lap();
 
   const Frame frame = make_frame(clean, camera, noise, options.num_threads);
+  if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
+  const ColorsRef colors(extras.colors);
+  observer.look_at(frame, colors, options.num_threads);
   report.milliseconds.back_project = watch.lap();
 
   const TrackingResult tracking = locate(frame, extras);
@@ -175,7 +180,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     poses.push_back(report.world_from_camera);
     if (report.status == FrameStatus::tracked) {
       if (was_lost) report.status = FrameStatus::relocalised;
-      fold_in(frame, extras, report);
+      fold_in(frame, report);
     }
   }
   was_lost = report.status == FrameStatus::lost && !poses.empty();
@@ -201,7 +206,7 @@ TrackingResult Model::Impl::locate(const Frame& frame, const FrameExtras& extras
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, guesses(extras), key_poses(), was_lost, options);
+  return track(cloud, frame, camera, observer, guesses(extras), key_poses(), was_lost, spacing, options);
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
@@ -228,10 +233,9 @@ std::vector<Pose> Model::Impl::key_poses() const {
   return chosen;
 }
 
-void Model::Impl::fold_in(const Frame& frame, const FrameExtras& extras, FrameReport& report) {
+void Model::Impl::fold_in(const Frame& frame, FrameReport& report) {
   StopWatch watch;
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
-  if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
   if (options.fold_in != FoldIn::fuse) {
     consolidate_frame(cloud, frame, report.world_from_camera, options, spacing,
                       static_cast<std::int32_t>(report.index));
@@ -240,8 +244,8 @@ void Model::Impl::fold_in(const Frame& frame, const FrameExtras& extras, FrameRe
     report.milliseconds.normals = watch.lap();
     return;
   }
-  report.fusion = fuse(cloud, frame, camera, report.world_from_camera, spacing, static_cast<std::int32_t>(report.index),
-                       options.fusion, extras.colors, options.num_threads);
+  report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing,
+                                static_cast<std::int32_t>(report.index), options.fusion, options.num_threads);
   while (cloud.size() > options.max_points) {
     spacing *= coarsening;
     thin(cloud, spacing);

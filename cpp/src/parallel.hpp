@@ -1,54 +1,33 @@
-// The only file that knows OpenMP. Work is cut into blocks that do not depend on the number of threads, and block
-// results are combined in block order, so that every result has the same bits for any number of threads.
+// Loops on several threads. Work is cut into blocks that do not depend on the number of threads, and block results are
+// combined in block order, so that every result has the same bits for any number of threads.
 #pragma once
 
 #include <algorithm>
 #include <cstdint>
-#include <exception>
+#include <type_traits>
 #include <vector>
-
-#ifdef NACRE_OPENMP
-#include <omp.h>
-#endif
 
 namespace nacre {
 
-// The number of threads meant by an option: 0 is all that the process may use.
-inline int resolve_threads(int num_threads) {
-#ifdef NACRE_OPENMP
-  return num_threads > 0 ? num_threads : omp_get_max_threads();
-#else
-  (void)num_threads;
-  return 1;
-#endif
-}
+// The number of threads meant by an option: 0 is all that the process may use (OMP_NUM_THREADS where that is set, else
+// the processors it may run on).
+int resolve_threads(int num_threads);
 
-// body(block, begin, end) for each block of [0, count); blocks run in any order. The first exception is rethrown.
+// run(context, block) for each block of [0, num_blocks), in any order, on the caller's and up to num_threads - 1 other
+// threads. The first exception stops the loop and is rethrown.
+void run_blocks(std::int64_t num_blocks, int num_threads, void (*run)(void* context, std::int64_t block),
+                void* context);
+
+// body(block, begin, end) for each block of [0, count); blocks run in any order.
 template <class Body>
 void parallel_blocks(std::int64_t count, std::int64_t block_size, int num_threads, Body&& body) {
-  const std::int64_t num_blocks = (count + block_size - 1) / block_size;
   const auto run = [&](std::int64_t block) {
     body(block, block * block_size, std::min(count, (block + 1) * block_size));
   };
-#ifdef NACRE_OPENMP
-  const int threads = static_cast<int>(std::min<std::int64_t>(resolve_threads(num_threads), num_blocks));
-  if (threads > 1) {
-    std::exception_ptr error;
-#pragma omp parallel for schedule(dynamic) num_threads(threads)
-    for (std::int64_t block = 0; block < num_blocks; ++block) {
-      try {
-        run(block);
-      } catch (...) {
-#pragma omp critical(nacre_parallel_error)
-        if (!error) error = std::current_exception();
-      }
-    }
-    if (error) std::rethrow_exception(error);
-    return;
-  }
-#endif
-  (void)num_threads;
-  for (std::int64_t block = 0; block < num_blocks; ++block) run(block);
+  using Run = decltype(run);
+  run_blocks((count + block_size - 1) / block_size, num_threads,
+             [](void* context, std::int64_t block) { (*static_cast<Run*>(context))(block); },
+             const_cast<std::remove_const_t<Run>*>(&run));
 }
 
 // body(i) for each i of [0, count).

@@ -41,8 +41,8 @@ double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double
 // few points; then it stays, and the points become more until the pose is at rest.
 class Schedule {
  public:
-  Schedule(const IcpTarget& target, const IcpSource& source, const AlignOptions& options)
-      : options_(options), source_(source) {
+  Schedule(const IcpTarget& target, const IcpSource& source, const AlignOptions& options, double last_residual)
+      : options_(options), source_(source), last_residual_(last_residual) {
     first_ = options.max_distance > 0.0 ? options.max_distance : 0.25 * target.diameter();
     smallest_ = options.final_distance > 0.0 ? options.final_distance : 2.5 * target.spacing();
     const std::size_t all = source.order.size();
@@ -87,6 +87,7 @@ class Schedule {
     const double decayed = first_ * std::pow(options_.gate_decay, iteration_);
     gate_.distance = std::max(smallest, decayed);
     at_smallest_ = options_.gate_decay >= 1.0 || decayed <= smallest;
+    gate_.residual = at_smallest_ ? last_residual_ : std::numeric_limits<double>::infinity();
     // Normals of a source that is still far off may differ by a third more.
     const double widening = options_.gate_decay < 1.0 ? gate_.distance / first_ / 3.0 : 0.0;
     const double angle = options_.max_angle * (1.0 + widening);
@@ -100,7 +101,8 @@ class Schedule {
   int iteration_ = 0, iterations_at_level_ = 0;
   double first_ = 0.0, smallest_ = 0.0;
   bool at_smallest_ = false;
-  Gate gate_{0.0, -1.0};
+  double last_residual_;
+  Gate gate_{};
   std::vector<std::int32_t> samples_;
 };
 
@@ -134,6 +136,7 @@ void AlignOptions::check() const {
   require(gate_decay > 0.0 && gate_decay <= 1.0, "gate_decay", "in (0, 1]", gate_decay);
   require(max_angle > 0.0, "max_angle", "a positive angle in radians", max_angle);
   require(sample_fraction > 0.0 && sample_fraction <= 1.0, "sample_fraction", "in (0, 1]", sample_fraction);
+  require(max_points >= 0, "max_points", "0 (no limit) or more", max_points);
   require(max_samples >= 0, "max_samples", "0 (no limit) or more", max_samples);
   require(coarse_samples >= 0, "coarse_samples", "0 (no limit) or more", coarse_samples);
   require(weak_threshold >= 0.0, "weak_threshold", "at least 0", weak_threshold);
@@ -146,14 +149,14 @@ AlignCloud::AlignCloud(const PointsRef& points_in, const PointsRef& normals_in, 
   require(sigma.size() == 0 || sigma.size() == points.rows(), "sigma", "one value per point", sigma.size());
 }
 
-AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial,
-                     const AlignOptions& options) {
+AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
+                     double last_residual) {
   AlignResult result;
   result.target_from_source = initial;
   result.rmse = std::numeric_limits<double>::quiet_NaN();
 
-  Schedule schedule(target, source, options);
-  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.points.rows()), -1);
+  Schedule schedule(target, source, options, last_residual);
+  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), -1);
   const double resolution = std::max(1e-3 * target.spacing(), 1e-9);
   Pose pose = initial, best_pose = initial;
   double best_rmse = std::numeric_limits<double>::infinity();
@@ -193,17 +196,6 @@ AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pos
   result.information = last.hessian / std::max(last.variance, resolution * resolution);
   result.weak_directions = last.weak_directions;
   return result;
-}
-
-double overlap_at(const IcpTarget& target, const IcpSource& source, const Pose& pose, const Gate& gate,
-                  std::size_t max_samples) {
-  if (source.order.empty()) return 0.0;
-  const std::vector<std::int32_t> samples(
-      source.order.begin(),
-      source.order.begin() + static_cast<std::ptrdiff_t>(std::min(source.order.size(), max_samples)));
-  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.points.rows()), -1);
-  return static_cast<double>(target.match(source, samples, pose, gate, nearest).size()) /
-         static_cast<double>(samples.size());
 }
 
 AlignResult align(const AlignCloud& source, const AlignCloud& target, const Pose& initial,

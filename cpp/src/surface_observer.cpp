@@ -6,41 +6,88 @@
 #include "parallel.hpp"
 
 namespace nacre {
+namespace {
+
+constexpr int border = simd::largest_window;
+
+}  // namespace
 
 float median_sigma(const Frame& frame) {
   if (frame.valid.empty()) return 0.0F;
+  constexpr std::size_t num_probes = 5000;
+  const std::size_t step = std::max<std::size_t>(1, frame.valid.size() / num_probes);
   std::vector<float> values;
-  values.reserve(frame.valid.size());
-  for (const std::int32_t row : frame.valid) values.push_back(frame.sigma[row]);
+  for (std::size_t i = 0; i < frame.valid.size(); i += step) values.push_back(frame.sigma[frame.valid[i]]);
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
 }
 
-SurfaceObserver::SurfaceObserver(const Frame& frame, const Camera& camera, const FusionOptions& options,
-                                 const ColorsRef& colors, int num_threads)
+SurfaceObserver::SurfaceObserver(const Camera& camera, const FusionOptions& options)
     : camera_(camera),
       options_(options),
-      colors_(colors),
-      width_(frame.width),
-      height_(frame.height),
-      pixels_(static_cast<std::size_t>(frame.points.rows())),
-      cos_max_angle_(static_cast<float>(std::cos(options.max_angle))) {
+      width_(camera.width()),
+      height_(camera.height()),
+      tiles_across_((camera.width() + tile_size - 1) / tile_size),
+      least_cosine_(static_cast<float>(std::cos(options.max_angle))) {}
+
+void SurfaceObserver::look_at(const Frame& frame, const ColorsRef& colors, int num_threads) {
+  constexpr int right_border = border + tile_size + 2;
+  const std::int64_t stride = border + width_ + right_border, rows = height_ + 2 * border;
+  const int num_planes = colors.rows() > 0 ? 10 : 7;
+  // The borders are zeros from the first frame on.
+  planes_.resize(static_cast<std::size_t>(num_planes * rows * stride), 0.0F);
+  const auto plane = [&](int index) { return planes_.data() + (index * rows + border) * stride + border; };
+  const simd::SurfaceRow out = {plane(0), plane(1), plane(2), plane(3), plane(4), plane(5), plane(6)};
+  image_ = {out.x,      out.y,   out.z,   out.normal_x, out.normal_y, out.normal_z,
+            out.weight, nullptr, nullptr, nullptr,      stride};
+  if (colors.rows() > 0) {
+    image_.red = plane(7);
+    image_.green = plane(8);
+    image_.blue = plane(9);
+  }
+
   const float reference =
-      options.reference_sigma > 0.0 ? static_cast<float>(options.reference_sigma) : median_sigma(frame);
-  parallel_for(frame.points.rows(), 4096, num_threads, [&](std::int64_t row) {
-    const Eigen::Vector3f point = frame.points.row(row).transpose(), normal = frame.normals.row(row).transpose();
-    const float ratio = reference / frame.sigma[row];
-    const float weight = normal.dot(towards_camera(point)) * ratio * ratio;
-    pixels_[static_cast<std::size_t>(row)] = {
-        point.x(), point.y(), point.z(), normal.x(), normal.y(), normal.z(), weight > 0.0F ? weight : 0.0F};
+      options_.reference_sigma > 0.0 ? static_cast<float>(options_.reference_sigma) : median_sigma(frame);
+  const auto fill_row = simd::fill_surface_row();
+  parallel_for(height_, 16, num_threads, [&](std::int64_t v) {
+    const std::int64_t first = v * width_, to = v * stride;
+    fill_row(
+        {width_, frame.points.data() + 3 * first, frame.normals.data() + 3 * first, frame.sigma.data() + first},
+        reference, camera_.model() == Camera::Model::orthographic,
+        {out.x + to, out.y + to, out.z + to, out.normal_x + to, out.normal_y + to, out.normal_z + to, out.weight + to});
+    if (colors.rows() == 0) return;
+    for (std::int64_t u = 0; u < width_; ++u) {
+      for (int channel = 0; channel < 3; ++channel) plane(7 + channel)[to + u] = colors(first + u, channel);
+    }
+  });
+  summarise(num_threads);
+}
+
+void SurfaceObserver::summarise(int num_threads) {
+  const int tiles_down = (height_ + tile_size - 1) / tile_size;
+  tiles_.resize(static_cast<std::size_t>(tiles_across_ * tiles_down));
+  parallel_for(tiles_down, 1, num_threads, [&](std::int64_t row) {
+    for (int column = 0; column < tiles_across_; ++column) {
+      Tile& tile = tiles_[static_cast<std::size_t>(row * tiles_across_ + column)];
+      const int first_u = column * tile_size - border, first_v = static_cast<int>(row) * tile_size - border;
+      const int last_v = std::min(first_v + tile_size + 2 * border, height_ + border);
+      simd::summarise_pixels()(image_, first_v * image_.stride + first_u, tile_size + 2 * border, last_v - first_v,
+                               &tile.nearest, &tile.farthest, &tile.largest_weight);
+    }
   });
 }
 
-std::int32_t SurfaceObserver::pixel_of(const Eigen::Vector3f& point) const {
-  const Eigen::Vector2d pixel = camera_.project(point.cast<double>());
-  if (!(pixel.x() > -0.5 && pixel.y() > -0.5 && pixel.x() < width_ - 0.5 && pixel.y() < height_ - 0.5)) return -1;
-  return static_cast<std::int32_t>(pixel.y() + 0.5) * width_ + static_cast<std::int32_t>(pixel.x() + 0.5);
+bool SurfaceObserver::may_observe(const Eigen::Vector3f& point, std::int32_t pixel, float sigma,
+                                  float least_weight) const {
+  const Tile& tile =
+      tiles_[static_cast<std::size_t>(pixel / width_ / tile_size * tiles_across_ + pixel % width_ / tile_size)];
+  const float radius = support(sigma, static_cast<float>(camera_.footprint(point.z())));
+  const float reach = radius + std::max(radius, 4.0F * sigma);
+  return point.z() > tile.nearest - reach &&
+         point.z()<tile.farthest +
+                   reach&& static_cast<float>(PixelWindow::size * PixelWindow::size) * tile.largest_weight>
+             least_weight;
 }
 
 Eigen::Vector3f SurfaceObserver::towards_camera(const Eigen::Vector3f& point) const {
@@ -48,47 +95,60 @@ Eigen::Vector3f SurfaceObserver::towards_camera(const Eigen::Vector3f& point) co
   return -point.normalized();
 }
 
-float SurfaceObserver::support(float z, float sigma) const {
+float SurfaceObserver::support(float sigma, float footprint) const {
   if (options_.support > 0.0) return static_cast<float>(options_.support);
-  const auto pixel = static_cast<float>(camera_.footprint(z));
-  return std::clamp(6.0F * sigma, 3.0F * pixel, static_cast<float>(max_window) * pixel);
+  return std::clamp(6.0F * sigma, 3.0F * footprint, 4.0F * footprint);
 }
 
-Observation SurfaceObserver::observe(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, std::int32_t pixel,
-                                     float sigma) const {
-  const float radius = support(point.z(), sigma);
-  const float squared_radius = radius * radius, inverse_squared_radius = 1.0F / squared_radius;
-  const float largest_offset = std::max(radius, 4.0F * sigma);
-  const int window = std::clamp(static_cast<int>(std::ceil(radius / camera_.footprint(point.z()))), 1, max_window);
-  const int u = pixel % width_, v = pixel / width_;
-  const int first_u = std::max(0, u - window), last_u = std::min(width_ - 1, u + window);
+void SurfaceObserver::add(ObservationBlock& block, const Eigen::Vector3f& point, const Eigen::Vector3f& normal,
+                          std::int32_t pixel, float sigma, float spacing) const {
+  const auto footprint = static_cast<float>(camera_.footprint(point.z()));
+  const float radius = support(sigma, footprint), reach = std::max(radius, spacing);
+  const int i = block.count_++;
+  block.x_[i] = point.x();
+  block.y_[i] = point.y();
+  block.z_[i] = point.z();
+  block.normal_x_[i] = normal.x();
+  block.normal_y_[i] = normal.y();
+  block.normal_z_[i] = normal.z();
+  block.sigma_[i] = sigma;
+  block.u_[i] = pixel % width_;
+  block.v_[i] = pixel / width_;
+  block.radius_[i] = radius;
+  block.largest_offset_[i] = std::max(radius, 4.0F * sigma);
+  block.spacing_[i] = spacing;
+  block.window_[i] = std::clamp(static_cast<int>(std::ceil(reach / footprint)), 1, simd::largest_window);
+}
 
-  Observation sum;
-  for (int y = std::max(0, v - window); y <= std::min(height_ - 1, v + window); ++y) {
-    const std::size_t line = static_cast<std::size_t>(y) * static_cast<std::size_t>(width_);
-    for (int x = first_u; x <= last_u; ++x) {
-      const std::size_t row = line + static_cast<std::size_t>(x);
-      const Pixel& q = pixels_[row];
-      const Eigen::Vector3f difference(q.x - point.x(), q.y - point.y(), q.z - point.z());
-      const Eigen::Vector3f q_normal(q.normal_x, q.normal_y, q.normal_z);
-      const float along = difference.dot(normal);
-      const float across_squared = difference.squaredNorm() - along * along;
-      const bool counts = (q.weight > 0.0F) & (across_squared < squared_radius) & (std::abs(along) < largest_offset) &
-                          (q_normal.dot(normal) > cos_max_angle_);
-      if (!counts) continue;
-      const float falloff = 1.0F - across_squared * inverse_squared_radius;
-      const float w = q.weight * falloff * falloff;
-      sum.weight += w;
-      sum.offset += w * 0.5F * (along + q_normal.dot(difference));
-      sum.normal += w * q_normal;
-      if (has_colors()) sum.color += w * colors_.row(static_cast<Eigen::Index>(row)).transpose().cast<float>();
-    }
+PixelWindow ObservationBlock::cover(int i) const {
+  PixelWindow window{u_[i] - window_[i], v_[i] - window_[i], 2 * window_[i] + 1, {}};
+  std::copy_n(cover_rows_ + PixelWindow::size * i, window.num_rows, window.rows);
+  return window;
+}
+
+void SurfaceObserver::observe(ObservationBlock& block) const { observe(block, nullptr); }
+
+void SurfaceObserver::observe_and_cover(ObservationBlock& block, float least_cosine) const {
+  for (int i = 0; i < block.count_; ++i) {
+    block.cover_offset_[i] = std::max(block.spacing_[i], 3.0F * block.sigma_[i]);
   }
-  if (sum.weight > 0.0F) {
-    sum.offset /= sum.weight;
-    sum.color /= sum.weight;
+  const simd::WindowCover cover = {block.spacing_, block.cover_offset_, least_cosine, block.cover_rows_};
+  observe(block, &cover);
+}
+
+void SurfaceObserver::observe(ObservationBlock& b, const simd::WindowCover* cover) const {
+  const bool colored = has_colors();
+  if (!colored) {
+    std::fill_n(b.red_, b.count_, 0.0F);
+    std::fill_n(b.green_, b.count_, 0.0F);
+    std::fill_n(b.blue_, b.count_, 0.0F);
   }
-  return sum;
+  simd::observe_windows()(
+      image_,
+      {b.count_, b.x_, b.y_, b.z_, b.normal_x_, b.normal_y_, b.normal_z_, b.u_, b.v_, b.window_, b.radius_,
+       b.largest_offset_},
+      least_cosine_,
+      {b.weight_, b.offset_, b.seen_normal_x_, b.seen_normal_y_, b.seen_normal_z_, b.red_, b.green_, b.blue_}, cover);
 }
 
 bool SurfaceObserver::sees_through(const Eigen::Vector3f& point, std::int32_t pixel, float margin) const {
@@ -96,9 +156,7 @@ bool SurfaceObserver::sees_through(const Eigen::Vector3f& point, std::int32_t pi
   if (u < 1 || v < 1 || u + 1 >= width_ || v + 1 >= height_) return false;
   for (int y = v - 1; y <= v + 1; ++y) {
     for (int x = u - 1; x <= u + 1; ++x) {
-      const Pixel& q =
-          pixels_[static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) + static_cast<std::size_t>(x)];
-      if (!(q.z > point.z() + margin)) return false;
+      if (!(image_.z[y * image_.stride + x] > point.z() + margin)) return false;
     }
   }
   return true;

@@ -1,63 +1,116 @@
-// What a depth frame says about a point of a surface: the symmetric implicit moving-least-squares residual.
+// What a depth frame says about points of a surface: the symmetric implicit moving-least-squares residual.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "nacre/fusion.hpp"
+#include "simd/surface_window.hpp"
 
 namespace nacre {
 
 // What the pixels around a surface point say about it.
 struct Observation {
-  float weight = 0.0F;
-  float offset = 0.0F;  // along the point's normal [m]
-  Eigen::Vector3f normal = Eigen::Vector3f::Zero();
-  Eigen::Vector3f color = Eigen::Vector3f::Zero();
+  float weight;
+  float offset;            // along the point's normal [m]
+  Eigen::Vector3f normal;  // not normalised
+  Eigen::Vector3f color;   // 0 without colours
+};
+
+// Some of the pixels around one.
+struct PixelWindow {
+  static constexpr int size = 2 * simd::largest_window + 1;
+  std::int32_t first_u, first_v;  // may lie outside of the image
+  int num_rows;
+  std::uint16_t rows[size];  // bit b: the pixel b to the right of first_u
+};
+
+// Points of the camera frame to observe together, and then what was observed.
+class ObservationBlock {
+ public:
+  static constexpr int capacity = 256;
+
+  int size() const { return count_; }
+  float sigma(int i) const { return sigma_[i]; }  // as given to add
+  // Which pixels of a point's window show its surface, after observe_and_cover.
+  PixelWindow cover(int i) const;
+  Observation operator[](int i) const {
+    return {weight_[i],
+            offset_[i],
+            {seen_normal_x_[i], seen_normal_y_[i], seen_normal_z_[i]},
+            {red_[i], green_[i], blue_[i]}};
+  }
+
+ private:
+  friend class SurfaceObserver;
+  template <class T>
+  using Column = T[capacity];
+
+  int count_ = 0;
+  Column<float> x_, y_, z_, normal_x_, normal_y_, normal_z_, sigma_, spacing_, radius_, largest_offset_;
+  Column<std::int32_t> u_, v_, window_;
+  Column<float> cover_offset_;
+  std::uint16_t cover_rows_[capacity * PixelWindow::size];
+  Column<float> weight_, offset_, seen_normal_x_, seen_normal_y_, seen_normal_z_, red_, green_, blue_;
 };
 
 // The median of the noise over a frame's valid pixels [m]; 0 when there are none.
 float median_sigma(const Frame& frame);
 
-// A frame, ready to be asked about points of the camera frame. Keeps references to its arguments.
+// Frames of a camera, each ready to be asked about points of the camera frame.
 class SurfaceObserver {
  public:
-  SurfaceObserver(const Frame& frame, const Camera& camera, const FusionOptions& options, const ColorsRef& colors,
-                  int num_threads);
+  // Keeps references to its arguments.
+  SurfaceObserver(const Camera& camera, const FusionOptions& options);
 
-  bool has_colors() const { return colors_.rows() > 0; }
+  // What is asked from now on is asked about this frame. colors has a row per pixel, or none.
+  void look_at(const Frame& frame, const ColorsRef& colors, int num_threads);
 
-  // The pixel nearest to the projection of a point, or -1.
-  std::int32_t pixel_of(const Eigen::Vector3f& point) const;
+  // Of a pixel: information relative to a frontal measurement of the reference noise.
+  float weight(int u, int v) const { return image_.weight[v * image_.stride + u]; }
+
+  bool has_colors() const { return image_.red != nullptr; }
+
+  // Whether a window around a point can say more than `least_weight` about it; false is certain.
+  bool may_observe(const Eigen::Vector3f& point, std::int32_t pixel, float sigma, float least_weight) const;
 
   Eigen::Vector3f towards_camera(const Eigen::Vector3f& point) const;
 
-  // offset = sum of w (n_i + n_j) / 2 . (q_j - x_i) / sum of w over the pixels j around `pixel`, where x_i is the
-  // point; it vanishes to second order on constant curvature. The weights fall to 0 at the support's radius.
-  Observation observe(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, std::int32_t pixel,
-                      float sigma) const;
+  // Adds a point, whose noise is about sigma and whose neighbours are a spacing away, to a block that is not full;
+  // pixel is where it projects to.
+  void add(ObservationBlock& block, const Eigen::Vector3f& point, const Eigen::Vector3f& normal, std::int32_t pixel,
+           float sigma, float spacing = 0.0F) const;
+  // offset = sum of w (n_i + n_j) / 2 . (q_j - x_i) / sum of w over the pixels j around each point x_i of the block; it
+  // vanishes to second order on constant curvature. The weights fall to 0 at the support's radius.
+  void observe(ObservationBlock& block) const;
+  // The same, and which pixels show each point's surface: within the spacing along it, the noise across it, and with a
+  // normal within an angle of its own.
+  void observe_and_cover(ObservationBlock& block, float least_cosine) const;
 
   // Whether every pixel around measures something farther than a margin behind a point.
   bool sees_through(const Eigen::Vector3f& point, std::int32_t pixel, float margin) const;
 
  private:
-  // One pixel in one half of a cache line.
-  struct alignas(32) Pixel {
-    float x, y, z;
-    float normal_x, normal_y, normal_z;
-    float weight;  // information relative to a frontal measurement of the reference noise; 0 where there is none
-  };
-
+  void observe(ObservationBlock& block, const simd::WindowCover* cover) const;
   // Radius of the kernel at a depth: wide enough to average the noise, narrow enough to keep the shape.
-  float support(float z, float sigma) const;
-
-  static constexpr int max_window = 4;  // pixels on each side of a point that may observe it
+  float support(float sigma, float footprint) const;
 
   const Camera& camera_;
   const FusionOptions& options_;
-  const ColorsRef& colors_;
   int width_, height_;
-  std::vector<Pixel> pixels_;
-  float cos_max_angle_;
+  // What the windows around the pixels of a tile may see.
+  struct Tile {
+    float nearest, farthest;  // depth [m]
+    float largest_weight;
+  };
+  static constexpr int tile_size = 16;  // [pixels]
+  void summarise(int num_threads);
+
+  int tiles_across_;
+  std::vector<float> planes_;
+  simd::SurfaceImage image_ = {};
+  std::vector<Tile> tiles_;
+  float least_cosine_;
 };
 
 }  // namespace nacre

@@ -13,43 +13,59 @@ namespace nacre {
 namespace {
 
 constexpr double far_turn = 0.35;  // from the guess [rad]: a registration that turned farther must be beyond doubt
+constexpr std::size_t max_target_points = 30000;  // that a frame is registered to
 
-// The model's points that a camera near a pose may see, as a cloud to register to.
+// Model points that a camera near a pose may see, as a cloud to register to.
 struct View {
-  Points points, normals;
+  Points points, normals;  // world frame
 };
 
-Eigen::Vector3d viewing_direction(const Camera& camera, const Eigen::Vector3d& point) {
-  return camera.model() == Camera::Model::orthographic ? Eigen::Vector3d::UnitZ() : point.normalized();
+Eigen::Vector3f viewing_direction(const Camera& camera, const Eigen::Vector3f& point) {
+  return camera.model() == Camera::Model::orthographic ? Eigen::Vector3f::UnitZ() : Eigen::Vector3f(point.normalized());
 }
 
-// Points in the image widened by a third on each side, turned away from the camera by at most 120 degrees.
-View points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera) {
-  const Pose camera_from_world = world_from_camera.inverse();
+// Points in the image widened by a third on each side, turned away from the camera by at most 120 degrees: one of every
+// n of them, so that at most max_target_points are left.
+View points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera, int num_threads) {
+  constexpr std::int64_t block_size = 4096;
+  const Eigen::Isometry3f camera_from_world(world_from_camera.inverse().cast<float>());
   const double margin_u = camera.width() / 3.0, margin_v = camera.height() / 3.0;
-  std::vector<std::size_t> rows;
-  for (std::size_t i = 0; i < model.points.size(); ++i) {
-    const Eigen::Vector3d point = camera_from_world * model.points[i].cast<double>();
-    const Eigen::Vector2d pixel = camera.project(point);
-    if (!(pixel.x() > -margin_u && pixel.x() < camera.width() + margin_u && pixel.y() > -margin_v &&
-          pixel.y() < camera.height() + margin_v)) {
-      continue;
+  std::vector<std::vector<std::uint32_t>> found(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
+  parallel_blocks(model.size(), block_size, num_threads, [&](std::int64_t block, std::int64_t begin, std::int64_t end) {
+    for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
+      const Eigen::Vector3f point = camera_from_world * model.points[i];
+      const Eigen::Vector2d pixel = camera.project(point.cast<double>());
+      if (!(pixel.x() > -margin_u && pixel.x() < camera.width() + margin_u && pixel.y() > -margin_v &&
+            pixel.y() < camera.height() + margin_v)) {
+        continue;
+      }
+      const Eigen::Vector3f normal = camera_from_world.linear() * model.normals[i];
+      if (!(normal.dot(viewing_direction(camera, point)) < 0.5F)) continue;
+      found[static_cast<std::size_t>(block)].push_back(static_cast<std::uint32_t>(i));
     }
-    const Eigen::Vector3d normal = camera_from_world.linear() * model.normals[i].cast<double>();
-    if (!(normal.dot(viewing_direction(camera, point)) < 0.5)) continue;
-    rows.push_back(i);
-  }
-  View view{Points(static_cast<Eigen::Index>(rows.size()), 3), Points(static_cast<Eigen::Index>(rows.size()), 3)};
-  for (std::size_t k = 0; k < rows.size(); ++k) {
-    view.points.row(static_cast<Eigen::Index>(k)) = model.points[rows[k]].transpose();
-    view.normals.row(static_cast<Eigen::Index>(k)) = model.normals[rows[k]].transpose();
+  });
+  std::size_t num_found = 0;
+  for (const auto& rows : found) num_found += rows.size();
+  const std::size_t step = (num_found + max_target_points - 1) / max_target_points;
+  const auto count = static_cast<Eigen::Index>(step > 0 ? (num_found + step - 1) / step : 0);
+  View view{Points(count, 3), Points(count, 3)};
+  // One of every `step`, at random.
+  const auto is_chosen = [&](std::size_t index) { return index % step == random_bits(0, index / step) % step; };
+  std::size_t index = 0;
+  Eigen::Index k = 0;
+  for (const auto& rows : found) {
+    for (const std::uint32_t row : rows) {
+      if (k == count || !is_chosen(index++)) continue;
+      view.points.row(k) = model.points[row].transpose();
+      view.normals.row(k++) = model.normals[row].transpose();
+    }
   }
   return view;
 }
 
-// Of the model's points that face the camera and project onto a measured pixel: the part that agrees with it, among
+// Of the view's points that face the camera and project onto a measured pixel: the part that agrees with it, among
 // those that agree and those that the camera sees through. Points behind the measured surface are hidden, not wrong.
-double consistency_of(const PointModel& model, const Frame& frame, const Camera& camera, const Pose& world_from_camera,
+double consistency_of(const View& view, const Frame& frame, const Camera& camera, const Pose& world_from_camera,
                       double spacing, int num_threads) {
   struct Counts {
     std::int64_t agree = 0, violated = 0;
@@ -59,26 +75,25 @@ double consistency_of(const PointModel& model, const Frame& frame, const Camera&
       return *this;
     }
   };
-  const Pose camera_from_world = world_from_camera.inverse();
+  const Eigen::Isometry3f camera_from_world(world_from_camera.inverse().cast<float>());
   const Counts counts =
-      block_reduce(model.size(), 1024, num_threads, Counts{}, [&](std::int64_t begin, std::int64_t end) {
+      block_reduce(view.points.rows(), 1024, num_threads, Counts{}, [&](std::int64_t begin, std::int64_t end) {
         Counts sum;
-        for (std::int64_t index = begin; index < end; ++index) {
-          const auto i = static_cast<std::size_t>(index);
-          const Eigen::Vector3d point = camera_from_world * model.points[i].cast<double>();
-          const Eigen::Vector3d normal = camera_from_world.linear() * model.normals[i].cast<double>();
-          const double facing = -normal.dot(viewing_direction(camera, point));
-          if (!(facing > 0.3)) continue;
-          const Eigen::Vector2d pixel = camera.project(point);
+        for (std::int64_t i = begin; i < end; ++i) {
+          const Eigen::Vector3f point = camera_from_world * view.points.row(i).transpose();
+          const Eigen::Vector3f normal = camera_from_world.linear() * view.normals.row(i).transpose();
+          const float facing = -normal.dot(viewing_direction(camera, point));
+          if (!(facing > 0.3F)) continue;
+          const Eigen::Vector2d pixel = camera.project(point.cast<double>());
           if (!(pixel.x() > -0.5 && pixel.y() > -0.5 && pixel.x() < frame.width - 0.5 &&
                 pixel.y() < frame.height - 0.5)) {
             continue;
           }
           const Eigen::Index row =
               static_cast<Eigen::Index>(pixel.y() + 0.5) * frame.width + static_cast<Eigen::Index>(pixel.x() + 0.5);
-          const double behind = static_cast<double>(frame.points(row, 2)) - point.z();
+          const float behind = frame.points(row, 2) - point.z();
           if (!std::isfinite(behind)) continue;
-          const double tolerance = std::max(3.0 * spacing, 4.0 * static_cast<double>(frame.sigma[row])) / facing;
+          const float tolerance = std::max(3.0F * static_cast<float>(spacing), 4.0F * frame.sigma[row]) / facing;
           if (behind > tolerance) {
             ++sum.violated;
           } else if (behind > -tolerance) {
@@ -97,27 +112,33 @@ struct Samples {
   Values sigma;
 };
 
-Samples sample_frame(const Frame& frame, const Camera& camera, const ModelOptions& options) {
+Samples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
   const std::int64_t count =
       options.registration.max_samples > 0
           ? std::min<std::int64_t>(options.registration.max_samples, static_cast<std::int64_t>(frame.valid.size()))
           : static_cast<std::int64_t>(frame.valid.size());
   Samples samples{Points(count, 3), Points(count, 3), Values(count)};
-  const Colors no_colors;
-  const ColorsRef colors(no_colors);
-  const SurfaceObserver observer(frame, camera, options.fusion, colors, options.num_threads);
   const double stride = static_cast<double>(frame.valid.size()) / static_cast<double>(std::max<std::int64_t>(count, 1));
-  parallel_for(count, 2048, options.num_threads, [&](std::int64_t i) {
-    // One of every `stride` pixels.
-    const double place =
-        (static_cast<double>(i) + random_uniform(options.registration.seed, static_cast<std::uint64_t>(i))) * stride;
-    const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
-    const Eigen::Vector3f point = frame.points.row(row).transpose(), normal = frame.normals.row(row).transpose();
-    const Observation seen =
-        options.denoise_samples ? observer.observe(point, normal, row, frame.sigma[row]) : Observation();
-    samples.points.row(i) = (point + seen.offset * normal).transpose();
-    samples.normals.row(i) = seen.weight > 0.0F ? seen.normal.normalized().transpose() : normal.transpose();
-    samples.sigma[i] = frame.sigma[row];
+  parallel_blocks(count, ObservationBlock::capacity, options.num_threads, [&](auto, auto begin, auto end) {
+    ObservationBlock block;
+    for (std::int64_t i = begin; i < end; ++i) {
+      // One of every `stride` pixels.
+      const double place =
+          (static_cast<double>(i) + random_uniform(options.registration.seed, static_cast<std::uint64_t>(i))) * stride;
+      const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
+      samples.points.row(i) = frame.points.row(row);
+      samples.normals.row(i) = frame.normals.row(row);
+      samples.sigma[i] = frame.sigma[row];
+      observer.add(block, samples.points.row(i).transpose(), samples.normals.row(i).transpose(), row, frame.sigma[row]);
+    }
+    if (!options.denoise_samples) return;
+    observer.observe(block);
+    for (std::int64_t i = begin; i < end; ++i) {
+      const Observation seen = block[static_cast<int>(i - begin)];
+      if (!(seen.weight > 0.0F)) continue;
+      samples.points.row(i) += seen.offset * samples.normals.row(i);
+      samples.normals.row(i) = seen.normal.normalized().transpose();
+    }
   });
   return samples;
 }
@@ -159,34 +180,39 @@ struct Search {
   const Camera& camera;
   const ModelOptions& options;
   IcpSource source;
+  double spacing;      // of the model [m]
+  float median_sigma;  // of the frame [m]
 
   bool has_automatic_gate() const { return !(options.registration.max_distance > 0.0); }
 
   // Near: the guess is about right, and a narrow gate is safest. Wide: it is not. Strict: see judge.
   TrackingResult register_from(const Pose& guess, bool wide, bool strict) const {
-    const View view = points_in_view(model, camera, guess);
+    const View view = points_in_view(model, camera, guess, options.num_threads);
     const IcpTarget target(AlignCloud(view.points, view.normals), options.registration);
     AlignOptions align_options = options.registration;
+    double verdict_gate =
+        align_options.final_distance > 0.0 ? align_options.final_distance : std::numeric_limits<double>::infinity();
     if (!(align_options.final_distance > 0.0)) {
       // Noise that is large against the surface would match anything.
-      align_options.final_distance = std::min(
-          std::max(2.5 * target.spacing(), 4.0 * static_cast<double>(median_sigma(frame))), 0.05 * target.diameter());
+      const double noise = 4.0 * static_cast<double>(median_sigma), largest = 0.05 * target.diameter();
+      align_options.final_distance = std::min(std::max(2.5 * target.spacing(), noise), largest);
+      verdict_gate = std::min(std::max(2.75 * spacing, noise), largest);
     }
     if (has_automatic_gate() && !wide) align_options.max_distance = 4.0 * align_options.final_distance;
 
     TrackingResult result;
-    result.alignment = align_to(target, source, guess, align_options);
-    result.consistency = consistency_of(model, frame, camera, result.alignment.target_from_source, target.spacing(),
-                                        options.num_threads);
+    result.alignment = align_to(target, source, guess, align_options, verdict_gate);
+    result.consistency =
+        consistency_of(view, frame, camera, result.alignment.target_from_source, spacing, options.num_threads);
     const double turned =
         Eigen::AngleAxisd(guess.linear().transpose() * result.alignment.target_from_source.linear()).angle();
-    judge(result, options, align_options.final_distance, strict || turned > far_turn);
+    judge(result, options, verdict_gate, strict || turned > far_turn);
     return result;
   }
 
   // Cameras around what a known camera saw: it turned about each of its axes, one way and the other.
   std::vector<Pose> around(const Pose& pose) const {
-    const View view = points_in_view(model, camera, pose);
+    const View view = points_in_view(model, camera, pose, options.num_threads);
     std::vector<Pose> poses = {pose};
     if (view.points.rows() == 0) return poses;
     const Eigen::Vector3d center = view.points.colwise().mean().transpose().cast<double>();
@@ -210,7 +236,7 @@ struct Search {
     AlignOptions coarse = options.registration;
     coarse.max_samples = coarse.coarse_samples = 300;
     coarse.max_iterations = 15;
-    const IcpSource few(AlignCloud(source.points, source.normals, source.sigma), coarse);
+    const IcpSource few(AlignCloud(source.cloud.points, source.cloud.normals, source.cloud.sigma), coarse);
 
     std::vector<std::pair<double, Pose>> candidates;
     for (const Pose& key_pose : key_poses) {
@@ -232,12 +258,17 @@ struct Search {
 
 }  // namespace
 
-TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera,
+TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
                      const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
-                     const ModelOptions& options) {
-  const Samples samples = sample_frame(frame, camera, options);
-  const Search search{model, frame, camera, options,
-                      IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration)};
+                     double spacing, const ModelOptions& options) {
+  const Samples samples = sample_frame(frame, observer, options);
+  const Search search{model,
+                      frame,
+                      camera,
+                      options,
+                      IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
+                      spacing,
+                      median_sigma(frame)};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
   for (const bool wide : {false, true}) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "nacre/model.hpp"
+#include "surface_observer.hpp"
 
 namespace nacre {
 
@@ -22,8 +23,8 @@ struct TrackingResult {
 
 // Tries the guesses (world_from_camera, most trusted first) until one registers the frame; when none does, searches
 // around the key poses, unless there are none.
-TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera,
+TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
                      const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
-                     const ModelOptions& options);
+                     double spacing, const ModelOptions& options);
 
 }  // namespace nacre

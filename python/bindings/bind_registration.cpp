@@ -19,6 +19,7 @@ void bind_registration(py::module_& m) {
       .def_readwrite("max_angle", &AlignOptions::max_angle)
       .def_readwrite("robust", &AlignOptions::robust)
       .def_readwrite("sample_fraction", &AlignOptions::sample_fraction)
+      .def_readwrite("max_points", &AlignOptions::max_points)
       .def_readwrite("max_samples", &AlignOptions::max_samples)
       .def_readwrite("coarse_samples", &AlignOptions::coarse_samples)
       .def_readwrite("keep_best", &AlignOptions::keep_best)

@@ -31,3 +31,4 @@ void bind_model(py::module_& m);
 void bind_normals(py::module_& m);
 void bind_registration(py::module_& m);
 void bind_simulation(py::module_& m);
+void bind_system(py::module_& m);

@@ -4,6 +4,7 @@
 PYBIND11_MODULE(_core, m) {
   m.doc() = "The C++ core of nacre; use it through the nacre package.";
   m.attr("__version__") = NACRE_VERSION;
+  bind_system(m);
   bind_camera(m);
   bind_depth(m);
   bind_kdtree(m);

@@ -27,6 +27,7 @@ from nacre.neighbors import KdTree, RadiusNeighbors
 from nacre.normals import estimate_normals
 from nacre.registration import AlignResult, RegistrationParameters, align
 from nacre.simulation import default_camera, simulate_depth, turntable_poses
+from nacre.system import default_threads, instruction_set
 
 if TYPE_CHECKING:
     from nacre import evaluation
@@ -60,10 +61,12 @@ __all__ = [
     "built_in_object",
     "consolidate",
     "default_camera",
+    "default_threads",
     "depth_normals",
     "estimate_noise",
     "estimate_normals",
     "evaluation",
+    "instruction_set",
     "open_sequence",
     "preprocess_depth",
     "project_samples",

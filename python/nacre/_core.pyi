@@ -350,6 +350,10 @@ class AlignOptions:
     @max_iterations.setter
     def max_iterations(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
+    def max_points(self) -> int: ...
+    @max_points.setter
+    def max_points(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
     def max_samples(self) -> int: ...
     @max_samples.setter
     def max_samples(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
@@ -774,6 +778,7 @@ def consolidate(
     Points, attributes and sources; see nacre.consolidate.
     """
 
+def default_threads() -> int: ...
 def estimate_noise(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,
@@ -791,6 +796,7 @@ def estimate_normals(
     options: NormalOptions,
     viewpoint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+def instruction_set() -> str: ...
 def make_frame(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,

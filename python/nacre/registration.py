@@ -31,7 +31,8 @@ class RegistrationParameters:
     max_angle: float = 0.7853982
     robust: bool = True
     sample_fraction: float = 1.0
-    max_samples: int = 20000
+    max_points: int = 30000
+    max_samples: int = 5000
     coarse_samples: int = 600
     keep_best: bool = False
     weak_threshold: float = 0.01
@@ -143,7 +144,8 @@ def align(
     max_angle: float = 0.7853982,
     robust: bool = True,
     sample_fraction: float = 1.0,
-    max_samples: int = 20000,
+    max_points: int = 30000,
+    max_samples: int = 5000,
     coarse_samples: int = 600,
     keep_best: bool = False,
     weak_threshold: float = 0.01,
@@ -185,8 +187,11 @@ def align(
         Weights of Geman and McClure on the residuals.
     sample_fraction : float
         Part of the source points that is used.
+    max_points : int
+        At most so many points of each cloud are looked at, chosen at random and spread evenly over the rows, where
+        ``final_distance`` is 0. 0: no limit.
     max_samples, coarse_samples : int
-        At most so many of them: in all, and while the gate shrinks. 0: no limit.
+        At most so many source points are matched: in all, and while the gate shrinks. 0: no limit.
     keep_best : bool
         Return the iterate of least rmse instead of the last.
     weak_threshold : float
@@ -216,6 +221,7 @@ def align(
         max_angle=max_angle,
         robust=robust,
         sample_fraction=sample_fraction,
+        max_points=max_points,
         max_samples=max_samples,
         coarse_samples=coarse_samples,
         keep_best=keep_best,

@@ -133,6 +133,7 @@ PAPER: dict[str, Any] = {
     "registration.keep_best": True,
     "registration.robust": False,
     "registration.max_angle": math.pi,
+    "registration.max_points": 0,
     "registration.max_samples": 0,
     "registration.coarse_samples": 0,
     "registration.weak_threshold": 0.0,

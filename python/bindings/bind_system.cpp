@@ -1,0 +1,7 @@
+#include "bindings.hpp"
+#include "nacre/system.hpp"
+
+void bind_system(py::module_& m) {
+  m.def("instruction_set", &nacre::instruction_set);
+  m.def("default_threads", &nacre::default_threads);
+}
