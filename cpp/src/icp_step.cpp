@@ -5,40 +5,46 @@
 #include <cmath>
 
 #include "parallel.hpp"
+#include "simd/pair_equations.hpp"
 
 namespace nacre {
 namespace {
 
-constexpr std::int64_t block_size = 2048;
+constexpr std::int64_t block_size = 256;
 constexpr double damping = 1e-9;          // information per pair, so that there always is a solution
 constexpr double unknown_chance = 0.008;  // information that normals off by 5 degrees feign
 
-struct Centroids {
+struct Moments {
   double weight = 0.0, squares = 0.0, weighted_squares = 0.0;
+  double extent = 0.0;  // sum of w |p - origin|^2
   Eigen::Vector3d p = Eigen::Vector3d::Zero(), q = Eigen::Vector3d::Zero();
 
-  Centroids& operator+=(const Centroids& other) {
+  Moments& operator+=(const Moments& other) {
     weight += other.weight;
     squares += other.squares;
     weighted_squares += other.weighted_squares;
+    extent += other.extent;
     p += other.p;
     q += other.q;
     return *this;
   }
 };
 
-Centroids sum_centroids(const std::vector<Pair>& pairs, Metric metric, int num_threads) {
+// Points relative to an origin near them.
+Moments sum_moments(const std::vector<Pair>& pairs, Metric metric, const Eigen::Vector3d& origin, int num_threads) {
   const auto count = static_cast<std::int64_t>(pairs.size());
-  return block_reduce(count, block_size, num_threads, Centroids{}, [&](std::int64_t begin, std::int64_t end) {
-    Centroids sum;
+  return block_reduce(count, block_size, num_threads, Moments{}, [&](std::int64_t begin, std::int64_t end) {
+    Moments sum;
     for (std::int64_t i = begin; i < end; ++i) {
       const Pair& pair = pairs[static_cast<std::size_t>(i)];
       const double r = residual(pair, metric);
+      const Eigen::Vector3d p = pair.p - origin;
       sum.weight += pair.weight;
       sum.squares += r * r;
       sum.weighted_squares += pair.weight * r * r;
-      sum.p += pair.weight * pair.p;
-      sum.q += pair.weight * pair.q;
+      sum.extent += pair.weight * p.squaredNorm();
+      sum.p += pair.weight * p;
+      sum.q += pair.weight * (pair.q - origin);
     }
     return sum;
   });
@@ -58,55 +64,63 @@ struct NormalEquations {
     covariance += other.covariance;
     return *this;
   }
-  void add(const Vector6& row, double right_side, double weight) {
-    hessian.noalias() += weight * row * row.transpose();
-    gradient.noalias() += weight * right_side * row;
-  }
-  // With rows c(n) for a normal n, normals n +- d of the two points whose errors are independent agree on
-  // c(n + d) c(n - d)^T, symmetrised c(n) c(n)^T - c(d) c(d)^T: noise cancels there and not in c(n) c(n)^T.
-  void add_chance(const Eigen::Vector3d& place, double extent, const Pair& pair) {
-    if (!pair.half_difference.allFinite()) {
-      chance.diagonal().array() += unknown_chance * pair.weight;
-      return;
-    }
-    Vector6 row;
-    row << place.cross(pair.half_difference) / extent, pair.half_difference;
-    chance.noalias() += pair.weight * row * row.transpose();
-  }
 };
+
+Matrix6 symmetric(const double* upper) {
+  Matrix6 matrix;
+  for (int row = 0; row < 6; ++row) {
+    for (int column = row; column < 6; ++column) matrix(row, column) = matrix(column, row) = *upper++;
+  }
+  return matrix;
+}
+
+simd::PairRow row_of(const Pair& pair, const Eigen::Vector3d& lever, const Eigen::Vector3d& normal) {
+  simd::PairRow row;
+  const bool knows_both = pair.half_difference.allFinite();
+  for (int axis = 0; axis < 3; ++axis) {
+    row.lever[axis] = lever[axis];
+    row.normal[axis] = normal[axis];
+    row.half_difference[axis] = knows_both ? pair.half_difference[axis] : 0.0;
+  }
+  row.right_side = (pair.q - pair.p).dot(normal);
+  row.weight = pair.weight;
+  return row;
+}
 
 // Unknowns: rotation times extent, translation of the centroid. Rotations are about the centroids, so that rotation and
 // translation are as independent as they can be.
+//
+// With rows c(n) for a normal n, normals n +- d of the two points whose errors are independent agree on
+// c(n + d) c(n - d)^T, symmetrised c(n) c(n)^T - c(d) c(d)^T: noise cancels there and not in the hessian.
 NormalEquations build_equations(const std::vector<Pair>& pairs, Metric metric, const Eigen::Vector3d& p_mean,
                                 const Eigen::Vector3d& q_mean, double extent, int num_threads) {
   const auto count = static_cast<std::int64_t>(pairs.size());
   return block_reduce(count, block_size, num_threads, NormalEquations{}, [&](std::int64_t begin, std::int64_t end) {
     NormalEquations sum;
+    simd::PairRow rows[3 * block_size];
+    std::int64_t num_rows = 0;
+    double weight_of_single = 0.0;
     for (std::int64_t i = begin; i < end; ++i) {
       const Pair& pair = pairs[static_cast<std::size_t>(i)];
       const Eigen::Vector3d p = pair.p - p_mean, q = pair.q - q_mean;
       if (metric == Metric::point_to_point) {
-        for (int axis = 0; axis < 3; ++axis) {
-          const Eigen::Vector3d unit = Eigen::Vector3d::Unit(axis);
-          Vector6 row;
-          row << p.cross(unit) / extent, unit;
-          sum.add(row, (pair.q - pair.p)[axis], pair.weight);
-        }
+        for (int axis = 0; axis < 3; ++axis) rows[num_rows++] = row_of(pair, p / extent, Eigen::Vector3d::Unit(axis));
         sum.covariance.noalias() += pair.weight * q * p.transpose();
       } else if (metric == Metric::point_to_plane) {
         // Chen and Medioni 1992 with small angles: (p + a x p + t - q) . n = 0, q about p's centroid.
-        Vector6 row;
-        row << p.cross(pair.normal) / extent, pair.normal;
-        sum.add(row, (pair.q - pair.p).dot(pair.normal), pair.weight);
+        rows[num_rows++] = row_of(pair, p / extent, pair.normal);
       } else {
         // Rusinkiewicz 2019, eq. 9, with the total rotation 2 a~ as the unknown.
-        const Eigen::Vector3d middle = 0.5 * (p + q);
-        Vector6 row;
-        row << middle.cross(pair.normal) / extent, pair.normal;
-        sum.add(row, (pair.q - pair.p).dot(pair.normal), pair.weight);
+        rows[num_rows++] = row_of(pair, (p + q) * (0.5 / extent), pair.normal);
       }
-      sum.add_chance(0.5 * (p + q), extent, pair);
+      if (!pair.half_difference.allFinite()) weight_of_single += pair.weight;
     }
+    simd::PairEquations sums;
+    simd::sum_pair_equations()(rows, num_rows, sums);
+    sum.hessian = symmetric(sums.hessian);
+    sum.chance = symmetric(sums.chance);
+    sum.chance.diagonal().array() += unknown_chance * weight_of_single;
+    sum.gradient = Eigen::Map<const Vector6>(sums.gradient);
     return sum;
   });
 }
@@ -138,16 +152,16 @@ Eigen::Matrix3d closest_rotation(const Eigen::Matrix3d& covariance) {
 
 IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, int num_threads) {
   IcpStep step;
-  const Centroids sums = sum_centroids(pairs, metric, num_threads);
+  if (pairs.empty()) return step;
+  const Eigen::Vector3d origin = pairs.front().q;
+  const Moments sums = sum_moments(pairs, metric, origin, num_threads);
   if (!(sums.weight > 0.0)) return step;
-  const Eigen::Vector3d p_mean = sums.p / sums.weight, q_mean = sums.q / sums.weight;
+  const Eigen::Vector3d p_offset = sums.p / sums.weight;
+  const Eigen::Vector3d p_mean = origin + p_offset, q_mean = origin + sums.q / sums.weight;
   step.center = q_mean;
   step.rmse = std::sqrt(sums.squares / static_cast<double>(pairs.size()));
   step.variance = sums.weighted_squares / sums.weight;
-
-  double squared_extent = 0.0;
-  for (const Pair& pair : pairs) squared_extent += pair.weight * (pair.p - p_mean).squaredNorm();
-  const double extent = std::sqrt(std::max(squared_extent / sums.weight, 1e-24));
+  const double extent = std::sqrt(std::max(sums.extent / sums.weight - p_offset.squaredNorm(), 1e-24));
 
   const NormalEquations equations = build_equations(pairs, metric, p_mean, q_mean, extent, num_threads);
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(equations.hessian - equations.chance);

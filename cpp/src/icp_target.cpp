@@ -6,6 +6,7 @@
 #include "nacre/normals.hpp"
 #include "parallel.hpp"
 #include "random.hpp"
+#include "spatial_order.hpp"
 
 namespace nacre {
 namespace {
@@ -40,10 +41,7 @@ std::vector<std::int32_t> choose(const std::vector<std::int32_t>& rows, std::siz
 
 // In an order that depends on the seed only.
 void shuffle(std::vector<std::int32_t>& rows, std::uint64_t seed) {
-  std::vector<std::pair<std::uint64_t, std::int32_t>> keyed(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) keyed[i] = {random_bits(seed, i), rows[i]};
-  std::sort(keyed.begin(), keyed.end());
-  for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = keyed[i].second;
+  for (std::size_t i = rows.size(); i > 1; --i) std::swap(rows[i - 1], rows[random_bits(seed, i) % i]);
 }
 
 template <class Matrix>
@@ -54,15 +52,15 @@ Matrix rows_of(const Eigen::Ref<const Matrix>& values, const std::vector<std::in
   return chosen;
 }
 
-double median_spacing(const KdTree& tree, const PointsRef& points) {
-  constexpr Eigen::Index num_probes = 500;
+double median_spacing(const BlockTree<float>& tree) {
+  constexpr std::int64_t num_probes = 300;
+  const std::int64_t step = std::max<std::int64_t>(1, tree.num_points() / num_probes);
   std::vector<double> distances;
-  for (Eigen::Index i = 0; i < points.rows(); i += std::max<Eigen::Index>(1, points.rows() / num_probes)) {
-    std::int64_t indices[2];
-    double squared[2];
-    if (tree.nearest(points.row(i).transpose().cast<double>(), 2, KdTree::infinity, indices, squared) == 2) {
-      distances.push_back(std::sqrt(squared[1]));
-    }
+  for (std::int64_t slot = 0; slot < tree.num_points(); slot += step) {
+    Found found[2];
+    KNearest nearest(2, std::numeric_limits<double>::infinity(), found);
+    tree.search(tree.position(static_cast<std::uint32_t>(slot)), nearest);
+    if (nearest.size() == 2) distances.push_back(std::sqrt(found[1].d2));
   }
   if (distances.empty()) return 0.0;
   const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
@@ -78,6 +76,17 @@ double bounding_diameter(const PointsRef& points) {
     high = high.cwiseMax(p);
   }
   return high.x() >= low.x() ? static_cast<double>((high - low).norm()) : 0.0;
+}
+
+// In an order in which each point is near the one before.
+void sort_in_space(const Points& points, std::vector<std::int32_t>::iterator begin,
+                   std::vector<std::int32_t>::iterator end) {
+  const std::vector<std::int32_t> rows(begin, end);
+  const Points chosen = rows_of<Points>(points, rows);
+  SpatialOrder<float>(chosen.data(), chosen.rows(), 1)
+      .for_each_stretch(1, [&](std::int64_t first, const std::uint64_t* entries, std::int64_t count) {
+        for (std::int64_t i = 0; i < count; ++i) begin[first + i] = rows[SpatialOrder<float>::row(entries[i])];
+      });
 }
 
 }  // namespace
@@ -112,11 +121,10 @@ IcpSource::IcpSource(const AlignCloud& cloud_in, const AlignOptions& options) : 
   levels = {std::min(few, all), std::min(5 * few, all), all};
   rows = choose(rows, static_cast<std::size_t>(all), options.seed);
   shuffle(rows, options.seed);
-  // The samples that each level adds are in the order of the cloud: neighbours in memory are neighbours in space.
   auto begin = rows.begin();
   for (const std::int64_t level : levels) {
     const auto end = rows.begin() + level;
-    std::sort(begin, end);
+    sort_in_space(cloud.points, begin, end);
     begin = end;
   }
   cloud.keep(rows);
@@ -125,60 +133,76 @@ IcpSource::IcpSource(const AlignCloud& cloud_in, const AlignOptions& options) : 
 IcpTarget::IcpTarget(const AlignCloud& cloud, const AlignOptions& options)
     : options_(options),
       cloud_(cloud, options, true),
-      tree_(cloud_.points, options.num_threads),
+      tree_(cloud_.points.data(), cloud_.points.rows(), options.num_threads),
       diameter_(bounding_diameter(cloud_.points)),
-      spacing_(median_spacing(tree_, cloud_.points)) {}
+      spacing_(median_spacing(tree_)) {
+  std::vector<std::int32_t> rows(static_cast<std::size_t>(tree_.num_points()));
+  for (std::size_t slot = 0; slot < rows.size(); ++slot) {
+    rows[slot] = static_cast<std::int32_t>(tree_.id(static_cast<std::uint32_t>(slot)));
+  }
+  cloud_.keep(rows);
+}
 
 std::vector<Pair> IcpTarget::match(const IcpSource& source, std::int64_t count, const Pose& pose, const Gate& gate,
-                                   std::vector<std::int32_t>& nearest) const {
+                                   std::vector<std::uint32_t>& nearest) const {
+  constexpr std::int64_t block_size = 256;
   const IcpCloud& from = source.cloud;
   const bool compare_normals = cloud_.has_normals() && from.has_normals();
   // Normals that were estimated point to an arbitrary side.
   const bool oriented = !cloud_.has_estimated_normals && !from.has_estimated_normals;
+  const bool has_sigma = from.sigma.size() > 0 || cloud_.sigma.size() > 0;
 
-  std::vector<Pair> pairs(static_cast<std::size_t>(count));
-  parallel_for(count, 512, options_.num_threads, [&](std::int64_t i) {
-    Pair& pair = pairs[static_cast<std::size_t>(i)];
-    pair.weight = 0.0;
-    pair.p = pose * from.points.row(i).transpose().cast<double>();
-
-    std::int32_t& last = nearest[static_cast<std::size_t>(i)];
-    double bound = gate.distance;
-    if (last >= 0)
-      bound = std::min(bound, (cloud_.points.row(last).transpose().cast<double>() - pair.p).norm() * (1 + 1e-12));
-    std::int64_t match = -1;
-    double squared_distance = 0.0;
-    if (tree_.nearest(pair.p, 1, bound, &match, &squared_distance) == 0) return;
-    last = static_cast<std::int32_t>(match);
-    pair.q = cloud_.points.row(match).transpose().cast<double>();
-
-    pair.half_difference.setConstant(std::numeric_limits<double>::quiet_NaN());
-    if (cloud_.has_normals()) {
-      const Eigen::Vector3d target_normal = cloud_.normals.row(match).transpose().cast<double>();
-      if (!target_normal.allFinite()) return;
-      pair.normal = target_normal;
-      if (compare_normals) {
-        Eigen::Vector3d source_normal = pose.linear() * from.normals.row(i).transpose().cast<double>();
-        double cosine = source_normal.dot(target_normal);
-        if (!oriented && cosine < 0.0) {
-          cosine = -cosine;
-          source_normal = -source_normal;
+  std::vector<std::vector<Pair>> found(static_cast<std::size_t>((count + block_size - 1) / block_size));
+  parallel_blocks(
+      count, block_size, options_.num_threads, [&](std::int64_t block, std::int64_t begin, std::int64_t end) {
+        float x[block_size], y[block_size], z[block_size], squared_distances[block_size];
+        Eigen::Vector3d moved[block_size];
+        for (std::int64_t i = begin; i < end; ++i) {
+          const std::int64_t k = i - begin;
+          moved[k] = pose * from.points.row(i).transpose().cast<double>();
+          x[k] = static_cast<float>(moved[k].x());
+          y[k] = static_cast<float>(moved[k].y());
+          z[k] = static_cast<float>(moved[k].z());
         }
-        if (cosine < gate.cos_angle) return;
-        pair.half_difference = 0.5 * (source_normal - target_normal);
-        if (options_.method == Metric::symmetric) pair.normal = 0.5 * (source_normal + target_normal);
-      }
-    }
-    if (std::abs(nacre::residual(pair, options_.method)) > gate.residual) return;
-    double variance = 0.0;
-    if (from.sigma.size() > 0) variance += static_cast<double>(from.sigma[i]) * from.sigma[i];
-    if (cloud_.sigma.size() > 0) variance += static_cast<double>(cloud_.sigma[match]) * cloud_.sigma[match];
-    const bool has_sigma = from.sigma.size() > 0 || cloud_.sigma.size() > 0;
-    pair.weight = has_sigma ? 1.0 / variance : 1.0;
-  });
-  pairs.erase(std::remove_if(pairs.begin(), pairs.end(),
-                             [](const Pair& pair) { return !(pair.weight > 0.0 && std::isfinite(pair.weight)); }),
-              pairs.end());
+        find_nearest_points(tree_, {x, y, z, nearest.data() + begin, squared_distances, nullptr}, 0, end - begin,
+                            gate.distance);
+
+        std::vector<Pair>& pairs = found[static_cast<std::size_t>(block)];
+        pairs.reserve(static_cast<std::size_t>(end - begin));
+        for (std::int64_t i = begin; i < end; ++i) {
+          const std::uint32_t match = nearest[static_cast<std::size_t>(i)];
+          if (match == no_slot) continue;
+          Pair pair;
+          pair.p = moved[i - begin];
+          pair.q = cloud_.points.row(match).transpose().cast<double>();
+          pair.half_difference.setConstant(std::numeric_limits<double>::quiet_NaN());
+          if (cloud_.has_normals()) {
+            const Eigen::Vector3d target_normal = cloud_.normals.row(match).transpose().cast<double>();
+            if (!target_normal.allFinite()) continue;
+            pair.normal = target_normal;
+            if (compare_normals) {
+              Eigen::Vector3d source_normal = pose.linear() * from.normals.row(i).transpose().cast<double>();
+              double cosine = source_normal.dot(target_normal);
+              if (!oriented && cosine < 0.0) {
+                cosine = -cosine;
+                source_normal = -source_normal;
+              }
+              if (cosine < gate.cos_angle) continue;
+              pair.half_difference = 0.5 * (source_normal - target_normal);
+              if (options_.method == Metric::symmetric) pair.normal = 0.5 * (source_normal + target_normal);
+            }
+          }
+          if (std::abs(nacre::residual(pair, options_.method)) > gate.residual) continue;
+          double variance = 0.0;
+          if (from.sigma.size() > 0) variance += static_cast<double>(from.sigma[i]) * from.sigma[i];
+          if (cloud_.sigma.size() > 0) variance += static_cast<double>(cloud_.sigma[match]) * cloud_.sigma[match];
+          pair.weight = has_sigma ? 1.0 / variance : 1.0;
+          if (pair.weight > 0.0 && std::isfinite(pair.weight)) pairs.push_back(pair);
+        }
+      });
+  std::vector<Pair> pairs;
+  pairs.reserve(static_cast<std::size_t>(count));
+  for (const std::vector<Pair>& part : found) pairs.insert(pairs.end(), part.begin(), part.end());
   return pairs;
 }
 

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "icp_step.hpp"
-#include "nacre/kdtree.hpp"
 #include "nacre/registration.hpp"
+#include "nearest_points.hpp"
 
 namespace nacre {
 
@@ -45,14 +45,14 @@ class IcpTarget {
   double spacing() const { return spacing_; }    // median distance of nearest neighbours [m]
 
   // The first `count` source samples moved by a pose, each with its nearest target point if that lies within the gate.
-  // `nearest` holds each sample's last match, -1 for none: a first bound for the search.
+  // `nearest` holds each sample's last match, no_slot for none: a first bound for the search.
   std::vector<Pair> match(const IcpSource& source, std::int64_t count, const Pose& pose, const Gate& gate,
-                          std::vector<std::int32_t>& nearest) const;
+                          std::vector<std::uint32_t>& nearest) const;
 
  private:
   AlignOptions options_;
-  IcpCloud cloud_;
-  KdTree tree_;
+  IcpCloud cloud_;  // in the tree's order
+  BlockTree<float> tree_;
   double diameter_ = 0.0, spacing_ = 0.0;
 };
 

@@ -14,8 +14,11 @@ constexpr double mad_to_sigma = 1.4826;  // median absolute deviation of a Gauss
 
 template <class Value>
 double median_of(const std::vector<Pair>& pairs, Value&& value) {
-  std::vector<double> values(pairs.size());
-  std::transform(pairs.begin(), pairs.end(), values.begin(), value);
+  constexpr std::size_t num_probes = 1000;  // enough for a scale
+  const std::size_t step = (pairs.size() + num_probes - 1) / num_probes;
+  std::vector<double> values;
+  values.reserve(num_probes);
+  for (std::size_t i = 0; i < pairs.size(); i += step) values.push_back(value(pairs[i]));
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
@@ -117,7 +120,7 @@ AlignResult iterate(const IcpTarget& target, const IcpSource& source, const Pose
   result.rmse = std::numeric_limits<double>::quiet_NaN();
 
   Schedule schedule(target, source, options, last_residual);
-  std::vector<std::int32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), -1);
+  std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
   const double resolution = std::max(1e-3 * target.spacing(), 1e-9);
   Pose pose = initial, best_pose = initial;
   double best_rmse = std::numeric_limits<double>::infinity();

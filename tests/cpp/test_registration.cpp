@@ -278,7 +278,7 @@ TEST_CASE("matches are the nearest points, whatever was matched before") {
   AlignOptions options;
   const IcpTarget icp_target(target.view(), options);
   const IcpSource icp_source(source.view(), options);
-  std::vector<std::int32_t> nearest(600, -1);
+  std::vector<std::uint32_t> nearest(600, no_slot);
   for (const double size : {0.3, 0.1, 0.0}) {
     const Pose pose = motion({size, 0.0, -size}, {0.0, 0.02 * size, 0.0});
     const std::vector<Pair> pairs = icp_target.match(icp_source, 600, pose, Gate{1.0, -2.0}, nearest);
