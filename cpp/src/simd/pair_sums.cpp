@@ -16,6 +16,7 @@ namespace nacre::simd::NACRE_ISA {
 namespace {
 
 constexpr int chunk_blocks = 64;
+constexpr float far_away = 1e18F;  // from anything, and its square is a float
 
 NACRE_INLINE int lowest_bit(unsigned mask) {
 #ifdef _MSC_VER
@@ -157,10 +158,11 @@ struct Chunk {
     const F32 shift_y = broadcast(static_cast<float>(origin[1] - targets.origin[1]));
     const F32 shift_z = broadcast(static_cast<float>(origin[2] - targets.origin[2]));
     const float* halves = points.halves + 3 * static_cast<int64_t>(block);
+    const int num_points = points.starts[block + 1] - points.starts[block];
     for (int part = 0; part < block_size; part += lanes) {
-      const int64_t from = static_cast<int64_t>(block) * block_size + part;
+      const int64_t from = static_cast<int64_t>(points.starts[block]) + part;
       const int to = num_blocks * block_size + part;
-      store(x + to, load(points.x + from) + shift_x);
+      store(x + to, select(first_lanes(num_points - part), load(points.x + from) + shift_x, broadcast(far_away)));
       store(y + to, load(points.y + from) + shift_y);
       store(z + to, load(points.z + from) + shift_z);
       if constexpr (with_mass) store(mass + to, load(points.mass + from));
@@ -257,14 +259,15 @@ void weigh(const PairKernel& pair_kernel, const PairTargets& targets, int i, con
     const F32 y = broadcast(targets.y[i]), shift_y = broadcast(static_cast<float>(origin[1] - targets.origin[1]));
     const F32 z = broadcast(targets.z[i]), shift_z = broadcast(static_cast<float>(origin[2] - targets.origin[2]));
     for (int part = 0; part < block_size; part += lanes) {
-      const int64_t from = static_cast<int64_t>(blocks[b]) * block_size + part;
+      const int64_t from = static_cast<int64_t>(points.starts[blocks[b]]) + part;
+      const Mask exists = first_lanes(points.starts[blocks[b] + 1] - points.starts[blocks[b]] - part);
       const F32 dx = load(points.x + from) + shift_x - x;
       const F32 dy = load(points.y + from) + shift_y - y;
       const F32 dz = load(points.z + from) + shift_z - z;
       const F32 squared_distance = mul_add(dz, dz, mul_add(dy, dy, dx * dx));
       F32 w = kernel.weight<decay>(squared_distance);
       if (points.mass != nullptr) w = w * load(points.mass + from);
-      store(weights + b * block_size + part, select(kernel.counts(squared_distance), w, broadcast(0.0F)));
+      store(weights + b * block_size + part, select(exists & kernel.counts(squared_distance), w, broadcast(0.0F)));
     }
   }
 }
