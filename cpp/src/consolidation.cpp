@@ -290,7 +290,7 @@ class Projection {
 };
 
 template <class Cloud, class Matrix>
-Matrix project(const Cloud& samples, SpatialOrder sample_order, const Cloud& points, SpatialOrder point_order,
+Matrix project(const Cloud& samples, CellOrder sample_order, const Cloud& points, CellOrder point_order,
                const CellLattice& lattice, const ConsolidateOptions& options, const ProjectionHints& hints,
                const Cargo* cargo) {
   const Form form = form_of(options);
@@ -336,8 +336,8 @@ BasicConsolidated<Matrix> consolidate_cloud(const Cloud& points, const Consolida
     if (attributes.cols() > 0) result.attributes.row(i) = attributes.row(source);
   }
   const CellLattice lattice = cell_lattice<Cloud>({&points}, options.radius / cells_a_radius, options.num_threads);
-  SpatialOrder order = spatial_order(points, lattice, options.num_threads);
-  SpatialOrder sample_order;
+  CellOrder order = cell_order(points, lattice, options.num_threads);
+  CellOrder sample_order;
   sample_order.rows.reserve(as_size(count));
   sample_order.cubes.reserve(as_size(count));
   for (std::size_t i = 0; i < order.rows.size(); ++i) {
@@ -374,8 +374,8 @@ Matrix project_cloud(const Cloud& samples, const Cloud& points, const Consolidat
           "one value per sample (" + std::to_string(samples.rows()) + ")", hints.frozen.size());
   const CellLattice lattice =
       cell_lattice<Cloud>({&points, &samples}, options.radius / cells_a_radius, options.num_threads);
-  return project<Cloud, Matrix>(samples, spatial_order(samples, lattice, options.num_threads), points,
-                                spatial_order(points, lattice, options.num_threads), lattice, options, hints, nullptr);
+  return project<Cloud, Matrix>(samples, cell_order(samples, lattice, options.num_threads), points,
+                                cell_order(points, lattice, options.num_threads), lattice, options, hints, nullptr);
 }
 
 }  // namespace

@@ -23,7 +23,7 @@ float round_up(double x) { return static_cast<float>(x + std::abs(x) * 1.2e-7); 
 }  // namespace
 
 template <class Cloud>
-PointBlocks::PointBlocks(const Cloud& points, SpatialOrder order, const Scaling& scaling, int num_threads)
+PointBlocks::PointBlocks(const Cloud& points, CellOrder order, const Scaling& scaling, int num_threads)
     : rows_(std::move(order.rows)) {
   starts_.reserve(rows_.size() / size + rows_.size() / 64 + 2);
   for (std::size_t i = 0; i < rows_.size();) {
@@ -146,7 +146,7 @@ simd::PairTargets PointBlocks::block(std::int64_t block) const {
   return targets;
 }
 
-template PointBlocks::PointBlocks(const PointsRef&, SpatialOrder, const Scaling&, int);
-template PointBlocks::PointBlocks(const PointsDoubleRef&, SpatialOrder, const Scaling&, int);
+template PointBlocks::PointBlocks(const PointsRef&, CellOrder, const Scaling&, int);
+template PointBlocks::PointBlocks(const PointsDoubleRef&, CellOrder, const Scaling&, int);
 
 }  // namespace nacre

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "cell_order.hpp"
 #include "simd/pair_sums.hpp"
-#include "spatial_order.hpp"
 
 namespace nacre {
 
@@ -21,7 +21,7 @@ class PointBlocks {
 
   // Blocks of points in their order; a block never spans two cubes of it. Defined for Points and PointsDouble.
   template <class Cloud>
-  PointBlocks(const Cloud& points, SpatialOrder order, const Scaling& scaling, int num_threads);
+  PointBlocks(const Cloud& points, CellOrder order, const Scaling& scaling, int num_threads);
 
   std::int64_t num_points() const { return static_cast<std::int64_t>(rows_.size()); }
   std::int64_t row(std::int64_t i) const { return rows_[static_cast<std::size_t>(i)]; }  // of the cloud

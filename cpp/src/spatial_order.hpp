@@ -1,42 +1,50 @@
-// Points in the order of a Hilbert curve, so that neighbours in space are neighbours in memory.
+// Points in the order of a Hilbert curve, so that neighbours in space become neighbours in memory.
 #pragma once
 
 #include <cstdint>
-#include <initializer_list>
 #include <vector>
 
-#include "nacre/types.hpp"
+#include "buffer.hpp"
+#include "parallel.hpp"
 
 namespace nacre {
 
-// Cubic cells, fewer than 2^num_bits in each direction; what is outside belongs to the nearest.
-struct CellLattice {
-  Eigen::Array3d origin = Eigen::Array3d::Zero();
-  Eigen::Array3d center = Eigen::Array3d::Zero();  // of the clouds; the first one's median if they are huge
-  double cells_per_length = 1.0;
-  int num_bits = 1;
+// The rows of the points whose coordinates are finite, along the curve. Where many points share a cell of the curve
+// they are ordered along a smaller one, and so on, so that outliers and clusters do no harm. Points in one place are in
+// the order of their rows.
+//
+// The order comes in stretches, so that several threads can sort them and use them while they are in the cache.
+template <class T>
+class SpatialOrder {
+ public:
+  // A row and, above it, its key.
+  using Entry = std::uint64_t;
+  static std::uint32_t row(Entry entry) { return static_cast<std::uint32_t>(entry); }
+
+  SpatialOrder(const T* points, std::int64_t count, int num_threads);
+
+  std::int64_t size() const { return stretches_.back(); }  // points that are finite
+
+  // use(first, entries, count) for each stretch, `first` being how many points come before it.
+  template <class Use>
+  void for_each_stretch(int num_threads, Use&& use) {
+    parallel_for(static_cast<std::int64_t>(stretches_.size()) - 1, 1, num_threads, [&](std::int64_t stretch) {
+      const std::int64_t first = stretches_[static_cast<std::size_t>(stretch)];
+      const std::int64_t count = stretches_[static_cast<std::size_t>(stretch) + 1] - first;
+      Entry* entries = entries_.data() + first;
+      sort_entries(entries, count, free_bits_);
+      use(first, static_cast<const Entry*>(entries), count);
+    });
+  }
+
+ private:
+  void sort_entries(Entry* entries, std::int64_t count, int bits);
+  void sort_smaller(Entry* entries, std::int64_t count);
+
+  const T* points_;
+  int free_bits_;  // of the keys, that differ within a stretch
+  Buffer<Entry> entries_;
+  std::vector<std::int64_t> stretches_;  // where each begins, and the end
 };
-
-// Cells of the given edge around some clouds; if these are more than two million cells wide, around the middle of the
-// first. Defined for Points and PointsDouble, as what follows.
-template <class Cloud>
-CellLattice cell_lattice(std::initializer_list<const Cloud*> clouds, double cell, int num_threads);
-
-struct SpatialOrder {
-  std::vector<std::uint32_t> rows;  // the finite ones; those in one cell ascend
-  // A number for the cube of 32 cells edge that each lies in: another one wherever the cube changes.
-  std::vector<std::uint32_t> cubes;
-};
-
-template <class Cloud>
-SpatialOrder spatial_order(const Cloud& points, const CellLattice& lattice, int num_threads);
-
-// Orders the points of each cube by halving instead, for blocks of so many that are more compact and take longer to
-// make.
-template <class Cloud>
-void halve_cubes(const Cloud& points, SpatialOrder& order, std::int64_t block_size, int num_threads);
-
-// The place of a cell on a curve through 2^num_bits cells in each direction; num_bits is at most 21.
-std::uint64_t hilbert_index(const std::uint32_t (&cell)[3], int num_bits);
 
 }  // namespace nacre

@@ -763,6 +763,7 @@ def align(
 def back_project(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]"]: ...
 def built_in_object() -> tuple[typing.Any, ...]: ...
 @typing.overload
@@ -794,6 +795,12 @@ def consolidate(
     """
 
 def default_threads() -> int: ...
+def depth_normals(
+    depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
+    camera: Camera,
+    noise: NoiseModel | None,
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]"]: ...
 def estimate_noise(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,
@@ -815,7 +822,7 @@ def instruction_set() -> str: ...
 def make_frame(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,
-    noise: NoiseModel,
+    noise: NoiseModel | None,
     num_threads: typing.SupportsInt | typing.SupportsIndex,
 ) -> Frame: ...
 def preprocess_depth(

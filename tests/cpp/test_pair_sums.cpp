@@ -69,7 +69,7 @@ struct Scene {
   }
   PointBlocks make_blocks(const PointsDouble& cloud) const {
     const PointsDoubleRef ref(cloud);
-    return {ref, spatial_order(ref, lattice, 1), Scaling{lattice.center, 1.0}, 1};
+    return {ref, cell_order(ref, lattice, 1), Scaling{lattice.center, 1.0}, 1};
   }
 
   double weight(const simd::PairKernel& kernel, double r2, std::int64_t place, bool with_mass) const {

@@ -7,7 +7,7 @@
 
 #include "doctest/doctest.h"
 #include "random.hpp"
-#include "spatial_order.hpp"
+#include "cell_order.hpp"
 
 using namespace nacre;
 
@@ -22,9 +22,9 @@ Matrix random_points(int count, double size) {
   return points;
 }
 
-SpatialOrder order_of(const PointsDouble& points, double cell, int threads = 1) {
+CellOrder order_of(const PointsDouble& points, double cell, int threads = 1) {
   const PointsDoubleRef ref(points);
-  return spatial_order(ref, cell_lattice<PointsDoubleRef>({&ref}, cell, threads), threads);
+  return cell_order(ref, cell_lattice<PointsDoubleRef>({&ref}, cell, threads), threads);
 }
 
 }  // namespace
@@ -63,7 +63,7 @@ TEST_CASE("the order holds each finite row once, by the curve, the same for any 
     points.row(500) = points.row(7);
     const PointsDoubleRef ref(points);
     const CellLattice lattice = cell_lattice<PointsDoubleRef>({&ref}, cell, 1);
-    const SpatialOrder order = spatial_order(ref, lattice, 1);
+    const CellOrder order = cell_order(ref, lattice, 1);
     CHECK(order.rows.size() == 19998);
     CHECK(std::set<std::uint32_t>(order.rows.begin(), order.rows.end()).size() == 19998);
     std::uint64_t last = 0;
@@ -81,7 +81,7 @@ TEST_CASE("the order holds each finite row once, by the curve, the same for any 
       }
     }
     for (const int threads : {2, 3, 4, 7, 8}) {
-      const SpatialOrder again = order_of(points, cell, threads);
+      const CellOrder again = order_of(points, cell, threads);
       CHECK(again.rows == order.rows);
       CHECK(again.cubes == order.cubes);
     }
@@ -102,14 +102,14 @@ TEST_CASE("halving keeps the points of each cube and makes compact blocks, the s
   const PointsDouble points = random_points<PointsDouble>(20000, 1.0);
   const PointsDoubleRef ref(points);
   const CellLattice lattice = cell_lattice<PointsDoubleRef>({&ref}, 0.01, 1);
-  const SpatialOrder before = spatial_order(ref, lattice, 1);
-  SpatialOrder halved = before;
+  const CellOrder before = cell_order(ref, lattice, 1);
+  CellOrder halved = before;
   halve_cubes(ref, halved, 16, 1);
   CHECK(halved.cubes == before.cubes);
   double sizes[2] = {};
   for (std::size_t first = 0, last; first < before.rows.size(); first = last) {
     for (last = first; last < before.rows.size() && before.cubes[last] == before.cubes[first];) ++last;
-    const auto at = [](const SpatialOrder& order, std::size_t i) {
+    const auto at = [](const CellOrder& order, std::size_t i) {
       return order.rows.begin() + static_cast<std::ptrdiff_t>(i);
     };
     CHECK(std::set<std::uint32_t>(at(before, first), at(before, last)) ==
@@ -125,7 +125,7 @@ TEST_CASE("halving keeps the points of each cube and makes compact blocks, the s
   }
   CHECK(sizes[1] < 0.95 * sizes[0]);
   for (const int threads : {2, 3, 4, 7, 8}) {
-    SpatialOrder again = before;
+    CellOrder again = before;
     halve_cubes(ref, again, 16, threads);
     CHECK(again.rows == halved.rows);
   }
@@ -139,6 +139,6 @@ TEST_CASE("no points, one point, a row stride") {
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> wide(200, 5);
   wide << points, Eigen::MatrixXd::Zero(200, 2);
   const PointsDoubleRef strided(wide.leftCols(3));
-  CHECK(spatial_order(strided, cell_lattice<PointsDoubleRef>({&strided}, 0.1, 1), 1).rows ==
+  CHECK(cell_order(strided, cell_lattice<PointsDoubleRef>({&strided}, 0.1, 1), 1).rows ==
         order_of(points, 0.1).rows);
 }
