@@ -9,6 +9,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <utility>
 
 #include "check.hpp"
 #include "parallel.hpp"
@@ -91,27 +92,24 @@ class Projection {
   Projection(PointBlocks& samples, const PointBlocks& points, const ConsolidateOptions& options, const Form& form,
              const ProjectionHints& hints)
       : options_(options), form_(form), hints_(hints), samples_(samples), points_(points) {
-    counts_ = Values::Ones(points.num_places());
+    counts_ = Values::Ones(points.num_readable());
     if (hints.point_weights.size() > 0) {
-      for (std::int64_t j = 0; j < points.num_places(); ++j) {
-        if (j % PointBlocks::size < points.count(j / PointBlocks::size))
-          counts_[j] = hints.point_weights[points.row(j)];
-      }
+      for (std::int64_t j = 0; j < points.num_points(); ++j) counts_[j] = hints.point_weights[points.row(j)];
     }
     point_mass_ = counts_;
-    sample_mass_.resize(samples.num_places());
-    neighbors_.setZero(samples.num_places());
+    sample_mass_.setZero(samples.num_readable());
+    neighbors_.setZero(samples.num_points());
     if (form.point_densities) {
       is_near_.reset(new std::atomic<bool>[as_size(points.num_blocks())]());
       has_density_.assign(as_size(points.num_blocks()), 0);
     }
     if (form.tangential) {
-      normals_ = Points::Constant(samples.num_places(), 3, std::numeric_limits<float>::quiet_NaN());
+      normals_ = Points::Constant(samples.num_points(), 3, std::numeric_limits<float>::quiet_NaN());
       if (hints.sample_normals.rows() > 0) {
-        for_samples([&](std::int64_t i) {
+        for (std::int64_t i = 0; i < samples.num_points(); ++i) {
           const Eigen::RowVector3f normal = hints.sample_normals.row(samples.row(i));
           normals_.row(i) = normal / normal.norm();  // 0 / 0: a normal without direction is unknown
-        });
+        }
       }
     }
     for (int axis = 0; axis < 3; ++axis) moved_[axis] = samples.axis(axis);
@@ -139,17 +137,10 @@ class Projection {
   }
 
   bool is_live(std::int64_t block) const {
-    for (std::int64_t i = block * size; i < block * size + samples_.count(block); ++i) {
+    for (std::int64_t i = samples_.begin(block); i < samples_.end(block); ++i) {
       if (!is_frozen(i)) return true;
     }
     return false;
-  }
-
-  template <class Body>
-  void for_samples(Body&& body) const {
-    for (std::int64_t block = 0; block < samples_.num_blocks(); ++block) {
-      for (std::int64_t i = block * size; i < block * size + samples_.count(block); ++i) body(i);
-    }
   }
 
   // body(block) for each of so many blocks.
@@ -182,9 +173,8 @@ class Projection {
       float densities[size];
       simd::sum_pairs()(form_.density, simd::PairSums::mass, points_.block(block),
                         points_.view(weighted ? counts_.data() : nullptr), densities);
-      for (int i = 0; i < points_.count(block); ++i) {
-        const float count = counts_[block * size + i];
-        point_mass_[block * size + i] = count > 0.0F ? count / densities[i] : 0.0F;
+      for (std::int64_t j = points_.begin(block); j < points_.end(block); ++j) {
+        point_mass_[j] = counts_[j] > 0.0F ? counts_[j] / densities[j - points_.begin(block)] : 0.0F;
       }
     });
   }
@@ -194,12 +184,12 @@ class Projection {
     const simd::PairPoints others = samples_.view(nullptr);
     const bool counted = form_.least_neighbors > 0.0F;
     for_blocks(samples_.num_blocks(), [&](std::int64_t block) {
-      float sums[2 * size] = {};
+      float sums[2 * size];
       simd::sum_pairs()(form_.density, counted ? simd::PairSums::mass_and_count : simd::PairSums::mass,
                         samples_.block(block), others, sums);
-      for (std::int64_t i = 0; i < size; ++i) {
-        sample_mass_[block * size + i] = sums[i] + (form_.lone_density - 1.0F);
-        if (counted) neighbors_[block * size + i] = sums[size + i] - 1.0F;
+      for (std::int64_t i = samples_.begin(block), k = 0; i < samples_.end(block); ++i, ++k) {
+        sample_mass_[i] = sums[k] + (form_.lone_density - 1.0F);
+        if (counted) neighbors_[i] = sums[size + k] - 1.0F;
       }
     });
   }
@@ -208,7 +198,8 @@ class Projection {
   void move_block(std::int64_t block, const simd::PairKernel& attraction) {
     const simd::PairTargets targets = samples_.block(block);
     const simd::PairPoints points = points_.view(form_.point_densities ? point_mass_.data() : nullptr);
-    const bool finds_normals = form_.tangential && !normals_.middleRows(block * size, targets.count).allFinite();
+    const bool finds_normals =
+        form_.tangential && !normals_.middleRows(samples_.begin(block), targets.count).allFinite();
     float attracting[10 * size], repelling[4 * size];
     simd::sum_pairs()(attraction, finds_normals ? simd::PairSums::second : simd::PairSums::first, targets, points,
                       attracting);
@@ -219,7 +210,7 @@ class Projection {
     if (!all_attracted) simd::sum_pairs()(form_.density, simd::PairSums::mass, targets, points, reached);
 
     for (std::int64_t k = 0; k < targets.count; ++k) {
-      const std::int64_t i = block * size + k;
+      const std::int64_t i = samples_.begin(block) + k;
       const auto mean = [&](const float* sums, float mass) -> Eigen::Vector3f {
         return Eigen::Vector3f(sums[size + k], sums[2 * size + k], sums[3 * size + k]) / mass;
       };
@@ -241,8 +232,8 @@ class Projection {
 
   // The unknown normals of a block, from the second moments of the points.
   void find_normals(std::int64_t block, const float* sums) {
-    for (std::int64_t k = 0; k < samples_.count(block); ++k) {
-      auto normal = normals_.row(block * size + k);
+    for (std::int64_t k = 0; k < samples_.end(block) - samples_.begin(block); ++k) {
+      auto normal = normals_.row(samples_.begin(block) + k);
       if (normal.allFinite() || !(sums[k] > 0.0F)) continue;
       const auto sum = [&](int s) { return static_cast<double>(sums[s * size + k]); };
       Eigen::Matrix3d second;
@@ -263,13 +254,14 @@ class Projection {
     simd::visit_blocks()(1.00001F * attraction.reach2, targets, points.tree, list, &near);
     std::vector<float> weights(near.size() * as_size(size));
     for (int k = 0; k < targets.count; ++k) {
-      if (is_frozen(block * size + k)) continue;
+      if (is_frozen(samples_.begin(block) + k)) continue;
       simd::weigh_pairs()(attraction, targets, k, points, near.data(), static_cast<std::int64_t>(near.size()),
                           weights.data());
       Row sums = Row::Zero(cargo.of_points.cols()), masses = sums;
       for (std::size_t j = 0; j < weights.size(); ++j) {
         if (!(weights[j] > 0.0F)) continue;
-        const std::int64_t row = points_.row(near[j / as_size(size)] * size + static_cast<std::int64_t>(j) % size);
+        const std::int64_t row =
+            points_.row(points_.begin(near[j / as_size(size)]) + static_cast<std::int64_t>(j) % size);
         for (Eigen::Index a = 0; a < sums.size(); ++a) {
           const double value = cargo.of_points(row, a);
           if (!std::isfinite(value)) continue;
@@ -277,7 +269,7 @@ class Projection {
           masses[a] += static_cast<double>(weights[j]);
         }
       }
-      const std::int64_t row = samples_.row(block * size + k);
+      const std::int64_t row = samples_.row(samples_.begin(block) + k);
       for (Eigen::Index a = 0; a < sums.size(); ++a) {
         if (masses[a] > 0.0) cargo.of_samples(row, a) = static_cast<float>(sums[a] / masses[a]);
       }
@@ -290,36 +282,33 @@ class Projection {
   PointBlocks& samples_;
   const PointBlocks& points_;
   std::vector<float> moved_[3];
-  Values counts_, point_mass_, sample_mass_, neighbors_;  // one a place
+  Values counts_, point_mass_, sample_mass_, neighbors_;
   Points normals_;
   std::unique_ptr<std::atomic<bool>[]> is_near_;  // one a block of points
   std::vector<std::uint8_t> has_density_;
   std::int64_t num_weighed_ = 0;  // blocks that have
 };
 
-// The iterations; the places of `samples`, in the order `sample_order` and the rows of `moved`.
 template <class Cloud, class Matrix>
-Matrix project(const Cloud& samples, CellOrder sample_order, const Cloud& points, const CellOrder& point_order,
+Matrix project(const Cloud& samples, CellOrder sample_order, const Cloud& points, CellOrder point_order,
                const CellLattice& lattice, const ConsolidateOptions& options, const ProjectionHints& hints,
                const Cargo* cargo) {
   const Form form = form_of(options);
   const Scaling scaling{lattice.center, form.scale};
-  const PointBlocks point_blocks(points, point_order, scaling, options.num_threads);
+  const PointBlocks point_blocks(points, std::move(point_order), scaling, options.num_threads);
   halve_cubes(samples, sample_order, PointBlocks::size, options.num_threads);
-  const PointBlocks blocks(samples, sample_order, scaling, options.num_threads);
+  const PointBlocks blocks(samples, std::move(sample_order), scaling, options.num_threads);
   PointBlocks moved = blocks;
   Projection projection(moved, point_blocks, options, form, hints);
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
     projection.move(iteration == 0, iteration + 1 == options.iterations ? cargo : nullptr);
   }
   Matrix result = samples;
-  parallel_for(blocks.num_blocks(), 1024, options.num_threads, [&](std::int64_t block) {
-    for (std::int64_t i = block * PointBlocks::size; i < block * PointBlocks::size + blocks.count(block); ++i) {
-      for (int axis = 0; axis < 3; ++axis) {
-        const double way = static_cast<double>(moved.axis(axis)[as_size(i)]) - blocks.axis(axis)[as_size(i)];
-        auto& coordinate = result(blocks.row(i), axis);
-        coordinate = static_cast<typename Matrix::Scalar>(static_cast<double>(coordinate) + way / form.scale);
-      }
+  parallel_for(blocks.num_points(), 16384, options.num_threads, [&](std::int64_t i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      const double way = static_cast<double>(moved.axis(axis)[as_size(i)]) - blocks.axis(axis)[as_size(i)];
+      auto& coordinate = result(blocks.row(i), axis);
+      coordinate = static_cast<typename Matrix::Scalar>(static_cast<double>(coordinate) + way / form.scale);
     }
   });
   return result;
@@ -347,7 +336,7 @@ BasicConsolidated<Matrix> consolidate_cloud(const Cloud& points, const Consolida
     if (attributes.cols() > 0) result.attributes.row(i) = attributes.row(source);
   }
   const CellLattice lattice = cell_lattice<Cloud>({&points}, options.radius / cells_a_radius, options.num_threads);
-  const CellOrder order = cell_order(points, lattice, options.num_threads);
+  CellOrder order = cell_order(points, lattice, options.num_threads);
   CellOrder sample_order;
   sample_order.rows.reserve(as_size(count));
   sample_order.cubes.reserve(as_size(count));
@@ -358,8 +347,8 @@ BasicConsolidated<Matrix> consolidate_cloud(const Cloud& points, const Consolida
     sample_order.cubes.push_back(order.cubes[i]);
   }
   const Cargo cargo{attributes, result.attributes};
-  result.points = project<Cloud, Matrix>(samples, sample_order, points, order, lattice, options, ProjectionHints(),
-                                         attributes.cols() > 0 ? &cargo : nullptr);
+  result.points = project<Cloud, Matrix>(samples, std::move(sample_order), points, std::move(order), lattice, options,
+                                         ProjectionHints(), attributes.cols() > 0 ? &cargo : nullptr);
   return result;
 }
 

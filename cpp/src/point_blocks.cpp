@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "parallel.hpp"
 #include "simd/block_fit.hpp"
@@ -10,7 +11,6 @@
 namespace nacre {
 namespace {
 
-constexpr float far_away = 1e18F;
 constexpr float infinity = std::numeric_limits<float>::infinity();
 constexpr std::int64_t nodes_per_task = 4;
 
@@ -23,52 +23,44 @@ float round_up(double x) { return static_cast<float>(x + std::abs(x) * 1.2e-7); 
 }  // namespace
 
 template <class Cloud>
-PointBlocks::PointBlocks(const Cloud& points, const CellOrder& order, const Scaling& scaling, int num_threads) {
-  std::vector<std::uint32_t> starts;  // of the blocks, in the order
-  const std::size_t num_points = order.rows.size();
-  starts.reserve(num_points / size + num_points / 64 + 2);
-  for (std::size_t i = 0; i < num_points;) {
-    starts.push_back(static_cast<std::uint32_t>(i));
-    const std::size_t most = std::min(num_points, i + static_cast<std::size_t>(size));
+PointBlocks::PointBlocks(const Cloud& points, CellOrder order, const Scaling& scaling, int num_threads)
+    : rows_(std::move(order.rows)) {
+  starts_.reserve(rows_.size() / size + rows_.size() / 64 + 2);
+  for (std::size_t i = 0; i < rows_.size();) {
+    starts_.push_back(static_cast<std::int32_t>(i));
+    const std::size_t last = std::min(rows_.size(), i + as_size(size));
     const std::uint32_t cube = order.cubes[i];
-    for (++i; i < most && order.cubes[i] == cube;) ++i;
+    for (++i; i < last && order.cubes[i] == cube;) ++i;
   }
-  const auto count = static_cast<std::int64_t>(starts.size());
-  starts.push_back(static_cast<std::uint32_t>(num_points));
+  starts_.push_back(static_cast<std::int32_t>(rows_.size()));
 
-  std::int64_t num_nodes = count;
+  for (std::vector<float>& axis : axes_) axis.resize(as_size(num_readable()));
+  origins_.resize(as_size(3 * num_blocks()));
+  halves_.resize(as_size(3 * num_blocks()));
+  std::int64_t num_nodes = num_blocks();
   while (num_nodes > 0 && (levels_.empty() || num_nodes > 1)) {
     num_nodes = (num_nodes + size - 1) / size;
     levels_.emplace_back(as_size(num_nodes * simd::node_floats));
   }
-  const std::int64_t room = levels_.empty() ? 0 : static_cast<std::int64_t>(levels_[0].size()) / 6;  // for full nodes
-  counts_.resize(as_size(count));
-  rows_.resize(as_size(count * size));
-  for (std::vector<float>& axis : axes_) axis.resize(as_size(room * size));
-  origins_.resize(as_size(3 * room));
-  halves_.resize(as_size(3 * room));
 
   using Scalar = typename Cloud::Scalar;
   const Scalar* const data = points.data();
   const std::int64_t stride = points.outerStride();
-  parallel_for(count, size * nodes_per_task, num_threads, [&](std::int64_t block) {
-    const std::uint32_t first = starts[as_size(block)], last = starts[as_size(block) + 1];
-    counts_[as_size(block)] = static_cast<std::uint8_t>(last - first);
+  parallel_for(num_blocks(), size * nodes_per_task, num_threads, [&](std::int64_t block) {
+    const std::int64_t count = end(block) - begin(block);
     double places[3][size];
-    for (std::int64_t i = 0; i < size; ++i) {  // places that are left over repeat the last point for now
-      const std::uint32_t row = order.rows[std::min<std::size_t>(first + as_size(i), last - 1)];
-      rows_[as_size(block * size + i)] = row;
-      const Scalar* const point = data + row * stride;
-      for (int axis = 0; axis < 3; ++axis) places[axis][i] = static_cast<double>(point[axis]);
+    for (std::int64_t i = 0; i < count; ++i) {
+      const Scalar* const point = data + row(begin(block) + i) * stride;
+      for (int axis = 0; axis < 3; ++axis) {
+        places[axis][i] = (static_cast<double>(point[axis]) - scaling.center[axis]) * scaling.scale;
+      }
     }
     for (int axis = 0; axis < 3; ++axis) {
-      double* const place = places[axis];
-      for (int i = 0; i < size; ++i) place[i] = (place[i] - scaling.center[axis]) * scaling.scale;
-      const double origin = 0.5 * (*std::min_element(place, place + size) + *std::max_element(place, place + size));
+      const double* const place = places[axis];
+      const double origin = 0.5 * (*std::min_element(place, place + count) + *std::max_element(place, place + count));
       origins_[as_size(3 * block + axis)] = origin;
-      float* const to = axes_[axis].data() + block * size;
-      for (int i = 0; i < size; ++i) to[i] = static_cast<float>(place[i] - origin);
-      std::fill(to + (last - first), to + size, far_away);
+      float* const to = axes_[axis].data() + begin(block);
+      for (std::int64_t i = 0; i < count; ++i) to[i] = static_cast<float>(place[i] - origin);
     }
   });
   refit(num_threads);
@@ -76,26 +68,33 @@ PointBlocks::PointBlocks(const Cloud& points, const CellOrder& order, const Scal
 
 void PointBlocks::refit(int num_threads) {
   if (levels_.empty()) return;
-  const std::int64_t num_nodes = static_cast<std::int64_t>(levels_[0].size()) / simd::node_floats;
+  const std::int64_t num_nodes = (num_blocks() + size - 1) / size;
   parallel_for(num_nodes, nodes_per_task, num_threads, [&](std::int64_t node) { fit_node(node); });
   fit_upper_levels();
 }
 
 // The boxes of the blocks under a node; no box where there is no block.
 void PointBlocks::fit_node(std::int64_t node) {
-  const float* places[3];
-  for (int axis = 0; axis < 3; ++axis) places[axis] = axes_[axis].data() + node * size * size;
+  const std::int64_t first = node * size, last = std::min(first + size, num_blocks());
+  std::int32_t starts[size + 1];
+  for (std::int64_t i = 0; i <= size; ++i) {
+    starts[i] = static_cast<std::int32_t>(first + i <= last ? begin(first + i) : begin(last - 1));
+  }
+  const float* const axes[3] = {axes_[0].data(), axes_[1].data(), axes_[2].data()};
   simd::BlockFit fit;
-  simd::fit_blocks()(places, fit);
+  simd::fit_blocks()(axes, starts, fit);
+
   float* const boxes = levels_[0].data() + node * simd::node_floats;
-  for (std::int64_t i = 0; i < size; ++i) {
-    const std::int64_t block = node * size + i;
-    const bool exists = block < num_blocks();
+  std::fill(boxes, boxes + 3 * size, infinity);
+  std::fill(boxes + 3 * size, boxes + 6 * size, -infinity);
+  for (std::int64_t block = first; block < last; ++block) {
+    const std::int64_t i = block - first;
     for (int axis = 0; axis < 3; ++axis) {
       const double origin = origins_[as_size(3 * block + axis)];
-      boxes[axis * size + i] = exists ? round_down(origin + static_cast<double>(fit.lower[axis][i])) : infinity;
-      halves_[as_size(3 * block + axis)] = std::max(std::abs(fit.lower[axis][i]), std::abs(fit.upper[axis][i]));
-      boxes[(3 + axis) * size + i] = exists ? round_up(origin + static_cast<double>(fit.upper[axis][i])) : -infinity;
+      const float lower = fit.lower[axis][i], upper = fit.upper[axis][i];
+      boxes[axis * size + i] = round_down(origin + static_cast<double>(lower));
+      boxes[(3 + axis) * size + i] = round_up(origin + static_cast<double>(upper));
+      halves_[as_size(3 * block + axis)] = std::max(std::abs(lower), std::abs(upper));
     }
   }
 }
@@ -124,6 +123,7 @@ simd::PairPoints PointBlocks::view(const float* mass) const {
   view.y = axes_[1].data();
   view.z = axes_[2].data();
   view.mass = mass;
+  view.starts = starts_.data();
   view.origin = origins_.data();
   view.halves = halves_.data();
   view.tree.num_levels = static_cast<int>(levels_.size());
@@ -133,10 +133,10 @@ simd::PairPoints PointBlocks::view(const float* mass) const {
 
 simd::PairTargets PointBlocks::block(std::int64_t block) const {
   simd::PairTargets targets{};
-  targets.count = count(block);
-  targets.x = axes_[0].data() + block * size;
-  targets.y = axes_[1].data() + block * size;
-  targets.z = axes_[2].data() + block * size;
+  targets.count = static_cast<int>(end(block) - begin(block));
+  targets.x = axes_[0].data() + begin(block);
+  targets.y = axes_[1].data() + begin(block);
+  targets.z = axes_[2].data() + begin(block);
   const float* const node = levels_[0].data() + block / size * simd::node_floats + block % size;
   for (int axis = 0; axis < 3; ++axis) {
     targets.origin[axis] = origins_[as_size(3 * block + axis)];
@@ -146,7 +146,7 @@ simd::PairTargets PointBlocks::block(std::int64_t block) const {
   return targets;
 }
 
-template PointBlocks::PointBlocks(const PointsRef&, const CellOrder&, const Scaling&, int);
-template PointBlocks::PointBlocks(const PointsDoubleRef&, const CellOrder&, const Scaling&, int);
+template PointBlocks::PointBlocks(const PointsRef&, CellOrder, const Scaling&, int);
+template PointBlocks::PointBlocks(const PointsDoubleRef&, CellOrder, const Scaling&, int);
 
 }  // namespace nacre

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "simd/pair_sums.hpp"
 #include "cell_order.hpp"
+#include "simd/pair_sums.hpp"
 
 namespace nacre {
 
@@ -21,20 +21,24 @@ class PointBlocks {
 
   // Blocks of points in their order; a block never spans two cubes of it. Defined for Points and PointsDouble.
   template <class Cloud>
-  PointBlocks(const Cloud& points, const CellOrder& order, const Scaling& scaling, int num_threads);
+  PointBlocks(const Cloud& points, CellOrder order, const Scaling& scaling, int num_threads);
 
-  std::int64_t num_blocks() const { return static_cast<std::int64_t>(counts_.size()); }
-  int count(std::int64_t block) const { return counts_[static_cast<std::size_t>(block)]; }
+  std::int64_t num_points() const { return static_cast<std::int64_t>(rows_.size()); }
+  std::int64_t row(std::int64_t i) const { return rows_[static_cast<std::size_t>(i)]; }  // of the cloud
 
-  // Row of the cloud of place i; block b has the places 16 b to 16 b + count(b) - 1.
-  std::int64_t row(std::int64_t i) const { return rows_[static_cast<std::size_t>(i)]; }
-  std::int64_t num_places() const { return size * num_blocks(); }
+  // Block b has the points begin(b) to end(b) - 1.
+  std::int64_t num_blocks() const { return static_cast<std::int64_t>(starts_.size()) - 1; }
+  std::int64_t begin(std::int64_t block) const { return starts_[static_cast<std::size_t>(block)]; }
+  std::int64_t end(std::int64_t block) const { return starts_[static_cast<std::size_t>(block) + 1]; }
 
   // Coordinates relative to the origin of the block.
   std::vector<float>& axis(int axis) { return axes_[axis]; }
   const std::vector<float>& axis(int axis) const { return axes_[axis]; }
   // After the coordinates have changed.
   void refit(int num_threads);
+
+  // Values a point must be readable as far, for the kernels.
+  std::int64_t num_readable() const { return num_points() + size - 1; }
 
   simd::PairPoints view(const float* mass) const;
   simd::PairTargets block(std::int64_t block) const;
@@ -44,8 +48,8 @@ class PointBlocks {
   void fit_upper_levels();
 
   std::vector<std::uint32_t> rows_;
-  std::vector<std::uint8_t> counts_;
-  std::vector<float> axes_[3];  // with room for full nodes, as the next two
+  std::vector<std::int32_t> starts_;
+  std::vector<float> axes_[3];
   std::vector<double> origins_;
   std::vector<float> halves_;
   std::vector<std::vector<float>> levels_;  // nodes of the box tree, level 0 first

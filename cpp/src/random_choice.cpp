@@ -108,13 +108,13 @@ class Draw {
     return rows;
   }
 
-  std::vector<Ticket> sorted() const {
+  // Rows in the order of their tickets.
+  void sort(std::vector<std::int64_t>& rows) const {
     std::vector<Ticket> tickets;
-    for (std::int64_t row = 0; row < points_.rows(); ++row) {
-      if (is_finite(row)) tickets.emplace_back(ticket(row), row);
-    }
+    tickets.reserve(rows.size());
+    for (const std::int64_t row : rows) tickets.emplace_back(ticket(row), row);
     std::sort(tickets.begin(), tickets.end());
-    return tickets;
+    for (std::size_t i = 0; i < rows.size(); ++i) rows[i] = tickets[i].second;
   }
 
  private:
@@ -141,22 +141,30 @@ class Draw {
 template <class Cloud>
 std::vector<std::int64_t> choose_rows(const Cloud& points, std::int64_t count, std::uint64_t seed, int num_threads) {
   const Draw<Cloud> draw(points, seed, num_threads);
-  std::vector<std::int64_t> chosen = draw.lowest(count);
-  if (static_cast<std::int64_t>(chosen.size()) < count || points.rows() <= count) return chosen;  // every finite row
+  std::vector<std::int64_t> drawn = draw.lowest(count);
+  if (static_cast<std::int64_t>(drawn.size()) < count || points.rows() <= count) return drawn;  // every finite row
   Places<Cloud> places(points, count);
-  if (std::all_of(chosen.begin(), chosen.end(), [&](std::int64_t row) { return places.add(row); })) return chosen;
+  if (std::all_of(drawn.begin(), drawn.end(), [&](std::int64_t row) { return places.add(row); })) return drawn;
 
-  chosen.clear();
-  std::vector<std::int64_t> repeated;
-  Places<Cloud> taken(points, count);
-  for (const auto& [ticket, row] : draw.sorted()) {
-    if (static_cast<std::int64_t>(chosen.size()) == count) break;
-    (taken.add(row) ? chosen : repeated).push_back(row);
+  // Draw more, until there are enough places.
+  for (std::int64_t num_drawn = count;;) {
+    draw.sort(drawn);
+    Places<Cloud> taken(points, count);
+    std::vector<std::int64_t> chosen, repeated;
+    for (const std::int64_t row : drawn) {
+      if (static_cast<std::int64_t>(chosen.size()) == count) break;
+      (taken.add(row) ? chosen : repeated).push_back(row);
+    }
+    const std::int64_t missing = count - static_cast<std::int64_t>(chosen.size());
+    const bool has_more = static_cast<std::int64_t>(drawn.size()) == num_drawn && num_drawn < points.rows();
+    if (missing == 0 || !has_more) {
+      chosen.insert(chosen.end(), repeated.begin(), repeated.begin() + missing);
+      std::sort(chosen.begin(), chosen.end());
+      return chosen;
+    }
+    num_drawn = std::min(num_drawn + 2 * std::max(missing, num_drawn / 4), points.rows());
+    drawn = draw.lowest(num_drawn);
   }
-  const auto missing = static_cast<std::ptrdiff_t>(as_size(count) - chosen.size());
-  chosen.insert(chosen.end(), repeated.begin(), repeated.begin() + missing);
-  std::sort(chosen.begin(), chosen.end());
-  return chosen;
 }
 
 template std::vector<std::int64_t> choose_rows(const PointsRef&, std::int64_t, std::uint64_t, int);

@@ -59,7 +59,7 @@ struct Scene {
         lattice(make_lattice(cell)),
         target_blocks(make_blocks(targets)),
         point_blocks(make_blocks(points)) {
-    mass.resize(static_cast<std::size_t>(point_blocks.num_places()));
+    mass.resize(static_cast<std::size_t>(point_blocks.num_readable()));
     for (std::size_t j = 0; j < mass.size(); ++j) mass[j] = static_cast<float>(0.5 + random_uniform(3, j));
   }
 
@@ -82,9 +82,7 @@ struct Scene {
 
   template <class Visit>  // visit(place, offset) for each point
   void for_points(Visit&& visit) const {
-    for (std::int64_t block = 0; block < point_blocks.num_blocks(); ++block) {
-      for (std::int64_t j = 16 * block; j < 16 * block + point_blocks.count(block); ++j) visit(j);
-    }
+    for (std::int64_t j = 0; j < point_blocks.num_points(); ++j) visit(j);
   }
 };
 
@@ -111,8 +109,9 @@ TEST_CASE("sums over pairs equal the plain sums in double precision, on every in
               float sums[160];
               set.sum_pairs(kernel, which, scene.target_blocks.block(block),
                             scene.point_blocks.view(with_mass ? scene.mass.data() : nullptr), sums);
-              for (int i = 0; i < scene.target_blocks.count(block); ++i) {
-                const Eigen::RowVector3d target = scene.targets.row(scene.target_blocks.row(16 * block + i));
+              for (std::int64_t at = scene.target_blocks.begin(block); at < scene.target_blocks.end(block); ++at) {
+                const std::int64_t i = at - scene.target_blocks.begin(block);
+                const Eigen::RowVector3d target = scene.targets.row(scene.target_blocks.row(at));
                 double truth[10] = {}, least_gap = 1.0;
                 scene.for_points([&](std::int64_t j) {
                   const Eigen::RowVector3d d = scene.points.row(scene.point_blocks.row(j)) - target;

@@ -19,13 +19,14 @@ struct BoxTree {
   int num_levels;
 };
 
-// Points in blocks of 16, relative to the origin of their block; unused places at the end of a block are far away. The
-// unit of length is the one in which theta(r) = 2^(-r^2).
+// Points in blocks of up to 16, relative to the origin of their block; 15 more than there are can be read. The unit of
+// length is the one in which theta(r) = 2^(-r^2).
 struct PairPoints {
   const float *x, *y, *z;
-  const float* mass;     // null: all are 1
-  const double* origin;  // 3 a block
-  const float* halves;   // 3 a block: how far its points reach from its origin along each axis
+  const float* mass;      // null: all are 1
+  const int32_t* starts;  // block b has the points starts[b] to starts[b + 1] - 1
+  const double* origin;   // 3 a block
+  const float* halves;    // 3 a block: how far its points reach from its origin along each axis
   BoxTree tree;
 };
 
@@ -58,7 +59,7 @@ using SumPairs = void(const PairKernel& kernel, PairSums which, const PairTarget
                       float* sums);
 NACRE_DECLARE_KERNEL(SumPairs, sum_pairs)
 
-// weights[16 b + j]: weight of target i and point j of the listed block b.
+// weights[16 b + j]: weight of the target and point j of the b-th block of the list; 0 where it has no such point.
 using WeighPairs = void(const PairKernel& kernel, const PairTargets& targets, int target, const PairPoints& points,
                         const int32_t* blocks, int64_t num_blocks, float* weights);
 NACRE_DECLARE_KERNEL(WeighPairs, weigh_pairs)
