@@ -35,17 +35,19 @@ struct Kernels {
   simd::DropLonely* drop_lonely;
   simd::SelectKept* select_kept;
   simd::LinkPixels* link_pixels;
+  simd::FillDepthRow* fill_depth_row;
   simd::FillPlanarRow* fill_planar_row;
   simd::FillPointRow* fill_point_row;
   simd::CountPoints* count_points;
   simd::GatherPoints* gather_points;
 };
 
-#define KERNELS_OF(isa)                                                                                          \
-  Kernels {                                                                                                      \
-    #isa, simd::isa::fit_normals, simd::isa::mark_edges, simd::isa::mark_gradients, simd::isa::fit_windows,      \
-        simd::isa::keep_pixels, simd::isa::drop_lonely, simd::isa::select_kept, simd::isa::link_pixels,          \
-        simd::isa::fill_planar_row, simd::isa::fill_point_row, simd::isa::count_points, simd::isa::gather_points \
+#define KERNELS_OF(isa)                                                                                            \
+  Kernels {                                                                                                        \
+    #isa, simd::isa::fit_normals, simd::isa::mark_edges, simd::isa::mark_gradients, simd::isa::fit_windows,        \
+        simd::isa::keep_pixels, simd::isa::drop_lonely, simd::isa::select_kept, simd::isa::link_pixels,            \
+        simd::isa::fill_depth_row, simd::isa::fill_planar_row, simd::isa::fill_point_row, simd::isa::count_points, \
+        simd::isa::gather_points                                                                                   \
   }
 
 std::vector<Kernels> all_kernels() {
@@ -385,6 +387,20 @@ TEST_CASE("pixels are kept and dropped as plain loops say") {
         const int spare = static_cast<int>(64 * words) - w;
         if (spare > 0) REQUIRE((kept.back() >> (64 - spare)) == 0);
       }
+    }
+  }
+}
+
+TEST_CASE("raw values become metres") {
+  std::vector<std::uint16_t> raw = {0, 1, 1000, 65534, 65535};
+  for (int i = 0; i < 70; ++i) raw.push_back(static_cast<std::uint16_t>(937 * i));
+  for (const Kernels& kernels : all_kernels()) {
+    std::vector<float> depth(raw.size());
+    kernels.fill_depth_row(raw.data(), 5000.0F, static_cast<int>(raw.size()), depth.data());
+    for (std::size_t i = 0; i < raw.size(); ++i) {
+      const bool is_there = raw[i] != 0 && raw[i] != 65535;
+      REQUIRE((depth[i] == depth[i]) == is_there);
+      if (is_there) REQUIRE(depth[i] == static_cast<float>(raw[i]) / 5000.0F);
     }
   }
 }
