@@ -68,7 +68,7 @@ std::vector<Camera> cameras(int w) {
           Camera::pinhole(w, rows, 90.0, 94.0, w / 2.0, 18.0, lens), Camera::orthographic(w, rows, 0.01)};
 }
 
-// A waved surface before another, with noise, holes and codes for "no measurement".
+// A waved surface before another, with noise, outliers, holes and codes for "no measurement".
 DepthImage scene(int w, double noise, std::uint64_t seed) {
   DepthImage depth(rows, w);
   for (int v = 0; v < rows; ++v) {
@@ -78,6 +78,7 @@ DepthImage scene(int w, double noise, std::uint64_t seed) {
       double z = 1.4 + 0.1 * std::sin(0.13 * u) * std::cos(0.11 * v) - near + noise * random_normal(seed, pixel);
       const double chance = random_uniform(seed + 1, pixel);
       if (chance < 0.02 || (u > 20 && u < 24 && v > 5 && v < 30)) z = missing;
+      if (chance > 0.02 && chance < 0.026) z += chance < 0.023 ? 0.7 : -0.5;
       if (chance > 0.995) z = chance > 0.9975 ? -1.0 : std::numeric_limits<double>::infinity();
       depth(v, u) = static_cast<float>(z);
     }
