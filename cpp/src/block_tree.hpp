@@ -1,16 +1,18 @@
-// The k-d tree: points in k-d order in blocks of 16 under a hierarchy of bounding boxes, 8 children each.
-//
-// Searches filter in the precision of the coordinates (T) and decide in double: a lane passes where its distance in T
-// is not above a slightly enlarged bound, then its exact distance is compared.
+// The k-d tree's heir: points along a Hilbert curve in blocks of 16, under a hierarchy of bounding boxes with 16
+// children each.
 #pragma once
 
+#include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <type_traits>
 #include <vector>
 
-#include "kd_blocks.hpp"
-#include "kd_order.hpp"
-#include "nacre/types.hpp"
+#include "buffer.hpp"
+#include "simd/block_layout.hpp"
+#include "simd/near_points.hpp"
 
 namespace nacre {
 
@@ -40,6 +42,7 @@ inline double squared_bound(double distance) {
 // The k nearest within a distance, sorted, in the caller's memory.
 class KNearest {
  public:
+  static constexpr bool bound_shrinks = true;
   KNearest(int k, double bound_d2, Found* found)
       : bound_{bound_d2, no_id, no_id}, begin_(found), end_(found), full_(found + k) {}
   int size() const { return static_cast<int>(end_ - begin_); }
@@ -61,6 +64,7 @@ class KNearest {
 // Everything within a distance, unsorted.
 class WithinRadius {
  public:
+  static constexpr bool bound_shrinks = false;
   WithinRadius(double bound_d2, std::vector<Found>& found) : bound_{bound_d2, no_id, no_id}, found_(found) {}
   const Found& bound() const { return bound_; }
   void add(const Found& point) {
@@ -72,123 +76,46 @@ class WithinRadius {
   std::vector<Found>& found_;
 };
 
-static_assert(leaf_points == block_points && group_boxes == 8, "every block and group is a subtree of the k-d order");
-
 template <class T>
 class BlockTree {
  public:
-  BlockTree(const Eigen::Ref<const PointMatrix<T>>& points, int num_threads);
+  // `count` rows of three coordinates; those that are not finite are left out.
+  BlockTree(const T* points, std::int64_t count, int num_threads);
 
   // The finite points, numbered by their places in the tree.
   std::int64_t num_points() const { return num_points_; }
   std::uint32_t id(std::uint32_t slot) const { return blocks_[slot / block_points].id[slot % block_points]; }
   Eigen::Vector3d position(std::uint32_t slot) const {
     const PointBlock<T>& block = blocks_[slot / block_points];
-    const int lane = static_cast<int>(slot % block_points);
+    const auto lane = slot % block_points;
     return {block.p[0][lane], block.p[1][lane], block.p[2][lane]};
   }
+  const BlockTreeView<T>& view() const { return view_; }
 
-  // Shows results.add() every point that may be within results.bound(), mostly near ones first.
+  // Shows results.add() every point that may be within results.bound().
   template <class Results>
   void search(const Eigen::Vector3d& query, Results& results) const;
 
  private:
-  struct Box {
-    T lo[3], hi[3];
-    std::uint32_t first_id;
-    void include(const Box& other);
-  };
+  void build_blocks(const T* points, std::int64_t count, int num_threads);
+  void build_groups(int num_threads);
+  template <class Results>
+  bool search_within_bound(const Eigen::Vector3d& query, Results& results) const;
+  template <class Results>
+  void search_nearest_first(const Eigen::Vector3d& query, Results& results) const;
+  template <class Results>
+  void show(const Eigen::Vector3d& query, std::uint32_t slot, Results& results) const;
+  static Found nearest_possible(const BoxGroup<T>& group, int lane, const Eigen::Vector3d& query);
 
-  std::vector<Box> build_blocks(const std::vector<IndexedPoint<T>>& points, int num_threads);
-  std::vector<Box> build_groups(const std::vector<Box>& children, std::size_t first_child, int num_threads);
-  Found nearest_possible(std::uint32_t box, const Eigen::Vector3d& query) const;
-
-  std::int64_t num_points_;
-  std::vector<PointBlock<T>> blocks_;
-  // Level after level, the groups over the blocks first, the root last. Box j of group g has the number 8 g + j, which
-  // for the blocks' boxes is the number of the block.
-  std::vector<BoxGroup<T>> groups_;
+  std::int64_t num_points_ = 0;
+  Buffer<PointBlock<T>> blocks_;
+  Buffer<BoxGroup<T>> groups_;  // level after level, the groups over the blocks first, the root last
+  BlockTreeView<T> view_ = {};
 };
-
-template <class T>
-BlockTree<T>::BlockTree(const Eigen::Ref<const PointMatrix<T>>& points, int num_threads) {
-  std::vector<IndexedPoint<T>> ordered = finite_points<T>(points);
-  num_points_ = static_cast<std::int64_t>(ordered.size());
-  kd_order(ordered, num_threads);
-  std::vector<Box> boxes = build_blocks(ordered, num_threads);
-  for (std::size_t first_child = 0; boxes.size() > (groups_.empty() ? 0u : 1u);) {
-    const std::size_t first_group = groups_.size();
-    boxes = build_groups(boxes, first_child, num_threads);
-    first_child = first_group;
-  }
-}
-
-template <class T>
-void BlockTree<T>::Box::include(const Box& other) {
-  for (int axis = 0; axis < 3; ++axis) {
-    lo[axis] = std::min(lo[axis], other.lo[axis]);
-    hi[axis] = std::max(hi[axis], other.hi[axis]);
-  }
-  first_id = std::min(first_id, other.first_id);
-}
-
-// Packs the points into blocks and returns the boxes of the blocks.
-template <class T>
-std::vector<typename BlockTree<T>::Box> BlockTree<T>::build_blocks(const std::vector<IndexedPoint<T>>& points,
-                                                                   int num_threads) {
-  constexpr T nan = std::numeric_limits<T>::quiet_NaN();
-  blocks_.resize((points.size() + block_points - 1) / block_points);
-  std::vector<Box> boxes(blocks_.size());
-  parallel_for(static_cast<std::int64_t>(blocks_.size()), 256, num_threads, [&](std::int64_t i) {
-    PointBlock<T>& block = blocks_[static_cast<std::size_t>(i)];
-    const std::size_t first = static_cast<std::size_t>(i) * block_points;
-    const std::size_t count = std::min<std::size_t>(points.size() - first, block_points);
-    for (std::size_t lane = 0; lane < block_points; ++lane) {
-      const IndexedPoint<T> point = lane < count ? points[first + lane] : IndexedPoint<T>{{nan, nan, nan}, no_id};
-      for (int axis = 0; axis < 3; ++axis) block.p[axis][static_cast<int>(lane)] = point.p[axis];
-      block.id[lane] = point.id;
-      if (lane >= count) continue;
-      const Box box = {{point.p[0], point.p[1], point.p[2]}, {point.p[0], point.p[1], point.p[2]}, point.id};
-      if (lane == 0) boxes[static_cast<std::size_t>(i)] = box;
-      boxes[static_cast<std::size_t>(i)].include(box);
-    }
-  });
-  return boxes;
-}
-
-// Packs the boxes of one level into groups and returns the boxes of the groups.
-template <class T>
-std::vector<typename BlockTree<T>::Box> BlockTree<T>::build_groups(const std::vector<Box>& children,
-                                                                   std::size_t first_child, int num_threads) {
-  const std::size_t first_group = groups_.size();
-  std::vector<Box> boxes((children.size() + group_boxes - 1) / group_boxes);
-  groups_.resize(first_group + boxes.size());
-  parallel_for(static_cast<std::int64_t>(boxes.size()), 256, num_threads, [&](std::int64_t i) {
-    BoxGroup<T>& group = groups_[first_group + static_cast<std::size_t>(i)];
-    const std::size_t first = static_cast<std::size_t>(i) * group_boxes;
-    const std::size_t count = std::min<std::size_t>(children.size() - first, group_boxes);
-    Box box = children[first];
-    for (std::size_t lane = 0; lane < group_boxes; ++lane) {
-      const Box& child = children[first + std::min(lane, count - 1)];
-      for (int axis = 0; axis < 3; ++axis) {
-        group.lo[axis][static_cast<int>(lane)] = child.lo[axis];
-        group.hi[axis][static_cast<int>(lane)] = child.hi[axis];
-      }
-      group.first_id[lane] = child.first_id;
-      box.include(child);
-    }
-    group.first_child = static_cast<std::uint32_t>(first_child + first);
-    group.used = (1u << count) - 1;
-    boxes[static_cast<std::size_t>(i)] = box;
-  });
-  return boxes;
-}
 
 // No point of the box comes before this one: rounding is monotonic, so the box's distance is not above any of theirs.
 template <class T>
-Found BlockTree<T>::nearest_possible(std::uint32_t box, const Eigen::Vector3d& query) const {
-  const BoxGroup<T>& group = groups_[box / group_boxes];
-  const auto lane = static_cast<int>(box % group_boxes);
+Found BlockTree<T>::nearest_possible(const BoxGroup<T>& group, int lane, const Eigen::Vector3d& query) {
   double outside[3];
   for (int axis = 0; axis < 3; ++axis) {
     outside[axis] = std::max({0.0, group.lo[axis][lane] - query[axis], query[axis] - group.hi[axis][lane]});
@@ -199,7 +126,48 @@ Found BlockTree<T>::nearest_possible(std::uint32_t box, const Eigen::Vector3d& q
 template <class T>
 template <class Results>
 void BlockTree<T>::search(const Eigen::Vector3d& query, Results& results) const {
-  if (groups_.empty() || !query.allFinite()) return;
+  if (num_points_ == 0 || !query.allFinite()) return;
+  if (Results::bound_shrinks || !search_within_bound(query, results)) search_nearest_first(query, results);
+}
+
+template <class T>
+template <class Results>
+void BlockTree<T>::show(const Eigen::Vector3d& query, std::uint32_t slot, Results& results) const {
+  const PointBlock<T>& block = blocks_[slot / block_points];
+  const auto lane = slot % block_points;
+  const double x = block.p[0][lane] - query.x(), y = block.p[1][lane] - query.y(), z = block.p[2][lane] - query.z();
+  results.add({x * x + y * y + z * z, block.id[lane], slot});
+}
+
+// False where there are too many points within it.
+template <class T>
+template <class Results>
+bool BlockTree<T>::search_within_bound(const Eigen::Vector3d& query, Results& results) const {
+  std::uint32_t slots[simd::most_near_points + 16];
+  int size;
+  if constexpr (std::is_same_v<T, float>) {
+    size = simd::near_points_f32()(view_, query.data(), results.bound().d2, slots);
+  } else {
+    size = simd::near_points_f64()(view_, query.data(), results.bound().d2, slots);
+  }
+  for (int i = 0; i < size; ++i) show(query, slots[i], results);
+  return size >= 0;
+}
+
+// Filters in the precision of the coordinates and decides in double: a lane passes where its distance in T is not above
+// a slightly enlarged bound, then its exact distance is compared.
+template <class T>
+template <class Results>
+void BlockTree<T>::search_nearest_first(const Eigen::Vector3d& query, Results& results) const {
+  simd::NearBoxes<T>* near_boxes;
+  simd::PointDistances<T>* point_distances;
+  if constexpr (std::is_same_v<T, float>) {
+    near_boxes = simd::near_boxes_f32();
+    point_distances = simd::point_distances_f32();
+  } else {
+    near_boxes = simd::near_boxes_f64();
+    point_distances = simd::point_distances_f64();
+  }
   const T q[3] = {static_cast<T>(query.x()), static_cast<T>(query.y()), static_cast<T>(query.z())};
 
   // A point at distance d of the query is at most d + e from q, e being the query's rounding, and for any s > 0
@@ -214,43 +182,34 @@ void BlockTree<T>::search(const Eigen::Vector3d& query, Results& results) const 
   };
   tighten();
 
-  // The boxes still to visit, nearest on top; opening one adds up to 7 more.
-  constexpr int max_levels = 10;  // 16 * 8^10 > 2^32
-  T distance[max_levels * (group_boxes - 1) + 1];
-  std::uint32_t boxes[max_levels * (group_boxes - 1) + 1];
+  // The boxes still to visit, the nearest of each group on top of the others; opening one adds up to 15 more.
+  // Above its number is a box's level.
+  constexpr int level_bits = 28, room = BlockTreeView<T>::most_levels * (group_boxes - 1) + 1 + group_boxes;
+  T distances[room];
+  std::uint32_t boxes[room];
   int size = 0;
-  const auto open = [&](std::size_t index) {
-    const BoxGroup<T>& group = groups_[index];
-    const typename BoxGroup<T>::Lanes d2 = group.squared_distances(q);
-    const int bottom = size;
-    for (unsigned mask = lanes_within(d2, limit) & group.used; mask != 0; mask &= mask - 1) {
-      const int lane = lowest_lane(mask);
-      int place = size++;
-      for (; place > bottom && distance[place - 1] <= d2[lane]; --place) {
-        distance[place] = distance[place - 1];
-        boxes[place] = boxes[place - 1];
-      }
-      distance[place] = d2[lane];
-      boxes[place] = static_cast<std::uint32_t>(index * group_boxes) + static_cast<std::uint32_t>(lane);
-    }
+  const auto open = [&](int level, std::uint32_t number) {
+    const auto first = static_cast<std::uint32_t>(level) << level_bits | number * group_boxes;
+    size += near_boxes(view_.levels[level][number], q, limit, first, boxes + size, distances + size);
   };
 
-  open(groups_.size() - 1);
+  open(view_.num_levels - 1, 0);
   while (size > 0) {
     --size;
-    const std::uint32_t box = boxes[size];
-    if (distance[size] > limit) continue;
-    if (distance[size] >= tie && !(nearest_possible(box, query) < results.bound())) continue;
-    if (box >= blocks_.size()) {
-      open(groups_[box / group_boxes].first_child + box % group_boxes);
+    const T distance = distances[size];
+    if (distance > limit) continue;
+    const auto level = static_cast<int>(boxes[size] >> level_bits);
+    const std::uint32_t box = boxes[size] & ((1U << level_bits) - 1);
+    if (distance >= tie) {
+      const BoxGroup<T>& group = view_.levels[level][box / group_boxes];
+      if (!(nearest_possible(group, static_cast<int>(box % group_boxes), query) < results.bound())) continue;
+    }
+    if (level > 0) {
+      open(level - 1, box);
       continue;
     }
-    const PointBlock<T>& block = blocks_[box];
-    const typename PointBlock<T>::Lanes d2 = block.squared_distances(q);
-    for (unsigned mask = lanes_within(d2, limit); mask != 0; mask &= mask - 1) {
-      const int lane = lowest_lane(mask);
-      const double x = block.p[0][lane] - query.x(), y = block.p[1][lane] - query.y(), z = block.p[2][lane] - query.z();
-      results.add({x * x + y * y + z * z, block.id[lane], box * block_points + static_cast<std::uint32_t>(lane)});
+    for (unsigned mask = point_distances(blocks_[box], q, limit); mask != 0; mask &= mask - 1) {
+      show(query, box * block_points + static_cast<std::uint32_t>(simd::lowest_bit(mask)), results);
     }
     tighten();
   }

@@ -2,42 +2,68 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <variant>
 
 #include "block_tree.hpp"
 #include "check.hpp"
+#include "group_queries.hpp"
 #include "parallel.hpp"
-#include "warm_search.hpp"
+#include "rows.hpp"
+#include "spatial_order.hpp"
 
 namespace nacre {
 namespace {
 
-constexpr std::int64_t queries_per_block = 128;
+using Tree = std::variant<BlockTree<float>, BlockTree<double>>;
 
 template <class T>
-std::variant<BlockTree<float>, BlockTree<double>> make_tree(const Eigen::Ref<const PointMatrix<T>>& points,
-                                                            int num_threads) {
+Tree make_tree(const Eigen::Ref<const PointMatrix<T>>& points, int num_threads) {
   require(points.rows() < static_cast<Eigen::Index>(no_id), "points", "fewer than 2^32 - 1 points", points.rows());
-  return BlockTree<T>(points, num_threads);
+  return BlockTree<T>(Rows<T>(points).data(), points.rows(), num_threads);
 }
 
-// The queries in an order in which each is near the one before, those that are not finite last.
+// The finite queries in an order in which each is near the one before.
 template <class T>
-std::vector<IndexedPoint<T>> visiting_order(const Eigen::Ref<const PointMatrix<T>>& queries, int num_threads) {
-  require(queries.rows() < static_cast<Eigen::Index>(no_id), "queries", "fewer than 2^32 - 1 points", queries.rows());
-  std::vector<IndexedPoint<T>> order = finite_points<T>(queries);
-  kd_order(order, num_threads);
-  for (Eigen::Index i = 0; order.size() < static_cast<std::size_t>(queries.rows()); ++i) {
-    if (queries.row(i).allFinite()) continue;
-    order.push_back({{queries(i, 0), queries(i, 1), queries(i, 2)}, static_cast<std::uint32_t>(i)});
-  }
-  return order;
+Buffer<std::uint32_t> visiting_order(const Rows<T>& queries, int num_threads) {
+  SpatialOrder<T> order(queries.data(), queries.size(), num_threads);
+  Buffer<std::uint32_t> rows(static_cast<std::size_t>(order.size()));
+  order.for_each_stretch(num_threads, [&](std::int64_t first, const std::uint64_t* entries, std::int64_t size) {
+    std::transform(entries, entries + size, rows.data() + first, SpatialOrder<T>::row);
+  });
+  return rows;
 }
 
+// Whether the queries are the points of the tree, row by row.
 template <class T>
-Eigen::Vector3d position(const IndexedPoint<T>& point) {
-  return {point.p[0], point.p[1], point.p[2]};
+bool are_points_of(const BlockTree<T>& tree, const Rows<T>& queries, int num_threads) {
+  const PointBlock<T>* const blocks = tree.view().blocks;
+  std::atomic<bool> equal{queries.size() == tree.num_points()};
+  parallel_blocks(equal ? tree.num_points() : 0, 4096, num_threads, [&](auto, std::int64_t begin, std::int64_t end) {
+    for (std::int64_t slot = begin; slot < end && equal.load(std::memory_order_relaxed); slot += block_points) {
+      const PointBlock<T>& block = blocks[slot / block_points];
+      bool same = true;
+      for (int lane = 0; lane < std::min<std::int64_t>(block_points, end - slot); ++lane) {
+        const T* const query = queries[block.id[lane]];
+        same = same && query[0] == block.p[0][lane] && query[1] == block.p[1][lane] && query[2] == block.p[2][lane];
+      }
+      if (!same) equal = false;
+    }
+  });
+  return equal;
+}
+template <class T, class Query>
+bool are_points_of(const BlockTree<T>&, const Rows<Query>&, int) {
+  return false;
+}
+
+Neighbors room_for(Eigen::Index queries, int k) {
+  Neighbors found;
+  if (k < 1) return found;
+  found.distances.resize(queries, k);
+  found.indices.resize(queries, k);
+  return found;
 }
 
 void require_distance(const char* name, double distance) {
@@ -48,69 +74,52 @@ void require_distance(const char* name, double distance) {
 
 struct KdTree::Impl {
   std::int64_t size;
-  std::variant<BlockTree<float>, BlockTree<double>> tree;
+  Tree tree;
 
   template <class T>
-  Neighbors query(const Eigen::Ref<const PointMatrix<T>>& queries, int k, double max_distance, int num_threads) const {
+  void query(const Rows<T>& queries, int k, double max_distance, int num_threads, std::int64_t* indices,
+             double* distances, float* float_distances) const {
     require(k >= 1, "k", "at least 1", k);
     require_distance("max_distance", max_distance);
-    const std::vector<IndexedPoint<T>> order = visiting_order<T>(queries, num_threads);
-    Neighbors result;
-    result.distances.resize(queries.rows(), k);
-    result.indices.resize(queries.rows(), k);
-    const auto run = [&](const auto& blocks) {
-      parallel_blocks(queries.rows(), queries_per_block, num_threads, [&](auto, std::int64_t begin, std::int64_t end) {
-        WarmSearch search(blocks, k, max_distance);
-        for (std::int64_t i = begin; i < end; ++i) {
-          const IndexedPoint<T>& point = order[static_cast<std::size_t>(i)];
-          const int found = search(position(point));
-          double* distances = result.distances.row(point.id).data();
-          std::int64_t* indices = result.indices.row(point.id).data();
-          for (int j = 0; j < found; ++j) {
-            distances[j] = std::sqrt(search[j].d2);
-            indices[j] = search[j].id;
-          }
-          std::fill(distances + found, distances + k, infinity);
-          std::fill(indices + found, indices + k, size);
-        }
-      });
-    };
-    std::visit(run, tree);
-    return result;
+    require(queries.size() < static_cast<std::int64_t>(no_id), "queries", "fewer than 2^32 - 1 points", queries.size());
+    const simd::NearestTask task = {k, squared_bound(max_distance), size, indices, distances, float_distances};
+    std::visit([&](const auto& blocks) { answer(blocks, task, queries, num_threads); }, tree);
   }
 
   template <class T>
-  RadiusNeighbors query_radius(const Eigen::Ref<const PointMatrix<T>>& queries, double radius, int num_threads) const {
+  RadiusNeighbors query_radius(const Rows<T>& queries, double radius, int num_threads) const {
+    constexpr std::int64_t queries_per_block = 128;
     require_distance("radius", radius);
+    require(queries.size() < static_cast<std::int64_t>(no_id), "queries", "fewer than 2^32 - 1 points", queries.size());
     const double bound = squared_bound(radius);
-    const std::vector<IndexedPoint<T>> order = visiting_order<T>(queries, num_threads);
-    const auto num_queries = static_cast<std::size_t>(queries.rows());
+    const Buffer<std::uint32_t> order = visiting_order(queries, num_threads);
+    const auto num_finite = static_cast<std::int64_t>(order.size());
     RadiusNeighbors result;
-    result.offsets.assign(num_queries + 1, 0);
+    result.offsets.assign(static_cast<std::size_t>(queries.size()) + 1, 0);
 
     // The searches run in visiting order; then each query's neighbours move to the caller's order.
-    std::vector<std::vector<Found>> found_by_block((num_queries + queries_per_block - 1) / queries_per_block);
+    std::vector<std::vector<Found>> found_by_block((order.size() + queries_per_block - 1) / queries_per_block);
     const auto run = [&](const auto& blocks) {
-      parallel_blocks(queries.rows(), queries_per_block, num_threads, [&](auto block, auto begin, auto end) {
+      parallel_blocks(num_finite, queries_per_block, num_threads, [&](auto block, auto begin, auto end) {
         std::vector<Found>& found = found_by_block[static_cast<std::size_t>(block)];
         for (std::int64_t i = begin; i < end; ++i) {
-          const IndexedPoint<T>& point = order[static_cast<std::size_t>(i)];
+          const std::uint32_t row = order[static_cast<std::size_t>(i)];
           const std::size_t before = found.size();
           WithinRadius within(bound, found);
-          blocks.search(position(point), within);
+          blocks.search(queries.position(row), within);
           std::sort(found.begin() + static_cast<std::ptrdiff_t>(before), found.end());
-          result.offsets[point.id + 1] = static_cast<std::int64_t>(found.size() - before);
+          result.offsets[row + std::size_t{1}] = static_cast<std::int64_t>(found.size() - before);
         }
       });
     };
     std::visit(run, tree);
-    for (std::size_t i = 0; i < num_queries; ++i) result.offsets[i + 1] += result.offsets[i];
+    for (std::size_t i = 1; i < result.offsets.size(); ++i) result.offsets[i] += result.offsets[i - 1];
     result.indices.resize(static_cast<std::size_t>(result.offsets.back()));
     result.distances.resize(result.indices.size());
-    parallel_blocks(queries.rows(), queries_per_block, num_threads, [&](auto block, auto begin, auto end) {
+    parallel_blocks(num_finite, queries_per_block, num_threads, [&](auto block, auto begin, auto end) {
       auto found = found_by_block[static_cast<std::size_t>(block)].cbegin();
       for (std::int64_t i = begin; i < end; ++i) {
-        const std::uint32_t row = order[static_cast<std::size_t>(i)].id;
+        const std::size_t row = order[static_cast<std::size_t>(i)];
         for (auto j = static_cast<std::size_t>(result.offsets[row]);
              j < static_cast<std::size_t>(result.offsets[row + 1]); ++j, ++found) {
           result.indices[j] = found->id;
@@ -119,6 +128,38 @@ struct KdTree::Impl {
       }
     });
     return result;
+  }
+
+ private:
+  template <class T, class Query>
+  static void answer(const BlockTree<T>& blocks, const simd::NearestTask& task, const Rows<Query>& queries,
+                     int num_threads) {
+    const bool in_tree_order = are_points_of(blocks, queries, num_threads);
+    const Buffer<std::uint32_t> order = in_tree_order ? Buffer<std::uint32_t>() : visiting_order(queries, num_threads);
+    const std::int64_t num_finite = in_tree_order ? blocks.num_points() : static_cast<std::int64_t>(order.size());
+    const std::int64_t per_block = std::clamp<std::int64_t>(num_finite / 64 / 16 * 16, 128, 2048);
+    parallel_blocks(num_finite, per_block, num_threads, [&](auto, std::int64_t begin, std::int64_t end) {
+      GroupQueries search(blocks, task);
+      for (std::int64_t first = begin; first < end; first += 16) {
+        simd::QueryGroup group;
+        group.size = static_cast<int>(std::min<std::int64_t>(16, end - first));
+        for (int i = 0; i < group.size; ++i) {
+          const auto place = static_cast<std::size_t>(first + i);
+          group.row[i] = in_tree_order ? blocks.id(static_cast<std::uint32_t>(place)) : order[place];
+          for (int axis = 0; axis < 3; ++axis) group.p[axis][i] = static_cast<double>(queries[group.row[i]][axis]);
+        }
+        search(group);
+      }
+    });
+    if (num_finite == queries.size()) return;
+    parallel_for(queries.size(), 16384, num_threads, [&](std::int64_t row) {
+      if (queries.is_finite(row)) return;
+      std::fill_n(task.indices + row * task.k, task.k, task.missing);
+      if (task.distances != nullptr) std::fill_n(task.distances + row * task.k, task.k, infinity);
+      if (task.float_distances != nullptr) {
+        std::fill_n(task.float_distances + row * task.k, task.k, std::numeric_limits<float>::infinity());
+      }
+    });
   }
 };
 
@@ -133,10 +174,23 @@ KdTree& KdTree::operator=(KdTree&&) noexcept = default;
 std::int64_t KdTree::size() const { return impl_->size; }
 
 Neighbors KdTree::query(const PointsRef& queries, int k, double max_distance, int num_threads) const {
-  return impl_->query<float>(queries, k, max_distance, num_threads);
+  Neighbors found = room_for(queries.rows(), k);
+  impl_->query<float>(queries, k, max_distance, num_threads, found.indices.data(), found.distances.data(), nullptr);
+  return found;
 }
 Neighbors KdTree::query(const PointsDoubleRef& queries, int k, double max_distance, int num_threads) const {
-  return impl_->query<double>(queries, k, max_distance, num_threads);
+  Neighbors found = room_for(queries.rows(), k);
+  impl_->query<double>(queries, k, max_distance, num_threads, found.indices.data(), found.distances.data(), nullptr);
+  return found;
+}
+
+void KdTree::query_into(const PointsRef& queries, int k, double max_distance, int num_threads, std::int64_t* indices,
+                        float* distances) const {
+  impl_->query<float>(queries, k, max_distance, num_threads, indices, nullptr, distances);
+}
+void KdTree::query_into(const PointsDoubleRef& queries, int k, double max_distance, int num_threads,
+                        std::int64_t* indices, double* distances) const {
+  impl_->query<double>(queries, k, max_distance, num_threads, indices, distances, nullptr);
 }
 
 RadiusNeighbors KdTree::query_radius(const PointsRef& queries, double radius, int num_threads) const {

@@ -15,14 +15,20 @@ py::array_t<T> as_array(std::vector<T>&& values) {
   return py::array_t<T>(static_cast<py::ssize_t>(owned->size()), owned->data(), free);
 }
 
+// In NumPy's own memory, which is in large pages where it is large.
 template <class Points>
 py::tuple query(const KdTree& tree, const Points& queries, int k, double max_distance, int num_threads) {
-  nacre::Neighbors found;
+  using Distance = typename Points::Scalar;
+  const std::array<py::ssize_t, 2> shape = {queries.rows(), k};
+  py::array_t<std::int64_t> indices(shape);
+  py::array_t<Distance> distances(shape);
+  std::int64_t* const to_indices = indices.mutable_data();
+  Distance* const to_distances = distances.mutable_data();
   {
     const py::gil_scoped_release release;
-    found = tree.query(queries, k, max_distance, num_threads);
+    tree.query_into(queries, k, max_distance, num_threads, to_indices, to_distances);
   }
-  return py::make_tuple(std::move(found.distances), std::move(found.indices));
+  return py::make_tuple(distances, indices);
 }
 
 template <class Points>

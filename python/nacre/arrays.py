@@ -135,9 +135,24 @@ def localize(points: FloatArray) -> tuple[npt.NDArray[np.float32], npt.NDArray[n
     """
     if points.dtype == np.float32:
         return points, np.zeros(3)  # type: ignore[return-value]
-    finite = points[np.isfinite(points).all(axis=1)]
+    # Any place among the points will do.
+    sample = points[:: max(1, len(points) // 1000)]
+    finite = sample[np.isfinite(sample).all(axis=1)]
+    if len(finite) == 0:
+        finite = points[np.isfinite(points).all(axis=1)]
     origin = np.round(finite.mean(axis=0, dtype=np.float64)) if len(finite) else np.zeros(3)
-    return (points - origin).astype(np.float32), origin
+    # Many rows side by side: NumPy is slow on rows of three.
+    local = np.empty(points.shape, np.float32)
+    width = 256
+    end = len(points) // width * width
+    for part, shift in ((slice(0, end), np.tile(origin, width)), (slice(end, None), origin)):
+        np.subtract(
+            points[part].reshape(-1, shift.size),
+            shift,
+            out=local[part].reshape(-1, shift.size),
+            casting="same_kind",
+        )
+    return local, origin
 
 
 def as_triangles(name: str, value: npt.ArrayLike, num_vertices: int) -> npt.NDArray[np.int32]:

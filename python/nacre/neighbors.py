@@ -144,7 +144,7 @@ class KdTree:
             as_count("num_threads", num_threads),
         )
         shape = array.shape[:-1] if k == 1 else (*array.shape[:-1], k)
-        return distances.astype(array.dtype, copy=False).reshape(shape)[()], indices.reshape(shape)[()]
+        return distances.reshape(shape)[()], indices.reshape(shape)[()]
 
     def query_radius(self, queries: npt.ArrayLike, radius: float, *, num_threads: int = 0) -> RadiusNeighbors:
         """

@@ -46,6 +46,12 @@ class KdTree {
   Neighbors query(const PointsRef& queries, int k, double max_distance = infinity, int num_threads = 0) const;
   Neighbors query(const PointsDoubleRef& queries, int k, double max_distance = infinity, int num_threads = 0) const;
 
+  /// The same into the caller's memory, k entries a query; distances in the precision of the queries.
+  void query_into(const PointsRef& queries, int k, double max_distance, int num_threads, std::int64_t* indices,
+                  float* distances) const;
+  void query_into(const PointsDoubleRef& queries, int k, double max_distance, int num_threads, std::int64_t* indices,
+                  double* distances) const;
+
   /// All within the radius (inclusive). Throws std::invalid_argument for a negative radius.
   RadiusNeighbors query_radius(const PointsRef& queries, double radius, int num_threads = 0) const;
   RadiusNeighbors query_radius(const PointsDoubleRef& queries, double radius, int num_threads = 0) const;
