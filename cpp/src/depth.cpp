@@ -15,8 +15,6 @@
 namespace nacre {
 namespace {
 
-constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
-
 // A wrong depth_scale shows as a median depth that no depth camera measures. A sample of the pixels tells enough.
 void require_plausible_median(const DepthRef& depth) {
   constexpr float nearest = 0.05F, farthest = 50.0F;
@@ -119,10 +117,12 @@ DepthImage depth_from_raw(
     double depth_scale) {
   require(std::isfinite(depth_scale) && depth_scale > 0.0, "depth_scale", "a positive number of stored units per metre",
           depth_scale);
-  const auto scale = static_cast<float>(depth_scale);
-  return raw.unaryExpr([scale](std::uint16_t value) {
-    return value == 0 || value == 65535 ? kMissing : static_cast<float>(value) / scale;
-  });
+  DepthImage depth(raw.rows(), raw.cols());
+  const auto fill_row = simd::fill_depth_row();
+  for (Eigen::Index v = 0; v < raw.rows(); ++v) {
+    fill_row(&raw.coeffRef(v, 0), static_cast<float>(depth_scale), static_cast<int>(raw.cols()), &depth(v, 0));
+  }
+  return depth;
 }
 
 DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const DepthOptions& options,

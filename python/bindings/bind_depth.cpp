@@ -66,6 +66,7 @@ void bind_depth(py::module_& m) {
         return py::array_t<std::int32_t>(static_cast<py::ssize_t>(valid.size()), valid.data(), std::move(self));
       });
 
+  m.def("depth_from_raw", &nacre::depth_from_raw, py::arg("raw"), py::arg("depth_scale"), ReleaseGil());
   m.def("preprocess_depth", &preprocess_depth, py::arg("depth"), py::arg("camera"), py::arg("options"), py::arg("mask"),
         py::arg("num_threads"), ReleaseGil());
   m.def("estimate_noise", &nacre::estimate_noise, py::arg("depth"), py::arg("camera"), py::arg("num_threads"),

@@ -795,6 +795,10 @@ def consolidate(
     """
 
 def default_threads() -> int: ...
+def depth_from_raw(
+    raw: typing.Annotated[numpy.typing.NDArray[numpy.uint16], "[m, n]", "flags.c_contiguous"],
+    depth_scale: typing.SupportsFloat | typing.SupportsIndex,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"]: ...
 def depth_normals(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,

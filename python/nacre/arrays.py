@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre import _core
+
 FloatArray = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 
 
@@ -100,6 +102,9 @@ def as_depth(name: str, value: npt.ArrayLike, depth_scale: float = 1.0) -> npt.N
         raise ValueError(
             f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}"
         )
+    if array.dtype == np.uint16:
+        raw = np.ascontiguousarray(array, dtype=np.uint16)
+        return _core.depth_from_raw(raw, depth_scale)
     if array.dtype.kind in "bui":
         metres = array.astype(np.float32)
         metres[(array == 0) | (array == 65535)] = np.nan

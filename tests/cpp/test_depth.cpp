@@ -295,18 +295,23 @@ TEST_CASE("the same bits for any number of threads") {
   BoxScene scene;
   add_noise(scene.depth, NoiseModel::kinect(), 4);
   scene.depth(70, 70) = missing;
+  const auto same = [](const Points& a, const Points& b) {
+    return a.size() == b.size() &&
+           std::memcmp(a.data(), b.data(), static_cast<std::size_t>(a.size()) * sizeof(float)) == 0;
+  };
   const NoiseModel noise = estimate_noise(scene.depth, pinhole, 1);
   const DepthImage clean = preprocess_depth(scene.depth, pinhole, {}, MaskImage(), nullptr, 1);
   const Frame frame = make_frame(clean, pinhole, noise, 1);
-  for (const int threads : {2, 3, 8, 0}) {
+  const Points points = back_project(clean, pinhole, 1);
+  for (const int threads : {2, 3, 4, 7, 8, 0}) {
     CHECK(estimate_noise(scene.depth, pinhole, threads).constant == noise.constant);
     CHECK(same_bits(preprocess_depth(scene.depth, pinhole, {}, MaskImage(), nullptr, threads), clean));
     const Frame other = make_frame(clean, pinhole, noise, threads);
     CHECK(other.valid == frame.valid);
-    for (const std::int32_t row : frame.valid) {
-      REQUIRE(other.normals.row(row) == frame.normals.row(row));
-      REQUIRE(other.points.row(row) == frame.points.row(row));
-    }
+    CHECK(same(other.points, frame.points));
+    CHECK(same(other.normals, frame.normals));
+    CHECK(same(depth_normals(clean, pinhole, noise, threads), frame.normals));
+    CHECK(same(back_project(clean, pinhole, threads), points));
   }
 }
 

@@ -132,3 +132,36 @@ TEST_CASE("a frame has a row per pixel, and NaN where nothing fits") {
     REQUIRE(frame.normals.row(row).dot(frame.points.row(row)) < 0.0F);
   }
 }
+
+TEST_CASE("noise that is not given is measured") {
+  DepthImage depth = render(pinhole, slanted_plane(1.5, 0.6, 0.8));
+  add_noise(depth, NoiseModel::kinect(), 11);
+  const Frame frame = make_frame(depth, pinhole);
+  const Frame expected = make_frame(depth, pinhole, estimate_noise(depth, pinhole));
+  CHECK(frame.valid == expected.valid);
+  CHECK(frame.sigma == expected.sigma);
+}
+
+TEST_CASE("a frame may be made in the place of another") {
+  const DepthImage first = render(pinhole, slanted_plane(1.5, 0.6, 0.8));
+  DepthImage second = DepthImage::Constant(height, width, missing);
+  second.topRows(50) = render(radial, slanted_plane(1.2, 0.3, 0.1)).topRows(50);
+  const Camera small = Camera::orthographic(20, 10, 0.01);
+  Frame frame;
+  for (const auto& [depth, camera] : {std::pair{first, pinhole},
+                                      {second, radial},
+                                      {first, pinhole},
+                                      {DepthImage(DepthImage::Constant(10, 20, 1.0F)), small}}) {
+    make_frame(depth, camera, NoiseModel::kinect(), 2, frame);
+    const Frame expected = make_frame(depth, camera, NoiseModel::kinect());
+    CHECK(frame.width == camera.width());
+    CHECK(frame.height == camera.height());
+    CHECK(frame.valid == expected.valid);
+    REQUIRE(frame.points.rows() == depth.size());
+    REQUIRE(frame.sigma.size() == depth.size());
+    for (const std::int32_t row : expected.valid) {
+      REQUIRE(frame.points.row(row) == expected.points.row(row));
+      REQUIRE(frame.normals.row(row) == expected.normals.row(row));
+    }
+  }
+}

@@ -14,7 +14,7 @@ constexpr int least_window = 2, largest_normal_window = 5;  // pixels on each si
 
 // The planar image (planar_image.hpp) around a row; NaN where there is no measurement.
 struct PlanarRow {
-  const float* values;  // NaN for largest_normal_window pixels beyond every side, and 15 more beyond the row's end
+  const float* values;  // NaN for largest_normal_window pixels beyond every side, and 31 more beyond the row's end
   ptrdiff_t stride;     // from row to row
   int width;
   bool is_inverse;  // inverse depth

@@ -1,10 +1,16 @@
 // A row of a depth image as values of the planar image, and as points.
 #pragma once
 
+#include <stdint.h>
+
 #include "isa.hpp"
 #include "ray_row.hpp"
 
 namespace nacre::simd {
+
+// value / scale; NaN for 0 and 65535.
+using FillDepthRow = void(const uint16_t* raw, float scale, int width, float* depth);
+NACRE_DECLARE_KERNEL(FillDepthRow, fill_depth_row)
 
 // The planar image's values: z, or 1 / z; NaN where there is no measurement. direction_z: of the rays where depth is
 // measured along them, else null.
