@@ -17,7 +17,7 @@ float squared_distance(const BlockTree<float>& tree, std::uint32_t slot, float x
 // The nearest point in float, found by a search that is exact.
 class NearestInFloat {
  public:
-  static constexpr bool bound_shrinks = true;
+  static int num_wanted() { return 1; }
   NearestInFloat(const BlockTree<float>& tree, float x, float y, float z, float largest2)
       : tree_(tree), x_(x), y_(y), z_(z) {
     set_bound(largest2);

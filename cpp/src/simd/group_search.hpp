@@ -136,9 +136,10 @@ NACRE_INLINE F32 local_lanes(const double* p, double origin, double scale) {
 #endif
 }
 
-// Collects the points within reach of the queries' box; false where there are too many.
+// Collects the points within reach of the queries' box; false where they are more than `most`.
 template <Position position, class T>
-NACRE_INLINE bool collect(const BlockTreeView<T>& tree, const GroupFrame<T>& frame, Candidates& out) {
+NACRE_INLINE bool collect(const BlockTreeView<T>& tree, const GroupFrame<T>& frame, Candidates& out,
+                          int most = most_candidates) {
   constexpr int most_boxes = 512;
   int32_t lists[2][most_boxes + group_boxes];
   const F32 reach2 = broadcast(frame.reach2), zero = broadcast(0.0F);
@@ -164,7 +165,7 @@ NACRE_INLINE bool collect(const BlockTreeView<T>& tree, const GroupFrame<T>& fra
         store_chosen(below + num_below, near, lane_numbers() + broadcast(boxes[i] * group_boxes + lane));
         num_below += simd::NACRE_ISA::count(near);
       }
-      if (num_below > most_boxes) return false;
+      if (num_below > most_boxes || num_below > most) return false;
     }
     int32_t* const swap = boxes;
     boxes = below;
@@ -190,7 +191,7 @@ NACRE_INLINE bool collect(const BlockTreeView<T>& tree, const GroupFrame<T>& fra
       store_chosen(out.slot + n, near, lane_numbers() + broadcast(boxes[i] * block_points + lane));
       n += simd::NACRE_ISA::count(near);
     }
-    if (n > most_candidates) return false;
+    if (n > most) return false;
   }
   out.count = n;
   if constexpr (position == Position::local) {
