@@ -143,6 +143,12 @@ class Search {
 
 void find_nearest_points(const BlockTree<float>& tree, const NearestPoints& queries, std::int64_t begin,
                          std::int64_t end, double max_distance) {
+  if (tree.num_points() == 0) {
+    std::fill(queries.slots + begin, queries.slots + end, no_slot);
+    std::fill(queries.squared_distances + begin, queries.squared_distances + end, infinity);
+    if (queries.next != nullptr) std::fill(queries.next + begin, queries.next + end, infinity);
+    return;
+  }
   Search(tree, queries, max_distance)(begin, end);
 }
 
