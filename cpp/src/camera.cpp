@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "check.hpp"
+#include "ray_table.hpp"
 
 namespace nacre {
 namespace {
@@ -51,6 +52,46 @@ Eigen::Vector2d undistort(const Eigen::Vector2d& distorted, const Camera::Distor
   return found ? undistorted : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
 }
 
+// Vectors may read beyond the last value.
+std::size_t padded(std::size_t size) { return size + 15; }
+
+// Rays along the axis through the origin.
+RayTable empty_table(int width, int height) {
+  RayTable rays;
+  rays.width = width;
+  const auto columns = padded(static_cast<std::size_t>(width)), rows = static_cast<std::size_t>(height);
+  rays.x.assign(columns, 0.0F);
+  rays.y.assign(rows, 0.0F);
+  rays.z.assign(columns, 1.0F);
+  rays.origin_x.assign(columns, 0.0F);
+  rays.origin_y.assign(rows, 0.0F);
+  return rays;
+}
+
+// How pixels follow the rays' (x / z, y / z), by central differences.
+void differentiate(int height, RayTable& rays) {
+  const int width = static_cast<int>(rays.width);
+  const auto index = [width](int u, int v) {
+    return static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
+  };
+  const auto xy = [&](int u, int v) {
+    const std::size_t i = index(u, v);
+    return Eigen::Vector2f(rays.x[i] / rays.z[i], rays.y[i] / rays.z[i]);
+  };
+  for (std::vector<float>& values : rays.pixel_from_ray) values.assign(rays.x.size(), 0.0F);
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
+      const int l = std::max(u - 1, 0), r = std::min(u + 1, width - 1);
+      const int t = std::max(v - 1, 0), b = std::min(v + 1, height - 1);
+      Eigen::Matrix2f ray_from_pixel;
+      ray_from_pixel << (xy(r, v) - xy(l, v)) / static_cast<float>(std::max(r - l, 1)),
+          (xy(u, b) - xy(u, t)) / static_cast<float>(std::max(b - t, 1));
+      const Eigen::Matrix2f inverse = ray_from_pixel.inverse();
+      for (int k = 0; k < 4; ++k) rays.pixel_from_ray[static_cast<std::size_t>(k)][index(u, v)] = inverse(k / 2, k % 2);
+    }
+  }
+}
+
 }  // namespace
 
 Camera Camera::pinhole(int width, int height, double fx, double fy, double cx, double cy, const Distortion& distortion,
@@ -75,18 +116,29 @@ Camera Camera::pinhole(int width, int height, double fx, double fy, double cx, d
 
   const bool distorted = distortion != Distortion{};
   if (distorted) camera.max_radius_squared_ = turning_point(distortion);
-  auto rays = std::make_shared<std::vector<Ray>>();
-  rays->reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  for (int v = 0; v < height; ++v) {
-    for (int u = 0; u < width; ++u) {
-      Eigen::Vector2d xy((u - cx) / fx, (v - cy) / fy);
-      if (distorted) xy = undistort(xy, distortion, camera.max_radius_squared_);
-      const double length = depth_kind == DepthKind::radial ? std::sqrt(1.0 + xy.squaredNorm()) : 1.0;
-      rays->push_back({0.0F, 0.0F, static_cast<float>(xy.x() / length), static_cast<float>(xy.y() / length),
-                       static_cast<float>(1.0 / length)});
+  RayTable rays = empty_table(width, height);
+  if (!distorted && depth_kind == DepthKind::z) {
+    for (int u = 0; u < width; ++u) rays.x[static_cast<std::size_t>(u)] = static_cast<float>((u - cx) / fx);
+    for (int v = 0; v < height; ++v) rays.y[static_cast<std::size_t>(v)] = static_cast<float>((v - cy) / fy);
+  } else {
+    rays.is_grid = false;
+    const std::size_t size = padded(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+    for (std::vector<float>* const values : {&rays.x, &rays.y, &rays.z}) values->assign(size, 0.0F);
+    for (int v = 0; v < height; ++v) {
+      for (int u = 0; u < width; ++u) {
+        Eigen::Vector2d xy((u - cx) / fx, (v - cy) / fy);
+        if (distorted) xy = undistort(xy, distortion, camera.max_radius_squared_);
+        const double length = depth_kind == DepthKind::radial ? std::sqrt(1.0 + xy.squaredNorm()) : 1.0;
+        const std::size_t i =
+            static_cast<std::size_t>(v) * static_cast<std::size_t>(width) + static_cast<std::size_t>(u);
+        rays.x[i] = static_cast<float>(xy.x() / length);
+        rays.y[i] = static_cast<float>(xy.y() / length);
+        rays.z[i] = static_cast<float>(1.0 / length);
+      }
     }
+    if (distorted) differentiate(height, rays);
   }
-  camera.rays_ = std::move(rays);
+  camera.rays_ = std::make_shared<const RayTable>(std::move(rays));
   return camera;
 }
 
@@ -103,16 +155,20 @@ Camera Camera::orthographic(int width, int height, double pixel_size) {
   camera.cx_ = (width - 1) / 2.0;
   camera.cy_ = (height - 1) / 2.0;
 
-  auto rays = std::make_shared<std::vector<Ray>>();
-  rays->reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  for (int v = 0; v < height; ++v) {
-    for (int u = 0; u < width; ++u) {
-      rays->push_back({static_cast<float>((u - camera.cx_) * pixel_size),
-                       static_cast<float>((v - camera.cy_) * pixel_size), 0.0F, 0.0F, 1.0F});
-    }
+  RayTable rays = empty_table(width, height);
+  for (int u = 0; u < width; ++u) {
+    rays.origin_x[static_cast<std::size_t>(u)] = static_cast<float>((u - camera.cx_) * pixel_size);
   }
-  camera.rays_ = std::move(rays);
+  for (int v = 0; v < height; ++v) {
+    rays.origin_y[static_cast<std::size_t>(v)] = static_cast<float>((v - camera.cy_) * pixel_size);
+  }
+  camera.rays_ = std::make_shared<const RayTable>(std::move(rays));
   return camera;
+}
+
+Ray Camera::ray(int u, int v) const {
+  const simd::RayRow row = rays_->row(v);
+  return {row.origin_x[u], row.origin_y, row.x[u], row.y != nullptr ? row.y[u] : row.row_y, row.z[u]};
 }
 
 Eigen::Vector2d Camera::project(const Eigen::Vector3d& point) const {

@@ -5,88 +5,77 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
-#include <cstring>
-#include <functional>
 #include <limits>
-#include <queue>
-#include <unordered_set>
-#include <utility>
+#include <memory>
 
-#include "cell_grid.hpp"
 #include "check.hpp"
-#include "pair_kernel.hpp"
 #include "parallel.hpp"
-#include "random.hpp"
+#include "point_blocks.hpp"
+#include "random_choice.hpp"
 
 namespace nacre {
 namespace {
 
-using Decay = PairKernel::Decay;
+std::size_t as_size(std::int64_t i) { return static_cast<std::size_t>(i); }
 
-constexpr std::int64_t cells_per_block = 16;
-
-// What makes a method.
+// What makes a method, in the unit of length in which theta(r) = 2^(-r^2).
 struct Form {
-  PairKernel density;            // theta, for v_j and w_i
-  PairKernel first_attraction;   // alpha of the first iteration
-  PairKernel attraction;         // alpha
-  PairKernel repulsion;          // beta
-  bool point_densities = true;   // whether the mass of a point is divided by its density v_j
-  float lone_density = 1.0F;     // w_i of a sample that has no neighbours
-  bool tangential = false;       // whether samples repel each other along the surface only
-  float least_repulsion = 0.0F;  // lower bound of the sum that the repulsion is divided by
+  double scale = 1.0;                   // units a metre
+  simd::PairKernel density{};           // theta, for v_j and w_i
+  simd::PairKernel first_attraction{};  // alpha of the first iteration
+  simd::PairKernel attraction{};        // alpha
+  simd::PairKernel repulsion{};         // beta
+  bool point_densities = true;          // whether the mass of a point is divided by its density v_j
+  float lone_density = 1.0F;            // w_i of a sample that has no neighbours
+  float least_neighbors = 0.0F;         // fewer do not repel
+  bool tangential = false;              // whether samples repel each other along the surface only
+  float least_repulsion = 0.0F;         // lower bound of the sum that the repulsion is divided by
   float longest_step = std::numeric_limits<float>::infinity();
 };
 
 Form form_of(const ConsolidateOptions& options) {
   constexpr double log2_e = 1.4426950408889634;
   const double h = options.radius;
-  double exponent = options.theta == Theta::huang ? -16.0 / (h * h) : -4.0 / h;
-  if (options.method == ConsolidationMethod::cgal) exponent = -4.0 / (h * h);
-
-  PairKernel theta{};
-  theta.decay = Decay::none;
-  theta.exponent = static_cast<float>(exponent * log2_e);
-  theta.reach2 = static_cast<float>(h * h);
-  theta.skip2 = -1.0F;
-  PairKernel theta_over_r = theta;
-  theta_over_r.decay = Decay::distance;
-  theta_over_r.skip2 = static_cast<float>(1e-12 * h * h);  // 1 / r has no value at 0
+  double rate = options.theta == Theta::huang ? 16.0 / (h * h) : 4.0 / h;
+  if (options.method == ConsolidationMethod::cgal) rate = 4.0 / (h * h);
 
   Form form;
-  form.density = form.first_attraction = theta;
-  form.attraction = form.repulsion = theta_over_r;
+  form.scale = std::sqrt(rate * log2_e);
+  const double reach = h * form.scale;
+  simd::PairKernel theta{};
+  theta.decay = 0;
+  theta.reach2 = static_cast<float>(std::min(reach * reach, 126.0));
+  theta.skip2 = -1.0F;
+  form.density = form.first_attraction = form.attraction = form.repulsion = theta;
+  form.attraction.decay = form.repulsion.decay = 1;
+  // 1 / r has no value at 0: points at a sample's place draw it as if they were a millionth of h away.
+  form.attraction.softening2 = static_cast<float>(1e-12 * reach * reach);
+  form.repulsion.skip2 = static_cast<float>(1e-10 * reach * reach);
   if (options.method == ConsolidationMethod::wlop_plus) {
-    form.attraction.softening2 = form.repulsion.softening2 = static_cast<float>(4e-4 * h * h);
-    form.attraction.skip2 = -1.0F;
+    form.attraction.softening2 = form.repulsion.softening2 = static_cast<float>(4e-4 * reach * reach);
     form.tangential = true;
-    form.least_repulsion = static_cast<float>(0.1 / h);
-    form.longest_step = static_cast<float>(0.25 * h);
+    form.least_repulsion = static_cast<float>(0.1 / reach);
+    form.longest_step = static_cast<float>(0.25 * reach);
   } else if (options.method == ConsolidationMethod::cgal) {
-    // As CGAL 5.5 behaves: a point does not attract a sample at its place, a sample counts itself twice.
-    form.attraction.decay = Decay::none;
+    // As CGAL 5.5 behaves: a point does not attract a sample at its place, a sample counts itself twice, and one
+    // neighbour alone does not repel.
+    form.attraction.decay = 0;
+    form.attraction.skip2 = form.repulsion.skip2;
     form.first_attraction = form.attraction;
-    form.repulsion.decay = Decay::squared_distance;
+    form.repulsion.decay = 2;
     form.point_densities = false;
     form.lone_density = 2.0F;
+    form.least_neighbors = 2.0F;
   }
   return form;
 }
 
-std::vector<std::int64_t> finite_rows(const PointsRef& points) {
-  std::vector<std::int64_t> rows;
-  rows.reserve(static_cast<std::size_t>(points.rows()));
-  for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    if (points.row(i).allFinite()) rows.push_back(i);
-  }
-  return rows;
-}
-
-// The direction in which weighted points with these moments spread least.
-Eigen::Vector3f thinnest_direction(const PairSums& sums) {
-  const Eigen::Vector3d mean = sums.first.cast<double>() / sums.mass;
-  const Eigen::Matrix3d covariance = sums.second.cast<double>() / sums.mass - mean * mean.transpose();
+// The direction in which points with these weighted moments spread least.
+Eigen::Vector3f thinnest_direction(double mass, const Eigen::Vector3d& first, const Eigen::Matrix3d& second) {
+  const Eigen::Vector3d mean = first / mass;
+  const Eigen::Matrix3d covariance = second / mass - mean * mean.transpose();
   return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>().computeDirect(covariance).eigenvectors().col(0).cast<float>();
 }
 
@@ -99,268 +88,288 @@ struct Cargo {
 // Moves samples among points that stay.
 class Projection {
  public:
-  Projection(const PointsRef& samples, const PointsRef& points, const ConsolidateOptions& options,
+  Projection(PointBlocks& samples, const PointBlocks& points, const ConsolidateOptions& options, const Form& form,
              const ProjectionHints& hints)
-      : options_(options),
-        form_(form_of(options)),
-        frozen_(hints.frozen),
-        samples_(samples),
-        normals_(hints.sample_normals),
-        point_grid_(origin(points), edge(options)),
-        sample_grid_(origin(points), edge(options)),
-        sample_order_(finite_rows(samples)) {
-    point_grid_.build(points, finite_rows(points));
-    counts_.assign(point_grid_.padded_size(), 1.0F);
+      : options_(options), form_(form), hints_(hints), samples_(samples), points_(points) {
+    counts_ = Values::Ones(points.num_places());
     if (hints.point_weights.size() > 0) {
-      for (std::size_t j = 0; j < point_grid_.size(); ++j) counts_[j] = hints.point_weights[point_grid_.row(j)];
+      for (std::int64_t j = 0; j < points.num_places(); ++j) {
+        if (j % PointBlocks::size < points.count(j / PointBlocks::size))
+          counts_[j] = hints.point_weights[points.row(j)];
+      }
     }
     point_mass_ = counts_;
-    has_density_.assign(point_grid_.num_cells(), 0);
-    if (normals_.rows() == 0) normals_ = Points::Constant(samples.rows(), 3, unknown);
-    const Values lengths = normals_.rowwise().norm();
-    normals_.array().colwise() /= lengths.array();  // 0 / 0: a normal without direction is unknown
+    sample_mass_.resize(samples.num_places());
+    neighbors_.setZero(samples.num_places());
+    if (form.point_densities) {
+      is_near_.reset(new std::atomic<bool>[as_size(points.num_blocks())]());
+      has_density_.assign(as_size(points.num_blocks()), 0);
+    }
+    if (form.tangential) {
+      normals_ = Points::Constant(samples.num_places(), 3, std::numeric_limits<float>::quiet_NaN());
+      if (hints.sample_normals.rows() > 0) {
+        for_samples([&](std::int64_t i) {
+          const Eigen::RowVector3f normal = hints.sample_normals.row(samples.row(i));
+          normals_.row(i) = normal / normal.norm();  // 0 / 0: a normal without direction is unknown
+        });
+      }
+    }
+    for (int axis = 0; axis < 3; ++axis) moved_[axis] = samples.axis(axis);
   }
 
   // One iteration; cargo, if any, is weighted as the attraction is.
   void move(bool first, const Cargo* cargo) {
-    sample_grid_.build(samples_, sample_order_);
-    sample_order_ = sample_grid_.rows();
     if (form_.point_densities) weigh_points();
     weigh_samples();
-    const PairKernel& attraction = first ? form_.first_attraction : form_.attraction;
-    Points moved = samples_;
-    for_cells(sample_grid_.num_cells(), [&](std::size_t cell, CellWalk& among_samples, CellWalk& among_points) {
-      if (!is_live(cell)) return;
-      const PairRuns points = among_points.around(sample_grid_.key(cell));
-      const PairRuns others = among_samples.around(sample_grid_.key(cell));
-      for (std::size_t s = sample_grid_.begin(cell); s < sample_grid_.end(cell); ++s) {
-        const std::int64_t row = sample_grid_.row(s);
-        if (is_frozen(row)) continue;
-        moved.row(row) += step(s, attraction, points, others).transpose();
-        if (cargo) load(*cargo, s, attraction, points);
-      }
+    const simd::PairKernel& attraction = first ? form_.first_attraction : form_.attraction;
+    for_blocks(samples_.num_blocks(), [&](std::int64_t block) {
+      if (!is_live(block)) return;
+      move_block(block, attraction);
+      if (cargo) load(*cargo, block, attraction);
     });
-    samples_ = std::move(moved);
+    for (int axis = 0; axis < 3; ++axis) samples_.axis(axis).swap(moved_[axis]);
+    samples_.refit(options_.num_threads);
   }
-
-  const Points& samples() const { return samples_; }
 
  private:
-  static constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+  static constexpr std::int64_t size = PointBlocks::size;
 
-  // A little more than the radius, so that rounding never puts a pair within it two cells apart.
-  static double edge(const ConsolidateOptions& options) { return 1.000001 * options.radius; }
-
-  static Eigen::Vector3d origin(const PointsRef& points) {
-    for (Eigen::Index i = 0; i < points.rows(); ++i) {
-      if (points.row(i).allFinite()) return points.row(i).cast<double>().transpose();
-    }
-    return Eigen::Vector3d::Zero();
+  bool is_frozen(std::int64_t i) const {
+    return !hints_.frozen.empty() && hints_.frozen[as_size(samples_.row(i))] != 0;
   }
 
-  bool is_frozen(std::int64_t row) const { return !frozen_.empty() && frozen_[static_cast<std::size_t>(row)] != 0; }
-
-  bool is_live(std::size_t cell) const {
-    for (std::size_t s = sample_grid_.begin(cell); s < sample_grid_.end(cell); ++s) {
-      if (!is_frozen(sample_grid_.row(s))) return true;
+  bool is_live(std::int64_t block) const {
+    for (std::int64_t i = block * size; i < block * size + samples_.count(block); ++i) {
+      if (!is_frozen(i)) return true;
     }
     return false;
   }
 
-  // body(i, walk among samples, walk among points) for each i of [0, count).
   template <class Body>
-  void for_cells(std::size_t count, Body&& body) const {
-    parallel_blocks(static_cast<std::int64_t>(count), cells_per_block, options_.num_threads,
-                    [&](std::int64_t, std::int64_t begin, std::int64_t end) {
-                      CellWalk among_samples(sample_grid_), among_points(point_grid_);
-                      for (std::int64_t i = begin; i < end; ++i) {
-                        body(static_cast<std::size_t>(i), among_samples, among_points);
-                      }
-                    });
-  }
-
-  // 1 + the sum of theta over the other points of a grid (Huang 2009, section 3), for the points of one cell. A point
-  // of count c stands for c points at one place.
-  void weigh(const CellGrid& grid, std::size_t cell, CellWalk& walk, const std::vector<float>& counts,
-             std::vector<float>& densities) const {
-    const PairRuns around = walk.around(grid.key(cell));
-    for (std::size_t i = grid.begin(cell); i < grid.end(cell); ++i) {
-      densities[i] = sum_pairs<0>(form_.density, grid.with_mass(counts), around, grid.point(i)).mass;
+  void for_samples(Body&& body) const {
+    for (std::int64_t block = 0; block < samples_.num_blocks(); ++block) {
+      for (std::int64_t i = block * size; i < block * size + samples_.count(block); ++i) body(i);
     }
   }
 
-  // Divides the mass of each point by its density v_j, once a sample has come near.
+  // body(block) for each of so many blocks.
+  template <class Body>
+  void for_blocks(std::int64_t count, Body&& body) const {
+    parallel_for(count, std::clamp<std::int64_t>(count / 64, 1, 64), options_.num_threads, body);
+  }
+
+  // Divides the mass of each point that is near a sample by its density v_j.
   void weigh_points() {
-    std::vector<std::size_t> cells;
-    CellWalk walk(point_grid_);
-    for (std::size_t cell = 0; cell < sample_grid_.num_cells(); ++cell) {
-      if (!is_live(cell)) continue;
-      walk.for_each_range(sample_grid_.key(cell), [&](std::size_t first, std::size_t last) {
-        for (std::size_t c = first; c < last; ++c) {
-          if (std::exchange(has_density_[c], 1) == 0) cells.push_back(c);
-        }
-      });
+    if (num_weighed_ == points_.num_blocks()) return;
+    for_blocks(samples_.num_blocks(), [&](std::int64_t block) {
+      if (!is_live(block)) return;
+      const auto mark = [](void* is_near, std::int32_t near_block) {
+        static_cast<std::atomic<bool>*>(is_near)[near_block].store(true, std::memory_order_relaxed);
+      };
+      simd::visit_blocks()(1.00001F * form_.density.reach2, samples_.block(block), points_.view(nullptr).tree, mark,
+                           is_near_.get());
+    });
+    std::vector<std::int64_t> fresh;
+    for (std::int64_t block = 0; block < points_.num_blocks(); ++block) {
+      if (has_density_[as_size(block)] != 0 || !is_near_[as_size(block)].load(std::memory_order_relaxed)) continue;
+      has_density_[as_size(block)] = 1;
+      fresh.push_back(block);
     }
-    std::sort(cells.begin(), cells.end());
-    for_cells(cells.size(), [&](std::size_t i, CellWalk&, CellWalk& among_points) {
-      weigh(point_grid_, cells[i], among_points, counts_, point_mass_);
-      for (std::size_t j = point_grid_.begin(cells[i]); j < point_grid_.end(cells[i]); ++j) {
-        point_mass_[j] = counts_[j] > 0.0F ? counts_[j] / point_mass_[j] : 0.0F;
+    num_weighed_ += static_cast<std::int64_t>(fresh.size());
+    const bool weighted = hints_.point_weights.size() > 0;
+    for_blocks(static_cast<std::int64_t>(fresh.size()), [&](std::int64_t k) {
+      const std::int64_t block = fresh[as_size(k)];
+      float densities[size];
+      simd::sum_pairs()(form_.density, simd::PairSums::mass, points_.block(block),
+                        points_.view(weighted ? counts_.data() : nullptr), densities);
+      for (int i = 0; i < points_.count(block); ++i) {
+        const float count = counts_[block * size + i];
+        point_mass_[block * size + i] = count > 0.0F ? count / densities[i] : 0.0F;
       }
     });
   }
 
-  // The mass of a sample is its density w_i.
+  // The mass of a sample is its density w_i: 1 + the sum of theta over the other samples (Huang 2009, section 3).
   void weigh_samples() {
-    sample_mass_.assign(sample_grid_.padded_size(), 0.0F);
-    const std::vector<float> ones(sample_grid_.padded_size(), 1.0F);
-    for_cells(sample_grid_.num_cells(), [&](std::size_t cell, CellWalk& among_samples, CellWalk&) {
-      weigh(sample_grid_, cell, among_samples, ones, sample_mass_);
-      for (std::size_t s = sample_grid_.begin(cell); s < sample_grid_.end(cell); ++s) {
-        sample_mass_[s] += form_.lone_density - 1.0F;
+    const simd::PairPoints others = samples_.view(nullptr);
+    const bool counted = form_.least_neighbors > 0.0F;
+    for_blocks(samples_.num_blocks(), [&](std::int64_t block) {
+      float sums[2 * size] = {};
+      simd::sum_pairs()(form_.density, counted ? simd::PairSums::mass_and_count : simd::PairSums::mass,
+                        samples_.block(block), others, sums);
+      for (std::int64_t i = 0; i < size; ++i) {
+        sample_mass_[block * size + i] = sums[i] + (form_.lone_density - 1.0F);
+        if (counted) neighbors_[block * size + i] = sums[size + i] - 1.0F;
       }
     });
   }
 
   // Attraction plus mu times repulsion (Huang 2009, section 3); zero where there are no points.
-  Eigen::Vector3f step(std::size_t s, const PairKernel& attraction, const PairRuns& points, const PairRuns& others) {
-    const Eigen::Vector3f place = sample_grid_.point(s);
-    auto normal = normals_.row(sample_grid_.row(s));
-    const PairPoints attracting_points = point_grid_.with_mass(point_mass_);
-    PairSums attracting;
-    if (form_.tangential && !normal.allFinite()) {
-      attracting = sum_pairs<2>(attraction, attracting_points, points, place);
-      if (attracting.mass > 0.0F) normal = thinnest_direction(attracting).transpose();
-    } else {
-      attracting = sum_pairs<1>(attraction, attracting_points, points, place);
-    }
-    Eigen::Vector3f step = Eigen::Vector3f::Zero();
-    if (attracting.mass > 0.0F) {
-      step = attracting.first / attracting.mass;
-    } else if (!(sum_pairs<0>(form_.density, attracting_points, points, place).mass > 0.0F)) {
-      return step;  // isolated: not even a point at the sample's own place
-    }
+  void move_block(std::int64_t block, const simd::PairKernel& attraction) {
+    const simd::PairTargets targets = samples_.block(block);
+    const simd::PairPoints points = points_.view(form_.point_densities ? point_mass_.data() : nullptr);
+    const bool finds_normals = form_.tangential && !normals_.middleRows(block * size, targets.count).allFinite();
+    float attracting[10 * size], repelling[4 * size];
+    simd::sum_pairs()(attraction, finds_normals ? simd::PairSums::second : simd::PairSums::first, targets, points,
+                      attracting);
+    simd::sum_pairs()(form_.repulsion, simd::PairSums::first, targets, samples_.view(sample_mass_.data()), repelling);
+    if (finds_normals) find_normals(block, attracting);
+    float reached[size];
+    const bool all_attracted = std::all_of(attracting, attracting + targets.count, [](float m) { return m > 0.0F; });
+    if (!all_attracted) simd::sum_pairs()(form_.density, simd::PairSums::mass, targets, points, reached);
 
-    const PairSums repelling = sum_pairs<1>(form_.repulsion, sample_grid_.with_mass(sample_mass_), others, place);
-    if (repelling.mass > 0.0F) {
-      Eigen::Vector3f away = -repelling.first / std::max(repelling.mass, form_.least_repulsion);
-      if (form_.tangential) away -= normal.dot(away) * normal.transpose();
-      step += static_cast<float>(options_.mu) * away;
+    for (std::int64_t k = 0; k < targets.count; ++k) {
+      const std::int64_t i = block * size + k;
+      const auto mean = [&](const float* sums, float mass) -> Eigen::Vector3f {
+        return Eigen::Vector3f(sums[size + k], sums[2 * size + k], sums[3 * size + k]) / mass;
+      };
+      Eigen::Vector3f step = Eigen::Vector3f::Zero();
+      const bool is_attracted = attracting[k] > 0.0F;
+      if (is_attracted) step = mean(attracting, attracting[k]);
+      const bool is_isolated = !is_attracted && !(reached[k] > 0.0F);
+      if (repelling[k] > 0.0F && !(neighbors_[i] < form_.least_neighbors)) {
+        Eigen::Vector3f away = -mean(repelling, std::max(repelling[k], form_.least_repulsion));
+        if (form_.tangential) away -= normals_.row(i).dot(away) * normals_.row(i).transpose();
+        step += static_cast<float>(options_.mu) * away;
+      }
+      const float length = step.norm();
+      if (length > form_.longest_step) step *= form_.longest_step / length;
+      if (is_isolated || is_frozen(i)) step.setZero();
+      for (int axis = 0; axis < 3; ++axis) moved_[axis][as_size(i)] = samples_.axis(axis)[as_size(i)] + step[axis];
     }
-    const float length = step.norm();
-    if (length > form_.longest_step) step *= form_.longest_step / length;
-    return step;
   }
 
-  // The means of attributes around a sample.
-  void load(const Cargo& cargo, std::size_t s, const PairKernel& attraction, const PairRuns& points) const {
+  // The unknown normals of a block, from the second moments of the points.
+  void find_normals(std::int64_t block, const float* sums) {
+    for (std::int64_t k = 0; k < samples_.count(block); ++k) {
+      auto normal = normals_.row(block * size + k);
+      if (normal.allFinite() || !(sums[k] > 0.0F)) continue;
+      const auto sum = [&](int s) { return static_cast<double>(sums[s * size + k]); };
+      Eigen::Matrix3d second;
+      second << sum(4), sum(5), sum(6), sum(5), sum(7), sum(8), sum(6), sum(8), sum(9);
+      normal = thinnest_direction(sum(0), {sum(1), sum(2), sum(3)}, second).transpose();
+    }
+  }
+
+  // The means of attributes around the samples of a block.
+  void load(const Cargo& cargo, std::int64_t block, const simd::PairKernel& attraction) const {
     using Row = Eigen::Array<double, 1, Eigen::Dynamic>;
-    const Eigen::Index size = cargo.of_points.cols();
-    Row sums = Row::Zero(size), masses = Row::Zero(size);
-    for (const auto& [begin, end] : points) {
-      for (std::size_t j = begin; j < end; ++j) {
-        const float squared_distance = (point_grid_.point(j) - sample_grid_.point(s)).squaredNorm();
-        const double weight = pair_weight(attraction, squared_distance) * point_mass_[j];
-        if (!(weight > 0.0)) continue;
-        for (Eigen::Index a = 0; a < size; ++a) {
-          const double value = cargo.of_points(point_grid_.row(j), a);
+    const simd::PairTargets targets = samples_.block(block);
+    const simd::PairPoints points = points_.view(form_.point_densities ? point_mass_.data() : nullptr);
+    std::vector<std::int32_t> near;
+    const auto list = [](void* blocks, std::int32_t near_block) {
+      static_cast<std::vector<std::int32_t>*>(blocks)->push_back(near_block);
+    };
+    simd::visit_blocks()(1.00001F * attraction.reach2, targets, points.tree, list, &near);
+    std::vector<float> weights(near.size() * as_size(size));
+    for (int k = 0; k < targets.count; ++k) {
+      if (is_frozen(block * size + k)) continue;
+      simd::weigh_pairs()(attraction, targets, k, points, near.data(), static_cast<std::int64_t>(near.size()),
+                          weights.data());
+      Row sums = Row::Zero(cargo.of_points.cols()), masses = sums;
+      for (std::size_t j = 0; j < weights.size(); ++j) {
+        if (!(weights[j] > 0.0F)) continue;
+        const std::int64_t row = points_.row(near[j / as_size(size)] * size + static_cast<std::int64_t>(j) % size);
+        for (Eigen::Index a = 0; a < sums.size(); ++a) {
+          const double value = cargo.of_points(row, a);
           if (!std::isfinite(value)) continue;
-          sums[a] += weight * value;
-          masses[a] += weight;
+          sums[a] += static_cast<double>(weights[j]) * value;
+          masses[a] += static_cast<double>(weights[j]);
         }
       }
-    }
-    for (Eigen::Index a = 0; a < size; ++a) {
-      if (masses[a] > 0.0) cargo.of_samples(sample_grid_.row(s), a) = static_cast<float>(sums[a] / masses[a]);
+      const std::int64_t row = samples_.row(block * size + k);
+      for (Eigen::Index a = 0; a < sums.size(); ++a) {
+        if (masses[a] > 0.0) cargo.of_samples(row, a) = static_cast<float>(sums[a] / masses[a]);
+      }
     }
   }
 
   const ConsolidateOptions& options_;
-  const Form form_;
-  const std::vector<std::uint8_t>& frozen_;
-  Points samples_, normals_;
-  CellGrid point_grid_, sample_grid_;
-  std::vector<std::int64_t> sample_order_;
-  std::vector<float> counts_, point_mass_, sample_mass_;  // in the order of the grids, padded
-  std::vector<std::uint8_t> has_density_;                 // one a cell of points
+  const Form& form_;
+  const ProjectionHints& hints_;
+  PointBlocks& samples_;
+  const PointBlocks& points_;
+  std::vector<float> moved_[3];
+  Values counts_, point_mass_, sample_mass_, neighbors_;  // one a place
+  Points normals_;
+  std::unique_ptr<std::atomic<bool>[]> is_near_;  // one a block of points
+  std::vector<std::uint8_t> has_density_;
+  std::int64_t num_weighed_ = 0;  // blocks that have
 };
 
-Points project(const PointsRef& samples, const PointsRef& points, const ConsolidateOptions& options,
-               const ProjectionHints& hints, const Cargo* cargo) {
-  Projection projection(samples, points, options, hints);
+// The iterations; the places of `samples`, in the order `sample_order` and the rows of `moved`.
+template <class Cloud, class Matrix>
+Matrix project(const Cloud& samples, CellOrder sample_order, const Cloud& points, const CellOrder& point_order,
+               const CellLattice& lattice, const ConsolidateOptions& options, const ProjectionHints& hints,
+               const Cargo* cargo) {
+  const Form form = form_of(options);
+  const Scaling scaling{lattice.center, form.scale};
+  const PointBlocks point_blocks(points, point_order, scaling, options.num_threads);
+  halve_cubes(samples, sample_order, PointBlocks::size, options.num_threads);
+  const PointBlocks blocks(samples, sample_order, scaling, options.num_threads);
+  PointBlocks moved = blocks;
+  Projection projection(moved, point_blocks, options, form, hints);
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
     projection.move(iteration == 0, iteration + 1 == options.iterations ? cargo : nullptr);
   }
-  return projection.samples();
-}
-
-// count of the rows that are finite, without replacement, in ascending order; a place that several points share is
-// taken again only when every place is taken, since samples at one place never part.
-std::vector<std::int64_t> choose(const PointsRef& points, int count, std::uint64_t seed) {
-  using Ticket = std::pair<std::uint64_t, std::int64_t>;
-  std::vector<Ticket> drawn;
-  for (const std::int64_t row : finite_rows(points)) {
-    drawn.emplace_back(random_bits(seed, static_cast<std::uint64_t>(row)), row);
-  }
-  std::priority_queue<Ticket, std::vector<Ticket>, std::greater<>> tickets(std::greater<>(), std::move(drawn));
-
-  const auto hash = [&](std::int64_t row) {
-    std::uint64_t bits = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      const float coordinate = points(row, axis) + 0.0F;  // -0 becomes 0
-      std::uint32_t word;
-      std::memcpy(&word, &coordinate, sizeof word);
-      bits = mix64(bits ^ word);
+  Matrix result = samples;
+  parallel_for(blocks.num_blocks(), 1024, options.num_threads, [&](std::int64_t block) {
+    for (std::int64_t i = block * PointBlocks::size; i < block * PointBlocks::size + blocks.count(block); ++i) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const double way = static_cast<double>(moved.axis(axis)[as_size(i)]) - blocks.axis(axis)[as_size(i)];
+        auto& coordinate = result(blocks.row(i), axis);
+        coordinate = static_cast<typename Matrix::Scalar>(static_cast<double>(coordinate) + way / form.scale);
+      }
     }
-    return static_cast<std::size_t>(bits);
-  };
-  const auto same_place = [&](std::int64_t a, std::int64_t b) { return points.row(a) == points.row(b); };
-  std::unordered_set<std::int64_t, decltype(hash), decltype(same_place)> taken(16, hash, same_place);
-
-  std::vector<std::int64_t> chosen, repeated;
-  const auto wanted = std::min(tickets.size(), static_cast<std::size_t>(count));
-  for (; chosen.size() < wanted && !tickets.empty(); tickets.pop()) {
-    const std::int64_t row = tickets.top().second;
-    (taken.insert(row).second ? chosen : repeated).push_back(row);
-  }
-  chosen.insert(chosen.end(), repeated.begin(),
-                repeated.begin() + static_cast<std::ptrdiff_t>(std::min(repeated.size(), wanted - chosen.size())));
-  std::sort(chosen.begin(), chosen.end());
-  return chosen;
-}
-
-}  // namespace
-
-void ConsolidateOptions::check() const {
-  require(radius >= 1e-12 && radius <= 1e12, "radius", "a length from 1e-12 to 1e12", radius);
-  require(num_points >= 1, "num_points", "at least 1", num_points);
-  require(iterations >= 0, "iterations", "at least 0", iterations);
-  require(mu >= 0.0 && mu <= 0.5, "mu", "from 0 to 0.5", mu);
-  require(num_threads >= 0, "num_threads", "at least 0", num_threads);
-}
-
-Consolidated consolidate(const PointsRef& points, const ConsolidateOptions& options, const AttributesRef& attributes) {
-  options.check();
-  require(attributes.size() == 0 || attributes.rows() == points.rows(), "attributes",
-          "one row per point (" + std::to_string(points.rows()) + ")", attributes.rows());
-  Consolidated result;
-  result.sources = choose(points, options.num_points, options.seed);
-  const auto count = static_cast<Eigen::Index>(result.sources.size());
-  Points samples(count, 3);
-  result.attributes.resize(count, attributes.cols());
-  for (Eigen::Index i = 0; i < count; ++i) {
-    const std::int64_t source = result.sources[static_cast<std::size_t>(i)];
-    samples.row(i) = points.row(source);
-    if (attributes.cols() > 0) result.attributes.row(i) = attributes.row(source);
-  }
-  const Cargo cargo{attributes, result.attributes};
-  result.points = project(samples, points, options, ProjectionHints(), attributes.cols() > 0 ? &cargo : nullptr);
+  });
   return result;
 }
 
-Points project_samples(const PointsRef& samples, const PointsRef& points, const ConsolidateOptions& options,
-                       const ProjectionHints& hints) {
+constexpr double cells_a_radius = 4.0;
+
+template <class Matrix, class Cloud>
+BasicConsolidated<Matrix> consolidate_cloud(const Cloud& points, const ConsolidateOptions& options,
+                                            const AttributesRef& attributes) {
   options.check();
+  require(points.rows() < (std::int64_t{1} << 31), "points", "fewer than 2^31 rows", points.rows());
+  require(attributes.size() == 0 || attributes.rows() == points.rows(), "attributes",
+          "one row per point (" + std::to_string(points.rows()) + ")", attributes.rows());
+  BasicConsolidated<Matrix> result;
+  result.sources = choose_rows(points, options.num_points, options.seed, options.num_threads);
+  const auto count = static_cast<Eigen::Index>(result.sources.size());
+  Matrix samples(count, 3);
+  result.attributes.resize(count, attributes.cols());
+  std::vector<std::int32_t> sample_of(as_size(points.rows()), -1);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const std::int64_t source = result.sources[as_size(i)];
+    samples.row(i) = points.row(source);
+    sample_of[as_size(source)] = static_cast<std::int32_t>(i);
+    if (attributes.cols() > 0) result.attributes.row(i) = attributes.row(source);
+  }
+  const CellLattice lattice = cell_lattice<Cloud>({&points}, options.radius / cells_a_radius, options.num_threads);
+  const CellOrder order = cell_order(points, lattice, options.num_threads);
+  CellOrder sample_order;
+  sample_order.rows.reserve(as_size(count));
+  sample_order.cubes.reserve(as_size(count));
+  for (std::size_t i = 0; i < order.rows.size(); ++i) {
+    const std::int32_t sample = sample_of[order.rows[i]];
+    if (sample < 0) continue;
+    sample_order.rows.push_back(static_cast<std::uint32_t>(sample));
+    sample_order.cubes.push_back(order.cubes[i]);
+  }
+  const Cargo cargo{attributes, result.attributes};
+  result.points = project<Cloud, Matrix>(samples, sample_order, points, order, lattice, options, ProjectionHints(),
+                                         attributes.cols() > 0 ? &cargo : nullptr);
+  return result;
+}
+
+template <class Matrix, class Cloud>
+Matrix project_cloud(const Cloud& samples, const Cloud& points, const ConsolidateOptions& options,
+                     const ProjectionHints& hints) {
+  options.check();
+  for (const Cloud* cloud : {&samples, &points}) {
+    require(cloud->rows() < (std::int64_t{1} << 31), "points", "fewer than 2^31 rows", cloud->rows());
+  }
   const bool hinted = hints.point_weights.size() > 0 || hints.sample_normals.rows() > 0 || !hints.frozen.empty();
   require(!hinted || options.method == ConsolidationMethod::wlop_plus, "hints", "empty unless the method is wlop_plus",
           "some");
@@ -374,7 +383,39 @@ Points project_samples(const PointsRef& samples, const PointsRef& points, const 
           "one row per sample (" + std::to_string(samples.rows()) + ")", hints.sample_normals.rows());
   require(hints.frozen.empty() || static_cast<Eigen::Index>(hints.frozen.size()) == samples.rows(), "frozen",
           "one value per sample (" + std::to_string(samples.rows()) + ")", hints.frozen.size());
-  return project(samples, points, options, hints, nullptr);
+  const CellLattice lattice =
+      cell_lattice<Cloud>({&points, &samples}, options.radius / cells_a_radius, options.num_threads);
+  return project<Cloud, Matrix>(samples, cell_order(samples, lattice, options.num_threads), points,
+                                cell_order(points, lattice, options.num_threads), lattice, options, hints, nullptr);
+}
+
+}  // namespace
+
+void ConsolidateOptions::check() const {
+  require(radius >= 1e-12 && radius <= 1e12, "radius", "a length from 1e-12 to 1e12", radius);
+  require(num_points >= 1, "num_points", "at least 1", num_points);
+  require(iterations >= 0, "iterations", "at least 0", iterations);
+  require(mu >= 0.0 && mu <= 0.5, "mu", "from 0 to 0.5", mu);
+  require(num_threads >= 0, "num_threads", "at least 0", num_threads);
+}
+
+Consolidated consolidate(const PointsRef& points, const ConsolidateOptions& options, const AttributesRef& attributes) {
+  return consolidate_cloud<Points>(points, options, attributes);
+}
+
+ConsolidatedDouble consolidate(const PointsDoubleRef& points, const ConsolidateOptions& options,
+                               const AttributesRef& attributes) {
+  return consolidate_cloud<PointsDouble>(points, options, attributes);
+}
+
+Points project_samples(const PointsRef& samples, const PointsRef& points, const ConsolidateOptions& options,
+                       const ProjectionHints& hints) {
+  return project_cloud<Points>(samples, points, options, hints);
+}
+
+PointsDouble project_samples(const PointsDoubleRef& samples, const PointsDoubleRef& points,
+                             const ConsolidateOptions& options, const ProjectionHints& hints) {
+  return project_cloud<PointsDouble>(samples, points, options, hints);
 }
 
 }  // namespace nacre

@@ -2,41 +2,48 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "check.hpp"
 #include "depth_cleaning.hpp"
 #include "parallel.hpp"
 #include "planar_image.hpp"
+#include "ray_table.hpp"
+#include "simd/keep_row.hpp"
+#include "simd/point_row.hpp"
 
 namespace nacre {
 namespace {
 
 constexpr float kMissing = std::numeric_limits<float>::quiet_NaN();
 
-// A pixel beyond the end of the distortion model sees nothing that could be placed.
-bool has_direction(const Ray& ray) { return ray.direction_x == ray.direction_x; }
-
 // A wrong depth_scale shows as a median depth that no depth camera measures. A sample of the pixels tells enough.
 void require_plausible_median(const DepthRef& depth) {
-  constexpr std::int64_t max_sample = 1 << 15;
+  constexpr float nearest = 0.05F, farthest = 50.0F;
+  constexpr std::int64_t max_sample = 1 << 13;
   const std::int64_t stride = std::max<std::int64_t>(1, depth.size() / max_sample);
   std::vector<float> sample;
   sample.reserve(static_cast<std::size_t>(depth.size() / stride + 1));
-  for (std::int64_t i = 0; i < depth.size(); i += stride) {
-    const float z = depth(i / depth.cols(), i % depth.cols());
-    if (is_measurement(z)) sample.push_back(z);
+  std::size_t num_near = 0, num_far = 0;
+  for (std::int64_t i = 0, v = 0, u = 0; i < depth.size(); i += stride, u += stride) {
+    for (; u >= depth.cols(); u -= depth.cols()) ++v;
+    const float z = depth(v, u);
+    if (!is_measurement(z)) continue;
+    sample.push_back(z);
+    num_near += z < nearest;
+    num_far += z > farthest;
   }
-  if (sample.empty()) return;
-  const auto middle = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() / 2);
+  const std::size_t half = sample.size() / 2;
+  if (sample.empty() || (num_near <= half && num_far < sample.size() - half)) return;
+  const auto middle = sample.begin() + static_cast<std::ptrdiff_t>(half);
   std::nth_element(sample.begin(), middle, sample.end());
-  if (*middle >= 0.05F && *middle <= 50.0F) return;
   std::ostringstream message;
   message << "depth must be in metres with a median of 0.05 to 50 m, got a median of " << *middle
           << " m: check depth_scale, the stored units per metre (1000 for millimetres, 5000 for TUM RGB-D)";
   throw std::invalid_argument(message.str());
 }
 
-EdgeMarks mark_edges(const DepthRef& depth, const PlanarImage& image, const WindowFits& fits, const NoiseModel& noise,
+ByteImage mark_edges(const DepthRef& depth, const PlanarImage& image, const WindowFits& fits, const NoiseModel& noise,
                      const DepthOptions& options, int num_threads) {
   switch (options.edge_test) {
     case EdgeTest::gradient:
@@ -46,8 +53,43 @@ EdgeMarks mark_edges(const DepthRef& depth, const PlanarImage& image, const Wind
     case EdgeTest::none:
       break;
   }
-  const auto size = static_cast<std::size_t>(depth.size());
-  return {Marks(size), Marks(size)};
+  ByteImage none(image.width(), image.height());
+  std::fill(none.row(0), none.row(image.height()), std::uint8_t{0});
+  return none;
+}
+
+// The nearest floats that are not beyond a limit.
+float round_up(double limit) {
+  const auto rounded = static_cast<float>(limit);
+  return rounded < limit ? std::nextafter(rounded, std::numeric_limits<float>::infinity()) : rounded;
+}
+float round_down(double limit) {
+  const auto rounded = static_cast<float>(limit);
+  return rounded > limit ? std::nextafter(rounded, 0.0F) : rounded;
+}
+
+// The pixels that hold a measurement within range and mask and bear no mark.
+ByteImage keep_pixels(const DepthRef& depth, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
+                      const ByteImage& marks, int num_threads, DepthReport& report) {
+  const int width = camera.width(), height = camera.height();
+  const float min_depth = round_up(options.min_depth), max_depth = round_down(options.max_depth);
+  ByteImage keep(width, height);
+  std::vector<simd::KeepCounts> counts(static_cast<std::size_t>(height));
+  const auto keep_row = simd::keep_pixels();
+  parallel_for(height, rows_per_block(width), num_threads, [&](std::int64_t v) {
+    counts[static_cast<std::size_t>(v)] =
+        keep_row({&depth.coeffRef(v, 0), camera.ray_table().row(static_cast<int>(v)).x,
+                  mask.size() > 0 ? &mask.coeffRef(v, 0) : nullptr, marks.row(v), min_depth, max_depth, width},
+                 keep.row(v));
+  });
+  for (const simd::KeepCounts& row : counts) {
+    report.num_invalid += row.num_invalid;
+    report.num_out_of_range += row.num_out_of_range;
+    report.num_masked += row.num_masked;
+    report.num_edge += row.num_edge;
+    report.num_slanted += row.num_slanted;
+  }
+  return keep;
 }
 
 }  // namespace
@@ -92,75 +134,51 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
 
   // The tests see every measurement, so that range and mask do not make edges where there are none.
   const PlanarImage image(depth, camera, num_threads);
-  const WindowFits fits = fit_windows(image, num_threads);
-  const NoiseModel noise = options.noise ? *options.noise : estimate_noise(image, fits, camera);
-  EdgeMarks marks = mark_edges(depth, image, fits, noise, options, num_threads);
-  const int width = camera.width(), height = camera.height();
-  dilate(width, height, options.edge_dilation, num_threads, marks.edge);
-  dilate(width, height, options.edge_dilation, num_threads, marks.slanted);
+  const WindowFits fits = fit_windows(image, camera, num_threads);
+  const NoiseModel noise = options.noise ? *options.noise : estimate_noise(fits, camera, num_threads);
+  ByteImage marks = mark_edges(depth, image, fits, noise, options, num_threads);
+  dilate(options.edge_dilation, num_threads, marks);
 
-  const Ray* const rays = camera.rays().data();
   DepthReport counts;
-  counts.num_pixels = depth.size();
-  Marks keep(static_cast<std::size_t>(depth.size()));
-  for (std::int64_t v = 0, i = 0; v < height; ++v) {
-    for (std::int64_t u = 0; u < width; ++u, ++i) {
-      const float z = depth(v, u);
-      const auto pixel = static_cast<std::size_t>(i);
-      if (!is_measurement(z) || !has_direction(rays[i])) {
-        ++counts.num_invalid;
-      } else if (z < options.min_depth || z > options.max_depth) {
-        ++counts.num_out_of_range;
-      } else if (mask.size() > 0 && mask(v, u) == 0) {
-        ++counts.num_masked;
-      } else if (marks.edge[pixel]) {
-        ++counts.num_edge;
-      } else if (marks.slanted[pixel]) {
-        ++counts.num_slanted;
-      } else {
-        keep[pixel] = 1;
-      }
-    }
-  }
-  const auto drop = [&](const Marks& isolated) {
-    for (std::size_t i = 0; i < keep.size(); ++i) {
-      counts.num_isolated += isolated[i];
-      keep[i] = keep[i] & !isolated[i];
-    }
-  };
-  drop(mark_lonely(width, height, keep, options.max_missing, num_threads));
-  drop(mark_specks(image, noise, options, keep));
+  ByteImage keep = keep_pixels(depth, camera, options, mask, marks, num_threads, counts);
+  drop_lonely(options.max_missing, num_threads, keep);
+  drop_specks(image, noise, options, num_threads, keep);
 
-  DepthImage clean(height, width);
-  for (std::int64_t i = 0; i < clean.size(); ++i) {
-    const bool kept = keep[static_cast<std::size_t>(i)] != 0;
-    counts.num_kept += kept;
-    clean.data()[i] = kept ? depth(i / width, i % width) : kMissing;
+  DepthImage clean(depth.rows(), depth.cols());
+  const auto select_row = simd::select_kept();
+  counts.num_kept = block_reduce(clean.rows(), rows_per_block(clean.cols()), num_threads, std::int64_t{0},
+                                 [&](std::int64_t begin, std::int64_t end) {
+                                   std::int64_t count = 0;
+                                   for (std::int64_t v = begin; v < end; ++v) {
+                                     count +=
+                                         select_row(&depth.coeffRef(v, 0), keep.row(v), camera.width(), &clean(v, 0));
+                                   }
+                                   return count;
+                                 });
+  counts.num_pixels = counts.num_isolated = depth.size();
+  for (const std::int64_t others : {counts.num_invalid, counts.num_out_of_range, counts.num_masked, counts.num_edge,
+                                    counts.num_slanted, counts.num_kept}) {
+    counts.num_isolated -= others;
   }
   if (report != nullptr) *report = counts;
   return clean;
 }
 
-Points back_project(const DepthRef& depth, const Camera& camera) {
+Points back_project(const DepthRef& depth, const Camera& camera, int num_threads) {
   require_camera_size("depth", depth.rows(), depth.cols(), camera);
-  const Ray* const rays = camera.rays().data();
-  const auto seen = [&](Eigen::Index v, Eigen::Index u) {
-    return is_measurement(depth(v, u)) && has_direction(rays[v * depth.cols() + u]);
-  };
-  Eigen::Index num_points = 0;
-  for (Eigen::Index v = 0; v < depth.rows(); ++v) {
-    for (Eigen::Index u = 0; u < depth.cols(); ++u) num_points += seen(v, u);
-  }
-  Points points(num_points, 3);
-  Eigen::Index next = 0;
-  for (Eigen::Index v = 0; v < depth.rows(); ++v) {
-    for (Eigen::Index u = 0; u < depth.cols(); ++u) {
-      if (!seen(v, u)) continue;
-      const Ray& ray = rays[v * depth.cols() + u];
-      const float z = depth(v, u);
-      points.row(next++) << ray.origin_x + z * ray.direction_x, ray.origin_y + z * ray.direction_y, z * ray.direction_z;
-    }
-  }
+  const std::int64_t height = camera.height(), block_size = rows_per_block(camera.width());
+  const auto ray_row = [&](std::int64_t v) { return camera.ray_table().row(static_cast<int>(v)); };
+  std::vector<std::int64_t> first(static_cast<std::size_t>(height) + 1);
+  const auto count = simd::count_points();
+  parallel_for(height, block_size, num_threads, [&](std::int64_t v) {
+    first[static_cast<std::size_t>(v) + 1] = count(&depth.coeffRef(v, 0), ray_row(v), camera.width());
+  });
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  Points points(first.back(), 3);
+  const auto gather = simd::gather_points();
+  parallel_for(height, block_size, num_threads, [&](std::int64_t v) {
+    gather(&depth.coeffRef(v, 0), ray_row(v), camera.width(), points.data() + 3 * first[static_cast<std::size_t>(v)]);
+  });
   return points;
 }
 

@@ -1,6 +1,9 @@
 // How noisy a depth image is, told by the image itself.
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstring>
+#include <functional>
 
 #include "parallel.hpp"
 #include "window_fits.hpp"
@@ -8,140 +11,100 @@
 namespace nacre {
 namespace {
 
-constexpr std::size_t kMinSamples = 8;
+constexpr std::int64_t kMinSamples = 8;
 
 constexpr double kMinStepped = 0.1;     // of the windows of a coarsely quantised image cross from plateau to plateau
 constexpr float kMaxStepPixels = 3.0F;  // orthographic: a larger step is an edge
 
-struct Fit {
-  double variance, slope;
-};
-
-// Orthogonal polynomials on -3..3: 1, u, v, u v, u^2 - 4, v^2 - 4. The quadratic ones take up smooth curvature.
-Fit fit_window(const PlanarImage& image, int u, int v) {
-  static_assert(WindowFits::kRadius == 3);
-  double sum = 0, sum_u = 0, sum_v = 0, sum_uv = 0, sum_uu = 0, sum_vv = 0, squares = 0;
-  const double centre = image.row(v)[u];
-  for (int dv = -3; dv <= 3; ++dv) {
-    const float* const row = image.row(v + dv) + u;
-    for (int du = -3; du <= 3; ++du) {
-      const double value = row[du] - centre;
-      sum += value;
-      sum_u += du * value;
-      sum_v += dv * value;
-      sum_uv += du * dv * value;
-      sum_uu += (du * du - 4) * value;
-      sum_vv += (dv * dv - 4) * value;
-      squares += value * value;
-    }
-  }
-  const double explained = sum * sum / 49 + (sum_u * sum_u + sum_v * sum_v) / 196 + sum_uv * sum_uv / 784 +
-                           (sum_uu * sum_uu + sum_vv * sum_vv) / 588;
-  return {std::max(squares - explained, 0.0) / (49 - 6), std::hypot(sum_u, sum_v) / 196};
+std::int64_t count_values(const std::vector<float>& values) {
+  std::int64_t count = 0;
+  for (const float value : values) count += value == value ? 1 : 0;
+  return count;
 }
 
-// The smallest step from one plateau to the next along a window's central row and column; 0 where there are not
-// both: plateaus, and steps.
-float plateau_step(const PlanarImage& image, int u, int v) {
-  int num_flat = 0;
-  float smallest = std::numeric_limits<float>::infinity();
-  const auto add = [&](float step) {
-    if (step == 0.0F) {
-      ++num_flat;
-    } else {
-      smallest = std::min(smallest, step);
-    }
+// Of those values that are there (not NaN; none is negative), the one that would stand at `part` of the way if they
+// were sorted.
+double quantile(const std::vector<float>& values, double part) {
+  // Floats that are not negative are ordered as their bits are: a histogram of the upper bits leaves few to sort.
+  constexpr int shift = 20;
+  const auto bin_of = [](float value) {
+    std::uint32_t bits;
+    std::memcpy(&bits, &value, sizeof bits);
+    return bits >> shift;
   };
-  const float* const pixel = image.row(v) + u;
-  for (int d = -WindowFits::kRadius; d < WindowFits::kRadius; ++d) {
-    add(std::abs(pixel[d + 1] - pixel[d]));
-    add(std::abs(pixel[(d + 1) * image.stride()] - pixel[d * image.stride()]));
+  std::array<std::int32_t, 1 << (32 - shift)> histogram{};
+  for (const float value : values) ++histogram[bin_of(value)];
+  auto place = static_cast<std::ptrdiff_t>(part * static_cast<double>(count_values(values) - 1));
+  std::uint32_t bin = 0;
+  while (place >= histogram[bin]) place -= histogram[bin++];
+  std::vector<float> candidates(static_cast<std::size_t>(histogram[bin]) + 1);
+  std::size_t next = 0;
+  for (const float value : values) {
+    candidates[next] = value;
+    next += bin_of(value) == bin;
   }
-  return num_flat >= 2 * WindowFits::kRadius && std::isfinite(smallest) ? smallest : 0.0F;
-}
-
-float quantile(std::vector<float>& values, double part) {
-  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(part * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
+  candidates.pop_back();
+  std::nth_element(candidates.begin(), candidates.begin() + place, candidates.end());
+  return static_cast<double>(candidates[static_cast<std::size_t>(place)]);
 }
 
 }  // namespace
 
-WindowFits fit_windows(const PlanarImage& image, int num_threads) {
+NoiseModel sensor_prior(const Camera& camera) {
+  return camera.model() == Camera::Model::pinhole ? NoiseModel::kinect() : NoiseModel{1.0, 0.0, 0.0};
+}
+
+WindowFits fit_windows(const PlanarImage& image, const Camera& camera, int num_threads) {
   const auto count = [](int size) { return std::max(0, (size - 2 * WindowFits::kRadius - 1) / WindowFits::kStep + 1); };
   WindowFits fits;
   fits.cols = image.width() > 2 * WindowFits::kRadius ? count(image.width()) : 0;
   fits.rows = image.height() > 2 * WindowFits::kRadius ? count(image.height()) : 0;
-  const auto size = static_cast<std::size_t>(fits.cols) * static_cast<std::size_t>(fits.rows);
-  fits.residual.resize(size);
-  fits.slope.resize(size);
-  parallel_for(
-      fits.rows, rows_per_block(fits.cols * WindowFits::kStep * WindowFits::kStep), num_threads, [&](std::int64_t row) {
-        for (int col = 0; col < fits.cols; ++col) {
-          const Fit fit = fit_window(image, WindowFits::centre(col), WindowFits::centre(static_cast<int>(row)));
-          const auto i = static_cast<std::size_t>(row * fits.cols + col);
-          // std::max(NaN, 0) is NaN: a window with a missing pixel has no residual.
-          fits.residual[i] = static_cast<float>(std::sqrt(fit.variance));
-          fits.slope[i] = static_cast<float>(fit.slope);
-        }
-      });
-  return fits;
-}
-
-std::vector<float> smooth_slopes(const WindowFits& fits) {
-  std::vector<float> slopes(fits.slope.size());
-  for (int row = 0; row < fits.rows; ++row) {
-    for (int col = 0; col < fits.cols; ++col) {
-      float least = std::numeric_limits<float>::infinity();
-      for (int r = std::max(row - 1, 0); r <= std::min(row + 1, fits.rows - 1); ++r) {
-        for (int c = std::max(col - 1, 0); c <= std::min(col + 1, fits.cols - 1); ++c) {
-          const float slope = fits.slope[static_cast<std::size_t>(r * fits.cols + c)];
-          if (slope < least) least = slope;
-        }
-      }
-      slopes[static_cast<std::size_t>(row * fits.cols + col)] = std::isfinite(least) ? least : 0.0F;
-    }
+  for (std::vector<float>* const values : {&fits.residual, &fits.pixel, &fits.step, &fits.slope}) {
+    values->resize(static_cast<std::size_t>(fits.cols) * static_cast<std::size_t>(fits.rows));
   }
-  return slopes;
+  // A step that no sensor's unit of depth explains is an edge: the worst, Kinect v1, has half of this.
+  constexpr float any = std::numeric_limits<float>::infinity();
+  const bool pinhole = camera.model() == Camera::Model::pinhole;
+  const simd::WindowRule rule = {image.sigma(sensor_prior(camera)), image.unit_slope(),
+                                 pinhole ? std::sqrt(12.0F) : any, pinhole ? any : kMaxStepPixels};
+  const auto fit_row = simd::fit_windows();
+  parallel_for(fits.rows, rows_per_block(fits.cols * WindowFits::kStep * WindowFits::kStep), num_threads,
+               [&](std::int64_t row) {
+                 const std::int64_t first = row * fits.cols;
+                 fit_row(image.row(WindowFits::centre(static_cast<int>(row))) + WindowFits::centre(0), image.stride(),
+                         fits.cols, rule,
+                         {fits.residual.data() + first, fits.pixel.data() + first, fits.step.data() + first,
+                          fits.slope.data() + first});
+               });
+  return fits;
 }
 
 NoiseModel estimate_noise(const DepthRef& depth, const Camera& camera, int num_threads) {
   const PlanarImage image(depth, camera, num_threads);
-  return estimate_noise(image, fit_windows(image, num_threads), camera);
+  return estimate_noise(fit_windows(image, camera, num_threads), camera, num_threads);
 }
 
-NoiseModel estimate_noise(const PlanarImage& image, const WindowFits& fits, const Camera& camera) {
-  const bool pinhole = camera.model() == Camera::Model::pinhole;
-  const NoiseModel shape = pinhole ? NoiseModel::kinect() : NoiseModel{1.0, 0.0, 0.0};
-  const Quadratic shape_sigma = image.sigma(shape), unit_slope = image.unit_slope();
-
-  // In units of the shape: the residuals, the steps of plateaus, the side of a pixel. A step that no sensor's unit of
-  // depth explains is an edge: the worst, Kinect v1, has half of max_step.
-  const float max_step = std::sqrt(12.0F);
-  std::vector<float> residuals, steps, pixels;
-  for (int row = 0; row < fits.rows; ++row) {
-    for (int col = 0; col < fits.cols; ++col) {
-      const float residual = fits.residual[static_cast<std::size_t>(row * fits.cols + col)];
-      if (!(residual >= 0.0F)) continue;
-      const int u = WindowFits::centre(col), v = WindowFits::centre(row);
-      const float value = image.row(v)[u], unit = 1.0F / shape_sigma(value), pixel = unit_slope(value) * unit;
-      residuals.push_back(residual * unit);
-      pixels.push_back(pixel);
-      const float step = plateau_step(image, u, v) * unit;
-      if (step > 0.0F && step <= (pinhole ? max_step : kMaxStepPixels * pixel)) steps.push_back(step);
-    }
-  }
-
+NoiseModel estimate_noise(const WindowFits& fits, const Camera& camera, int num_threads) {
   // Nothing to measure: the sensor's prior, or a tenth of a pixel.
-  if (pixels.size() < kMinSamples) return pinhole ? shape : NoiseModel{0.1 * camera.pixel_size(), 0.0, 0.0};
-
-  // Below the median of the residuals: edges and fine structure leave more over than noise does.
-  double scale = std::max(1e-3 * quantile(pixels, 0.5), static_cast<double>(quantile(residuals, 0.4)));
-  // Plateaus leave nothing over.
-  if (static_cast<double>(steps.size()) > kMinStepped * static_cast<double>(pixels.size())) {
-    scale = std::max(scale, quantile(steps, 0.5) / std::sqrt(12.0));
+  const NoiseModel shape = sensor_prior(camera);
+  const std::int64_t num_windows = count_values(fits.residual), num_steps = count_values(fits.step);
+  if (num_windows < kMinSamples) {
+    return camera.model() == Camera::Model::pinhole ? shape : NoiseModel{0.1 * camera.pixel_size(), 0.0, 0.0};
   }
+  const std::array<std::function<double()>, 3> parts = {
+      // Below the median of the residuals: edges and fine structure leave more over than noise does.
+      [&] { return quantile(fits.residual, 0.4); }, [&] { return 1e-3 * quantile(fits.pixel, 0.5); },
+      // Plateaus leave nothing over.
+      [&] {
+        const bool is_stepped = static_cast<double>(num_steps) > kMinStepped * static_cast<double>(num_windows);
+        return is_stepped ? quantile(fits.step, 0.5) / std::sqrt(12.0) : 0.0;
+      }};
+  std::array<double, 3> scales{};
+  parallel_for(3, 1, num_threads, [&](std::int64_t i) {
+    const auto k = static_cast<std::size_t>(i);
+    scales[k] = parts[k]();
+  });
+  const double scale = *std::max_element(scales.begin(), scales.end());
   return {shape.constant * scale, shape.quadratic * scale, shape.offset};
 }
 

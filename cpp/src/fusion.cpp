@@ -9,7 +9,7 @@
 #include "image_index.hpp"
 #include "parallel.hpp"
 #include "point_grid.hpp"
-#include "view_of_model.hpp"
+#include "model_view.hpp"
 
 namespace nacre {
 namespace {

@@ -4,6 +4,8 @@
 #include <string>
 
 #include "parallel.hpp"
+#include "ray_table.hpp"
+#include "simd/point_row.hpp"
 
 namespace nacre {
 
@@ -17,22 +19,27 @@ void require_camera_size(const char* name, Eigen::Index rows, Eigen::Index cols,
 PlanarImage::PlanarImage(const DepthRef& depth, const Camera& camera, int num_threads)
     : width_(camera.width()),
       height_(camera.height()),
-      stride_(camera.width() + 2 * kBorder),
+      stride_(camera.width() + 2 * kBorder + kOverhang),
       inverse_(camera.model() == Camera::Model::pinhole),
-      pixel_(static_cast<float>(1.0 / std::sqrt(std::abs(camera.fx() * camera.fy())))) {
+      pixel_(static_cast<float>(1.0 / std::sqrt(std::abs(camera.fx() * camera.fy())))),
+      values_(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(camera.height() + 2 * kBorder)) {
   require_camera_size("depth", depth.rows(), depth.cols(), camera);
   constexpr float missing = std::numeric_limits<float>::quiet_NaN();
-  values_.assign(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height_ + 2 * kBorder), missing);
-  const bool radial = camera.depth_kind() == DepthKind::radial;
-  const Ray* const rays = camera.rays().data();
-  parallel_for(height_, rows_per_block(width_), num_threads, [&](std::int64_t v) {
-    const float* const source = &depth.coeffRef(v, 0);
-    float* const target = values_.data() + (v + kBorder) * stride_ + kBorder;
-    for (int u = 0; u < width_; ++u) {
-      const float z = radial ? source[u] * rays[v * width_ + u].direction_z : source[u];
-      const float value = inverse_ ? 1.0F / z : z;
-      target[u] = is_measurement(z) && is_measurement(value) ? value : missing;
+  const std::int64_t num_rows = height_ + 2 * kBorder;
+  const bool is_radial = camera.depth_kind() == DepthKind::radial;
+  const auto fill_row = simd::fill_planar_row();
+  parallel_for(num_rows, rows_per_block(width_), num_threads, [&](std::int64_t row) {
+    float* const start = values_.data() + row * stride_;
+    const std::int64_t v = row - kBorder;
+    if (v < 0 || v >= height_) {
+      std::fill(start, start + stride_, missing);
+      return;
     }
+    float* const first = start + kBorder;
+    std::fill(start, first, missing);
+    fill_row(&depth.coeffRef(v, 0), is_radial ? camera.ray_table().row(static_cast<int>(v)).z : nullptr, inverse_,
+             width_, first);
+    std::fill(first + width_, start + stride_, missing);
   });
 }
 

@@ -6,23 +6,25 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
-#include <vector>
 
 #include "nacre/camera.hpp"
 #include "nacre/depth.hpp"
+#include "scratch.hpp"
+#include "simd/normal_row.hpp"
 
 namespace nacre {
 
-struct Quadratic {
-  float constant = 0, linear = 0, square = 0;
+using simd::Quadratic;
 
-  float operator()(float x) const { return constant + x * (linear + x * square); }
-  Quadratic operator*(float factor) const { return {constant * factor, linear * factor, square * factor}; }
-};
+inline float evaluate(const Quadratic& q, float x) { return q.constant + x * (q.linear + x * q.square); }
+inline Quadratic operator*(const Quadratic& q, float factor) {
+  return {q.constant * factor, q.linear * factor, q.square * factor};
+}
 
 class PlanarImage {
  public:
-  static constexpr int kBorder = 5;  // NaN on every side, so that windows need no bounds checks
+  // NaN on every side, so that windows need no bounds checks, and on the right so many more that vectors need none.
+  static constexpr int kBorder = simd::largest_normal_window, kOverhang = 31;
 
   // Throws std::invalid_argument when depth and camera differ in size.
   PlanarImage(const DepthRef& depth, const Camera& camera, int num_threads);
@@ -33,19 +35,20 @@ class PlanarImage {
   // The first pixel of row v; columns and rows may be addressed from -kBorder on.
   const float* row(int v) const { return values_.data() + (v + kBorder) * stride_ + kBorder; }
 
+  simd::PlanarRow planar_row(int v) const { return {row(v), stride_, width_, inverse_}; }
+
   // The change of the value between neighbouring pixels on a surface of slope 1 (slanted by 45 degrees), given the
   // value: a slant s changes it by tan(s) times as much.
   Quadratic unit_slope() const;
   // The standard deviation of the value, given the value.
   Quadratic sigma(const NoiseModel& noise) const;
-  float to_depth(float value) const { return inverse_ ? 1.0F / value : value; }
 
  private:
   int width_, height_;
   std::ptrdiff_t stride_;
   bool inverse_;
   float pixel_;  // the side of a pixel at distance 1 (pinhole), or everywhere (orthographic)
-  std::vector<float> values_;
+  Scratch<float> values_;
 };
 
 // Rows that are worth a thread's while, for images of this width.

@@ -30,7 +30,7 @@ class View {
         rotation_(world_from_camera.linear()),
         translation_(world_from_camera.translation()) {}
 
-  std::int64_t num_pixels() const { return static_cast<std::int64_t>(camera_.rays().size()); }
+  std::int64_t num_pixels() const { return static_cast<std::int64_t>(width()) * height(); }
   int width() const { return camera_.width(); }
   int height() const { return camera_.height(); }
   double footprint(double depth) const { return std::abs(camera_.footprint(depth)); }
@@ -38,7 +38,7 @@ class View {
   MeshTree::Hit cast(const WorldRay& ray) const { return mesh_.cast(ray.origin, ray.direction); }
 
   WorldRay ray(std::int64_t pixel) const {
-    const Ray& ray = camera_.rays()[static_cast<std::size_t>(pixel)];
+    const Ray ray = camera_.ray(static_cast<int>(pixel % width()), static_cast<int>(pixel / width()));
     return to_world({ray.origin_x, ray.origin_y, 0.0}, {ray.direction_x, ray.direction_y, ray.direction_z});
   }
 
@@ -50,8 +50,7 @@ class View {
     const double x = u - left, y = v - top;
     Vector3d origin = Vector3d::Zero(), direction = Vector3d::Zero();
     const auto add = [&](int column, int row, double weight) {
-      const Ray& ray = camera_.rays()[static_cast<std::size_t>(row) * static_cast<std::size_t>(width()) +
-                                      static_cast<std::size_t>(column)];
+      const Ray ray = camera_.ray(column, row);
       origin += weight * Vector3d(ray.origin_x, ray.origin_y, 0.0);
       direction += weight * Vector3d(ray.direction_x, ray.direction_y, ray.direction_z);
     };

@@ -8,6 +8,7 @@
 #include "parallel.hpp"
 #include "random.hpp"
 #include "surface_observer.hpp"
+#include "model_view.hpp"
 
 namespace nacre {
 namespace {
@@ -20,30 +21,30 @@ struct View {
   Points points, normals;  // world frame
 };
 
-Eigen::Vector3f viewing_direction(const Camera& camera, const Eigen::Vector3f& point) {
-  return camera.model() == Camera::Model::orthographic ? Eigen::Vector3f::UnitZ() : Eigen::Vector3f(point.normalized());
-}
-
 // Points in the image widened by a third on each side, turned away from the camera by at most 120 degrees: one of every
 // n of them, so that at most max_target_points are left.
 View points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera, int num_threads) {
-  constexpr std::int64_t block_size = 4096;
-  const Eigen::Isometry3f camera_from_world(world_from_camera.inverse().cast<float>());
-  const double margin_u = camera.width() / 3.0, margin_v = camera.height() / 3.0;
+  constexpr std::int64_t block_size = ModelView::capacity;
+  const ModelView model_view(camera, world_from_camera);
+  const auto width = static_cast<float>(camera.width()), height = static_cast<float>(camera.height());
+  const float margin_u = width / 3.0F, margin_v = height / 3.0F;
   std::vector<std::vector<std::uint32_t>> found(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
-  parallel_blocks(model.size(), block_size, num_threads, [&](std::int64_t block, std::int64_t begin, std::int64_t end) {
-    for (auto i = static_cast<std::size_t>(begin); i < static_cast<std::size_t>(end); ++i) {
-      const Eigen::Vector3f point = camera_from_world * model.points[i];
-      const Eigen::Vector2d pixel = camera.project(point.cast<double>());
-      if (!(pixel.x() > -margin_u && pixel.x() < camera.width() + margin_u && pixel.y() > -margin_v &&
-            pixel.y() < camera.height() + margin_v)) {
-        continue;
-      }
-      const Eigen::Vector3f normal = camera_from_world.linear() * model.normals[i];
-      if (!(normal.dot(viewing_direction(camera, point)) < 0.5F)) continue;
-      found[static_cast<std::size_t>(block)].push_back(static_cast<std::uint32_t>(i));
-    }
-  });
+  parallel_blocks(model.size(), block_size, num_threads,
+                  [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
+                    const auto first = static_cast<std::size_t>(begin);
+                    ModelView::Block block;
+                    model_view.project(model.points[first].data(), model.normals[first].data(),
+                                       static_cast<int>(end - begin), block);
+                    std::uint32_t rows[block_size];
+                    std::size_t count = 0;
+                    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(end - begin); ++i) {
+                      rows[count] = static_cast<std::uint32_t>(begin) + i;
+                      count += static_cast<std::size_t>((block.u[i] > -margin_u) & (block.u[i] < width + margin_u) &
+                                                        (block.v[i] > -margin_v) & (block.v[i] < height + margin_v) &
+                                                        (block.facing[i] > -0.5F));
+                    }
+                    found[static_cast<std::size_t>(number)].assign(rows, rows + count);
+                  });
   std::size_t num_found = 0;
   for (const auto& rows : found) num_found += rows.size();
   const std::size_t step = (num_found + max_target_points - 1) / max_target_points;
@@ -75,25 +76,21 @@ double consistency_of(const View& view, const Frame& frame, const Camera& camera
       return *this;
     }
   };
-  const Eigen::Isometry3f camera_from_world(world_from_camera.inverse().cast<float>());
+  constexpr std::int64_t block_size = ModelView::capacity;
+  const ModelView model_view(camera, world_from_camera);
   const Counts counts =
-      block_reduce(view.points.rows(), 1024, num_threads, Counts{}, [&](std::int64_t begin, std::int64_t end) {
+      block_reduce(view.points.rows(), block_size, num_threads, Counts{}, [&](std::int64_t begin, std::int64_t end) {
+        ModelView::Block block;
+        model_view.project(view.points.data() + 3 * begin, view.normals.data() + 3 * begin,
+                           static_cast<int>(end - begin), block);
         Counts sum;
-        for (std::int64_t i = begin; i < end; ++i) {
-          const Eigen::Vector3f point = camera_from_world * view.points.row(i).transpose();
-          const Eigen::Vector3f normal = camera_from_world.linear() * view.normals.row(i).transpose();
-          const float facing = -normal.dot(viewing_direction(camera, point));
-          if (!(facing > 0.3F)) continue;
-          const Eigen::Vector2d pixel = camera.project(point.cast<double>());
-          if (!(pixel.x() > -0.5 && pixel.y() > -0.5 && pixel.x() < frame.width - 0.5 &&
-                pixel.y() < frame.height - 0.5)) {
-            continue;
-          }
-          const Eigen::Index row =
-              static_cast<Eigen::Index>(pixel.y() + 0.5) * frame.width + static_cast<Eigen::Index>(pixel.x() + 0.5);
-          const float behind = frame.points(row, 2) - point.z();
+        for (int i = 0; i < static_cast<int>(end - begin); ++i) {
+          if (!block.inside[i] || !(block.facing[i] > 0.3F)) continue;
+          const std::int32_t pixel = block.pixel[i];
+          const float behind = frame.points(pixel, 2) - block.z[i];
           if (!std::isfinite(behind)) continue;
-          const float tolerance = std::max(3.0F * static_cast<float>(spacing), 4.0F * frame.sigma[row]) / facing;
+          const float tolerance =
+              std::max(3.0F * static_cast<float>(spacing), 4.0F * frame.sigma[pixel]) / block.facing[i];
           if (behind > tolerance) {
             ++sum.violated;
           } else if (behind > -tolerance) {

@@ -5,27 +5,27 @@
 #include <vector>
 
 #include "planar_image.hpp"
+#include "simd/window_row.hpp"
 
 namespace nacre {
 
 struct WindowFits {
-  static constexpr int kRadius = 3;  // windows of 7 x 7
-  static constexpr int kStep = 5;    // from window to window
+  static constexpr int kRadius = simd::fit_radius, kStep = simd::fit_step;
 
   int cols = 0, rows = 0;
-  std::vector<float> residual;  // standard deviation of the planar image about the surface; NaN: a pixel is missing
-  std::vector<float> slope;     // of the surface, in the planar image, per pixel
+  // Of each window, row by row: see simd::WindowRow.
+  std::vector<float> residual, pixel, step, slope;
 
   // The image column or row of a window's centre.
   static int centre(int index) { return kRadius + index * kStep; }
 };
 
-WindowFits fit_windows(const PlanarImage& image, int num_threads);
+// Residuals, pixels and steps are in units of the noise of `sensor_prior`.
+WindowFits fit_windows(const PlanarImage& image, const Camera& camera, int num_threads);
 
-NoiseModel estimate_noise(const PlanarImage& image, const WindowFits& fits, const Camera& camera);
+// The Kinect's curve; for an orthographic camera a constant.
+NoiseModel sensor_prior(const Camera& camera);
 
-// For each window of the grid the smallest slope among it and its neighbours, so that edges do not count; 0 where
-// there is none.
-std::vector<float> smooth_slopes(const WindowFits& fits);
+NoiseModel estimate_noise(const WindowFits& fits, const Camera& camera, int num_threads);
 
 }  // namespace nacre

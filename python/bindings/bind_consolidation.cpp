@@ -12,6 +12,22 @@ py::array_t<T> to_array(std::vector<T>&& values) {
   return py::array_t<T>(static_cast<py::ssize_t>(kept->size()), kept->data(), owner);
 }
 
+template <class Cloud>
+py::tuple consolidate(const Cloud& points, const ConsolidateOptions& options, const nacre::AttributesRef& attributes) {
+  decltype(nacre::consolidate(points, options, attributes)) result;
+  {
+    const py::gil_scoped_release unlocked;
+    result = nacre::consolidate(points, options, attributes);
+  }
+  return py::make_tuple(std::move(result.points), std::move(result.attributes), to_array(std::move(result.sources)));
+}
+
+template <class Cloud>
+auto project_samples(const Cloud& samples, const Cloud& points, const ConsolidateOptions& options,
+                     const nacre::ProjectionHints& hints) {
+  return nacre::project_samples(samples, points, options, hints);
+}
+
 }  // namespace
 
 void bind_consolidation(py::module_& m) {
@@ -33,19 +49,11 @@ void bind_consolidation(py::module_& m) {
       .def_readwrite("num_threads", &ConsolidateOptions::num_threads)
       .def("check", &ConsolidateOptions::check);
 
-  m.def(
-      "consolidate",
-      [](const nacre::PointsRef& points, const ConsolidateOptions& options, const nacre::AttributesRef& attributes) {
-        nacre::Consolidated result;
-        {
-          const py::gil_scoped_release unlocked;
-          result = nacre::consolidate(points, options, attributes);
-        }
-        return py::make_tuple(std::move(result.points), std::move(result.attributes),
-                              to_array(std::move(result.sources)));
-      },
-      py::arg("points"), py::arg("options"), py::arg("attributes"),
-      "Points, attributes and sources; see nacre.consolidate.");
+  // The arguments are noconvert, so that each array meets the overload of its own precision.
+  m.def("consolidate", &consolidate<nacre::PointsRef>, py::arg("points").noconvert(), py::arg("options"),
+        py::arg("attributes"), "Points, attributes and sources; see nacre.consolidate.");
+  m.def("consolidate", &consolidate<nacre::PointsDoubleRef>, py::arg("points").noconvert(), py::arg("options"),
+        py::arg("attributes"), "Points, attributes and sources; see nacre.consolidate.");
 
   py::class_<nacre::ProjectionHints>(m, "ProjectionHints")
       .def(py::init<>())
@@ -53,6 +61,8 @@ void bind_consolidation(py::module_& m) {
       .def_readwrite("sample_normals", &nacre::ProjectionHints::sample_normals)
       .def_readwrite("frozen", &nacre::ProjectionHints::frozen);
 
-  m.def("project_samples", &nacre::project_samples, py::arg("samples"), py::arg("points"), py::arg("options"),
-        py::arg("hints"), ReleaseGil());
+  m.def("project_samples", &project_samples<nacre::PointsRef>, py::arg("samples").noconvert(),
+        py::arg("points").noconvert(), py::arg("options"), py::arg("hints"), ReleaseGil());
+  m.def("project_samples", &project_samples<nacre::PointsDoubleRef>, py::arg("samples").noconvert(),
+        py::arg("points").noconvert(), py::arg("options"), py::arg("hints"), ReleaseGil());
 }

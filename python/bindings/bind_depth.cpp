@@ -70,7 +70,11 @@ void bind_depth(py::module_& m) {
         py::arg("num_threads"), ReleaseGil());
   m.def("estimate_noise", &nacre::estimate_noise, py::arg("depth"), py::arg("camera"), py::arg("num_threads"),
         ReleaseGil());
-  m.def("back_project", &nacre::back_project, py::arg("depth"), py::arg("camera"), ReleaseGil());
-  m.def("make_frame", &nacre::make_frame, py::arg("depth"), py::arg("camera"), py::arg("noise"), py::arg("num_threads"),
+  m.def("back_project", &nacre::back_project, py::arg("depth"), py::arg("camera"), py::arg("num_threads"),
         ReleaseGil());
+  m.def("make_frame",
+        py::overload_cast<const DepthRef&, const Camera&, const std::optional<NoiseModel>&, int>(&nacre::make_frame),
+        py::arg("depth"), py::arg("camera"), py::arg("noise"), py::arg("num_threads"), ReleaseGil());
+  m.def("depth_normals", &nacre::depth_normals, py::arg("depth"), py::arg("camera"), py::arg("noise"),
+        py::arg("num_threads"), ReleaseGil());
 }

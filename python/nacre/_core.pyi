@@ -763,8 +763,10 @@ def align(
 def back_project(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]"]: ...
 def built_in_object() -> tuple[typing.Any, ...]: ...
+@typing.overload
 def consolidate(
     points: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
     options: ConsolidateOptions,
@@ -778,7 +780,27 @@ def consolidate(
     Points, attributes and sources; see nacre.consolidate.
     """
 
+@typing.overload
+def consolidate(
+    points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"],
+    options: ConsolidateOptions,
+    attributes: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
+) -> tuple[
+    typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
+    typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"],
+    numpy.typing.NDArray[numpy.int64],
+]:
+    """
+    Points, attributes and sources; see nacre.consolidate.
+    """
+
 def default_threads() -> int: ...
+def depth_normals(
+    depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
+    camera: Camera,
+    noise: NoiseModel | None,
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]"]: ...
 def estimate_noise(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,
@@ -800,7 +822,7 @@ def instruction_set() -> str: ...
 def make_frame(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,
-    noise: NoiseModel,
+    noise: NoiseModel | None,
     num_threads: typing.SupportsInt | typing.SupportsIndex,
 ) -> Frame: ...
 def preprocess_depth(
@@ -810,12 +832,20 @@ def preprocess_depth(
     mask: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, n]", "flags.c_contiguous"],
     num_threads: typing.SupportsInt | typing.SupportsIndex,
 ) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"], DepthReport]: ...
+@typing.overload
 def project_samples(
     samples: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
     points: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
     options: ConsolidateOptions,
     hints: ProjectionHints,
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]"]: ...
+@typing.overload
+def project_samples(
+    samples: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"],
+    points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"],
+    options: ConsolidateOptions,
+    hints: ProjectionHints,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
 def simulate_depth(
     mesh: MeshTree,
     camera: Camera,

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_count, as_length, as_matching_points, as_points, localize
+from nacre.arrays import FloatArray, as_count, as_length, as_matching_points, as_points
 from nacre.parameters import as_choice
 
 _METHODS = {
@@ -129,10 +129,9 @@ def consolidate(
     wanted = len(array) if num_points is None else as_count("num_points", num_points, minimum=1)
     options.num_points = max(1, min(wanted, len(array)))
     options.seed = as_count("seed", seed)
-    local, origin = localize(array)
     cargo = _Cargo(attributes, len(array))
-    moved, carried, sources = _core.consolidate(local, options, cargo.columns)
-    return Consolidated(_globalize(moved, origin, array.dtype), cargo.unpack(carried, sources), sources)
+    moved, carried, sources = _core.consolidate(array, options, cargo.columns)
+    return Consolidated(moved, cargo.unpack(carried, sources), sources)
 
 
 def project_samples(
@@ -189,12 +188,11 @@ def project_samples(
         hints.sample_normals = normals.astype(np.float32)
     if frozen is not None:
         hints.frozen = (_as_column("frozen", frozen, len(sample_array)) != 0).astype(np.uint8)
-    local, origin = localize(
-        point_array if sample_array.dtype == np.float32 else point_array.astype(np.float64)
+    common = np.promote_types(sample_array.dtype, point_array.dtype)
+    moved = _core.project_samples(
+        sample_array.astype(common, copy=False), point_array.astype(common, copy=False), options, hints
     )
-    local_samples = (sample_array - origin).astype(np.float32)
-    moved = _core.project_samples(local_samples, local, options, hints)
-    return _globalize(moved, origin, sample_array.dtype)
+    return moved.astype(np.float32) if sample_array.dtype == np.float32 else moved
 
 
 def _options(
@@ -208,13 +206,6 @@ def _options(
     options.theta = as_choice("theta", theta, _THETAS)
     options.num_threads = as_count("num_threads", num_threads)
     return options
-
-
-def _globalize(
-    local: npt.NDArray[np.float32], origin: npt.NDArray[np.float64], dtype: np.dtype[Any]
-) -> FloatArray:
-    points: FloatArray = local if dtype == np.float32 and not origin.any() else (local + origin).astype(dtype)
-    return points
 
 
 def _real(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:

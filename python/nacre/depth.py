@@ -254,7 +254,7 @@ def preprocess_depth(
 
 
 def back_project(
-    depth: npt.ArrayLike, camera: _core.Camera, *, depth_scale: float = 1.0
+    depth: npt.ArrayLike, camera: _core.Camera, *, depth_scale: float = 1.0, num_threads: int = 0
 ) -> npt.NDArray[np.float32]:
     """
     Return the valid pixels of a depth image as points of the camera's frame, row by row.
@@ -267,6 +267,8 @@ def back_project(
         The camera of the image.
     depth_scale : float
         Stored units per metre.
+    num_threads : int
+        0 uses every processor. The result does not depend on it.
 
     Returns
     -------
@@ -278,7 +280,9 @@ def back_project(
     ValueError
         Depth and camera differ in size.
     """
-    points: npt.NDArray[np.float32] = _core.back_project(as_depth("depth", depth, depth_scale), camera)
+    points: npt.NDArray[np.float32] = _core.back_project(
+        as_depth("depth", depth, depth_scale), camera, num_threads
+    )
     return points
 
 
@@ -322,10 +326,10 @@ def depth_normals(
         Depth and camera differ in size.
     """
     image = as_depth("depth", depth, depth_scale)
-    model = as_noise("noise", noise) or estimate_noise(image, camera, num_threads=num_threads)
-    frame = _core.make_frame(image, camera, model.to_core(), num_threads)
-    normals: npt.NDArray[np.float32] = frame.normals.reshape(*image.shape, 3)
-    return normals
+    model = as_noise("noise", noise)
+    core_model = None if model is None else model.to_core()
+    normals: npt.NDArray[np.float32] = _core.depth_normals(image, camera, core_model, num_threads)
+    return normals.reshape(*image.shape, 3)
 
 
 def estimate_noise(

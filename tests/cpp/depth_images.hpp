@@ -36,11 +36,15 @@ inline Plane slanted_plane(double z, double slant, double axis) {
   return {normal, normal.z() * z};
 }
 
+inline Ray ray_of(const Camera& camera, Eigen::Index pixel) {
+  return camera.ray(static_cast<int>(pixel % camera.width()), static_cast<int>(pixel / camera.width()));
+}
+
 // The depth of a plane in the camera's depth kind; missing where a ray does not meet it within 20 m.
 inline DepthImage render(const Camera& camera, const Plane& plane) {
   DepthImage depth(camera.height(), camera.width());
   for (Eigen::Index i = 0; i < depth.size(); ++i) {
-    const Ray& ray = camera.rays()[static_cast<std::size_t>(i)];
+    const Ray ray = ray_of(camera, i);
     const double along = plane.normal.dot(Eigen::Vector3d(ray.direction_x, ray.direction_y, ray.direction_z));
     const double value = (plane.offset - plane.normal.x() * ray.origin_x - plane.normal.y() * ray.origin_y) / along;
     depth.data()[i] = value > 0.0 && value < 20.0 ? static_cast<float>(value) : missing;
@@ -59,7 +63,7 @@ inline void add_noise(DepthImage& depth, const NoiseModel& noise, std::uint64_t 
 inline std::int64_t num_facing(const Camera& camera, const Plane& plane, const DepthImage& depth) {
   std::int64_t count = 0;
   for (Eigen::Index i = 0; i < depth.size(); ++i) {
-    const Ray& ray = camera.rays()[static_cast<std::size_t>(i)];
+    const Ray ray = ray_of(camera, i);
     const Eigen::Vector3d direction(ray.direction_x, ray.direction_y, ray.direction_z);
     count += std::isfinite(depth.data()[i]) && -plane.normal.dot(direction.normalized()) > 0.2588;
   }

@@ -4,10 +4,8 @@
 #include <limits>
 #include <set>
 
-#include "cell_grid.hpp"
 #include "doctest/doctest.h"
 #include "nacre/consolidation.hpp"
-#include "pair_kernel.hpp"
 #include "random.hpp"
 
 using namespace nacre;
@@ -68,77 +66,6 @@ double unevenness(const Points& points) {
 
 }  // namespace
 
-TEST_CASE("exp2_of_negative is exact to 3e-7 over the range of theta, and never zero or infinite") {
-  for (double x = 0.0; x > -24.0; x -= 0.0037) {
-    const double truth = std::exp2(static_cast<double>(static_cast<float>(x)));
-    CHECK(std::abs(exp2_of_negative(static_cast<float>(x)) - truth) < 3e-7 * truth);
-  }
-  CHECK(exp2_of_negative(0.0F) == 1.0F);
-  CHECK(exp2_of_negative(-1e30F) == doctest::Approx(std::exp2(-126.0)));
-}
-
-TEST_CASE("pairs of a grid: every point within the edge is met once, also from outside and beyond a million cells") {
-  Points points = noisy_sphere(500, 1.0, 0.3);
-  points.row(7) << 1e9F, -1e9F, 3.0F;
-  points.row(8) << 1e9F, -1e9F, 3.1F;
-  const double edge = 0.35;
-  std::vector<std::int64_t> rows;
-  for (std::int64_t i = 0; i < points.rows(); ++i) rows.push_back(i);
-  CellGrid grid(points.row(0).cast<double>().transpose(), edge);
-  grid.build(points, rows);
-  CellWalk walk(grid);
-  for (const std::size_t cell : {grid.num_cells() - 1, std::size_t{0}, grid.num_cells() / 2, grid.num_cells() / 3}) {
-    const PairRuns runs = walk.around(grid.key(cell));
-    std::multiset<std::int64_t> met;
-    for (const auto& [begin, end] : runs) {
-      for (std::size_t i = begin; i < end; ++i) met.insert(grid.row(i));
-    }
-    for (std::size_t i = grid.begin(cell); i < grid.end(cell); ++i) {
-      for (std::int64_t j = 0; j < points.rows(); ++j) {
-        if ((points.row(j).transpose() - grid.point(i)).norm() < edge) CHECK(met.count(j) == 1);
-      }
-    }
-    for (const std::int64_t row : met) CHECK(met.count(row) == 1);
-  }
-}
-
-TEST_CASE("sums over pairs equal the plain sums in double precision") {
-  const Points points = noisy_sphere(61, 0.9, 0.1);
-  std::vector<std::int64_t> rows;
-  for (std::int64_t i = 0; i < points.rows(); ++i) rows.push_back(i);
-  CellGrid grid(Eigen::Vector3d::Zero(), 10.0);
-  grid.build(points, rows);
-  std::vector<float> mass(grid.padded_size());
-  for (std::size_t i = 0; i < mass.size(); ++i) mass[i] = 1.0F + static_cast<float>(i);
-  PairRuns runs;
-  runs.ranges[runs.count++] = {3, 20};
-  runs.ranges[runs.count++] = {25, 61};
-  const Eigen::Vector3f place(0.2F, -0.1F, 0.3F);
-  for (const auto decay : {PairKernel::Decay::none, PairKernel::Decay::distance, PairKernel::Decay::squared_distance}) {
-    const PairKernel kernel{decay, -2.0F, 1.2F, decay == PairKernel::Decay::distance ? 0.1F : 0.0F, 0.04F};
-    double total = 0.0;
-    Eigen::Vector3d first = Eigen::Vector3d::Zero();
-    Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
-    for (const auto& [begin, end] : runs) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const Eigen::Vector3d d = (grid.point(i) - place).cast<double>();
-        const double r2 = d.squaredNorm();
-        if (r2 >= kernel.reach2 || r2 <= kernel.skip2) continue;
-        double w = std::exp2(-2.0 * r2) * mass[i];
-        if (decay == PairKernel::Decay::distance) w /= std::sqrt(r2 + 0.1);
-        if (decay == PairKernel::Decay::squared_distance) w /= r2;
-        total += w;
-        first += w * d;
-        second += w * d * d.transpose();
-      }
-    }
-    const PairSums sums = sum_pairs<2>(kernel, grid.with_mass(mass), runs, place);
-    CHECK(sums.mass == doctest::Approx(total).epsilon(1e-6));
-    CHECK((sums.first.cast<double>() - first).norm() < 1e-6 * total);
-    CHECK((sums.second.cast<double>() - second).norm() < 1e-6 * total);
-  }
-}
-
 TEST_CASE("noise falls and evenness grows on a sphere and on a plane") {
   ConsolidateOptions options;
   options.num_points = 600;
@@ -186,7 +113,7 @@ TEST_CASE("the same bits for any number of threads") {
     options.method = method;
     options.num_threads = 1;
     const Consolidated one = consolidate(points, options, attributes);
-    for (const int threads : {2, 3, 8}) {
+    for (const int threads : {2, 3, 4, 7, 8}) {
       options.num_threads = threads;
       const Consolidated many = consolidate(points, options, attributes);
       CHECK(same_bits(one.points, many.points));
@@ -355,6 +282,47 @@ TEST_CASE("scale and shift do not matter") {
     const Points shifted = consolidate((points.array() + 0.125F).matrix(), options).points;
     CHECK(((shifted.array() - 0.125F).matrix() - moved).cwiseAbs().maxCoeff() < 1e-5F);
   }
+}
+
+TEST_CASE("double precision keeps the digits of coordinates that are far away") {
+  const PointsDouble points = noisy_sphere(1500, 0.03, 0.0005).cast<double>();
+  const PointsDouble shifted = points.rowwise() + Eigen::RowVector3d(4.4e6, -1.2e6, 3.3e3);
+  ConsolidateOptions options;
+  options.num_points = 200;
+  options.iterations = 2;
+  for (const auto method : all_methods) {
+    options.method = method;
+    const ConsolidatedDouble near = consolidate(points, options), far = consolidate(shifted, options);
+    CHECK(near.sources == far.sources);
+    const PointsDouble back = far.points.rowwise() - Eigen::RowVector3d(4.4e6, -1.2e6, 3.3e3);
+    CHECK((back - near.points).cwiseAbs().maxCoeff() < 1e-8);
+    const Points single = consolidate(points.cast<float>(), options).points;
+    CHECK((single.cast<double>() - near.points).cwiseAbs().maxCoeff() < 1e-7);
+  }
+}
+
+TEST_CASE("samples stay with their digits among strays") {
+  Points points = noisy_sphere(3000, 0.03, 0.0005);
+  ConsolidateOptions options;
+  options.iterations = 2;
+  const Points samples = points.topRows(100);
+  const Points moved = project_samples(samples, points, options);
+  points.conservativeResize(3002, 3);
+  points.row(3000) << 1e9F, 1e9F, -1e9F;
+  points.row(3001) << -1e30F, 1e9F, 0.0F;
+  CHECK((project_samples(samples, points, options) - moved).cwiseAbs().maxCoeff() < 1e-7F);
+}
+
+TEST_CASE("cgal: one neighbour alone does not repel, two do") {
+  const Points points = noisy_plane(3000, 0.05, 0.0);
+  ConsolidateOptions options;
+  options.method = ConsolidationMethod::cgal;
+  options.iterations = 1;
+  Points samples(3, 3);
+  samples << 0.0250F, 0.025F, 0.0F, 0.0265F, 0.025F, 0.0F, 0.0258F, 0.026F, 0.0F;
+  const Points single = project_samples(samples.topRows(1), points, options);
+  CHECK(project_samples(samples.topRows(2), points, options).row(0) == single.row(0));
+  CHECK((project_samples(samples, points, options).row(0) - single.row(0)).norm() > 0.0003F);
 }
 
 TEST_CASE("misuse raises") {

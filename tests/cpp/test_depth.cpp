@@ -258,7 +258,7 @@ TEST_CASE("sizes that do not match are named") {
         "depth must have the camera's size 120 x 90 (width x height), got 90 x 120");
   CHECK(message_of([&] { preprocess_depth(depth, pinhole, {}, MaskImage::Ones(3, 2)); }).find("mask") == 0);
   CHECK(message_of([&] { back_project(wrong, pinhole); }).find("depth") == 0);
-  CHECK(message_of([&] { make_frame(wrong, pinhole, {}); }).find("depth") == 0);
+  CHECK(message_of([&] { make_frame(wrong, pinhole); }).find("depth") == 0);
   CHECK(message_of([&] { estimate_noise(wrong, pinhole); }).find("depth") == 0);
 }
 

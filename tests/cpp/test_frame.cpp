@@ -81,7 +81,7 @@ TEST_CASE("normals of planes are exact, for every camera and slant") {
       for (const double axis : {0.0, 1.0, 3.0, 5.0}) {
         const Plane plane = slanted_plane(1.5, slant, axis);
         const DepthImage depth = render(camera, plane);
-        const Frame frame = make_frame(depth, camera, {0.0001, 0.0, 0.0});
+        const Frame frame = make_frame(depth, camera, NoiseModel{0.0001, 0.0, 0.0});
         CHECK(static_cast<double>(frame.valid.size()) >= 0.99 * static_cast<double>(num_facing(camera, plane, depth)));
         for (const std::int32_t row : frame.valid) {
           CAPTURE(row);

@@ -35,7 +35,7 @@ Pose some_pose() {
 }
 
 Vector3d point_of(const Camera& camera, Eigen::Index pixel, double depth) {
-  const nacre::Ray& ray = camera.rays()[static_cast<std::size_t>(pixel)];
+  const nacre::Ray ray = camera.ray(static_cast<int>(pixel % camera.width()), static_cast<int>(pixel / camera.width()));
   return {ray.origin_x + depth * ray.direction_x, ray.origin_y + depth * ray.direction_y, depth * ray.direction_z};
 }
 

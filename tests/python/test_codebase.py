@@ -116,7 +116,9 @@ def test_only_the_facade_touches_the_extension_module() -> None:
 
 
 def test_no_build_depends_on_the_machine() -> None:
-    assert lines_matching(r"-march=native|-ffast-math|-Ofast", files(suffixes=CODE)) == []
+    # What nacre is measured against may be built for the machine: nothing of it is installed.
+    paths = [path for path in files(suffixes=CODE) if path.parent.name != "cpp_peers"]
+    assert lines_matching(r"-march=native|-ffast-math|-Ofast", paths) == []
     assert lines_matching(r"""(^|[\s"'(=`])/(home|root|work|tmp|Users)/""", files()) == []
 
 

@@ -36,9 +36,8 @@ def plain_wlop(samples, points, h, iterations, mu, method, theta="huang", weight
     def kernel(r):
         return np.where(r < h, np.exp(-rate * r**2), 0.0)
 
-    def divided(value, r, power, softening=0.0):
-        r = np.sqrt(r**2 + softening**2)
-        return np.where(r > 1e-6 * h, value / np.where(r > 0, r, 1.0) ** power, 0.0)
+    def divided(value, r, power, softening):
+        return np.where(r > 1e-5 * h, value / np.sqrt(r**2 + softening**2 + (r == 0)) ** power, 0.0)
 
     def distances(a, b):
         return np.linalg.norm(a[:, None] - b[None], axis=2)
@@ -47,6 +46,7 @@ def plain_wlop(samples, points, h, iterations, mu, method, theta="huang", weight
         return w @ rows / w.sum()
 
     softening = 0.02 * h if method == "wlop+" else 0.0
+    alone = 2 if method == "cgal" else 0
     count = np.ones(len(points)) if weights is None else weights
     density = kernel(distances(points, points)) @ count if method != "cgal" else np.ones(len(points))
     x = samples.copy()
@@ -55,9 +55,9 @@ def plain_wlop(samples, points, h, iterations, mu, method, theta="huang", weight
         r, s = distances(x, points), distances(x, x)
         alpha = kernel(r) * (count / density)
         if method == "cgal":
-            alpha[r < 1e-6 * h] = 0
+            alpha[r < 1e-5 * h] = 0
         elif iteration > 0:
-            alpha = divided(alpha, r, 1, softening)
+            alpha /= np.sqrt(r**2 + max(softening, 1e-6 * h) ** 2)
         w = kernel(s).sum(axis=1) + (method == "cgal")
         beta = kernel(s) * w
         np.fill_diagonal(beta, 0)
@@ -72,7 +72,7 @@ def plain_wlop(samples, points, h, iterations, mu, method, theta="huang", weight
             if not (r[i] < h).any():
                 continue
             step = mean(alpha[i], points) - x[i] if alpha[i].any() else np.zeros(3)
-            if beta[i].sum() > 0:
+            if beta[i].sum() > 0 and (s[i] < h).sum() - 1 >= alone:
                 floor = 0.1 / h if method == "wlop+" else 0.0
                 away = beta[i] @ (x[i] - x) / max(beta[i].sum(), floor)
                 if method == "wlop+":

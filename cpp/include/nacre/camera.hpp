@@ -1,11 +1,10 @@
-/// Camera models. One ray table serves all of them: the point seen by a pixel is origin + depth * direction.
+/// Camera models. To all of them, the point seen by a pixel is origin + depth * direction.
 #pragma once
 
 #include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
-#include <vector>
 
 #include "nacre/types.hpp"
 
@@ -21,6 +20,8 @@ struct Ray {
   float origin_x, origin_y;
   float direction_x, direction_y, direction_z;
 };
+
+struct RayTable;
 
 /// An immutable camera; copies are cheap and share the ray table. Pixel centres are integers.
 class Camera {
@@ -46,8 +47,10 @@ class Camera {
   DepthKind depth_kind() const { return depth_kind_; }
   double pixel_size() const { return pixel_size_; }  ///< [m]; 0 for a pinhole camera
 
-  /// height * width rays, row by row; NaN where the distortion model ends before the image does.
-  const std::vector<Ray>& rays() const { return *rays_; }
+  /// The ray of pixel (u, v); NaN where the distortion model ends before the image does.
+  Ray ray(int u, int v) const;
+  /// All rays, as the library itself reads them.
+  const RayTable& ray_table() const { return *rays_; }
 
   /// The pixel (u, v) that sees a point of the camera frame, distortion included; NaN behind a pinhole camera, and
   /// where the distortion model has ended: beyond its turning point it would fold far-off points back into the image.
@@ -71,7 +74,7 @@ class Camera {
   Distortion distortion_{};
   double max_radius_squared_ = std::numeric_limits<double>::infinity();  // of x^2 + y^2, where the distortion turns
   DepthKind depth_kind_ = DepthKind::z;
-  std::shared_ptr<const std::vector<Ray>> rays_;
+  std::shared_ptr<const RayTable> rays_;
 };
 
 }  // namespace nacre

@@ -34,16 +34,22 @@ struct ConsolidateOptions {
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };
 
-struct Consolidated {
-  Points points;
+template <class PointMatrix>
+struct BasicConsolidated {
+  PointMatrix points;
   Attributes attributes;              ///< one row a point: means of the input's, with the last attraction's weights
   std::vector<std::int64_t> sources;  ///< the input point that each point started from
 };
+
+using Consolidated = BasicConsolidated<Points>;
+using ConsolidatedDouble = BasicConsolidated<PointsDouble>;
 
 /// num_points of the input, chosen at random, moved as project_samples does; in the order of their sources. Input rows
 /// that are not finite are ignored, attribute values that are not finite are left out of the means.
 Consolidated consolidate(const PointsRef& points, const ConsolidateOptions& options = {},
                          const AttributesRef& attributes = Attributes());
+ConsolidatedDouble consolidate(const PointsDoubleRef& points, const ConsolidateOptions& options = {},
+                               const AttributesRef& attributes = Attributes());
 
 /// What project_samples of method wlop_plus may know besides positions; empty means "not known".
 struct ProjectionHints {
@@ -57,5 +63,7 @@ struct ProjectionHints {
 /// options.num_points and options.seed are not used.
 Points project_samples(const PointsRef& samples, const PointsRef& points, const ConsolidateOptions& options = {},
                        const ProjectionHints& hints = {});
+PointsDouble project_samples(const PointsDoubleRef& samples, const PointsDoubleRef& points,
+                             const ConsolidateOptions& options = {}, const ProjectionHints& hints = {});
 
 }  // namespace nacre

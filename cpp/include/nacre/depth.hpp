@@ -79,7 +79,7 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
                             const MaskRef& mask = MaskImage(), DepthReport* report = nullptr, int num_threads = 0);
 
 /// The valid pixels as points of the camera frame, row by row.
-Points back_project(const DepthRef& depth, const Camera& camera);
+Points back_project(const DepthRef& depth, const Camera& camera, int num_threads = 0);
 
 /// A depth image as organised points: row v * width + u of each array belongs to pixel (u, v); NaN where invalid.
 struct Frame {
@@ -92,7 +92,15 @@ struct Frame {
 
 /// Points and normals of a cleaned depth image. A plane is affine in inverse depth over the image of a pinhole camera
 /// and affine in depth for an orthographic one, so a normal is one linear fit over a window; the window (5 x 5 to
-/// 11 x 11) grows with the noise, and pixels across a depth edge are left out of it.
-Frame make_frame(const DepthRef& depth, const Camera& camera, const NoiseModel& noise, int num_threads = 0);
+/// 11 x 11) grows with the noise, and pixels across a depth edge are left out of it. Unset noise is measured from the
+/// image itself (estimate_noise). The second form reuses the memory of a frame of the same size.
+Frame make_frame(const DepthRef& depth, const Camera& camera, const std::optional<NoiseModel>& noise = std::nullopt,
+                 int num_threads = 0);
+void make_frame(const DepthRef& depth, const Camera& camera, const std::optional<NoiseModel>& noise, int num_threads,
+                Frame& frame);
+
+/// The normals of make_frame alone.
+Points depth_normals(const DepthRef& depth, const Camera& camera, const std::optional<NoiseModel>& noise = std::nullopt,
+                     int num_threads = 0);
 
 }  // namespace nacre

@@ -16,6 +16,10 @@ namespace nacre {
 using Points = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
 using PointsRef = Eigen::Ref<const Points>;
 
+/// The same in double precision, for coordinates far from the origin.
+using PointsDouble = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+using PointsDoubleRef = Eigen::Ref<const PointsDouble>;
+
 /// N x 3 colours, red green blue.
 using Colors = Eigen::Matrix<std::uint8_t, Eigen::Dynamic, 3, Eigen::RowMajor>;
 using ColorsRef = Eigen::Ref<const Colors>;

@@ -58,6 +58,9 @@ NACRE_INLINE F32 operator-(F32 a, F32 b) { return {_mm512_sub_ps(a.v, b.v)}; }
 NACRE_INLINE F32 operator*(F32 a, F32 b) { return {_mm512_mul_ps(a.v, b.v)}; }
 NACRE_INLINE F32 operator/(F32 a, F32 b) { return {_mm512_div_ps(a.v, b.v)}; }
 NACRE_INLINE F32 mul_add(F32 a, F32 b, F32 c) { return {_mm512_fmadd_ps(a.v, b.v, c.v)}; }
+// a + b and a - b where the mask is set, a elsewhere.
+NACRE_INLINE F32 add_where(Mask m, F32 a, F32 b) { return {_mm512_mask_add_ps(a.v, m.v, a.v, b.v)}; }
+NACRE_INLINE F32 sub_where(Mask m, F32 a, F32 b) { return {_mm512_mask_sub_ps(a.v, m.v, a.v, b.v)}; }
 NACRE_INLINE F32 sqrt(F32 a) { return {_mm512_sqrt_ps(a.v)}; }
 // Where a comparison with NaN decides, the second argument.
 NACRE_INLINE F32 min(F32 a, F32 b) { return {_mm512_min_ps(a.v, b.v)}; }
@@ -66,11 +69,17 @@ NACRE_INLINE F32 abs(F32 a) { return {_mm512_abs_ps(a.v)}; }
 
 NACRE_INLINE I32 operator+(I32 a, I32 b) { return {_mm512_add_epi32(a.v, b.v)}; }
 NACRE_INLINE I32 operator-(I32 a, I32 b) { return {_mm512_sub_epi32(a.v, b.v)}; }
+NACRE_INLINE I32 add_where(Mask m, I32 a, I32 b) { return {_mm512_mask_add_epi32(a.v, m.v, a.v, b.v)}; }
 NACRE_INLINE I32 operator&(I32 a, I32 b) { return {_mm512_and_si512(a.v, b.v)}; }
 NACRE_INLINE I32 operator|(I32 a, I32 b) { return {_mm512_or_si512(a.v, b.v)}; }
 template <int bits>
 NACRE_INLINE I32 shift_left(I32 a) {
   return {_mm512_slli_epi32(a.v, bits)};
+}
+// The sign comes down.
+template <int bits>
+NACRE_INLINE I32 shift_right(I32 a) {
+  return {_mm512_srai_epi32(a.v, bits)};
 }
 
 NACRE_INLINE I32 as_int(F32 a) { return {_mm512_castps_si512(a.v)}; }
@@ -93,6 +102,17 @@ NACRE_INLINE Mask first_lanes(int count) {
   return {static_cast<__mmask16>(count >= 16 ? 0xFFFFU : (1U << count) - 1U)};
 }
 NACRE_INLINE F32 select(Mask m, F32 a, F32 b) { return {_mm512_mask_blend_ps(m.v, b.v, a.v)}; }
+// x0 y0 z0 x1 y1 z1 ...: 3 lanes vectors. As 3 and the number of lanes have no common divisor, one permutation brings
+// all lanes of a vector to their places in the three that are stored.
+NACRE_INLINE void store_interleaved(float* p, F32 x, F32 y, F32 z) {
+  const __m512 a = _mm512_permutexvar_ps(_mm512_setr_epi32(0, 11, 6, 1, 12, 7, 2, 13, 8, 3, 14, 9, 4, 15, 10, 5), x.v);
+  const __m512 b = _mm512_permutexvar_ps(_mm512_setr_epi32(5, 0, 11, 6, 1, 12, 7, 2, 13, 8, 3, 14, 9, 4, 15, 10), y.v);
+  const __m512 c = _mm512_permutexvar_ps(_mm512_setr_epi32(10, 5, 0, 11, 6, 1, 12, 7, 2, 13, 8, 3, 14, 9, 4, 15), z.v);
+  constexpr __mmask16 first = 0x9249, second = 0x2492;
+  _mm512_storeu_ps(p, _mm512_mask_blend_ps(first, _mm512_mask_blend_ps(second, c, b), a));
+  _mm512_storeu_ps(p + 16, _mm512_mask_blend_ps(first, _mm512_mask_blend_ps(second, a, c), b));
+  _mm512_storeu_ps(p + 32, _mm512_mask_blend_ps(first, _mm512_mask_blend_ps(second, b, a), c));
+}
 NACRE_INLINE I32 select(Mask m, I32 a, I32 b) { return {_mm512_mask_blend_epi32(m.v, b.v, a.v)}; }
 
 #elif defined(__AVX2__) && defined(__FMA__)
@@ -121,6 +141,8 @@ NACRE_INLINE F32 operator-(F32 a, F32 b) { return {_mm256_sub_ps(a.v, b.v)}; }
 NACRE_INLINE F32 operator*(F32 a, F32 b) { return {_mm256_mul_ps(a.v, b.v)}; }
 NACRE_INLINE F32 operator/(F32 a, F32 b) { return {_mm256_div_ps(a.v, b.v)}; }
 NACRE_INLINE F32 mul_add(F32 a, F32 b, F32 c) { return {_mm256_fmadd_ps(a.v, b.v, c.v)}; }
+NACRE_INLINE F32 add_where(Mask m, F32 a, F32 b) { return {_mm256_add_ps(a.v, _mm256_and_ps(m.v, b.v))}; }
+NACRE_INLINE F32 sub_where(Mask m, F32 a, F32 b) { return {_mm256_sub_ps(a.v, _mm256_and_ps(m.v, b.v))}; }
 NACRE_INLINE F32 sqrt(F32 a) { return {_mm256_sqrt_ps(a.v)}; }
 NACRE_INLINE F32 min(F32 a, F32 b) { return {_mm256_min_ps(a.v, b.v)}; }
 NACRE_INLINE F32 max(F32 a, F32 b) { return {_mm256_max_ps(a.v, b.v)}; }
@@ -128,11 +150,18 @@ NACRE_INLINE F32 abs(F32 a) { return {_mm256_andnot_ps(_mm256_set1_ps(-0.0F), a.
 
 NACRE_INLINE I32 operator+(I32 a, I32 b) { return {_mm256_add_epi32(a.v, b.v)}; }
 NACRE_INLINE I32 operator-(I32 a, I32 b) { return {_mm256_sub_epi32(a.v, b.v)}; }
+NACRE_INLINE I32 add_where(Mask m, I32 a, I32 b) {
+  return {_mm256_add_epi32(a.v, _mm256_and_si256(_mm256_castps_si256(m.v), b.v))};
+}
 NACRE_INLINE I32 operator&(I32 a, I32 b) { return {_mm256_and_si256(a.v, b.v)}; }
 NACRE_INLINE I32 operator|(I32 a, I32 b) { return {_mm256_or_si256(a.v, b.v)}; }
 template <int bits>
 NACRE_INLINE I32 shift_left(I32 a) {
   return {_mm256_slli_epi32(a.v, bits)};
+}
+template <int bits>
+NACRE_INLINE I32 shift_right(I32 a) {
+  return {_mm256_srai_epi32(a.v, bits)};
 }
 
 NACRE_INLINE I32 as_int(F32 a) { return {_mm256_castps_si256(a.v)}; }
@@ -151,6 +180,15 @@ NACRE_INLINE Mask operator!(Mask a) { return {_mm256_xor_ps(a.v, _mm256_castsi25
 NACRE_INLINE unsigned bits(Mask a) { return static_cast<unsigned>(_mm256_movemask_ps(a.v)); }
 NACRE_INLINE Mask first_lanes(int count) { return I32{_mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7)} < broadcast(count); }
 NACRE_INLINE F32 select(Mask m, F32 a, F32 b) { return {_mm256_blendv_ps(b.v, a.v, m.v)}; }
+NACRE_INLINE void store_interleaved(float* p, F32 x, F32 y, F32 z) {
+  const __m256 a = _mm256_permutevar8x32_ps(x.v, _mm256_setr_epi32(0, 3, 6, 1, 4, 7, 2, 5));
+  const __m256 b = _mm256_permutevar8x32_ps(y.v, _mm256_setr_epi32(5, 0, 3, 6, 1, 4, 7, 2));
+  const __m256 c = _mm256_permutevar8x32_ps(z.v, _mm256_setr_epi32(2, 5, 0, 3, 6, 1, 4, 7));
+  constexpr int first = 0x49, second = 0x92;
+  _mm256_storeu_ps(p, _mm256_blend_ps(_mm256_blend_ps(c, b, second), a, first));
+  _mm256_storeu_ps(p + 8, _mm256_blend_ps(_mm256_blend_ps(b, a, second), c, first));
+  _mm256_storeu_ps(p + 16, _mm256_blend_ps(_mm256_blend_ps(a, c, second), b, first));
+}
 NACRE_INLINE I32 select(Mask m, I32 a, I32 b) { return {_mm256_blendv_epi8(b.v, a.v, _mm256_castps_si256(m.v))}; }
 
 #elif defined(NACRE_SSE2)
@@ -183,6 +221,8 @@ NACRE_INLINE F32 operator-(F32 a, F32 b) { return {_mm_sub_ps(a.v, b.v)}; }
 NACRE_INLINE F32 operator*(F32 a, F32 b) { return {_mm_mul_ps(a.v, b.v)}; }
 NACRE_INLINE F32 operator/(F32 a, F32 b) { return {_mm_div_ps(a.v, b.v)}; }
 NACRE_INLINE F32 mul_add(F32 a, F32 b, F32 c) { return a * b + c; }
+NACRE_INLINE F32 add_where(Mask m, F32 a, F32 b) { return {_mm_add_ps(a.v, _mm_and_ps(m.v, b.v))}; }
+NACRE_INLINE F32 sub_where(Mask m, F32 a, F32 b) { return {_mm_sub_ps(a.v, _mm_and_ps(m.v, b.v))}; }
 NACRE_INLINE F32 sqrt(F32 a) { return {_mm_sqrt_ps(a.v)}; }
 NACRE_INLINE F32 min(F32 a, F32 b) { return {_mm_min_ps(a.v, b.v)}; }
 NACRE_INLINE F32 max(F32 a, F32 b) { return {_mm_max_ps(a.v, b.v)}; }
@@ -190,11 +230,18 @@ NACRE_INLINE F32 abs(F32 a) { return {_mm_andnot_ps(_mm_set1_ps(-0.0F), a.v)}; }
 
 NACRE_INLINE I32 operator+(I32 a, I32 b) { return {_mm_add_epi32(a.v, b.v)}; }
 NACRE_INLINE I32 operator-(I32 a, I32 b) { return {_mm_sub_epi32(a.v, b.v)}; }
+NACRE_INLINE I32 add_where(Mask m, I32 a, I32 b) {
+  return {_mm_add_epi32(a.v, _mm_and_si128(_mm_castps_si128(m.v), b.v))};
+}
 NACRE_INLINE I32 operator&(I32 a, I32 b) { return {_mm_and_si128(a.v, b.v)}; }
 NACRE_INLINE I32 operator|(I32 a, I32 b) { return {_mm_or_si128(a.v, b.v)}; }
 template <int bits>
 NACRE_INLINE I32 shift_left(I32 a) {
   return {_mm_slli_epi32(a.v, bits)};
+}
+template <int bits>
+NACRE_INLINE I32 shift_right(I32 a) {
+  return {_mm_srai_epi32(a.v, bits)};
 }
 
 NACRE_INLINE I32 as_int(F32 a) { return {_mm_castps_si128(a.v)}; }
@@ -214,6 +261,16 @@ NACRE_INLINE unsigned bits(Mask a) { return static_cast<unsigned>(_mm_movemask_p
 NACRE_INLINE Mask first_lanes(int count) { return I32{_mm_setr_epi32(0, 1, 2, 3)} < broadcast(count); }
 NACRE_INLINE F32 select(Mask m, F32 a, F32 b) { return {_mm_or_ps(_mm_and_ps(m.v, a.v), _mm_andnot_ps(m.v, b.v))}; }
 NACRE_INLINE I32 select(Mask m, I32 a, I32 b) { return as_int(select(m, as_float(a), as_float(b))); }
+NACRE_INLINE void store_interleaved(float* p, F32 x, F32 y, F32 z) {
+  const F32 a = {_mm_shuffle_ps(x.v, x.v, _MM_SHUFFLE(1, 2, 3, 0))};
+  const F32 b = {_mm_shuffle_ps(y.v, y.v, _MM_SHUFFLE(2, 3, 0, 1))};
+  const F32 c = {_mm_shuffle_ps(z.v, z.v, _MM_SHUFFLE(3, 0, 1, 2))};
+  const Mask first = {_mm_castsi128_ps(_mm_setr_epi32(-1, 0, 0, -1))};
+  const Mask second = {_mm_castsi128_ps(_mm_setr_epi32(0, -1, 0, 0))};
+  store(p, select(first, a, select(second, b, c)));
+  store(p + 4, select(first, b, select(second, c, a)));
+  store(p + 8, select(first, c, select(second, a, b)));
+}
 
 #else  // plain loops, which a compiler for NEON and the like makes vectors of
 
@@ -266,6 +323,12 @@ NACRE_INLINE F32 operator/(F32 a, F32 b) {
   return each_lane<F32>([=](int i) { return a.v[i] / b.v[i]; });
 }
 NACRE_INLINE F32 mul_add(F32 a, F32 b, F32 c) { return a * b + c; }
+NACRE_INLINE F32 add_where(Mask m, F32 a, F32 b) {
+  return each_lane<F32>([=](int i) { return m.v[i] ? a.v[i] + b.v[i] : a.v[i]; });
+}
+NACRE_INLINE F32 sub_where(Mask m, F32 a, F32 b) {
+  return each_lane<F32>([=](int i) { return m.v[i] ? a.v[i] - b.v[i] : a.v[i]; });
+}
 NACRE_INLINE F32 sqrt(F32 a) {
   return each_lane<F32>([=](int i) { return ::sqrtf(a.v[i]); });
 }
@@ -285,6 +348,9 @@ NACRE_INLINE I32 operator+(I32 a, I32 b) {
 NACRE_INLINE I32 operator-(I32 a, I32 b) {
   return each_lane<I32>([=](int i) { return a.v[i] - b.v[i]; });
 }
+NACRE_INLINE I32 add_where(Mask m, I32 a, I32 b) {
+  return each_lane<I32>([=](int i) { return m.v[i] ? a.v[i] + b.v[i] : a.v[i]; });
+}
 NACRE_INLINE I32 operator&(I32 a, I32 b) {
   return each_lane<I32>([=](int i) { return a.v[i] & b.v[i]; });
 }
@@ -294,6 +360,10 @@ NACRE_INLINE I32 operator|(I32 a, I32 b) {
 template <int bits>
 NACRE_INLINE I32 shift_left(I32 a) {
   return each_lane<I32>([=](int i) { return static_cast<int32_t>(static_cast<uint32_t>(a.v[i]) << bits); });
+}
+template <int bits>
+NACRE_INLINE I32 shift_right(I32 a) {
+  return each_lane<I32>([=](int i) { return a.v[i] >> bits; });
 }
 
 NACRE_INLINE I32 as_int(F32 a) {
@@ -351,12 +421,29 @@ NACRE_INLINE F32 select(Mask m, F32 a, F32 b) {
 NACRE_INLINE I32 select(Mask m, I32 a, I32 b) {
   return each_lane<I32>([=](int i) { return m.v[i] ? a.v[i] : b.v[i]; });
 }
+NACRE_INLINE void store_interleaved(float* p, F32 x, F32 y, F32 z) {
+  for (int i = 0; i < lanes; ++i) {
+    p[3 * i] = x.v[i];
+    p[3 * i + 1] = y.v[i];
+    p[3 * i + 2] = z.v[i];
+  }
+}
 
 #endif
 
 NACRE_INLINE Mask operator>(F32 a, F32 b) { return b < a; }
 NACRE_INLINE Mask operator>=(F32 a, F32 b) { return b <= a; }
 NACRE_INLINE F32& operator+=(F32& a, F32 b) { return a = a + b; }
+// 1 / sqrt(a) of a positive number to 2 units in the last place, the same bits everywhere: Newton's method from an
+// estimate by the exponent. Half the time of a division by a square root.
+NACRE_INLINE F32 inverse_sqrt(F32 a) {
+  const F32 half = broadcast(0.5F) * a;
+  F32 y = as_float(broadcast(0x5F375A86) - shift_right<1>(as_int(a)));
+  for (int step = 0; step < 3; ++step) y = y * (broadcast(1.5F) - half * y * y);
+  return y;
+}
+NACRE_INLINE bool all(Mask a) { return bits(a) == (1U << lanes) - 1U; }
+NACRE_INLINE bool any(Mask a) { return bits(a) != 0; }
 
 // The sum of 16 values in a fixed order, whatever the number of lanes: i with i + 8, then i with i + 4, 2 and 1.
 NACRE_INLINE float sum_lanes(const F32 (&v)[16 / lanes]) {

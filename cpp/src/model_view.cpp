@@ -1,4 +1,4 @@
-#include "view_of_model.hpp"
+#include "model_view.hpp"
 
 #include <limits>
 

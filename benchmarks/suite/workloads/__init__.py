@@ -1,0 +1,1 @@
+"""The workloads, one idea a module; peers are imported where they are used."""
