@@ -55,6 +55,13 @@ Box<T> box_of(const BoxGroup<T>& group) {
   return box;
 }
 
+std::uint32_t curve_key(const float* point, const simd::CurveCube<float>& cube) {
+  return simd::curve_key_f32()(point, cube);
+}
+std::uint32_t curve_key(const double* point, const simd::CurveCube<double>& cube) {
+  return simd::curve_key_f64()(point, cube);
+}
+
 constexpr std::int64_t groups_for(std::int64_t children) { return (children + group_boxes - 1) / group_boxes; }
 
 // Fills groups with the boxes of the level below.
@@ -88,6 +95,8 @@ template <class T>
 void BlockTree<T>::build_blocks(const T* points, std::int64_t count, int num_threads) {
   SpatialOrder<T> order(points, count, num_threads);
   num_points_ = order.size();
+  cube_ = order.cube();
+  keys_.resize(static_cast<std::size_t>((num_points_ + block_points - 1) / block_points));
   blocks_ = Buffer<PointBlock<T>>(static_cast<std::size_t>((num_points_ + block_points - 1) / block_points));
   view_.blocks = blocks_.data();
   order.for_each_stretch(num_threads, [&](std::int64_t first, const std::uint64_t* entries, std::int64_t size) {
@@ -97,6 +106,7 @@ void BlockTree<T>::build_blocks(const T* points, std::int64_t count, int num_thr
       PointBlock<T>& block = blocks_[slot / block_points];
       const std::size_t lane = slot % block_points;
       const T* const point = points + 3 * static_cast<std::int64_t>(row);
+      if (lane == 0) keys_[slot / block_points] = curve_key(point, cube_);
       for (int axis = 0; axis < 3; ++axis) block.p[axis][lane] = point[axis];
       block.id[lane] = row;
     }

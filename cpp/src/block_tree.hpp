@@ -12,6 +12,7 @@
 
 #include "buffer.hpp"
 #include "simd/block_layout.hpp"
+#include "simd/curve_keys.hpp"
 #include "simd/near_points.hpp"
 
 namespace nacre {
@@ -42,9 +43,9 @@ inline double squared_bound(double distance) {
 // The k nearest within a distance, sorted, in the caller's memory.
 class KNearest {
  public:
-  static constexpr bool bound_shrinks = true;
   KNearest(int k, double bound_d2, Found* found)
       : bound_{bound_d2, no_id, no_id}, begin_(found), end_(found), full_(found + k) {}
+  int num_wanted() const { return static_cast<int>(full_ - begin_); }
   int size() const { return static_cast<int>(end_ - begin_); }
   const Found& bound() const { return bound_; }
   void add(const Found& point) {
@@ -64,7 +65,7 @@ class KNearest {
 // Everything within a distance, unsorted.
 class WithinRadius {
  public:
-  static constexpr bool bound_shrinks = false;
+  static int num_wanted() { return 0; }  // all
   WithinRadius(double bound_d2, std::vector<Found>& found) : bound_{bound_d2, no_id, no_id}, found_(found) {}
   const Found& bound() const { return bound_; }
   void add(const Found& point) {
@@ -99,10 +100,14 @@ class BlockTree {
  private:
   void build_blocks(const T* points, std::int64_t count, int num_threads);
   void build_groups(int num_threads);
+  struct Blocks {
+    std::uint32_t begin, end;
+  };
+  Blocks close_blocks(const Eigen::Vector3d& query, int num_points) const;
   template <class Results>
-  bool search_within_bound(const Eigen::Vector3d& query, Results& results) const;
+  bool search_within_bound(const Eigen::Vector3d& query, int most, Blocks seen, Results& results) const;
   template <class Results>
-  void search_nearest_first(const Eigen::Vector3d& query, Results& results) const;
+  void search_nearest_first(const Eigen::Vector3d& query, Blocks seen, Results& results) const;
   template <class Results>
   void show(const Eigen::Vector3d& query, std::uint32_t slot, Results& results) const;
   static Found nearest_possible(const BoxGroup<T>& group, int lane, const Eigen::Vector3d& query);
@@ -111,6 +116,8 @@ class BlockTree {
   Buffer<PointBlock<T>> blocks_;
   Buffer<BoxGroup<T>> groups_;  // level after level, the groups over the blocks first, the root last
   BlockTreeView<T> view_ = {};
+  simd::CurveCube<T> cube_ = {};
+  std::vector<std::uint32_t> keys_;  // of the blocks' first points
 };
 
 // No point of the box comes before this one: rounding is monotonic, so the box's distance is not above any of theirs.
@@ -123,11 +130,40 @@ Found BlockTree<T>::nearest_possible(const BoxGroup<T>& group, int lane, const E
   return {outside[0] * outside[0] + outside[1] * outside[1] + outside[2] * outside[2], group.first_id[lane], no_id};
 }
 
+// Where few points are within the bound, all are looked at. Else some that are close along the curve make it smaller.
 template <class T>
 template <class Results>
 void BlockTree<T>::search(const Eigen::Vector3d& query, Results& results) const {
   if (num_points_ == 0 || !query.allFinite()) return;
-  if (Results::bound_shrinks || !search_within_bound(query, results)) search_nearest_first(query, results);
+  Blocks seen = {0, 0};
+  if (results.num_wanted() > 0) {
+    if (search_within_bound(query, 64, seen, results)) return;
+    seen = close_blocks(query, results.num_wanted());
+    const std::int64_t end = std::min(num_points_, std::int64_t{seen.end} * block_points);
+    for (std::int64_t slot = std::int64_t{seen.begin} * block_points; slot < end; ++slot) {
+      show(query, static_cast<std::uint32_t>(slot), results);
+    }
+  }
+  if (search_within_bound(query, simd::most_near_points, seen, results)) return;
+  search_nearest_first(query, seen, results);
+}
+
+// The blocks around the query's place on the curve.
+template <class T>
+typename BlockTree<T>::Blocks BlockTree<T>::close_blocks(const Eigen::Vector3d& query, int num_points) const {
+  const T q[3] = {static_cast<T>(query.x()), static_cast<T>(query.y()), static_cast<T>(query.z())};
+  std::uint32_t key;
+  if constexpr (std::is_same_v<T, float>) {
+    key = simd::curve_key_f32()(q, cube_);
+  } else {
+    key = simd::curve_key_f64()(q, cube_);
+  }
+  const std::int64_t after = std::upper_bound(keys_.begin(), keys_.end(), key) - keys_.begin();
+  const std::int64_t around = (num_points + block_points / 2) / block_points;
+  const std::int64_t begin = std::max<std::int64_t>(after - 1 - around, 0);
+  const std::int64_t end =
+      std::min<std::int64_t>(std::max<std::int64_t>(after, 1) + around, static_cast<std::int64_t>(keys_.size()));
+  return {static_cast<std::uint32_t>(begin), static_cast<std::uint32_t>(end)};
 }
 
 template <class T>
@@ -139,18 +175,21 @@ void BlockTree<T>::show(const Eigen::Vector3d& query, std::uint32_t slot, Result
   results.add({x * x + y * y + z * z, block.id[lane], slot});
 }
 
-// False where there are too many points within it.
+// False where more points are within the bound.
 template <class T>
 template <class Results>
-bool BlockTree<T>::search_within_bound(const Eigen::Vector3d& query, Results& results) const {
+bool BlockTree<T>::search_within_bound(const Eigen::Vector3d& query, int most, Blocks seen, Results& results) const {
   std::uint32_t slots[simd::most_near_points + 16];
   int size;
   if constexpr (std::is_same_v<T, float>) {
-    size = simd::near_points_f32()(view_, query.data(), results.bound().d2, slots);
+    size = simd::near_points_f32()(view_, query.data(), results.bound().d2, most, slots);
   } else {
-    size = simd::near_points_f64()(view_, query.data(), results.bound().d2, slots);
+    size = simd::near_points_f64()(view_, query.data(), results.bound().d2, most, slots);
   }
-  for (int i = 0; i < size; ++i) show(query, slots[i], results);
+  for (int i = 0; i < size; ++i) {
+    const std::uint32_t block = slots[i] / block_points;
+    if (block < seen.begin || block >= seen.end) show(query, slots[i], results);
+  }
   return size >= 0;
 }
 
@@ -158,7 +197,7 @@ bool BlockTree<T>::search_within_bound(const Eigen::Vector3d& query, Results& re
 // a slightly enlarged bound, then its exact distance is compared.
 template <class T>
 template <class Results>
-void BlockTree<T>::search_nearest_first(const Eigen::Vector3d& query, Results& results) const {
+void BlockTree<T>::search_nearest_first(const Eigen::Vector3d& query, Blocks seen, Results& results) const {
   simd::NearBoxes<T>* near_boxes;
   simd::PointDistances<T>* point_distances;
   if constexpr (std::is_same_v<T, float>) {
@@ -208,6 +247,7 @@ void BlockTree<T>::search_nearest_first(const Eigen::Vector3d& query, Results& r
       open(level - 1, box);
       continue;
     }
+    if (box >= seen.begin && box < seen.end) continue;
     for (unsigned mask = point_distances(blocks_[box], q, limit); mask != 0; mask &= mask - 1) {
       show(query, box * block_points + static_cast<std::uint32_t>(simd::lowest_bit(mask)), results);
     }

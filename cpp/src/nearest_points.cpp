@@ -17,7 +17,7 @@ float squared_distance(const BlockTree<float>& tree, std::uint32_t slot, float x
 // The nearest point in float, found by a search that is exact.
 class NearestInFloat {
  public:
-  static constexpr bool bound_shrinks = true;
+  static int num_wanted() { return 1; }
   NearestInFloat(const BlockTree<float>& tree, float x, float y, float z, float largest2)
       : tree_(tree), x_(x), y_(y), z_(z) {
     set_bound(largest2);
@@ -143,6 +143,12 @@ class Search {
 
 void find_nearest_points(const BlockTree<float>& tree, const NearestPoints& queries, std::int64_t begin,
                          std::int64_t end, double max_distance) {
+  if (tree.num_points() == 0) {
+    std::fill(queries.slots + begin, queries.slots + end, no_slot);
+    std::fill(queries.squared_distances + begin, queries.squared_distances + end, infinity);
+    if (queries.next != nullptr) std::fill(queries.next + begin, queries.next + end, infinity);
+    return;
+  }
   Search(tree, queries, max_distance)(begin, end);
 }
 

@@ -4,8 +4,6 @@
 #include <limits>
 #include <utility>
 
-#include "simd/curve_keys.hpp"
-
 namespace nacre {
 namespace {
 
@@ -80,7 +78,7 @@ SpatialOrder<T>::SpatialOrder(const T* points, std::int64_t count, int num_threa
   });
   CurveBox<T> box = empty_box<T>();
   for (const CurveBox<T>& part : boxes) widen_box(part.lo, 2, box);  // by two corners
-  const CurveCube<T> cube = cube_around(box);
+  cube_ = cube_around(box);
 
   int stretch_bits = 0;
   while (stretch_bits < most_stretch_bits && (count >> stretch_bits) >= 2 * points_per_stretch) ++stretch_bits;
@@ -92,7 +90,7 @@ SpatialOrder<T>::SpatialOrder(const T* points, std::int64_t count, int num_threa
   std::vector<std::int64_t> places(num_chunks * num_stretches, 0);
   parallel_blocks(count, chunk_size, num_threads, [&](std::int64_t chunk, std::int64_t begin, std::int64_t end) {
     std::int64_t* place = places.data() + static_cast<std::size_t>(chunk) * num_stretches;
-    curve_keys(points + 3 * begin, end - begin, cube, keys.data() + begin);
+    curve_keys(points + 3 * begin, end - begin, cube_, keys.data() + begin);
     for (std::int64_t i = begin; i < end; ++i) {
       const std::uint32_t key = keys[static_cast<std::size_t>(i)];
       if (key != simd::no_key) ++place[key >> free_bits_];

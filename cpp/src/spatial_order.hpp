@@ -6,6 +6,7 @@
 
 #include "buffer.hpp"
 #include "parallel.hpp"
+#include "simd/curve_keys.hpp"
 
 namespace nacre {
 
@@ -23,7 +24,8 @@ class SpatialOrder {
 
   SpatialOrder(const T* points, std::int64_t count, int num_threads);
 
-  std::int64_t size() const { return stretches_.back(); }  // points that are finite
+  std::int64_t size() const { return stretches_.back(); }   // points that are finite
+  const simd::CurveCube<T>& cube() const { return cube_; }  // of the curve
 
   // use(first, entries, count) for each stretch, `first` being how many points come before it.
   template <class Use>
@@ -42,6 +44,7 @@ class SpatialOrder {
   void sort_smaller(Entry* entries, std::int64_t count);
 
   const T* points_;
+  simd::CurveCube<T> cube_ = {};
   int free_bits_;  // of the keys, that differ within a stretch
   Buffer<Entry> entries_;
   std::vector<std::int64_t> stretches_;  // where each begins, and the end

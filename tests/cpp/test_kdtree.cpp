@@ -148,6 +148,39 @@ TEST_CASE("a million metres away, doubles keep their digits") {
   check_all(Points(points.cast<float>()), queries, 8, inf);
 }
 
+TEST_CASE("clusters of any size beside each other") {
+  PointsDouble points = random_points(6000, 16);
+  points.middleRows(1000, 2000) *= 1e-4;
+  points.middleRows(3000, 2000) *= 1e-9;
+  points.row(5000) << 1e7, -1e7, 1e7;
+  PointsDouble queries(60, 3);
+  for (Eigen::Index i = 0; i < queries.rows(); ++i) queries.row(i) = points.row(100 * i) * 1.0001;
+  check_all(points, queries, 16, inf);
+  check_all(points, points, 2, 1e-5);
+  check_all(Points(points.cast<float>()), Points(queries.cast<float>()), 16, inf);
+  check_all(Points(points.cast<float>()), Points(points.cast<float>()), 3, inf);
+}
+
+TEST_CASE("k beyond what is sorted side by side") {
+  const PointsDouble points = random_points(2000, 17), queries = random_points(40, 18);
+  for (int k : {8, 9, 20, 21, 44, 45, 64, 65, 200, 2000, 2001}) {
+    CAPTURE(k);
+    check_all(points, queries, k, inf);
+    check_all(Points(points.cast<float>()), Points(queries.cast<float>()), k, 0.2);
+  }
+}
+
+TEST_CASE("the rows of a wider matrix") {
+  Eigen::Matrix<double, Eigen::Dynamic, 5, Eigen::RowMajor> wide(200, 5);
+  wide.setConstant(1e9);
+  wide.middleCols(1, 3) = random_points(200, 19);
+  const PointsDouble points = wide.middleCols(1, 3);
+  const Neighbors expected = KdTree(points).query(points, 4);
+  const Neighbors found = KdTree(PointsDoubleRef(wide.middleCols(1, 3))).query(wide.middleCols(1, 3), 4);
+  CHECK((found.indices.array() == expected.indices.array()).all());
+  CHECK((found.distances.array() == expected.distances.array()).all());
+}
+
 TEST_CASE("extreme magnitudes") {
   for (double scale : {1e-300, 1e-30, 1e18, 1e150}) {
     CAPTURE(scale);
@@ -188,9 +221,12 @@ TEST_CASE("a point at exactly the distance is found") {
 TEST_CASE("the same bits for any number of threads") {
   const Points points = random_points(30000, 14).cast<float>();
   const KdTree one(points, 1), four(points, 4);
-  const Neighbors a = one.query(points, 7, 0.05, 1), b = four.query(points, 7, 0.05, 3);
-  CHECK((a.indices.array() == b.indices.array()).all());
-  CHECK((a.distances.array() == b.distances.array()).all());
+  const Neighbors a = one.query(points, 7, 0.05, 1);
+  for (int num_threads : {2, 3, 4, 7, 8}) {
+    const Neighbors b = KdTree(points, num_threads).query(points, 7, 0.05, num_threads);
+    CHECK((a.indices.array() == b.indices.array()).all());
+    CHECK((a.distances.array() == b.distances.array()).all());
+  }
   const RadiusNeighbors c = one.query_radius(points, 0.03, 1), d = four.query_radius(points, 0.03, 4);
   CHECK(c.offsets == d.offsets);
   CHECK(c.indices == d.indices);

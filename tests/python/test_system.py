@@ -109,6 +109,33 @@ def test_an_unknown_instruction_set_is_an_error():
     assert "NACRE_SIMD must be baseline, avx2 or avx512, got mmx" in done.stderr
 
 
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="instruction sets are chosen on x86-64 only")
+@pytest.mark.parametrize("instruction_set", ["baseline", "avx2", "avx512"])
+def test_neighbours_and_normals_have_the_same_bits_on_every_instruction_set(instruction_set):
+    program = """
+        import hashlib, numpy as np, nacre
+        digest = hashlib.sha256()
+        rng = np.random.default_rng(11)
+        surface = rng.normal(size=(6000, 3))
+        surface /= np.linalg.norm(surface, axis=1, keepdims=True)
+        surface += rng.normal(scale=0.003, size=surface.shape)
+        lattice = rng.integers(0, 12, (3000, 3)) / 4
+        clouds = (surface, surface.astype(np.float32), surface + 1e6, lattice, lattice.astype(np.float32))
+        for points in clouds:
+            tree = nacre.KdTree(points)
+            for k in (1, 9, 16, 30, 70):
+                for array in tree.query(points, k) + tree.query(points[::3] + 0.01, k, max_distance=0.1):
+                    digest.update(array.tobytes())
+            digest.update(nacre.estimate_normals(points).tobytes())
+        print(digest.hexdigest())
+    """
+    forced = run_python(program, NACRE_SIMD=instruction_set)
+    if "which this processor does not have" in forced.stderr:
+        pytest.skip(f"no {instruction_set} here")
+    assert forced.returncode == 0, forced.stderr
+    assert forced.stdout == run_python(program).stdout
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="instruction sets are chosen on x86-64 only")
 def test_vector_objects_define_only_their_own_names(static_build: Path, run: Callable[..., str]) -> None:

@@ -34,4 +34,10 @@ using CurveKeys = void(const T* points, int64_t count, const CurveCube<T>& cube,
 NACRE_DECLARE_KERNEL(CurveKeys<float>, curve_keys_f32)
 NACRE_DECLARE_KERNEL(CurveKeys<double>, curve_keys_f64)
 
+// The key of one point, which is finite.
+template <class T>
+using CurveKey = uint32_t(const T* point, const CurveCube<T>& cube);
+NACRE_DECLARE_KERNEL(CurveKey<float>, curve_key_f32)
+NACRE_DECLARE_KERNEL(CurveKey<double>, curve_key_f64)
+
 }  // namespace nacre::simd

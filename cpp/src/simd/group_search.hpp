@@ -57,6 +57,13 @@ NACRE_INLINE void set_reach(double radius2, float squared_half, GroupFrame<T>& f
   frame.margin = (2.0F * radius + error) * error + 3e-7F * frame.radius2;
 }
 
+// Through memory: GCC 12 takes double(float(x)) for x in vectors.
+NACRE_INLINE void round_to(double value, float& rounded) {
+  volatile float memory = static_cast<float>(value);
+  rounded = memory;
+}
+NACRE_INLINE void round_to(double value, double& rounded) { rounded = value; }
+
 // Lays out the frame of the first queries; false where radius2 is beyond what the kernels handle.
 template <class T>
 NACRE_INLINE bool make_frame(const double (&queries)[3][group_queries], int size, double radius2,
@@ -77,7 +84,8 @@ NACRE_INLINE bool make_frame(const double (&queries)[3][group_queries], int size
         hi[i] = hi[i] > hi[i + n] ? hi[i] : hi[i + n];
       }
     }
-    const T origin = static_cast<T>(lo[0] + (hi[0] - lo[0]) / 2);
+    T origin;
+    round_to(lo[0] + (hi[0] - lo[0]) / 2, origin);
     for (int i = 0; i < group_queries; ++i) {
       frame.q[axis][i] = static_cast<float>((q[i] - static_cast<double>(origin)) * scale);
     }
@@ -100,7 +108,7 @@ NACRE_INLINE bool make_frame(const double* query, double radius2, GroupFrame<T>&
   const double scale = scale_for(radius2);
   float squared_half = 0.0F;
   for (int axis = 0; axis < 3; ++axis) {
-    frame.origin[axis] = static_cast<T>(query[axis]);
+    round_to(query[axis], frame.origin[axis]);
     frame.q[axis][0] = static_cast<float>((query[axis] - static_cast<double>(frame.origin[axis])) * scale);
     frame.half[axis] = fabsf(frame.q[axis][0]);
     squared_half += frame.half[axis] * frame.half[axis];
@@ -136,9 +144,10 @@ NACRE_INLINE F32 local_lanes(const double* p, double origin, double scale) {
 #endif
 }
 
-// Collects the points within reach of the queries' box; false where there are too many.
+// Collects the points within reach of the queries' box; false where they are more than `most`.
 template <Position position, class T>
-NACRE_INLINE bool collect(const BlockTreeView<T>& tree, const GroupFrame<T>& frame, Candidates& out) {
+NACRE_INLINE bool collect(const BlockTreeView<T>& tree, const GroupFrame<T>& frame, Candidates& out,
+                          int most = most_candidates) {
   constexpr int most_boxes = 512;
   int32_t lists[2][most_boxes + group_boxes];
   const F32 reach2 = broadcast(frame.reach2), zero = broadcast(0.0F);
@@ -164,7 +173,7 @@ NACRE_INLINE bool collect(const BlockTreeView<T>& tree, const GroupFrame<T>& fra
         store_chosen(below + num_below, near, lane_numbers() + broadcast(boxes[i] * group_boxes + lane));
         num_below += simd::NACRE_ISA::count(near);
       }
-      if (num_below > most_boxes) return false;
+      if (num_below > most_boxes || num_below > most) return false;
     }
     int32_t* const swap = boxes;
     boxes = below;
@@ -190,7 +199,7 @@ NACRE_INLINE bool collect(const BlockTreeView<T>& tree, const GroupFrame<T>& fra
       store_chosen(out.slot + n, near, lane_numbers() + broadcast(boxes[i] * block_points + lane));
       n += simd::NACRE_ISA::count(near);
     }
-    if (n > most_candidates) return false;
+    if (n > most) return false;
   }
   out.count = n;
   if constexpr (position == Position::local) {

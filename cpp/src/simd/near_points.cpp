@@ -96,10 +96,10 @@ unsigned point_distances(const PointBlock<T>& block, const T* place, T limit) {
 }
 
 template <class T>
-int near_points(const BlockTreeView<T>& tree, const double* place, double radius2, uint32_t* slots) {
+int near_points(const BlockTreeView<T>& tree, const double* place, double radius2, int most, uint32_t* slots) {
   GroupFrame<T> frame;
   Candidates candidates;
-  if (!make_frame(place, radius2, frame) || !collect<Position::none>(tree, frame, candidates)) return -1;
+  if (!make_frame(place, radius2, frame) || !collect<Position::none>(tree, frame, candidates, most)) return -1;
   memcpy(slots, candidates.slot, static_cast<size_t>(candidates.count) * sizeof *slots);
   return candidates.count;
 }
@@ -120,11 +120,11 @@ unsigned point_distances_f32(const PointBlock<float>& block, const float* place,
 unsigned point_distances_f64(const PointBlock<double>& block, const double* place, double limit) {
   return point_distances(block, place, limit);
 }
-int near_points_f32(const BlockTreeView<float>& tree, const double* place, double radius2, uint32_t* slots) {
-  return near_points(tree, place, radius2, slots);
+int near_points_f32(const BlockTreeView<float>& tree, const double* place, double radius2, int most, uint32_t* slots) {
+  return near_points(tree, place, radius2, most, slots);
 }
-int near_points_f64(const BlockTreeView<double>& tree, const double* place, double radius2, uint32_t* slots) {
-  return near_points(tree, place, radius2, slots);
+int near_points_f64(const BlockTreeView<double>& tree, const double* place, double radius2, int most, uint32_t* slots) {
+  return near_points(tree, place, radius2, most, slots);
 }
 
 }  // namespace nacre::simd::NACRE_ISA

@@ -35,9 +35,10 @@ NACRE_DECLARE_KERNEL(PointDistances<double>, point_distances_f64)
 constexpr int most_near_points = 1024;
 
 // Where all points are that are within a radius, and some that are hardly beyond it. Returns how many, or -1 where they
-// are more than most_near_points or the radius is beyond what floats can do. `slots` has room for 16 more.
+// are more than `most`, which is up to most_near_points, or the radius is beyond what floats can do. `slots` has room
+// for 16 more.
 template <class T>
-using NearPoints = int(const BlockTreeView<T>& tree, const double* place, double radius2, uint32_t* slots);
+using NearPoints = int(const BlockTreeView<T>& tree, const double* place, double radius2, int most, uint32_t* slots);
 NACRE_DECLARE_KERNEL(NearPoints<float>, near_points_f32)
 NACRE_DECLARE_KERNEL(NearPoints<double>, near_points_f64)
 
