@@ -17,7 +17,7 @@ lint:
 format:
 	ruff check --fix .
 	ruff format .
-	find cpp python tests examples -name '*.[ch]pp' -exec clang-format -i {} +
+	find cpp python tests examples benchmarks -name '*.[ch]pp' -exec clang-format -i {} +
 
 stub:  # _core.pyi, from the installed extension module
 	pip install pybind11-stubgen

@@ -84,7 +84,7 @@ def accepted(result: Result, about: dict[str, Any]) -> bool:
 
 def ratio(peer: Result, ours: Result) -> float:
     """Return how many times faster nacre is."""
-    return median(peer["seconds"]) / median(ours["seconds"])
+    return float(median(peer["seconds"]) / median(ours["seconds"]))
 
 
 def workload(run: dict[str, Any], name: str) -> str:

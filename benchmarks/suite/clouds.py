@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -44,7 +44,7 @@ def scan(size: int, seed: int, sigma: float = 0.0005) -> tuple[Array, Array]:
     return points + sigma * rng.normal(size=points.shape), normals
 
 
-@cache
+@lru_cache(maxsize=2)
 def cloud(size: int, seed: int = 1, ordered: bool = False) -> dict[str, Array]:
     """Return a scan as float32 and, with the same values, as float64; along a Morton curve if ordered."""
     points, normals = scan(size, seed)
@@ -67,7 +67,8 @@ def morton_codes(points: Array) -> Array:
         (2, 0x1249249249249249),
     ):
         cells = (cells | (cells << np.uint64(shift))) & np.uint64(mask)
-    return cells[:, 0] | cells[:, 1] << np.uint64(1) | cells[:, 2] << np.uint64(2)
+    codes: Array = cells[:, 0] | cells[:, 1] << np.uint64(1) | cells[:, 2] << np.uint64(2)
+    return codes
 
 
 def rotation(axis: Any, degrees: float) -> Array:
@@ -75,7 +76,8 @@ def rotation(axis: Any, degrees: float) -> Array:
     x, y, z = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     angle = np.radians(degrees)
-    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    turn: Array = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return turn
 
 
 def degrees_between(a: Array, b: Array) -> float:

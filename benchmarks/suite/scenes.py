@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from nacre import Camera, Mesh
+from nacre import Camera, Mesh, NoiseModel
 from suite.clouds import Array, bumpy_surface, rotation
 
 CAMERA = Camera(width=640, height=480, fx=525, fy=525, cx=319.5, cy=239.5)
@@ -118,7 +118,7 @@ def recording(scene: str, num_given: int, num_frames: int) -> Recording:
 
     def views(angles: Array, seed: int) -> tuple[Array, Array]:
         poses = np.array([pose_at(angle) for angle in angles])
-        noise = 0.0005 if scene == "object" else "kinect"
+        noise = NoiseModel(0.0005) if scene == "object" else NoiseModel.kinect()
         depths = [
             mesh().simulate_depth(CAMERA, pose, noise=noise, edge_mixing=1, seed=seed + i)
             for i, pose in enumerate(poses)

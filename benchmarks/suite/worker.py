@@ -62,7 +62,7 @@ def turn(
         peak = memory("VmHWM") - before if before is not None else None
         errors = {name: float(value) for name, value in workload.check(arrays, answer).items()}
         return {"seconds": seconds, "stages": stages, "errors": errors, "memory": peak}
-    runs = []
+    runs: list[tuple[float, dict[str, float]]] = []
     while sum(run[0] for run in runs) < TURN and len(runs) < 25:
         runs.append(run_once(contender, arrays, threads)[:2])
     seconds, stages = sorted(runs, key=lambda run: run[0])[len(runs) // 2]
@@ -96,7 +96,8 @@ def memory(field: str) -> int:
 
 def load(folder: Path) -> dict[str, Any]:
     """Map the arrays of a folder into memory, all pages present; what is written to them stays here."""
-    arrays = {path.stem: np.load(path, mmap_mode="c") for path in sorted(folder.glob("*.npy"))}
+    paths = sorted(folder.glob("*.npy"))
+    arrays = {path.stem: np.asarray(np.load(path, mmap_mode="c")) for path in paths}
     for array in arrays.values():
         array.max(initial=0)
     return arrays

@@ -13,7 +13,7 @@ import numpy as np
 from suite.clouds import degrees_between
 from suite.registry import Arrays, Contender, Lap, Run, Workload
 
-FRAMES, MOST_FRAMES, FAR = 12, 60, 10.0
+FRAMES, MOST_FRAMES, FAR = 12, 60, 4.0
 STAGES = ("preprocess", "back_project", "registration", "fold_in", "normals")
 DATA = "NACRE_BENCHMARK_DATA"
 """The environment variable that names the folder of real recordings."""
@@ -43,10 +43,11 @@ def recorded(name: str, voxel: float) -> dict[str, Any]:
     """Return a real recording; the first frame is given."""
     import nacre
 
-    sequence = list(itertools.islice(nacre.open_sequence(Path(os.environ[DATA]) / name), MOST_FRAMES + 1))
+    known = (frame for frame in nacre.open_sequence(Path(os.environ[DATA]) / name) if frame.truth is not None)
+    sequence = list(itertools.islice(known, MOST_FRAMES + 1))
     camera = sequence[0].camera
     frames = np.array([np.asarray(frame.depth, np.float32) for frame in sequence])
-    poses = np.array([frame.world_from_camera for frame in sequence])
+    poses = np.array([frame.truth for frame in sequence])
     return {
         "given": frames[:1],
         "given poses": poses[:1],
@@ -217,7 +218,7 @@ WORKLOADS = [
         note=f"{SWAY} The noise of structured light, mixed pixels at edges.",
     ),
 ]
-for _name, _voxel in {"tum-fr1-rpy": 0.008, "tum-fr3-teddy": 0.006}.items():
+for _name, _voxel in {"tum-fr1-rpy": 0.008, "tum-fr3-teddy": 0.01}.items():
     if DATA in os.environ and (Path(os.environ[DATA]) / _name).is_dir():
         _work = workload(
             f"loop-{_name}",

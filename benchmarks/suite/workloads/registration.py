@@ -27,7 +27,7 @@ def pairs() -> dict[str, Any]:
         targets.append(scan(SIZE, 10 + 2 * i)[0].astype(np.float32))
         source = (scan(SIZE, 11 + 2 * i)[0] - truth[i, :3, 3]) @ truth[i, :3, :3]
         sources.append(source.astype(np.float32))
-    arrays = {"sources": np.array(sources), "targets": np.array(targets), "truth": truth}
+    arrays: dict[str, Any] = {"sources": np.array(sources), "targets": np.array(targets), "truth": truth}
     return {**arrays, **{f"{name}64": arrays[name].astype(np.float64) for name in ("sources", "targets")}}
 
 
