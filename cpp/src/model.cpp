@@ -120,7 +120,7 @@ void ModelOptions::check() const {
 struct Model::Impl {
   Camera camera;
   ModelOptions options;  // what the first frame decides is filled in
-  Frame frame;  // the newest; its memory and the observer's are used again for the next
+  Frame frame;           // the newest; its memory and the observer's are used again for the next
   SurfaceObserver observer{camera, options.fusion};
   PointModel cloud;
   std::vector<FrameReport> reports;

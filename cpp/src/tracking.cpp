@@ -5,10 +5,10 @@
 #include <sstream>
 
 #include "icp_target.hpp"
+#include "model_view.hpp"
 #include "parallel.hpp"
 #include "random.hpp"
 #include "surface_observer.hpp"
-#include "model_view.hpp"
 
 namespace nacre {
 namespace {

@@ -177,7 +177,9 @@ def test_same_bits_with_all_threads(work: str) -> None:
 @pytest.mark.parametrize("work", ["align symmetric", "Model default, large"])
 def test_same_bits_every_time(work: str) -> None:
     """Whatever was in the memory before."""
-    program = f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import test_determinism as t; "
+    program = (
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import test_determinism as t; "
+    )
     program += f"print(t.WORK[{work!r}](2))"
     digests = {
         subprocess.run(
