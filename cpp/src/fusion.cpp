@@ -36,6 +36,11 @@ struct Known {
   PixelIndex points;
 };
 
+// Between neighbours on a surface that the camera sees at a depth [m].
+float spacing_at(float z, const Camera& camera, double spacing) {
+  return static_cast<float>(std::max(spacing, least_pixels * camera.footprint(z)));
+}
+
 struct NewPoint {
   std::int32_t row = 0;
   Eigen::Vector3f point = Eigen::Vector3f::Zero(), normal = point;  // camera frame
@@ -92,7 +97,8 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
             continue;
           }
           seen[block.size()] = j;
-          observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma, static_cast<float>(spacing));
+          observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma,
+                       spacing_at(points.z[j], camera, spacing));
         }
         observer.observe_and_cover(block, sheet_cosine);
         for (int k = 0; k < block.size(); ++k) {
@@ -155,7 +161,7 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
       candidate.point = frame.points.row(row).transpose();
       candidate.normal = frame.normals.row(row).transpose();
       if (!(candidate.normal.dot(observer.towards_camera(candidate.point)) > least_facing)) continue;
-      candidate.spacing = static_cast<float>(std::max(spacing, least_pixels * camera.footprint(candidate.point.z())));
+      candidate.spacing = spacing_at(candidate.point.z(), camera, spacing);
       observer.add(block, candidate.point, candidate.normal, row, frame.sigma[row], candidate.spacing);
       candidates.push_back(candidate);
     }
