@@ -173,6 +173,7 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   damped.diagonal().array() += damping * sums.weight;
   const Vector6 solution =
       sure * (sure.transpose() * damped * sure).ldlt().solve(sure.transpose() * equations.gradient);
+  step.reduction = solution.dot(equations.hessian * solution);
   Vector6 scale;
   scale << extent, extent, extent, 1.0, 1.0, 1.0;
   step.hessian = scale.asDiagonal() * equations.hessian * scale.asDiagonal();

@@ -23,6 +23,7 @@ inline double residual(const Pair& pair, Metric metric) {
 struct IcpStep {
   Pose motion = Pose::Identity();  // p <- motion * p
   double size = 0.0;               // how far the motion moves the pairs, root mean square [m]
+  double reduction = 0.0;          // of the weighted squares, as far as they are linear [m^2]
   double rmse = 0.0;               // of the residuals before the motion [m]
   double variance = 0.0;           // weighted mean of the squared residuals before the motion [m^2]
   Eigen::Vector3d center = Eigen::Vector3d::Zero();

@@ -55,15 +55,14 @@ class Schedule {
   const Gate& gate() const { return gate_; }
   std::int64_t num_samples() const { return source_.levels[level_]; }
 
-  // After a step: returns false when the pose is at rest with the last gate and all points.
-  bool advance(double step_size, double residual_scale, double resting_size) {
+  // After a step that was small, or not: returns false when the pose is at rest with the last gate and all points.
+  bool advance(bool at_rest, double residual_scale) {
     ++iteration_;
     ++iterations_at_level_;
     const bool shrinking = !at_smallest_;
     update_gate(residual_scale);
     if (shrinking) return true;
     const bool is_last = level_ + 1 == source_.levels.size();
-    const bool at_rest = step_size < resting_size;
     if (at_rest && is_last) return false;
     if (!is_last && (at_rest || iterations_at_level_ >= 8)) set_level(level_ + 1);
     return true;
@@ -138,9 +137,9 @@ AlignResult iterate(const IcpTarget& target, const IcpSource& source, const Pose
     }
     pose = step.motion * pose;
     result.iterations = iteration + 1;
-    // The accuracy that these residuals allow: six unknowns from so many pairs.
-    const double accuracy = scale * std::sqrt(6.0 / static_cast<double>(pairs.size()));
-    at_rest = !schedule.advance(step.size, scale, std::max(resolution, 0.2 * accuracy));
+    // At rest where the step is a fifth of what the residuals' noise leaves uncertain in each of six unknowns.
+    const bool is_small = step.size < resolution || step.reduction < 6.0 * 0.04 * scale * scale;
+    at_rest = !schedule.advance(is_small, scale);
   }
 
   schedule.finish();

@@ -185,8 +185,9 @@ struct Search {
   // Near: the guess is about right, and a narrow gate is safest. Wide: it is not. Strict: see judge.
   TrackingResult register_from(const Pose& guess, bool wide, bool strict) const {
     const View view = points_in_view(model, camera, guess, options.num_threads);
-    const IcpTarget target(AlignCloud(view.points, view.normals), options.registration);
     AlignOptions align_options = options.registration;
+    align_options.max_points = 0;  // the view is thin enough
+    const IcpTarget target(AlignCloud(view.points, view.normals), align_options);
     double verdict_gate =
         align_options.final_distance > 0.0 ? align_options.final_distance : std::numeric_limits<double>::infinity();
     if (!(align_options.final_distance > 0.0)) {

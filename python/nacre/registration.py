@@ -31,7 +31,7 @@ class RegistrationParameters:
     max_angle: float = 0.7853982
     robust: bool = True
     sample_fraction: float = 1.0
-    max_points: int = 30000
+    max_points: int = 10000
     max_samples: int = 5000
     coarse_samples: int = 600
     keep_best: bool = False
@@ -144,7 +144,7 @@ def align(
     max_angle: float = 0.7853982,
     robust: bool = True,
     sample_fraction: float = 1.0,
-    max_points: int = 30000,
+    max_points: int = 10000,
     max_samples: int = 5000,
     coarse_samples: int = 600,
     keep_best: bool = False,

@@ -26,7 +26,7 @@ struct AlignOptions {
   double max_angle = 0.7853982;  ///< pairs whose normals differ more are rejected [rad]; 45 degrees
   bool robust = true;            ///< weights of Geman and McClure on the residuals, scaled by their median
   double sample_fraction = 1.0;  ///< part of the source points that is used
-  int max_points = 30000;    ///< at most so many points of each cloud are looked at, where final_distance is 0; 0: all
+  int max_points = 10000;    ///< at most so many points of each cloud are looked at, where final_distance is 0; 0: all
   int max_samples = 5000;    ///< at most so many of them in the last iterations; 0: no limit
   int coarse_samples = 600;  ///< at most so many of them while the gate shrinks; 0: no limit
   bool keep_best = false;    ///< return the iterate of least rmse instead of the last (the paper's choice)
