@@ -7,9 +7,9 @@
 #include "check.hpp"
 #include "fusion_step.hpp"
 #include "image_index.hpp"
+#include "model_view.hpp"
 #include "parallel.hpp"
 #include "point_grid.hpp"
-#include "model_view.hpp"
 
 namespace nacre {
 namespace {

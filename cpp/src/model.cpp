@@ -120,7 +120,8 @@ void ModelOptions::check() const {
 struct Model::Impl {
   Camera camera;
   ModelOptions options;  // what the first frame decides is filled in
-  SurfaceObserver observer{camera, options.fusion};  // of the newest frame
+  Frame frame;           // the newest; its memory and the observer's are used again for the next
+  SurfaceObserver observer{camera, options.fusion};
   PointModel cloud;
   std::vector<FrameReport> reports;
   std::vector<Pose> poses;  // of the registered frames, oldest first
@@ -136,10 +137,10 @@ struct Model::Impl {
   }
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
-  TrackingResult locate(const Frame& frame, const FrameExtras& extras) const;
+  TrackingResult locate(const FrameExtras& extras) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   std::vector<Pose> key_poses() const;
-  void fold_in(const Frame& frame, FrameReport& report);
+  void fold_in(FrameReport& report);
 };
 
 // The loop: clean the image, make points of it, register them to the model, fold them in, renew the normals.
@@ -152,17 +153,15 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
 
   const DepthImage clean =
       preprocess_depth(depth, camera, options.depth, extras.mask, &report.depth, options.num_threads);
-  const NoiseModel noise =
-      options.depth.noise ? *options.depth.noise : estimate_noise(clean, camera, options.num_threads);
   report.milliseconds.preprocess = watch.lap();
 
-  const Frame frame = make_frame(clean, camera, noise, options.num_threads);
+  make_frame(clean, camera, options.depth.noise, options.num_threads, frame);
   if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
   const ColorsRef colors(extras.colors);
   observer.look_at(frame, colors, options.num_threads);
   report.milliseconds.back_project = watch.lap();
 
-  const TrackingResult tracking = locate(frame, extras);
+  const TrackingResult tracking = locate(extras);
   report.status = tracking.status;
   report.reason = tracking.reason;
   report.world_from_camera = tracking.alignment.target_from_source;
@@ -180,7 +179,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     poses.push_back(report.world_from_camera);
     if (report.status == FrameStatus::tracked) {
       if (was_lost) report.status = FrameStatus::relocalised;
-      fold_in(frame, report);
+      fold_in(report);
     }
   }
   was_lost = report.status == FrameStatus::lost && !poses.empty();
@@ -192,7 +191,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   return report;
 }
 
-TrackingResult Model::Impl::locate(const Frame& frame, const FrameExtras& extras) const {
+TrackingResult Model::Impl::locate(const FrameExtras& extras) const {
   TrackingResult result;
   result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
   if (frame.valid.size() < least_pixels) {
@@ -233,7 +232,7 @@ std::vector<Pose> Model::Impl::key_poses() const {
   return chosen;
 }
 
-void Model::Impl::fold_in(const Frame& frame, FrameReport& report) {
+void Model::Impl::fold_in(FrameReport& report) {
   StopWatch watch;
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
   if (options.fold_in != FoldIn::fuse) {

@@ -10,7 +10,7 @@
 #include "nacre/camera.hpp"
 #include "nacre/depth.hpp"
 #include "scratch.hpp"
-#include "simd/normal_row.hpp"
+#include "simd/planar_row.hpp"
 
 namespace nacre {
 

@@ -5,10 +5,10 @@
 #include <sstream>
 
 #include "icp_target.hpp"
+#include "model_view.hpp"
 #include "parallel.hpp"
 #include "random.hpp"
 #include "surface_observer.hpp"
-#include "model_view.hpp"
 
 namespace nacre {
 namespace {
@@ -48,7 +48,7 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
   std::size_t num_found = 0;
   for (const auto& rows : found) num_found += rows.size();
   const std::size_t step = (num_found + max_target_points - 1) / max_target_points;
-  const auto count = static_cast<Eigen::Index>(step > 0 ? (num_found + step - 1) / step : 0);
+  const auto count = static_cast<Eigen::Index>(step > 0 ? num_found / step : 0);
   View view{Points(count, 3), Points(count, 3)};
   // One of every `step`, at random.
   const auto is_chosen = [&](std::size_t index) { return index % step == random_bits(0, index / step) % step; };

@@ -188,8 +188,8 @@ def align(
     sample_fraction : float
         Part of the source points that is used.
     max_points : int
-        At most so many points of each cloud are looked at, chosen at random and spread evenly over the rows, where
-        ``final_distance`` is 0. 0: no limit.
+        At most so many points of each cloud are looked at, chosen at random and spread evenly over the rows,
+        where ``final_distance`` is 0. 0: no limit.
     max_samples, coarse_samples : int
         At most so many source points are matched: in all, and while the gate shrinks. 0: no limit.
     keep_best : bool

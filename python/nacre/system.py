@@ -9,8 +9,8 @@ def instruction_set() -> str:
     Returns
     -------
     str
-        ``"baseline"``, ``"avx2"`` (x86-64-v3) or ``"avx512"`` (x86-64-v4): the best that the processor has, or
-        the one that the environment variable ``NACRE_SIMD`` named when it was first needed.
+        ``"baseline"``, ``"avx2"`` (x86-64-v3) or ``"avx512"`` (x86-64-v4): the best that the processor has,
+        or the one that the environment variable ``NACRE_SIMD`` named when it was first needed.
 
     Raises
     ------

@@ -5,9 +5,9 @@
 #include <numeric>
 #include <set>
 
+#include "cell_order.hpp"
 #include "doctest/doctest.h"
 #include "random.hpp"
-#include "cell_order.hpp"
 
 using namespace nacre;
 
@@ -139,6 +139,5 @@ TEST_CASE("no points, one point, a row stride") {
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> wide(200, 5);
   wide << points, Eigen::MatrixXd::Zero(200, 2);
   const PointsDoubleRef strided(wide.leftCols(3));
-  CHECK(cell_order(strided, cell_lattice<PointsDoubleRef>({&strided}, 0.1, 1), 1).rows ==
-        order_of(points, 0.1).rows);
+  CHECK(cell_order(strided, cell_lattice<PointsDoubleRef>({&strided}, 0.1, 1), 1).rows == order_of(points, 0.1).rows);
 }

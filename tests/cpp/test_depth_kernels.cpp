@@ -105,7 +105,7 @@ Eigen::Vector3d normal_of(const PlanarImage& image, const Camera& camera, const 
   const float own = image.row(v)[u];
   if (own != own) return none;
   const auto spread = [](int r) { return static_cast<float>((2 * r + 1) * (2 * r + 1) * r * (r + 1)) / 3.0F; };
-  int radius = simd::least_window;
+  int radius = simd::least_normal_window;
   while (radius < simd::largest_normal_window &&
          evaluate(rule.sigma, own) > rule.slope_sigma * evaluate(rule.unit_slope, own) * std::sqrt(spread(radius))) {
     ++radius;

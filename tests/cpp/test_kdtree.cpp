@@ -156,9 +156,9 @@ TEST_CASE("clusters of any size beside each other") {
   PointsDouble queries(60, 3);
   for (Eigen::Index i = 0; i < queries.rows(); ++i) queries.row(i) = points.row(100 * i) * 1.0001;
   check_all(points, queries, 16, inf);
-  check_all(points, points, 2, 1e-5);
+  check_all(points, queries, 2, 1e-5);
   check_all(Points(points.cast<float>()), Points(queries.cast<float>()), 16, inf);
-  check_all(Points(points.cast<float>()), Points(points.cast<float>()), 3, inf);
+  check_all(Points(points.cast<float>()), queries, 3, inf);
 }
 
 TEST_CASE("k beyond what is sorted side by side") {

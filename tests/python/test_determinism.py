@@ -2,7 +2,11 @@
 
 import functools
 import hashlib
+import os
+import subprocess
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -90,6 +94,23 @@ def of_model(preset: Any, num_threads: int) -> str:
     )
 
 
+@functools.cache
+def relief(index: int) -> Any:
+    """A wavy wall that fills an image, so that the model is larger than what a frame is registered to."""
+    v, u = np.mgrid[:480, :640]
+    noise = np.random.default_rng(index).normal(scale=0.0005, size=u.shape)
+    return (0.8 + 0.02 * np.sin(u / 23 + 0.02 * index) * np.cos(v / 31) + noise).astype(np.float32)
+
+
+def of_large_model(num_threads: int) -> str:
+    wide = nacre.Camera(width=640, height=480, fx=525, fy=525, cx=319.5, cy=239.5)
+    model = nacre.Model(wide, num_threads=num_threads)
+    for index in range(3):
+        model.add_frame(relief(index))
+    assert len(model) > 30000
+    return digest(model.points, model.normals, model.poses)
+
+
 def of_simulation(num_threads: int) -> str:
     pose = nacre.turntable_poses(thing())[1]
     return digest(
@@ -137,6 +158,7 @@ WORK: dict[str, Callable[[int], str]] = {
     "preprocess gradient": functools.partial(of_preprocessing, "gradient"),
     "simulate_depth": of_simulation,
     "Model default": functools.partial(of_model, "default"),
+    "Model default, large": of_large_model,
     "Model paper": functools.partial(of_model, "paper"),
 }
 
@@ -150,6 +172,26 @@ def test_same_bits_for_any_number_of_threads(work: str) -> None:
 @pytest.mark.parametrize("work", WORK)
 def test_same_bits_with_all_threads(work: str) -> None:
     assert WORK[work](0) == WORK[work](1)
+
+
+@pytest.mark.parametrize("work", ["align symmetric", "Model default, large"])
+def test_same_bits_every_time(work: str) -> None:
+    """Whatever was in the memory before."""
+    program = (
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import test_determinism as t; "
+    )
+    program += f"print(t.WORK[{work!r}](2))"
+    digests = {
+        subprocess.run(
+            [sys.executable, "-c", program],
+            env={**os.environ, "MALLOC_PERTURB_": perturb},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+        for perturb in ("0", "85", "170")
+    }
+    assert len(digests) == 1
 
 
 def test_digest_tells_a_single_bit() -> None:

@@ -4,8 +4,7 @@
 #include <stdint.h>
 
 #include "isa.hpp"
-#include "normal_row.hpp"
-#include "quadratic.hpp"
+#include "planar_row.hpp"
 
 namespace nacre::simd {
 

@@ -4,16 +4,13 @@
 #include <float.h>
 
 #include "edge_row.hpp"
+#include "evaluate.hpp"
 #include "vec.hpp"
 
 namespace nacre::simd::NACRE_ISA {
 namespace {
 
 constexpr int chunk = 64;  // pixels
-
-NACRE_INLINE F32 evaluate(const Quadratic& q, F32 x) {
-  return broadcast(q.constant) + x * (broadcast(q.linear) + x * broadcast(q.square));
-}
 
 NACRE_INLINE void select_values(const float* values, const uint8_t* keep, int count, float* kept) {
   for (int i = 0; i < count; ++i) kept[i] = values[i] + (keep[i] != 0 ? 0.0F : NAN);

@@ -3,6 +3,7 @@
 // windows of 5 x 5 takes one thread 0.65 ms with AVX-512, one with 7 x 7 to 11 x 11 and many holes 1.3 ms.
 #include "normal_row.hpp"
 
+#include "evaluate.hpp"
 #include "vec.hpp"
 
 namespace nacre::simd::NACRE_ISA {
@@ -11,10 +12,6 @@ namespace {
 constexpr int group = 16;  // pixels that go the same way, whatever the number of lanes
 constexpr int parts = group / lanes;
 constexpr int chunk = 64;  // pixels that are written together
-
-NACRE_INLINE F32 evaluate(const Quadratic& q, F32 x) {
-  return broadcast(q.constant) + x * (broadcast(q.linear) + x * broadcast(q.square));
-}
 
 constexpr float full_window(int radius) { return static_cast<float>((2 * radius + 1) * (2 * radius + 1)); }
 // Sum of du^2 over a full window.
@@ -226,8 +223,8 @@ NACRE_INLINE void fit_radius(const PlanarRow& row, const NormalRule& rule, int b
 NACRE_INLINE F32 window_radius(const NormalRule& rule, F32 value) {
   const F32 sigma = evaluate(rule.sigma, value);
   const F32 slope = broadcast(rule.slope_sigma) * evaluate(rule.unit_slope, value);
-  F32 radius = broadcast(static_cast<float>(least_window)) + (value - value);
-  for (int r = least_window; r < largest_normal_window; ++r) {
+  F32 radius = broadcast(static_cast<float>(least_normal_window)) + (value - value);
+  for (int r = least_normal_window; r < largest_normal_window; ++r) {
     radius = select(sigma > slope * broadcast(::sqrtf(full_spread(r))), broadcast(static_cast<float>(r + 1)), radius);
   }
   return select(value == value, radius, value);

@@ -1,24 +1,15 @@
 // Normals of a row of a depth image.
 #pragma once
 
-#include <stddef.h>
 #include <stdint.h>
 
 #include "isa.hpp"
-#include "quadratic.hpp"
+#include "planar_row.hpp"
 #include "ray_row.hpp"
 
 namespace nacre::simd {
 
-constexpr int least_window = 2, largest_normal_window = 5;  // pixels on each side
-
-// The planar image (planar_image.hpp) around a row; NaN where there is no measurement.
-struct PlanarRow {
-  const float* values;  // NaN for largest_normal_window pixels beyond every side, and 31 more beyond the row's end
-  ptrdiff_t stride;     // from row to row
-  int width;
-  bool is_inverse;  // inverse depth
-};
+constexpr int least_normal_window = 2;  // pixels on each side, up to largest_normal_window
 
 struct NormalRule {
   Quadratic sigma, unit_slope;      // of the value: its noise, and its change per pixel on a slope of 1

@@ -4,7 +4,7 @@
 #include <stddef.h>
 
 #include "isa.hpp"
-#include "quadratic.hpp"
+#include "planar_row.hpp"
 
 namespace nacre::simd {
 
