@@ -47,7 +47,7 @@ def summary(run: dict[str, Any]) -> str:
         for threads in run["threads"]:
             ours, best = leaders(run, name, threads)
             row += [
-                time_of(median(ours["seconds"]), about) if ours else "-",
+                time_of(median(ours["seconds"]), about) if ours else "not good enough, see below",
                 f"{best['contender']}: {time_of(median(best['seconds']), about)}" if best else "-",
                 f"**{times(ratio(best, ours))}**" if ours and best else "-",
             ]

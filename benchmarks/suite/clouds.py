@@ -35,8 +35,14 @@ def bumpy_surface(
     return lengths * directions, normals / np.linalg.norm(normals, axis=1, keepdims=True)
 
 
-def scan(size: int, seed: int, sigma: float = 0.0005) -> tuple[Array, Array]:
-    """Return noisy points of the bumpy surface, 0.15 m wide, in random order, and the true normals."""
+def scan(size: int, seed: int) -> tuple[Array, Array]:
+    """
+    Return noisy points of the bumpy surface, 0.15 m wide, in random order, and the true normals.
+
+    The noise is 0.5 mm up to 100,000 points, and beyond them in proportion to their spacing, so that
+    neighbours lie on a surface for any size.
+    """
+    sigma = 0.0005 * min(1.0, (100_000 / size) ** 0.5)
     rng = np.random.default_rng(seed)
     directions = rng.normal(size=(size, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)

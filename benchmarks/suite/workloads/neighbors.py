@@ -169,7 +169,7 @@ def self_query(size: int, ordered: bool, goal: float | None = None) -> Workload:
             size * (12 + 32 + 192),
             size * 16 * 8,
         ),
-        note="Errors are relative to the distance of the last neighbour.",
+        note="Noisy bumpy surface. Errors are relative to the distance of the last neighbour.",
     )
 
 
