@@ -497,6 +497,26 @@ def test_weak_directions_keep_their_initial_value(
     assert result.rmse < 1.2e-4
 
 
+def test_low_bumps_tell_the_turn_of_a_noisy_ball() -> None:
+    """Normals that are estimated from noise neither hide the turn, nor feign one on a ball without bumps."""
+
+    def scan(seed: int, height: float) -> Array:
+        rng = np.random.default_rng(seed)
+        directions = rng.normal(size=(10000, 3))
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        x, y, z = directions.T
+        bumps = np.sin(5 * x + 1) * np.cos(4 * y) + np.sin(6 * z + 2 * x)
+        points = 0.075 * (1 + height * bumps)[:, None] * directions
+        return points + 0.0003 * rng.normal(size=points.shape)
+
+    turn = motion(np.radians([4, -6, 5]), [0.003, -0.002, 0.004])
+    bumpy = nacre.align(moved(turn, scan(1, 0.03)), scan(2, 0.03))
+    assert bumpy.converged
+    assert len(bumpy.weak_directions) == 0
+    assert errors(bumpy.target_from_source, np.linalg.inv(turn))[0] < 1
+    assert len(nacre.align(moved(turn, scan(1, 0.0)), scan(2, 0.0)).weak_directions) == 3
+
+
 def test_no_direction_of_a_generic_object_is_weak(cloud: Any, resampled: Any) -> None:
     source, normals = source_of(resampled)
     result = nacre.align(source, cloud[0], source_normals=normals, target_normals=cloud[1])

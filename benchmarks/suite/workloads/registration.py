@@ -139,7 +139,7 @@ WORKLOADS = [
         data=pairs,
         contenders=[
             Contender("nacre", nacre),
-            Contender("nacre", partial(nacre, max_samples=5000), "5000 samples"),
+            Contender("nacre", partial(nacre, max_points=4000, max_samples=2000), "4000 points"),
             Contender("small_gicp", partial(small_gicp, kind="GICP", voxel=0.004), "GICP, 4 mm grid"),
             Contender("small_gicp", partial(small_gicp, kind="GICP", voxel=0.008), "GICP, 8 mm grid"),
             Contender("small_gicp", partial(small_gicp, kind="VGICP", voxel=0.008), "VGICP, 8 mm grid"),
