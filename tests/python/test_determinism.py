@@ -176,9 +176,8 @@ def test_same_bits_with_all_threads(work: str) -> None:
 
 def in_another_process(works: list[str], **environment: str) -> list[str]:
     """Return the digests of some works, or what went wrong."""
-    program = (
-        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import test_determinism as t; "
-    )
+    folder = str(Path(__file__).parent)
+    program = f"import sys; sys.path.insert(0, {folder!r}); import test_determinism as t; "
     program += f"[print(t.WORK[work](2)) for work in {works!r}]"
     done = subprocess.run(
         [sys.executable, "-c", program],
@@ -200,7 +199,7 @@ def test_same_bits_every_time() -> None:
 
 @pytest.mark.parametrize("instruction_set", ["baseline", "avx2", "avx512"])
 def test_same_bits_on_every_instruction_set(instruction_set: str) -> None:
-    """Consolidation, and with it the paper's preset, is the exception: it fuses multiplications where it can."""
+    """Except for consolidation, and the paper's preset with it, which fuse multiplications where they can."""
     works = [work for work in WORK if "consolidate" not in work and "paper" not in work]
     digests = in_another_process(works, NACRE_SIMD=instruction_set)
     if "which this processor does not have" in digests[0]:
