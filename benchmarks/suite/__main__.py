@@ -61,15 +61,21 @@ def main() -> int:
         "versions": machine.versions(),
         "limits": machine.limits(options["threads"]),
         "packages": machine.packages(options["wheel"]),
-        "workloads": {workload.name: describe(workload) for workload in chosen},
-        "results": contest.run(chosen, options["threads"], options["repeats"], tell),
+        "workloads": {},
+        "results": [],
     }
-    results["minutes"] = (time.perf_counter() - start) / 60
-    results["machine"]["taken by other processes"] = f"{100 * others.share():.0f} % of the processors' time"
     folder = Path(options["output"])
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "results.json").write_text(json.dumps(results, indent=1) + "\n")
-    (folder / "results.md").write_text(report.markdown(results))
+    # What has been measured is kept if the run is ended early.
+    for workload, measured in contest.run(chosen, options["threads"], options["repeats"], tell):
+        results["workloads"][workload.name] = describe(workload)
+        results["results"] += measured
+        results["minutes"] = (time.perf_counter() - start) / 60
+        results["machine"]["taken by other processes"] = (
+            f"{100 * others.share():.0f} % of the processors' time"
+        )
+        (folder / "results.json").write_text(json.dumps(results, indent=1) + "\n")
+        (folder / "results.md").write_text(report.markdown(results))
     tell(f"{results['minutes']:.1f} minutes; see {folder / 'results.md'}")
     if others.share() > 0.05:
         tell("other processes kept the machine busy: the times say little")

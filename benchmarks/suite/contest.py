@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -131,13 +131,13 @@ def _add(result: dict[str, Any], said: dict[str, Any]) -> None:
 
 def run(
     workloads: Iterable[Workload], thread_counts: list[int], repeats: int, tell: Callable[[str], None]
-) -> list[dict[str, Any]]:
-    """Run workloads with each number of threads."""
-    results = []
+) -> Iterator[tuple[Workload, list[dict[str, Any]]]]:
+    """Run workloads with each number of threads, one after the other."""
     with ExitStack() as stack:
         teams = [stack.enter_context(Workers(threads)) for threads in thread_counts]
         for workload in workloads:
             start = time.perf_counter()
+            results = []
             with tempfile.TemporaryDirectory(prefix="nacre-benchmark-") as folder:
                 error = _save(workload, Path(folder))
                 for team in teams:
@@ -147,7 +147,7 @@ def run(
                             turn = partial(_fail, error)
                         results += contend(workload, team.threads, repeats, turn)
             tell(f"{workload.name}: {time.perf_counter() - start:.1f} s")
-    return results
+            yield workload, results
 
 
 def _save(workload: Workload, folder: Path) -> str | None:
