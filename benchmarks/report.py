@@ -45,6 +45,9 @@ def summary(run: dict[str, Any]) -> str:
     for name, about in run["workloads"].items():
         row = [f"[{about['title']}](#{name})"]
         for threads in run["threads"]:
+            if not results(run, name, threads):
+                row += ["not run", "-", "-"]
+                continue
             ours, best = leaders(run, name, threads)
             row += [
                 time_of(median(ours["seconds"]), about) if ours else "not good enough, see below",

@@ -66,16 +66,20 @@ def main() -> int:
     }
     folder = Path(options["output"])
     folder.mkdir(parents=True, exist_ok=True)
+
+    def write() -> None:
+        results["minutes"] = (time.perf_counter() - start) / 60
+        (folder / "results.json").write_text(json.dumps(results, indent=1) + "\n")
+        (folder / "results.md").write_text(report.markdown(results))
+
     # What has been measured is kept if the run is ended early.
     for workload, measured in contest.run(chosen, options["threads"], options["repeats"], tell):
         results["workloads"][workload.name] = describe(workload)
         results["results"] += measured
-        results["minutes"] = (time.perf_counter() - start) / 60
-        results["machine"]["taken by other processes"] = (
-            f"{100 * others.share():.0f} % of the processors' time"
-        )
-        (folder / "results.json").write_text(json.dumps(results, indent=1) + "\n")
-        (folder / "results.md").write_text(report.markdown(results))
+        write()
+    # What the workers took is known when they have ended.
+    results["machine"]["taken by other processes"] = f"{100 * others.share():.0f} % of the processors' time"
+    write()
     tell(f"{results['minutes']:.1f} minutes; see {folder / 'results.md'}")
     if others.share() > 0.05:
         tell("other processes kept the machine busy: the times say little")
