@@ -28,6 +28,7 @@ SOURCES = sorted((ROOT / "cpp" / "src").rglob("*.[ch]pp"))
 FOLDERS = ("cpp", "python", "tests", "examples", "benchmarks", "docs", "third_party", ".ci", ".github")
 CODE = {".py", ".pyi", ".cpp", ".hpp", ".cmake", ".txt", ".toml", ".yml", ".yaml", ".json", ".in", ".sh", ""}
 TEXT = CODE | {".md"}
+GENERATED = {"__pycache__", ".env", "results"}  # what git ignores
 
 
 def files(*folders: str, suffixes: set[str] = TEXT) -> list[Path]:
@@ -39,7 +40,7 @@ def files(*folders: str, suffixes: set[str] = TEXT) -> list[Path]:
         for path in found
         if path.is_file()
         and path.suffix in suffixes
-        and "__pycache__" not in path.parts
+        and GENERATED.isdisjoint(path.parts)
         and path != Path(__file__).resolve()
     )
 
