@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
 
 #include "check.hpp"
 #include "fusion_step.hpp"
@@ -277,6 +278,8 @@ FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, c
                   int num_threads) {
   options.check();
   require(spacing > 0.0, "spacing", "a positive distance in metres", spacing);
+  require(frame.width == camera.width() && frame.height == camera.height(), "frame", "of the camera's size",
+          std::to_string(frame.width) + " x " + std::to_string(frame.height));
   require(colors.rows() == 0 || colors.rows() == frame.points.rows(), "colors", "one row per pixel", colors.rows());
   SurfaceObserver observer(camera, options);
   observer.look_at(frame, colors, num_threads);

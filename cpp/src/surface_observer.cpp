@@ -84,10 +84,9 @@ bool SurfaceObserver::may_observe(const Eigen::Vector3f& point, std::int32_t pix
       tiles_[static_cast<std::size_t>(pixel / width_ / tile_size * tiles_across_ + pixel % width_ / tile_size)];
   const float radius = support(sigma, static_cast<float>(camera_.footprint(point.z())));
   const float reach = radius + std::max(radius, 4.0F * sigma);
-  return point.z() > tile.nearest - reach &&
-         point.z()<tile.farthest +
-                   reach&& static_cast<float>(PixelWindow::size * PixelWindow::size) * tile.largest_weight>
-             least_weight;
+  const bool is_in_range = point.z() > tile.nearest - reach && point.z() < tile.farthest + reach;
+  const float largest_sum = static_cast<float>(PixelWindow::size * PixelWindow::size) * tile.largest_weight;
+  return is_in_range && largest_sum > least_weight;
 }
 
 Eigen::Vector3f SurfaceObserver::towards_camera(const Eigen::Vector3f& point) const {

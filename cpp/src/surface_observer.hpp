@@ -1,7 +1,6 @@
 // What a depth frame says about points of a surface: the symmetric implicit moving-least-squares residual.
 #pragma once
 
-#include <array>
 #include <vector>
 
 #include "nacre/fusion.hpp"

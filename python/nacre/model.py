@@ -87,7 +87,8 @@ class ModelParameters:
         How a registered frame becomes part of the model: confidence-weighted fusion, the 2010 paper's WLOP of
         model and new points, or WLOP repaired for incremental use.
     spacing : float
-        Distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces.
+        Distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces. New
+        points are also at least a pixel and a half apart in the frame that brings them.
     max_points : int
         The model never grows beyond: its spacing is widened instead.
     predict_motion : bool

@@ -381,6 +381,9 @@ TEST_CASE("arguments out of range are named") {
   };
   CHECK_THROWS_WITH_AS(add({}, 0.0), doctest::Contains("spacing must be"), std::invalid_argument);
   CHECK_THROWS_WITH_AS(add({}, -1.0), doctest::Contains("spacing must be"), std::invalid_argument);
+  const Camera other = Camera::orthographic(64, 48, 0.001);
+  CHECK_THROWS_WITH_AS(fuse(model, frame, other, Pose::Identity(), spacing, 0), doctest::Contains("frame must be"),
+                       std::invalid_argument);
   CHECK_THROWS_WITH_AS(add({}, spacing, 7), doctest::Contains("colors must be"), std::invalid_argument);
   CHECK_THROWS_WITH_AS(thin(model, 0.0), doctest::Contains("spacing must be"), std::invalid_argument);
   FusionOptions options;

@@ -45,8 +45,9 @@ struct FusionReport {
 };
 
 /// Folds a frame in: model points that the camera observes move along their normals by the symmetric implicit
-/// moving-least-squares residual; surface that the model lacks is inserted at the given spacing; points that the camera
-/// sees through, or that were never confirmed, are removed. colors is empty or has a row per pixel.
+/// moving-least-squares residual; surface that the model lacks is inserted at the given spacing, but no denser than a
+/// pixel and a half of the frame; points that the camera sees through, or that were never confirmed, are removed.
+/// colors is empty or has a row per pixel; the frame has the camera's size.
 FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, const Pose& world_from_camera,
                   double spacing, std::int32_t frame_index, const FusionOptions& options = {},
                   const ColorsRef& colors = Colors(), int num_threads = 0);

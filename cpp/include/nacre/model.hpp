@@ -39,7 +39,8 @@ struct ModelOptions {
   FusionOptions fusion;
   ConsolidateOptions consolidation;  ///< its num_points is not used: see max_points
   NormalOptions normals;             ///< of the model, where fold_in is not fuse
-  double spacing = 0.0;  ///< distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces
+  double spacing = 0.0;  ///< distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces;
+                         ///< new points are also at least a pixel and a half of their frame apart
   int max_points = 500000;       ///< the model never grows beyond: its spacing is widened instead
   bool predict_motion = true;    ///< start also from the pose that continues the last motion
   bool relocalise = true;        ///< search around earlier poses where the guesses fail
