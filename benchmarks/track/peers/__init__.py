@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[Any]
 
-ANY_CAMERA = ("open3d_icp", "open3d_icp_eroded", "small_gicp_vgicp", "kiss_icp")
+ANY_CAMERA = ("open3d_icp", "open3d_icp_eroded", "small_gicp_vgicp_eroded", "kiss_icp_eroded")
 PINHOLE = ("open3d_odometry", "open3d_slam", "opencv_odometry", "opencv_tsdf")
 
 TITLES = {
@@ -25,8 +25,8 @@ TITLES = {
     "open3d_slam": "Open3D: TSDF and ray casting",
     "opencv_odometry": "OpenCV: Odometry, depth",
     "opencv_tsdf": "OpenCV: HashTSDF and ray casting",
-    "small_gicp_vgicp": "small_gicp: VGICP to a voxel map",
-    "kiss_icp": "KISS-ICP",
+    "small_gicp_vgicp_eroded": "small_gicp: VGICP to a voxel map, 2 px eroded",
+    "kiss_icp_eroded": "KISS-ICP, 2 px eroded",
 }
 FAR = 3.0
 """Farther measurements are not used by peers [m]: the default of Open3D's RGB-D images, odometry and SLAM."""
@@ -44,9 +44,9 @@ class Loop(Protocol):
 
 def make(name: str, camera: Any, depth: Array) -> Loop:
     """Return a peer's loop for a camera."""
-    module, _, variant = name.partition("_eroded")
+    module = name.removesuffix("_eroded")
     loop: Loop = importlib.import_module(f"track.peers.{module}").make(camera, depth)
-    return Eroded(loop) if name.endswith("_eroded") and not variant else loop
+    return loop if module == name else Eroded(loop)
 
 
 class Eroded:
