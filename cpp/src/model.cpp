@@ -108,9 +108,7 @@ void ModelOptions::check() const {
   require(spacing >= 0.0 && std::isfinite(spacing), "spacing", "0 (automatic) or a positive distance in metres",
           spacing);
   require(max_points >= 100, "max_points", "at least 100", max_points);
-  require(min_overlap >= 0.0 && min_overlap <= 1.0, "min_overlap", "in [0, 1]", min_overlap);
-  require(min_consistency >= 0.0 && min_consistency <= 1.0, "min_consistency", "in [0, 1]", min_consistency);
-  require(max_residual > 0.0, "max_residual", "positive", max_residual);
+  require(min_evidence >= 0.0, "min_evidence", "0 or more", min_evidence);
   require(first_fraction > 0.0 && first_fraction <= 1.0, "first_fraction", "in (0, 1]", first_fraction);
   require(kept_fraction > 0.0 && kept_fraction <= 1.0, "kept_fraction", "in (0, 1]", kept_fraction);
   require(new_fraction >= 0.0 && new_fraction <= 1.0, "new_fraction", "in [0, 1]", new_fraction);
@@ -124,6 +122,7 @@ struct Model::Impl {
   SurfaceObserver observer{camera, options.fusion};
   PointModel cloud;
   std::vector<FrameReport> reports;
+  Sight before;             // of the newest frame that was folded in
   std::vector<Pose> poses;  // of the registered frames, oldest first
   double spacing = 0.0;
   bool was_lost = false;
@@ -168,6 +167,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   report.num_inliers = tracking.alignment.num_inliers;
   report.overlap = tracking.alignment.overlap;
   report.consistency = tracking.consistency;
+  report.evidence = tracking.evidence;
   report.rmse = tracking.alignment.rmse;
   report.information = tracking.alignment.information;
   report.weak_directions = tracking.alignment.weak_directions;
@@ -180,6 +180,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     if (report.status == FrameStatus::tracked) {
       if (was_lost) report.status = FrameStatus::relocalised;
       fold_in(report);
+      before = {frame.points.col(2), frame.sigma, report.world_from_camera};
     }
   }
   was_lost = report.status == FrameStatus::lost && !poses.empty();
@@ -205,7 +206,7 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras) const {
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), key_poses(), was_lost, spacing, options);
+  return track(cloud, frame, camera, observer, guesses(extras), key_poses(), was_lost, before, spacing, options);
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {

@@ -295,7 +295,7 @@ def _frame_dict(
         "rotation_error": rotation_error,
     }
     for name in (
-        "num_inliers", "overlap", "consistency", "rmse", "weak_directions",
+        "num_inliers", "overlap", "consistency", "evidence", "rmse", "weak_directions",
         "num_updated", "num_inserted", "num_removed", "num_points", "spacing", "milliseconds",
     ):  # fmt: skip
         figures[name] = None if report is None else getattr(report, name)
