@@ -9,95 +9,106 @@ namespace {
 
 constexpr double points_per_cell = 6.0;
 constexpr int most_cells = 256;  // across
+constexpr int outline = 2;       // so far from a cell with points nothing is certain [cells]
+constexpr int least_filled = 8;  // of a cell and its eight neighbours, to know what is in front and behind
 constexpr float infinity = std::numeric_limits<float>::infinity();
-
-bool is_finite(const PointsRef& points, Eigen::Index row) { return points.row(row).allFinite(); }
 
 }  // namespace
 
 FreeSpace::FreeSpace(const PointsRef& points, const Eigen::Vector3d& viewpoint) : viewpoint_(viewpoint) {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  Eigen::Index count = 0;
+  std::vector<Eigen::Vector3d> finite;
+  finite.reserve(static_cast<std::size_t>(points.rows()));
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    if (!is_finite(points, i)) continue;
-    sum += points.row(i).transpose().cast<double>();
-    ++count;
+    if (!points.row(i).allFinite()) continue;
+    finite.push_back(points.row(i).transpose().cast<double>());
+    middle += finite.back();
   }
-  const Eigen::Vector3d middle = count > 0 ? Eigen::Vector3d(sum / static_cast<double>(count)) : viewpoint_;
+  if (!finite.empty()) middle /= static_cast<double>(finite.size());
   axis_ = (middle - viewpoint_).normalized();
-  if (count == 0 || !(axis_.norm() > 0.5)) {
+  if (finite.empty() || !(axis_.norm() > 0.5)) {
     axis_ = Eigen::Vector3d::UnitZ();
     return;
   }
   right_ = axis_.unitOrthogonal();
   down_ = axis_.cross(right_);
 
-  double low_u = infinity, low_v = infinity, high_u = -infinity, high_v = -infinity, squares = 0.0;
-  for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    double u, v, range;
-    const Eigen::Vector3d point = points.row(i).transpose().cast<double>();
-    if (!is_finite(points, i) || !project(point, u, v, range)) continue;
-    low_u = std::min(low_u, u);
-    low_v = std::min(low_v, v);
-    high_u = std::max(high_u, u);
-    high_v = std::max(high_v, v);
-    squares += (point - middle).squaredNorm() - std::pow((point - middle).dot(axis_), 2);
+  std::vector<Projection> projections;
+  projections.reserve(finite.size());
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(infinity), high = -low;
+  double squares = 0.0;
+  for (const Eigen::Vector3d& point : finite) {
+    projections.push_back(project(point));
+    low = low.cwiseMin(projections.back().uv);
+    high = high.cwiseMax(projections.back().uv);
+    squares += (point - middle).cross(axis_).squaredNorm();
   }
-  radius_ = std::sqrt(std::max(squares, 0.0) / static_cast<double>(count));
-  const double extent = std::max({high_u - low_u, high_v - low_v, 1e-9});
+  radius_ = std::sqrt(squares / static_cast<double>(finite.size()));
   // A cloud fills about half of the rectangle around it.
-  cell_ = std::sqrt(0.5 * std::max(high_u - low_u, 1e-9) * std::max(high_v - low_v, 1e-9) * points_per_cell /
-                    static_cast<double>(count));
-  cell_ = std::max(cell_, extent / most_cells);
-  first_u_ = low_u;
-  first_v_ = low_v;
-  width_ = static_cast<int>((high_u - low_u) / cell_) + 1;
-  height_ = static_cast<int>((high_v - low_v) / cell_) + 1;
-  std::vector<Cell> single(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_), {infinity, -infinity});
-  for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    double u, v, range;
-    if (!is_finite(points, i) || !project(points.row(i).transpose().cast<double>(), u, v, range)) continue;
-    const auto column = static_cast<int>((u - first_u_) / cell_), row = static_cast<int>((v - first_v_) / cell_);
-    Cell& cell = single[static_cast<std::size_t>(row * width_ + column)];
-    cell.nearest = std::min(cell.nearest, static_cast<float>(range));
-    cell.farthest = std::max(cell.farthest, static_cast<float>(range));
+  const Eigen::Vector2d extent = (high - low).cwiseMax(1e-9);
+  cell_ = std::max(std::sqrt(0.5 * extent.prod() * points_per_cell / static_cast<double>(finite.size())),
+                   extent.maxCoeff() / most_cells);
+  first_ = low.array() - (outline + 1) * cell_;
+  width_ = static_cast<int>(extent.x() / cell_) + 2 * outline + 3;
+  height_ = static_cast<int>(extent.y() / cell_) + 2 * outline + 3;
+  fill_cells(projections);
+}
+
+void FreeSpace::fill_cells(const std::vector<Projection>& projections) {
+  struct Range {
+    float nearest = infinity, farthest = -infinity;
+  };
+  std::vector<Range> single(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  for (const Projection& projection : projections) {
+    Range& range = single[index_of(projection)];
+    range.nearest = std::min(range.nearest, static_cast<float>(projection.range));
+    range.farthest = std::max(range.farthest, static_cast<float>(projection.range));
   }
-  cells_.assign(single.size(), {infinity, -infinity});
-  for (int row = 1; row + 1 < height_; ++row) {
-    for (int column = 1; column + 1 < width_; ++column) {
-      Cell around = {infinity, -infinity};
+  cells_.resize(single.size());
+  for (int row = outline; row < height_ - outline; ++row) {
+    for (int column = outline; column < width_ - outline; ++column) {
+      Cell cell;
       int filled = 0;
-      for (int k = 0; k < 9; ++k) {
-        const Cell& cell = single[static_cast<std::size_t>((row + k / 3 - 1) * width_ + column + k % 3 - 1)];
-        filled += cell.nearest < infinity ? 1 : 0;
-        around.nearest = std::min(around.nearest, cell.nearest);
-        around.farthest = std::max(around.farthest, cell.farthest);
+      for (int v = -outline; v <= outline; ++v) {
+        for (int u = -outline; u <= outline; ++u) {
+          const Range& range = single[static_cast<std::size_t>((row + v) * width_ + column + u)];
+          if (!(range.nearest < infinity)) continue;
+          cell.is_reached = true;
+          if (std::max(std::abs(u), std::abs(v)) > 1) continue;
+          ++filled;
+          cell.nearest = std::min(cell.nearest, range.nearest);
+          cell.farthest = std::max(cell.farthest, range.farthest);
+        }
       }
-      if (filled >= 8) cells_[static_cast<std::size_t>(row * width_ + column)] = around;
+      cell.is_known = filled >= least_filled;
+      cells_[static_cast<std::size_t>(row * width_ + column)] = cell;
     }
   }
 }
 
-bool FreeSpace::project(const Eigen::Vector3d& point, double& u, double& v, double& range) const {
+FreeSpace::Projection FreeSpace::project(const Eigen::Vector3d& point) const {
   const Eigen::Vector3d ray = point - viewpoint_;
-  range = ray.norm();
-  if (!(range > 0.0)) return false;
-  const double x = ray.dot(right_), y = ray.dot(down_), across = std::hypot(x, y);
-  const double scale = across > 0.0 ? std::atan2(across, ray.dot(axis_)) / across : 0.0;
-  u = x * scale;
-  v = y * scale;
-  return true;
+  const Eigen::Vector2d across(ray.dot(right_), ray.dot(down_));
+  const double length = across.norm();
+  const double scale = length > 0.0 ? std::atan2(length, ray.dot(axis_)) / length : 0.0;
+  return {across * scale, ray.norm()};
+}
+
+// The number of the cell, that of one that nothing reaches where there is none.
+std::size_t FreeSpace::index_of(const Projection& projection) const {
+  const double column = (projection.uv.x() - first_.x()) / cell_, row = (projection.uv.y() - first_.y()) / cell_;
+  if (!(column >= 0.0 && column < width_ && row >= 0.0 && row < height_)) return 0;
+  return static_cast<std::size_t>(static_cast<int>(row) * width_ + static_cast<int>(column));
 }
 
 FreeSpace::Seen FreeSpace::look(const Eigen::Vector3d& point, double tolerance) const {
-  double u, v, range;
-  if (width_ == 0 || !project(point, u, v, range)) return Seen::unknown;
-  const double column = std::floor((u - first_u_) / cell_), row = std::floor((v - first_v_) / cell_);
-  if (!(column >= 0.0 && column < width_ && row >= 0.0 && row < height_)) return Seen::unknown;
-  const Cell& cell = cells_[static_cast<std::size_t>(static_cast<int>(row) * width_ + static_cast<int>(column))];
-  if (!(cell.nearest < infinity)) return Seen::unknown;
-  if (range < static_cast<double>(cell.nearest) - tolerance) return Seen::free;
-  return range > static_cast<double>(cell.farthest) + tolerance ? Seen::hidden : Seen::near;
+  if (cells_.empty()) return Seen::unknown;
+  const Projection projection = project(point);
+  const Cell& cell = cells_[index_of(projection)];
+  if (!cell.is_reached) return Seen::beyond;
+  if (!cell.is_known) return Seen::unknown;
+  if (projection.range < static_cast<double>(cell.nearest) - tolerance) return Seen::free;
+  return projection.range > static_cast<double>(cell.farthest) + tolerance ? Seen::hidden : Seen::near;
 }
 
 }  // namespace nacre

@@ -1,6 +1,7 @@
-// What is known about the space in front of and behind a cloud that was seen from one place.
+// What is known about the space in front of a cloud, behind it and beside it, that was seen from one place.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "nacre/types.hpp"
@@ -11,29 +12,41 @@ namespace nacre {
 class FreeSpace {
  public:
   enum class Seen {
-    unknown,  // no surface was seen around there
+    beyond,   // no surface was seen anywhere near its direction
+    unknown,  // at the outline of what was seen
     free,     // the viewpoint looks through the point, at something behind
     near,     // about where a surface was seen
     hidden,   // behind what was seen
   };
 
+  // Points that are not finite are left out.
   FreeSpace(const PointsRef& points, const Eigen::Vector3d& viewpoint);
 
   Seen look(const Eigen::Vector3d& point, double tolerance) const;
   const Eigen::Vector3d& viewpoint() const { return viewpoint_; }
-  const Eigen::Vector3d& axis() const { return axis_; }
-  double radius() const { return radius_; }  // of the cloud across the axis, root mean square [m]
+  const Eigen::Vector3d& axis() const { return axis_; }  // from the viewpoint to the cloud's middle
+  double radius() const { return radius_; }              // of the cloud about the axis, root mean square [m]
 
  private:
-  struct Cell {
-    float nearest, farthest;
+  struct Projection {
+    Eigen::Matrix<double, 2, 1, Eigen::DontAlign> uv;  // [rad]
+    double range;
   };
-  bool project(const Eigen::Vector3d& point, double& u, double& v, double& range) const;
+  // What is known of a cell from its own points and those around it.
+  struct Cell {
+    float nearest = std::numeric_limits<float>::infinity(), farthest = -nearest;
+    bool is_known = false, is_reached = false;
+  };
+
+  Projection project(const Eigen::Vector3d& point) const;
+  std::size_t index_of(const Projection& projection) const;
+  void fill_cells(const std::vector<Projection>& projections);
 
   Eigen::Vector3d viewpoint_, axis_, right_, down_;
-  double radius_ = 0.0, first_u_ = 0.0, first_v_ = 0.0, cell_ = 1.0;
+  Eigen::Matrix<double, 2, 1, Eigen::DontAlign> first_;
+  double radius_ = 0.0, cell_ = 1.0;
   int width_ = 0, height_ = 0;
-  std::vector<Cell> cells_;  // of each and its eight neighbours; nearest > farthest where too few of them have points
+  std::vector<Cell> cells_;
 };
 
 }  // namespace nacre

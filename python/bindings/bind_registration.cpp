@@ -61,6 +61,7 @@ void bind_registration(py::module_& m) {
       .def_readwrite("min_overlap", &GlobalAlignOptions::min_overlap)
       .def_readwrite("min_consistency", &GlobalAlignOptions::min_consistency)
       .def_readwrite("max_rivalry", &GlobalAlignOptions::max_rivalry)
+      .def_readwrite("outlines", &GlobalAlignOptions::outlines)
       .def_readwrite("max_points", &GlobalAlignOptions::max_points)
       .def_readwrite("max_samples", &GlobalAlignOptions::max_samples)
       .def_readwrite("coarse_samples", &GlobalAlignOptions::coarse_samples)
@@ -73,7 +74,6 @@ void bind_registration(py::module_& m) {
       .def_readonly("overlap", &GlobalAlignResult::overlap)
       .def_readonly("consistency", &GlobalAlignResult::consistency)
       .def_readonly("rivalry", &GlobalAlignResult::rivalry)
-      .def_readonly("debug", &GlobalAlignResult::debug)
       .def_readonly("tolerance", &GlobalAlignResult::tolerance);
 
   m.def(
@@ -81,8 +81,8 @@ void bind_registration(py::module_& m) {
       [](const PointsRef& source, const PointsRef& source_normals, const std::optional<Eigen::Vector3d>& source_viewpoint,
          const PointsRef& target, const PointsRef& target_normals, const std::optional<Eigen::Vector3d>& target_viewpoint,
          const GlobalAlignOptions& options) {
-        return align_global(GlobalCloud(source, source_normals, Values(), source_viewpoint),
-                            GlobalCloud(target, target_normals, Values(), target_viewpoint), options);
+        return align_global(GlobalCloud(source, source_normals, source_viewpoint),
+                            GlobalCloud(target, target_normals, target_viewpoint), options);
       },
       ReleaseGil());
 }

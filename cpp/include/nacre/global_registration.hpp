@@ -16,6 +16,8 @@ struct GlobalAlignOptions {
   double min_overlap = 0.2;       ///< of the smaller part of the clouds' points that agree
   double min_consistency = 0.85;  ///< agreeing points, of those and the ones that contradict; see GlobalAlignResult
   double max_rivalry = 0.85;      ///< score of the best different motion, as a part of the best
+  bool outlines = false;          ///< nothing but the clouds was to be seen from their viewpoints: what lies beyond the
+                                  ///< other's outline contradicts
   int max_points = 10000;         ///< at most so many points of each cloud are looked at; 0: all
   int max_samples = 2000;         ///< at most so many of them are matched
   int coarse_samples = 250;       ///< and so many in the search
@@ -25,11 +27,13 @@ struct GlobalAlignOptions {
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };
 
-/// A cloud that is seen from one place, or not.
-struct GlobalCloud : AlignCloud {
+/// A cloud, and the place that it was seen from where there is one. Empty normals are estimated.
+struct GlobalCloud {
+  PointsRef points;   ///< rows that are not finite are ignored
+  PointsRef normals;  ///< unit length, on the side that the surface is seen from
   std::optional<Eigen::Vector3d> viewpoint;  ///< [m]; nothing is between it and the points
 
-  explicit GlobalCloud(const PointsRef& points, const PointsRef& normals = Points(), const ValuesRef& sigma = Values(),
+  explicit GlobalCloud(const PointsRef& points, const PointsRef& normals = Points(),
                        const std::optional<Eigen::Vector3d>& viewpoint = std::nullopt);
 };
 
@@ -49,7 +53,6 @@ struct GlobalAlignResult {
                              ///< or that should be seen from there and are not
   double rivalry = 0.0;      ///< score of the best different motion / score of this one
   double tolerance = 0.0;    ///< that was used [m]
-  Vector6 debug = Vector6::Zero();
 
   bool found() const { return status == GlobalAlignStatus::found; }
 };
