@@ -44,9 +44,27 @@ double roughness(const Points& points, const Points& normals, int num_threads) {
   return 1.4826 * static_cast<double>(*middle) / std::sqrt(2.0);
 }
 
+// Moves points, which are some rows of a cloud, to the mean of their neighbours.
+void denoise(const PointsRef& all, const Points& all_normals, const std::vector<std::int64_t>& rows, int num_threads,
+             Points& points, const Points& normals) {
+  const Neighbors near = KdTree(all, num_threads)
+                             .query(PointsRef(points), num_neighbors, KdTree::infinity, num_threads);
+  parallel_for(points.rows(), block_size, num_threads, [&](std::int64_t i) {
+    float sum = 0.0F, count = 0.0F;
+    for (Eigen::Index k = 0; k < near.indices.cols(); ++k) {
+      const std::int64_t row = near.indices(i, k);
+      if (row >= all.rows()) break;
+      if (!(std::abs(all_normals.row(row).dot(normals.row(i))) > least_cosine)) continue;
+      sum += (all.row(row) - all.row(rows[static_cast<std::size_t>(i)])).dot(normals.row(i));
+      count += 1.0F;
+    }
+    if (count > 0.0F) points.row(i) += sum / count * normals.row(i);
+  });
+}
+
 }  // namespace
 
-DenoisedCloud::DenoisedCloud(const GlobalCloud& cloud, const GlobalAlignOptions& options) {
+DenoisedCloud::DenoisedCloud(const GlobalCloud& cloud, const GlobalAlignOptions& options, bool is_noisy) {
   const PointsRef& all = cloud.points;
   const Points all_normals = normals_of(cloud, options.num_threads);
   const std::int64_t most = options.max_points > 0 ? options.max_points : all.rows();
@@ -59,19 +77,7 @@ DenoisedCloud::DenoisedCloud(const GlobalCloud& cloud, const GlobalAlignOptions&
   }
   if (points.rows() == 0) return;
 
-  const Neighbors near = KdTree(all, options.num_threads)
-                             .query(PointsRef(points), num_neighbors, KdTree::infinity, options.num_threads);
-  parallel_for(points.rows(), block_size, options.num_threads, [&](std::int64_t i) {
-    float sum = 0.0F, count = 0.0F;
-    for (Eigen::Index k = 0; k < near.indices.cols(); ++k) {
-      const std::int64_t row = near.indices(i, k);
-      if (row >= all.rows()) break;
-      if (!(std::abs(all_normals.row(row).dot(normals.row(i))) > least_cosine)) continue;
-      sum += (all.row(row) - all.row(rows[static_cast<std::size_t>(i)])).dot(normals.row(i));
-      count += 1.0F;
-    }
-    if (count > 0.0F) points.row(i) += sum / count * normals.row(i);
-  });
+  if (is_noisy) denoise(all, all_normals, rows, options.num_threads, points, normals);
   noise = roughness(points, normals, options.num_threads);
   if (cloud.normals.rows() == 0 && !cloud.viewpoint) normals.resize(0, 3);
 }

@@ -11,7 +11,8 @@ struct DenoisedCloud {
   Points points, normals;
   double noise = 0.0;  // that is left [m], with what the surface bends between neighbours
 
-  DenoisedCloud(const GlobalCloud& cloud, const GlobalAlignOptions& options);
+  // A cloud that is not noisy, or whose points are thin already, stays as it is.
+  DenoisedCloud(const GlobalCloud& cloud, const GlobalAlignOptions& options, bool is_noisy);
 };
 
 }  // namespace nacre

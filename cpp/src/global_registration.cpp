@@ -10,8 +10,6 @@
 namespace nacre {
 namespace {
 
-constexpr Eigen::Index least_points = 50;
-
 double consistency_of(const Evidence& evidence, bool outlines) {
   const double judged = evidence.agree + evidence.against(outlines);
   return judged > 0.0 ? evidence.agree / judged : 0.0;
@@ -54,29 +52,35 @@ GlobalCloud::GlobalCloud(const PointsRef& points_in, const PointsRef& normals_in
   if (viewpoint) require(viewpoint->allFinite(), "viewpoint", "finite", viewpoint->transpose());
 }
 
+Verdict judge(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options) {
+  const SearchCandidate& best = candidates.front();
+  Verdict verdict{GlobalAlignStatus::not_found, best, std::max(best.forward.agree, best.backward.agree), 0.0, 0.0};
+  verdict.consistency =
+      std::min(consistency_of(best.forward, options.outlines), consistency_of(best.backward, options.outlines));
+  if (candidates.size() > 1 && best.score > 0.0) verdict.rivalry = std::max(0.0, candidates[1].score / best.score);
+  if (!(best.score > 0.0) || verdict.overlap < options.min_overlap || verdict.consistency < options.min_consistency) {
+    return verdict;
+  }
+  const bool is_unique = verdict.rivalry <= options.max_rivalry && best.alignment.weak_directions.cols() == 0;
+  verdict.status = is_unique ? GlobalAlignStatus::found : GlobalAlignStatus::ambiguous;
+  return verdict;
+}
+
 GlobalAlignResult align_global(const GlobalCloud& source_cloud, const GlobalCloud& target_cloud,
                                const GlobalAlignOptions& options) {
   options.check();
   GlobalAlignResult result;
   result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
-  const SearchSide source(source_cloud, options), target(target_cloud, options);
-  if (std::min(source.all.cloud.points.rows(), target.all.cloud.points.rows()) < least_points) return result;
-
+  const SearchSide source(source_cloud, options, true), target(target_cloud, options, true);
+  if (!is_enough(source) || !is_enough(target)) return result;
   const GlobalSearch search(source, target, options);
-  const std::vector<SearchCandidate> candidates = search.run();
-  const SearchCandidate& best = candidates.front();
-  result.status = GlobalAlignStatus::not_found;
+  const Verdict verdict = judge(search.run(), options);
+  result.status = verdict.status;
+  result.alignment = verdict.best.alignment;
+  result.overlap = verdict.overlap;
+  result.consistency = verdict.consistency;
+  result.rivalry = verdict.rivalry;
   result.tolerance = search.tolerance();
-  result.alignment = best.alignment;
-  result.overlap = std::max(best.forward.agree, best.backward.agree);
-  result.consistency =
-      std::min(consistency_of(best.forward, options.outlines), consistency_of(best.backward, options.outlines));
-  if (candidates.size() > 1 && best.score > 0.0) result.rivalry = std::max(0.0, candidates[1].score / best.score);
-  if (!(best.score > 0.0) || result.overlap < options.min_overlap || result.consistency < options.min_consistency) {
-    return result;
-  }
-  const bool is_unique = result.rivalry <= options.max_rivalry && best.alignment.weak_directions.cols() == 0;
-  result.status = is_unique ? GlobalAlignStatus::found : GlobalAlignStatus::ambiguous;
   return result;
 }
 

@@ -10,6 +10,7 @@
 namespace nacre {
 namespace {
 
+constexpr Eigen::Index least_points = 50;
 // Parts of the smaller cloud's diameter.
 constexpr double first_gate = 0.25, coarse_gate = 0.04, refined_gate = 0.06;
 constexpr double coarse_tolerance = 0.02, least_tolerance = 0.003;
@@ -63,8 +64,10 @@ Evidence ask(const IcpSource& source, const SearchSide& onto, const Pose& pose, 
 
 }  // namespace
 
-SearchSide::SearchSide(const GlobalCloud& cloud_in, const GlobalAlignOptions& options)
-    : cloud(cloud_in, options),
+bool is_enough(const SearchSide& side) { return side.all.cloud.points.rows() >= least_points; }
+
+SearchSide::SearchSide(const GlobalCloud& cloud_in, const GlobalAlignOptions& options, bool is_noisy)
+    : cloud(cloud_in, options, is_noisy),
       all(AlignCloud(cloud.points, cloud.normals), icp_options(options)),
       few(few_of(all)),
       target(AlignCloud(cloud.points, cloud.normals), icp_options(options)) {

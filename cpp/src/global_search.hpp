@@ -18,8 +18,11 @@ struct SearchSide {
   std::optional<FreeSpace> seen;                     // from the viewpoint
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();  // about that of the body, of which the cloud may show the front
 
-  SearchSide(const GlobalCloud& cloud, const GlobalAlignOptions& options);
+  SearchSide(const GlobalCloud& cloud, const GlobalAlignOptions& options, bool is_noisy);
 };
+
+// Whether there is enough to search with.
+bool is_enough(const SearchSide& side);
 
 // What the points of one cloud say about a motion, as parts of all that were asked.
 struct Evidence {
@@ -61,5 +64,13 @@ class GlobalSearch {
   double size_;       // diameter of the smaller cloud [m]
   double tolerance_;  // [m]
 };
+
+// What becomes of the candidates of a search.
+struct Verdict {
+  GlobalAlignStatus status;
+  SearchCandidate best;
+  double overlap, consistency, rivalry;  // see GlobalAlignResult
+};
+Verdict judge(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options);
 
 }  // namespace nacre

@@ -21,10 +21,16 @@ struct TrackingResult {
   double rank() const { return (status == FrameStatus::lost ? 0.0 : 1.0) + alignment.overlap * consistency; }
 };
 
+// Where the search for a camera that the guesses do not find may go on.
+struct WhereElse {
+  std::vector<Pose> key_poses;  // and around them
+  bool everywhere = false;
+};
+
 // Tries the guesses (world_from_camera, most trusted first) until one registers the frame; when none does, searches
-// around the key poses, unless there are none.
+// elsewhere.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
-                     double spacing, const ModelOptions& options);
+                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, double spacing,
+                     const ModelOptions& options);
 
 }  // namespace nacre
