@@ -38,6 +38,7 @@ void GlobalAlignOptions::check() const {
   require(max_angle > 0.0, "max_angle", "a positive angle in radians", max_angle);
   require(min_overlap >= 0.0 && min_overlap <= 1.0, "min_overlap", "in [0, 1]", min_overlap);
   require(min_consistency >= 0.0 && min_consistency <= 1.0, "min_consistency", "in [0, 1]", min_consistency);
+  require(max_residual > 0.0, "max_residual", "positive", max_residual);
   require(max_rivalry >= 0.0 && max_rivalry <= 1.0, "max_rivalry", "in [0, 1]", max_rivalry);
   require(max_points >= 0, "max_points", "0 (no limit) or more", max_points);
   require(max_samples >= 1, "max_samples", "at least 1", max_samples);
@@ -52,12 +53,18 @@ GlobalCloud::GlobalCloud(const PointsRef& points_in, const PointsRef& normals_in
   if (viewpoint) require(viewpoint->allFinite(), "viewpoint", "finite", viewpoint->transpose());
 }
 
-Verdict judge(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options) {
-  const SearchCandidate& best = candidates.front();
+// A motion whose residuals are too large for the tolerance is no rival, however much is within it.
+Verdict judge(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options, double tolerance) {
+  const double largest = options.max_residual * tolerance;
+  const auto is_close = [&](const SearchCandidate& candidate) { return candidate.alignment.rmse <= largest; };
+  const auto found = std::find_if(candidates.begin(), candidates.end(), is_close);
+  const SearchCandidate& best = found != candidates.end() ? *found : candidates.front();
   Verdict verdict{GlobalAlignStatus::not_found, best, std::max(best.forward.agree, best.backward.agree), 0.0, 0.0};
   verdict.consistency =
       std::min(consistency_of(best.forward, options.outlines), consistency_of(best.backward, options.outlines));
-  if (candidates.size() > 1 && best.score > 0.0) verdict.rivalry = std::max(0.0, candidates[1].score / best.score);
+  if (found == candidates.end()) return verdict;
+  const auto rival = std::find_if(found + 1, candidates.end(), is_close);
+  if (rival != candidates.end() && best.score > 0.0) verdict.rivalry = std::max(0.0, rival->score / best.score);
   if (!(best.score > 0.0) || verdict.overlap < options.min_overlap || verdict.consistency < options.min_consistency) {
     return verdict;
   }
@@ -74,7 +81,7 @@ GlobalAlignResult align_global(const GlobalCloud& source_cloud, const GlobalClou
   const SearchSide source(source_cloud, options, true), target(target_cloud, options, true);
   if (!is_enough(source) || !is_enough(target)) return result;
   const GlobalSearch search(source, target, options);
-  const Verdict verdict = judge(search.run(), options);
+  const Verdict verdict = judge(search.run(), options, search.tolerance());
   result.status = verdict.status;
   result.alignment = verdict.best.alignment;
   result.overlap = verdict.overlap;

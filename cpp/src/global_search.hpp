@@ -71,6 +71,6 @@ struct Verdict {
   SearchCandidate best;
   double overlap, consistency, rivalry;  // see GlobalAlignResult
 };
-Verdict judge(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options);
+Verdict judge(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options, double tolerance);
 
 }  // namespace nacre

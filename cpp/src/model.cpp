@@ -241,16 +241,17 @@ WhereElse Model::Impl::elsewhere() const {
 void Model::Impl::fold_in(FrameReport& report) {
   StopWatch watch;
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
+  const auto num_registered = static_cast<std::int32_t>(poses.size() - 1);  // lost frames make no point older
   if (options.fold_in != FoldIn::fuse) {
     consolidate_frame(cloud, frame, report.world_from_camera, options, spacing,
-                      static_cast<std::int32_t>(report.index));
+                      num_registered);
     watch.lap();
     renew_normals(cloud, options);
     report.milliseconds.normals = watch.lap();
     return;
   }
   report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing,
-                                static_cast<std::int32_t>(report.index), options.fusion, options.num_threads);
+                                num_registered, options.fusion, options.num_threads);
   while (cloud.size() > options.max_points) {
     spacing *= coarsening;
     thin(cloud, spacing);

@@ -44,8 +44,11 @@ std::optional<Pose> fit_anywhere(const PointModel& model, const IcpSource& sourc
   const SearchSide moving(frame, search_options, false), still(whole, search_options, false);
   if (!is_enough(moving) || !is_enough(still)) return std::nullopt;
   const GlobalSearch search(moving, still, search_options);
-  const Verdict verdict = judge(search.run(), search_options);
-  if (verdict.status != GlobalAlignStatus::found) return std::nullopt;
+  const Verdict verdict = judge(search.run(), search_options, search.tolerance());
+  // Whether a direction of the pose is weak is decided where all of the frame is registered.
+  const bool is_one_place = verdict.status == GlobalAlignStatus::found ||
+                            (verdict.status == GlobalAlignStatus::ambiguous && verdict.rivalry <= search_options.max_rivalry);
+  if (!is_one_place) return std::nullopt;
   return verdict.best.alignment.target_from_source;
 }
 

@@ -60,6 +60,7 @@ void bind_registration(py::module_& m) {
       .def_readwrite("max_angle", &GlobalAlignOptions::max_angle)
       .def_readwrite("min_overlap", &GlobalAlignOptions::min_overlap)
       .def_readwrite("min_consistency", &GlobalAlignOptions::min_consistency)
+      .def_readwrite("max_residual", &GlobalAlignOptions::max_residual)
       .def_readwrite("max_rivalry", &GlobalAlignOptions::max_rivalry)
       .def_readwrite("outlines", &GlobalAlignOptions::outlines)
       .def_readwrite("max_points", &GlobalAlignOptions::max_points)

@@ -17,14 +17,15 @@ from nacre.parameters import to_core
 class GlobalRegistrationParameters:
     """How :func:`align_global` works; see there for each field. Mirrors the C++ ``GlobalAlignOptions``."""
 
-    num_rotations: int = 576
-    num_candidates: int = 24
+    num_rotations: int = 288
+    num_candidates: int = 16
     tolerance: float = 0.0
     max_angle: float = 0.5235988
     outlines: bool = False
-    min_overlap: float = 0.2
-    min_consistency: float = 0.85
-    max_rivalry: float = 0.85
+    min_overlap: float = 0.15
+    min_consistency: float = 0.7
+    max_residual: float = 0.8
+    max_rivalry: float = 0.7
     max_points: int = 10000
     max_samples: int = 2000
     coarse_samples: int = 250
@@ -51,7 +52,7 @@ class GlobalAlignResult:
         Agreeing points, as a part of those and the ones that contradict: that the other cloud's viewpoint
         sees through, or that face it and should be seen and are not. 1 where no viewpoint is known.
     rivalry : float
-        Score of the best motion that differs from this one, as a part of this one's.
+        Score of the best motion that differs from this one and is as close, as a part of this one's.
     tolerance : float
         Within which surfaces agree [m].
     rmse : float
@@ -108,14 +109,15 @@ def align_global(
     target_normals: npt.ArrayLike | None = None,
     source_viewpoint: npt.ArrayLike | None = None,
     target_viewpoint: npt.ArrayLike | None = None,
-    num_rotations: int = 576,
-    num_candidates: int = 24,
+    num_rotations: int = 288,
+    num_candidates: int = 16,
     tolerance: float = 0.0,
     max_angle: float = 0.5235988,
     outlines: bool = False,
-    min_overlap: float = 0.2,
-    min_consistency: float = 0.85,
-    max_rivalry: float = 0.85,
+    min_overlap: float = 0.15,
+    min_consistency: float = 0.7,
+    max_residual: float = 0.8,
+    max_rivalry: float = 0.7,
     max_points: int = 10000,
     max_samples: int = 2000,
     coarse_samples: int = 250,
@@ -153,6 +155,8 @@ def align_global(
         that points beyond the other cloud's outline contradict. Leave it off for clouds that were cut out.
     min_overlap, min_consistency, max_rivalry : float
         Bounds on the result's figures of these names for "found".
+    max_residual : float
+        Bound on ``rmse``, as a part of ``tolerance``.
     max_points, max_samples, coarse_samples : int
         At most so many points of each cloud are looked at (0: all), matched, and matched in the search.
     seed : int
@@ -182,6 +186,7 @@ def align_global(
         outlines=outlines,
         min_overlap=min_overlap,
         min_consistency=min_consistency,
+        max_residual=max_residual,
         max_rivalry=max_rivalry,
         max_points=max_points,
         max_samples=max_samples,

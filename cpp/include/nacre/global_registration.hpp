@@ -9,13 +9,14 @@
 namespace nacre {
 
 struct GlobalAlignOptions {
-  int num_rotations = 576;        ///< spread over all rotations, from which the search starts
-  int num_candidates = 24;        ///< of them are refined
+  int num_rotations = 288;        ///< spread over all rotations, from which the search starts
+  int num_candidates = 16;        ///< of them are refined
   double tolerance = 0.0;         ///< surfaces agree within it, along their normals [m]; 0: from their noise and size
   double max_angle = 0.5235988;   ///< and where their normals differ by less [rad]; 30 degrees
-  double min_overlap = 0.2;       ///< of the smaller part of the clouds' points that agree
-  double min_consistency = 0.85;  ///< agreeing points, of those and the ones that contradict; see GlobalAlignResult
-  double max_rivalry = 0.85;      ///< score of the best different motion, as a part of the best
+  double min_overlap = 0.15;      ///< of the part of a cloud's points that agree, of the cloud where it is more
+  double min_consistency = 0.7;   ///< agreeing points, of those and the ones that contradict; see GlobalAlignResult
+  double max_residual = 0.8;      ///< of the last registration, as a part of the tolerance
+  double max_rivalry = 0.7;       ///< score of the best different motion, as a part of the best
   bool outlines = false;          ///< nothing but the clouds was to be seen from their viewpoints: what lies beyond the
                                   ///< other's outline contradicts
   int max_points = 10000;         ///< at most so many points of each cloud are looked at; 0: all
@@ -48,7 +49,7 @@ const char* to_string(GlobalAlignStatus status);
 struct GlobalAlignResult {
   GlobalAlignStatus status = GlobalAlignStatus::too_few_points;
   AlignResult alignment;     ///< of the last registration
-  double overlap = 0.0;      ///< part of the points that agree, of the cloud where it is less
+  double overlap = 0.0;      ///< part of the points that agree, of the cloud where it is more
   double consistency = 0.0;  ///< agreeing points, of those and the ones that the other cloud's viewpoint sees through
                              ///< or that should be seen from there and are not
   double rivalry = 0.0;      ///< score of the best different motion / score of this one
