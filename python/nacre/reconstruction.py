@@ -30,7 +30,7 @@ STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
 _RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
 
 # Fields of evaluation results that hold one value per frame or point; the frames have them already.
-_LONG = {"errors", "rotation_errors", "distances"}
+_LONG = {"errors", "translation_errors", "rotation_errors", "distances"}
 
 
 @dataclass(frozen=True, eq=False)
