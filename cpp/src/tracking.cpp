@@ -218,8 +218,8 @@ struct Search {
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
-                     const Sight& before, double spacing, const ModelOptions& options) {
+                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
+                     double spacing, const ModelOptions& options) {
   const Samples samples = sample_frame(frame, observer, options);
   const Search search{model,
                       frame,
@@ -240,9 +240,16 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
       if (result.is_beyond_doubt) return result;
     }
   }
-  if (best.status == FrameStatus::lost && !key_poses.empty()) {
-    const TrackingResult found = search.relocalise(key_poses);
+  if (best.status == FrameStatus::lost && !elsewhere.key_poses.empty()) {
+    const TrackingResult found = search.relocalise(elsewhere.key_poses);
     if (found.status != FrameStatus::lost) return found;
+  }
+  if (best.status == FrameStatus::lost && elsewhere.everywhere) {
+    const std::optional<Pose> pose = fit_anywhere(model, search.source, options.registration);
+    if (pose) {
+      const TrackingResult found = search.register_from(*pose, false, false);
+      if (found.status != FrameStatus::lost) return found;
+    }
   }
   return best;
 }

@@ -9,10 +9,16 @@
 
 namespace nacre {
 
+// Where the search for a camera that the guesses do not find may go on.
+struct WhereElse {
+  std::vector<Pose> key_poses;  // and around them
+  bool everywhere = false;
+};
+
 // Tries the guesses (world_from_camera, most trusted first) until one registers the frame; when none does, searches
-// around the key poses, unless there are none. `before` is what the camera saw when it was last registered.
+// elsewhere. `before` is what the camera saw when it was last registered.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
-                     const Sight& before, double spacing, const ModelOptions& options);
+                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
+                     double spacing, const ModelOptions& options);
 
 }  // namespace nacre

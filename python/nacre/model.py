@@ -94,7 +94,8 @@ class ModelParameters:
     predict_motion : bool
         Start also from the pose that continues the last motion.
     relocalise : bool
-        Search around earlier poses where the guesses fail.
+        Search around earlier poses where the guesses fail, then everywhere (some tenths of a second; not at
+        every frame where that has failed often).
     denoise_samples : bool
         Register surface points averaged over their pixels, not single pixels.
     verify : bool

@@ -43,7 +43,7 @@ struct ModelOptions {
                          ///< new points are also at least a pixel and a half of their frame apart
   int max_points = 500000;      ///< the model never grows beyond: its spacing is widened instead
   bool predict_motion = true;   ///< start also from the pose that continues the last motion
-  bool relocalise = true;       ///< search around earlier poses where the guesses fail
+  bool relocalise = true;       ///< search around earlier poses where the guesses fail, then everywhere
   bool denoise_samples = true;  ///< register surface points averaged over their pixels, not single pixels
   bool verify = true;           ///< judge registrations by their evidence
   double min_evidence = 0.3;    ///< a frame with less is lost; see FrameReport
