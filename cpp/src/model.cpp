@@ -8,6 +8,8 @@
 #include "check.hpp"
 #include "consolidation_fold.hpp"
 #include "fusion_step.hpp"
+#include "loop_closure.hpp"
+#include "model_correction.hpp"
 #include "tracking.hpp"
 
 namespace nacre {
@@ -94,6 +96,7 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.predict_motion = false;
   options.relocalise = false;
   options.denoise_samples = false;
+  options.loop_closure = false;
   options.verify = false;
   return options;
 }
@@ -123,6 +126,7 @@ struct Model::Impl {
   Frame frame;           // the newest; its memory and the observer's are used again for the next
   SurfaceObserver observer{camera, options.fusion};
   PointModel cloud;
+  LoopClosure loops{camera, options};
   std::vector<FrameReport> reports;
   std::vector<Pose> poses;  // of the registered frames, oldest first
   double spacing = 0.0;
@@ -140,10 +144,12 @@ struct Model::Impl {
   TrackingResult locate(const FrameExtras& extras) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   std::vector<Pose> key_poses() const;
+  void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
   void fold_in(FrameReport& report);
 };
 
-// The loop: clean the image, make points of it, register them to the model, fold them in, renew the normals.
+// The loop: clean the image, make points of it, register them to the model, correct the model where a loop closes, fold
+// the points in, renew the normals.
 FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& extras) {
   check_extras(camera, extras);
   StopWatch total, watch;
@@ -179,6 +185,8 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     poses.push_back(report.world_from_camera);
     if (report.status == FrameStatus::tracked) {
       if (was_lost) report.status = FrameStatus::relocalised;
+      if (options.loop_closure && options.fold_in == FoldIn::fuse) close_loops(report, tracking, extras.keep_guess);
+      report.milliseconds.loop_closure = watch.lap();
       fold_in(report);
     }
   }
@@ -205,7 +213,8 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras) const {
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), key_poses(), was_lost, spacing, options);
+  return track(cloud, frame, camera, observer, guesses(extras), key_poses(), was_lost,
+               options.loop_closure && !was_lost ? loops.oldest_frame() : 0, spacing, options);
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
@@ -230,6 +239,24 @@ std::vector<Pose> Model::Impl::key_poses() const {
     if (is_new) chosen.push_back(*pose);
   }
   return chosen;
+}
+
+void Model::Impl::close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given) {
+  const std::int32_t oldest_frame = loops.oldest_frame();
+  const LoopReport loop = loops.add_frame({static_cast<std::int32_t>(report.index), frame, observer, tracking.alignment,
+                                           spacing, is_given, was_lost || tracking.is_to_whole_model});
+  if (loop.corrections.empty()) return;
+  report.loop_frame = loop.frame;
+  report.loop_distance = loop.distance;
+  move_points(cloud, loop.corrections, options.num_threads);
+  merge_layers(cloud, oldest_frame, spacing, std::max(2.75 * spacing, 4.0 * static_cast<double>(median_sigma(frame))));
+  report.world_from_camera = loop.corrections.back() * report.world_from_camera;
+  poses.clear();
+  for (FrameReport& earlier : reports) {
+    earlier.world_from_camera = loop.corrections[static_cast<std::size_t>(earlier.index)] * earlier.world_from_camera;
+    if (earlier.status != FrameStatus::lost) poses.push_back(earlier.world_from_camera);
+  }
+  poses.push_back(report.world_from_camera);
 }
 
 void Model::Impl::fold_in(FrameReport& report) {

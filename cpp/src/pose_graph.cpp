@@ -103,40 +103,44 @@ bool PoseGraph::step(const std::vector<double>& weights, double& damping, double
   return false;
 }
 
-PoseGraphFit PoseGraph::optimise(double outlier, int max_iterations) {
+PoseGraphFit PoseGraph::fit(const std::vector<double>& weights) {
+  constexpr int max_iterations = 50;
   PoseGraphFit fit;
-  fit.weights.assign(edges_.size(), 1.0);
-  const double threshold = outlier * outlier;
-  double convexity = 0.0;  // mu of the paper; 0: all weights are 1
+  fit.weights = weights;
+  fit.cost = cost(poses_, weights);
   double damping = 1e-6;
-  while (fit.iterations < max_iterations && num_unknowns_ > 0) {
-    double now = cost(poses_, fit.weights);
-    bool moves = true;
-    // While the kernel changes, its minimum need not be met.
-    for (int i = 0; moves && i < (convexity > 1.0 ? 2 : 10) && fit.iterations < max_iterations; ++i) {
-      moves = step(fit.weights, damping, now);
-      ++fit.iterations;
-    }
-    double largest = 0.0;
-    for (std::size_t i = 0; i < edges_.size(); ++i) {
-      if (edges_[i].is_loop) largest = std::max(largest, squared_error(i, poses_));
-    }
-    if (convexity == 1.0 || (convexity == 0.0 && largest <= threshold)) {
-      fit.converged = !moves;
-      if (fit.converged) break;
-      continue;
-    }
-    convexity = convexity == 0.0 ? std::max(1.0, 2.0 * largest / threshold) : std::max(1.0, convexity / 1.4);
-    for (std::size_t i = 0; i < edges_.size(); ++i) {  // Yang et al. 2020, equation 12
-      if (!edges_[i].is_loop) continue;
-      const double part = convexity * threshold;
-      fit.weights[i] = std::pow(part / (squared_error(i, poses_) + part), 2);
-    }
+  while (!fit.converged && fit.iterations < max_iterations && num_unknowns_ > 0) {
+    fit.converged = !step(weights, damping, fit.cost);
+    ++fit.iterations;
   }
   for (std::size_t i = 0; i < edges_.size(); ++i) {
-    if (fit.weights[i] > 0.5) fit.largest_error = std::max(fit.largest_error, std::sqrt(squared_error(i, poses_)));
+    if (weights[i] > 0.0) fit.largest_error = std::max(fit.largest_error, std::sqrt(squared_error(i, poses_)));
   }
   return fit;
+}
+
+PoseGraphFit PoseGraph::optimise(double outlier) {
+  const std::vector<Pose> before = poses_;
+  PoseGraphFit best = fit(std::vector<double>(edges_.size(), 1.0));
+  while (best.largest_error > outlier) {
+    // Without which loop do the others fit best?
+    PoseGraphFit without;
+    std::vector<Pose> poses;
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      if (!edges_[i].is_loop || best.weights[i] == 0.0) continue;
+      std::vector<double> weights = best.weights;
+      weights[i] = 0.0;
+      poses_ = before;
+      const PoseGraphFit trial = fit(weights);
+      if (!poses.empty() && !(trial.cost < without.cost)) continue;
+      without = trial;
+      poses = poses_;
+    }
+    if (poses.empty()) break;
+    best = without;
+    poses_ = poses;
+  }
+  return best;
 }
 
 }  // namespace nacre

@@ -13,12 +13,13 @@ struct PoseEdge {
   int from, to;
   Pose from_from_to;
   Matrix6 information;
-  bool is_loop;  // may be wrong: it is left out where the other edges contradict it
+  bool is_loop;  // may be wrong
 };
 
 struct PoseGraphFit {
   bool converged = false;
   int iterations = 0;
+  double cost = 0.0;            // sum of the squared errors that count
   double largest_error = 0.0;   // of the edges that count, in standard deviations
   std::vector<double> weights;  // of each edge: 1 counts, 0 is left out
 };
@@ -36,14 +37,16 @@ class PoseGraph {
   const std::vector<Pose>& poses() const { return poses_; }
   void set_poses(const std::vector<Pose>& poses) { poses_ = poses; }
 
-  // Moves the nodes to the least squares of all residuals (Gauss and Newton, damped after Levenberg and Marquardt). A
-  // loop edge counts as far as its residual then is within `outlier` standard deviations, by graduated
-  // non-convexity with the kernel of Geman and McClure (Yang, Antonante, Tzoumas and Carlone 2020).
-  PoseGraphFit optimise(double outlier = 5.0, int max_iterations = 100);
+  // Moves the nodes to the least squares of all residuals (Gauss and Newton, damped after Levenberg and Marquardt).
+  // Loops are measured more finely than the way between their ends, so that a wrong one does not keep its residual: it
+  // bends the way. While an edge is off by more than `outlier` standard deviations, the loop goes without which the
+  // others fit best.
+  PoseGraphFit optimise(double outlier = 5.0);
 
  private:
   double squared_error(std::size_t edge, const std::vector<Pose>& poses) const;
   double cost(const std::vector<Pose>& poses, const std::vector<double>& weights) const;
+  PoseGraphFit fit(const std::vector<double>& weights);
   bool step(const std::vector<double>& weights, double& damping, double& cost);
 
   std::vector<Pose> poses_;

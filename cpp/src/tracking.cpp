@@ -23,7 +23,8 @@ struct View {
 
 // Points in the image widened by a third on each side, turned away from the camera by at most 120 degrees: one of every
 // n of them, so that at most max_target_points are left.
-View points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera, int num_threads) {
+View points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera,
+                    std::int32_t oldest_frame, int num_threads) {
   constexpr std::int64_t block_size = ModelView::capacity;
   const ModelView model_view(camera, world_from_camera);
   const auto width = static_cast<float>(camera.width()), height = static_cast<float>(camera.height());
@@ -41,7 +42,8 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
                       rows[count] = static_cast<std::uint32_t>(begin) + i;
                       count += static_cast<std::size_t>((block.u[i] > -margin_u) & (block.u[i] < width + margin_u) &
                                                         (block.v[i] > -margin_v) & (block.v[i] < height + margin_v) &
-                                                        (block.facing[i] > -0.5F));
+                                                        (block.facing[i] > -0.5F) &
+                                                        (model.last_seen[first + i] >= oldest_frame));
                     }
                     found[static_cast<std::size_t>(number)].assign(rows, rows + count);
                   });
@@ -179,12 +181,13 @@ struct Search {
   IcpSource source;
   double spacing;      // of the model [m]
   float median_sigma;  // of the frame [m]
+  std::int32_t oldest_frame;  // see track
 
   bool has_automatic_gate() const { return !(options.registration.max_distance > 0.0); }
 
   // Near: the guess is about right, and a narrow gate is safest. Wide: it is not. Strict: see judge.
   TrackingResult register_from(const Pose& guess, bool wide, bool strict) const {
-    const View view = points_in_view(model, camera, guess, options.num_threads);
+    const View view = points_in_view(model, camera, guess, oldest_frame, options.num_threads);
     AlignOptions align_options = options.registration;
     align_options.max_points = 0;  // the view is thin enough
     const IcpTarget target(AlignCloud(view.points, view.normals), align_options);
@@ -210,7 +213,7 @@ struct Search {
 
   // Cameras around what a known camera saw: it turned about each of its axes, one way and the other.
   std::vector<Pose> around(const Pose& pose) const {
-    const View view = points_in_view(model, camera, pose, options.num_threads);
+    const View view = points_in_view(model, camera, pose, oldest_frame, options.num_threads);
     std::vector<Pose> poses = {pose};
     if (view.points.rows() == 0) return poses;
     const Eigen::Vector3d center = view.points.colwise().mean().transpose().cast<double>();
@@ -258,27 +261,38 @@ struct Search {
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
                      const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
-                     double spacing, const ModelOptions& options) {
+                     std::int32_t oldest_frame, double spacing, const ModelOptions& options) {
   const Samples samples = sample_frame(frame, observer, options);
-  const Search search{model,
-                      frame,
-                      camera,
-                      options,
-                      IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
-                      spacing,
-                      median_sigma(frame)};
+  Search search{model,
+                frame,
+                camera,
+                options,
+                IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
+                spacing,
+                median_sigma(frame),
+                oldest_frame};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
-  for (const bool wide : {false, true}) {
-    if (wide && !search.has_automatic_gate()) break;
-    for (const Pose& guess : guesses) {
-      const TrackingResult result = search.register_from(guess, wide, was_lost);
-      if (result.rank() >= best.rank()) best = result;
-      if (result.is_beyond_doubt) return result;
+  const auto try_guesses = [&] {
+    for (const bool wide : {false, true}) {
+      if (wide && !search.has_automatic_gate()) return;
+      for (const Pose& guess : guesses) {
+        const TrackingResult result = search.register_from(guess, wide, was_lost);
+        if (result.rank() >= best.rank()) best = result;
+        if (result.is_beyond_doubt) return;
+      }
     }
+  };
+  try_guesses();
+  if (best.status == FrameStatus::lost && oldest_frame > 0) {
+    search.oldest_frame = 0;
+    try_guesses();
+    best.is_to_whole_model = true;
   }
+  search.oldest_frame = 0;
   if (best.status == FrameStatus::lost && !key_poses.empty()) {
-    const TrackingResult found = search.relocalise(key_poses);
+    TrackingResult found = search.relocalise(key_poses);
+    found.is_to_whole_model = true;
     if (found.status != FrameStatus::lost) return found;
   }
   return best;

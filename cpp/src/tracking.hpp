@@ -16,15 +16,17 @@ struct TrackingResult {
   std::string reason;  // why it is weak or lost
   // Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
   bool is_beyond_doubt = false;
+  bool is_to_whole_model = false;  // older points included
 
   // A frame that is not lost before one that is, then by how much agrees.
   double rank() const { return (status == FrameStatus::lost ? 0.0 : 1.0) + alignment.overlap * consistency; }
 };
 
 // Tries the guesses (world_from_camera, most trusted first) until one registers the frame; when none does, searches
-// around the key poses, unless there are none.
+// around the key poses, unless there are none. Points that were last observed before oldest_frame may have drifted away:
+// they are left out, except by the search.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
                      const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
-                     double spacing, const ModelOptions& options);
+                     std::int32_t oldest_frame, double spacing, const ModelOptions& options);
 
 }  // namespace nacre

@@ -116,9 +116,18 @@ class Reconstruction:
             report = self.model.add_frame(frame.depth, color=frame.color, timestamp=frame.timestamp)
         except ValueError as error:
             return FrameRecord(index, frame.timestamp, "LOST", str(error), None, frame.truth, error)
+        if report.loop_frame is not None:
+            self._take_corrected_poses()
         if self._example is None and report.tracked:
             self._example = index, frame.depth
         return FrameRecord(index, frame.timestamp, report.status, report.reason, report, frame.truth)
+
+    def _take_corrected_poses(self) -> None:
+        reports = self.model.frames
+        self.frames[:] = [
+            record if record.report is None else dataclasses.replace(record, report=reports[record.report.index])
+            for record in self.frames
+        ]
 
     @property
     def counts(self) -> dict[str, int]:
@@ -295,7 +304,7 @@ def _frame_dict(
         "rotation_error": rotation_error,
     }
     for name in (
-        "num_inliers", "overlap", "consistency", "rmse", "weak_directions",
+        "num_inliers", "overlap", "consistency", "rmse", "weak_directions", "loop_frame", "loop_distance",
         "num_updated", "num_inserted", "num_removed", "num_points", "spacing", "milliseconds",
     ):  # fmt: skip
         figures[name] = None if report is None else getattr(report, name)
