@@ -9,16 +9,17 @@
 namespace nacre {
 namespace {
 
-constexpr int cloud_size = 3000;          // samples of a key frame
+constexpr int cloud_size = 3000;  // samples of a key frame
 constexpr std::size_t most_key_frames = 1000;
-constexpr std::size_t most_candidates = 4;  // key frames that a frame is registered to at once
-constexpr int stops_in_place = 8;         // what was seen since is taken to be in place
-constexpr double least_overlap = 0.3;     // of a frame and a key frame
-constexpr double reach = 0.12;            // drift that is looked for, as a part of the depth
-constexpr double drift = 0.005;           // of a step: [rad], and as a part of the depth
+constexpr std::size_t most_candidates = 4;   // key frames that a frame is registered to at once
+constexpr int stops_in_place = 8;            // what was seen since is taken to be in place
+constexpr double least_overlap = 0.3;        // of a frame and a key frame
+constexpr double reach = 0.12;               // drift that is looked for, as a part of the depth
+constexpr double drift = 0.005;              // of a step: [rad], and as a part of the depth
+constexpr double weak_drift = 10.0 * drift;  // where the registration leaves a direction open
 constexpr double loop_error = 0.25 * drift;
-constexpr double optimism = 25.0;         // of the covariance that a registration claims
-constexpr double most_stretch = 4.0;      // of an edge, in standard deviations
+constexpr double optimism = 25.0;     // of the covariance that a registration claims
+constexpr double most_stretch = 4.0;  // of an edge, in standard deviations
 
 double rms_distance(const Points& points, const Pose& a, const Pose& b) {
   double sum = 0.0;
@@ -124,8 +125,9 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
       pending_ && found->stop - pending_->stop <= 2 &&
       rms_distance(key_frames_.back().cloud.points, found->correction * pose, pending_->correction * pose) <
           std::max(3.0 * tolerance, 0.3 * found->distance);
-  if (is_confirmed) {
-    report.corrections = close({*pending_, *found}, depth, frame.index);
+  if (is_confirmed || found->is_beyond_doubt) {
+    report.corrections =
+        close(is_confirmed ? std::vector<Match>{*pending_, *found} : std::vector<Match>{*found}, depth, frame.index);
     if (!report.corrections.empty()) {
       report.frame = key_frames_[static_cast<std::size_t>(found->key_frame)].frame;
       report.distance = found->distance;
@@ -174,14 +176,15 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
   }
   CloudInView view;
   for (const int k : candidates) {
-    const CloudInView part =
-        look_for(key_frames_[static_cast<std::size_t>(k)].cloud, pose.inverse() * pose_of(k), frame.frame, camera_,
-                 gate / cloud.depth);
+    const CloudInView part = look_for(key_frames_[static_cast<std::size_t>(k)].cloud, pose.inverse() * pose_of(k),
+                                      frame.frame, camera_, gate / cloud.depth);
     view.seen += part.seen;
     view.through += part.through;
   }
   if (view.seen < options_.min_consistency * (view.seen + view.through)) return std::nullopt;
   found.correction = orthonormal(pose * frame.alignment.target_from_source.inverse());
+  found.is_beyond_doubt = found.alignment.overlap > 2.0 * least_overlap && view.through < 0.05 * view.seen &&
+                          found.alignment.rmse < 0.5 * options_.max_residual * gate;
   found.distance = rms_distance(cloud.points, pose, frame.alignment.target_from_source);
   return found;
 }
@@ -190,7 +193,8 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
 // itself, a step drifts, and a loop is as good as its samples.
 PoseEdge LoopClosure::edge(int from, int to, const Pose& pose, const AlignResult& alignment, double depth,
                            bool is_loop) const {
-  const double error = is_loop ? loop_error : drift;
+  const bool is_weak = alignment.weak_directions.cols() > 0;
+  const double error = is_loop ? loop_error : is_weak ? weak_drift : drift;
   Matrix6 covariance = Matrix6::Zero();
   if (alignment.information.trace() > 0.0) {
     Matrix6 information = alignment.information;
@@ -200,8 +204,9 @@ PoseEdge LoopClosure::edge(int from, int to, const Pose& pose, const AlignResult
   covariance.diagonal().head<3>().array() += error * error;
   covariance.diagonal().tail<3>().array() += error * error * depth * depth;
   // A twist of the node about its own origin, seen as one about the registration's centre in the world.
-  const Eigen::Vector3d center =
-      alignment.information.trace() > 0.0 ? Eigen::Vector3d(pose.inverse() * alignment.center) : depth * Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d center = alignment.information.trace() > 0.0
+                                     ? Eigen::Vector3d(pose.inverse() * alignment.center)
+                                     : depth * Eigen::Vector3d::UnitZ();
   Matrix6 about_center = Matrix6::Zero();
   about_center.topLeftCorner<3, 3>() = about_center.bottomRightCorner<3, 3>() = pose.linear();
   about_center.bottomLeftCorner<3, 3>() = -pose.linear() * cross_matrix(center);
@@ -243,8 +248,9 @@ std::vector<Pose> LoopClosure::corrections(const std::vector<Pose>& before, std:
     while (next < stops_.size() && stops_[next].frame <= i) ++next;
     const Stop& a = stops_[next > 0 ? next - 1 : 0];
     const Stop& b = stops_[std::min(next, stops_.size() - 1)];
-    const double part =
-        b.frame > a.frame ? std::max(0.0, static_cast<double>(i - a.frame) / static_cast<double>(b.frame - a.frame)) : 0.0;
+    const double part = b.frame > a.frame
+                            ? std::max(0.0, static_cast<double>(i - a.frame) / static_cast<double>(b.frame - a.frame))
+                            : 0.0;
     const Eigen::Vector3d pivot =
         a.pose * (key_frames_[static_cast<std::size_t>(a.key_frame)].cloud.depth * Eigen::Vector3d::UnitZ());
     motions.push_back(blend(correction_at(a), correction_at(b), part, pivot));

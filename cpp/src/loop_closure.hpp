@@ -53,6 +53,7 @@ class LoopClosure {
     AlignResult alignment;
     Pose correction = Pose::Identity();  // world then from world now
     double distance = 0.0;               // [m]
+    bool is_beyond_doubt = false;        // needs no other to confirm it
   };
 
   int now() const { return static_cast<int>(stops_.size()); }  // the number of the stop to come

@@ -183,10 +183,10 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     report.world_from_camera = poses.empty() ? Pose::Identity() : poses.back();
   } else {
     poses.push_back(report.world_from_camera);
+    if (options.loop_closure && options.fold_in == FoldIn::fuse) close_loops(report, tracking, extras.keep_guess);
+    report.milliseconds.loop_closure = watch.lap();
     if (report.status == FrameStatus::tracked) {
       if (was_lost) report.status = FrameStatus::relocalised;
-      if (options.loop_closure && options.fold_in == FoldIn::fuse) close_loops(report, tracking, extras.keep_guess);
-      report.milliseconds.loop_closure = watch.lap();
       fold_in(report);
     }
   }
@@ -248,6 +248,11 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
   if (loop.corrections.empty()) return;
   report.loop_frame = loop.frame;
   report.loop_distance = loop.distance;
+  if (report.status == FrameStatus::weak) {  // what it saw before determines its pose
+    report.status = FrameStatus::tracked;
+    report.reason.clear();
+    report.weak_directions.resize(6, 0);
+  }
   move_points(cloud, loop.corrections, options.num_threads);
   merge_layers(cloud, oldest_frame, spacing, std::max(2.75 * spacing, 4.0 * static_cast<double>(median_sigma(frame))));
   report.world_from_camera = loop.corrections.back() * report.world_from_camera;

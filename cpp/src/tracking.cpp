@@ -30,23 +30,22 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
   const auto width = static_cast<float>(camera.width()), height = static_cast<float>(camera.height());
   const float margin_u = width / 3.0F, margin_v = height / 3.0F;
   std::vector<std::vector<std::uint32_t>> found(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
-  parallel_blocks(model.size(), block_size, num_threads,
-                  [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
-                    const auto first = static_cast<std::size_t>(begin);
-                    ModelView::Block block;
-                    model_view.project(model.points[first].data(), model.normals[first].data(),
-                                       static_cast<int>(end - begin), block);
-                    std::uint32_t rows[block_size];
-                    std::size_t count = 0;
-                    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(end - begin); ++i) {
-                      rows[count] = static_cast<std::uint32_t>(begin) + i;
-                      count += static_cast<std::size_t>((block.u[i] > -margin_u) & (block.u[i] < width + margin_u) &
-                                                        (block.v[i] > -margin_v) & (block.v[i] < height + margin_v) &
-                                                        (block.facing[i] > -0.5F) &
-                                                        (model.last_seen[first + i] >= oldest_frame));
-                    }
-                    found[static_cast<std::size_t>(number)].assign(rows, rows + count);
-                  });
+  parallel_blocks(
+      model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
+        const auto first = static_cast<std::size_t>(begin);
+        ModelView::Block block;
+        model_view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin),
+                           block);
+        std::uint32_t rows[block_size];
+        std::size_t count = 0;
+        for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(end - begin); ++i) {
+          rows[count] = static_cast<std::uint32_t>(begin) + i;
+          count += static_cast<std::size_t>((block.u[i] > -margin_u) & (block.u[i] < width + margin_u) &
+                                            (block.v[i] > -margin_v) & (block.v[i] < height + margin_v) &
+                                            (block.facing[i] > -0.5F) & (model.last_seen[first + i] >= oldest_frame));
+        }
+        found[static_cast<std::size_t>(number)].assign(rows, rows + count);
+      });
   std::size_t num_found = 0;
   for (const auto& rows : found) num_found += rows.size();
   const std::size_t step = (num_found + max_target_points - 1) / max_target_points;
@@ -179,8 +178,8 @@ struct Search {
   const Camera& camera;
   const ModelOptions& options;
   IcpSource source;
-  double spacing;      // of the model [m]
-  float median_sigma;  // of the frame [m]
+  double spacing;             // of the model [m]
+  float median_sigma;         // of the frame [m]
   std::int32_t oldest_frame;  // see track
 
   bool has_automatic_gate() const { return !(options.registration.max_distance > 0.0); }

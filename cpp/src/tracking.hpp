@@ -23,8 +23,8 @@ struct TrackingResult {
 };
 
 // Tries the guesses (world_from_camera, most trusted first) until one registers the frame; when none does, searches
-// around the key poses, unless there are none. Points that were last observed before oldest_frame may have drifted away:
-// they are left out, except by the search.
+// around the key poses, unless there are none. Points that were last observed before oldest_frame may have drifted
+// away: they are left out, except by the search.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
                      const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
                      std::int32_t oldest_frame, double spacing, const ModelOptions& options);

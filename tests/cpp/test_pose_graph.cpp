@@ -107,7 +107,8 @@ TEST_CASE("measurements without error are met exactly from a bad start") {
   }
   graph.add_edge(true_loop(0, count - 1));
   CHECK(graph.optimise().converged);
-  for (int k = 0; k < count; ++k) CHECK(distance(graph.poses()[static_cast<std::size_t>(k)], on_circle(k, count)) < 1e-8);
+  for (int k = 0; k < count; ++k)
+    CHECK(distance(graph.poses()[static_cast<std::size_t>(k)], on_circle(k, count)) < 1e-8);
 }
 
 TEST_CASE("wrong loops are left out, whether other loops contradict them or the odometry alone") {

@@ -78,8 +78,8 @@ struct FrameReport {
   double rmse = 0.0;                      ///< of the inliers, along the normals [m]
   Matrix6 information = Matrix6::Zero();  ///< see AlignResult
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult
-  std::optional<std::int64_t> loop_frame;  ///< the earlier frame that this one closed a loop with
-  double loop_distance = 0.0;              ///< between the surfaces that the two saw, before [m]
+  std::optional<std::int64_t> loop_frame;                    ///< the earlier frame that this one closed a loop with
+  double loop_distance = 0.0;                                ///< between the surfaces that the two saw, before [m]
   DepthReport depth;
   FusionReport fusion;
   std::int64_t num_points = 0;  ///< of the model, after the frame
@@ -111,11 +111,11 @@ class Model {
 
   const Camera& camera() const;
   const ModelOptions& options() const;
-  const PointModel& cloud() const;                 ///< in the world frame
-  PointModel cloud_in_camera() const;              ///< in the newest registered camera's frame
+  const PointModel& cloud() const;     ///< in the world frame
+  PointModel cloud_in_camera() const;  ///< in the newest registered camera's frame
   /// One report per frame that was added. Where a later frame closed a loop, the poses are the corrected ones.
   const std::vector<FrameReport>& frames() const;
-  double spacing() const;                          ///< [m]; 0 before the first frame
+  double spacing() const;  ///< [m]; 0 before the first frame
 
  private:
   struct Impl;
