@@ -12,7 +12,7 @@ namespace {
 constexpr int cloud_size = 3000;  // samples of a key frame
 constexpr std::size_t most_key_frames = 1000;
 constexpr std::size_t most_candidates = 4;   // key frames that a frame is registered to at once
-constexpr int stops_in_place = 8;            // what was seen since is taken to be in place
+constexpr int stops_in_place = 12;           // what was seen since is taken to be in place
 constexpr double least_overlap = 0.3;        // of a frame and a key frame
 constexpr double reach = 0.12;               // drift that is looked for, as a part of the depth
 constexpr double drift = 0.005;              // of a step: [rad], and as a part of the depth

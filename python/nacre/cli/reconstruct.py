@@ -39,6 +39,14 @@ def reconstruct(
         int | None, typer.Option(min=0, metavar="INDEX", help="The last frame.", show_default="all")
     ] = None,
     color: Annotated[bool, typer.Option("--color/--no-color", help="Give the model colours.")] = True,
+    loop_closure: Annotated[
+        bool | None,
+        typer.Option(
+            "--loop-closure/--no-loop-closure",
+            help="Correct model and poses where the camera comes back to what it saw before.",
+            show_default="on",
+        ),
+    ] = None,
     preset: PresetOption = None,
     config: ConfigOption = None,
     settings: SetOption = None,
@@ -57,7 +65,7 @@ def reconstruct(
     report.html. A frame that cannot be read or registered is LOST and changes nothing.
     """
     terminal = Terminal(json, quiet, verbose)
-    more = {"depth.min_depth": min_depth, "depth.max_depth": max_depth}
+    more: dict[str, Any] = {"depth.min_depth": min_depth, "depth.max_depth": max_depth, "loop_closure": loop_closure}
     parameters, preset_name = model_parameters(preset, config, settings, **more)
     sequence = open_source(source, format, camera, depth_scale)
     if not color:
