@@ -8,6 +8,7 @@
 #include "model_view.hpp"
 #include "parallel.hpp"
 #include "random.hpp"
+#include "relocalisation.hpp"
 #include "surface_observer.hpp"
 
 namespace nacre {
@@ -230,26 +231,13 @@ struct Search {
   // From every place where a camera has been, and around it: a few points each, then the best with all.
   TrackingResult relocalise(const std::vector<Pose>& key_poses) const {
     constexpr std::size_t num_finalists = 3;
-    const PointsRef points = Eigen::Map<const Points>(model.points.front().data(), model.size(), 3);
-    const PointsRef normals = Eigen::Map<const Points>(model.normals.front().data(), model.size(), 3);
-    const IcpTarget whole(AlignCloud(points, normals), options.registration);
-    AlignOptions coarse = options.registration;
-    coarse.max_samples = coarse.coarse_samples = 300;
-    coarse.max_iterations = 15;
-    const IcpSource few(AlignCloud(source.cloud.points, source.cloud.normals, source.cloud.sigma), coarse);
-
-    std::vector<std::pair<double, Pose>> candidates;
+    std::vector<Pose> guesses;
     for (const Pose& key_pose : key_poses) {
-      for (const Pose& guess : around(key_pose)) {
-        const AlignResult result = align_to(whole, few, guess, coarse);
-        candidates.emplace_back(result.overlap, result.target_from_source);
-      }
+      for (const Pose& guess : around(key_pose)) guesses.push_back(guess);
     }
-    std::stable_sort(candidates.begin(), candidates.end(),
-                     [](const auto& a, const auto& b) { return a.first > b.first; });
     TrackingResult best;
-    for (std::size_t i = 0; i < std::min(num_finalists, candidates.size()); ++i) {
-      const TrackingResult result = register_from(candidates[i].second, false, true);
+    for (const Pose& candidate : most_promising(model, source, guesses, options.registration, num_finalists)) {
+      const TrackingResult result = register_from(candidate, false, true);
       if (result.rank() >= best.rank()) best = result;
     }
     return best;
