@@ -11,8 +11,9 @@ namespace {
 
 constexpr int cloud_size = 3000;  // samples of a key frame
 constexpr std::size_t most_key_frames = 1000;
-constexpr std::size_t most_candidates = 4;   // key frames that a frame is registered to at once
-constexpr int stops_in_place = 12;           // what was seen since is taken to be in place
+constexpr std::size_t most_candidates = 4;  // key frames that a frame is registered to at once
+constexpr int stops_in_place = 12;          // what was seen since is taken to be in place
+constexpr int never = -1000000;
 constexpr double least_overlap = 0.3;        // of a frame and a key frame
 constexpr double reach = 0.12;               // drift that is looked for, as a part of the depth
 constexpr double drift = 0.005;              // of a step: [rad], and as a part of the depth
@@ -45,7 +46,8 @@ bool LoopClosure::is_in_place(int key_frame) const {
 }
 
 std::int32_t LoopClosure::oldest_frame() const {
-  return now() > stops_in_place ? stops_[static_cast<std::size_t>(now() - 1 - stops_in_place)].frame : 0;
+  if (now() <= stops_in_place) return first_in_place_;
+  return std::max(first_in_place_, stops_[static_cast<std::size_t>(now() - 1 - stops_in_place)].frame);
 }
 
 LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
@@ -54,7 +56,7 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
   if (!stops_.empty()) {
     const Stop& last = stops_.back();
     const double depth = key_frames_[static_cast<std::size_t>(last.key_frame)].cloud.depth;
-    if (view_distance(last.pose, pose, depth) < 1.0) return report;
+    if (!frame.to_whole_model && view_distance(last.pose, pose, depth) < 1.0) return report;
   }
   KeyFrame key{frame.index, sample_cloud(frame.frame, frame.observer, cloud_size, options_.num_threads), now()};
 
@@ -81,6 +83,11 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
   const double tolerance = std::max(frame.spacing, static_cast<double>(median_sigma(frame.frame)));
   const bool agrees = found && found->distance <= tolerance;
   if (agrees) in_view.insert(in_view.end(), candidates.begin(), candidates.end());
+  if (frame.to_whole_model) {  // how the rest of the model lies to what is in view is not known
+    first_in_place_ = frame.index;
+    for (KeyFrame& other : key_frames_) other.last_seen = never;
+    pending_.reset();
+  }
   for (const int k : in_view) {
     key_frames_[static_cast<std::size_t>(k)].last_seen = now();
     const double distance = view_distance(pose_of(k), pose, key.cloud.depth);

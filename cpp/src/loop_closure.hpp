@@ -69,7 +69,8 @@ class LoopClosure {
   std::vector<KeyFrame> key_frames_;  // nodes of the graph
   PoseGraph graph_;
   std::vector<Stop> stops_;
-  std::optional<Match> pending_;  // a loop that waits for another to confirm it
+  std::int32_t first_in_place_ = 0;  // the frame that was last registered to the whole model
+  std::optional<Match> pending_;     // a loop that waits for another to confirm it
 };
 
 }  // namespace nacre
