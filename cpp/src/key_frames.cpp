@@ -4,39 +4,20 @@
 #include <cmath>
 
 #include "model_view.hpp"
-#include "parallel.hpp"
-#include "random.hpp"
 
 namespace nacre {
 
-FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, int most_points, int num_threads) {
-  const auto num_valid = static_cast<std::int64_t>(frame.valid.size());
-  const std::int64_t count = std::min<std::int64_t>(most_points, num_valid);
-  FrameCloud cloud{Points(count, 3), Points(count, 3), Values(count)};
-  const double stride = static_cast<double>(num_valid) / static_cast<double>(std::max<std::int64_t>(count, 1));
-  parallel_blocks(count, ObservationBlock::capacity, num_threads, [&](auto, auto begin, auto end) {
-    ObservationBlock block;
-    for (std::int64_t i = begin; i < end; ++i) {
-      const double place = (static_cast<double>(i) + random_uniform(0, static_cast<std::uint64_t>(i))) * stride;
-      const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
-      cloud.points.row(i) = frame.points.row(row);
-      cloud.normals.row(i) = frame.normals.row(row);
-      cloud.sigma[i] = frame.sigma[row];
-      observer.add(block, cloud.points.row(i).transpose(), cloud.normals.row(i).transpose(), row, frame.sigma[row]);
-    }
-    observer.observe(block);
-    for (std::int64_t i = begin; i < end; ++i) {
-      const Observation seen = block[static_cast<int>(i - begin)];
-      if (!(seen.weight > 0.0F)) continue;
-      cloud.points.row(i) += seen.offset * cloud.normals.row(i);
-      cloud.normals.row(i) = seen.normal.normalized().transpose();
-    }
-  });
-  std::vector<float> z(static_cast<std::size_t>(count));
-  for (std::int64_t i = 0; i < count; ++i) z[static_cast<std::size_t>(i)] = cloud.points(i, 2);
+FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
+  constexpr int most_points = 3000;
+  ModelOptions fewer = options;
+  fewer.registration.max_samples = most_points;
+  FrameCloud cloud{sample_frame(frame, observer, fewer), 0.0};
+  const auto count = static_cast<std::size_t>(cloud.points.rows());
+  std::vector<float> z(count);
+  for (std::size_t i = 0; i < count; ++i) z[i] = cloud.points(static_cast<Eigen::Index>(i), 2);
   if (count > 0) {
-    std::nth_element(z.begin(), z.begin() + count / 2, z.end());
-    cloud.depth = static_cast<double>(z[static_cast<std::size_t>(count / 2)]);
+    std::nth_element(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(count / 2), z.end());
+    cloud.depth = static_cast<double>(z[count / 2]);
   }
   return cloud;
 }

@@ -3,17 +3,14 @@
 
 #include <cstdint>
 
-#include "surface_observer.hpp"
+#include "tracking.hpp"
 
 namespace nacre {
 
-// Denoised points of a frame, spread over it at random.
-struct FrameCloud {
-  Points points, normals;  // camera frame
-  Values sigma;            // [m]
-  double depth = 0.0;      // the median [m]
+struct FrameCloud : Samples {
+  double depth;  // the median [m]
 };
-FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, int most_points, int num_threads);
+FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options);
 
 struct KeyFrame {
   std::int32_t frame;  // its number

@@ -9,7 +9,6 @@
 namespace nacre {
 namespace {
 
-constexpr int cloud_size = 3000;  // samples of a key frame
 constexpr std::size_t most_key_frames = 1000;
 constexpr std::size_t most_candidates = 4;  // key frames that a frame is registered to at once
 constexpr int stops_in_place = 12;          // what was seen since is taken to be in place
@@ -29,6 +28,13 @@ double rms_distance(const Points& points, const Pose& a, const Pose& b) {
     sum += (a * point - b * point).squaredNorm();
   }
   return std::sqrt(sum / static_cast<double>(std::max<Eigen::Index>(1, points.rows())));
+}
+
+float median(const Values& values) {
+  std::vector<float> sorted(values.data(), values.data() + values.size());
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  return *middle;
 }
 
 // Between two motions; the pivot goes along a straight line.
@@ -58,7 +64,7 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
     const double depth = key_frames_[static_cast<std::size_t>(last.key_frame)].cloud.depth;
     if (!frame.to_whole_model && view_distance(last.pose, pose, depth) < 1.0) return report;
   }
-  KeyFrame key{frame.index, sample_cloud(frame.frame, frame.observer, cloud_size, options_.num_threads), now()};
+  KeyFrame key{frame.index, sample_cloud(frame.frame, frame.observer, options_), now()};
 
   // Which key frames' surfaces are in view?
   std::vector<std::pair<double, int>> in_question;
@@ -164,34 +170,40 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
     }
   }
   AlignOptions align_options = options_.registration;
-  align_options.max_samples = cloud_size;
+  align_options.max_samples = align_options.max_points = 0;
   const IcpTarget target(AlignCloud(points, normals), align_options);
-  const IcpSource source(AlignCloud(cloud.points, cloud.normals, cloud.sigma), align_options);
-  const double noise = 4.0 * static_cast<double>(median_sigma(frame.frame)), largest = 0.05 * target.diameter();
+  IcpSource source(AlignCloud(cloud.points, cloud.normals, cloud.sigma), align_options);
+  const double largest = 0.05 * target.diameter();
+  source.reach.resize(source.cloud.points.rows());
+  source.largest_residual.resize(source.cloud.points.rows());
+  for (Eigen::Index i = 0; i < source.reach.size(); ++i) {
+    const double noise = 4.0 * static_cast<double>(cloud.noise[source.cloud.rows[static_cast<std::size_t>(i)]]);
+    source.reach[i] = static_cast<float>(std::min(std::max(2.5 * target.spacing(), noise), largest));
+    source.largest_residual[i] = static_cast<float>(std::min(std::max(2.75 * frame.spacing, noise), largest));
+  }
   align_options.max_distance = reach * cloud.depth;
-  align_options.final_distance = std::min(std::max(2.5 * target.spacing(), noise), largest);
-  const double gate = std::min(std::max(2.75 * frame.spacing, noise), largest);
+  align_options.final_distance = static_cast<double>(median(source.reach));
 
   Match found;
   found.stop = now();
   found.key_frame = candidates.front();
-  found.alignment = align_to(target, source, frame.alignment.target_from_source, align_options, gate);
+  found.alignment = align_to(target, source, frame.alignment.target_from_source, align_options);
   const Pose& pose = found.alignment.target_from_source;
   if (found.alignment.status == AlignStatus::too_few_pairs || found.alignment.overlap < least_overlap ||
-      found.alignment.weak_directions.cols() > 0 || found.alignment.rmse > options_.max_residual * gate) {
+      found.alignment.weak_directions.cols() > 0 || found.alignment.residual_ratio > options_.max_residual) {
     return std::nullopt;
   }
   CloudInView view;
   for (const int k : candidates) {
     const CloudInView part = look_for(key_frames_[static_cast<std::size_t>(k)].cloud, pose.inverse() * pose_of(k),
-                                      frame.frame, camera_, gate / cloud.depth);
+                                      frame.frame, camera_, 2.75 * frame.spacing / cloud.depth);
     view.seen += part.seen;
     view.through += part.through;
   }
   if (view.seen < options_.min_consistency * (view.seen + view.through)) return std::nullopt;
   found.correction = orthonormal(pose * frame.alignment.target_from_source.inverse());
   found.is_beyond_doubt = found.alignment.overlap > 2.0 * least_overlap && view.through < 0.05 * view.seen &&
-                          found.alignment.rmse < 0.5 * options_.max_residual * gate;
+                          found.alignment.residual_ratio < 0.5 * options_.max_residual;
   found.distance = rms_distance(cloud.points, pose, frame.alignment.target_from_source);
   return found;
 }

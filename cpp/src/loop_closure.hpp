@@ -50,7 +50,7 @@ class LoopClosure {
     int key_frame = -1;
     int node = -1;
     int stop = 0;
-    AlignResult alignment;
+    IcpResult alignment;
     Pose correction = Pose::Identity();  // world then from world now
     double distance = 0.0;               // [m]
     bool is_beyond_doubt = false;        // needs no other to confirm it

@@ -4,13 +4,24 @@
 #include <string>
 #include <vector>
 
+#include "icp_target.hpp"
 #include "nacre/model.hpp"
 #include "surface_observer.hpp"
 
 namespace nacre {
 
+// Denoised points of a frame, spread over it at random: noise would shift the matches on curved surfaces.
+struct Samples {
+  Points points, normals;  // camera frame
+  Values noise;            // standard deviation of each measurement [m]
+  Values sigma;            // with what its neighbours are wrong by, too, which no averaging removes [m]
+};
+
+// options.registration.max_samples of them, or as many as the frame has.
+Samples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options);
+
 struct TrackingResult {
-  AlignResult alignment;     // world_from_camera as target_from_source
+  IcpResult alignment;       // world_from_camera as target_from_source
   double consistency = 0.0;  // part of the model's points in view that the frame does not see through
   FrameStatus status = FrameStatus::lost;
   std::string reason;  // why it is weak or lost

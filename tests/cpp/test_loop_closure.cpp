@@ -236,8 +236,8 @@ TEST_CASE("a cloud is found in its own view, not behind the camera, and seen thr
   const FusionOptions options;
   SurfaceObserver observer(camera, options);
   observer.look_at(frame, Colors(), 0);
-  const FrameCloud cloud = sample_cloud(frame, observer, 500, 0);
-  CHECK(cloud.points.rows() == 500);
+  const FrameCloud cloud = sample_cloud(frame, observer, {});
+  CHECK(cloud.points.rows() == 3000);
   CHECK(cloud.depth == doctest::Approx(1.0).epsilon(0.001));
   CHECK(look_for(cloud, Pose::Identity(), frame, camera, 0.02).seen == 1.0);
   Pose behind = Pose::Identity(), nearer = Pose::Identity(), farther = Pose::Identity();
