@@ -45,8 +45,8 @@ class Room {
   Room() : tree_(furnished()) {}
 
   static Camera camera(double focal_error = 0.0) {
-    const double f = 130.0 * (1.0 + focal_error);
-    return Camera::pinhole(160, 120, f, f, 79.5, 59.5);
+    const double f = 180.0 * (1.0 + focal_error);
+    return Camera::pinhole(208, 156, f, f, 103.5, 77.5);
   }
   static Pose pose(int k) {
     const double a = 2.0 * pi * k / frames_per_turn;
@@ -61,7 +61,7 @@ class Room {
     DepthImage& image = views_[k];
     if (image.size() == 0) {
       SimulationOptions options;
-      options.noise.constant = 0.002;
+      options.noise = NoiseModel::kinect();
       options.seed = static_cast<std::uint64_t>(k);
       image = simulate_depth(tree_, camera(), pose(k), options);
     }
@@ -72,10 +72,10 @@ class Room {
   static MeshTree furnished() {
     Mesh mesh = box(Eigen::Vector3d::Zero(), {4.0, 2.6, 4.0}, 0.0);
     const auto random = [](int i, int j) { return random_uniform(5, static_cast<std::uint64_t>(10 * i + j)); };
-    for (int i = 0; i < 110; ++i) {
-      const double a = 2.0 * pi * (i + random(i, 0)) / 110.0;
+    for (int i = 0; i < 70; ++i) {
+      const double a = 2.0 * pi * (i + random(i, 0)) / 70.0;
       const Eigen::Vector3d way(std::sin(a), 0.0, std::cos(a));
-      Eigen::Vector3d place = (1.9 / way.cwiseAbs().maxCoeff() - 0.7 * random(i, 1)) * way;
+      Eigen::Vector3d place = (1.9 / way.cwiseAbs().maxCoeff() - 0.4 * random(i, 1)) * way;
       place.y() = 2.2 * random(i, 2) - 1.1;
       mesh = together(
           mesh,
@@ -232,7 +232,7 @@ TEST_CASE("the distance of two views counts turns and, by depth, ways") {
 
 TEST_CASE("a cloud is found in its own view, not behind the camera, and seen through where nothing is") {
   const Camera camera = Room::camera();
-  const Frame frame = make_frame(DepthImage::Constant(120, 160, 1.0F), camera);
+  const Frame frame = make_frame(DepthImage::Constant(156, 208, 1.0F), camera);
   const FusionOptions options;
   SurfaceObserver observer(camera, options);
   observer.look_at(frame, Colors(), 0);
