@@ -144,6 +144,7 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
     if (!report.corrections.empty()) {
       report.frame = key_frames_[static_cast<std::size_t>(found->key_frame)].frame;
       report.distance = found->distance;
+      report.depth = depth;
       for (const int k : candidates) key_frames_[static_cast<std::size_t>(k)].last_seen = now() - 1;
       pending_.reset();
       return report;

@@ -25,6 +25,7 @@ struct LoopFrame {
 struct LoopReport {
   std::optional<std::int64_t> frame;  // the earlier one that a loop was closed with
   double distance = 0.0;              // between the surfaces before [m], root mean square
+  double depth = 0.0;                 // of this frame, the median [m]
   std::vector<Pose> corrections;      // corrected world from the world before, of each frame; empty: all are in place
 };
 

@@ -10,6 +10,7 @@
 #include "fusion_step.hpp"
 #include "loop_closure.hpp"
 #include "model_correction.hpp"
+#include "point_spacing.hpp"
 #include "tracking.hpp"
 
 namespace nacre {
@@ -254,8 +255,14 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
     report.weak_directions.resize(6, 0);
   }
   move_points(cloud, loop.corrections, options.num_threads);
-  merge_layers(cloud, oldest_frame, spacing, std::max(2.75 * spacing, 4.0 * static_cast<double>(median_sigma(frame))));
   report.world_from_camera = loop.corrections.back() * report.world_from_camera;
+  const double noise = static_cast<double>(median_sigma(frame));
+  merge_layers(cloud, oldest_frame, spacing, [&](const Eigen::Vector3f& point) {
+    const double distance = (point.cast<double>() - report.world_from_camera.translation()).norm();
+    const double farther = camera.model() == Camera::Model::pinhole ? distance / loop.depth : 1.0;
+    const double sigma = noise * farther * farther;  // noise grows with the square
+    return spacing_at(static_cast<float>(distance), static_cast<float>(sigma), camera, spacing);
+  });
   poses.clear();
   for (FrameReport& earlier : reports) {
     earlier.world_from_camera = loop.corrections[static_cast<std::size_t>(earlier.index)] * earlier.world_from_camera;

@@ -155,6 +155,7 @@ PointModel plane(float height, std::int32_t frame, float confidence) {
       model.confidence.push_back(confidence);
       model.last_seen.push_back(frame);
       model.violations.push_back(0);
+      model.sightings.push_back(200);
     }
   }
   return model;
@@ -165,6 +166,7 @@ void append(PointModel& model, const PointModel& more) {
   model.normals.insert(model.normals.end(), more.normals.begin(), more.normals.end());
   model.confidence.insert(model.confidence.end(), more.confidence.begin(), more.confidence.end());
   model.last_seen.insert(model.last_seen.end(), more.last_seen.begin(), more.last_seen.end());
+  model.sightings.insert(model.sightings.end(), more.sightings.begin(), more.sightings.end());
   model.violations.insert(model.violations.end(), more.violations.begin(), more.violations.end());
 }
 
@@ -263,12 +265,13 @@ TEST_CASE("points move with the frame that last observed them") {
 TEST_CASE("two layers of one surface become one, weighted by confidence") {
   PointModel model = plane(0.0F, 0, 3.0F);
   append(model, plane(0.008F, 50, 1.0F));
-  merge_layers(model, 10, 0.01, 0.02);
+  merge_layers(model, 10, 0.01, [](const Eigen::Vector3f&) { return 0.01; });
   REQUIRE(model.size() == 400);
   for (std::size_t i = 0; i < 400; ++i) {
     CHECK(model.points[i].z() == doctest::Approx(0.002));
     CHECK(model.confidence[i] == 4.0F);
     CHECK(model.last_seen[i] == 50);
+    CHECK(model.sightings[i] == 255);
   }
 }
 
@@ -276,11 +279,19 @@ TEST_CASE("layers that are far apart, face away or are of the same time stay") {
   const auto merged = [](PointModel more) {
     PointModel model = plane(0.0F, 0, 1.0F);
     append(model, more);
-    merge_layers(model, 10, 0.01, 0.02);
+    merge_layers(model, 10, 0.01, [](const Eigen::Vector3f& point) { return point.z() > 0.5F ? 0.06 : 0.01; });
     return model.size();
   };
   CHECK(merged(plane(0.03F, 50, 1.0F)) == 800);
   CHECK(merged(plane(0.008F, 5, 1.0F)) == 800);
+  PointModel high = plane(0.1F, 50, 1.0F);  // where points are farther apart
+  for (Eigen::Vector3f& point : high.points) point.z() += 0.5F;
+  PointModel low = high;
+  low.last_seen.assign(400, 0);
+  for (Eigen::Vector3f& point : low.points) point.z() += 0.1F;
+  append(low, high);
+  merge_layers(low, 10, 0.01, [](const Eigen::Vector3f& point) { return point.z() > 0.5F ? 0.06 : 0.01; });
+  CHECK(low.size() == 400);
   PointModel back = plane(-0.008F, 50, 1.0F);
   for (Eigen::Vector3f& normal : back.normals) normal = -normal;
   CHECK(merged(back) == 800);
