@@ -43,6 +43,14 @@ def reconstruct(
         bool,
         typer.Option("--retry/--no-retry", help="At the end, try lost frames again while any is found."),
     ] = True,
+    loop_closure: Annotated[
+        bool | None,
+        typer.Option(
+            "--loop-closure/--no-loop-closure",
+            help="Correct model and poses where the camera comes back to what it saw before.",
+            show_default="on",
+        ),
+    ] = None,
     preset: PresetOption = None,
     config: ConfigOption = None,
     settings: SetOption = None,
@@ -62,7 +70,11 @@ def reconstruct(
     The frames may be far apart and in any order: a lost camera is searched for everywhere.
     """
     terminal = Terminal(json, quiet, verbose)
-    more = {"depth.min_depth": min_depth, "depth.max_depth": max_depth}
+    more: dict[str, Any] = {
+        "depth.min_depth": min_depth,
+        "depth.max_depth": max_depth,
+        "loop_closure": loop_closure,
+    }
     parameters, preset_name = model_parameters(preset, config, settings, **more)
     sequence = open_source(source, format, camera, depth_scale)
     if not color:
