@@ -15,8 +15,8 @@ constexpr Eigen::Index least_points = 50;
 constexpr double first_gate = 0.25, coarse_gate = 0.04, refined_gate = 0.06;
 constexpr double coarse_tolerance = 0.02, least_tolerance = 0.003;
 constexpr double same_shift = 0.1;
-constexpr double same_turn = 0.26;   // [rad]
-constexpr double body_depth = 0.7;   // from the middle of what is seen to that of the body, in radii of what is seen
+constexpr double same_turn = 0.26;    // [rad]
+constexpr double body_depth = 0.7;    // from the middle of what is seen to that of the body, in radii of what is seen
 constexpr double least_facing = 0.3;  // cosine
 
 AlignOptions icp_options(const GlobalAlignOptions& options) {
@@ -37,13 +37,14 @@ IcpSource few_of(IcpSource source) {
   return source;
 }
 
-Evidence ask(const IcpSource& source, const SearchSide& onto, const Pose& pose, const Gate& gate, double margin) {
+Evidence ask(const IcpSource& source, const SearchSide& onto, const Pose& pose, const Gate& gate, double tolerance,
+             double margin) {
   const Eigen::Index count = source.cloud.points.rows();
   std::vector<std::uint32_t> nearest(static_cast<std::size_t>(count), no_slot);
   Evidence evidence;
   for (const Pair& pair : onto.target.match(source, count, pose, gate, nearest)) {
-    const double ratio = residual(pair, Metric::symmetric) / gate.residual;
-    evidence.agree += 1.0 - ratio * ratio;
+    const double ratio = residual(pair, Metric::symmetric) / tolerance;
+    evidence.agree += std::max(0.0, 1.0 - ratio * ratio);
   }
   for (Eigen::Index i = 0; onto.seen && i < count; ++i) {
     const Eigen::Vector3d point = pose * source.cloud.points.row(i).transpose().cast<double>();
@@ -89,9 +90,8 @@ GlobalSearch::GlobalSearch(const SearchSide& source, const SearchSide& target, c
 
 std::vector<SearchCandidate> GlobalSearch::run() const {
   std::vector<SearchCandidate> candidates(static_cast<std::size_t>(options_.num_rotations));
-  parallel_for(options_.num_rotations, 4, options_.num_threads, [&](std::int64_t i) {
-    candidates[static_cast<std::size_t>(i)] = start_from(static_cast<int>(i));
-  });
+  parallel_for(options_.num_rotations, 4, options_.num_threads,
+               [&](std::int64_t i) { candidates[static_cast<std::size_t>(i)] = start_from(static_cast<int>(i)); });
   candidates = best_different(std::move(candidates), static_cast<std::size_t>(options_.num_candidates));
   parallel_for(static_cast<std::int64_t>(candidates.size()), 1, options_.num_threads,
                [&](std::int64_t i) { refine(candidates[static_cast<std::size_t>(i)]); });
@@ -125,11 +125,11 @@ void GlobalSearch::weigh(SearchCandidate& candidate, bool with_few, double toler
   if (candidate.alignment.status == AlignStatus::too_few_pairs) return;
   // Along the surface the nearest point is as far as the points are apart.
   const double spacing = std::max(source_.target.spacing(), target_.target.spacing());
-  const Gate gate{tolerance + 2.0 * spacing, std::cos(options_.max_angle), tolerance};
+  const Gate gate{tolerance + 2.0 * spacing, std::cos(options_.max_angle), false};
   const double margin = std::max(2.0 * tolerance, 0.01 * size_);
   const Pose& pose = candidate.alignment.target_from_source;
-  candidate.forward = ask(with_few ? source_.few : source_.all, target_, pose, gate, margin);
-  candidate.backward = ask(with_few ? target_.few : target_.all, source_, pose.inverse(), gate, margin);
+  candidate.forward = ask(with_few ? source_.few : source_.all, target_, pose, gate, tolerance, margin);
+  candidate.backward = ask(with_few ? target_.few : target_.all, source_, pose.inverse(), gate, tolerance, margin);
   candidate.score = candidate.forward.score(options_.outlines) + candidate.backward.score(options_.outlines);
 }
 
