@@ -100,6 +100,7 @@ ModelOptions ModelOptions::preset(const std::string& name) {
 
 void ModelOptions::check() const {
   depth.check();
+  region.check();
   registration.check();
   fusion.check();
   consolidation.check();
@@ -122,6 +123,7 @@ struct Model::Impl {
   ModelOptions options;  // what the first frame decides is filled in
   Frame frame;           // the newest; its memory and the observer's are used again for the next
   SurfaceObserver observer{camera, options.fusion};
+  MaskImage region;  // of the newest frame; empty where nothing is left out
   PointModel cloud;
   std::vector<FrameReport> reports;
   std::vector<Pose> poses;  // of the registered frames, oldest first
@@ -137,13 +139,15 @@ struct Model::Impl {
   }
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
-  TrackingResult locate(const FrameExtras& extras) const;
+  void keep_region(RegionReport& report);
+  TrackingResult locate(const FrameExtras& extras, const RegionReport& region) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   std::vector<Pose> key_poses() const;
   void fold_in(FrameReport& report);
 };
 
-// The loop: clean the image, make points of it, register them to the model, fold them in, renew the normals.
+// The loop: clean the image, make points of it, keep those of interest, register them to the model, fold them in, renew
+// the normals.
 FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& extras) {
   check_extras(camera, extras);
   StopWatch total, watch;
@@ -156,12 +160,17 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   report.milliseconds.preprocess = watch.lap();
 
   make_frame(clean, camera, options.depth.noise, options.num_threads, frame);
+  report.milliseconds.back_project = watch.lap();
+
+  keep_region(report.region);
+  report.milliseconds.region = watch.lap();
+
   if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
   const ColorsRef colors(extras.colors);
   observer.look_at(frame, colors, options.num_threads);
-  report.milliseconds.back_project = watch.lap();
+  report.milliseconds.back_project += watch.lap();
 
-  const TrackingResult tracking = locate(extras);
+  const TrackingResult tracking = locate(extras, report.region);
   report.status = tracking.status;
   report.reason = tracking.reason;
   report.world_from_camera = tracking.alignment.target_from_source;
@@ -191,11 +200,22 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   return report;
 }
 
-TrackingResult Model::Impl::locate(const FrameExtras& extras) const {
+void Model::Impl::keep_region(RegionReport& report) {
+  if (!options.region.is_limited()) {
+    report.num_inside = static_cast<std::int64_t>(frame.valid.size());
+    return;
+  }
+  MaskImage found = select_region(frame, camera, options.region, region, &report, options.num_threads);
+  nacre::keep_region(found, frame);
+  if (report.num_inside > 0) region = std::move(found);
+}
+
+TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport& region_report) const {
   TrackingResult result;
   result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
   if (frame.valid.size() < least_pixels) {
-    result.reason = "only " + std::to_string(frame.valid.size()) + " pixels of the frame are usable";
+    const std::string count = "only " + std::to_string(frame.valid.size()) + " pixels of the frame are usable";
+    result.reason = region_report.reason.empty() ? count : region_report.reason;
     return result;
   }
   if (cloud.size() == 0 || extras.keep_guess) {

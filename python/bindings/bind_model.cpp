@@ -23,6 +23,7 @@ py::dict milliseconds(const FrameReport& report) {
   py::dict result;
   result["preprocess"] = times.preprocess;
   result["back_project"] = times.back_project;
+  result["region"] = times.region;
   result["registration"] = times.registration;
   result["fold_in"] = times.fold_in;
   result["normals"] = times.normals;
@@ -63,6 +64,7 @@ void bind_model(py::module_& m) {
       .def(py::init<>())
       .def_static("preset", &ModelOptions::preset)
       .def_readwrite("depth", &ModelOptions::depth)
+      .def_readwrite("region", &ModelOptions::region)
       .def_readwrite("registration", &ModelOptions::registration)
       .def_readwrite("fold_in", &ModelOptions::fold_in)
       .def_readwrite("fusion", &ModelOptions::fusion)
@@ -106,6 +108,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("weak_directions",
                              [](const FrameReport& report) { return Twists(report.weak_directions.transpose()); })
       .def_readonly("depth", &FrameReport::depth)
+      .def_readonly("region", &FrameReport::region)
       .def_property_readonly("num_updated", [](const FrameReport& report) { return report.fusion.num_updated; })
       .def_property_readonly("num_inserted", [](const FrameReport& report) { return report.fusion.num_inserted; })
       .def_property_readonly("num_removed", [](const FrameReport& report) { return report.fusion.num_removed; })

@@ -15,6 +15,7 @@ from nacre._core import Camera
 from nacre.arrays import as_depth, as_mask, as_pose
 from nacre.depth import DepthParameters, DepthReport
 from nacre.parameters import from_core, to_core, updated
+from nacre.region import RegionParameters, RegionReport
 from nacre.registration import RegistrationParameters
 
 Preset = Literal["default", "paper"]
@@ -80,7 +81,7 @@ class ModelParameters:
 
     Attributes
     ----------
-    depth, registration, fusion, consolidation, normals
+    depth, region, registration, fusion, consolidation, normals
         Of the steps of the loop. ``consolidation`` and ``normals`` (of the model) are used where ``fold_in``
         is not "fuse".
     fold_in : "fuse", "wlop" or "wlop+"
@@ -112,6 +113,7 @@ class ModelParameters:
     """
 
     depth: DepthParameters = field(default_factory=DepthParameters)
+    region: RegionParameters = field(default_factory=RegionParameters)
     registration: RegistrationParameters = field(default_factory=RegistrationParameters)
     fold_in: Literal["fuse", "wlop", "wlop+"] = "fuse"
     fusion: FusionParameters = field(default_factory=FusionParameters)
@@ -162,6 +164,8 @@ class FrameReport:
         Part of the model's points in view that the frame does not see through.
     depth : DepthReport
         Pixels that were removed, by reason.
+    region : RegionReport
+        What was left out of the rest.
     num_updated, num_inserted, num_removed : int
         Points of the model that the frame moved, added and removed.
     num_points : int
@@ -184,6 +188,7 @@ class FrameReport:
     information: npt.NDArray[np.float64]
     weak_directions: npt.NDArray[np.float64]
     depth: DepthReport
+    region: RegionReport
     num_updated: int
     num_inserted: int
     num_removed: int
@@ -200,6 +205,7 @@ class FrameReport:
     def _from_core(cls, core: Any) -> FrameReport:
         values = {f.name: getattr(core, f.name) for f in fields(cls)}
         values["depth"] = DepthReport._from_core(core.depth)
+        values["region"] = RegionReport._from_core(core.region)
         return cls(**values)
 
     def __repr__(self) -> str:

@@ -12,6 +12,7 @@
 #include "nacre/depth.hpp"
 #include "nacre/fusion.hpp"
 #include "nacre/normals.hpp"
+#include "nacre/region.hpp"
 #include "nacre/registration.hpp"
 #include "nacre/types.hpp"
 
@@ -34,6 +35,7 @@ enum class FoldIn {
 
 struct ModelOptions {
   DepthOptions depth;
+  RegionOptions region;
   AlignOptions registration;
   FoldIn fold_in = FoldIn::fuse;
   FusionOptions fusion;
@@ -61,7 +63,7 @@ struct ModelOptions {
 
 /// Wall time of each step of the loop [ms].
 struct StepTimes {
-  double preprocess = 0, back_project = 0, registration = 0, fold_in = 0, normals = 0, total = 0;
+  double preprocess = 0, back_project = 0, region = 0, registration = 0, fold_in = 0, normals = 0, total = 0;
 };
 
 /// What became of one frame.
@@ -78,6 +80,7 @@ struct FrameReport {
   Matrix6 information = Matrix6::Zero();  ///< see AlignResult
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult
   DepthReport depth;
+  RegionReport region;
   FusionReport fusion;
   std::int64_t num_points = 0;  ///< of the model, after the frame
   double spacing = 0.0;         ///< of the model [m]
