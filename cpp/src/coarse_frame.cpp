@@ -7,8 +7,10 @@
 namespace nacre {
 namespace {
 
+constexpr int border = 1;         // of the image [cells]
 constexpr float steepest = 3.0F;  // tangent of the slant at which neighbouring cells still hold together
-constexpr int link_reach = 2;     // [cells]; noisy edges between are missing
+constexpr int link_reach = 3;     // [cells]; noisy edges between are missing
+constexpr int most_steps = 2;     // that the distance between linked cells may grow with
 
 }  // namespace
 
@@ -46,8 +48,23 @@ CoarseFrame::CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef
 
 bool are_linked(const Cell& a, const Cell& b, int steps, float link) {
   const float reach =
-      link > 0.0F ? link : steepest * static_cast<float>(steps) * std::min(a.footprint, b.footprint);
+      link > 0.0F ? link : steepest * static_cast<float>(std::min(steps, most_steps)) * std::min(a.footprint, b.footprint);
   return (a.point - b.point).squaredNorm() < reach * reach;
+}
+
+std::vector<std::int32_t> border_cells(const CoarseFrame& frame, const std::vector<std::int32_t>& group,
+                                       std::size_t num_groups) {
+  std::vector<std::int32_t> count(num_groups, 0);
+  const auto visit = [&](int u, int v) {
+    // Cleaning leaves little at the very border.
+    const int x = std::clamp(u, border, frame.width - 1 - border), y = std::clamp(v, border, frame.height - 1 - border);
+    const std::int32_t number = group[static_cast<std::size_t>(y * frame.width + x)];
+    if (number >= 0) ++count[static_cast<std::size_t>(number)];
+  };
+  if (std::min(frame.width, frame.height) <= 2 * border) return count;
+  for (int u = 0; u < frame.width; ++u) visit(u, 0), visit(u, frame.height - 1);
+  for (int v = 1; v + 1 < frame.height; ++v) visit(0, v), visit(frame.width - 1, v);
+  return count;
 }
 
 CellGroups connect(const CoarseFrame& frame, const std::vector<std::uint8_t>& side, float link) {

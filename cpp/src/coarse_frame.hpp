@@ -1,6 +1,7 @@
 // A frame seen coarsely: one point for every square of pixels.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -56,6 +57,15 @@ struct CellGroups {
 // Cells of equal side (0: in no group) are connected where they are at most `link` apart; 0: so many cells' sides that
 // a surface slanted by 70 degrees holds together.
 CellGroups connect(const CoarseFrame& frame, const std::vector<std::uint8_t>& side, float link);
+
+// How many cells of each group lie at the image's border.
+std::vector<std::int32_t> border_cells(const CoarseFrame& frame, const std::vector<std::int32_t>& group,
+                                       std::size_t num_groups);
+
+// How much the border cuts off of something: 0: nothing; about 1: a side of it; more: two and three sides.
+inline double cut_off(std::int32_t num_border, std::int32_t size) {
+  return static_cast<double>(num_border) * num_border / std::max(1, size);
+}
 
 // Whether a surface may go from one cell to another that is so many steps away.
 bool are_linked(const Cell& a, const Cell& b, int steps, float link);

@@ -139,7 +139,7 @@ struct Model::Impl {
   }
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
-  void keep_region(RegionReport& report);
+  void keep_region(FrameReport& report);
   TrackingResult locate(const FrameExtras& extras, const RegionReport& region) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   std::vector<Pose> key_poses() const;
@@ -162,7 +162,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   make_frame(clean, camera, options.depth.noise, options.num_threads, frame);
   report.milliseconds.back_project = watch.lap();
 
-  keep_region(report.region);
+  keep_region(report);
   report.milliseconds.region = watch.lap();
 
   if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
@@ -200,14 +200,12 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   return report;
 }
 
-void Model::Impl::keep_region(RegionReport& report) {
-  if (!options.region.is_limited()) {
-    report.num_inside = static_cast<std::int64_t>(frame.valid.size());
-    return;
-  }
-  MaskImage found = select_region(frame, camera, options.region, region, &report, options.num_threads);
+void Model::Impl::keep_region(FrameReport& report) {
+  report.region.num_inside = report.depth.num_kept;
+  if (!options.region.is_limited()) return;
+  MaskImage found = select_region(frame, camera, options.region, region, &report.region, options.num_threads);
   nacre::keep_region(found, frame);
-  if (report.num_inside > 0) region = std::move(found);
+  if (report.region.num_inside > 0) region = std::move(found);
 }
 
 TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport& region_report) const {

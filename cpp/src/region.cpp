@@ -15,8 +15,6 @@
 namespace nacre {
 namespace {
 
-constexpr int cut_off = 4;        // so much less do things count that the image's border cuts off
-constexpr int border = 2;         // [cells] of the image
 constexpr int adoption_reach = 6; // [cells] between parts of a thing that hide what joins them
 constexpr int contact_reach = 3;  // [cells] between a thing and the plane that it stands on
 
@@ -47,17 +45,18 @@ std::vector<std::uint8_t> standing_groups(const CoarseFrame& frame, const CellGr
   return stands;
 }
 
-// A group that stands on nothing is part of one that does, close behind or before it: of the one to which most links go.
-void adopt_floating(const CoarseFrame& frame, const std::vector<std::uint8_t>& stands, const RegionOptions& options,
-                    CellGroups& groups) {
+// A group that stands on nothing is part of one that does, no farther behind or before it than that one is large: of the
+// one to which most links go.
+void adopt_floating(const CoarseFrame& frame, const std::vector<std::uint8_t>& stands, CellGroups& groups) {
   std::map<std::pair<std::int32_t, std::int32_t>, std::int64_t> links;  // of floating and standing groups
   for (int i = 0; i < frame.size(); ++i) {
     const std::int32_t floating = groups.group[static_cast<std::size_t>(i)];
     if (floating < 0 || stands[static_cast<std::size_t>(floating)] != 0) continue;
-    frame.for_neighbours(i, adoption_reach, [&](int j, int steps) {
+    frame.for_neighbours(i, adoption_reach, [&](int j, int) {
       const std::int32_t other = groups.group[static_cast<std::size_t>(j)];
       if (other < 0 || stands[static_cast<std::size_t>(other)] == 0) return;
-      links[{floating, other}] += are_linked(frame[i], frame[j], steps, static_cast<float>(options.link_distance));
+      const float extent = std::sqrt(static_cast<float>(groups.size[static_cast<std::size_t>(other)]));
+      links[{floating, other}] += (frame[i].point - frame[j].point).norm() < extent * frame[j].footprint;
     });
   }
   std::vector<std::int32_t> becomes(groups.size.size());
@@ -78,17 +77,11 @@ void adopt_floating(const CoarseFrame& frame, const std::vector<std::uint8_t>& s
   }
 }
 
-// How large a group is: one that the image's border cuts off counts for less, being rarely what the camera is aimed at.
-std::vector<std::int64_t> importance(const CoarseFrame& frame, const CellGroups& groups) {
-  std::vector<std::int64_t> values(groups.size.begin(), groups.size.end());
-  std::vector<std::uint8_t> is_cut(values.size(), 0);
-  for (int i = 0; i < frame.size(); ++i) {
-    const int u = i % frame.width, v = i / frame.width;
-    const std::int32_t group = groups.group[static_cast<std::size_t>(i)];
-    const bool at_border = std::min(u, v) < border || std::min(frame.width - u, frame.height - v) <= border;
-    if (group >= 0 && at_border) is_cut[static_cast<std::size_t>(group)] = 1;
-  }
-  for (std::size_t g = 0; g < values.size(); ++g) values[g] /= is_cut[g] != 0 ? cut_off : 1;
+// How large a group is: the longer the image's border cuts it, the less it counts, for the camera is aimed at others.
+std::vector<double> importance(const CoarseFrame& frame, const CellGroups& groups) {
+  std::vector<double> values;
+  const std::vector<std::int32_t> cut = border_cells(frame, groups.group, groups.size.size());
+  for (std::size_t g = 0; g < cut.size(); ++g) values.push_back(groups.size[g] / (1.0 + 2.0 * cut_off(cut[g], groups.size[g])));
   return values;
 }
 
@@ -103,14 +96,14 @@ std::int32_t choose_group(const CoarseFrame& frame, const CellGroups& groups, co
     const std::int32_t group = groups.group[static_cast<std::size_t>(i)];
     if (group >= 0) ++shared[static_cast<std::size_t>(group)];
   }
-  const std::vector<std::int64_t> sizes = importance(frame, groups);
+  const std::vector<double> sizes = importance(frame, groups);
   std::int32_t best = -1;
-  std::pair<std::int64_t, std::int64_t> best_rank;  // shared cells where these are many, then all
+  std::pair<std::int64_t, double> best_rank;  // shared cells where these are many, then all
   for (std::size_t g = 0; g < groups.size.size(); ++g) {
     if (eligible[g] == 0 || groups.size[g] < options.min_object * frame.size()) continue;
     const double smaller = static_cast<double>(std::min<std::int64_t>(groups.size[g], num_previous));
     const bool is_known = shared[g] > 0 && static_cast<double>(shared[g]) >= options.keep_fraction * smaller;
-    const std::pair<std::int64_t, std::int64_t> rank{is_known ? shared[g] : 0, sizes[g]};
+    const std::pair<std::int64_t, double> rank{is_known ? shared[g] : 0, sizes[g]};
     if (best >= 0 && rank <= best_rank) continue;
     best = static_cast<std::int32_t>(g);
     best_rank = rank;
@@ -162,7 +155,7 @@ void select_object(const Frame& frame, const Camera& camera, const RegionOptions
   std::vector<std::uint8_t> eligible(groups.size.size(), 1);
   if (!report.planes.empty()) {
     eligible = standing_groups(coarse, groups, on_plane, options);
-    adopt_floating(coarse, eligible, options, groups);
+    adopt_floating(coarse, eligible, groups);
   }
   const std::int32_t chosen = choose_group(coarse, groups, eligible, previous, options);
   if (chosen < 0) {

@@ -69,7 +69,8 @@ struct Search {
 
   // The plane of most cells: a few cells with their normals, drawn at random, as in RANSAC (Fischler and Bolles 1981),
   // and the best of these refined.
-  std::optional<SupportPlane> largest_plane(const std::vector<int>& rows, std::uint64_t seed) const {
+  std::optional<SupportPlane> largest_plane(const std::vector<int>& rows, std::int64_t least,
+                                            std::uint64_t seed) const {
     if (rows.empty()) return std::nullopt;
     std::vector<int> voters;
     const std::size_t stride = (rows.size() + most_voters - 1) / most_voters;
@@ -90,14 +91,13 @@ struct Search {
     parallel_for(num_refined, 1, num_threads, [&](std::int64_t k) {
       SupportPlane plane = hypothesis(votes[static_cast<std::size_t>(k)].second);
       for (int i = 0; i < num_refinements; ++i) {
-        if (!refine(plane, rows, margin_factor(i))) return;
+        if (!refine(plane, voters, margin_factor(i))) return;
       }
       found[static_cast<std::size_t>(k)] = {count(plane, rows, 1.0F), plane};
     });
     const auto best =
         std::max_element(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
-    const auto least = static_cast<std::int64_t>(options.min_plane * static_cast<double>(rows.size()));
-    if (best->first < std::max<std::int64_t>(least, 12)) return std::nullopt;
+    if (best->first < least) return std::nullopt;
     return best->second;
   }
 
@@ -114,8 +114,8 @@ struct Search {
     return sides;
   }
 
-  // Something stands on the plane, and what hangs on its back is small against the plane, as the edge of a table is, or
-  // is outweighed: by sizes and the lengths along which they touch.
+  // Something stands on the plane, or it goes on beyond the image; and what hangs on its back is small against it, as the
+  // edge of a table is, or is outweighed: by sizes and the lengths along which they touch.
   bool is_support(const std::vector<std::uint8_t>& sides) const {
     const auto link = static_cast<float>(options.link_distance);
     const CellGroups groups = connect(frame, sides, link);
@@ -139,8 +139,11 @@ struct Search {
       (side_of[g] == before ? standing : hanging) += groups.size[g];
       (side_of[g] == before ? standing_weight : hanging_weight) += contact[g] * groups.size[g];
     }
-    const auto size = static_cast<double>(std::count(sides.begin(), sides.end(), on));
-    return standing >= options.min_object * frame.size() &&
+    const auto size = static_cast<std::int32_t>(std::count(sides.begin(), sides.end(), on));
+    std::vector<std::int32_t> is_on(sides.size());
+    std::transform(sides.begin(), sides.end(), is_on.begin(), [](std::uint8_t side) { return side == on ? 0 : -1; });
+    const bool goes_on = cut_off(border_cells(frame, is_on, 1)[0], size) > 0.5;
+    return (goes_on || standing >= options.min_object * frame.size()) &&
            (hanging < small_part * size || hanging_weight < standing_weight);
   }
 };
@@ -151,6 +154,8 @@ std::vector<SupportPlane> put_planes_aside(const CoarseFrame& frame, const Regio
                                            std::vector<std::uint8_t>& left, std::vector<std::uint8_t>& on_plane) {
   const Search search{frame, options, num_threads};
   std::vector<SupportPlane> planes;
+  const auto num_points = std::count(left.begin(), left.end(), std::uint8_t{1});
+  const auto least = static_cast<std::int64_t>(options.min_plane * static_cast<double>(num_points)) + 1;
   std::uint64_t seed = 0;
   bool found = true;
   while (found && planes.size() < most_planes) {
@@ -160,7 +165,7 @@ std::vector<SupportPlane> put_planes_aside(const CoarseFrame& frame, const Regio
       if (left[static_cast<std::size_t>(i)] != 0 && frame[i].normal.squaredNorm() > 0.0F) rows.push_back(i);
     }
     for (int candidate = 0; candidate < num_candidates && !found; ++candidate) {
-      const std::optional<SupportPlane> plane = search.largest_plane(rows, ++seed);
+      const std::optional<SupportPlane> plane = search.largest_plane(rows, least, ++seed);
       if (!plane) break;
       const std::vector<std::uint8_t> sides = search.sides_of(*plane, left);
       found = search.is_support(sides);

@@ -32,7 +32,7 @@ class RegionParameters:
     min_z: float = -math.inf
     max_z: float = math.inf
     object: bool = False
-    min_plane: float = 0.2
+    min_plane: float = 0.1
     min_object: float = 0.003
     plane_margin: float = 0.0
     link_distance: float = 0.0
@@ -134,7 +134,7 @@ def select_region(
         object : bool
             Only the largest thing that stands on a plane.
         min_plane : float
-            A supporting plane holds at least this part of what is not yet put aside.
+            A supporting plane holds at least this part of the points.
         min_object : float
             Things of a smaller part of the image's pixels are none.
         plane_margin : float

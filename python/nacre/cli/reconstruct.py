@@ -33,6 +33,26 @@ def reconstruct(
     max_depth: Annotated[
         float | None, typer.Option(help="Farther measurements are not used (metres).", show_default=False)
     ] = None,
+    box: Annotated[
+        tuple[float, float, float, float, float, float] | None,
+        typer.Option(
+            metavar="X0 X1 Y0 Y1 Z0 Z1",
+            help="Model only what is in this box of the camera's frame (metres; x right, y down, z forward).",
+            show_default=False,
+        ),
+    ] = None,
+    object: Annotated[
+        bool,
+        typer.Option("--object", help="Model only the largest thing that stands on a plane, e.g. a turntable."),
+    ] = False,
+    masks: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Images named as the depth images; black pixels are not used.",
+            show_default="the recording's",
+        ),
+    ] = None,
     every: Annotated[int, typer.Option(min=1, metavar="N", help="Use every N-th frame.")] = 1,
     first: Annotated[int, typer.Option(min=0, metavar="INDEX", help="The first frame, from 0.")] = 0,
     last: Annotated[
@@ -57,9 +77,14 @@ def reconstruct(
     report.html. A frame that cannot be read or registered is LOST and changes nothing.
     """
     terminal = Terminal(json, quiet, verbose)
-    more = {"depth.min_depth": min_depth, "depth.max_depth": max_depth}
+    more: dict[str, Any] = {"depth.min_depth": min_depth, "depth.max_depth": max_depth}
+    sides = ("min_x", "max_x", "min_y", "max_y", "min_z", "max_z")
+    more |= {f"region.{side}": value for side, value in zip(sides, box or (), strict=box is not None)}
+    more["region.object"] = object or None
     parameters, preset_name = model_parameters(preset, config, settings, **more)
     sequence = open_source(source, format, camera, depth_scale)
+    if masks is not None:
+        sequence = sequence.with_masks(masks)
     if not color:
         sequence = sequence.without_color()
     indices = range(len(sequence))[first : None if last is None else last + 1 : every]

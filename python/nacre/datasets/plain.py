@@ -1,5 +1,5 @@
 """
-The plain recording: camera.json, depth/, optionally color/ (same stems), groundtruth.txt and timestamps.txt.
+The plain recording: camera.json, depth/, optionally color/ and mask/ (same stems), groundtruth.txt and timestamps.txt.
 
 ``timestamps.txt`` has one time [s] for each depth image, in name order. Without it the time is its index.
 """
@@ -27,7 +27,7 @@ from nacre.io.images import COLOR_SUFFIXES, DEPTH_SUFFIXES, write_color_png, wri
 from nacre.io.trajectories import write_trajectory
 
 FORMAT = "plain"
-LAYOUT = "camera.json and depth/, optionally color/, groundtruth.txt and timestamps.txt"
+LAYOUT = "camera.json and depth/, optionally color/, mask/, groundtruth.txt and timestamps.txt"
 
 _LARGEST_STORED = 65534
 
@@ -48,6 +48,7 @@ def read(folder: Path, given: Given) -> Sequence:
             folder, f"a plain recording needs depth images in depth/; the folder holds {describe(folder)}"
         )
     colors = {path.stem: path for path in files(folder / "color", COLOR_SUFFIXES)}
+    masks = {path.stem: path for path in files(folder / "mask", COLOR_SUFFIXES)}
     timestamps = _read_timestamps(folder / "timestamps.txt", len(depth))
     times = np.arange(len(depth), dtype=np.float64) if timestamps is None else timestamps
     truth, poses = read_truth(folder / "groundtruth.txt", times, given.max_difference)
@@ -58,7 +59,12 @@ def read(folder: Path, given: Given) -> Sequence:
         depth_scale=depth_scale,
         sources=[
             FrameSource(
-                i, path, colors.get(path.stem), None if timestamps is None else float(times[i]), poses[i]
+                i,
+                path,
+                colors.get(path.stem),
+                None if timestamps is None else float(times[i]),
+                poses[i],
+                masks.get(path.stem),
             )
             for i, path in enumerate(depth)
         ],
