@@ -15,7 +15,7 @@ constexpr int most_steps = 2;     // that the distance between linked cells may 
 }  // namespace
 
 CoarseFrame::CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef& mask) {
-  while ((frame.width / step) * (frame.height / step) > most_cells) ++step;
+  while ((frame.width / step) * (frame.height / step) > most_cells && step < largest_step) ++step;
   width = (frame.width + step - 1) / step;
   height = (frame.height + step - 1) / step;
   cells.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
@@ -48,7 +48,8 @@ CoarseFrame::CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef
 
 bool are_linked(const Cell& a, const Cell& b, int steps, float link) {
   const float reach =
-      link > 0.0F ? link : steepest * static_cast<float>(std::min(steps, most_steps)) * std::min(a.footprint, b.footprint);
+      link > 0.0F ? link
+                  : steepest * static_cast<float>(std::min(steps, most_steps)) * std::min(a.footprint, b.footprint);
   return (a.point - b.point).squaredNorm() < reach * reach;
 }
 

@@ -13,7 +13,7 @@ namespace nacre {
 
 struct Cell {
   Eigen::Vector3f point = Eigen::Vector3f::Zero(), normal = Eigen::Vector3f::Zero();  // normal: 0 where there is none
-  float sigma = 0.0F;      // [m]
+  float sigma = 0.0F;                                                                 // [m]
   float footprint = 0.0F;  // the side of a cell on a surface that faces the camera there [m]
   std::int32_t pixel = -1;
 
@@ -21,7 +21,7 @@ struct Cell {
 };
 
 struct CoarseFrame {
-  static constexpr int most_cells = 20000;
+  static constexpr int most_cells = 20000, largest_step = 12;
   int width = 0, height = 0;
   int step = 1;  // [pixels]
   std::vector<Cell> cells;

@@ -15,8 +15,8 @@
 namespace nacre {
 namespace {
 
-constexpr int adoption_reach = 6; // [cells] between parts of a thing that hide what joins them
-constexpr int contact_reach = 3;  // [cells] between a thing and the plane that it stands on
+constexpr int contact_reach = 12;   // [pixels] between a thing and the plane that it stands on
+constexpr int adoption_reach = 24;  // [pixels] between parts of a thing that hide what joins them
 
 // The pixels with a point in the box.
 MaskImage box_mask(const Frame& frame, const RegionOptions& options) {
@@ -30,33 +30,38 @@ MaskImage box_mask(const Frame& frame, const RegionOptions& options) {
   return mask;
 }
 
-// Which groups of cells come near to a cell of a plane.
+// The side of a square of so many cells [m].
+float extent_of(const CellGroups& groups, std::int32_t group, const Cell& cell) {
+  return std::sqrt(static_cast<float>(groups.size[static_cast<std::size_t>(group)])) * cell.footprint;
+}
+
+// Which groups of cells stand on a plane: a cell of it is nearer than half of the group is large, for round things hide
+// where they touch.
 std::vector<std::uint8_t> standing_groups(const CoarseFrame& frame, const CellGroups& groups,
-                                          const std::vector<std::uint8_t>& on_plane, const RegionOptions& options) {
+                                          const std::vector<std::uint8_t>& on_plane) {
   std::vector<std::uint8_t> stands(groups.size.size(), 0);
   for (int i = 0; i < frame.size(); ++i) {
     if (on_plane[static_cast<std::size_t>(i)] == 0) continue;
-    frame.for_neighbours(i, contact_reach, [&](int j, int steps) {
+    frame.for_neighbours(i, contact_reach / frame.step, [&](int j, int) {
       const std::int32_t group = groups.group[static_cast<std::size_t>(j)];
-      if (group < 0 || !are_linked(frame[i], frame[j], steps, static_cast<float>(options.link_distance))) return;
+      if (group < 0 || !((frame[i].point - frame[j].point).norm() < 0.5F * extent_of(groups, group, frame[j]))) return;
       stands[static_cast<std::size_t>(group)] = 1;
     });
   }
   return stands;
 }
 
-// A group that stands on nothing is part of one that does, no farther behind or before it than that one is large: of the
-// one to which most links go.
+// A group that stands on nothing is part of one that does, no farther behind or before it than that one is large: of
+// the one to which most links go.
 void adopt_floating(const CoarseFrame& frame, const std::vector<std::uint8_t>& stands, CellGroups& groups) {
   std::map<std::pair<std::int32_t, std::int32_t>, std::int64_t> links;  // of floating and standing groups
   for (int i = 0; i < frame.size(); ++i) {
     const std::int32_t floating = groups.group[static_cast<std::size_t>(i)];
     if (floating < 0 || stands[static_cast<std::size_t>(floating)] != 0) continue;
-    frame.for_neighbours(i, adoption_reach, [&](int j, int) {
+    frame.for_neighbours(i, adoption_reach / frame.step, [&](int j, int) {
       const std::int32_t other = groups.group[static_cast<std::size_t>(j)];
       if (other < 0 || stands[static_cast<std::size_t>(other)] == 0) return;
-      const float extent = std::sqrt(static_cast<float>(groups.size[static_cast<std::size_t>(other)]));
-      links[{floating, other}] += (frame[i].point - frame[j].point).norm() < extent * frame[j].footprint;
+      links[{floating, other}] += (frame[i].point - frame[j].point).norm() < extent_of(groups, other, frame[j]);
     });
   }
   std::vector<std::int32_t> becomes(groups.size.size());
@@ -77,11 +82,18 @@ void adopt_floating(const CoarseFrame& frame, const std::vector<std::uint8_t>& s
   }
 }
 
+// Walls and the like: beside a plane, what the image's border cuts off on most sides is no thing.
+void leave_out_background(const CoarseFrame& frame, const CellGroups& groups, std::vector<std::uint8_t>& eligible) {
+  const std::vector<std::int32_t> cut = border_cells(frame, groups.group, groups.size.size());
+  for (std::size_t g = 0; g < cut.size(); ++g) eligible[g] &= cut_off(cut[g], groups.size[g]) < 4.0;
+}
+
 // How large a group is: the longer the image's border cuts it, the less it counts, for the camera is aimed at others.
 std::vector<double> importance(const CoarseFrame& frame, const CellGroups& groups) {
   std::vector<double> values;
   const std::vector<std::int32_t> cut = border_cells(frame, groups.group, groups.size.size());
-  for (std::size_t g = 0; g < cut.size(); ++g) values.push_back(groups.size[g] / (1.0 + 2.0 * cut_off(cut[g], groups.size[g])));
+  for (std::size_t g = 0; g < cut.size(); ++g)
+    values.push_back(groups.size[g] / (1.0 + 2.0 * cut_off(cut[g], groups.size[g])));
   return values;
 }
 
@@ -154,8 +166,9 @@ void select_object(const Frame& frame, const Camera& camera, const RegionOptions
   CellGroups groups = connect(coarse, left, static_cast<float>(options.link_distance));
   std::vector<std::uint8_t> eligible(groups.size.size(), 1);
   if (!report.planes.empty()) {
-    eligible = standing_groups(coarse, groups, on_plane, options);
+    eligible = standing_groups(coarse, groups, on_plane);
     adopt_floating(coarse, eligible, groups);
+    leave_out_background(coarse, groups, eligible);
   }
   const std::int32_t chosen = choose_group(coarse, groups, eligible, previous, options);
   if (chosen < 0) {
@@ -208,9 +221,9 @@ MaskImage select_region(const Frame& frame, const Camera& camera, const RegionOp
 void keep_region(const MaskRef& region, Frame& frame) {
   require(region.rows() == frame.height && region.cols() == frame.width, "region", "of the frame's size",
           std::to_string(region.cols()) + " x " + std::to_string(region.rows()));
-  frame.valid.erase(std::remove_if(frame.valid.begin(), frame.valid.end(),
-                                   [&](std::int32_t row) { return region.data()[row] == 0; }),
-                    frame.valid.end());
+  frame.valid.erase(
+      std::remove_if(frame.valid.begin(), frame.valid.end(), [&](std::int32_t row) { return region.data()[row] == 0; }),
+      frame.valid.end());
   for (Eigen::Index row = 0; row < region.size(); ++row) {
     if (region.data()[row] == 0) frame.normals.row(row).setConstant(std::numeric_limits<float>::quiet_NaN());
   }

@@ -12,13 +12,13 @@ namespace nacre {
 namespace {
 
 constexpr int num_hypotheses = 160;
-constexpr int num_refined = 6;           // of them, the best
-constexpr int num_refinements = 5;       // least squares over the cells of a plane, and its cells again
+constexpr int num_refined = 6;             // of them, the best
+constexpr int num_refinements = 5;         // least squares over the cells of a plane, and its cells again
 constexpr std::size_t most_voters = 3000;  // cells that choose between the planes
-constexpr float start_margin = 3.0F;     // times the last one, for planes from one noisy normal
-constexpr std::size_t most_planes = 8;   // in a frame
-constexpr double small_part = 0.3;       // of a plane
-constexpr int num_candidates = 4;        // planes that are tried before a frame is said to have no more
+constexpr float start_margin = 3.0F;       // times the last one, for planes from one noisy normal
+constexpr std::size_t most_planes = 8;     // in a frame
+constexpr double small_part = 0.3;         // of a plane
+constexpr int num_candidates = 4;          // planes that are tried before a frame is said to have no more
 
 // The part of the first margin that counts at a refinement.
 float margin_factor(int refinement) { return std::max(1.0F, start_margin - static_cast<float>(refinement)); }
@@ -114,8 +114,8 @@ struct Search {
     return sides;
   }
 
-  // Something stands on the plane, or it goes on beyond the image; and what hangs on its back is small against it, as the
-  // edge of a table is, or is outweighed: by sizes and the lengths along which they touch.
+  // What hangs on the back of a plane is small against it, as the edge of a table is. And something stands on it, or it
+  // goes on beyond the image; then what stands on it may also outweigh what hangs, by size and length of contact.
   bool is_support(const std::vector<std::uint8_t>& sides) const {
     const auto link = static_cast<float>(options.link_distance);
     const CellGroups groups = connect(frame, sides, link);
@@ -143,8 +143,9 @@ struct Search {
     std::vector<std::int32_t> is_on(sides.size());
     std::transform(sides.begin(), sides.end(), is_on.begin(), [](std::uint8_t side) { return side == on ? 0 : -1; });
     const bool goes_on = cut_off(border_cells(frame, is_on, 1)[0], size) > 0.5;
-    return (goes_on || standing >= options.min_object * frame.size()) &&
-           (hanging < small_part * size || hanging_weight < standing_weight);
+    const bool is_edge = hanging < small_part * size;
+    return goes_on ? is_edge || hanging_weight < standing_weight
+                   : is_edge && standing >= options.min_object * frame.size();
   }
 };
 
@@ -174,9 +175,9 @@ std::vector<SupportPlane> put_planes_aside(const CoarseFrame& frame, const Regio
         if (sides[i] == on) on_plane[i] = 1;
         if (sides[i] != before) left[i] = 0;
       }
-      rows.erase(std::remove_if(rows.begin(), rows.end(),
-                                [&](int i) { return sides[static_cast<std::size_t>(i)] == on; }),
-                 rows.end());
+      rows.erase(
+          std::remove_if(rows.begin(), rows.end(), [&](int i) { return sides[static_cast<std::size_t>(i)] == on; }),
+          rows.end());
     }
   }
   return planes;

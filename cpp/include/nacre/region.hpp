@@ -22,7 +22,7 @@ struct RegionOptions {
   double max_z = std::numeric_limits<double>::infinity();
 
   bool object = false;          ///< only the largest thing that stands on a plane
-  double min_plane = 0.1;          ///< a supporting plane holds at least this part of the points
+  double min_plane = 0.1;       ///< a supporting plane holds at least this part of the points
   double min_object = 0.003;    ///< things of a smaller part of the image's pixels are none
   double plane_margin = 0.0;    ///< so near to a plane a point belongs to it [m]; 0: from the noise and the pixels
   double link_distance = 0.0;   ///< across wider gaps a thing does not go on [m]; 0: from the pixels

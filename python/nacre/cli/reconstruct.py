@@ -43,7 +43,9 @@ def reconstruct(
     ] = None,
     object: Annotated[
         bool,
-        typer.Option("--object", help="Model only the largest thing that stands on a plane, e.g. a turntable."),
+        typer.Option(
+            "--object", help="Model only the largest thing that stands on a plane, e.g. a turntable."
+        ),
     ] = False,
     masks: Annotated[
         Path | None,

@@ -1,5 +1,7 @@
 """
-The plain recording: camera.json, depth/, optionally color/ and mask/ (same stems), groundtruth.txt and timestamps.txt.
+The plain recording: camera.json, depth/, optionally color/, mask/, groundtruth.txt and timestamps.txt.
+
+Colour images and masks (black: not used) have the stems of the depth images.
 
 ``timestamps.txt`` has one time [s] for each depth image, in name order. Without it the time is its index.
 """

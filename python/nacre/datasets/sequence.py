@@ -170,9 +170,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
 
     def without_color(self) -> Sequence:
         """Return the same recording with ``color`` None in every view."""
-        return self._with_sources(
-            [dataclasses.replace(source, color=None) for source in self._sources]
-        )
+        return self._with_sources([dataclasses.replace(source, color=None) for source in self._sources])
 
     def with_masks(self, folder: str | os.PathLike[str]) -> Sequence:
         """
