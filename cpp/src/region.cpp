@@ -35,8 +35,8 @@ float extent_of(const CellGroups& groups, std::int32_t group, const Cell& cell) 
   return std::sqrt(static_cast<float>(groups.size[static_cast<std::size_t>(group)])) * cell.footprint;
 }
 
-// Which groups of cells stand on a plane: a cell of it is nearer than half of the group is large, for round things hide
-// where they touch.
+// Which groups of cells stand on a plane: a cell of it is nearer than the group is large, or nearly, for round things
+// hide where they touch.
 std::vector<std::uint8_t> standing_groups(const CoarseFrame& frame, const CellGroups& groups,
                                           const std::vector<std::uint8_t>& on_plane) {
   std::vector<std::uint8_t> stands(groups.size.size(), 0);
@@ -44,7 +44,7 @@ std::vector<std::uint8_t> standing_groups(const CoarseFrame& frame, const CellGr
     if (on_plane[static_cast<std::size_t>(i)] == 0) continue;
     frame.for_neighbours(i, contact_reach / frame.step, [&](int j, int) {
       const std::int32_t group = groups.group[static_cast<std::size_t>(j)];
-      if (group < 0 || !((frame[i].point - frame[j].point).norm() < 0.5F * extent_of(groups, group, frame[j]))) return;
+      if (group < 0 || !((frame[i].point - frame[j].point).norm() < 0.75F * extent_of(groups, group, frame[j]))) return;
       stands[static_cast<std::size_t>(group)] = 1;
     });
   }
