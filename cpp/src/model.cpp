@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "attribute_fusion.hpp"
 #include "check.hpp"
 #include "consolidation_fold.hpp"
 #include "fusion_step.hpp"
@@ -40,10 +41,11 @@ double spacing_for(const Frame& frame, const Camera& camera) {
   return 2.0 * camera.footprint(*quartile);
 }
 
-void check_extras(const Camera& camera, const FrameExtras& extras) {
+void check_extras(const Camera& camera, const FrameExtras& extras, const PointModel& model) {
   const Eigen::Index pixels = static_cast<Eigen::Index>(camera.width()) * camera.height();
   require(extras.colors.rows() == 0 || extras.colors.rows() == pixels, "colors", "one row per pixel",
           extras.colors.rows());
+  check_attributes(extras.attributes, camera, model);
   require(!extras.keep_guess || extras.guess.has_value(), "keep_guess", "used with a guess", "no guess");
 }
 
@@ -143,13 +145,13 @@ struct Model::Impl {
   TrackingResult locate(const FrameExtras& extras, const RegionReport& region) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   std::vector<Pose> key_poses() const;
-  void fold_in(FrameReport& report);
+  void fold_in(const FrameExtras& extras, FrameReport& report);
 };
 
 // The loop: clean the image, make points of it, keep those of interest, register them to the model, fold them in, renew
 // the normals.
 FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& extras) {
-  check_extras(camera, extras);
+  check_extras(camera, extras, cloud);
   StopWatch total, watch;
   FrameReport report;
   report.index = static_cast<std::int64_t>(reports.size());
@@ -188,7 +190,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     poses.push_back(report.world_from_camera);
     if (report.status == FrameStatus::tracked) {
       if (was_lost) report.status = FrameStatus::relocalised;
-      fold_in(report);
+      fold_in(extras, report);
     }
   }
   was_lost = report.status == FrameStatus::lost && !poses.empty();
@@ -250,7 +252,7 @@ std::vector<Pose> Model::Impl::key_poses() const {
   return chosen;
 }
 
-void Model::Impl::fold_in(FrameReport& report) {
+void Model::Impl::fold_in(const FrameExtras& extras, FrameReport& report) {
   StopWatch watch;
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
   if (options.fold_in != FoldIn::fuse) {
@@ -261,8 +263,9 @@ void Model::Impl::fold_in(FrameReport& report) {
     report.milliseconds.normals = watch.lap();
     return;
   }
-  report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing,
-                                static_cast<std::int32_t>(report.index), options.fusion, options.num_threads);
+  report.fusion =
+      fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing,
+                    static_cast<std::int32_t>(report.index), options.fusion, options.num_threads, extras.attributes);
   while (cloud.size() > options.max_points) {
     spacing *= coarsening;
     thin(cloud, spacing);

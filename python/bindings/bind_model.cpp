@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstring>
 
 #include "bindings.hpp"
@@ -18,6 +19,18 @@ py::array_t<Value> copy_values(const std::vector<Value>& values) {
   return py::array_t<Value>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
+// name: (points, channels)
+py::dict copy_attributes(const PointModel& cloud) {
+  py::dict result;
+  for (const PointAttribute& attribute : cloud.attributes) {
+    py::array_t<float> array(
+        {static_cast<py::ssize_t>(cloud.size()), static_cast<py::ssize_t>(attribute.num_channels)});
+    std::copy(attribute.values.begin(), attribute.values.end(), array.mutable_data());
+    result[attribute.name.c_str()] = array;
+  }
+  return result;
+}
+
 py::dict milliseconds(const FrameReport& report) {
   const StepTimes& times = report.milliseconds;
   py::dict result;
@@ -32,10 +45,12 @@ py::dict milliseconds(const FrameReport& report) {
 }
 
 FrameReport add_frame(Model& model, const DepthRef& depth, const MaskRef& mask, const ColorsRef& colors,
+                      const std::vector<std::pair<std::string, Attributes>>& attributes,
                       std::optional<double> timestamp, const std::optional<PoseMatrix>& guess, bool keep_guess) {
   FrameExtras extras;
   extras.mask = mask;
   extras.colors = colors;
+  for (const auto& [name, values] : attributes) extras.attributes.push_back({name, values});
   extras.timestamp = timestamp;
   if (guess) extras.guess = to_pose(*guess);
   extras.keep_guess = keep_guess;
@@ -88,6 +103,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("points", [](const PointModel& cloud) { return copy_rows(cloud.points); })
       .def_property_readonly("normals", [](const PointModel& cloud) { return copy_rows(cloud.normals); })
       .def_property_readonly("colors", [](const PointModel& cloud) { return copy_rows(cloud.colors); })
+      .def_property_readonly("attributes", &copy_attributes)
       .def_property_readonly("confidence", [](const PointModel& cloud) { return copy_values(cloud.confidence); })
       .def_property_readonly("last_seen", [](const PointModel& cloud) { return copy_values(cloud.last_seen); })
       .def("__len__", &PointModel::size);

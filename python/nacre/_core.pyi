@@ -742,6 +742,8 @@ class RegionReport:
 class PointModel:
     def __len__(self) -> int: ...
     @property
+    def attributes(self) -> dict[str, typing.Any]: ...
+    @property
     def colors(self) -> numpy.typing.NDArray[numpy.float32]: ...
     @property
     def confidence(self) -> numpy.typing.NDArray[numpy.float32]: ...
@@ -799,9 +801,12 @@ class Model:
         arg0: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
         arg1: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, n]", "flags.c_contiguous"],
         arg2: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 3]", "flags.c_contiguous"],
-        arg3: typing.SupportsFloat | typing.SupportsIndex | None,
-        arg4: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] | None,
-        arg5: bool,
+        arg3: collections.abc.Sequence[
+            tuple[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float32, "[m, n]"]]
+        ],
+        arg4: typing.SupportsFloat | typing.SupportsIndex | None,
+        arg5: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] | None,
+        arg6: bool,
     ) -> FrameReport: ...
     def cloud_in_camera(self) -> PointModel: ...
     @property

@@ -114,7 +114,11 @@ class Reconstruction:
             return FrameRecord(index, None, "LOST", str(error), None, None, error)
         try:
             report = self.model.add_frame(
-                frame.depth, color=frame.color, mask=frame.mask, timestamp=frame.timestamp
+                frame.depth,
+                color=frame.color,
+                mask=frame.mask,
+                timestamp=frame.timestamp,
+                attributes=frame.attributes,
             )
         except ValueError as error:
             return FrameRecord(index, frame.timestamp, "LOST", str(error), None, frame.truth, error)

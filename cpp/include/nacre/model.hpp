@@ -89,11 +89,12 @@ struct FrameReport {
 
 /// What may come with a depth image.
 struct FrameExtras {
-  Colors colors;                    ///< height * width rows, row by row; empty: none
-  MaskImage mask;                   ///< pixels of the object, see MaskImage
-  std::optional<double> timestamp;  ///< [s]
-  std::optional<Pose> guess;        ///< world_from_camera to start the registration from
-  bool keep_guess = false;          ///< take the guess for the pose, without registration
+  Colors colors;                           ///< height * width rows, row by row; empty: none
+  std::vector<FrameAttribute> attributes;  ///< fused along with the points where fold_in is fuse
+  MaskImage mask;                          ///< pixels of the object, see MaskImage
+  std::optional<double> timestamp;         ///< [s]
+  std::optional<Pose> guess;               ///< world_from_camera to start the registration from
+  bool keep_guess = false;                 ///< take the guess for the pose, without registration
 };
 
 /// A 3D model that grows with every depth frame. The world is the first camera's frame unless the first frame comes

@@ -61,6 +61,13 @@ def reconstruct(
         int | None, typer.Option(min=0, metavar="INDEX", help="The last frame.", show_default="all")
     ] = None,
     color: Annotated[bool, typer.Option("--color/--no-color", help="Give the model colours.")] = True,
+    attribute: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=FOLDER",
+            help="Images of anything else, named as the depth images; fused along. May be repeated.",
+        ),
+    ] = None,
     preset: PresetOption = None,
     config: ConfigOption = None,
     settings: SetOption = None,
@@ -87,6 +94,11 @@ def reconstruct(
     sequence = open_source(source, format, camera, depth_scale)
     if masks is not None:
         sequence = sequence.with_masks(masks)
+    for text in attribute or ():
+        name, equals, folder = text.partition("=")
+        if not (name and equals and folder):
+            raise CommandError(f"--attribute needs NAME=FOLDER, got {text!r}", 2)
+        sequence = sequence.with_attribute(name, folder)
     if not color:
         sequence = sequence.without_color()
     indices = range(len(sequence))[first : None if last is None else last + 1 : every]

@@ -6,8 +6,8 @@ import collections.abc
 import dataclasses
 import logging
 import os
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, overload
@@ -19,7 +19,7 @@ from nacre import arrays
 from nacre._core import Camera
 from nacre.datasets.listing import files, pair
 from nacre.errors import FileFormatError
-from nacre.io.images import COLOR_SUFFIXES, read_color, read_depth
+from nacre.io.images import ATTRIBUTE_SUFFIXES, COLOR_SUFFIXES, read_attribute, read_color, read_depth
 from nacre.io.trajectories import Trajectory
 
 _log = logging.getLogger(__name__)
@@ -48,6 +48,8 @@ class SequenceFrame:
         ``world_from_camera``, where the recording knows it.
     mask : (H, W) bool or None
         The pixels of interest, where the recording says so.
+    attributes : dict of str to (H, W) or (H, W, C) float32
+        Whatever else the recording has for each pixel, by name.
     """
 
     index: int
@@ -57,6 +59,7 @@ class SequenceFrame:
     color: npt.NDArray[np.uint8] | None
     truth: npt.NDArray[np.float64] | None
     mask: npt.NDArray[np.bool_] | None = None
+    attributes: Mapping[str, npt.NDArray[np.float32]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         height, width = self.depth.shape
@@ -64,6 +67,7 @@ class SequenceFrame:
         if self.timestamp is not None:
             parts.append(f"timestamp={self.timestamp!r}")
         parts += [name for name in ("color", "truth", "mask") if getattr(self, name) is not None]
+        parts += self.attributes
         return f"SequenceFrame({', '.join(parts)})"
 
 
@@ -77,6 +81,7 @@ class FrameSource:
     timestamp: float | None = None
     truth: npt.NDArray[np.float64] | None = None
     mask: Path | None = None
+    attributes: Mapping[str, Path] = field(default_factory=dict)
 
 
 class Sequence(collections.abc.Sequence[SequenceFrame]):
@@ -191,6 +196,28 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
             [dataclasses.replace(s, mask=mask) for s, mask in zip(self._sources, masks, strict=True)]
         )
 
+    def with_attribute(self, name: str, folder: str | os.PathLike[str]) -> Sequence:
+        """
+        Return the same recording with images of a folder as an attribute of its frames.
+
+        An image (PNG, TIFF, JPEG or ``.npy``, with the values that are stored) belongs to the depth image of
+        the same stem, or else of the same first number.
+
+        Raises
+        ------
+        FileFormatError
+            None of the folder's images belongs to a depth image.
+        """
+        images = pair([source.depth for source in self._sources], files(Path(folder), ATTRIBUTE_SUFFIXES))
+        if not any(images):
+            raise FileFormatError(Path(folder), "no image here is named as a depth image of the recording is")
+        return self._with_sources(
+            [
+                s if image is None else dataclasses.replace(s, attributes={**s.attributes, name: image})
+                for s, image in zip(self._sources, images, strict=True)
+            ]
+        )
+
     def _with_sources(self, sources: collections.abc.Sequence[FrameSource]) -> Sequence:
         return Sequence(
             self.path,
@@ -215,7 +242,12 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         if source.mask is not None:
             mask = _named(read_color, source.mask).any(axis=2)
             check_size(source.mask, mask, self.camera)
-        return SequenceFrame(source.index, depth, self.camera, source.timestamp, color, source.truth, mask)
+        attributes = {name: _named(read_attribute, path) for name, path in source.attributes.items()}
+        for name, path in source.attributes.items():
+            check_size(path, attributes[name], self.camera)
+        return SequenceFrame(
+            source.index, depth, self.camera, source.timestamp, color, source.truth, mask, attributes
+        )
 
 
 class _FrameIterator(Iterator[SequenceFrame]):
