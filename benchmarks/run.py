@@ -21,7 +21,7 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parent
 NEEDED = ["numpy", "scipy", "pillow", "cmake", "ninja"]
-PYTHON_PEERS = ["pykdtree", "small_gicp", "open3d", "opencv-contrib-python-headless"]
+PYTHON_PEERS = ["pykdtree", "small_gicp", "open3d", "opencv-contrib-python-headless", "kiss-icp"]
 DEBIAN_PACKAGES = {
     "nanoflann": ["libnanoflann-dev"],
     "flann": ["libflann-dev", "liblz4-dev"],

@@ -108,7 +108,7 @@ void fuse_attributes(PointModel& model, std::int64_t first, const Frame& frame, 
         planes.observe(block, averages.data());
         for (int k = 0; k < block.size(); ++k) {
           const float weight = block[k].weight;
-          if (!(weight > least_weight)) continue;
+          if (!(weight > least_weight * observer.frontal_weight(block.sigma(k)))) continue;
           const auto average = [&](int plane) {
             return averages[static_cast<std::size_t>(plane * ObservationBlock::capacity + k)];
           };

@@ -110,6 +110,7 @@ void NoiseModel::check() const {
           constant);
   require(std::isfinite(quadratic) && quadratic >= 0.0, "noise.quadratic", "finite, at least 0", quadratic);
   require(std::isfinite(offset), "noise.offset", "finite", offset);
+  require(shared >= 0.0 && shared < 1.0, "noise.shared", "a part from 0 to below 1", shared);
 }
 
 DepthImage depth_from_raw(

@@ -20,7 +20,7 @@ constexpr float kStepSigmas = 3.0F;
 constexpr float kLateralSigma = 0.5F;
 
 simd::EdgeLimits edge_limits(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options) {
-  const Quadratic sigma = image.sigma(noise), unit_slope = image.unit_slope();
+  const Quadratic sigma = image.sigma(noise.local()), unit_slope = image.unit_slope();
   const auto bend_sigmas = static_cast<float>(options.edge_sigmas * std::sqrt(6.0));
   const float step_sigmas = kStepSigmas * std::sqrt(2.0F);
   return {sigma * bend_sigmas,         unit_slope * kCreaseSlope,

@@ -172,7 +172,7 @@ void drop_lonely(double max_missing, int num_threads, ByteImage& keep) {
 void drop_specks(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options, int num_threads,
                  ByteImage& keep) {
   if (options.min_component <= 1) return;
-  const simd::LinkRule rule = {image.sigma(noise) * (3.0F * std::sqrt(2.0F)),
+  const simd::LinkRule rule = {image.sigma(noise.local()) * (3.0F * std::sqrt(2.0F)),
                                image.unit_slope() * static_cast<float>(std::tan(options.max_slant))};
   PixelLinks links(keep.width(), keep.height());
   const auto link_row = simd::link_pixels();

@@ -9,6 +9,7 @@
 
 namespace nacre {
 
+// In frontal measurements of a point's own noise: far surfaces are measured with less weight, not less often.
 constexpr float least_weight = 0.05F;  // less observation than this is none
 constexpr float least_facing = 0.1F;   // surfaces that are seen at a smaller cosine are not judged
 
@@ -20,8 +21,9 @@ inline float sigma_at(const Frame& frame, std::int32_t pixel) {
 
 // Whether the frame may show a point of a block.
 inline bool is_observable(const ModelView::Block& points, int j, const Frame& frame, const SurfaceObserver& observer) {
-  return points.inside[j] && points.facing[j] > least_facing &&
-         observer.may_observe(points.point(j), points.pixel[j], sigma_at(frame, points.pixel[j]), least_weight);
+  if (!points.inside[j] || !(points.facing[j] > least_facing)) return false;
+  const float sigma = sigma_at(frame, points.pixel[j]);
+  return observer.may_observe(points.point(j), points.pixel[j], sigma, least_weight * observer.frontal_weight(sigma));
 }
 
 // fuse() with the observer of the frame. Colours are the observer's.

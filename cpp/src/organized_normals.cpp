@@ -18,7 +18,7 @@ constexpr float kGateSlope = 5.67F;   // neighbours belong to the surface up to 
 constexpr float kGateSigmas = 4.0F;
 
 simd::NormalRule normal_rule(const PlanarImage& image, const Camera& camera, const NoiseModel& noise) {
-  const Quadratic sigma = image.sigma(noise), unit_slope = image.unit_slope();
+  const Quadratic sigma = image.sigma(noise.local()), unit_slope = image.unit_slope();
   return {sigma,      unit_slope, sigma * (kGateSigmas * std::sqrt(2.0F)), unit_slope * kGateSlope,        kSlopeSigma,
           kMinFilled, kMinSpread, static_cast<float>(camera.fx()),         static_cast<float>(camera.fy())};
 }

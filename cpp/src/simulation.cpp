@@ -191,6 +191,7 @@ void SimulationOptions::check() const {
   require_length(noise.constant, "noise.constant");
   require_length(noise.quadratic, "noise.quadratic");
   require(std::isfinite(noise.offset), "noise.offset", "finite", noise.offset);
+  require(noise.shared >= 0.0 && noise.shared < 1.0, "noise.shared", "a part from 0 to below 1", noise.shared);
   require(edge_mixing >= 0.0 && edge_mixing <= 16.0, "edge_mixing", "0 to 16 pixels", edge_mixing);
   require_length(background_depth, "background_depth");
   require_length(quantization, "quantization");

@@ -7,7 +7,9 @@
 #include "icp_target.hpp"
 #include "model_view.hpp"
 #include "parallel.hpp"
+#include "point_spacing.hpp"
 #include "random.hpp"
+#include "relocalisation.hpp"
 #include "surface_observer.hpp"
 
 namespace nacre {
@@ -19,6 +21,7 @@ constexpr std::size_t max_target_points = 30000;  // that a frame is registered 
 // Model points that a camera near a pose may see, as a cloud to register to.
 struct View {
   Points points, normals;  // world frame
+  double thinning = 1.0;   // how much farther apart the points are than the model's
 };
 
 // Points in the image widened by a third on each side, turned away from the camera by at most 120 degrees: one of every
@@ -49,7 +52,7 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
   for (const auto& rows : found) num_found += rows.size();
   const std::size_t step = (num_found + max_target_points - 1) / max_target_points;
   const auto count = static_cast<Eigen::Index>(step > 0 ? num_found / step : 0);
-  View view{Points(count, 3), Points(count, 3)};
+  View view{Points(count, 3), Points(count, 3), std::sqrt(static_cast<double>(std::max<std::size_t>(step, 1)))};
   // One of every `step`, at random.
   const auto is_chosen = [&](std::size_t index) { return index % step == random_bits(0, index / step) % step; };
   std::size_t index = 0;
@@ -106,15 +109,23 @@ double consistency_of(const View& view, const Frame& frame, const Camera& camera
 // Denoised points of the frame, spread over it at random: noise would shift the matches on curved surfaces.
 struct Samples {
   Points points, normals;
-  Values sigma;
+  Values noise;  // standard deviation of each measurement [m]
+  Values sigma;  // with what its neighbours are wrong by, too, which no averaging removes [m]
 };
+
+// Depth cameras are also wrong by what neighbouring pixels have in common: millimetres at arm's length, centimetres
+// beyond three metres (Teichman, Miller and Thrun 2013, figure 3).
+float systematic_error(float z) {
+  constexpr float growth = 0.0015F;  // [1/m^2]
+  return growth * z * z * z;
+}
 
 Samples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
   const std::int64_t count =
       options.registration.max_samples > 0
           ? std::min<std::int64_t>(options.registration.max_samples, static_cast<std::int64_t>(frame.valid.size()))
           : static_cast<std::int64_t>(frame.valid.size());
-  Samples samples{Points(count, 3), Points(count, 3), Values(count)};
+  Samples samples{Points(count, 3), Points(count, 3), Values(count), Values(count)};
   const double stride = static_cast<double>(frame.valid.size()) / static_cast<double>(std::max<std::int64_t>(count, 1));
   parallel_blocks(count, ObservationBlock::capacity, options.num_threads, [&](auto, auto begin, auto end) {
     ObservationBlock block;
@@ -125,7 +136,8 @@ Samples sample_frame(const Frame& frame, const SurfaceObserver& observer, const 
       const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
       samples.points.row(i) = frame.points.row(row);
       samples.normals.row(i) = frame.normals.row(row);
-      samples.sigma[i] = frame.sigma[row];
+      samples.noise[i] = frame.sigma[row];
+      samples.sigma[i] = std::hypot(frame.sigma[row], systematic_error(frame.points(row, 2)));
       observer.add(block, samples.points.row(i).transpose(), samples.normals.row(i).transpose(), row, frame.sigma[row]);
     }
     if (!options.denoise_samples) return;
@@ -141,12 +153,12 @@ Samples sample_frame(const Frame& frame, const SurfaceObserver& observer, const 
 }
 
 // Strict, for guesses that may be far off: only a registration beyond doubt is believed.
-void judge(TrackingResult& result, const ModelOptions& options, double gate, bool strict) {
+void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
   std::ostringstream reason;
   reason.precision(3);
   result.status = FrameStatus::lost;
-  const bool is_close =
-      result.alignment.overlap > 0.35 && result.consistency > 0.9 && result.alignment.rmse < 0.25 * gate;
+  const double ratio = result.alignment.residual_ratio;
+  const bool is_close = result.alignment.overlap > 0.35 && result.consistency > 0.9 && ratio < 0.25;
   if (result.alignment.status == AlignStatus::too_few_pairs) {
     reason << "too few points of the frame match the model";
   } else if (!options.verify) {
@@ -155,11 +167,11 @@ void judge(TrackingResult& result, const ModelOptions& options, double gate, boo
     reason << "overlap " << result.alignment.overlap << " is below " << options.min_overlap;
   } else if (result.consistency < options.min_consistency) {
     reason << "consistency " << result.consistency << " is below " << options.min_consistency;
-  } else if (result.alignment.rmse > options.max_residual * gate) {
-    reason << "residuals of " << result.alignment.rmse << " m are above " << options.max_residual * gate;
+  } else if (ratio > options.max_residual) {
+    reason << "residuals are " << ratio << " of the largest that match, above " << options.max_residual;
   } else if (strict && !is_close) {
     reason << "not sure enough: overlap " << result.alignment.overlap << ", consistency " << result.consistency
-           << ", residuals " << result.alignment.rmse << " m";
+           << ", residuals " << ratio << " of the largest that match";
   } else if (result.alignment.weak_directions.cols() > 0) {
     result.status = FrameStatus::weak;
     reason << result.alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
@@ -170,6 +182,14 @@ void judge(TrackingResult& result, const ModelOptions& options, double gate, boo
   result.reason = reason.str();
 }
 
+double median_reach(const IcpSource& source) {
+  std::vector<float> values(source.reach.data(), source.reach.data() + source.reach.size());
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return static_cast<double>(*middle);
+}
+
 // What stays the same while one frame is registered from several guesses.
 struct Search {
   const PointModel& model;
@@ -177,10 +197,31 @@ struct Search {
   const Camera& camera;
   const ModelOptions& options;
   IcpSource source;
-  double spacing;      // of the model [m]
-  float median_sigma;  // of the frame [m]
+  const Values& noise;  // of the sampled points [m]
+  double spacing;       // of the model [m]
 
   bool has_automatic_gate() const { return !(options.registration.max_distance > 0.0); }
+
+  // A match may be as far as the model's points are apart, or as noise takes it; its residual less so, since the model
+  // is known better across its surface than along it.
+  IcpSource with_reach(const View& view, const IcpTarget& target) const {
+    IcpSource gated = source;
+    const auto count = static_cast<Eigen::Index>(source.cloud.rows.size());
+    gated.reach.resize(count);
+    gated.largest_residual.resize(count);
+    // Noise that is large against the surface would match anything.
+    const double largest = 0.05 * target.diameter();
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const float sigma = noise[source.cloud.rows[static_cast<std::size_t>(i)]];
+      const double apart = spacing_at(source.cloud.points(i, 2), sigma, camera, spacing);
+      const double noise = 4.0 * static_cast<double>(sigma), set = options.registration.final_distance;
+      gated.reach[i] =
+          static_cast<float>(set > 0.0 ? set : std::min(std::max(2.5 * view.thinning * apart, noise), largest));
+      gated.largest_residual[i] =
+          static_cast<float>(set > 0.0 ? set : std::min(std::max(2.75 * apart, noise), largest));
+    }
+    return gated;
+  }
 
   // Near: the guess is about right, and a narrow gate is safest. Wide: it is not. Strict: see judge.
   TrackingResult register_from(const Pose& guess, bool wide, bool strict) const {
@@ -188,23 +229,17 @@ struct Search {
     AlignOptions align_options = options.registration;
     align_options.max_points = 0;  // the view is thin enough
     const IcpTarget target(AlignCloud(view.points, view.normals), align_options);
-    double verdict_gate =
-        align_options.final_distance > 0.0 ? align_options.final_distance : std::numeric_limits<double>::infinity();
-    if (!(align_options.final_distance > 0.0)) {
-      // Noise that is large against the surface would match anything.
-      const double noise = 4.0 * static_cast<double>(median_sigma), largest = 0.05 * target.diameter();
-      align_options.final_distance = std::min(std::max(2.5 * target.spacing(), noise), largest);
-      verdict_gate = std::min(std::max(2.75 * spacing, noise), largest);
-    }
+    const IcpSource gated = with_reach(view, target);
+    if (!(align_options.final_distance > 0.0)) align_options.final_distance = median_reach(gated);
     if (has_automatic_gate() && !wide) align_options.max_distance = 4.0 * align_options.final_distance;
 
     TrackingResult result;
-    result.alignment = align_to(target, source, guess, align_options, verdict_gate);
+    result.alignment = align_to(target, gated, guess, align_options);
     result.consistency =
         consistency_of(view, frame, camera, result.alignment.target_from_source, spacing, options.num_threads);
     const double turned =
         Eigen::AngleAxisd(guess.linear().transpose() * result.alignment.target_from_source.linear()).angle();
-    judge(result, options, verdict_gate, strict || turned > far_turn);
+    judge(result, options, strict || turned > far_turn);
     return result;
   }
 
@@ -228,26 +263,13 @@ struct Search {
   // From every place where a camera has been, and around it: a few points each, then the best with all.
   TrackingResult relocalise(const std::vector<Pose>& key_poses) const {
     constexpr std::size_t num_finalists = 3;
-    const PointsRef points = Eigen::Map<const Points>(model.points.front().data(), model.size(), 3);
-    const PointsRef normals = Eigen::Map<const Points>(model.normals.front().data(), model.size(), 3);
-    const IcpTarget whole(AlignCloud(points, normals), options.registration);
-    AlignOptions coarse = options.registration;
-    coarse.max_samples = coarse.coarse_samples = 300;
-    coarse.max_iterations = 15;
-    const IcpSource few(AlignCloud(source.cloud.points, source.cloud.normals, source.cloud.sigma), coarse);
-
-    std::vector<std::pair<double, Pose>> candidates;
+    std::vector<Pose> guesses;
     for (const Pose& key_pose : key_poses) {
-      for (const Pose& guess : around(key_pose)) {
-        const AlignResult result = align_to(whole, few, guess, coarse);
-        candidates.emplace_back(result.overlap, result.target_from_source);
-      }
+      for (const Pose& guess : around(key_pose)) guesses.push_back(guess);
     }
-    std::stable_sort(candidates.begin(), candidates.end(),
-                     [](const auto& a, const auto& b) { return a.first > b.first; });
     TrackingResult best;
-    for (std::size_t i = 0; i < std::min(num_finalists, candidates.size()); ++i) {
-      const TrackingResult result = register_from(candidates[i].second, false, true);
+    for (const Pose& candidate : most_promising(model, source, guesses, options.registration, num_finalists)) {
+      const TrackingResult result = register_from(candidate, false, true);
       if (result.rank() >= best.rank()) best = result;
     }
     return best;
@@ -265,8 +287,8 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
                       camera,
                       options,
                       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
-                      spacing,
-                      median_sigma(frame)};
+                      samples.noise,
+                      spacing};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
   for (const bool wide : {false, true}) {

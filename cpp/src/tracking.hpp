@@ -4,13 +4,14 @@
 #include <string>
 #include <vector>
 
+#include "icp_target.hpp"
 #include "nacre/model.hpp"
 #include "surface_observer.hpp"
 
 namespace nacre {
 
 struct TrackingResult {
-  AlignResult alignment;     // world_from_camera as target_from_source
+  IcpResult alignment;       // world_from_camera as target_from_source
   double consistency = 0.0;  // part of the model's points in view that the frame does not see through
   FrameStatus status = FrameStatus::lost;
   std::string reason;  // why it is weak or lost

@@ -32,8 +32,13 @@ void bind_depth(py::module_& m) {
       .def_readwrite("constant", &NoiseModel::constant)
       .def_readwrite("quadratic", &NoiseModel::quadratic)
       .def_readwrite("offset", &NoiseModel::offset)
+      .def_readwrite("shared", &NoiseModel::shared)
       .def("sigma", &NoiseModel::sigma, py::arg("z"))
-      .def_static("kinect", &NoiseModel::kinect);
+      .def("local", &NoiseModel::local)
+      .def_static("kinect", &NoiseModel::kinect)
+      .def_static("stereo", &NoiseModel::stereo, py::arg("fx"), py::arg("baseline") = 0.05,
+                  py::arg("disparity_sigma") = 0.08)
+      .def_static("time_of_flight", &NoiseModel::time_of_flight);
   py::class_<DepthOptions>(m, "DepthOptions")
       .def(py::init<>())
       .def_readwrite("edge_test", &DepthOptions::edge_test)

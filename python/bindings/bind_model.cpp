@@ -70,8 +70,7 @@ void bind_model(py::module_& m) {
       .def_readwrite("support", &FusionOptions::support)
       .def_readwrite("max_angle", &FusionOptions::max_angle)
       .def_readwrite("max_confidence", &FusionOptions::max_confidence)
-      .def_readwrite("min_confidence", &FusionOptions::min_confidence)
-      .def_readwrite("max_age", &FusionOptions::max_age)
+      .def_readwrite("min_sightings", &FusionOptions::min_sightings)
       .def_readwrite("max_violations", &FusionOptions::max_violations)
       .def_readwrite("reference_sigma", &FusionOptions::reference_sigma);
 
@@ -105,6 +104,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("colors", [](const PointModel& cloud) { return copy_rows(cloud.colors); })
       .def_property_readonly("attributes", &copy_attributes)
       .def_property_readonly("confidence", [](const PointModel& cloud) { return copy_values(cloud.confidence); })
+      .def_property_readonly("sightings", [](const PointModel& cloud) { return copy_values(cloud.sightings); })
       .def_property_readonly("last_seen", [](const PointModel& cloud) { return copy_values(cloud.last_seen); })
       .def("__len__", &PointModel::size);
 

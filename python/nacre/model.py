@@ -35,10 +35,11 @@ class FusionParameters:
         Nor do those whose normal differs more [rad].
     max_confidence : float
         Bounds the confidence from above, so that new observations always count.
-    min_confidence, max_age : float, int
-        A point of less confidence that is not seen again for so many frames goes.
+    min_sightings : int
+        A point that fewer frames observed is not confirmed.
     max_violations : int
-        A point that a camera saw through so often goes.
+        A point that a camera saw through so often goes; an unconfirmed one also where cameras looked so often
+        and did not find it.
     reference_sigma : float
         Noise of an observation of weight 1 [m]; 0: the frame's median.
     """
@@ -46,8 +47,7 @@ class FusionParameters:
     support: float = 0.0
     max_angle: float = 1.0471976
     max_confidence: float = 1e6
-    min_confidence: float = 3.0
-    max_age: int = 10
+    min_sightings: int = 3
     max_violations: int = 3
     reference_sigma: float = 0.0
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
 
 # Fields of evaluation results that hold one value per frame or point; the frames have them already.
-_LONG = {"errors", "rotation_errors", "distances"}
+_LONG = {"errors", "translation_errors", "rotation_errors", "distances"}
 
 
 @dataclass(frozen=True, eq=False)

@@ -180,12 +180,12 @@ def test_unknown_preset() -> None:
 
 def test_changes_by_dotted_name() -> None:
     before = nacre.ModelParameters()
-    after = updated(before, {"registration.max_angle": 0.5, "spacing": 0.002, "fusion.max_age": 3})
+    after = updated(before, {"registration.max_angle": 0.5, "spacing": 0.002, "fusion.min_sightings": 5})
     assert after.registration.max_angle == 0.5
     assert after.spacing == 0.002
-    assert after.fusion.max_age == 3
+    assert after.fusion.min_sightings == 5
     assert before == nacre.ModelParameters()
-    nested = {"registration": {"max_angle": 0.5}, "spacing": 0.002, "fusion": {"max_age": 3}}
+    nested = {"registration": {"max_angle": 0.5}, "spacing": 0.002, "fusion": {"min_sightings": 5}}
     assert after == updated(before, nested)
     assert updated(before, {}) == before
 
@@ -211,7 +211,7 @@ def test_unknown_name_lists_the_names(name: str) -> None:
     with pytest.raises(ValueError, match=r"there is no parameter .* it has ") as caught:
         updated(nacre.ModelParameters(), {name: 1})
     part = name.partition(".")[0]
-    assert {"registration": "max_angle", "fusion": "max_age"}.get(part, "spacing") in str(caught.value)
+    assert {"registration": "max_angle", "fusion": "min_sightings"}.get(part, "spacing") in str(caught.value)
 
 
 def test_unknown_name_in_a_nested_mapping() -> None:

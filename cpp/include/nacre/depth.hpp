@@ -12,14 +12,28 @@
 namespace nacre {
 
 /// The standard deviation of a depth value: sigma(z) = constant + quadratic * (z - offset)^2 [m].
+///
+/// It is the noise of a surface seen from the front. On a slanted one the depth is noisier, since a pixel also errs to
+/// the side, by half a pixel or more (Nguyen et al. 2012, figure 7); across the surface the two effects of the slant
+/// cancel, so that for a distance along the normal sigma(z) holds at any slant.
 struct NoiseModel {
   double constant = 0.0;   ///< [m]
   double quadratic = 0.0;  ///< [1/m]
   double offset = 0.0;     ///< [m]
+  double shared = 0.0;     ///< part of the variance that pixels near each other have in common, from 0 to below 1:
+                           ///< structured light and stereo match windows; a simulated camera ignores it
 
   double sigma(double z) const { return constant + quadratic * (z - offset) * (z - offset); }
+  /// The noise of pixels about a smooth surface fitted to 7 x 7 of them, which takes up most of what they share.
+  NoiseModel local() const;
+
   /// Structured light, Nguyen et al. 2012: 1.2 mm + 1.9 mm (z - 0.4 m)^2.
-  static NoiseModel kinect() { return {0.0012, 0.0019, 0.4}; }
+  static NoiseModel kinect() { return {0.0012, 0.0019, 0.4, 0.0}; }
+  /// Two cameras: disparity_sigma z^2 / (fx baseline), with the focal length in pixels. The defaults are those of a
+  /// RealSense D435 on good texture (Grunnet-Jepsen et al., tuning D400 cameras).
+  static NoiseModel stereo(double fx, double baseline = 0.05, double disparity_sigma = 0.08);
+  /// Time of flight, Fankhauser et al. 2015 (Kinect v2): 1.5 mm - 0.5 mm z + 0.3 mm z^2.
+  static NoiseModel time_of_flight() { return {0.0015 - 0.0003 * 25.0 / 36.0, 0.0003, 5.0 / 6.0, 0.0}; }
 
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };
@@ -69,7 +83,7 @@ DepthImage depth_from_raw(
 
 /// The noise of a depth image, from the residuals of local surface fits (robust) and, where the image is quantised to
 /// plateaus, from their steps: for a pinhole camera the Kinect's curve scaled to them, for an orthographic camera a
-/// constant. A clean image gives a small positive floor, one without smooth patches the Kinect's curve (orthographic: a
+/// constant. Where neighbouring pixels are too alike for independent noise, what they share is added. A clean image gives a small positive floor, one without smooth patches the Kinect's curve (orthographic: a
 /// tenth of a pixel).
 NoiseModel estimate_noise(const DepthRef& depth, const Camera& camera, int num_threads = 0);
 

@@ -18,11 +18,12 @@ struct WindowRule {
   float max_step, max_step_pixels;
 };
 
-// Of each window: the standard deviation of the values about the surface; the change per pixel on a slope of 1; the
-// smallest step from one plateau to the next along the central row and column, NaN where there are not both: plateaus,
-// and steps (all three in units of the noise); the surface's slope per pixel. NaN where a pixel is missing.
+// Of each window: the standard deviation of the values about the surface; the same from the second differences along
+// the central row and column, which see nothing of what neighbours have in common; the change per pixel on a slope of 1;
+// the smallest step from one plateau to the next along the central row and column, NaN where there are not both:
+// plateaus, and steps (all four in units of the noise); the surface's slope per pixel. NaN where a pixel is missing.
 struct WindowRow {
-  float *residual, *pixel, *step, *slope;
+  float *residual, *roughness, *pixel, *step, *slope;
 };
 // `values` is the centre of the first of `count` windows; 100 values beyond the last are read, the next row's perhaps.
 using FitWindows = void(const float* values, ptrdiff_t stride, int count, const WindowRule& rule, const WindowRow& out);

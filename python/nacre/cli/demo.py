@@ -14,10 +14,6 @@ from nacre.cli.results import file_rows, trajectory_rows, write_results
 from nacre.cli.running import run_frames
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
 
-# Surfaces that no camera saw steeper than this count as not seen [degrees].
-_MAX_SLANT = 75
-
-
 def demo(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.")] = Path(
         "nacre-demo"
@@ -48,7 +44,7 @@ def demo(
     parameters, preset_name = model_parameters(preset, config, settings)
     import nacre
     from nacre import evaluation
-    from nacre.cli.surfaces import evaluate_surface, seen_samples, transformed
+    from nacre.cli.surfaces import evaluate_surface, transformed
     from nacre.reconstruction import Reconstruction
 
     mesh = nacre.built_in_object()
@@ -72,7 +68,7 @@ def demo(
     if len(done.model):
         samples = evaluation.sample_surface(mesh.vertices, mesh.triangles, 20_000)
         points, normals = transformed(poses[0], done.model.points, done.model.normals)
-        seen = seen_samples(mesh, samples, camera, poses, math.radians(_MAX_SLANT))
+        seen = evaluation.seen_samples(mesh, samples, camera, poses)
         done.evaluation |= evaluate_surface(
             points, normals, mesh, samples=samples, seen=seen, tau=(0.002, 0.003, 0.005)
         )
@@ -109,27 +105,18 @@ def demo(
         raise CommandError(f"every frame was lost: {done.frames[0].reason}")
 
 
-def _pose_error(done: Any, center: Any) -> dict[str, float] | None:
-    """Return the largest errors of the poses at the object's centre, with the first camera in its place."""
-    import numpy as np
-
-    from nacre.evaluation import absolute_trajectory_error
+def _pose_error(done: Any, center: Any) -> dict[str, Any] | None:
+    """Return the errors of the poses at the object's centre, with the first camera in its place."""
+    from nacre.evaluation import pose_error
+    from nacre.reconstruction import result_dict
 
     truths = done.truths
     if truths is None or not done.num_tracked:
         return None
-    to_center = np.tile(np.eye(4), (len(truths), 1, 1))
-    to_center[:, :3, 3] = (np.linalg.inv(truths) @ (*center, 1.0))[:, :3]
-    error = absolute_trajectory_error(done.poses @ to_center, truths @ to_center, align="first")
-    return {
-        "translation_max": error.max,
-        "translation_rmse": error.rmse,
-        "rotation_max": error.rotation_max,
-        "rotation_rmse": error.rotation_rmse,
-    }
+    return result_dict(pose_error(done.poses, truths, center=center))
 
 
-def _rows(done: Any, pose_error: dict[str, float] | None) -> list[tuple[str, str]]:
+def _rows(done: Any, pose_error: dict[str, Any] | None) -> list[tuple[str, str]]:
     from nacre.report.text import quantity
 
     rows = [row for row in trajectory_rows(done) if row[0] in ("frames tracked", "model", "time per frame")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -15,9 +16,16 @@ if TYPE_CHECKING:
     import numpy as np
     import numpy.typing as npt
 
-    from nacre import Trajectory
+    from nacre import Mesh, Trajectory
+
+    from nacre.cli.written import Written
+    from nacre.evaluation import SurfaceSamples
+    from nacre.evaluation.result import Result
 
     Matrix = npt.NDArray[np.float64]
+
+Figures = dict[str, Any]
+Rows = list[tuple[str, str]]
 
 
 def evaluate(
@@ -68,11 +76,13 @@ def evaluate(
     """
     Measure a model against a reference surface, or a trajectory against the truth.
 
-    A model: distance to the surface, completeness, F-score, uniformity, error of the normals. It must lie in
-    the reference's frame: a reconstruction lies in its first camera's, so give its OUT folder (which moves it
-    where the recording had true poses), --world-from-model or --align.
+    A model: distance to the surface, completeness (of what the cameras saw, where true poses tell), F-score,
+    uniformity, error of the normals. It must lie in the reference's frame: a reconstruction lies in its first
+    camera's, so give its OUT folder (which moves it where the recording had true poses), --world-from-model
+    or --align.
 
-    A trajectory: absolute error (ATE, after a rigid alignment), relative error (RPE), coverage.
+    A trajectory: absolute error (ATE, after a rigid alignment), relative error (RPE), coverage. Of an OUT
+    folder also what became of its frames, and the errors of its poses at the middle of the object.
     """
     terminal = Terminal(json, quiet, verbose)
     if not estimate.exists():
@@ -80,66 +90,124 @@ def evaluate(
     if truth is not None and not truth.exists():
         raise CommandError(f"no such file or folder: {truth}", 2)
     is_surface = truth is not None and truth.suffix.lower() in MESH_SUFFIXES + POINT_SUFFIXES
-    if estimate.is_dir() and not (estimate / "report.json").is_file():
-        raise CommandError(
-            f"{estimate}: no report.json; give the OUT folder of a reconstruction, or a file", 2
-        )
-    if is_surface or (estimate.suffix.lower() in POINT_SUFFIXES and estimate.is_file()):
+    written = None
+    if estimate.is_dir():
+        from nacre.cli.written import Written
+
+        if not (estimate / "report.json").is_file():
+            raise CommandError(
+                f"{estimate}: no report.json; give the OUT folder of a reconstruction, or a file", 2
+            )
+        written = Written(estimate)
+    if is_surface or (estimate.suffix.lower() in POINT_SUFFIXES and written is None):
         if truth is None or not is_surface:
             raise CommandError(f"{estimate} is a model: a mesh or a point file must follow it", 2)
-        figures, rows = _surface(estimate, truth, tau, world_from_model, align, scale)
+        figures, rows = _surface(estimate, written, truth, tau, world_from_model, align, scale)
     else:
-        figures, rows = _trajectory(estimate, truth, max_difference)
+        figures, rows = _trajectory(estimate, written, truth, max_difference)
     terminal.answer(figures, rows)
 
 
 def _surface(
     estimate: Path,
+    written: Written | None,
     truth: Path,
     tau: list[float] | None,
     world_from_model: Path | None,
     align: bool,
     scale: float,
-) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+) -> tuple[Figures, Rows]:
     import numpy as np
 
     import nacre
-    from nacre.report.text import label, quantity
+    from nacre.evaluation import sample_surface
 
-    cloud = nacre.read_points(estimate / "model.ply" if estimate.is_dir() else estimate)
+    cloud = nacre.read_points(estimate / "model.ply" if written else estimate)
     if not np.isfinite(cloud.points).all(axis=1).any():
         raise CommandError(f"{estimate}: the model has no points")
     reference, reference_normals = read_surface(truth, scale)
     pose, how = np.eye(4), "the identity"
     if world_from_model is not None:
         pose, how = read_matrix(world_from_model), str(world_from_model)
-    elif estimate.is_dir() and (known := _world_from_model(estimate)) is not None:
+    elif written and (known := written.truth_from_world) is not None:
         pose, how = known, "the first true pose in report.json"
     if align:
         pose = _aligned(cloud.points, cloud.normals, reference, reference_normals, pose)
         how = "ICP" if how == "the identity" else f"{how}, then ICP"
     points, normals = transformed(pose, cloud.points, cloud.normals)
-    results = evaluate_surface(points, normals, reference, reference_normals, tau=tau or (0.002, 0.005, 0.01))
-    figures: dict[str, Any] = {"kind": "surface", "world_from_model": pose, "world_from_model_from": how}
-    rows = [("model moved by", how)]
-    from nacre.reconstruction import result_dict
-
-    for name, result in results.items():
-        figures[name] = result_dict(result)
-        units = result.units()
-        rows.append(("", ""))
-        rows.append((label(name).upper(), ""))
-        rows += [
-            (label(field), quantity(value, units[field]))
-            for field, value in figures[name].items()
-            if not (name == "f_score" and field in ("precision", "recall") and value is None)
-        ]
+    samples = seen = None
+    figures: Figures = {"kind": "surface", "world_from_model": pose, "world_from_model_from": how}
+    rows: Rows = [("model moved by", how)]
+    if written and isinstance(reference, nacre.Mesh):
+        seen = _seen(written, reference, samples := sample_surface(reference.vertices, reference.triangles))
+    results = evaluate_surface(
+        points,
+        normals,
+        reference,
+        reference_normals,
+        tau=tau or (0.002, 0.005, 0.01),
+        samples=None if seen is None else samples,
+        seen=seen,
+    )
+    if seen is not None:
+        figures["seen"] = float(seen.mean())
+        rows.append(("surface that the cameras saw", f"{100 * figures['seen']:.1f} %; completeness is of it"))
+    if written and written.truths is not None:
+        middle = reference.bounds.mean(axis=0) if isinstance(reference, nacre.Mesh) else reference.mean(axis=0)
+        _add(figures, rows, _frame_results(written, middle), written)
+    _add(figures, rows, results)
     if align:
         rows += [
             ("", ""),
             *zip(("world from model", "", "", ""), format_matrix(pose).splitlines(), strict=True),
         ]
     return figures, rows
+
+
+def _add(figures: Figures, rows: Rows, results: Mapping[str, Result], written: Written | None = None) -> None:
+    """Add results, and what became of the frames, to the figures and as rows for people."""
+    from nacre.reconstruction import result_dict
+    from nacre.report.text import label, quantity
+
+    if written:
+        figures["frames"] = written.counts
+        rows += [("", ""), ("FRAMES", "")]
+        rows += [(label(name), quantity(number, "count")) for name, number in written.counts.items()]
+    for name, result in results.items():
+        figures[name] = result_dict(result)
+        units = result.units()
+        rows += [("", ""), (label(name).upper(), "")]
+        rows += [
+            (label(field), quantity(value, units[field]))
+            for field, value in figures[name].items()
+            if field != "truth_from_estimated"
+            and not (name == "f_score" and field in ("precision", "recall") and value is None)
+        ]
+        for field in ("translation_errors", "rotation_errors"):
+            if name == "pose_error":
+                figures[name][field] = result.as_dict()[field]
+
+
+def _seen(written: Written, mesh: Mesh, samples: SurfaceSamples) -> Any:
+    """Return which samples of the surface the cameras saw from their true poses; None where it is not known."""
+    from nacre.evaluation import seen_samples
+
+    if written.truths is None or written.camera is None:
+        return None
+    return seen_samples(mesh, samples, written.camera, written.truths)
+
+
+def _frame_results(written: Written, middle: Any) -> dict[str, Result]:
+    """Return the errors of the poses of a reconstruction whose recording had true ones."""
+    from nacre.evaluation import absolute_trajectory_error, pose_error, relative_pose_error
+
+    poses, truths = written.poses, written.truths
+    assert truths is not None
+    return {
+        "pose_error": pose_error(poses, truths, center=middle),
+        "absolute_trajectory_error": absolute_trajectory_error(poses, truths),
+        "relative_pose_error": relative_pose_error(poses, truths),
+    }
 
 
 def _aligned(points: Any, normals: Any, reference: Any, reference_normals: Any, initial: Matrix) -> Matrix:
@@ -160,87 +228,57 @@ def _aligned(points: Any, normals: Any, reference: Any, reference_normals: Any, 
     return pose
 
 
-def _world_from_model(folder: Path) -> Matrix | None:
-    import numpy as np
-
-    for frame in _report(folder)["frames"]:
-        if frame["truth"] is not None and frame["world_from_camera"] is not None:
-            pose: Matrix = np.array(frame["truth"]) @ np.linalg.inv(frame["world_from_camera"])
-            return pose
-    return None
-
-
-def _report(folder: Path) -> Any:
-    import json
-
-    from nacre.errors import FileFormatError
-
-    path = folder / "report.json"
-    try:
-        report = json.loads(path.read_text(encoding="utf-8"))
-        if isinstance(report["frames"], list):
-            return report
-    except (ValueError, KeyError, TypeError):
-        pass
-    raise FileFormatError(path, "not a report of nacre reconstruct")
-
-
 def _trajectory(
-    estimate: Path, truth: Path | None, max_difference: float
-) -> tuple[dict[str, Any], list[tuple[str, str]]]:
-    import numpy as np
-
+    estimate: Path, written: Written | None, truth: Path | None, max_difference: float
+) -> tuple[Figures, Rows]:
     import nacre
     from nacre.evaluation import absolute_trajectory_error, relative_pose_error
-    from nacre.reconstruction import result_dict
-    from nacre.report.text import label, quantity
 
-    num_frames = None
-    if estimate.is_dir():
-        frames = _report(estimate)["frames"]
-        num_frames = len(frames)
-    options: dict[str, Any] = {}
     if truth is None:
-        if not estimate.is_dir():
+        if not written:
             raise CommandError(f"{estimate}: a true trajectory or a recording must follow it", 2)
-        missing = np.full((4, 4), np.nan)
-
-        def stack(name: str) -> Any:
-            return np.array([missing if f[name] is None else f[name] for f in frames], dtype=np.float64)
-
-        poses, true_poses = stack("world_from_camera"), stack("truth")
-        if not np.isfinite(true_poses).any():
+        if written.truths is None:
             raise CommandError(
                 f"{estimate}: its recording had no true poses; give a trajectory or a mesh after it", 2
             )
+        results = _frame_results(written, _middle(written))
     else:
-        found = nacre.read_trajectory(estimate / "trajectory.txt" if estimate.is_dir() else estimate)
+        found = nacre.read_trajectory(estimate / "trajectory.txt" if written else estimate)
         known = _true_trajectory(truth)
-        poses, true_poses = found.poses, known.poses
-        options = {
+        options: dict[str, Any] = {
             "timestamps": found.timestamps,
             "truth_timestamps": known.timestamps,
             "max_time_difference": max_difference,
         }
-    absolute = absolute_trajectory_error(poses, true_poses, num_frames=num_frames, **options)
-    relative = relative_pose_error(poses, true_poses, **options)
+        num_frames = len(written.frames) if written else None
+        results = {
+            "absolute_trajectory_error": absolute_trajectory_error(
+                found.poses, known.poses, num_frames=num_frames, **options
+            ),
+            "relative_pose_error": relative_pose_error(found.poses, known.poses, **options),
+        }
+    absolute: Any = results["absolute_trajectory_error"]
     if not absolute.num_compared:
         raise CommandError(
             "no pose has a true pose near in time; are these of one recording? See --max-difference"
         )
-    figures: dict[str, Any] = {"kind": "trajectory"}
-    rows: list[tuple[str, str]] = []
-    for name, result in (("absolute_trajectory_error", absolute), ("relative_pose_error", relative)):
-        figures[name] = result_dict(result)
-        units = result.units()
-        rows += [("", "")] * bool(rows)
-        rows.append((label(name).upper(), ""))
-        rows += [
-            (label(field), quantity(value, units[field]))
-            for field, value in figures[name].items()
-            if field != "truth_from_estimated"
-        ]
-    return figures, rows
+    figures: Figures = {"kind": "trajectory"}
+    rows: Rows = []
+    _add(figures, rows, results, written)
+    return figures, rows[1:]
+
+
+def _middle(written: Written) -> Any:
+    """Return the middle of the model in the frame of the true poses; the median, since rooms have corners."""
+    import numpy as np
+
+    import nacre
+
+    pose = written.truth_from_world
+    points = nacre.read_points(written.folder / "model.ply").points
+    if pose is None or not len(points):
+        return np.zeros(3)
+    return transformed(pose, np.median(points, axis=0, keepdims=True), None)[0][0]
 
 
 def _true_trajectory(path: Path) -> Trajectory:

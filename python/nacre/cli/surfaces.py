@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +12,7 @@ import numpy.typing as npt
 from nacre.cli.terminal import CommandError
 
 if TYPE_CHECKING:
-    from nacre import Camera, Mesh
+    from nacre import Mesh
     from nacre.evaluation import SurfaceSamples
     from nacre.evaluation.result import Result
 
@@ -27,23 +26,6 @@ def transformed(pose: Array, points: Array, normals: Array | None) -> tuple[Arra
     """Return points and normals in another frame, as float64."""
     rotation = pose[:3, :3].T
     return points @ rotation + pose[:3, 3], None if normals is None else normals @ rotation
-
-
-def seen_samples(
-    mesh: Mesh, samples: SurfaceSamples, camera: Camera, poses: Array, max_slant: float
-) -> npt.NDArray[np.bool_]:
-    """Return which points of a mesh some orthographic camera saw, slanted no more than that."""
-    points = samples.points
-    seen = np.zeros(len(points), dtype=bool)
-    half = 0.5 * np.array([camera.width - 1, camera.height - 1]) * camera.pixel_size
-    for pose in poses:
-        local = (points - pose[:3, 3]) @ pose[:3, :3]
-        facing = -(samples.normals @ pose[:3, 2]) > math.cos(max_slant)
-        rows = np.flatnonzero(~seen & facing & (np.abs(local[:, :2]) <= half).all(axis=1) & (local[:, 2] > 0))
-        starts = points[rows] - local[rows, 2:] * pose[:3, 2]
-        hits = mesh.cast(starts, np.broadcast_to(pose[:3, 2], starts.shape))
-        seen[rows] = np.abs(hits.distances - local[rows, 2]) < 1e-3 * camera.pixel_size
-    return seen
 
 
 def evaluate_surface(

@@ -1,6 +1,7 @@
 """How good a trajectory and a model are: errors in metres and radians, as the literature defines them."""
 
 from nacre.evaluation.normals import NormalError, normal_error
+from nacre.evaluation.pose import PoseError, pose_error
 from nacre.evaluation.surface import (
     Completeness,
     FScore,
@@ -18,12 +19,14 @@ from nacre.evaluation.trajectory import (
     relative_pose_error,
 )
 from nacre.evaluation.uniformity import Uniformity, uniformity
+from nacre.evaluation.visibility import seen_samples
 
 __all__ = [
     "AbsoluteTrajectoryError",
     "Completeness",
     "FScore",
     "NormalError",
+    "PoseError",
     "RelativePoseError",
     "SurfaceAccuracy",
     "SurfaceSamples",
@@ -32,8 +35,10 @@ __all__ = [
     "completeness",
     "f_score",
     "normal_error",
+    "pose_error",
     "relative_pose_error",
     "sample_surface",
+    "seen_samples",
     "surface_accuracy",
     "uniformity",
 ]

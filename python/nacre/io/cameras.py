@@ -56,11 +56,15 @@ def read_camera(path: str | os.PathLike[str]) -> CameraFile:
         raise FileFormatError(path, f"not a JSON file: {error.msg}", line=error.lineno) from error
     except UnicodeDecodeError as error:
         raise FileFormatError(path, "not a JSON file: it is not text") from error
+    return camera_of(path, document)
+
+
+def camera_of(path: str | os.PathLike[str], document: Any) -> CameraFile:
+    """Return the camera that a JSON object of a file describes; see :func:`read_camera`."""
     if not isinstance(document, dict):
         raise FileFormatError(
             path, f"a camera file must hold a JSON object, this holds a {type(document).__name__}"
         )
-
     fields = _Fields(path, document)
     scale = fields.number("depth_scale") if "depth_scale" in document else None
     if scale is not None and scale <= 0:

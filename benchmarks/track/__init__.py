@@ -1,0 +1,1 @@
+"""Tracking and models on simulated and real recordings, beside peers."""

@@ -1,0 +1,85 @@
+"""Runs the rows, prints the table, and keeps every figure in ``results.json``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+from track import commands, page
+from track.figures import TAU, collect
+from track.peers import TITLES
+from track.rows import Figures, Places, Row
+from track.table import BY_NAME, ROWS
+
+
+def run_row(places: Places, row: Row, with_peers: bool) -> dict[str, Figures]:
+    """Return the figures of every contender, or why it has none."""
+    if row.measure is not None:
+        return row.measure(places, row)
+    assert row.recording is not None
+    recording = row.recording(places)
+    results: dict[str, Figures] = {}
+    for name, settings in row.settings.items():
+        results[name] = attempt(
+            places, row, name, lambda out, options=settings: commands.reconstruct(recording, out, *options)
+        )
+    for peer in row.peers if with_peers else ():
+        results[TITLES[peer]] = attempt(
+            places, row, peer, lambda out, name=peer: commands.run_peer(name, recording, out)
+        )
+    return results
+
+
+def attempt(places: Places, row: Row, name: str, run: Any) -> Figures:
+    """Run a contender and evaluate what it wrote."""
+    out = places.work / "out" / row.name / name.replace(" ", "-").replace("+", "-plus")
+    out.parent.mkdir(parents=True, exist_ok=True)
+    print(f"{row.name}: {name}", file=sys.stderr, flush=True)
+    try:
+        processor = run(out)
+        arguments: list[Any] = []
+        report = json.loads((out / "report.json").read_text())
+        if row.mesh is not None and report.get("has_model", True):
+            arguments = [row.mesh(places), "--tau", TAU, "--scale", row.scale]
+        known = any(frame["truth"] is not None for frame in report["frames"])
+        evaluation = commands.evaluate(out, *arguments) if known or arguments else {}
+        return collect(evaluation, out, processor)
+    except (RuntimeError, OSError, ValueError) as error:
+        return {"failed": str(error)}
+
+
+def main() -> int:
+    """Run what was asked for; results of other rows in ``results.json`` stay."""
+    options = json.loads(sys.argv[1])
+    places = Places(Path(options["data"]), Path(options["work"]))
+    output = Path(options["output"])
+    output.mkdir(parents=True, exist_ok=True)
+    file = output / "results.json"
+    results: dict[str, Any] = json.loads(file.read_text()) if file.exists() else {}
+    unknown = [name for name in options["only"] if name not in BY_NAME]
+    if unknown:
+        print(f"there is no row {', '.join(unknown)}; there are {', '.join(BY_NAME)}", file=sys.stderr)
+        return 2
+    for row in ROWS:
+        if options["only"] and row.name not in options["only"]:
+            continue
+        try:
+            found = run_row(places, row, options["peers"])
+        except (FileNotFoundError, RuntimeError) as error:
+            print(f"{row.name} is left out: {error}", file=sys.stderr)
+            continue
+        kept = {} if options["peers"] else results.get(row.name, {}).get("contenders", {})
+        results[row.name] = {"date": commands.stamp(), "contenders": {**kept, **found}}
+        file.write_text(json.dumps(results, indent=1) + "\n")
+        print(page.section(row, results[row.name]))
+    if options["page"]:
+        Path(options["page"]).write_text(page.page(results))
+    missed = page.missed(results, [row for row in ROWS if not options["only"] or row.name in options["only"]])
+    print("\n".join(missed) if missed else "every goal of these rows is reached")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

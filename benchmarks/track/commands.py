@@ -1,0 +1,59 @@
+"""Running nacre's commands, and the peers, as programs; what they wrote is evaluated from the files."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+NACRE = [sys.executable, "-c", "from nacre.cli import main; main()"]
+LIMIT = 1800.0
+"""A program that takes longer [s] has failed."""
+
+
+def nacre(*arguments: str | Path | float) -> str:
+    """Run a command of nacre and return what it printed."""
+    return program(NACRE, *arguments)[0]
+
+
+def program(command: list[str], *arguments: str | Path | float) -> tuple[str, float]:
+    """Run a program; return its standard output and the processor time that it took [s]."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run(
+        [*command, *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=LIMIT,
+        env={**os.environ, "NO_COLOR": "1"},
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode:
+        raise RuntimeError((done.stderr or done.stdout).strip().splitlines()[-1][:300])
+    return done.stdout, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+
+
+def reconstruct(recording: Path, out: Path, *settings: str) -> float:
+    """Run ``nacre reconstruct``; return the processor time [s]."""
+    return program(NACRE, "reconstruct", recording, "-o", out, "--quiet", *settings)[1]
+
+
+def run_peer(name: str, recording: Path, out: Path) -> float:
+    """Run a peer over a recording in a process of its own; return the processor time [s]."""
+    return program([sys.executable, "-m", "track.peer"], name, recording, out)[1]
+
+
+def evaluate(out: Path, *arguments: str | Path | float) -> dict[str, Any]:
+    """Run ``nacre evaluate`` on what was written, and return its figures."""
+    figures: dict[str, Any] = json.loads(nacre("evaluate", out, *arguments, "--json"))
+    return figures
+
+
+def stamp() -> str:
+    """Return the date."""
+    return time.strftime("%Y-%m-%d")

@@ -1,0 +1,16 @@
+// Where may a camera be that has been lost? Candidates, found with a few points of its frame.
+#pragma once
+
+#include <vector>
+
+#include "icp_target.hpp"
+#include "nacre/fusion.hpp"
+
+namespace nacre {
+
+// The guesses (world_from_camera) after a short registration of a few points of the frame to the whole model: the
+// `count` of them on which most agrees, best first.
+std::vector<Pose> most_promising(const PointModel& model, const IcpSource& source, const std::vector<Pose>& guesses,
+                                 const AlignOptions& options, std::size_t count);
+
+}  // namespace nacre
