@@ -69,6 +69,10 @@ class SurfaceObserver {
   float weight(int u, int v) const { return image_.weight[v * image_.stride + u]; }
 
   bool has_colors() const { return image_.red != nullptr; }
+  Eigen::Vector3f color(int u, int v) const {
+    const std::int64_t pixel = v * image_.stride + u;
+    return {image_.red[pixel], image_.green[pixel], image_.blue[pixel]};
+  }
 
   // The same of a frontal measurement of some noise; sigma 0 stands for the reference.
   float frontal_weight(float sigma) const {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "color_registration.hpp"
 #include "icp_target.hpp"
 #include "model_view.hpp"
 #include "parallel.hpp"
@@ -21,6 +22,7 @@ constexpr std::size_t max_target_points = 30000;  // that a frame is registered 
 // Model points that a camera near a pose may see, as a cloud to register to.
 struct View {
   Points points, normals;  // world frame
+  Values brightness;       // empty where the model has no colours
   double thinning = 1.0;   // how much farther apart the points are than the model's
 };
 
@@ -52,7 +54,8 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
   for (const auto& rows : found) num_found += rows.size();
   const std::size_t step = (num_found + max_target_points - 1) / max_target_points;
   const auto count = static_cast<Eigen::Index>(step > 0 ? num_found / step : 0);
-  View view{Points(count, 3), Points(count, 3), std::sqrt(static_cast<double>(std::max<std::size_t>(step, 1)))};
+  View view{Points(count, 3), Points(count, 3), Values(model.colors.empty() ? 0 : count),
+            std::sqrt(static_cast<double>(std::max<std::size_t>(step, 1)))};
   // One of every `step`, at random.
   const auto is_chosen = [&](std::size_t index) { return index % step == random_bits(0, index / step) % step; };
   std::size_t index = 0;
@@ -61,6 +64,7 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
     for (const std::uint32_t row : rows) {
       if (k == count || !is_chosen(index++)) continue;
       view.points.row(k) = model.points[row].transpose();
+      if (view.brightness.size() > 0) view.brightness[k] = luma(model.colors[row]);
       view.normals.row(k++) = model.normals[row].transpose();
     }
   }
@@ -152,6 +156,22 @@ Samples sample_frame(const Frame& frame, const SurfaceObserver& observer, const 
   return samples;
 }
 
+// The frame's pixels with their brightness where there are many, some at random.
+BrightCloud bright_cloud(const Frame& frame, const SurfaceObserver& observer) {
+  constexpr std::size_t most = 100000;
+  const std::size_t step = std::max<std::size_t>(1, (frame.valid.size() + most - 1) / most);
+  const auto count = static_cast<Eigen::Index>(frame.valid.size() / step);
+  Points points(count, 3);
+  Values brightness(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const std::size_t place = static_cast<std::size_t>(i) * step;
+    const std::int32_t row = frame.valid[place + random_bits(0, place) % step];
+    points.row(i) = frame.points.row(row);
+    brightness[i] = luma(observer.color(row % frame.width, row / frame.width));
+  }
+  return BrightCloud(points, brightness);
+}
+
 // Strict, for guesses that may be far off: only a registration beyond doubt is believed.
 void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
   std::ostringstream reason;
@@ -195,6 +215,7 @@ struct Search {
   const PointModel& model;
   const Frame& frame;
   const Camera& camera;
+  const SurfaceObserver& observer;
   const ModelOptions& options;
   IcpSource source;
   const Values& noise;  // of the sampled points [m]
@@ -235,6 +256,10 @@ struct Search {
 
     TrackingResult result;
     result.alignment = align_to(target, gated, guess, align_options);
+    if (result.alignment.weak_directions.cols() > 0 && view.brightness.size() > 0 && observer.has_colors()) {
+      result.alignment = determine_by_color(target, gated, BrightCloud(view.points, view.brightness),
+                                            bright_cloud(frame, observer), result.alignment, align_options);
+    }
     result.consistency =
         consistency_of(view, frame, camera, result.alignment.target_from_source, spacing, options.num_threads);
     const double turned =
@@ -285,6 +310,7 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
   const Search search{model,
                       frame,
                       camera,
+                      observer,
                       options,
                       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
                       samples.noise,

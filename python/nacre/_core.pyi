@@ -818,11 +818,13 @@ def align(
     arg0: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
     arg1: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
     arg2: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
-    arg3: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
+    arg3: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
     arg4: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
-    arg5: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
-    arg6: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
-    arg7: AlignOptions,
+    arg5: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
+    arg6: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
+    arg7: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
+    arg8: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
+    arg9: AlignOptions,
 ) -> AlignResult: ...
 def back_project(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
