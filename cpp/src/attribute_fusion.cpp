@@ -49,6 +49,7 @@ AttributePlanes::AttributePlanes(const std::vector<FrameAttribute>& attributes, 
     parts_.push_back({&attribute, num_planes_, has_gaps ? num_planes_ + channels : -1});
     num_planes_ += channels + (has_gaps ? 1 : 0);
   }
+  if (parts_.empty()) return;
   num_planes_ = (num_planes_ + group - 1) / group * group;
   values_.assign(static_cast<std::size_t>(num_planes_ * plane_size_), 0.0F);
   parallel_for(camera.height(), 16, num_threads, [&](std::int64_t v) {

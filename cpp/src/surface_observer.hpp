@@ -101,8 +101,8 @@ class SurfaceObserver {
   std::int64_t plane_offset(int u, int v) const {
     return (v + simd::largest_window) * image_.stride + simd::largest_window + u;
   }
-  // The weighted averages of three planes, one after the other, around each point of the block: average[c * capacity +
-  // i].
+  // The weighted averages of three planes, one after the other, around the points i of the block, at
+  // average[c * capacity + i].
   void observe_planes(ObservationBlock& block, const float* planes, float* average) const;
 
   // Whether every pixel around measures something farther than a margin behind a point.

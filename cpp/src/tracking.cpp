@@ -307,14 +307,11 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
                      const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
                      double spacing, const ModelOptions& options) {
   const Samples samples = sample_frame(frame, observer, options);
-  const Search search{model,
-                      frame,
-                      camera,
-                      observer,
-                      options,
-                      IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
-                      samples.noise,
-                      spacing};
+  const Search search{
+      model,         frame,
+      camera,        observer,
+      options,       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
+      samples.noise, spacing};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
   for (const bool wide : {false, true}) {
