@@ -50,4 +50,19 @@ FrameSamples sample_frame(const Frame& frame, const SurfaceObserver& observer, c
   return samples;
 }
 
+BrightCloud bright_cloud(const Frame& frame, const SurfaceObserver& observer) {
+  constexpr std::size_t most = 100000;
+  const std::size_t step = std::max<std::size_t>(1, (frame.valid.size() + most - 1) / most);
+  const auto count = static_cast<Eigen::Index>(frame.valid.size() / step);
+  Points points(count, 3);
+  Values brightness(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const std::size_t place = static_cast<std::size_t>(i) * step;
+    const std::int32_t row = frame.valid[place + random_bits(0, place) % step];
+    points.row(i) = frame.points.row(row);
+    brightness[i] = luma(observer.color(row % frame.width, row / frame.width));
+  }
+  return BrightCloud(points, brightness);
+}
+
 }  // namespace nacre

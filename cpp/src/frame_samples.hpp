@@ -1,6 +1,7 @@
 // Points of a frame to register it by.
 #pragma once
 
+#include "color_registration.hpp"
 #include "nacre/model.hpp"
 #include "surface_observer.hpp"
 
@@ -15,5 +16,8 @@ struct FrameSamples {
 
 // options.registration.max_samples of them, or as many as the frame has.
 FrameSamples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options);
+
+// The frame's pixels with their brightness: where there are many, some at random. The observer has colours.
+BrightCloud bright_cloud(const Frame& frame, const SurfaceObserver& observer);
 
 }  // namespace nacre

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "attribute_fusion.hpp"
 #include "check.hpp"
 #include "consolidation_fold.hpp"
 #include "fusion_step.hpp"
@@ -43,10 +44,11 @@ double spacing_for(const Frame& frame, const Camera& camera) {
   return 2.0 * camera.footprint(*quartile);
 }
 
-void check_extras(const Camera& camera, const FrameExtras& extras) {
+void check_extras(const Camera& camera, const FrameExtras& extras, const PointModel& model) {
   const Eigen::Index pixels = static_cast<Eigen::Index>(camera.width()) * camera.height();
   require(extras.colors.rows() == 0 || extras.colors.rows() == pixels, "colors", "one row per pixel",
           extras.colors.rows());
+  check_attributes(extras.attributes, camera, model);
   require(!extras.keep_guess || extras.guess.has_value(), "keep_guess", "used with a guess", "no guess");
 }
 
@@ -104,6 +106,7 @@ ModelOptions ModelOptions::preset(const std::string& name) {
 
 void ModelOptions::check() const {
   depth.check();
+  region.check();
   registration.check();
   fusion.check();
   consolidation.check();
@@ -124,6 +127,7 @@ struct Model::Impl {
   ModelOptions options;  // what the first frame decides is filled in
   Frame frame;           // the newest; its memory and the observer's are used again for the next
   SurfaceObserver observer{camera, options.fusion};
+  MaskImage region;  // of the newest frame; empty where nothing is left out
   PointModel cloud;
   LoopClosure loops{camera, options};
   std::vector<FrameReport> reports;
@@ -143,17 +147,18 @@ struct Model::Impl {
   }
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
-  TrackingResult locate(const FrameExtras& extras) const;
+  void keep_region(FrameReport& report);
+  TrackingResult locate(const FrameExtras& extras, const RegionReport& region) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   WhereElse elsewhere() const;
   void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
-  void fold_in(FrameReport& report);
+  void fold_in(const FrameExtras& extras, FrameReport& report);
 };
 
-// The loop: clean the image, make points of it, register them to the model, correct the model where a loop closes, fold
-// the points in, renew the normals.
+// The loop: clean the image, make points of it, keep those of interest, register them to the model, correct the model
+// where a loop closes, fold the points in, renew the normals.
 FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& extras) {
-  check_extras(camera, extras);
+  check_extras(camera, extras, cloud);
   StopWatch total, watch;
   FrameReport report;
   report.index = static_cast<std::int64_t>(reports.size());
@@ -164,12 +169,17 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   report.milliseconds.preprocess = watch.lap();
 
   make_frame(clean, camera, options.depth.noise, options.num_threads, frame);
+  report.milliseconds.back_project = watch.lap();
+
+  keep_region(report);
+  report.milliseconds.region = watch.lap();
+
   if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
   const ColorsRef colors(extras.colors);
   observer.look_at(frame, colors, options.num_threads);
-  report.milliseconds.back_project = watch.lap();
+  report.milliseconds.back_project += watch.lap();
 
-  const TrackingResult tracking = locate(extras);
+  const TrackingResult tracking = locate(extras, report.region);
   report.status = tracking.status;
   report.reason = tracking.reason;
   report.world_from_camera = tracking.alignment.target_from_source;
@@ -190,7 +200,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     report.milliseconds.loop_closure = watch.lap();
     if (report.status == FrameStatus::tracked) {
       if (was_lost()) report.status = FrameStatus::relocalised;
-      fold_in(report);
+      fold_in(extras, report);
       before = {frame.points.col(2), frame.sigma, report.world_from_camera};
     }
   }
@@ -203,11 +213,20 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   return report;
 }
 
-TrackingResult Model::Impl::locate(const FrameExtras& extras) const {
+void Model::Impl::keep_region(FrameReport& report) {
+  report.region.num_inside = report.depth.num_kept;
+  if (!options.region.is_limited()) return;
+  MaskImage found = select_region(frame, camera, options.region, region, &report.region, options.num_threads);
+  nacre::keep_region(found, frame);
+  if (report.region.num_inside > 0) region = std::move(found);
+}
+
+TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport& region_report) const {
   TrackingResult result;
   result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
   if (frame.valid.size() < least_pixels) {
-    result.reason = "only " + std::to_string(frame.valid.size()) + " pixels of the frame are usable";
+    const std::string count = "only " + std::to_string(frame.valid.size()) + " pixels of the frame are usable";
+    result.reason = region_report.reason.empty() ? count : region_report.reason;
     return result;
   }
   if (cloud.size() == 0 || extras.keep_guess) {
@@ -278,20 +297,19 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
   poses.push_back(report.world_from_camera);
 }
 
-void Model::Impl::fold_in(FrameReport& report) {
+void Model::Impl::fold_in(const FrameExtras& extras, FrameReport& report) {
   StopWatch watch;
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
   const auto num_registered = static_cast<std::int32_t>(poses.size() - 1);  // lost frames make no point older
   if (options.fold_in != FoldIn::fuse) {
-    consolidate_frame(cloud, frame, report.world_from_camera, options, spacing,
-                      num_registered);
+    consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, num_registered);
     watch.lap();
     renew_normals(cloud, options);
     report.milliseconds.normals = watch.lap();
     return;
   }
-  report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing,
-                                num_registered, options.fusion, options.num_threads);
+  report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing, num_registered,
+                                options.fusion, options.num_threads, extras.attributes);
   while (cloud.size() > options.max_points) {
     spacing *= coarsening;
     thin(cloud, spacing);

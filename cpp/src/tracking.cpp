@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "color_registration.hpp"
 #include "frame_samples.hpp"
 #include "icp_target.hpp"
 #include "model_view.hpp"
@@ -22,6 +23,7 @@ constexpr std::size_t max_target_points = 30000;  // that a frame is registered 
 // Model points that a camera near a pose may see, as a cloud to register to.
 struct View {
   Points points, normals;  // world frame
+  Values brightness;       // empty where the model has no colours
   double thinning = 1.0;   // how much farther apart the points are than the model's
 };
 
@@ -54,7 +56,8 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
   for (const auto& rows : found) num_found += rows.size();
   const std::size_t step = (num_found + max_target_points - 1) / max_target_points;
   const auto count = static_cast<Eigen::Index>(step > 0 ? num_found / step : 0);
-  View view{Points(count, 3), Points(count, 3), std::sqrt(static_cast<double>(std::max<std::size_t>(step, 1)))};
+  View view{Points(count, 3), Points(count, 3), Values(model.colors.empty() ? 0 : count),
+            std::sqrt(static_cast<double>(std::max<std::size_t>(step, 1)))};
   // One of every `step`, at random.
   const auto is_chosen = [&](std::size_t index) { return index % step == random_bits(0, index / step) % step; };
   std::size_t index = 0;
@@ -63,6 +66,7 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
     for (const std::uint32_t row : rows) {
       if (k == count || !is_chosen(index++)) continue;
       view.points.row(k) = model.points[row].transpose();
+      if (view.brightness.size() > 0) view.brightness[k] = luma(model.colors[row]);
       view.normals.row(k++) = model.normals[row].transpose();
     }
   }
@@ -82,6 +86,7 @@ struct Search {
   const PointModel& model;
   const Frame& frame;
   const Camera& camera;
+  const SurfaceObserver& observer;
   const ModelOptions& options;
   IcpSource source;
   const Values& noise;  // of the sampled points [m]
@@ -125,6 +130,10 @@ struct Search {
 
     TrackingResult result;
     result.alignment = align_to(target, gated, guess, align_options);
+    if (result.alignment.weak_directions.cols() > 0 && view.brightness.size() > 0 && observer.has_colors()) {
+      result.alignment = determine_by_color(target, gated, BrightCloud(view.points, view.brightness),
+                                            bright_cloud(frame, observer), result.alignment, align_options);
+    }
     const Pose& pose = result.alignment.target_from_source;
     const Sight now{depth, frame.sigma, pose};
     const double in_view = consistency_of(view.points, view.normals, now, camera, spacing, options.num_threads);
@@ -178,16 +187,13 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
                      const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
                      std::int32_t oldest_frame, double spacing, const ModelOptions& options) {
   const FrameSamples samples = sample_frame(frame, observer, options);
-  Search search{model,
-                frame,
-                camera,
-                options,
-                IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
-                samples.noise,
-                frame.points.col(2),
-                before,
-                spacing,
-                oldest_frame};
+  Search search{
+      model,         frame,
+      camera,        observer,
+      options,       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
+      samples.noise, frame.points.col(2),
+      before,        spacing,
+      oldest_frame};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
   const auto try_guesses = [&] {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstring>
 
 #include "bindings.hpp"
@@ -18,11 +19,24 @@ py::array_t<Value> copy_values(const std::vector<Value>& values) {
   return py::array_t<Value>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
+// name: (points, channels)
+py::dict copy_attributes(const PointModel& cloud) {
+  py::dict result;
+  for (const PointAttribute& attribute : cloud.attributes) {
+    py::array_t<float> array(
+        {static_cast<py::ssize_t>(cloud.size()), static_cast<py::ssize_t>(attribute.num_channels)});
+    std::copy(attribute.values.begin(), attribute.values.end(), array.mutable_data());
+    result[attribute.name.c_str()] = array;
+  }
+  return result;
+}
+
 py::dict milliseconds(const FrameReport& report) {
   const StepTimes& times = report.milliseconds;
   py::dict result;
   result["preprocess"] = times.preprocess;
   result["back_project"] = times.back_project;
+  result["region"] = times.region;
   result["registration"] = times.registration;
   result["loop_closure"] = times.loop_closure;
   result["fold_in"] = times.fold_in;
@@ -32,10 +46,12 @@ py::dict milliseconds(const FrameReport& report) {
 }
 
 FrameReport add_frame(Model& model, const DepthRef& depth, const MaskRef& mask, const ColorsRef& colors,
+                      const std::vector<std::pair<std::string, Attributes>>& attributes,
                       std::optional<double> timestamp, const std::optional<PoseMatrix>& guess, bool keep_guess) {
   FrameExtras extras;
   extras.mask = mask;
   extras.colors = colors;
+  for (const auto& [name, values] : attributes) extras.attributes.push_back({name, values});
   extras.timestamp = timestamp;
   if (guess) extras.guess = to_pose(*guess);
   extras.keep_guess = keep_guess;
@@ -63,6 +79,7 @@ void bind_model(py::module_& m) {
       .def(py::init<>())
       .def_static("preset", &ModelOptions::preset)
       .def_readwrite("depth", &ModelOptions::depth)
+      .def_readwrite("region", &ModelOptions::region)
       .def_readwrite("registration", &ModelOptions::registration)
       .def_readwrite("fold_in", &ModelOptions::fold_in)
       .def_readwrite("fusion", &ModelOptions::fusion)
@@ -85,6 +102,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("points", [](const PointModel& cloud) { return copy_rows(cloud.points); })
       .def_property_readonly("normals", [](const PointModel& cloud) { return copy_rows(cloud.normals); })
       .def_property_readonly("colors", [](const PointModel& cloud) { return copy_rows(cloud.colors); })
+      .def_property_readonly("attributes", &copy_attributes)
       .def_property_readonly("confidence", [](const PointModel& cloud) { return copy_values(cloud.confidence); })
       .def_property_readonly("sightings", [](const PointModel& cloud) { return copy_values(cloud.sightings); })
       .def_property_readonly("last_seen", [](const PointModel& cloud) { return copy_values(cloud.last_seen); })
@@ -109,6 +127,7 @@ void bind_model(py::module_& m) {
       .def_readonly("loop_frame", &FrameReport::loop_frame)
       .def_readonly("loop_distance", &FrameReport::loop_distance)
       .def_readonly("depth", &FrameReport::depth)
+      .def_readonly("region", &FrameReport::region)
       .def_property_readonly("num_updated", [](const FrameReport& report) { return report.fusion.num_updated; })
       .def_property_readonly("num_inserted", [](const FrameReport& report) { return report.fusion.num_inserted; })
       .def_property_readonly("num_removed", [](const FrameReport& report) { return report.fusion.num_removed; })

@@ -704,6 +704,7 @@ class ModelOptions:
     fusion: FusionOptions
     normals: NormalOptions
     predict_motion: bool
+    region: RegionOptions
     registration: AlignOptions
     relocalise: bool
     verify: bool
@@ -739,8 +740,68 @@ class ModelOptions:
     @spacing.setter
     def spacing(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
 
+class RegionOptions:
+    object: bool
+    def __init__(self) -> None: ...
+    @property
+    def keep_fraction(self) -> float: ...
+    @keep_fraction.setter
+    def keep_fraction(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def link_distance(self) -> float: ...
+    @link_distance.setter
+    def link_distance(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def max_x(self) -> float: ...
+    @max_x.setter
+    def max_x(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def max_y(self) -> float: ...
+    @max_y.setter
+    def max_y(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def max_z(self) -> float: ...
+    @max_z.setter
+    def max_z(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def min_object(self) -> float: ...
+    @min_object.setter
+    def min_object(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def min_plane(self) -> float: ...
+    @min_plane.setter
+    def min_plane(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def min_x(self) -> float: ...
+    @min_x.setter
+    def min_x(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def min_y(self) -> float: ...
+    @min_y.setter
+    def min_y(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def min_z(self) -> float: ...
+    @min_z.setter
+    def min_z(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+    @property
+    def plane_margin(self) -> float: ...
+    @plane_margin.setter
+    def plane_margin(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
+
+class RegionReport:
+    @property
+    def num_inside(self) -> int: ...
+    @property
+    def num_outside(self) -> int: ...
+    @property
+    def planes(self) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 4]"]: ...
+    @property
+    def reason(self) -> str: ...
+
 class PointModel:
     def __len__(self) -> int: ...
+    @property
+    def attributes(self) -> dict[str, typing.Any]: ...
     @property
     def colors(self) -> numpy.typing.NDArray[numpy.float32]: ...
     @property
@@ -786,6 +847,8 @@ class FrameReport:
     @property
     def reason(self) -> str: ...
     @property
+    def region(self) -> RegionReport: ...
+    @property
     def rmse(self) -> float: ...
     @property
     def spacing(self) -> float: ...
@@ -805,9 +868,12 @@ class Model:
         arg0: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
         arg1: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, n]", "flags.c_contiguous"],
         arg2: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 3]", "flags.c_contiguous"],
-        arg3: typing.SupportsFloat | typing.SupportsIndex | None,
-        arg4: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] | None,
-        arg5: bool,
+        arg3: collections.abc.Sequence[
+            tuple[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float32, "[m, n]"]]
+        ],
+        arg4: typing.SupportsFloat | typing.SupportsIndex | None,
+        arg5: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] | None,
+        arg6: bool,
     ) -> FrameReport: ...
     def cloud_in_camera(self) -> PointModel: ...
     def pose(
@@ -824,11 +890,13 @@ def align(
     arg0: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
     arg1: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
     arg2: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
-    arg3: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
+    arg3: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
     arg4: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
-    arg5: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
-    arg6: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
-    arg7: AlignOptions,
+    arg5: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
+    arg6: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
+    arg7: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
+    arg8: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
+    arg9: AlignOptions,
 ) -> AlignResult: ...
 def align_global(
     arg0: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
@@ -929,6 +997,14 @@ def project_samples(
     options: ConsolidateOptions,
     hints: ProjectionHints,
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+def select_region(
+    depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
+    camera: Camera,
+    options: RegionOptions,
+    previous: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, n]", "flags.c_contiguous"],
+    noise: NoiseModel | None,
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
+) -> tuple[typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, n]"], RegionReport]: ...
 def simulate_depth(
     mesh: MeshTree,
     camera: Camera,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numbers
 import threading
+from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
@@ -12,9 +13,10 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._core import Camera
-from nacre.arrays import as_depth, as_mask, as_pose
+from nacre.arrays import as_attributes, as_depth, as_mask, as_pose
 from nacre.depth import DepthParameters, DepthReport
 from nacre.parameters import from_core, to_core, updated
+from nacre.region import RegionParameters, RegionReport
 from nacre.registration import RegistrationParameters
 
 Preset = Literal["default", "paper"]
@@ -80,7 +82,7 @@ class ModelParameters:
 
     Attributes
     ----------
-    depth, registration, fusion, consolidation, normals
+    depth, region, registration, fusion, consolidation, normals
         Of the steps of the loop. ``consolidation`` and ``normals`` (of the model) are used where ``fold_in``
         is not "fuse".
     fold_in : "fuse", "wlop" or "wlop+"
@@ -112,6 +114,7 @@ class ModelParameters:
     """
 
     depth: DepthParameters = field(default_factory=DepthParameters)
+    region: RegionParameters = field(default_factory=RegionParameters)
     registration: RegistrationParameters = field(default_factory=RegistrationParameters)
     fold_in: Literal["fuse", "wlop", "wlop+"] = "fuse"
     fusion: FusionParameters = field(default_factory=FusionParameters)
@@ -170,6 +173,8 @@ class FrameReport:
         Between the surfaces that the two saw, before the correction [m].
     depth : DepthReport
         Pixels that were removed, by reason.
+    region : RegionReport
+        What was left out of the rest.
     num_updated, num_inserted, num_removed : int
         Points of the model that the frame moved, added and removed.
     num_points : int
@@ -195,6 +200,7 @@ class FrameReport:
     loop_frame: int | None
     loop_distance: float
     depth: DepthReport
+    region: RegionReport
     num_updated: int
     num_inserted: int
     num_removed: int
@@ -211,6 +217,7 @@ class FrameReport:
     def _from_core(cls, core: Any) -> FrameReport:
         values = {f.name: getattr(core, f.name) for f in fields(cls)}
         values["depth"] = DepthReport._from_core(core.depth)
+        values["region"] = RegionReport._from_core(core.region)
         return cls(**values)
 
     def __repr__(self) -> str:
@@ -284,6 +291,7 @@ class Model:
         mask: npt.ArrayLike | None = None,
         timestamp: float | None = None,
         *,
+        attributes: Mapping[str, npt.ArrayLike] | None = None,
         guess: npt.ArrayLike | None = None,
         keep_guess: bool = False,
     ) -> FrameReport:
@@ -302,6 +310,9 @@ class Model:
             Pixels where it is 0 are not used.
         timestamp : float, optional
             [s], kept in the report.
+        attributes : mapping of str to (H, W) or (H, W, C) real, optional
+            Anything else that pixels have (an intensity, a temperature, class probabilities), by name; NaN
+            is no value. Fused along with the points, as colours are, where ``fold_in`` is "fuse".
         guess : (4, 4), optional
             A pose (world_from_camera) to start the registration from, in place of the last one.
         keep_guess : bool
@@ -329,11 +340,12 @@ class Model:
                     f"color must be uint8 of shape {(*image.shape, 3)}, got {array.dtype} {array.shape}"
                 )
             colors = np.ascontiguousarray(array).reshape(-1, 3)
+        more = as_attributes("attributes", attributes, (image.shape[0], image.shape[1]))
         pose = None if guess is None else as_pose("guess", guess)
         if timestamp is not None and not isinstance(timestamp, numbers.Real):
             raise TypeError(f"timestamp must be a number of seconds or None, got {timestamp!r}")
         with self._lock:
-            core = self._core.add_frame(image, pixels, colors, timestamp, pose, keep_guess)
+            core = self._core.add_frame(image, pixels, colors, more, timestamp, pose, keep_guess)
             report = FrameReport._from_core(core)
             if report.loop_frame is not None:
                 self._frames = [
@@ -378,6 +390,13 @@ class Model:
         if len(colors) == 0:
             return None
         return np.clip(np.rint(np.nan_to_num(colors)), 0, 255).astype(np.uint8)
+
+    @property
+    def attributes(self) -> dict[str, npt.NDArray[np.float32]]:
+        """(N,) or (N, C) for each attribute that a frame had, by name; NaN where never seen; a copy."""
+        with self._lock:
+            attributes = self._core.cloud.attributes
+        return {name: values[:, 0] if values.shape[1] == 1 else values for name, values in attributes.items()}
 
     @property
     def confidence(self) -> npt.NDArray[np.float32]:

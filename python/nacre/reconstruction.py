@@ -138,7 +138,12 @@ class Reconstruction:
             return FrameRecord(index, None, "LOST", str(error), None, None, error)
         try:
             report = self.model.add_frame(
-                frame.depth, color=frame.color, timestamp=frame.timestamp, guess=guess
+                frame.depth,
+                color=frame.color,
+                mask=frame.mask,
+                timestamp=frame.timestamp,
+                guess=guess,
+                attributes=frame.attributes,
             )
         except ValueError as error:
             return FrameRecord(index, frame.timestamp, "LOST", str(error), None, frame.truth, error)
@@ -328,11 +333,12 @@ def _removed(report: FrameReport | None) -> dict[str, int]:
     if report is None:
         return {}
     depth = dataclasses.asdict(report.depth)
-    return {
+    removed = {
         name.removeprefix("num_"): count
         for name, count in depth.items()
         if name not in ("num_pixels", "num_invalid", "num_kept")
     }
+    return {**removed, "outside": report.region.num_outside}
 
 
 def _frame_dict(
@@ -359,6 +365,7 @@ def _frame_dict(
         figures[name] = None if report is None else getattr(report, name)
     figures["loop_frame"] = loop_frame
     figures["depth"] = None if report is None else dataclasses.asdict(report.depth)
+    figures["region"] = None if report is None else dataclasses.asdict(report.region)
     figures["removed"] = _removed(report)
     return figures
 

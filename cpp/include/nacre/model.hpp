@@ -12,6 +12,7 @@
 #include "nacre/depth.hpp"
 #include "nacre/fusion.hpp"
 #include "nacre/normals.hpp"
+#include "nacre/region.hpp"
 #include "nacre/registration.hpp"
 #include "nacre/types.hpp"
 
@@ -34,6 +35,7 @@ enum class FoldIn {
 
 struct ModelOptions {
   DepthOptions depth;
+  RegionOptions region;
   AlignOptions registration;
   FoldIn fold_in = FoldIn::fuse;
   FusionOptions fusion;
@@ -60,7 +62,8 @@ struct ModelOptions {
 
 /// Wall time of each step of the loop [ms].
 struct StepTimes {
-  double preprocess = 0, back_project = 0, registration = 0, loop_closure = 0, fold_in = 0, normals = 0, total = 0;
+  double preprocess = 0, back_project = 0, region = 0, registration = 0, loop_closure = 0, fold_in = 0, normals = 0,
+         total = 0;
 };
 
 /// What became of one frame.
@@ -82,6 +85,7 @@ struct FrameReport {
   std::optional<std::int64_t> loop_frame;                    ///< the earlier frame that this one closed a loop with
   double loop_distance = 0.0;                                ///< between the surfaces that the two saw, before [m]
   DepthReport depth;
+  RegionReport region;
   FusionReport fusion;
   std::int64_t num_points = 0;  ///< of the model, after the frame
   double spacing = 0.0;         ///< of the model [m]
@@ -90,11 +94,12 @@ struct FrameReport {
 
 /// What may come with a depth image.
 struct FrameExtras {
-  Colors colors;                    ///< height * width rows, row by row; empty: none
-  MaskImage mask;                   ///< pixels of the object, see MaskImage
-  std::optional<double> timestamp;  ///< [s]
-  std::optional<Pose> guess;        ///< world_from_camera to start the registration from
-  bool keep_guess = false;          ///< take the guess for the pose, without registration
+  Colors colors;                           ///< height * width rows, row by row; empty: none
+  std::vector<FrameAttribute> attributes;  ///< fused along with the points where fold_in is fuse
+  MaskImage mask;                          ///< pixels of the object, see MaskImage
+  std::optional<double> timestamp;         ///< [s]
+  std::optional<Pose> guess;               ///< world_from_camera to start the registration from
+  bool keep_guess = false;                 ///< take the guess for the pose, without registration
 };
 
 /// A 3D model that grows with every depth frame. The world is the first camera's frame unless the first frame comes
