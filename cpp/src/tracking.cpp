@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
 #include "color_registration.hpp"
 #include "icp_target.hpp"
@@ -12,6 +11,7 @@
 #include "random.hpp"
 #include "relocalisation.hpp"
 #include "surface_observer.hpp"
+#include "verdict.hpp"
 
 namespace nacre {
 namespace {
@@ -69,45 +69,6 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
     }
   }
   return view;
-}
-
-// Of the view's points that face the camera and project onto a measured pixel: the part that agrees with it, among
-// those that agree and those that the camera sees through. Points behind the measured surface are hidden, not wrong.
-double consistency_of(const View& view, const Frame& frame, const Camera& camera, const Pose& world_from_camera,
-                      double spacing, int num_threads) {
-  struct Counts {
-    std::int64_t agree = 0, violated = 0;
-    Counts& operator+=(const Counts& other) {
-      agree += other.agree;
-      violated += other.violated;
-      return *this;
-    }
-  };
-  constexpr std::int64_t block_size = ModelView::capacity;
-  const ModelView model_view(camera, world_from_camera);
-  const Counts counts =
-      block_reduce(view.points.rows(), block_size, num_threads, Counts{}, [&](std::int64_t begin, std::int64_t end) {
-        ModelView::Block block;
-        model_view.project(view.points.data() + 3 * begin, view.normals.data() + 3 * begin,
-                           static_cast<int>(end - begin), block);
-        Counts sum;
-        for (int i = 0; i < static_cast<int>(end - begin); ++i) {
-          if (!block.inside[i] || !(block.facing[i] > 0.3F)) continue;
-          const std::int32_t pixel = block.pixel[i];
-          const float behind = frame.points(pixel, 2) - block.z[i];
-          if (!std::isfinite(behind)) continue;
-          const float tolerance =
-              std::max(3.0F * static_cast<float>(spacing), 4.0F * frame.sigma[pixel]) / block.facing[i];
-          if (behind > tolerance) {
-            ++sum.violated;
-          } else if (behind > -tolerance) {
-            ++sum.agree;
-          }
-        }
-        return sum;
-      });
-  const std::int64_t judged = counts.agree + counts.violated;
-  return judged > 0 ? static_cast<double>(counts.agree) / static_cast<double>(judged) : 0.0;
 }
 
 // Denoised points of the frame, spread over it at random: noise would shift the matches on curved surfaces.
@@ -172,36 +133,6 @@ BrightCloud bright_cloud(const Frame& frame, const SurfaceObserver& observer) {
   return BrightCloud(points, brightness);
 }
 
-// Strict, for guesses that may be far off: only a registration beyond doubt is believed.
-void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
-  std::ostringstream reason;
-  reason.precision(3);
-  result.status = FrameStatus::lost;
-  const double ratio = result.alignment.residual_ratio;
-  const bool is_close = result.alignment.overlap > 0.35 && result.consistency > 0.9 && ratio < 0.25;
-  if (result.alignment.status == AlignStatus::too_few_pairs) {
-    reason << "too few points of the frame match the model";
-  } else if (!options.verify) {
-    result.status = FrameStatus::tracked;
-  } else if (result.alignment.overlap < options.min_overlap) {
-    reason << "overlap " << result.alignment.overlap << " is below " << options.min_overlap;
-  } else if (result.consistency < options.min_consistency) {
-    reason << "consistency " << result.consistency << " is below " << options.min_consistency;
-  } else if (ratio > options.max_residual) {
-    reason << "residuals are " << ratio << " of the largest that match, above " << options.max_residual;
-  } else if (strict && !is_close) {
-    reason << "not sure enough: overlap " << result.alignment.overlap << ", consistency " << result.consistency
-           << ", residuals " << ratio << " of the largest that match";
-  } else if (result.alignment.weak_directions.cols() > 0) {
-    result.status = FrameStatus::weak;
-    reason << result.alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
-  } else {
-    result.status = FrameStatus::tracked;
-    result.is_beyond_doubt = is_close;
-  }
-  result.reason = reason.str();
-}
-
 double median_reach(const IcpSource& source) {
   std::vector<float> values(source.reach.data(), source.reach.data() + source.reach.size());
   if (values.empty()) return 0.0;
@@ -219,7 +150,9 @@ struct Search {
   const ModelOptions& options;
   IcpSource source;
   const Values& noise;  // of the sampled points [m]
-  double spacing;       // of the model [m]
+  const Values depth;   // of each pixel [m]
+  const Sight& before;
+  double spacing;  // of the model [m]
 
   bool has_automatic_gate() const { return !(options.registration.max_distance > 0.0); }
 
@@ -260,10 +193,16 @@ struct Search {
       result.alignment = determine_by_color(target, gated, BrightCloud(view.points, view.brightness),
                                             bright_cloud(frame, observer), result.alignment, align_options);
     }
-    result.consistency =
-        consistency_of(view, frame, camera, result.alignment.target_from_source, spacing, options.num_threads);
-    const double turned =
-        Eigen::AngleAxisd(guess.linear().transpose() * result.alignment.target_from_source.linear()).angle();
+    const Pose& pose = result.alignment.target_from_source;
+    const Sight now{depth, frame.sigma, pose};
+    const double in_view = consistency_of(view.points, view.normals, now, camera, spacing, options.num_threads);
+    const Eigen::Matrix3f rotation = pose.linear().cast<float>();
+    const Eigen::RowVector3f translation = pose.translation().cast<float>().transpose();
+    const Points points = (source.cloud.points * rotation.transpose()).rowwise() + translation;
+    const Points normals = source.cloud.normals * rotation.transpose();
+    const double earlier = consistency_of(points, normals, before, camera, spacing, options.num_threads);
+    result.consistency = std::isfinite(in_view) || std::isfinite(earlier) ? std::fmin(in_view, earlier) : 0.0;
+    const double turned = Eigen::AngleAxisd(guess.linear().transpose() * pose.linear()).angle();
     judge(result, options, strict || turned > far_turn);
     return result;
   }
@@ -304,27 +243,35 @@ struct Search {
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
+                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
                      double spacing, const ModelOptions& options) {
   const Samples samples = sample_frame(frame, observer, options);
   const Search search{
       model,         frame,
       camera,        observer,
       options,       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
-      samples.noise, spacing};
+      samples.noise, frame.points.col(2),
+      before,        spacing};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
   for (const bool wide : {false, true}) {
-    if (wide && !search.has_automatic_gate()) break;
+    if (wide && (best.status != FrameStatus::lost || !search.has_automatic_gate())) break;
     for (const Pose& guess : guesses) {
       const TrackingResult result = search.register_from(guess, wide, was_lost);
       if (result.rank() >= best.rank()) best = result;
       if (result.is_beyond_doubt) return result;
     }
   }
-  if (best.status == FrameStatus::lost && !key_poses.empty()) {
-    const TrackingResult found = search.relocalise(key_poses);
+  if (best.status == FrameStatus::lost && !elsewhere.key_poses.empty()) {
+    const TrackingResult found = search.relocalise(elsewhere.key_poses);
     if (found.status != FrameStatus::lost) return found;
+  }
+  if (best.status == FrameStatus::lost && elsewhere.everywhere) {
+    const std::optional<Pose> pose = fit_anywhere(model, search.source, options.registration);
+    if (pose) {
+      const TrackingResult found = search.register_from(*pose, false, false);
+      if (found.status != FrameStatus::lost) return found;
+    }
   }
   return best;
 }

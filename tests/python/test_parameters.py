@@ -16,6 +16,7 @@ MIRRORS: dict[type, Any] = {
     nacre.DepthParameters: _core.DepthOptions,
     nacre.RegionParameters: _core.RegionOptions,
     nacre.RegistrationParameters: _core.AlignOptions,
+    nacre.GlobalRegistrationParameters: _core.GlobalAlignOptions,
     FusionParameters: _core.FusionOptions,
     ConsolidationParameters: _core.ConsolidateOptions,
     NormalParameters: _core.NormalOptions,
