@@ -27,8 +27,7 @@ double roughness(const Points& points, const Points& normals, int num_threads) {
   const Eigen::Index step = std::max<Eigen::Index>(1, points.rows() / num_probes);
   Points probes(points.rows() / step, 3);
   for (Eigen::Index i = 0; i < probes.rows(); ++i) probes.row(i) = points.row(i * step);
-  const Neighbors near =
-      KdTree(points, num_threads).query(PointsRef(probes), 4, KdTree::infinity, num_threads);
+  const Neighbors near = KdTree(points, num_threads).query(PointsRef(probes), 4, KdTree::infinity, num_threads);
   std::vector<float> offsets;
   for (Eigen::Index i = 0; i < probes.rows(); ++i) {
     for (Eigen::Index k = 0; k < near.indices.cols(); ++k) {
@@ -47,8 +46,8 @@ double roughness(const Points& points, const Points& normals, int num_threads) {
 // Moves points, which are some rows of a cloud, to the mean of their neighbours.
 void denoise(const PointsRef& all, const Points& all_normals, const std::vector<std::int64_t>& rows, int num_threads,
              Points& points, const Points& normals) {
-  const Neighbors near = KdTree(all, num_threads)
-                             .query(PointsRef(points), num_neighbors, KdTree::infinity, num_threads);
+  const Neighbors near =
+      KdTree(all, num_threads).query(PointsRef(points), num_neighbors, KdTree::infinity, num_threads);
   parallel_for(points.rows(), block_size, num_threads, [&](std::int64_t i) {
     float sum = 0.0F, count = 0.0F;
     for (Eigen::Index k = 0; k < near.indices.cols(); ++k) {

@@ -1,4 +1,5 @@
-// The search of align_global: many short registrations, fewer longer ones, and how well each motion explains the clouds.
+// The search of align_global: many short registrations, fewer longer ones, and how well each motion explains the
+// clouds.
 #pragma once
 
 #include <optional>

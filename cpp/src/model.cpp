@@ -9,6 +9,9 @@
 #include "check.hpp"
 #include "consolidation_fold.hpp"
 #include "fusion_step.hpp"
+#include "loop_closure.hpp"
+#include "model_correction.hpp"
+#include "point_spacing.hpp"
 #include "tracking.hpp"
 
 namespace nacre {
@@ -96,6 +99,7 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.predict_motion = false;
   options.relocalise = false;
   options.denoise_samples = false;
+  options.loop_closure = false;
   options.verify = false;
   return options;
 }
@@ -125,6 +129,7 @@ struct Model::Impl {
   SurfaceObserver observer{camera, options.fusion};
   MaskImage region;  // of the newest frame; empty where nothing is left out
   PointModel cloud;
+  LoopClosure loops{camera, options};
   std::vector<FrameReport> reports;
   Sight before;             // of the newest frame that was folded in
   std::vector<Pose> poses;  // of the registered frames, oldest first
@@ -146,11 +151,12 @@ struct Model::Impl {
   TrackingResult locate(const FrameExtras& extras, const RegionReport& region) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   WhereElse elsewhere() const;
+  void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
   void fold_in(const FrameExtras& extras, FrameReport& report);
 };
 
-// The loop: clean the image, make points of it, keep those of interest, register them to the model, fold them in, renew
-// the normals.
+// The loop: clean the image, make points of it, keep those of interest, register them to the model, correct the model
+// where a loop closes, fold the points in, renew the normals.
 FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& extras) {
   check_extras(camera, extras, cloud);
   StopWatch total, watch;
@@ -190,6 +196,8 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     report.world_from_camera = poses.empty() ? Pose::Identity() : poses.back();
   } else {
     poses.push_back(report.world_from_camera);
+    if (options.loop_closure && options.fold_in == FoldIn::fuse) close_loops(report, tracking, extras.keep_guess);
+    report.milliseconds.loop_closure = watch.lap();
     if (report.status == FrameStatus::tracked) {
       if (was_lost()) report.status = FrameStatus::relocalised;
       fold_in(extras, report);
@@ -228,7 +236,8 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost(), before, spacing, options);
+  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost(), before,
+               options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
@@ -257,6 +266,35 @@ WhereElse Model::Impl::elsewhere() const {
     if (is_new) chosen.push_back(*pose);
   }
   return where;
+}
+
+void Model::Impl::close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given) {
+  const std::int32_t oldest_frame = loops.oldest_frame();
+  const LoopReport loop = loops.add_frame({static_cast<std::int32_t>(report.index), frame, observer, tracking.alignment,
+                                           spacing, is_given, was_lost() || tracking.is_to_whole_model});
+  if (loop.corrections.empty()) return;
+  report.loop_frame = loop.frame;
+  report.loop_distance = loop.distance;
+  if (report.status == FrameStatus::weak) {  // what it saw before determines its pose
+    report.status = FrameStatus::tracked;
+    report.reason.clear();
+    report.weak_directions.resize(6, 0);
+  }
+  move_points(cloud, loop.corrections, options.num_threads);
+  report.world_from_camera = loop.corrections.back() * report.world_from_camera;
+  const double noise = static_cast<double>(median_sigma(frame));
+  merge_layers(cloud, oldest_frame, spacing, [&](const Eigen::Vector3f& point) {
+    const double distance = (point.cast<double>() - report.world_from_camera.translation()).norm();
+    const double farther = camera.model() == Camera::Model::pinhole ? distance / loop.depth : 1.0;
+    const double sigma = noise * farther * farther;  // noise grows with the square
+    return spacing_at(static_cast<float>(distance), static_cast<float>(sigma), camera, spacing);
+  });
+  poses.clear();
+  for (FrameReport& earlier : reports) {
+    earlier.world_from_camera = loop.corrections[static_cast<std::size_t>(earlier.index)] * earlier.world_from_camera;
+    if (earlier.status != FrameStatus::lost) poses.push_back(earlier.world_from_camera);
+  }
+  poses.push_back(report.world_from_camera);
 }
 
 void Model::Impl::fold_in(const FrameExtras& extras, FrameReport& report) {

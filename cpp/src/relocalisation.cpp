@@ -46,8 +46,9 @@ std::optional<Pose> fit_anywhere(const PointModel& model, const IcpSource& sourc
   const GlobalSearch search(moving, still, search_options);
   const Verdict verdict = judge(search.run(), search_options, search.tolerance());
   // Whether a direction of the pose is weak is decided where all of the frame is registered.
-  const bool is_one_place = verdict.status == GlobalAlignStatus::found ||
-                            (verdict.status == GlobalAlignStatus::ambiguous && verdict.rivalry <= search_options.max_rivalry);
+  const bool is_one_place =
+      verdict.status == GlobalAlignStatus::found ||
+      (verdict.status == GlobalAlignStatus::ambiguous && verdict.rivalry <= search_options.max_rivalry);
   if (!is_one_place) return std::nullopt;
   return verdict.best.alignment.target_from_source;
 }

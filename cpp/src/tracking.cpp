@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "color_registration.hpp"
+#include "frame_samples.hpp"
 #include "icp_target.hpp"
 #include "model_view.hpp"
 #include "parallel.hpp"
@@ -28,28 +29,29 @@ struct View {
 
 // Points in the image widened by a third on each side, turned away from the camera by at most 120 degrees: one of every
 // n of them, so that at most max_target_points are left.
-View points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera, int num_threads) {
+View points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera,
+                    std::int32_t oldest_frame, int num_threads) {
   constexpr std::int64_t block_size = ModelView::capacity;
   const ModelView model_view(camera, world_from_camera);
   const auto width = static_cast<float>(camera.width()), height = static_cast<float>(camera.height());
   const float margin_u = width / 3.0F, margin_v = height / 3.0F;
   std::vector<std::vector<std::uint32_t>> found(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
-  parallel_blocks(model.size(), block_size, num_threads,
-                  [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
-                    const auto first = static_cast<std::size_t>(begin);
-                    ModelView::Block block;
-                    model_view.project(model.points[first].data(), model.normals[first].data(),
-                                       static_cast<int>(end - begin), block);
-                    std::uint32_t rows[block_size];
-                    std::size_t count = 0;
-                    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(end - begin); ++i) {
-                      rows[count] = static_cast<std::uint32_t>(begin) + i;
-                      count += static_cast<std::size_t>((block.u[i] > -margin_u) & (block.u[i] < width + margin_u) &
-                                                        (block.v[i] > -margin_v) & (block.v[i] < height + margin_v) &
-                                                        (block.facing[i] > -0.5F));
-                    }
-                    found[static_cast<std::size_t>(number)].assign(rows, rows + count);
-                  });
+  parallel_blocks(
+      model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
+        const auto first = static_cast<std::size_t>(begin);
+        ModelView::Block block;
+        model_view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin),
+                           block);
+        std::uint32_t rows[block_size];
+        std::size_t count = 0;
+        for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(end - begin); ++i) {
+          rows[count] = static_cast<std::uint32_t>(begin) + i;
+          count += static_cast<std::size_t>((block.u[i] > -margin_u) & (block.u[i] < width + margin_u) &
+                                            (block.v[i] > -margin_v) & (block.v[i] < height + margin_v) &
+                                            (block.facing[i] > -0.5F) & (model.last_seen[first + i] >= oldest_frame));
+        }
+        found[static_cast<std::size_t>(number)].assign(rows, rows + count);
+      });
   std::size_t num_found = 0;
   for (const auto& rows : found) num_found += rows.size();
   const std::size_t step = (num_found + max_target_points - 1) / max_target_points;
@@ -69,52 +71,6 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
     }
   }
   return view;
-}
-
-// Denoised points of the frame, spread over it at random: noise would shift the matches on curved surfaces.
-struct Samples {
-  Points points, normals;
-  Values noise;  // standard deviation of each measurement [m]
-  Values sigma;  // with what its neighbours are wrong by, too, which no averaging removes [m]
-};
-
-// Depth cameras are also wrong by what neighbouring pixels have in common: millimetres at arm's length, centimetres
-// beyond three metres (Teichman, Miller and Thrun 2013, figure 3).
-float systematic_error(float z) {
-  constexpr float growth = 0.0015F;  // [1/m^2]
-  return growth * z * z * z;
-}
-
-Samples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
-  const std::int64_t count =
-      options.registration.max_samples > 0
-          ? std::min<std::int64_t>(options.registration.max_samples, static_cast<std::int64_t>(frame.valid.size()))
-          : static_cast<std::int64_t>(frame.valid.size());
-  Samples samples{Points(count, 3), Points(count, 3), Values(count), Values(count)};
-  const double stride = static_cast<double>(frame.valid.size()) / static_cast<double>(std::max<std::int64_t>(count, 1));
-  parallel_blocks(count, ObservationBlock::capacity, options.num_threads, [&](auto, auto begin, auto end) {
-    ObservationBlock block;
-    for (std::int64_t i = begin; i < end; ++i) {
-      // One of every `stride` pixels.
-      const double place =
-          (static_cast<double>(i) + random_uniform(options.registration.seed, static_cast<std::uint64_t>(i))) * stride;
-      const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
-      samples.points.row(i) = frame.points.row(row);
-      samples.normals.row(i) = frame.normals.row(row);
-      samples.noise[i] = frame.sigma[row];
-      samples.sigma[i] = std::hypot(frame.sigma[row], systematic_error(frame.points(row, 2)));
-      observer.add(block, samples.points.row(i).transpose(), samples.normals.row(i).transpose(), row, frame.sigma[row]);
-    }
-    if (!options.denoise_samples) return;
-    observer.observe(block);
-    for (std::int64_t i = begin; i < end; ++i) {
-      const Observation seen = block[static_cast<int>(i - begin)];
-      if (!(seen.weight > 0.0F)) continue;
-      samples.points.row(i) += seen.offset * samples.normals.row(i);
-      samples.normals.row(i) = seen.normal.normalized().transpose();
-    }
-  });
-  return samples;
 }
 
 // The frame's pixels with their brightness where there are many, some at random.
@@ -152,7 +108,8 @@ struct Search {
   const Values& noise;  // of the sampled points [m]
   const Values depth;   // of each pixel [m]
   const Sight& before;
-  double spacing;  // of the model [m]
+  double spacing;             // of the model [m]
+  std::int32_t oldest_frame;  // see track
 
   bool has_automatic_gate() const { return !(options.registration.max_distance > 0.0); }
 
@@ -179,7 +136,7 @@ struct Search {
 
   // Near: the guess is about right, and a narrow gate is safest. Wide: it is not. Strict: see judge.
   TrackingResult register_from(const Pose& guess, bool wide, bool strict) const {
-    const View view = points_in_view(model, camera, guess, options.num_threads);
+    const View view = points_in_view(model, camera, guess, oldest_frame, options.num_threads);
     AlignOptions align_options = options.registration;
     align_options.max_points = 0;  // the view is thin enough
     const IcpTarget target(AlignCloud(view.points, view.normals), align_options);
@@ -209,7 +166,7 @@ struct Search {
 
   // Cameras around what a known camera saw: it turned about each of its axes, one way and the other.
   std::vector<Pose> around(const Pose& pose) const {
-    const View view = points_in_view(model, camera, pose, options.num_threads);
+    const View view = points_in_view(model, camera, pose, oldest_frame, options.num_threads);
     std::vector<Pose> poses = {pose};
     if (view.points.rows() == 0) return poses;
     const Eigen::Vector3d center = view.points.colwise().mean().transpose().cast<double>();
@@ -244,32 +201,45 @@ struct Search {
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
                      const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
-                     double spacing, const ModelOptions& options) {
-  const Samples samples = sample_frame(frame, observer, options);
-  const Search search{
+                     std::int32_t oldest_frame, double spacing, const ModelOptions& options) {
+  const FrameSamples samples = sample_frame(frame, observer, options);
+  Search search{
       model,         frame,
       camera,        observer,
       options,       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
       samples.noise, frame.points.col(2),
-      before,        spacing};
+      before,        spacing,
+      oldest_frame};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
-  for (const bool wide : {false, true}) {
-    if (wide && (best.status != FrameStatus::lost || !search.has_automatic_gate())) break;
-    for (const Pose& guess : guesses) {
-      const TrackingResult result = search.register_from(guess, wide, was_lost);
-      if (result.rank() >= best.rank()) best = result;
-      if (result.is_beyond_doubt) return result;
+  const auto try_guesses = [&] {
+    for (const bool wide : {false, true}) {
+      if (wide && (best.status != FrameStatus::lost || !search.has_automatic_gate())) return;
+      for (const Pose& guess : guesses) {
+        const TrackingResult result = search.register_from(guess, wide, was_lost);
+        if (result.rank() >= best.rank()) best = result;
+        if (result.is_beyond_doubt) return;
+      }
     }
+  };
+  try_guesses();
+  if (best.status != FrameStatus::lost) return best;
+  if (oldest_frame > 0) {
+    search.oldest_frame = 0;
+    try_guesses();
+    best.is_to_whole_model = true;
+    if (best.status != FrameStatus::lost) return best;
   }
-  if (best.status == FrameStatus::lost && !elsewhere.key_poses.empty()) {
-    const TrackingResult found = search.relocalise(elsewhere.key_poses);
+  if (!elsewhere.key_poses.empty()) {
+    TrackingResult found = search.relocalise(elsewhere.key_poses);
+    found.is_to_whole_model = true;
     if (found.status != FrameStatus::lost) return found;
   }
-  if (best.status == FrameStatus::lost && elsewhere.everywhere) {
+  if (elsewhere.everywhere) {
     const std::optional<Pose> pose = fit_anywhere(model, search.source, options.registration);
     if (pose) {
-      const TrackingResult found = search.register_from(*pose, false, false);
+      TrackingResult found = search.register_from(*pose, false, false);
+      found.is_to_whole_model = true;
       if (found.status != FrameStatus::lost) return found;
     }
   }

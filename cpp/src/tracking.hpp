@@ -16,9 +16,10 @@ struct WhereElse {
 };
 
 // Tries the guesses (world_from_camera, most trusted first) until one registers the frame; when none does, searches
-// elsewhere. `before` is what the camera saw when it was last registered.
+// elsewhere. `before` is what the camera saw when it was last registered. Points that were last observed before
+// oldest_frame may have drifted away: they are left out, except by the search.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
                      const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
-                     double spacing, const ModelOptions& options);
+                     std::int32_t oldest_frame, double spacing, const ModelOptions& options);
 
 }  // namespace nacre

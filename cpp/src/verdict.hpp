@@ -20,6 +20,7 @@ struct TrackingResult {
   std::string reason;  // why it is weak or lost
   // Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
   bool is_beyond_doubt = false;
+  bool is_to_whole_model = false;  // older points included
 
   // A frame that is not lost before one that is, then by the evidence.
   double rank() const { return (status == FrameStatus::lost ? 0.0 : 1000.0) + evidence; }

@@ -38,6 +38,7 @@ py::dict milliseconds(const FrameReport& report) {
   result["back_project"] = times.back_project;
   result["region"] = times.region;
   result["registration"] = times.registration;
+  result["loop_closure"] = times.loop_closure;
   result["fold_in"] = times.fold_in;
   result["normals"] = times.normals;
   result["total"] = times.total;
@@ -88,6 +89,7 @@ void bind_model(py::module_& m) {
       .def_readwrite("max_points", &ModelOptions::max_points)
       .def_readwrite("predict_motion", &ModelOptions::predict_motion)
       .def_readwrite("relocalise", &ModelOptions::relocalise)
+      .def_readwrite("loop_closure", &ModelOptions::loop_closure)
       .def_readwrite("denoise_samples", &ModelOptions::denoise_samples)
       .def_readwrite("verify", &ModelOptions::verify)
       .def_readwrite("min_evidence", &ModelOptions::min_evidence)
@@ -122,6 +124,8 @@ void bind_model(py::module_& m) {
                              [](const FrameReport& report) { return Eigen::Matrix<double, 6, 6>(report.information); })
       .def_property_readonly("weak_directions",
                              [](const FrameReport& report) { return Twists(report.weak_directions.transpose()); })
+      .def_readonly("loop_frame", &FrameReport::loop_frame)
+      .def_readonly("loop_distance", &FrameReport::loop_distance)
       .def_readonly("depth", &FrameReport::depth)
       .def_readonly("region", &FrameReport::region)
       .def_property_readonly("num_updated", [](const FrameReport& report) { return report.fusion.num_updated; })
@@ -137,5 +141,6 @@ void bind_model(py::module_& m) {
       .def_property_readonly("camera", &Model::camera)
       .def_property_readonly("cloud", &Model::cloud, py::return_value_policy::reference_internal)
       .def("cloud_in_camera", &Model::cloud_in_camera)
+      .def("pose", [](const Model& model, std::size_t i) { return to_matrix(model.frames().at(i).world_from_camera); })
       .def_property_readonly("spacing", &Model::spacing);
 }

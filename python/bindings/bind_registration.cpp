@@ -80,8 +80,9 @@ void bind_registration(py::module_& m) {
 
   m.def(
       "align_global",
-      [](const PointsRef& source, const PointsRef& source_normals, const std::optional<Eigen::Vector3d>& source_viewpoint,
-         const PointsRef& target, const PointsRef& target_normals, const std::optional<Eigen::Vector3d>& target_viewpoint,
+      [](const PointsRef& source, const PointsRef& source_normals,
+         const std::optional<Eigen::Vector3d>& source_viewpoint, const PointsRef& target,
+         const PointsRef& target_normals, const std::optional<Eigen::Vector3d>& target_viewpoint,
          const GlobalAlignOptions& options) {
         return align_global(GlobalCloud(source, source_normals, source_viewpoint),
                             GlobalCloud(target, target_normals, target_viewpoint), options);

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numbers
 import threading
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -98,6 +98,8 @@ class ModelParameters:
     relocalise : bool
         Search around earlier poses where the guesses fail, then everywhere (some tenths of a second; not at
         every frame where that has failed often).
+    loop_closure : bool
+        Where ``fold_in`` is "fuse": correct model and poses where the camera comes back to what it saw before.
     denoise_samples : bool
         Register surface points averaged over their pixels, not single pixels.
     verify : bool
@@ -122,6 +124,7 @@ class ModelParameters:
     max_points: int = 500000
     predict_motion: bool = True
     relocalise: bool = True
+    loop_closure: bool = True
     denoise_samples: bool = True
     verify: bool = True
     min_evidence: float = 0.3
@@ -154,7 +157,8 @@ class FrameReport:
     reason : str
         Why the frame is weak or lost; empty otherwise.
     world_from_camera : (4, 4) float64
-        The camera's pose; of a lost frame the last known one.
+        The camera's pose; of a lost frame the last known one. Where a later frame closes a loop, the reports
+        in ``Model.frames`` have the corrected poses.
     num_inliers, overlap, rmse, information, weak_directions
         Of the registration; see :class:`nacre.AlignResult`.
     consistency : float
@@ -163,6 +167,10 @@ class FrameReport:
     evidence : float
         That the registration is right, against chance: what the residuals tell a match, times overlap^2 and
         consistency^4. Unrelated surfaces reach 0.25; good registrations have 0.4 to 3.
+    loop_frame : int or None
+        The earlier frame that this one closed a loop with: model and poses were corrected.
+    loop_distance : float
+        Between the surfaces that the two saw, before the correction [m].
     depth : DepthReport
         Pixels that were removed, by reason.
     region : RegionReport
@@ -189,6 +197,8 @@ class FrameReport:
     rmse: float
     information: npt.NDArray[np.float64]
     weak_directions: npt.NDArray[np.float64]
+    loop_frame: int | None
+    loop_distance: float
     depth: DepthReport
     region: RegionReport
     num_updated: int
@@ -337,6 +347,11 @@ class Model:
         with self._lock:
             core = self._core.add_frame(image, pixels, colors, more, timestamp, pose, keep_guess)
             report = FrameReport._from_core(core)
+            if report.loop_frame is not None:
+                self._frames = [
+                    replace(earlier, world_from_camera=self._core.pose(earlier.index))
+                    for earlier in self._frames
+                ]
             self._frames.append(report)
         return report
 
@@ -391,7 +406,11 @@ class Model:
 
     @property
     def poses(self) -> npt.NDArray[np.float64]:
-        """(F, 4, 4) world_from_camera of every frame; NaN where the frame is lost."""
+        """
+        (F, 4, 4) world_from_camera of every frame; NaN where the frame is lost.
+
+        Where a later frame closed a loop, the corrected poses.
+        """
         poses = np.full((len(self._frames), 4, 4), np.nan)
         for pose, report in zip(poses, self._frames, strict=True):
             if report.tracked:
@@ -400,7 +419,7 @@ class Model:
 
     @property
     def frames(self) -> tuple[FrameReport, ...]:
-        """The report of every frame that was added."""
+        """The report of every frame that was added, with poses as corrected by later frames."""
         return tuple(self._frames)
 
     @property

@@ -71,8 +71,7 @@ TEST_CASE("two views from sides 90 degrees apart are joined") {
     const Eigen::Vector3d to = 0.6 * from.cross(random_direction(seed, 2)).normalized();
     const Pose truth = random_motion(seed);
     const OrientedCloud source = moved(facing(other, from), truth.inverse()), target = facing(whole, to);
-    const GlobalAlignResult result =
-        align_global(view_of(source, truth.inverse() * from), view_of(target, to));
+    const GlobalAlignResult result = align_global(view_of(source, truth.inverse() * from), view_of(target, to));
     if (!result.found()) continue;
     ++num_found;
     CHECK(angle_between(result.alignment.target_from_source, truth) < 0.03);

@@ -154,6 +154,7 @@ PAPER: dict[str, Any] = {
     "predict_motion": False,
     "verify": False,
     "relocalise": False,
+    "loop_closure": False,
     "denoise_samples": False,
 }
 

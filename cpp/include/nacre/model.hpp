@@ -46,6 +46,7 @@ struct ModelOptions {
   int max_points = 500000;      ///< the model never grows beyond: its spacing is widened instead
   bool predict_motion = true;   ///< start also from the pose that continues the last motion
   bool relocalise = true;       ///< search around earlier poses where the guesses fail, then everywhere
+  bool loop_closure = true;     ///< fuse: correct model and poses where the camera comes back to what it saw before
   bool denoise_samples = true;  ///< register surface points averaged over their pixels, not single pixels
   bool verify = true;           ///< judge registrations by their evidence
   double min_evidence = 0.3;    ///< a frame with less is lost; see FrameReport
@@ -61,7 +62,7 @@ struct ModelOptions {
 
 /// Wall time of each step of the loop [ms].
 struct StepTimes {
-  double preprocess = 0, back_project = 0, region = 0, registration = 0, fold_in = 0, normals = 0, total = 0;
+  double preprocess = 0, back_project = 0, region = 0, registration = 0, loop_closure = 0, fold_in = 0, normals = 0, total = 0;
 };
 
 /// What became of one frame.
@@ -80,6 +81,8 @@ struct FrameReport {
   double rmse = 0.0;                      ///< of the inliers, along the normals [m]
   Matrix6 information = Matrix6::Zero();  ///< see AlignResult
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult
+  std::optional<std::int64_t> loop_frame;                    ///< the earlier frame that this one closed a loop with
+  double loop_distance = 0.0;                                ///< between the surfaces that the two saw, before [m]
   DepthReport depth;
   RegionReport region;
   FusionReport fusion;
@@ -113,10 +116,11 @@ class Model {
 
   const Camera& camera() const;
   const ModelOptions& options() const;
-  const PointModel& cloud() const;                 ///< in the world frame
-  PointModel cloud_in_camera() const;              ///< in the newest registered camera's frame
-  const std::vector<FrameReport>& frames() const;  ///< one report per frame that was added
-  double spacing() const;                          ///< [m]; 0 before the first frame
+  const PointModel& cloud() const;     ///< in the world frame
+  PointModel cloud_in_camera() const;  ///< in the newest registered camera's frame
+  /// One report per frame that was added. Where a later frame closed a loop, the poses are the corrected ones.
+  const std::vector<FrameReport>& frames() const;
+  double spacing() const;  ///< [m]; 0 before the first frame
 
  private:
   struct Impl;

@@ -72,6 +72,14 @@ def reconstruct(
         bool,
         typer.Option("--retry/--no-retry", help="At the end, try lost frames again while any is found."),
     ] = True,
+    loop_closure: Annotated[
+        bool | None,
+        typer.Option(
+            "--loop-closure/--no-loop-closure",
+            help="Correct model and poses where the camera comes back to what it saw before.",
+            show_default="on",
+        ),
+    ] = None,
     preset: PresetOption = None,
     config: ConfigOption = None,
     settings: SetOption = None,
@@ -91,7 +99,11 @@ def reconstruct(
     The frames may be far apart and in any order: a lost camera is searched for everywhere.
     """
     terminal = Terminal(json, quiet, verbose)
-    more: dict[str, Any] = {"depth.min_depth": min_depth, "depth.max_depth": max_depth}
+    more: dict[str, Any] = {
+        "depth.min_depth": min_depth,
+        "depth.max_depth": max_depth,
+        "loop_closure": loop_closure,
+    }
     sides = ("min_x", "max_x", "min_y", "max_y", "min_z", "max_z")
     more |= {f"region.{side}": value for side, value in zip(sides, box or (), strict=box is not None)}
     more["region.object"] = object or None
