@@ -71,6 +71,14 @@ void merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
       Eigen::Vector3f& color = model.colors[best];
       color = color.allFinite() ? Eigen::Vector3f(color + gain * (model.colors[i] - color)) : model.colors[i];
     }
+    for (PointAttribute& attribute : model.attributes) {
+      const auto channels = static_cast<std::size_t>(attribute.num_channels);
+      for (std::size_t c = 0; c < channels; ++c) {
+        float& value = attribute.values[best * channels + c];
+        const float other = attribute.values[i * channels + c];
+        if (std::isfinite(other)) value = std::isfinite(value) ? value + gain * (other - value) : other;
+      }
+    }
     model.confidence[best] += model.confidence[i];
     model.sightings[best] = static_cast<std::uint8_t>(std::min(255, model.sightings[best] + model.sightings[i]));
     model.last_seen[best] = std::max(model.last_seen[best], model.last_seen[i]);
