@@ -96,7 +96,8 @@ class ModelParameters:
     relocalise : bool
         Search around earlier poses where the guesses fail.
     loop_closure : bool
-        Where ``fold_in`` is "fuse": correct model and poses where the camera comes back to what it saw before.
+        Where ``fold_in`` is "fuse": correct model and poses where the camera comes back to what it saw
+        before.
     denoise_samples : bool
         Register surface points averaged over their pixels, not single pixels.
     verify : bool
@@ -336,7 +337,8 @@ class Model:
             report = FrameReport._from_core(core)
             if report.loop_frame is not None:
                 self._frames = [
-                    replace(earlier, world_from_camera=self._core.pose(earlier.index)) for earlier in self._frames
+                    replace(earlier, world_from_camera=self._core.pose(earlier.index))
+                    for earlier in self._frames
                 ]
             self._frames.append(report)
         return report

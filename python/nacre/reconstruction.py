@@ -126,7 +126,9 @@ class Reconstruction:
     def _take_corrected_poses(self) -> None:
         reports = self.model.frames
         self.frames[:] = [
-            record if record.report is None else dataclasses.replace(record, report=reports[record.report.index])
+            record
+            if record.report is None
+            else dataclasses.replace(record, report=reports[record.report.index])
             for record in self.frames
         ]
 
@@ -139,7 +141,9 @@ class Reconstruction:
     @property
     def loops(self) -> list[FrameRecord]:
         """The frames that closed a loop."""
-        return [frame for frame in self.frames if frame.report is not None and frame.report.loop_frame is not None]
+        return [
+            frame for frame in self.frames if frame.report is not None and frame.report.loop_frame is not None
+        ]
 
     @property
     def num_tracked(self) -> int:
@@ -216,7 +220,8 @@ class Reconstruction:
                 **{name: result_dict(result) for name, result in self.evaluation.items()},
                 "parameters": self.parameters,
                 "frames": [
-                    _frame_dict(frame, *errors[i], self._loop_frame(frame)) for i, frame in enumerate(self.frames)
+                    _frame_dict(frame, *errors[i], self._loop_frame(frame))
+                    for i, frame in enumerate(self.frames)
                 ],
             }
         )

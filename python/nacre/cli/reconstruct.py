@@ -65,7 +65,11 @@ def reconstruct(
     report.html. A frame that cannot be read or registered is LOST and changes nothing.
     """
     terminal = Terminal(json, quiet, verbose)
-    more: dict[str, Any] = {"depth.min_depth": min_depth, "depth.max_depth": max_depth, "loop_closure": loop_closure}
+    more: dict[str, Any] = {
+        "depth.min_depth": min_depth,
+        "depth.max_depth": max_depth,
+        "loop_closure": loop_closure,
+    }
     parameters, preset_name = model_parameters(preset, config, settings, **more)
     sequence = open_source(source, format, camera, depth_scale)
     if not color:
