@@ -3,11 +3,11 @@
 
 #include <cstdint>
 
-#include "tracking.hpp"
+#include "frame_samples.hpp"
 
 namespace nacre {
 
-struct FrameCloud : Samples {
+struct FrameCloud : FrameSamples {
   double depth;  // the median [m]
 };
 FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options);

@@ -14,6 +14,8 @@ constexpr std::size_t most_candidates = 4;    // key frames that a frame is regi
 constexpr int stops_in_place = 12;            // what was seen since is taken to be in place
 constexpr int never = -1000000;
 constexpr double least_overlap = 0.3;        // of a frame and a key frame
+constexpr double least_consistency = 0.8;    // of what both should see, the part that agrees
+constexpr double largest_ratio = 0.35;       // of the residuals to the largest that match; 0.58 by chance
 constexpr double reach = 0.12;               // drift that is looked for, as a part of the depth
 constexpr double drift = 0.005;              // of a step: [rad], and as a part of the depth
 constexpr double weak_drift = 10.0 * drift;  // where the registration leaves a direction open
@@ -191,7 +193,7 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
   found.alignment = align_to(target, source, frame.alignment.target_from_source, align_options);
   const Pose& pose = found.alignment.target_from_source;
   if (found.alignment.status == AlignStatus::too_few_pairs || found.alignment.overlap < least_overlap ||
-      found.alignment.weak_directions.cols() > 0 || found.alignment.residual_ratio > options_.max_residual) {
+      found.alignment.weak_directions.cols() > 0 || found.alignment.residual_ratio > largest_ratio) {
     return std::nullopt;
   }
   CloudInView view;
@@ -201,10 +203,10 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
     view.seen += part.seen;
     view.through += part.through;
   }
-  if (view.seen < options_.min_consistency * (view.seen + view.through)) return std::nullopt;
+  if (view.seen < least_consistency * (view.seen + view.through)) return std::nullopt;
   found.correction = orthonormal(pose * frame.alignment.target_from_source.inverse());
   found.is_beyond_doubt = found.alignment.overlap > 2.0 * least_overlap && view.through < 0.05 * view.seen &&
-                          found.alignment.residual_ratio < 0.5 * options_.max_residual;
+                          found.alignment.residual_ratio < 0.5 * largest_ratio;
   found.distance = rms_distance(cloud.points, pose, frame.alignment.target_from_source);
   return found;
 }

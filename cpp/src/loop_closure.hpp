@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "icp_target.hpp"
 #include "key_frames.hpp"
 #include "nacre/model.hpp"
 #include "pose_graph.hpp"

@@ -112,9 +112,7 @@ void ModelOptions::check() const {
   require(spacing >= 0.0 && std::isfinite(spacing), "spacing", "0 (automatic) or a positive distance in metres",
           spacing);
   require(max_points >= 100, "max_points", "at least 100", max_points);
-  require(min_overlap >= 0.0 && min_overlap <= 1.0, "min_overlap", "in [0, 1]", min_overlap);
-  require(min_consistency >= 0.0 && min_consistency <= 1.0, "min_consistency", "in [0, 1]", min_consistency);
-  require(max_residual > 0.0, "max_residual", "positive", max_residual);
+  require(min_evidence >= 0.0, "min_evidence", "0 or more", min_evidence);
   require(first_fraction > 0.0 && first_fraction <= 1.0, "first_fraction", "in (0, 1]", first_fraction);
   require(kept_fraction > 0.0 && kept_fraction <= 1.0, "kept_fraction", "in (0, 1]", kept_fraction);
   require(new_fraction >= 0.0 && new_fraction <= 1.0, "new_fraction", "in [0, 1]", new_fraction);
@@ -129,9 +127,12 @@ struct Model::Impl {
   PointModel cloud;
   LoopClosure loops{camera, options};
   std::vector<FrameReport> reports;
+  Sight before;             // of the newest frame that was folded in
   std::vector<Pose> poses;  // of the registered frames, oldest first
   double spacing = 0.0;
-  bool was_lost = false;
+  std::int64_t num_lost = 0;  // frames in a row, up to the newest
+
+  bool was_lost() const { return num_lost > 0; }
 
   Impl(const Camera& camera_in, const ModelOptions& options_in) : camera(camera_in), options(options_in) {
     options.check();
@@ -144,7 +145,7 @@ struct Model::Impl {
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
   TrackingResult locate(const FrameExtras& extras) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
-  std::vector<Pose> key_poses() const;
+  WhereElse elsewhere() const;
   void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
   void fold_in(FrameReport& report);
 };
@@ -175,6 +176,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   report.num_inliers = tracking.alignment.num_inliers;
   report.overlap = tracking.alignment.overlap;
   report.consistency = tracking.consistency;
+  report.evidence = tracking.evidence;
   report.rmse = tracking.alignment.rmse;
   report.information = tracking.alignment.information;
   report.weak_directions = tracking.alignment.weak_directions;
@@ -187,11 +189,12 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     if (options.loop_closure && options.fold_in == FoldIn::fuse) close_loops(report, tracking, extras.keep_guess);
     report.milliseconds.loop_closure = watch.lap();
     if (report.status == FrameStatus::tracked) {
-      if (was_lost) report.status = FrameStatus::relocalised;
+      if (was_lost()) report.status = FrameStatus::relocalised;
       fold_in(report);
+      before = {frame.points.col(2), frame.sigma, report.world_from_camera};
     }
   }
-  was_lost = report.status == FrameStatus::lost && !poses.empty();
+  num_lost = report.status == FrameStatus::lost && !poses.empty() ? num_lost + 1 : 0;
   report.milliseconds.fold_in = watch.lap() - report.milliseconds.normals;
   report.num_points = cloud.size();
   report.spacing = spacing;
@@ -214,38 +217,42 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras) const {
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), key_poses(), was_lost,
-               options.loop_closure && !was_lost ? loops.oldest_frame() : 0, spacing, options);
+  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost(), before,
+               options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
   if (extras.guess) return {*extras.guess};
   const Pose& last = poses.back();
-  if (!options.predict_motion || poses.size() < 2 || was_lost) return {last};
+  if (!options.predict_motion || poses.size() < 2 || was_lost()) return {last};
   Pose predicted = last * (poses[poses.size() - 2].inverse() * last);
   predicted.linear() = Eigen::Quaterniond(predicted.linear()).normalized().toRotationMatrix();
   return {predicted, last};
 }
 
-// Some of the newest poses from which the camera looked in different directions.
-std::vector<Pose> Model::Impl::key_poses() const {
+// Some of the newest poses from which the camera looked in different directions; and everywhere, but not at every frame
+// where that has been to no avail.
+WhereElse Model::Impl::elsewhere() const {
   constexpr std::size_t most = 8;
   constexpr double least_angle = 0.35;
-  std::vector<Pose> chosen;
-  if (!options.relocalise) return chosen;
+  constexpr std::int64_t patience = 8;
+  WhereElse where;
+  if (!options.relocalise) return where;
+  where.everywhere = num_lost < patience || num_lost % patience == 0;
+  std::vector<Pose>& chosen = where.key_poses;
   for (auto pose = poses.rbegin(); pose != poses.rend() && chosen.size() < most; ++pose) {
     const bool is_new = std::all_of(chosen.begin(), chosen.end(), [&](const Pose& other) {
       return Eigen::AngleAxisd(other.linear().transpose() * pose->linear()).angle() > least_angle;
     });
     if (is_new) chosen.push_back(*pose);
   }
-  return chosen;
+  return where;
 }
 
 void Model::Impl::close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given) {
   const std::int32_t oldest_frame = loops.oldest_frame();
   const LoopReport loop = loops.add_frame({static_cast<std::int32_t>(report.index), frame, observer, tracking.alignment,
-                                           spacing, is_given, was_lost || tracking.is_to_whole_model});
+                                           spacing, is_given, was_lost() || tracking.is_to_whole_model});
   if (loop.corrections.empty()) return;
   report.loop_frame = loop.frame;
   report.loop_distance = loop.distance;
@@ -274,16 +281,17 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
 void Model::Impl::fold_in(FrameReport& report) {
   StopWatch watch;
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
+  const auto num_registered = static_cast<std::int32_t>(poses.size() - 1);  // lost frames make no point older
   if (options.fold_in != FoldIn::fuse) {
     consolidate_frame(cloud, frame, report.world_from_camera, options, spacing,
-                      static_cast<std::int32_t>(report.index));
+                      num_registered);
     watch.lap();
     renew_normals(cloud, options);
     report.milliseconds.normals = watch.lap();
     return;
   }
   report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing,
-                                static_cast<std::int32_t>(report.index), options.fusion, options.num_threads);
+                                num_registered, options.fusion, options.num_threads);
   while (cloud.size() > options.max_points) {
     spacing *= coarsening;
     thin(cloud, spacing);

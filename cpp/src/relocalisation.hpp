@@ -1,6 +1,7 @@
 // Where may a camera be that has been lost? Candidates, found with a few points of its frame.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "icp_target.hpp"
@@ -12,5 +13,9 @@ namespace nacre {
 // `count` of them on which most agrees, best first.
 std::vector<Pose> most_promising(const PointModel& model, const IcpSource& source, const std::vector<Pose>& guesses,
                                  const AlignOptions& options, std::size_t count);
+
+// Where a frame fits the model, wherever the camera is: none where it fits nowhere, or in several places about as well.
+// `source` holds points of the frame. Takes some tenths of a second.
+std::optional<Pose> fit_anywhere(const PointModel& model, const IcpSource& source, const AlignOptions& options);
 
 }  // namespace nacre

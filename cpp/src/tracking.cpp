@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
+#include "frame_samples.hpp"
 #include "icp_target.hpp"
 #include "model_view.hpp"
 #include "parallel.hpp"
@@ -11,6 +11,7 @@
 #include "random.hpp"
 #include "relocalisation.hpp"
 #include "surface_observer.hpp"
+#include "verdict.hpp"
 
 namespace nacre {
 namespace {
@@ -68,118 +69,6 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
   return view;
 }
 
-// Of the view's points that face the camera and project onto a measured pixel: the part that agrees with it, among
-// those that agree and those that the camera sees through. Points behind the measured surface are hidden, not wrong.
-double consistency_of(const View& view, const Frame& frame, const Camera& camera, const Pose& world_from_camera,
-                      double spacing, int num_threads) {
-  struct Counts {
-    std::int64_t agree = 0, violated = 0;
-    Counts& operator+=(const Counts& other) {
-      agree += other.agree;
-      violated += other.violated;
-      return *this;
-    }
-  };
-  constexpr std::int64_t block_size = ModelView::capacity;
-  const ModelView model_view(camera, world_from_camera);
-  const Counts counts =
-      block_reduce(view.points.rows(), block_size, num_threads, Counts{}, [&](std::int64_t begin, std::int64_t end) {
-        ModelView::Block block;
-        model_view.project(view.points.data() + 3 * begin, view.normals.data() + 3 * begin,
-                           static_cast<int>(end - begin), block);
-        Counts sum;
-        for (int i = 0; i < static_cast<int>(end - begin); ++i) {
-          if (!block.inside[i] || !(block.facing[i] > 0.3F)) continue;
-          const std::int32_t pixel = block.pixel[i];
-          const float behind = frame.points(pixel, 2) - block.z[i];
-          if (!std::isfinite(behind)) continue;
-          const float tolerance =
-              std::max(3.0F * static_cast<float>(spacing), 4.0F * frame.sigma[pixel]) / block.facing[i];
-          if (behind > tolerance) {
-            ++sum.violated;
-          } else if (behind > -tolerance) {
-            ++sum.agree;
-          }
-        }
-        return sum;
-      });
-  const std::int64_t judged = counts.agree + counts.violated;
-  return judged > 0 ? static_cast<double>(counts.agree) / static_cast<double>(judged) : 0.0;
-}
-
-// Depth cameras are also wrong by what neighbouring pixels have in common: millimetres at arm's length, centimetres
-// beyond three metres (Teichman, Miller and Thrun 2013, figure 3).
-float systematic_error(float z) {
-  constexpr float growth = 0.0015F;  // [1/m^2]
-  return growth * z * z * z;
-}
-
-}  // namespace
-
-Samples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
-  const std::int64_t count =
-      options.registration.max_samples > 0
-          ? std::min<std::int64_t>(options.registration.max_samples, static_cast<std::int64_t>(frame.valid.size()))
-          : static_cast<std::int64_t>(frame.valid.size());
-  Samples samples{Points(count, 3), Points(count, 3), Values(count), Values(count)};
-  const double stride = static_cast<double>(frame.valid.size()) / static_cast<double>(std::max<std::int64_t>(count, 1));
-  parallel_blocks(count, ObservationBlock::capacity, options.num_threads, [&](auto, auto begin, auto end) {
-    ObservationBlock block;
-    for (std::int64_t i = begin; i < end; ++i) {
-      // One of every `stride` pixels.
-      const double place =
-          (static_cast<double>(i) + random_uniform(options.registration.seed, static_cast<std::uint64_t>(i))) * stride;
-      const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
-      samples.points.row(i) = frame.points.row(row);
-      samples.normals.row(i) = frame.normals.row(row);
-      samples.noise[i] = frame.sigma[row];
-      samples.sigma[i] = std::hypot(frame.sigma[row], systematic_error(frame.points(row, 2)));
-      observer.add(block, samples.points.row(i).transpose(), samples.normals.row(i).transpose(), row, frame.sigma[row]);
-    }
-    if (!options.denoise_samples) return;
-    observer.observe(block);
-    for (std::int64_t i = begin; i < end; ++i) {
-      const Observation seen = block[static_cast<int>(i - begin)];
-      if (!(seen.weight > 0.0F)) continue;
-      samples.points.row(i) += seen.offset * samples.normals.row(i);
-      samples.normals.row(i) = seen.normal.normalized().transpose();
-    }
-  });
-  return samples;
-}
-
-namespace {
-
-// Strict, for guesses that may be far off: only a registration beyond doubt is believed.
-void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
-  std::ostringstream reason;
-  reason.precision(3);
-  result.status = FrameStatus::lost;
-  const double ratio = result.alignment.residual_ratio;
-  const bool is_close = result.alignment.overlap > 0.35 && result.consistency > 0.9 && ratio < 0.25;
-  if (result.alignment.status == AlignStatus::too_few_pairs) {
-    reason << "too few points of the frame match the model";
-  } else if (!options.verify) {
-    result.status = FrameStatus::tracked;
-  } else if (result.alignment.overlap < options.min_overlap) {
-    reason << "overlap " << result.alignment.overlap << " is below " << options.min_overlap;
-  } else if (result.consistency < options.min_consistency) {
-    reason << "consistency " << result.consistency << " is below " << options.min_consistency;
-  } else if (ratio > options.max_residual) {
-    reason << "residuals are " << ratio << " of the largest that match, above " << options.max_residual;
-  } else if (strict && !is_close) {
-    reason << "not sure enough: overlap " << result.alignment.overlap << ", consistency " << result.consistency
-           << ", residuals " << ratio << " of the largest that match";
-  } else if (result.alignment.weak_directions.cols() > 0) {
-    result.status = FrameStatus::weak;
-    reason << result.alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
-  } else {
-    result.status = FrameStatus::tracked;
-    result.is_beyond_doubt = is_close;
-  }
-  result.reason = reason.str();
-}
-
 double median_reach(const IcpSource& source) {
   std::vector<float> values(source.reach.data(), source.reach.data() + source.reach.size());
   if (values.empty()) return 0.0;
@@ -195,7 +84,9 @@ struct Search {
   const Camera& camera;
   const ModelOptions& options;
   IcpSource source;
-  const Values& noise;        // of the sampled points [m]
+  const Values& noise;  // of the sampled points [m]
+  const Values depth;   // of each pixel [m]
+  const Sight& before;
   double spacing;             // of the model [m]
   std::int32_t oldest_frame;  // see track
 
@@ -234,10 +125,16 @@ struct Search {
 
     TrackingResult result;
     result.alignment = align_to(target, gated, guess, align_options);
-    result.consistency =
-        consistency_of(view, frame, camera, result.alignment.target_from_source, spacing, options.num_threads);
-    const double turned =
-        Eigen::AngleAxisd(guess.linear().transpose() * result.alignment.target_from_source.linear()).angle();
+    const Pose& pose = result.alignment.target_from_source;
+    const Sight now{depth, frame.sigma, pose};
+    const double in_view = consistency_of(view.points, view.normals, now, camera, spacing, options.num_threads);
+    const Eigen::Matrix3f rotation = pose.linear().cast<float>();
+    const Eigen::RowVector3f translation = pose.translation().cast<float>().transpose();
+    const Points points = (source.cloud.points * rotation.transpose()).rowwise() + translation;
+    const Points normals = source.cloud.normals * rotation.transpose();
+    const double earlier = consistency_of(points, normals, before, camera, spacing, options.num_threads);
+    result.consistency = std::isfinite(in_view) || std::isfinite(earlier) ? std::fmin(in_view, earlier) : 0.0;
+    const double turned = Eigen::AngleAxisd(guess.linear().transpose() * pose.linear()).angle();
     judge(result, options, strict || turned > far_turn);
     return result;
   }
@@ -278,22 +175,24 @@ struct Search {
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
+                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
                      std::int32_t oldest_frame, double spacing, const ModelOptions& options) {
-  const Samples samples = sample_frame(frame, observer, options);
+  const FrameSamples samples = sample_frame(frame, observer, options);
   Search search{model,
                 frame,
                 camera,
                 options,
                 IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
                 samples.noise,
+                frame.points.col(2),
+                before,
                 spacing,
                 oldest_frame};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
   const auto try_guesses = [&] {
     for (const bool wide : {false, true}) {
-      if (wide && !search.has_automatic_gate()) return;
+      if (wide && (best.status != FrameStatus::lost || !search.has_automatic_gate())) return;
       for (const Pose& guess : guesses) {
         const TrackingResult result = search.register_from(guess, wide, was_lost);
         if (result.rank() >= best.rank()) best = result;
@@ -302,16 +201,25 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
     }
   };
   try_guesses();
-  if (best.status == FrameStatus::lost && oldest_frame > 0) {
+  if (best.status != FrameStatus::lost) return best;
+  if (oldest_frame > 0) {
     search.oldest_frame = 0;
     try_guesses();
     best.is_to_whole_model = true;
+    if (best.status != FrameStatus::lost) return best;
   }
-  search.oldest_frame = 0;
-  if (best.status == FrameStatus::lost && !key_poses.empty()) {
-    TrackingResult found = search.relocalise(key_poses);
+  if (!elsewhere.key_poses.empty()) {
+    TrackingResult found = search.relocalise(elsewhere.key_poses);
     found.is_to_whole_model = true;
     if (found.status != FrameStatus::lost) return found;
+  }
+  if (elsewhere.everywhere) {
+    const std::optional<Pose> pose = fit_anywhere(model, search.source, options.registration);
+    if (pose) {
+      TrackingResult found = search.register_from(*pose, false, false);
+      found.is_to_whole_model = true;
+      if (found.status != FrameStatus::lost) return found;
+    }
   }
   return best;
 }

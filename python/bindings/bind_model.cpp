@@ -75,9 +75,7 @@ void bind_model(py::module_& m) {
       .def_readwrite("loop_closure", &ModelOptions::loop_closure)
       .def_readwrite("denoise_samples", &ModelOptions::denoise_samples)
       .def_readwrite("verify", &ModelOptions::verify)
-      .def_readwrite("min_overlap", &ModelOptions::min_overlap)
-      .def_readwrite("min_consistency", &ModelOptions::min_consistency)
-      .def_readwrite("max_residual", &ModelOptions::max_residual)
+      .def_readwrite("min_evidence", &ModelOptions::min_evidence)
       .def_readwrite("first_fraction", &ModelOptions::first_fraction)
       .def_readwrite("kept_fraction", &ModelOptions::kept_fraction)
       .def_readwrite("new_fraction", &ModelOptions::new_fraction)
@@ -102,6 +100,7 @@ void bind_model(py::module_& m) {
       .def_readonly("num_inliers", &FrameReport::num_inliers)
       .def_readonly("overlap", &FrameReport::overlap)
       .def_readonly("consistency", &FrameReport::consistency)
+      .def_readonly("evidence", &FrameReport::evidence)
       .def_readonly("rmse", &FrameReport::rmse)
       .def_property_readonly("information",
                              [](const FrameReport& report) { return Eigen::Matrix<double, 6, 6>(report.information); })

@@ -94,19 +94,17 @@ class ModelParameters:
     predict_motion : bool
         Start also from the pose that continues the last motion.
     relocalise : bool
-        Search around earlier poses where the guesses fail.
+        Search around earlier poses where the guesses fail, then everywhere (some tenths of a second; not at
+        every frame where that has failed often).
     loop_closure : bool
         Where ``fold_in`` is "fuse": correct model and poses where the camera comes back to what it saw
         before.
     denoise_samples : bool
         Register surface points averaged over their pixels, not single pixels.
     verify : bool
-        Judge registrations, by the three bounds below and by what is beyond doubt.
-    min_overlap, min_consistency : float
-        A frame of which a smaller part matches the model is lost; so is one that sees through more than the
-        rest of what the model shows there.
-    max_residual : float
-        So is one whose residuals exceed this part of the last gate on distances; chance gives 0.58.
+        Judge registrations by their evidence.
+    min_evidence : float
+        A frame with less is lost; see :class:`FrameReport`.
     first_fraction, kept_fraction, new_fraction : float
         WLOP: part of the first frame that becomes the model; part of the model that is kept at each frame;
         new points, as a part of the model.
@@ -127,9 +125,7 @@ class ModelParameters:
     loop_closure: bool = True
     denoise_samples: bool = True
     verify: bool = True
-    min_overlap: float = 0.15
-    min_consistency: float = 0.8
-    max_residual: float = 0.35
+    min_evidence: float = 0.3
     first_fraction: float = 0.5
     kept_fraction: float = 0.9
     new_fraction: float = 0.2
@@ -164,7 +160,11 @@ class FrameReport:
     num_inliers, overlap, rmse, information, weak_directions
         Of the registration; see :class:`nacre.AlignResult`.
     consistency : float
-        Part of the model's points in view that the frame does not see through.
+        Part of the model's points in view that the frame does not see through, or of the frame's points that
+        the camera did not see through before, whichever is smaller.
+    evidence : float
+        That the registration is right, against chance: what the residuals tell a match, times overlap^2 and
+        consistency^4. Unrelated surfaces reach 0.25; good registrations have 0.4 to 3.
     loop_frame : int or None
         The earlier frame that this one closed a loop with: model and poses were corrected.
     loop_distance : float
@@ -189,6 +189,7 @@ class FrameReport:
     num_inliers: int
     overlap: float
     consistency: float
+    evidence: float
     rmse: float
     information: npt.NDArray[np.float64]
     weak_directions: npt.NDArray[np.float64]

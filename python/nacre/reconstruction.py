@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from nacre.report import FrameEntry, ReportData
 
 STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
+_RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
 
 # Fields of evaluation results that hold one value per frame or point; the frames have them already.
 _LONG = {"errors", "translation_errors", "rotation_errors", "distances"}
@@ -108,13 +109,37 @@ class Reconstruction:
             self.frames.append(record)
             yield record
 
-    def _add(self, index: int) -> FrameRecord:
+    def retry_lost(self) -> Iterator[FrameRecord]:
+        """
+        Go over the lost frames again, while any of them is found, and yield each that was tried.
+
+        The model has grown since they were lost. A frame that is found now is RELOCALISED, and takes the
+        place of its lost record in ``frames``; so do WEAK ones of which the model now knows enough. Frames
+        that could not be read, or that the model refused, stay as they are.
+        """
+        found_any = self.counts["LOST"] > 0
+        while found_any:
+            found_any = False
+            for place, before in enumerate(self.frames):
+                if before.report is None or before.status not in ("LOST", "WEAK"):
+                    continue
+                record = self._add(before.index, before.world_from_camera)
+                if record.status == "TRACKED":
+                    record = dataclasses.replace(record, status="RELOCALISED")
+                if _RANK[record.status] > _RANK[before.status]:
+                    found_any = True
+                    self.frames[place] = record
+                yield self.frames[place]
+
+    def _add(self, index: int, guess: npt.NDArray[np.float64] | None = None) -> FrameRecord:
         try:
             frame = self.sequence[index]
         except (FileFormatError, OSError) as error:
             return FrameRecord(index, None, "LOST", str(error), None, None, error)
         try:
-            report = self.model.add_frame(frame.depth, color=frame.color, timestamp=frame.timestamp)
+            report = self.model.add_frame(
+                frame.depth, color=frame.color, timestamp=frame.timestamp, guess=guess
+            )
         except ValueError as error:
             return FrameRecord(index, frame.timestamp, "LOST", str(error), None, frame.truth, error)
         if report.loop_frame is not None:
@@ -328,7 +353,7 @@ def _frame_dict(
         "rotation_error": rotation_error,
     }
     for name in (
-        "num_inliers", "overlap", "consistency", "rmse", "weak_directions", "loop_distance",
+        "num_inliers", "overlap", "consistency", "evidence", "rmse", "weak_directions", "loop_distance",
         "num_updated", "num_inserted", "num_removed", "num_points", "spacing", "milliseconds",
     ):  # fmt: skip
         figures[name] = None if report is None else getattr(report, name)

@@ -15,6 +15,7 @@ from nacre.parameters import as_choice, from_core, to_core, updated
 MIRRORS: dict[type, Any] = {
     nacre.DepthParameters: _core.DepthOptions,
     nacre.RegistrationParameters: _core.AlignOptions,
+    nacre.GlobalRegistrationParameters: _core.GlobalAlignOptions,
     FusionParameters: _core.FusionOptions,
     ConsolidationParameters: _core.ConsolidateOptions,
     NormalParameters: _core.NormalOptions,
