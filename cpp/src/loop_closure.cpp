@@ -9,9 +9,9 @@
 namespace nacre {
 namespace {
 
-constexpr std::size_t most_key_frames = 1000;
-constexpr std::size_t most_candidates = 4;  // key frames that a frame is registered to at once
-constexpr int stops_in_place = 12;          // what was seen since is taken to be in place
+constexpr std::size_t most_key_frames = 500;  // about 80 kB each
+constexpr std::size_t most_candidates = 4;    // key frames that a frame is registered to at once
+constexpr int stops_in_place = 12;            // what was seen since is taken to be in place
 constexpr int never = -1000000;
 constexpr double least_overlap = 0.3;        // of a frame and a key frame
 constexpr double least_consistency = 0.8;    // of what both should see, the part that agrees

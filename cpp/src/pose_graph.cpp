@@ -120,14 +120,17 @@ PoseGraphFit PoseGraph::fit(const std::vector<double>& weights) {
 }
 
 PoseGraphFit PoseGraph::optimise(double outlier) {
+  constexpr int most_suspects = 16;
   const std::vector<Pose> before = poses_;
   PoseGraphFit best = fit(std::vector<double>(edges_.size(), 1.0));
   while (best.largest_error > outlier) {
-    // Without which loop do the others fit best?
+    // Without which loop, of the newest, do the others fit best?
+    int num_suspects = 0;
     PoseGraphFit without;
     std::vector<Pose> poses;
-    for (std::size_t i = 0; i < edges_.size(); ++i) {
+    for (std::size_t i = edges_.size(); i-- > 0 && num_suspects < most_suspects;) {
       if (!edges_[i].is_loop || best.weights[i] == 0.0) continue;
+      ++num_suspects;
       std::vector<double> weights = best.weights;
       weights[i] = 0.0;
       poses_ = before;

@@ -39,8 +39,8 @@ class PoseGraph {
 
   // Moves the nodes to the least squares of all residuals (Gauss and Newton, damped after Levenberg and Marquardt).
   // Loops are measured more finely than the way between their ends, so that a wrong one does not keep its residual: it
-  // bends the way. While an edge is off by more than `outlier` standard deviations, the loop goes without which the
-  // others fit best.
+  // bends the way. While an edge is off by more than `outlier` standard deviations, the loop goes, of the newest,
+  // without which the others fit best.
   PoseGraphFit optimise(double outlier = 5.0);
 
  private:

@@ -99,7 +99,8 @@ class ModelParameters:
         Search around earlier poses where the guesses fail, then everywhere (some tenths of a second; not at
         every frame where that has failed often).
     loop_closure : bool
-        Where ``fold_in`` is "fuse": correct model and poses where the camera comes back to what it saw before.
+        Where ``fold_in`` is "fuse": correct model and poses where the camera comes back to what it saw
+        before.
     denoise_samples : bool
         Register surface points averaged over their pixels, not single pixels.
     verify : bool
