@@ -20,10 +20,10 @@ def page(results: Mapping[str, Any]) -> str:
 
 INTRODUCTION = """# Tracking and models, measured
 
-Made by `python benchmarks/tracking.py`: every recording is simulated (`nacre simulate`) or real, is run through
-`nacre reconstruct` with default settings, and what that wrote is measured by `nacre evaluate`. Peers run on
-the same frames, all of them, in an environment of their own, and what they wrote is measured by the same
-command. [`benchmarks/README.md`](../benchmarks/README.md) says how.
+Made by `python benchmarks/tracking.py`: every recording is simulated (`nacre simulate`) or real, is run
+through `nacre reconstruct` with default settings, and what that wrote is measured by `nacre evaluate`.
+Peers run on the same frames, all of them, in an environment of their own, and what they wrote is measured
+by the same command. [`benchmarks/README.md`](../benchmarks/README.md) says how.
 
 Errors of poses are those throughout, the greatest of all frames, with the first frame in its place; the
 shift is that of the object's middle. A model's RMS and bias (positive: outside) are to the true surface;

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from track.peers import ANY_CAMERA, PINHOLE
-from track.recordings import KINECT, ORTHOGRAPHIC, found, simulated
+from track.recordings import ORTHOGRAPHIC, found, simulated
 from track.rows import Goal, Places, Row
 
 

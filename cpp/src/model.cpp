@@ -7,6 +7,7 @@
 
 #include "check.hpp"
 #include "consolidation_fold.hpp"
+#include "depth_cleaning.hpp"
 #include "fusion_step.hpp"
 #include "tracking.hpp"
 
@@ -122,6 +123,7 @@ struct Model::Impl {
   ModelOptions options;  // what the first frame decides is filled in
   Frame frame;           // the newest; its memory and the observer's are used again for the next
   SurfaceObserver observer{camera, options.fusion};
+  NoiseCalibration calibration{camera};
   PointModel cloud;
   std::vector<FrameReport> reports;
   std::vector<Pose> poses;  // of the registered frames, oldest first
@@ -137,6 +139,7 @@ struct Model::Impl {
   }
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
+  NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
   TrackingResult locate(const FrameExtras& extras) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   std::vector<Pose> key_poses() const;
@@ -152,10 +155,10 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   report.timestamp = extras.timestamp;
 
   const DepthImage clean =
-      preprocess_depth(depth, camera, options.depth, extras.mask, &report.depth, options.num_threads);
+      clean_depth(depth, camera, options.depth, extras.mask, &calibration, &report.depth, nullptr, options.num_threads);
   report.milliseconds.preprocess = watch.lap();
 
-  make_frame(clean, camera, options.depth.noise, options.num_threads, frame);
+  make_frame(clean, camera, noise(), options.num_threads, frame);
   if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
   const ColorsRef colors(extras.colors);
   observer.look_at(frame, colors, options.num_threads);
@@ -264,6 +267,7 @@ const Camera& Model::camera() const { return impl_->camera; }
 const ModelOptions& Model::options() const { return impl_->options; }
 const PointModel& Model::cloud() const { return impl_->cloud; }
 const std::vector<FrameReport>& Model::frames() const { return impl_->reports; }
+NoiseModel Model::noise() const { return impl_->noise(); }
 double Model::spacing() const { return impl_->spacing; }
 
 PointModel Model::cloud_in_camera() const {

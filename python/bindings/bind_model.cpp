@@ -119,5 +119,6 @@ void bind_model(py::module_& m) {
       .def_property_readonly("camera", &Model::camera)
       .def_property_readonly("cloud", &Model::cloud, py::return_value_policy::reference_internal)
       .def("cloud_in_camera", &Model::cloud_in_camera)
+      .def_property_readonly("noise", &Model::noise)
       .def_property_readonly("spacing", &Model::spacing);
 }

@@ -111,6 +111,7 @@ class Model {
   const PointModel& cloud() const;                 ///< in the world frame
   PointModel cloud_in_camera() const;              ///< in the newest registered camera's frame
   const std::vector<FrameReport>& frames() const;  ///< one report per frame that was added
+  NoiseModel noise() const;                        ///< given, or measured from the frames so far
   double spacing() const;                          ///< [m]; 0 before the first frame
 
  private:
