@@ -27,7 +27,7 @@ def run_row(places: Places, row: Row, with_peers: bool) -> dict[str, Figures]:
         )
     for peer in row.peers if with_peers else ():
         results[TITLES[peer]] = attempt(
-            places, row, peer, lambda out, name=peer: commands.run_peer(name, recording, out)
+            places, row, peer, lambda out, name=peer: commands.run_peer(name, recording, out, row.voxel)
         )
     return results
 
