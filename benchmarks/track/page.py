@@ -11,9 +11,18 @@ from track.rows import Goal, Row
 from track.table import ROWS
 
 
-def page(results: Mapping[str, Any]) -> str:
+PICTURES = {
+    "model-bunny12.png": "The bunny from 12 noisy views (Stanford 3D Scanning Repository)",
+    "model-spot12.png": "Spot from 12 noisy views (Keenan Crane)",
+    "model-teddy.png": "tum-fr3-teddy (TUM RGB-D benchmark, CC BY 4.0)",
+}
+"""What may be shown; the others stay in the folder of the results."""
+
+
+def page(results: Mapping[str, Any], pictures: list[str]) -> str:
     """Return the whole page."""
     parts = [INTRODUCTION, summary(results)]
+    parts += [f"![{PICTURES[name]}](images/{name})\n\n*{PICTURES[name]}.*\n" for name in pictures]
     parts += [section(row, results[row.name]) for row in ROWS if row.name in results]
     return "\n".join(parts)
 
