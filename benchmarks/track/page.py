@@ -10,7 +10,6 @@ from track.figures import FIGURES as ALL
 from track.rows import Goal, Row
 from track.table import ROWS
 
-
 PICTURES = {
     "model-bunny12.png": "The bunny from 12 noisy views (Stanford 3D Scanning Repository)",
     "model-spot12.png": "Spot from 12 noisy views (Keenan Crane)",

@@ -25,6 +25,7 @@ PointModel to_world(const Frame& frame, const Pose& world_from_camera, std::int3
   }
   result.confidence.assign(result.points.size(), 1.0F);
   result.last_seen.assign(result.points.size(), frame_index);
+  result.sightings.assign(result.points.size(), 1);
   result.violations.assign(result.points.size(), 0);
   return result;
 }
@@ -52,6 +53,7 @@ void append(PointModel& model, const PointModel& more) {
   append(model.normals, more.normals);
   append(model.confidence, more.confidence);
   append(model.last_seen, more.last_seen);
+  append(model.sightings, more.sightings);
   append(model.violations, more.violations);
 }
 

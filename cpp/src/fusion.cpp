@@ -11,16 +11,16 @@
 #include "model_view.hpp"
 #include "parallel.hpp"
 #include "point_grid.hpp"
+#include "point_spacing.hpp"
 
 namespace nacre {
 namespace {
 
+// In frontal measurements of a point's own noise: far surfaces are measured with less weight, not less often.
 constexpr float least_weight = 0.05F;     // less observation than this is none
 constexpr float insertion_weight = 2.0F;  // a new point must be seen by so many pixels of its frame
-constexpr float least_pixel_weight = insertion_weight / 20.0F;  // no window of such pixels weighs enough
-constexpr double least_pixels = 1.5;                            // between new points, in the image that they come from
-constexpr float sheet_cosine = 0.3F;                            // normals that differ more belong to different sheets
-constexpr float least_facing = 0.1F;  // surfaces that are seen at a smaller cosine are not judged
+constexpr float sheet_cosine = 0.3F;      // normals that differ more belong to different sheets
+constexpr float least_facing = 0.1F;      // surfaces that are seen at a smaller cosine are not judged
 
 // Whether a point with a normal stands for the same piece of surface as another.
 bool same_surface(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, const Eigen::Vector3f& other,
@@ -37,11 +37,6 @@ struct Known {
   PixelIndex points;
 };
 
-// Between neighbours on a surface that the camera sees at a depth [m].
-float spacing_at(float z, const Camera& camera, double spacing) {
-  return static_cast<float>(std::max(spacing, least_pixels * camera.footprint(z)));
-}
-
 struct NewPoint {
   std::int32_t row = 0;
   Eigen::Vector3f point = Eigen::Vector3f::Zero(), normal = point;  // camera frame
@@ -50,6 +45,8 @@ struct NewPoint {
   float spacing = 0.0F;  // to its neighbours [m]
   PixelWindow cover;
 };
+
+void count_up(std::uint8_t& count) { count = static_cast<std::uint8_t>(std::min(255, count + 1)); }
 
 template <class T>
 std::vector<T> concatenate(const std::vector<std::vector<T>>& parts) {
@@ -82,10 +79,13 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
         ModelView::Block points;
         view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin), points);
         const auto note_violation = [&](int j, float sigma) {
+          const std::size_t i = first + static_cast<std::size_t>(j);
           const float margin = std::max(static_cast<float>(2.0 * spacing), 4.0F * sigma);
-          if (!observer.sees_through(points.point(j), points.pixel[j], margin)) return;
-          std::uint8_t& violations = model.violations[first + static_cast<std::size_t>(j)];
-          violations = static_cast<std::uint8_t>(std::min(255, violations + 1));
+          const bool is_confirmed = model.sightings[i] >= options.min_sightings;
+          const float behind = frame.points(points.pixel[j], 2) - points.z[j];
+          const bool is_missed =
+              is_confirmed ? observer.sees_through(points.point(j), points.pixel[j], margin) : behind > -margin;
+          if (is_missed) count_up(model.violations[i]);
         };
         ObservationBlock block;
         int seen[block_size];  // of the points
@@ -93,20 +93,21 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
           if (!points.inside[j] || !(points.facing[j] > least_facing)) continue;
           const float measured_sigma = frame.sigma[points.pixel[j]];
           const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
-          if (!observer.may_observe(points.point(j), points.pixel[j], sigma, least_weight)) {
+          if (!observer.may_observe(points.point(j), points.pixel[j], sigma,
+                                    least_weight * observer.frontal_weight(sigma))) {
             note_violation(j, sigma);
             continue;
           }
           seen[block.size()] = j;
           observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma,
-                       spacing_at(points.z[j], camera, spacing));
+                       spacing_at(points.z[j], sigma, camera, spacing));
         }
         observer.observe_and_cover(block, sheet_cosine);
         for (int k = 0; k < block.size(); ++k) {
           const int j = seen[k];
           const std::size_t i = first + static_cast<std::size_t>(j);
           const Observation observed = block[k];
-          if (observed.weight > least_weight) {
+          if (observed.weight > least_weight * observer.frontal_weight(block.sigma(k))) {
             const float gain = observed.weight / (model.confidence[i] + observed.weight);
             model.points[i] += world_rotation * (gain * observed.offset * points.normal(j));
             model.normals[i] = (model.confidence[i] * model.normals[i] + world_rotation * observed.normal).normalized();
@@ -117,6 +118,7 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
             model.confidence[i] =
                 std::min(model.confidence[i] + observed.weight, static_cast<float>(options.max_confidence));
             model.last_seen[i] = frame_index;
+            count_up(model.sightings[i]);
             model.violations[i] = 0;
             covers[static_cast<std::size_t>(number)].push_back({i, points.pixel[j], block.cover(k)});
           } else {
@@ -143,7 +145,7 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
   parallel_for(frame.height, 16, num_threads, [&](std::int64_t v) {
     const auto first = static_cast<std::int32_t>(v) * frame.width;
     for (int u = 0; u < frame.width; ++u) {
-      if (observer.weight(u, static_cast<int>(v)) > least_pixel_weight && !covered.contains(u, static_cast<int>(v))) {
+      if (observer.weight(u, static_cast<int>(v)) > 0.0F && !covered.contains(u, static_cast<int>(v))) {
         uncovered[static_cast<std::size_t>(v)].push_back(first + u);
       }
     }
@@ -162,7 +164,7 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
       candidate.point = frame.points.row(row).transpose();
       candidate.normal = frame.normals.row(row).transpose();
       if (!(candidate.normal.dot(observer.towards_camera(candidate.point)) > least_facing)) continue;
-      candidate.spacing = spacing_at(candidate.point.z(), camera, spacing);
+      candidate.spacing = spacing_at(candidate.point.z(), frame.sigma[row], camera, spacing);
       observer.add(block, candidate.point, candidate.normal, row, frame.sigma[row], candidate.spacing);
       candidates.push_back(candidate);
     }
@@ -170,7 +172,7 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
     std::size_t kept = 0;
     for (int k = 0; k < block.size(); ++k) {
       const Observation observed = block[k];
-      if (!(observed.weight > insertion_weight)) continue;
+      if (!(observed.weight > insertion_weight * observer.frontal_weight(block.sigma(k)))) continue;
       NewPoint candidate = candidates[static_cast<std::size_t>(k)];
       candidate.point += observed.offset * candidate.normal;
       candidate.normal = observed.normal.normalized();
@@ -205,22 +207,18 @@ void insert(PointModel& model, const std::vector<NewPoint>& candidates, Known& k
     if (with_colors) model.colors.push_back(candidate.color);
     model.confidence.push_back(candidate.weight);
     model.last_seen.push_back(frame_index);
+    model.sightings.push_back(1);
     model.violations.push_back(0);
     ++report.num_inserted;
   }
 }
 
-void remove_unconfirmed(PointModel& model, std::int32_t frame_index, const FusionOptions& options,
-                        FusionReport& report) {
+void remove_violated(PointModel& model, const FusionOptions& options, FusionReport& report) {
   std::vector<std::uint8_t> flags(model.points.size(), 1);
   for (std::size_t i = 0; i < flags.size(); ++i) {
-    const bool seen_through = model.violations[i] >= options.max_violations;
-    const bool forgotten = model.confidence[i] < static_cast<float>(options.min_confidence) &&
-                           frame_index - model.last_seen[i] > options.max_age;
-    if (seen_through || forgotten) {
-      flags[i] = 0;
-      ++report.num_removed;
-    }
+    if (model.violations[i] < options.max_violations) continue;
+    flags[i] = 0;
+    ++report.num_removed;
   }
   if (report.num_removed > 0) model.keep(flags);
 }
@@ -243,6 +241,7 @@ void PointModel::keep(const std::vector<std::uint8_t>& flags) {
   keep_flagged(colors, flags);
   keep_flagged(confidence, flags);
   keep_flagged(last_seen, flags);
+  keep_flagged(sightings, flags);
   keep_flagged(violations, flags);
 }
 
@@ -250,8 +249,7 @@ void FusionOptions::check() const {
   require(support >= 0.0, "support", "0 (automatic) or a positive distance in metres", support);
   require(max_angle > 0.0, "max_angle", "a positive angle in radians", max_angle);
   require(max_confidence > 0.0, "max_confidence", "positive", max_confidence);
-  require(min_confidence >= 0.0, "min_confidence", "0 or more", min_confidence);
-  require(max_age >= 0, "max_age", "0 frames or more", max_age);
+  require(min_sightings >= 0 && min_sightings <= 255, "min_sightings", "0 to 255 frames", min_sightings);
   require(max_violations >= 1 && max_violations <= 255, "max_violations", "1 to 255", max_violations);
   require(reference_sigma >= 0.0, "reference_sigma", "0 (automatic) or positive metres", reference_sigma);
 }
@@ -269,7 +267,7 @@ FusionReport fuse_observed(PointModel& model, const Frame& frame, const Camera& 
   const std::vector<NewPoint> candidates =
       find_new_points(frame, camera, observer, known.covered, spacing, num_threads);
   insert(model, candidates, known, frame, world_from_camera, frame_index, with_colors, report);
-  remove_unconfirmed(model, frame_index, options, report);
+  remove_violated(model, options, report);
   return report;
 }
 

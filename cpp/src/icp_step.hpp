@@ -1,6 +1,7 @@
 // One step of ICP: the motion that reduces the residuals of given pairs, and what the pairs know about the pose.
 #pragma once
 
+#include <limits>
 #include <vector>
 
 #include "nacre/registration.hpp"
@@ -13,6 +14,7 @@ struct Pair {
   Eigen::Vector3d normal;           // direction along which the residual counts; not used by point_to_point
   Eigen::Vector3d half_difference;  // of the two points' normals; NaN where only one is known
   double weight;
+  double largest_residual = std::numeric_limits<double>::infinity();  // that a match may have [m]
 };
 
 inline double residual(const Pair& pair, Metric metric) {

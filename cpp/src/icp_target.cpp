@@ -93,7 +93,7 @@ void sort_in_space(const Points& points, std::vector<std::int32_t>::iterator beg
 
 IcpCloud::IcpCloud(const AlignCloud& cloud, const AlignOptions& options, bool is_target)
     : has_estimated_normals(needs_normals(options, is_target) && cloud.normals.rows() == 0) {
-  std::vector<std::int32_t> rows = finite_rows(cloud.points, cloud.normals);
+  rows = finite_rows(cloud.points, cloud.normals);
   // A gate that somebody has set is meant for the cloud as it is.
   const bool may_thin_out = options.max_points > 0 && !(options.final_distance > 0.0);
   if (may_thin_out) rows = choose(rows, static_cast<std::size_t>(options.max_points), options.seed);
@@ -107,10 +107,13 @@ IcpCloud::IcpCloud(const AlignCloud& cloud, const AlignOptions& options, bool is
   normals = estimate_normals(points, normal_options);
 }
 
-void IcpCloud::keep(const std::vector<std::int32_t>& rows) {
-  points = rows_of<Points>(points, rows);
-  normals = rows_of<Points>(normals, rows);
-  sigma = rows_of<Values>(sigma, rows);
+void IcpCloud::keep(const std::vector<std::int32_t>& kept) {
+  points = rows_of<Points>(points, kept);
+  normals = rows_of<Points>(normals, kept);
+  sigma = rows_of<Values>(sigma, kept);
+  std::vector<std::int32_t> kept_rows(kept.size());
+  for (std::size_t i = 0; i < kept.size(); ++i) kept_rows[i] = rows[static_cast<std::size_t>(kept[i])];
+  rows = std::move(kept_rows);
 }
 
 IcpSource::IcpSource(const AlignCloud& cloud_in, const AlignOptions& options) : cloud(cloud_in, options, false) {
@@ -151,6 +154,12 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, std::int64_t count, 
   // Normals that were estimated point to an arbitrary side.
   const bool oriented = !cloud_.has_estimated_normals && !from.has_estimated_normals;
   const bool has_sigma = from.sigma.size() > 0 || cloud_.sigma.size() > 0;
+  const bool has_reach = source.reach.size() > 0;
+  double widest = gate.distance;
+  if (has_reach) {
+    const auto largest_reach = static_cast<double>(source.reach.head(count).maxCoeff());
+    widest = gate.is_smallest ? largest_reach : std::max(widest, largest_reach);
+  }
 
   std::vector<std::vector<Pair>> found(static_cast<std::size_t>((count + block_size - 1) / block_size));
   parallel_blocks(
@@ -165,13 +174,18 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, std::int64_t count, 
           z[k] = static_cast<float>(moved[k].z());
         }
         find_nearest_points(tree_, {x, y, z, nearest.data() + begin, squared_distances, nullptr}, 0, end - begin,
-                            gate.distance);
+                            widest);
 
         std::vector<Pair>& pairs = found[static_cast<std::size_t>(block)];
         pairs.reserve(static_cast<std::size_t>(end - begin));
         for (std::int64_t i = begin; i < end; ++i) {
           const std::uint32_t match = nearest[static_cast<std::size_t>(i)];
           if (match == no_slot) continue;
+          if (has_reach) {
+            const auto reach = static_cast<double>(source.reach[i]);
+            const double farthest = gate.is_smallest ? reach : std::max(gate.distance, reach);
+            if (squared_distances[i - begin] > farthest * farthest) continue;
+          }
           Pair pair;
           pair.p = moved[i - begin];
           pair.q = cloud_.points.row(match).transpose().cast<double>();
@@ -192,7 +206,10 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, std::int64_t count, 
               if (options_.method == Metric::symmetric) pair.normal = 0.5 * (source_normal + target_normal);
             }
           }
-          if (std::abs(nacre::residual(pair, options_.method)) > gate.residual) continue;
+          if (gate.is_smallest && has_reach) {
+            pair.largest_residual = static_cast<double>(source.largest_residual[i]);
+            if (std::abs(residual(pair, options_.method)) > pair.largest_residual) continue;
+          }
           double variance = 0.0;
           if (from.sigma.size() > 0) variance += static_cast<double>(from.sigma[i]) * from.sigma[i];
           if (cloud_.sigma.size() > 0) variance += static_cast<double>(cloud_.sigma[match]) * cloud_.sigma[match];

@@ -16,6 +16,7 @@ namespace nacre {
 struct IcpCloud {
   Points points, normals;
   Values sigma;
+  std::vector<std::int32_t> rows;  // of the given cloud
   bool has_estimated_normals;
 
   IcpCloud(const AlignCloud& cloud, const AlignOptions& options, bool is_target);
@@ -27,14 +28,16 @@ struct IcpCloud {
 struct IcpSource {
   IcpCloud cloud;
   std::array<std::int64_t, 3> levels;  // few, more, all
+  // For each sample, or empty: how far a match may be when the gate is at its smallest, and its residual [m].
+  Values reach, largest_residual;
 
   IcpSource(const AlignCloud& cloud, const AlignOptions& options);
 };
 
 struct Gate {
-  double distance;                                            // [m]
-  double cos_angle;                                           // of the largest angle between matched normals
-  double residual = std::numeric_limits<double>::infinity();  // along the normals [m]
+  double distance;   // [m]
+  double cos_angle;  // of the largest angle between matched normals
+  bool is_smallest;  // then each sample's own reach and largest residual count, if it has them
 };
 
 class IcpTarget {
@@ -56,9 +59,11 @@ class IcpTarget {
   double diameter_ = 0.0, spacing_ = 0.0;
 };
 
-// align with a prepared target. With the last gate, pairs with larger residuals than `last_residual` are rejected: for
-// a target that is sparser than its surface is known, where near points may lie far along the surface, but not across.
-AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
-                     double last_residual = std::numeric_limits<double>::infinity());
+struct IcpResult : AlignResult {
+  double residual_ratio = std::numeric_limits<double>::quiet_NaN();  // residuals to the largest they may be, rms
+};
+
+// align with a prepared target.
+IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options);
 
 }  // namespace nacre

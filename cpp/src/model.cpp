@@ -9,6 +9,9 @@
 #include "consolidation_fold.hpp"
 #include "depth_cleaning.hpp"
 #include "fusion_step.hpp"
+#include "loop_closure.hpp"
+#include "model_correction.hpp"
+#include "point_spacing.hpp"
 #include "tracking.hpp"
 
 namespace nacre {
@@ -95,6 +98,7 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.predict_motion = false;
   options.relocalise = false;
   options.denoise_samples = false;
+  options.loop_closure = false;
   options.verify = false;
   return options;
 }
@@ -109,9 +113,7 @@ void ModelOptions::check() const {
   require(spacing >= 0.0 && std::isfinite(spacing), "spacing", "0 (automatic) or a positive distance in metres",
           spacing);
   require(max_points >= 100, "max_points", "at least 100", max_points);
-  require(min_overlap >= 0.0 && min_overlap <= 1.0, "min_overlap", "in [0, 1]", min_overlap);
-  require(min_consistency >= 0.0 && min_consistency <= 1.0, "min_consistency", "in [0, 1]", min_consistency);
-  require(max_residual > 0.0, "max_residual", "positive", max_residual);
+  require(min_evidence >= 0.0, "min_evidence", "0 or more", min_evidence);
   require(first_fraction > 0.0 && first_fraction <= 1.0, "first_fraction", "in (0, 1]", first_fraction);
   require(kept_fraction > 0.0 && kept_fraction <= 1.0, "kept_fraction", "in (0, 1]", kept_fraction);
   require(new_fraction >= 0.0 && new_fraction <= 1.0, "new_fraction", "in [0, 1]", new_fraction);
@@ -125,10 +127,14 @@ struct Model::Impl {
   SurfaceObserver observer{camera, options.fusion};
   NoiseCalibration calibration{camera};
   PointModel cloud;
+  LoopClosure loops{camera, options};
   std::vector<FrameReport> reports;
+  Sight before;             // of the newest frame that was folded in
   std::vector<Pose> poses;  // of the registered frames, oldest first
   double spacing = 0.0;
-  bool was_lost = false;
+  std::int64_t num_lost = 0;  // frames in a row, up to the newest
+
+  bool was_lost() const { return num_lost > 0; }
 
   Impl(const Camera& camera_in, const ModelOptions& options_in) : camera(camera_in), options(options_in) {
     options.check();
@@ -142,11 +148,13 @@ struct Model::Impl {
   NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
   TrackingResult locate(const FrameExtras& extras) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
-  std::vector<Pose> key_poses() const;
+  WhereElse elsewhere() const;
+  void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
   void fold_in(FrameReport& report);
 };
 
-// The loop: clean the image, make points of it, register them to the model, fold them in, renew the normals.
+// The loop: clean the image, make points of it, register them to the model, correct the model where a loop closes, fold
+// the points in, renew the normals.
 FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& extras) {
   check_extras(camera, extras);
   StopWatch total, watch;
@@ -171,6 +179,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   report.num_inliers = tracking.alignment.num_inliers;
   report.overlap = tracking.alignment.overlap;
   report.consistency = tracking.consistency;
+  report.evidence = tracking.evidence;
   report.rmse = tracking.alignment.rmse;
   report.information = tracking.alignment.information;
   report.weak_directions = tracking.alignment.weak_directions;
@@ -180,12 +189,15 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     report.world_from_camera = poses.empty() ? Pose::Identity() : poses.back();
   } else {
     poses.push_back(report.world_from_camera);
+    if (options.loop_closure && options.fold_in == FoldIn::fuse) close_loops(report, tracking, extras.keep_guess);
+    report.milliseconds.loop_closure = watch.lap();
     if (report.status == FrameStatus::tracked) {
-      if (was_lost) report.status = FrameStatus::relocalised;
+      if (was_lost()) report.status = FrameStatus::relocalised;
       fold_in(report);
+      before = {frame.points.col(2), frame.sigma, report.world_from_camera};
     }
   }
-  was_lost = report.status == FrameStatus::lost && !poses.empty();
+  num_lost = report.status == FrameStatus::lost && !poses.empty() ? num_lost + 1 : 0;
   report.milliseconds.fold_in = watch.lap() - report.milliseconds.normals;
   report.num_points = cloud.size();
   report.spacing = spacing;
@@ -208,46 +220,81 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras) const {
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), key_poses(), was_lost, spacing, options);
+  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost(), before,
+               options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
   if (extras.guess) return {*extras.guess};
   const Pose& last = poses.back();
-  if (!options.predict_motion || poses.size() < 2 || was_lost) return {last};
+  if (!options.predict_motion || poses.size() < 2 || was_lost()) return {last};
   Pose predicted = last * (poses[poses.size() - 2].inverse() * last);
   predicted.linear() = Eigen::Quaterniond(predicted.linear()).normalized().toRotationMatrix();
   return {predicted, last};
 }
 
-// Some of the newest poses from which the camera looked in different directions.
-std::vector<Pose> Model::Impl::key_poses() const {
+// Some of the newest poses from which the camera looked in different directions; and everywhere, but not at every frame
+// where that has been to no avail.
+WhereElse Model::Impl::elsewhere() const {
   constexpr std::size_t most = 8;
   constexpr double least_angle = 0.35;
-  std::vector<Pose> chosen;
-  if (!options.relocalise) return chosen;
+  constexpr std::int64_t patience = 8;
+  WhereElse where;
+  if (!options.relocalise) return where;
+  where.everywhere = num_lost < patience || num_lost % patience == 0;
+  std::vector<Pose>& chosen = where.key_poses;
   for (auto pose = poses.rbegin(); pose != poses.rend() && chosen.size() < most; ++pose) {
     const bool is_new = std::all_of(chosen.begin(), chosen.end(), [&](const Pose& other) {
       return Eigen::AngleAxisd(other.linear().transpose() * pose->linear()).angle() > least_angle;
     });
     if (is_new) chosen.push_back(*pose);
   }
-  return chosen;
+  return where;
+}
+
+void Model::Impl::close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given) {
+  const std::int32_t oldest_frame = loops.oldest_frame();
+  const LoopReport loop = loops.add_frame({static_cast<std::int32_t>(report.index), frame, observer, tracking.alignment,
+                                           spacing, is_given, was_lost() || tracking.is_to_whole_model});
+  if (loop.corrections.empty()) return;
+  report.loop_frame = loop.frame;
+  report.loop_distance = loop.distance;
+  if (report.status == FrameStatus::weak) {  // what it saw before determines its pose
+    report.status = FrameStatus::tracked;
+    report.reason.clear();
+    report.weak_directions.resize(6, 0);
+  }
+  move_points(cloud, loop.corrections, options.num_threads);
+  report.world_from_camera = loop.corrections.back() * report.world_from_camera;
+  const double noise = static_cast<double>(median_sigma(frame));
+  merge_layers(cloud, oldest_frame, spacing, [&](const Eigen::Vector3f& point) {
+    const double distance = (point.cast<double>() - report.world_from_camera.translation()).norm();
+    const double farther = camera.model() == Camera::Model::pinhole ? distance / loop.depth : 1.0;
+    const double sigma = noise * farther * farther;  // noise grows with the square
+    return spacing_at(static_cast<float>(distance), static_cast<float>(sigma), camera, spacing);
+  });
+  poses.clear();
+  for (FrameReport& earlier : reports) {
+    earlier.world_from_camera = loop.corrections[static_cast<std::size_t>(earlier.index)] * earlier.world_from_camera;
+    if (earlier.status != FrameStatus::lost) poses.push_back(earlier.world_from_camera);
+  }
+  poses.push_back(report.world_from_camera);
 }
 
 void Model::Impl::fold_in(FrameReport& report) {
   StopWatch watch;
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
+  const auto num_registered = static_cast<std::int32_t>(poses.size() - 1);  // lost frames make no point older
   if (options.fold_in != FoldIn::fuse) {
     consolidate_frame(cloud, frame, report.world_from_camera, options, spacing,
-                      static_cast<std::int32_t>(report.index));
+                      num_registered);
     watch.lap();
     renew_normals(cloud, options);
     report.milliseconds.normals = watch.lap();
     return;
   }
   report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing,
-                                static_cast<std::int32_t>(report.index), options.fusion, options.num_threads);
+                                num_registered, options.fusion, options.num_threads);
   while (cloud.size() > options.max_points) {
     spacing *= coarsening;
     thin(cloud, spacing);

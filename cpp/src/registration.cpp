@@ -44,8 +44,8 @@ double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double
 // few points; then it stays, and the points become more until the pose is at rest.
 class Schedule {
  public:
-  Schedule(const IcpTarget& target, const IcpSource& source, const AlignOptions& options, double last_residual)
-      : options_(options), source_(source), last_residual_(last_residual) {
+  Schedule(const IcpTarget& target, const IcpSource& source, const AlignOptions& options)
+      : options_(options), source_(source) {
     first_ = options.max_distance > 0.0 ? options.max_distance : 0.25 * target.diameter();
     smallest_ = options.final_distance > 0.0 ? options.final_distance : 2.5 * target.spacing();
     set_level(0);
@@ -84,7 +84,7 @@ class Schedule {
     const double decayed = first_ * std::pow(options_.gate_decay, iteration_);
     gate_.distance = std::max(smallest, decayed);
     at_smallest_ = options_.gate_decay >= 1.0 || decayed <= smallest;
-    gate_.residual = at_smallest_ ? last_residual_ : std::numeric_limits<double>::infinity();
+    gate_.is_smallest = at_smallest_;
     // Normals of a source that is still far off may differ by a third more.
     const double widening = options_.gate_decay < 1.0 ? gate_.distance / first_ / 3.0 : 0.0;
     const double angle = options_.max_angle * (1.0 + widening);
@@ -97,7 +97,6 @@ class Schedule {
   int iteration_ = 0, iterations_at_level_ = 0;
   double first_ = 0.0, smallest_ = 0.0;
   bool at_smallest_ = false;
-  double last_residual_;
   Gate gate_{};
 };
 
@@ -107,18 +106,27 @@ double rmse_of(const std::vector<Pair>& pairs, Metric metric) {
   return std::sqrt(squares / static_cast<double>(pairs.size()));
 }
 
+double residual_ratio_of(const std::vector<Pair>& pairs, Metric metric) {
+  double squares = 0.0;
+  for (const Pair& pair : pairs) {
+    const double ratio = residual(pair, metric) / pair.largest_residual;
+    squares += ratio * ratio;
+  }
+  return std::sqrt(squares / static_cast<double>(pairs.size()));
+}
+
 std::size_t least_pairs(std::int64_t num_samples) {
   return static_cast<std::size_t>(std::max<std::int64_t>(6, num_samples / 100));
 }
 
 // hold_weak: whether directions that the pairs do not determine stay as they are in each step.
-AlignResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
-                    double last_residual, bool hold_weak) {
-  AlignResult result;
+IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
+                  bool hold_weak) {
+  IcpResult result;
   result.target_from_source = initial;
   result.rmse = std::numeric_limits<double>::quiet_NaN();
 
-  Schedule schedule(target, source, options, last_residual);
+  Schedule schedule(target, source, options);
   std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
   const double resolution = std::max(1e-3 * target.spacing(), 1e-9);
   Pose pose = initial, best_pose = initial;
@@ -156,6 +164,7 @@ AlignResult iterate(const IcpTarget& target, const IcpSource& source, const Pose
   result.num_inliers = static_cast<int>(pairs.size());
   result.overlap = static_cast<double>(pairs.size()) / static_cast<double>(schedule.num_samples());
   result.rmse = last.rmse;
+  result.residual_ratio = residual_ratio_of(pairs, options.method);
   result.center = last.center;
   result.information = last.hessian / std::max(last.variance, resolution * resolution);
   result.weak_directions = last.weak_directions;
@@ -197,12 +206,11 @@ AlignCloud::AlignCloud(const PointsRef& points_in, const PointsRef& normals_in, 
   require(sigma.size() == 0 || sigma.size() == points.rows(), "sigma", "one value per point", sigma.size());
 }
 
-AlignResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
-                     double last_residual) {
+IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options) {
   // What pairs know of a direction shows at the end only: while source and target are apart their normals disagree.
-  const AlignResult free = iterate(target, source, initial, options, last_residual, false);
+  const IcpResult free = iterate(target, source, initial, options, false);
   if (free.status != AlignStatus::too_few_pairs && free.weak_directions.cols() == 0) return free;
-  return iterate(target, source, initial, options, last_residual, true);
+  return iterate(target, source, initial, options, true);
 }
 
 AlignResult align(const AlignCloud& source, const AlignCloud& target, const Pose& initial,

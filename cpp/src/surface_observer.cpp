@@ -47,14 +47,14 @@ void SurfaceObserver::look_at(const Frame& frame, const ColorsRef& colors, int n
     image_.blue = plane(9);
   }
 
-  const float reference =
+  reference_sigma_ =
       options_.reference_sigma > 0.0 ? static_cast<float>(options_.reference_sigma) : median_sigma(frame);
   const auto fill_row = simd::fill_surface_row();
   parallel_for(height_, 16, num_threads, [&](std::int64_t v) {
     const std::int64_t first = v * width_, to = v * stride;
     fill_row(
         {width_, frame.points.data() + 3 * first, frame.normals.data() + 3 * first, frame.sigma.data() + first},
-        reference, camera_.model() == Camera::Model::orthographic,
+        reference_sigma_, camera_.model() == Camera::Model::orthographic,
         {out.x + to, out.y + to, out.z + to, out.normal_x + to, out.normal_y + to, out.normal_z + to, out.weight + to});
     if (colors.rows() == 0) return;
     for (std::int64_t u = 0; u < width_; ++u) {

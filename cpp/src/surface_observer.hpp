@@ -70,6 +70,12 @@ class SurfaceObserver {
 
   bool has_colors() const { return image_.red != nullptr; }
 
+  // The same of a frontal measurement of some noise; sigma 0 stands for the reference.
+  float frontal_weight(float sigma) const {
+    const float ratio = sigma > 0.0F ? reference_sigma_ / sigma : 1.0F;
+    return ratio * ratio;
+  }
+
   // Whether a window around a point can say more than `least_weight` about it; false is certain.
   bool may_observe(const Eigen::Vector3f& point, std::int32_t pixel, float sigma, float least_weight) const;
 
@@ -110,6 +116,7 @@ class SurfaceObserver {
   simd::SurfaceImage image_ = {};
   std::vector<Tile> tiles_;
   float least_cosine_;
+  float reference_sigma_ = 0.0F;
 };
 
 }  // namespace nacre

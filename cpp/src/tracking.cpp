@@ -2,13 +2,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
+#include "frame_samples.hpp"
 #include "icp_target.hpp"
 #include "model_view.hpp"
 #include "parallel.hpp"
+#include "point_spacing.hpp"
 #include "random.hpp"
+#include "relocalisation.hpp"
 #include "surface_observer.hpp"
+#include "verdict.hpp"
 
 namespace nacre {
 namespace {
@@ -19,37 +22,39 @@ constexpr std::size_t max_target_points = 30000;  // that a frame is registered 
 // Model points that a camera near a pose may see, as a cloud to register to.
 struct View {
   Points points, normals;  // world frame
+  double thinning = 1.0;   // how much farther apart the points are than the model's
 };
 
 // Points in the image widened by a third on each side, turned away from the camera by at most 120 degrees: one of every
 // n of them, so that at most max_target_points are left.
-View points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera, int num_threads) {
+View points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera,
+                    std::int32_t oldest_frame, int num_threads) {
   constexpr std::int64_t block_size = ModelView::capacity;
   const ModelView model_view(camera, world_from_camera);
   const auto width = static_cast<float>(camera.width()), height = static_cast<float>(camera.height());
   const float margin_u = width / 3.0F, margin_v = height / 3.0F;
   std::vector<std::vector<std::uint32_t>> found(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
-  parallel_blocks(model.size(), block_size, num_threads,
-                  [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
-                    const auto first = static_cast<std::size_t>(begin);
-                    ModelView::Block block;
-                    model_view.project(model.points[first].data(), model.normals[first].data(),
-                                       static_cast<int>(end - begin), block);
-                    std::uint32_t rows[block_size];
-                    std::size_t count = 0;
-                    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(end - begin); ++i) {
-                      rows[count] = static_cast<std::uint32_t>(begin) + i;
-                      count += static_cast<std::size_t>((block.u[i] > -margin_u) & (block.u[i] < width + margin_u) &
-                                                        (block.v[i] > -margin_v) & (block.v[i] < height + margin_v) &
-                                                        (block.facing[i] > -0.5F));
-                    }
-                    found[static_cast<std::size_t>(number)].assign(rows, rows + count);
-                  });
+  parallel_blocks(
+      model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
+        const auto first = static_cast<std::size_t>(begin);
+        ModelView::Block block;
+        model_view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin),
+                           block);
+        std::uint32_t rows[block_size];
+        std::size_t count = 0;
+        for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(end - begin); ++i) {
+          rows[count] = static_cast<std::uint32_t>(begin) + i;
+          count += static_cast<std::size_t>((block.u[i] > -margin_u) & (block.u[i] < width + margin_u) &
+                                            (block.v[i] > -margin_v) & (block.v[i] < height + margin_v) &
+                                            (block.facing[i] > -0.5F) & (model.last_seen[first + i] >= oldest_frame));
+        }
+        found[static_cast<std::size_t>(number)].assign(rows, rows + count);
+      });
   std::size_t num_found = 0;
   for (const auto& rows : found) num_found += rows.size();
   const std::size_t step = (num_found + max_target_points - 1) / max_target_points;
   const auto count = static_cast<Eigen::Index>(step > 0 ? num_found / step : 0);
-  View view{Points(count, 3), Points(count, 3)};
+  View view{Points(count, 3), Points(count, 3), std::sqrt(static_cast<double>(std::max<std::size_t>(step, 1)))};
   // One of every `step`, at random.
   const auto is_chosen = [&](std::size_t index) { return index % step == random_bits(0, index / step) % step; };
   std::size_t index = 0;
@@ -64,110 +69,12 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
   return view;
 }
 
-// Of the view's points that face the camera and project onto a measured pixel: the part that agrees with it, among
-// those that agree and those that the camera sees through. Points behind the measured surface are hidden, not wrong.
-double consistency_of(const View& view, const Frame& frame, const Camera& camera, const Pose& world_from_camera,
-                      double spacing, int num_threads) {
-  struct Counts {
-    std::int64_t agree = 0, violated = 0;
-    Counts& operator+=(const Counts& other) {
-      agree += other.agree;
-      violated += other.violated;
-      return *this;
-    }
-  };
-  constexpr std::int64_t block_size = ModelView::capacity;
-  const ModelView model_view(camera, world_from_camera);
-  const Counts counts =
-      block_reduce(view.points.rows(), block_size, num_threads, Counts{}, [&](std::int64_t begin, std::int64_t end) {
-        ModelView::Block block;
-        model_view.project(view.points.data() + 3 * begin, view.normals.data() + 3 * begin,
-                           static_cast<int>(end - begin), block);
-        Counts sum;
-        for (int i = 0; i < static_cast<int>(end - begin); ++i) {
-          if (!block.inside[i] || !(block.facing[i] > 0.3F)) continue;
-          const std::int32_t pixel = block.pixel[i];
-          const float behind = frame.points(pixel, 2) - block.z[i];
-          if (!std::isfinite(behind)) continue;
-          const float tolerance =
-              std::max(3.0F * static_cast<float>(spacing), 4.0F * frame.sigma[pixel]) / block.facing[i];
-          if (behind > tolerance) {
-            ++sum.violated;
-          } else if (behind > -tolerance) {
-            ++sum.agree;
-          }
-        }
-        return sum;
-      });
-  const std::int64_t judged = counts.agree + counts.violated;
-  return judged > 0 ? static_cast<double>(counts.agree) / static_cast<double>(judged) : 0.0;
-}
-
-// Denoised points of the frame, spread over it at random: noise would shift the matches on curved surfaces.
-struct Samples {
-  Points points, normals;
-  Values sigma;
-};
-
-Samples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
-  const std::int64_t count =
-      options.registration.max_samples > 0
-          ? std::min<std::int64_t>(options.registration.max_samples, static_cast<std::int64_t>(frame.valid.size()))
-          : static_cast<std::int64_t>(frame.valid.size());
-  Samples samples{Points(count, 3), Points(count, 3), Values(count)};
-  const double stride = static_cast<double>(frame.valid.size()) / static_cast<double>(std::max<std::int64_t>(count, 1));
-  parallel_blocks(count, ObservationBlock::capacity, options.num_threads, [&](auto, auto begin, auto end) {
-    ObservationBlock block;
-    for (std::int64_t i = begin; i < end; ++i) {
-      // One of every `stride` pixels.
-      const double place =
-          (static_cast<double>(i) + random_uniform(options.registration.seed, static_cast<std::uint64_t>(i))) * stride;
-      const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
-      samples.points.row(i) = frame.points.row(row);
-      samples.normals.row(i) = frame.normals.row(row);
-      samples.sigma[i] = frame.sigma[row];
-      observer.add(block, samples.points.row(i).transpose(), samples.normals.row(i).transpose(), row, frame.sigma[row]);
-    }
-    if (!options.denoise_samples) return;
-    observer.observe(block);
-    for (std::int64_t i = begin; i < end; ++i) {
-      const Observation seen = block[static_cast<int>(i - begin)];
-      if (!(seen.weight > 0.0F)) continue;
-      samples.points.row(i) += seen.offset * samples.normals.row(i);
-      samples.normals.row(i) = seen.normal.normalized().transpose();
-    }
-  });
-  return samples;
-}
-
-// Strict, for guesses that may be far off: only a registration beyond doubt is believed.
-void judge(TrackingResult& result, const ModelOptions& options, double gate, bool strict) {
-  std::ostringstream reason;
-  reason.precision(3);
-  result.status = FrameStatus::lost;
-  const bool is_close =
-      result.alignment.overlap > 0.35 && result.consistency > 0.9 && result.alignment.rmse < 0.25 * gate;
-  if (result.alignment.status == AlignStatus::too_few_pairs) {
-    reason << "too few points of the frame match the model";
-  } else if (!options.verify) {
-    result.status = FrameStatus::tracked;
-  } else if (result.alignment.overlap < options.min_overlap) {
-    reason << "overlap " << result.alignment.overlap << " is below " << options.min_overlap;
-  } else if (result.consistency < options.min_consistency) {
-    reason << "consistency " << result.consistency << " is below " << options.min_consistency;
-  } else if (result.alignment.rmse > options.max_residual * gate) {
-    reason << "residuals of " << result.alignment.rmse << " m are above " << options.max_residual * gate;
-  } else if (strict && !is_close) {
-    reason << "not sure enough: overlap " << result.alignment.overlap << ", consistency " << result.consistency
-           << ", residuals " << result.alignment.rmse << " m";
-  } else if (result.alignment.weak_directions.cols() > 0) {
-    result.status = FrameStatus::weak;
-    reason << result.alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
-  } else {
-    result.status = FrameStatus::tracked;
-    result.is_beyond_doubt = is_close;
-  }
-  result.reason = reason.str();
+double median_reach(const IcpSource& source) {
+  std::vector<float> values(source.reach.data(), source.reach.data() + source.reach.size());
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return static_cast<double>(*middle);
 }
 
 // What stays the same while one frame is registered from several guesses.
@@ -177,40 +84,64 @@ struct Search {
   const Camera& camera;
   const ModelOptions& options;
   IcpSource source;
-  double spacing;      // of the model [m]
-  float median_sigma;  // of the frame [m]
+  const Values& noise;  // of the sampled points [m]
+  const Values depth;   // of each pixel [m]
+  const Sight& before;
+  double spacing;             // of the model [m]
+  std::int32_t oldest_frame;  // see track
 
   bool has_automatic_gate() const { return !(options.registration.max_distance > 0.0); }
 
+  // A match may be as far as the model's points are apart, or as noise takes it; its residual less so, since the model
+  // is known better across its surface than along it.
+  IcpSource with_reach(const View& view, const IcpTarget& target) const {
+    IcpSource gated = source;
+    const auto count = static_cast<Eigen::Index>(source.cloud.rows.size());
+    gated.reach.resize(count);
+    gated.largest_residual.resize(count);
+    // Noise that is large against the surface would match anything.
+    const double largest = 0.05 * target.diameter();
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const float sigma = noise[source.cloud.rows[static_cast<std::size_t>(i)]];
+      const double apart = spacing_at(source.cloud.points(i, 2), sigma, camera, spacing);
+      const double noise = 4.0 * static_cast<double>(sigma), set = options.registration.final_distance;
+      gated.reach[i] =
+          static_cast<float>(set > 0.0 ? set : std::min(std::max(2.5 * view.thinning * apart, noise), largest));
+      gated.largest_residual[i] =
+          static_cast<float>(set > 0.0 ? set : std::min(std::max(2.75 * apart, noise), largest));
+    }
+    return gated;
+  }
+
   // Near: the guess is about right, and a narrow gate is safest. Wide: it is not. Strict: see judge.
   TrackingResult register_from(const Pose& guess, bool wide, bool strict) const {
-    const View view = points_in_view(model, camera, guess, options.num_threads);
+    const View view = points_in_view(model, camera, guess, oldest_frame, options.num_threads);
     AlignOptions align_options = options.registration;
     align_options.max_points = 0;  // the view is thin enough
     const IcpTarget target(AlignCloud(view.points, view.normals), align_options);
-    double verdict_gate =
-        align_options.final_distance > 0.0 ? align_options.final_distance : std::numeric_limits<double>::infinity();
-    if (!(align_options.final_distance > 0.0)) {
-      // Noise that is large against the surface would match anything.
-      const double noise = 4.0 * static_cast<double>(median_sigma), largest = 0.05 * target.diameter();
-      align_options.final_distance = std::min(std::max(2.5 * target.spacing(), noise), largest);
-      verdict_gate = std::min(std::max(2.75 * spacing, noise), largest);
-    }
+    const IcpSource gated = with_reach(view, target);
+    if (!(align_options.final_distance > 0.0)) align_options.final_distance = median_reach(gated);
     if (has_automatic_gate() && !wide) align_options.max_distance = 4.0 * align_options.final_distance;
 
     TrackingResult result;
-    result.alignment = align_to(target, source, guess, align_options, verdict_gate);
-    result.consistency =
-        consistency_of(view, frame, camera, result.alignment.target_from_source, spacing, options.num_threads);
-    const double turned =
-        Eigen::AngleAxisd(guess.linear().transpose() * result.alignment.target_from_source.linear()).angle();
-    judge(result, options, verdict_gate, strict || turned > far_turn);
+    result.alignment = align_to(target, gated, guess, align_options);
+    const Pose& pose = result.alignment.target_from_source;
+    const Sight now{depth, frame.sigma, pose};
+    const double in_view = consistency_of(view.points, view.normals, now, camera, spacing, options.num_threads);
+    const Eigen::Matrix3f rotation = pose.linear().cast<float>();
+    const Eigen::RowVector3f translation = pose.translation().cast<float>().transpose();
+    const Points points = (source.cloud.points * rotation.transpose()).rowwise() + translation;
+    const Points normals = source.cloud.normals * rotation.transpose();
+    const double earlier = consistency_of(points, normals, before, camera, spacing, options.num_threads);
+    result.consistency = std::isfinite(in_view) || std::isfinite(earlier) ? std::fmin(in_view, earlier) : 0.0;
+    const double turned = Eigen::AngleAxisd(guess.linear().transpose() * pose.linear()).angle();
+    judge(result, options, strict || turned > far_turn);
     return result;
   }
 
   // Cameras around what a known camera saw: it turned about each of its axes, one way and the other.
   std::vector<Pose> around(const Pose& pose) const {
-    const View view = points_in_view(model, camera, pose, options.num_threads);
+    const View view = points_in_view(model, camera, pose, oldest_frame, options.num_threads);
     std::vector<Pose> poses = {pose};
     if (view.points.rows() == 0) return poses;
     const Eigen::Vector3d center = view.points.colwise().mean().transpose().cast<double>();
@@ -228,26 +159,13 @@ struct Search {
   // From every place where a camera has been, and around it: a few points each, then the best with all.
   TrackingResult relocalise(const std::vector<Pose>& key_poses) const {
     constexpr std::size_t num_finalists = 3;
-    const PointsRef points = Eigen::Map<const Points>(model.points.front().data(), model.size(), 3);
-    const PointsRef normals = Eigen::Map<const Points>(model.normals.front().data(), model.size(), 3);
-    const IcpTarget whole(AlignCloud(points, normals), options.registration);
-    AlignOptions coarse = options.registration;
-    coarse.max_samples = coarse.coarse_samples = 300;
-    coarse.max_iterations = 15;
-    const IcpSource few(AlignCloud(source.cloud.points, source.cloud.normals, source.cloud.sigma), coarse);
-
-    std::vector<std::pair<double, Pose>> candidates;
+    std::vector<Pose> guesses;
     for (const Pose& key_pose : key_poses) {
-      for (const Pose& guess : around(key_pose)) {
-        const AlignResult result = align_to(whole, few, guess, coarse);
-        candidates.emplace_back(result.overlap, result.target_from_source);
-      }
+      for (const Pose& guess : around(key_pose)) guesses.push_back(guess);
     }
-    std::stable_sort(candidates.begin(), candidates.end(),
-                     [](const auto& a, const auto& b) { return a.first > b.first; });
     TrackingResult best;
-    for (std::size_t i = 0; i < std::min(num_finalists, candidates.size()); ++i) {
-      const TrackingResult result = register_from(candidates[i].second, false, true);
+    for (const Pose& candidate : most_promising(model, source, guesses, options.registration, num_finalists)) {
+      const TrackingResult result = register_from(candidate, false, true);
       if (result.rank() >= best.rank()) best = result;
     }
     return best;
@@ -257,29 +175,51 @@ struct Search {
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const std::vector<Pose>& guesses, const std::vector<Pose>& key_poses, bool was_lost,
-                     double spacing, const ModelOptions& options) {
-  const Samples samples = sample_frame(frame, observer, options);
-  const Search search{model,
-                      frame,
-                      camera,
-                      options,
-                      IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
-                      spacing,
-                      median_sigma(frame)};
+                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
+                     std::int32_t oldest_frame, double spacing, const ModelOptions& options) {
+  const FrameSamples samples = sample_frame(frame, observer, options);
+  Search search{model,
+                frame,
+                camera,
+                options,
+                IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
+                samples.noise,
+                frame.points.col(2),
+                before,
+                spacing,
+                oldest_frame};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
-  for (const bool wide : {false, true}) {
-    if (wide && !search.has_automatic_gate()) break;
-    for (const Pose& guess : guesses) {
-      const TrackingResult result = search.register_from(guess, wide, was_lost);
-      if (result.rank() >= best.rank()) best = result;
-      if (result.is_beyond_doubt) return result;
+  const auto try_guesses = [&] {
+    for (const bool wide : {false, true}) {
+      if (wide && (best.status != FrameStatus::lost || !search.has_automatic_gate())) return;
+      for (const Pose& guess : guesses) {
+        const TrackingResult result = search.register_from(guess, wide, was_lost);
+        if (result.rank() >= best.rank()) best = result;
+        if (result.is_beyond_doubt) return;
+      }
     }
+  };
+  try_guesses();
+  if (best.status != FrameStatus::lost) return best;
+  if (oldest_frame > 0) {
+    search.oldest_frame = 0;
+    try_guesses();
+    best.is_to_whole_model = true;
+    if (best.status != FrameStatus::lost) return best;
   }
-  if (best.status == FrameStatus::lost && !key_poses.empty()) {
-    const TrackingResult found = search.relocalise(key_poses);
+  if (!elsewhere.key_poses.empty()) {
+    TrackingResult found = search.relocalise(elsewhere.key_poses);
+    found.is_to_whole_model = true;
     if (found.status != FrameStatus::lost) return found;
+  }
+  if (elsewhere.everywhere) {
+    const std::optional<Pose> pose = fit_anywhere(model, search.source, options.registration);
+    if (pose) {
+      TrackingResult found = search.register_from(*pose, false, false);
+      found.is_to_whole_model = true;
+      if (found.status != FrameStatus::lost) return found;
+    }
   }
   return best;
 }

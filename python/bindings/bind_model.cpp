@@ -24,6 +24,7 @@ py::dict milliseconds(const FrameReport& report) {
   result["preprocess"] = times.preprocess;
   result["back_project"] = times.back_project;
   result["registration"] = times.registration;
+  result["loop_closure"] = times.loop_closure;
   result["fold_in"] = times.fold_in;
   result["normals"] = times.normals;
   result["total"] = times.total;
@@ -54,8 +55,7 @@ void bind_model(py::module_& m) {
       .def_readwrite("support", &FusionOptions::support)
       .def_readwrite("max_angle", &FusionOptions::max_angle)
       .def_readwrite("max_confidence", &FusionOptions::max_confidence)
-      .def_readwrite("min_confidence", &FusionOptions::min_confidence)
-      .def_readwrite("max_age", &FusionOptions::max_age)
+      .def_readwrite("min_sightings", &FusionOptions::min_sightings)
       .def_readwrite("max_violations", &FusionOptions::max_violations)
       .def_readwrite("reference_sigma", &FusionOptions::reference_sigma);
 
@@ -72,11 +72,10 @@ void bind_model(py::module_& m) {
       .def_readwrite("max_points", &ModelOptions::max_points)
       .def_readwrite("predict_motion", &ModelOptions::predict_motion)
       .def_readwrite("relocalise", &ModelOptions::relocalise)
+      .def_readwrite("loop_closure", &ModelOptions::loop_closure)
       .def_readwrite("denoise_samples", &ModelOptions::denoise_samples)
       .def_readwrite("verify", &ModelOptions::verify)
-      .def_readwrite("min_overlap", &ModelOptions::min_overlap)
-      .def_readwrite("min_consistency", &ModelOptions::min_consistency)
-      .def_readwrite("max_residual", &ModelOptions::max_residual)
+      .def_readwrite("min_evidence", &ModelOptions::min_evidence)
       .def_readwrite("first_fraction", &ModelOptions::first_fraction)
       .def_readwrite("kept_fraction", &ModelOptions::kept_fraction)
       .def_readwrite("new_fraction", &ModelOptions::new_fraction)
@@ -87,6 +86,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("normals", [](const PointModel& cloud) { return copy_rows(cloud.normals); })
       .def_property_readonly("colors", [](const PointModel& cloud) { return copy_rows(cloud.colors); })
       .def_property_readonly("confidence", [](const PointModel& cloud) { return copy_values(cloud.confidence); })
+      .def_property_readonly("sightings", [](const PointModel& cloud) { return copy_values(cloud.sightings); })
       .def_property_readonly("last_seen", [](const PointModel& cloud) { return copy_values(cloud.last_seen); })
       .def("__len__", &PointModel::size);
 
@@ -100,11 +100,14 @@ void bind_model(py::module_& m) {
       .def_readonly("num_inliers", &FrameReport::num_inliers)
       .def_readonly("overlap", &FrameReport::overlap)
       .def_readonly("consistency", &FrameReport::consistency)
+      .def_readonly("evidence", &FrameReport::evidence)
       .def_readonly("rmse", &FrameReport::rmse)
       .def_property_readonly("information",
                              [](const FrameReport& report) { return Eigen::Matrix<double, 6, 6>(report.information); })
       .def_property_readonly("weak_directions",
                              [](const FrameReport& report) { return Twists(report.weak_directions.transpose()); })
+      .def_readonly("loop_frame", &FrameReport::loop_frame)
+      .def_readonly("loop_distance", &FrameReport::loop_distance)
       .def_readonly("depth", &FrameReport::depth)
       .def_property_readonly("num_updated", [](const FrameReport& report) { return report.fusion.num_updated; })
       .def_property_readonly("num_inserted", [](const FrameReport& report) { return report.fusion.num_inserted; })
@@ -120,5 +123,6 @@ void bind_model(py::module_& m) {
       .def_property_readonly("cloud", &Model::cloud, py::return_value_policy::reference_internal)
       .def("cloud_in_camera", &Model::cloud_in_camera)
       .def_property_readonly("noise", &Model::noise)
+      .def("pose", [](const Model& model, std::size_t i) { return to_matrix(model.frames().at(i).world_from_camera); })
       .def_property_readonly("spacing", &Model::spacing);
 }

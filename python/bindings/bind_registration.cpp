@@ -1,4 +1,5 @@
 #include "bindings.hpp"
+#include "nacre/global_registration.hpp"
 #include "nacre/registration.hpp"
 
 using namespace nacre;
@@ -48,6 +49,42 @@ void bind_registration(py::module_& m) {
          const PoseMatrix& initial, const AlignOptions& options) {
         return align(AlignCloud(source, source_normals, source_sigma), AlignCloud(target, target_normals, target_sigma),
                      to_pose(initial), options);
+      },
+      ReleaseGil());
+
+  py::class_<GlobalAlignOptions>(m, "GlobalAlignOptions")
+      .def(py::init<>())
+      .def_readwrite("num_rotations", &GlobalAlignOptions::num_rotations)
+      .def_readwrite("num_candidates", &GlobalAlignOptions::num_candidates)
+      .def_readwrite("tolerance", &GlobalAlignOptions::tolerance)
+      .def_readwrite("max_angle", &GlobalAlignOptions::max_angle)
+      .def_readwrite("min_overlap", &GlobalAlignOptions::min_overlap)
+      .def_readwrite("min_consistency", &GlobalAlignOptions::min_consistency)
+      .def_readwrite("max_residual", &GlobalAlignOptions::max_residual)
+      .def_readwrite("max_rivalry", &GlobalAlignOptions::max_rivalry)
+      .def_readwrite("outlines", &GlobalAlignOptions::outlines)
+      .def_readwrite("max_points", &GlobalAlignOptions::max_points)
+      .def_readwrite("max_samples", &GlobalAlignOptions::max_samples)
+      .def_readwrite("coarse_samples", &GlobalAlignOptions::coarse_samples)
+      .def_readwrite("seed", &GlobalAlignOptions::seed)
+      .def_readwrite("num_threads", &GlobalAlignOptions::num_threads);
+
+  py::class_<GlobalAlignResult>(m, "GlobalAlignResult")
+      .def_property_readonly("status", [](const GlobalAlignResult& result) { return to_string(result.status); })
+      .def_readonly("alignment", &GlobalAlignResult::alignment)
+      .def_readonly("overlap", &GlobalAlignResult::overlap)
+      .def_readonly("consistency", &GlobalAlignResult::consistency)
+      .def_readonly("rivalry", &GlobalAlignResult::rivalry)
+      .def_readonly("tolerance", &GlobalAlignResult::tolerance);
+
+  m.def(
+      "align_global",
+      [](const PointsRef& source, const PointsRef& source_normals,
+         const std::optional<Eigen::Vector3d>& source_viewpoint, const PointsRef& target,
+         const PointsRef& target_normals, const std::optional<Eigen::Vector3d>& target_viewpoint,
+         const GlobalAlignOptions& options) {
+        return align_global(GlobalCloud(source, source_normals, source_viewpoint),
+                            GlobalCloud(target, target_normals, target_viewpoint), options);
       },
       ReleaseGil());
 }

@@ -16,6 +16,7 @@ from nacre.depth import (
     preprocess_depth,
 )
 from nacre.errors import FileFormatError
+from nacre.global_registration import GlobalAlignResult, GlobalRegistrationParameters, align_global
 from nacre.io.cameras import CameraFile, read_camera, write_camera
 from nacre.io.cloud import Cloud
 from nacre.io.meshes import read_mesh, write_mesh
@@ -45,6 +46,8 @@ __all__ = [
     "DepthReport",
     "FileFormatError",
     "FrameReport",
+    "GlobalAlignResult",
+    "GlobalRegistrationParameters",
     "KdTree",
     "Mesh",
     "Model",
@@ -58,6 +61,7 @@ __all__ = [
     "Trajectory",
     "__version__",
     "align",
+    "align_global",
     "associate",
     "back_project",
     "built_in_object",

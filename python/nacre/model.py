@@ -34,10 +34,11 @@ class FusionParameters:
         Nor do those whose normal differs more [rad].
     max_confidence : float
         Bounds the confidence from above, so that new observations always count.
-    min_confidence, max_age : float, int
-        A point of less confidence that is not seen again for so many frames goes.
+    min_sightings : int
+        A point that fewer frames observed is not confirmed.
     max_violations : int
-        A point that a camera saw through so often goes.
+        A point that a camera saw through so often goes; an unconfirmed one also where cameras looked so often
+        and did not find it.
     reference_sigma : float
         Noise of an observation of weight 1 [m]; 0: the frame's median.
     """
@@ -45,8 +46,7 @@ class FusionParameters:
     support: float = 0.0
     max_angle: float = 1.0471976
     max_confidence: float = 1e6
-    min_confidence: float = 3.0
-    max_age: int = 10
+    min_sightings: int = 3
     max_violations: int = 3
     reference_sigma: float = 0.0
 
@@ -95,16 +95,16 @@ class ModelParameters:
     predict_motion : bool
         Start also from the pose that continues the last motion.
     relocalise : bool
-        Search around earlier poses where the guesses fail.
+        Search around earlier poses where the guesses fail, then everywhere (some tenths of a second; not at
+        every frame where that has failed often).
+    loop_closure : bool
+        Where ``fold_in`` is "fuse": correct model and poses where the camera comes back to what it saw before.
     denoise_samples : bool
         Register surface points averaged over their pixels, not single pixels.
     verify : bool
-        Judge registrations, by the three bounds below and by what is beyond doubt.
-    min_overlap, min_consistency : float
-        A frame of which a smaller part matches the model is lost; so is one that sees through more than the
-        rest of what the model shows there.
-    max_residual : float
-        So is one whose residuals exceed this part of the last gate on distances; chance gives 0.58.
+        Judge registrations by their evidence.
+    min_evidence : float
+        A frame with less is lost; see :class:`FrameReport`.
     first_fraction, kept_fraction, new_fraction : float
         WLOP: part of the first frame that becomes the model; part of the model that is kept at each frame;
         new points, as a part of the model.
@@ -122,11 +122,10 @@ class ModelParameters:
     max_points: int = 500000
     predict_motion: bool = True
     relocalise: bool = True
+    loop_closure: bool = True
     denoise_samples: bool = True
     verify: bool = True
-    min_overlap: float = 0.15
-    min_consistency: float = 0.8
-    max_residual: float = 0.35
+    min_evidence: float = 0.3
     first_fraction: float = 0.5
     kept_fraction: float = 0.9
     new_fraction: float = 0.2
@@ -156,11 +155,20 @@ class FrameReport:
     reason : str
         Why the frame is weak or lost; empty otherwise.
     world_from_camera : (4, 4) float64
-        The camera's pose; of a lost frame the last known one.
+        The camera's pose; of a lost frame the last known one. Where a later frame closes a loop, the reports
+        in ``Model.frames`` have the corrected poses.
     num_inliers, overlap, rmse, information, weak_directions
         Of the registration; see :class:`nacre.AlignResult`.
     consistency : float
-        Part of the model's points in view that the frame does not see through.
+        Part of the model's points in view that the frame does not see through, or of the frame's points that
+        the camera did not see through before, whichever is smaller.
+    evidence : float
+        That the registration is right, against chance: what the residuals tell a match, times overlap^2 and
+        consistency^4. Unrelated surfaces reach 0.25; good registrations have 0.4 to 3.
+    loop_frame : int or None
+        The earlier frame that this one closed a loop with: model and poses were corrected.
+    loop_distance : float
+        Between the surfaces that the two saw, before the correction [m].
     depth : DepthReport
         Pixels that were removed, by reason.
     num_updated, num_inserted, num_removed : int
@@ -181,9 +189,12 @@ class FrameReport:
     num_inliers: int
     overlap: float
     consistency: float
+    evidence: float
     rmse: float
     information: npt.NDArray[np.float64]
     weak_directions: npt.NDArray[np.float64]
+    loop_frame: int | None
+    loop_distance: float
     depth: DepthReport
     num_updated: int
     num_inserted: int
@@ -326,6 +337,11 @@ class Model:
         with self._lock:
             core = self._core.add_frame(image, pixels, colors, timestamp, pose, keep_guess)
             report = FrameReport._from_core(core)
+            if report.loop_frame is not None:
+                self._frames = [
+                    replace(earlier, world_from_camera=self._core.pose(earlier.index))
+                    for earlier in self._frames
+                ]
             self._frames.append(report)
         return report
 
@@ -373,7 +389,11 @@ class Model:
 
     @property
     def poses(self) -> npt.NDArray[np.float64]:
-        """(F, 4, 4) world_from_camera of every frame; NaN where the frame is lost."""
+        """
+        (F, 4, 4) world_from_camera of every frame; NaN where the frame is lost.
+
+        Where a later frame closed a loop, the corrected poses.
+        """
         poses = np.full((len(self._frames), 4, 4), np.nan)
         for pose, report in zip(poses, self._frames, strict=True):
             if report.tracked:
@@ -382,7 +402,7 @@ class Model:
 
     @property
     def frames(self) -> tuple[FrameReport, ...]:
-        """The report of every frame that was added."""
+        """The report of every frame that was added, with poses as corrected by later frames."""
         return tuple(self._frames)
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections.abc
 import dataclasses
+import itertools
 import platform
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from nacre.report import FrameEntry, ReportData
 
 STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
+_RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
 
 # Fields of evaluation results that hold one value per frame or point; the frames have them already.
 _LONG = {"errors", "translation_errors", "rotation_errors", "distances"}
@@ -107,24 +109,66 @@ class Reconstruction:
             self.frames.append(record)
             yield record
 
-    def _add(self, index: int) -> FrameRecord:
+    def retry_lost(self) -> Iterator[FrameRecord]:
+        """
+        Go over the lost frames again, while any of them is found, and yield each that was tried.
+
+        The model has grown since they were lost. A frame that is found now is RELOCALISED, and takes the
+        place of its lost record in ``frames``; so do WEAK ones of which the model now knows enough. Frames
+        that could not be read, or that the model refused, stay as they are.
+        """
+        found_any = self.counts["LOST"] > 0
+        while found_any:
+            found_any = False
+            for place, before in enumerate(self.frames):
+                if before.report is None or before.status not in ("LOST", "WEAK"):
+                    continue
+                record = self._add(before.index, before.world_from_camera)
+                if record.status == "TRACKED":
+                    record = dataclasses.replace(record, status="RELOCALISED")
+                if _RANK[record.status] > _RANK[before.status]:
+                    found_any = True
+                    self.frames[place] = record
+                yield self.frames[place]
+
+    def _add(self, index: int, guess: npt.NDArray[np.float64] | None = None) -> FrameRecord:
         try:
             frame = self.sequence[index]
         except (FileFormatError, OSError) as error:
             return FrameRecord(index, None, "LOST", str(error), None, None, error)
         try:
-            report = self.model.add_frame(frame.depth, color=frame.color, timestamp=frame.timestamp)
+            report = self.model.add_frame(
+                frame.depth, color=frame.color, timestamp=frame.timestamp, guess=guess
+            )
         except ValueError as error:
             return FrameRecord(index, frame.timestamp, "LOST", str(error), None, frame.truth, error)
+        if report.loop_frame is not None:
+            self._take_corrected_poses()
         if self._example is None and report.tracked:
             self._example = index, frame.depth
         return FrameRecord(index, frame.timestamp, report.status, report.reason, report, frame.truth)
+
+    def _take_corrected_poses(self) -> None:
+        reports = self.model.frames
+        self.frames[:] = [
+            record
+            if record.report is None
+            else dataclasses.replace(record, report=reports[record.report.index])
+            for record in self.frames
+        ]
 
     @property
     def counts(self) -> dict[str, int]:
         """How many frames have each status."""
         found = Counter(frame.status for frame in self.frames)
         return {status: found[status] for status in STATUSES}
+
+    @property
+    def loops(self) -> list[FrameRecord]:
+        """The frames that closed a loop."""
+        return [
+            frame for frame in self.frames if frame.report is not None and frame.report.loop_frame is not None
+        ]
 
     @property
     def num_tracked(self) -> int:
@@ -189,6 +233,7 @@ class Reconstruction:
                 "num_frames": len(self.frames),
                 "num_tracked": self.num_tracked,
                 **{f"num_{name.lower()}": counts[name] for name in STATUSES[1:]},
+                "num_loops": len(self.loops),
                 "coverage": self.num_tracked / len(self.frames) if self.frames else None,
                 "num_points": len(self.model),
                 "spacing": self.model.spacing,
@@ -200,7 +245,10 @@ class Reconstruction:
                 },
                 **{name: result_dict(result) for name, result in self.evaluation.items()},
                 "parameters": self.parameters,
-                "frames": [_frame_dict(frame, *errors[i]) for i, frame in enumerate(self.frames)],
+                "frames": [
+                    _frame_dict(frame, *errors[i], self._loop_frame(frame))
+                    for i, frame in enumerate(self.frames)
+                ],
             }
         )
         return figures
@@ -226,6 +274,13 @@ class Reconstruction:
             figures=figures or {},
             parameters=self.parameters,
         )
+
+    def _loop_frame(self, frame: FrameRecord) -> int | None:
+        """Return the place in the recording of the frame that another closed a loop with."""
+        if frame.report is None or frame.report.loop_frame is None:
+            return None
+        given = (other.index for other in self.frames if other.report is not None)
+        return next(itertools.islice(given, frame.report.loop_frame, None))
 
     def _depth_example(self) -> Any:
         from nacre.report import DepthExample
@@ -282,7 +337,10 @@ def _removed(report: FrameReport | None) -> dict[str, int]:
 
 
 def _frame_dict(
-    frame: FrameRecord, translation_error: float | None, rotation_error: float | None
+    frame: FrameRecord,
+    translation_error: float | None,
+    rotation_error: float | None,
+    loop_frame: int | None,
 ) -> dict[str, Any]:
     report = frame.report
     figures: dict[str, Any] = {
@@ -296,10 +354,11 @@ def _frame_dict(
         "rotation_error": rotation_error,
     }
     for name in (
-        "num_inliers", "overlap", "consistency", "rmse", "weak_directions",
+        "num_inliers", "overlap", "consistency", "evidence", "rmse", "weak_directions", "loop_distance",
         "num_updated", "num_inserted", "num_removed", "num_points", "spacing", "milliseconds",
     ):  # fmt: skip
         figures[name] = None if report is None else getattr(report, name)
+    figures["loop_frame"] = loop_frame
     figures["depth"] = None if report is None else dataclasses.asdict(report.depth)
     figures["removed"] = _removed(report)
     return figures

@@ -336,6 +336,7 @@ TEST_CASE("keep drops the points whose flag is 0, in order") {
     model.normals.emplace_back(0.0F, static_cast<float>(i), 0.0F);
     model.confidence.push_back(static_cast<float>(i));
     model.last_seen.push_back(i);
+    model.sightings.push_back(static_cast<std::uint8_t>(i));
     model.violations.push_back(static_cast<std::uint8_t>(i));
   }
   model.keep({0, 1, 0, 1, 1});

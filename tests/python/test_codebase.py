@@ -20,6 +20,7 @@ LAYERS = [
     ["kdtree", "mesh"],
     ["normals", "depth"],
     ["registration", "consolidation", "fusion", "simulation"],
+    ["global_registration"],
     ["model"],
 ]
 RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}

@@ -15,6 +15,7 @@ from nacre.parameters import as_choice, from_core, to_core, updated
 MIRRORS: dict[type, Any] = {
     nacre.DepthParameters: _core.DepthOptions,
     nacre.RegistrationParameters: _core.AlignOptions,
+    nacre.GlobalRegistrationParameters: _core.GlobalAlignOptions,
     FusionParameters: _core.FusionOptions,
     ConsolidationParameters: _core.ConsolidateOptions,
     NormalParameters: _core.NormalOptions,
@@ -151,6 +152,7 @@ PAPER: dict[str, Any] = {
     "predict_motion": False,
     "verify": False,
     "relocalise": False,
+    "loop_closure": False,
     "denoise_samples": False,
 }
 
@@ -178,12 +180,12 @@ def test_unknown_preset() -> None:
 
 def test_changes_by_dotted_name() -> None:
     before = nacre.ModelParameters()
-    after = updated(before, {"registration.max_angle": 0.5, "spacing": 0.002, "fusion.max_age": 3})
+    after = updated(before, {"registration.max_angle": 0.5, "spacing": 0.002, "fusion.min_sightings": 5})
     assert after.registration.max_angle == 0.5
     assert after.spacing == 0.002
-    assert after.fusion.max_age == 3
+    assert after.fusion.min_sightings == 5
     assert before == nacre.ModelParameters()
-    nested = {"registration": {"max_angle": 0.5}, "spacing": 0.002, "fusion": {"max_age": 3}}
+    nested = {"registration": {"max_angle": 0.5}, "spacing": 0.002, "fusion": {"min_sightings": 5}}
     assert after == updated(before, nested)
     assert updated(before, {}) == before
 
@@ -209,7 +211,7 @@ def test_unknown_name_lists_the_names(name: str) -> None:
     with pytest.raises(ValueError, match=r"there is no parameter .* it has ") as caught:
         updated(nacre.ModelParameters(), {name: 1})
     part = name.partition(".")[0]
-    assert {"registration": "max_angle", "fusion": "max_age"}.get(part, "spacing") in str(caught.value)
+    assert {"registration": "max_angle", "fusion": "min_sightings"}.get(part, "spacing") in str(caught.value)
 
 
 def test_unknown_name_in_a_nested_mapping() -> None:

@@ -18,7 +18,9 @@ struct PointModel {
       colors;                     ///< red green blue, 0 to 255, NaN where never seen; empty when no frame had colour
   std::vector<float> confidence;  ///< frontal observations that the point stands for
   std::vector<std::int32_t> last_seen;   ///< frame that last observed the point
-  std::vector<std::uint8_t> violations;  ///< how often a camera saw through the point since it was last observed
+  std::vector<std::uint8_t> sightings;   ///< frames that observed the point, at most 255
+  std::vector<std::uint8_t> violations;  ///< how often a camera saw through the point since it was last observed;
+                                         ///< of a point with few sightings: how often one looked and did not find it
 
   std::int64_t size() const { return static_cast<std::int64_t>(points.size()); }
   /// Keeps the points whose flag is not 0, in order.
@@ -29,9 +31,9 @@ struct FusionOptions {
   double support = 0.0;  ///< observations farther from a model point do not move it [m]; 0: from noise and pixels
   double max_angle = 1.0471976;  ///< nor do those whose normal differs more [rad]; 60 degrees
   double max_confidence = 1e6;   ///< a lower bound on the weight of new observations, for objects that change
-  double min_confidence = 3.0;   ///< a point below it that is not seen again goes
-  int max_age = 10;              ///< after so many frames
-  int max_violations = 3;        ///< a point that was seen through so often goes
+  int min_sightings = 3;         ///< a point that fewer frames observed is not confirmed
+  int max_violations = 3;        ///< a point that was seen through so often goes; an unconfirmed one also where cameras
+                                 ///< looked so often and did not find it
 
   double reference_sigma = 0.0;  ///< noise of an observation of weight 1 [m]; 0: the frame's median
 

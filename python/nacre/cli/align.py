@@ -40,6 +40,16 @@ def align(
             metavar="FILE", help="First guess: a text file of 4x4 numbers.", show_default="identity"
         ),
     ] = None,
+    everywhere: Annotated[
+        bool, typer.Option("--global", help="Search all motions: no first guess is needed.")
+    ] = False,
+    seen_from_origin: Annotated[
+        bool,
+        typer.Option(
+            "--seen-from-origin",
+            help="With --global: each cloud was seen from (0, 0, 0), as points of one depth image are.",
+        ),
+    ] = False,
     method: Annotated[Method, typer.Option(help="What is minimised.")] = Method.symmetric,
     max_distance: Annotated[
         float,
@@ -53,10 +63,10 @@ def align(
     verbose: Verbose = 0,
 ) -> None:
     """
-    Find the motion that brings one cloud onto another (ICP), from a first guess.
+    Find the motion that brings one cloud onto another (ICP), from a first guess or, with --global, from none.
 
     Prints the 4x4 matrix that takes points of SOURCE to TARGET. Exit code 1 where the clouds did not come to
-    rest on each other.
+    rest on each other, or with --global where no motion, or more than one, explains them.
     """
     terminal = Terminal(json, quiet, verbose)
     import numpy as np
@@ -64,8 +74,15 @@ def align(
     import nacre
     from nacre.report.text import count, quantity
 
+    if everywhere and initial is not None:
+        raise CommandError("--initial is the first guess that --global does without; give one of them", 2)
+    if seen_from_origin and not everywhere:
+        raise CommandError("--seen-from-origin is only of use with --global", 2)
     if out is not None:
         writable_file(out)
+    if everywhere:
+        _align_globally(terminal, source, target, out, seen_from_origin)
+        return
     guess = None if initial is None else read_matrix(initial)
     moving, still = nacre.read_points(source), nacre.read_points(target)
     result = nacre.align(
@@ -106,6 +123,51 @@ def align(
         terminal.say(f"moved source  {out}")
     if not result.converged:
         raise CommandError("still moving after the last step; give more --max-iterations")
+
+
+def _align_globally(terminal: Terminal, source: Path, target: Path, out: Path | None, seen: bool) -> None:
+    import nacre
+    from nacre.report.text import quantity
+
+    moving, still = nacre.read_points(source), nacre.read_points(target)
+    origin = (0.0, 0.0, 0.0) if seen else None
+    result = nacre.align_global(
+        moving.points,
+        still.points,
+        source_normals=moving.normals,
+        target_normals=still.normals,
+        source_viewpoint=origin,
+        target_viewpoint=origin,
+    )
+    pose = result.target_from_source
+    figures = {
+        "target_from_source": pose, "status": result.status, "found": result.found,
+        "overlap": result.overlap, "consistency": result.consistency, "rivalry": result.rivalry,
+        "tolerance": result.tolerance, "rmse": result.rmse, "information": result.information,
+        "weak_directions": result.weak_directions, "center": result.center,
+    }  # fmt: skip
+    rows = [
+        ("status", result.status.replace("_", " ")),
+        (
+            "overlap",
+            f"{quantity(result.overlap, 'fraction')} (agree within {quantity(result.tolerance, 'm')})",
+        ),
+        ("consistency", quantity(result.consistency, "fraction")),
+        ("next best motion", f"{quantity(result.rivalry, 'fraction')} as good"),
+        ("residual", f"{quantity(result.rmse, 'm')} RMS"),
+        *zip(("matrix", "", "", ""), format_matrix(pose).splitlines(), strict=True),
+    ]
+    terminal.answer(figures, rows)
+    if out is not None and result.status != "too_few_points":
+        _write_moved(out, moving, pose)
+        terminal.say(f"moved source  {out}")
+    if not result.found:
+        reasons = {
+            "ambiguous": "several motions explain the clouds about as well; the best is shown",
+            "not_found": "no motion explains the clouds; the best is shown",
+            "too_few_points": "the clouds have too few points",
+        }
+        raise CommandError(reasons[result.status])
 
 
 def read_matrix(path: Path) -> npt.NDArray[np.float64]:

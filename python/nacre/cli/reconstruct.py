@@ -9,7 +9,7 @@ import typer
 
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
 from nacre.cli.results import file_rows, trajectory_rows, write_results
-from nacre.cli.running import run_frames
+from nacre.cli.running import retry_lost, run_frames
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
 
@@ -39,6 +39,18 @@ def reconstruct(
         int | None, typer.Option(min=0, metavar="INDEX", help="The last frame.", show_default="all")
     ] = None,
     color: Annotated[bool, typer.Option("--color/--no-color", help="Give the model colours.")] = True,
+    retry: Annotated[
+        bool,
+        typer.Option("--retry/--no-retry", help="At the end, try lost frames again while any is found."),
+    ] = True,
+    loop_closure: Annotated[
+        bool | None,
+        typer.Option(
+            "--loop-closure/--no-loop-closure",
+            help="Correct model and poses where the camera comes back to what it saw before.",
+            show_default="on",
+        ),
+    ] = None,
     preset: PresetOption = None,
     config: ConfigOption = None,
     settings: SetOption = None,
@@ -55,9 +67,14 @@ def reconstruct(
 
     OUT gets model.ply (points with normals, in the first camera's frame), trajectory.txt, report.json and
     report.html. A frame that cannot be read or registered is LOST and changes nothing.
+    The frames may be far apart and in any order: a lost camera is searched for everywhere.
     """
     terminal = Terminal(json, quiet, verbose)
-    more = {"depth.min_depth": min_depth, "depth.max_depth": max_depth}
+    more: dict[str, Any] = {
+        "depth.min_depth": min_depth,
+        "depth.max_depth": max_depth,
+        "loop_closure": loop_closure,
+    }
     parameters, preset_name = model_parameters(preset, config, settings, **more)
     sequence = open_source(source, format, camera, depth_scale)
     if not color:
@@ -73,6 +90,8 @@ def reconstruct(
     words = describe(sequence, indices)
     terminal.say(f"{sequence.name}: {words}")
     interrupted = run_frames(terminal, done, indices)
+    if retry and not interrupted:
+        interrupted = retry_lost(terminal, done)
     done.evaluate_trajectory()
     report = write_results(
         out,

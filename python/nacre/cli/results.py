@@ -82,6 +82,9 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
         ("frames tracked", f"{done.num_tracked} of {len(done.frames)}{extra}"),
         ("model", f"{count(len(done.model))} points, {quantity(done.model.spacing, 'm')} apart"),
     ]
+    if done.loops:
+        last = done.loops[-1]
+        rows.append(("loops closed", f"{len(done.loops)}, the last at frame {last.index}"))
     ate: Any = done.evaluation.get("absolute_trajectory_error")
     if ate is not None and ate.num_compared:
         rows.append(

@@ -61,6 +61,21 @@ def run_frames(terminal: Terminal, done: Reconstruction, indices: Sequence[int])
     return interruption.wanted
 
 
+def retry_lost(terminal: Terminal, done: Reconstruction) -> bool:
+    """Go over the lost frames again, while any of them is found; return whether Ctrl-C stopped it."""
+    num_lost = done.counts["LOST"]
+    if not num_lost:
+        return False
+    with interruptible() as interruption, terminal.progress("lost frames", num_lost) as advance:
+        for frame in done.retry_lost():
+            if frame.world_from_camera is not None:
+                _log.info("frame %d: found after all", frame.index)
+            advance(f"{num_lost - done.counts['LOST']} found")
+            if interruption.wanted:
+                break
+    return interruption.wanted
+
+
 def advice(reason: str) -> str:
     """Return a message of the library in the words of the command line."""
     return reason.replace("check depth_scale,", "give --depth-scale,").replace("depth_scale", "--depth-scale")

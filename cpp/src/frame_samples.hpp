@@ -1,0 +1,19 @@
+// Points of a frame to register it by.
+#pragma once
+
+#include "nacre/model.hpp"
+#include "surface_observer.hpp"
+
+namespace nacre {
+
+// Denoised points of a frame, spread over it at random: noise would shift the matches on curved surfaces.
+struct FrameSamples {
+  Points points, normals;  // camera frame
+  Values noise;            // standard deviation of each measurement [m]
+  Values sigma;            // with what its neighbours are wrong by, too, which no averaging removes [m]
+};
+
+// options.registration.max_samples of them, or as many as the frame has.
+FrameSamples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options);
+
+}  // namespace nacre
