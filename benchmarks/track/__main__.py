@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from pathlib import Path
 from typing import Any
 
-from track import commands, page
+from track import commands, page, pictures
 from track.figures import TAU, collect
 from track.peers import TITLES
 from track.rows import Figures, Places, Row
@@ -27,7 +28,7 @@ def run_row(places: Places, row: Row, with_peers: bool) -> dict[str, Figures]:
         )
     for peer in row.peers if with_peers else ():
         results[TITLES[peer]] = attempt(
-            places, row, peer, lambda out, name=peer: commands.run_peer(name, recording, out)
+            places, row, peer, lambda out, name=peer: commands.run_peer(name, recording, out, row.voxel)
         )
     return results
 
@@ -75,7 +76,13 @@ def main() -> int:
         file.write_text(json.dumps(results, indent=1) + "\n")
         print(page.section(row, results[row.name]))
     if options["page"]:
-        Path(options["page"]).write_text(page.page(results))
+        target = Path(options["page"])
+        drawn = pictures.write_all(places, output / "pictures")
+        shown = [name for name in drawn if name in page.PICTURES]
+        (target.parent / "images").mkdir(exist_ok=True)
+        for name in shown:
+            shutil.copy(output / "pictures" / name, target.parent / "images" / name)
+        target.write_text(page.page(results, shown))
     missed = page.missed(results, [row for row in ROWS if not options["only"] or row.name in options["only"]])
     print("\n".join(missed) if missed else "every goal of these rows is reached")
     return 0

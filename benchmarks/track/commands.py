@@ -43,9 +43,9 @@ def reconstruct(recording: Path, out: Path, *settings: str) -> float:
     return program(NACRE, "reconstruct", recording, "-o", out, "--quiet", *settings)[1]
 
 
-def run_peer(name: str, recording: Path, out: Path) -> float:
+def run_peer(name: str, recording: Path, out: Path, voxel: float | None) -> float:
     """Run a peer over a recording in a process of its own; return the processor time [s]."""
-    return program([sys.executable, "-m", "track.peer"], name, recording, out)[1]
+    return program([sys.executable, "-m", "track.peer"], name, recording, out, voxel or 0.0)[1]
 
 
 def evaluate(out: Path, *arguments: str | Path | float) -> dict[str, Any]:

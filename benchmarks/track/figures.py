@@ -47,9 +47,14 @@ BY_NAME = {figure.name: figure for figure in FIGURES}
 
 
 def collect(evaluation: Mapping[str, Any], out: Path, processor: float) -> dict[str, Any]:
-    """Return the figures of a contender by name, in the table's units; those that are not known are left out."""
+    """Return the figures of a contender by name, in the table's units; unknown ones are left out."""
     report = json.loads((out / "report.json").read_text())
+    status = [frame["status"] for frame in report["frames"]]
+    counts = {
+        f"num_{name}": status.count(name.upper()) for name in ("tracked", "relocalised", "weak", "lost")
+    }
     known = {
+        "frames": {"num_frames": len(status), **counts},
         **evaluation,
         "run": {"milliseconds": report["milliseconds"]["median"], "processor": processor},
     }

@@ -10,20 +10,28 @@ from track.figures import FIGURES as ALL
 from track.rows import Goal, Row
 from track.table import ROWS
 
+PICTURES = {
+    "model-bunny12.png": "The bunny from 12 noisy views (Stanford 3D Scanning Repository)",
+    "model-spot12.png": "Spot from 12 noisy views (Keenan Crane)",
+    "model-teddy.png": "tum-fr3-teddy (TUM RGB-D benchmark, CC BY 4.0)",
+}
+"""What may be shown; the others stay in the folder of the results."""
 
-def page(results: Mapping[str, Any]) -> str:
+
+def page(results: Mapping[str, Any], pictures: list[str]) -> str:
     """Return the whole page."""
     parts = [INTRODUCTION, summary(results)]
+    parts += [f"![{PICTURES[name]}](images/{name})\n\n*{PICTURES[name]}.*\n" for name in pictures]
     parts += [section(row, results[row.name]) for row in ROWS if row.name in results]
     return "\n".join(parts)
 
 
 INTRODUCTION = """# Tracking and models, measured
 
-Made by `python benchmarks/tracking.py`: every recording is simulated (`nacre simulate`) or real, is run through
-`nacre reconstruct` with default settings, and what that wrote is measured by `nacre evaluate`. Peers run on
-the same frames, all of them, in an environment of their own, and what they wrote is measured by the same
-command. [`benchmarks/README.md`](../benchmarks/README.md) says how.
+Made by `python benchmarks/tracking.py`: every recording is simulated (`nacre simulate`) or real, is run
+through `nacre reconstruct` with default settings, and what that wrote is measured by `nacre evaluate`.
+Peers run on the same frames, all of them, in an environment of their own, and what they wrote is measured
+by the same command. [`benchmarks/README.md`](../benchmarks/README.md) says how.
 
 Errors of poses are those throughout, the greatest of all frames, with the first frame in its place; the
 shift is that of the object's middle. A model's RMS and bias (positive: outside) are to the true surface;

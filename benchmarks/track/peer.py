@@ -1,5 +1,5 @@
 """
-Run a peer over a recording: ``python -m track.peer NAME RECORDING OUT``.
+Run a peer over a recording: ``python -m track.peer NAME RECORDING OUT VOXEL``.
 
 OUT gets what ``nacre reconstruct`` writes, as far as ``nacre evaluate`` reads it.
 """
@@ -18,7 +18,7 @@ import nacre
 from track.peers import make
 
 
-def main(name: str, recording: str, out: str) -> None:
+def main(name: str, recording: str, out: str, voxel: str) -> None:
     """Track every frame; one that the peer fails on is lost."""
     sequence = nacre.open_sequence(recording).without_color()
     camera, folder = sequence.camera, Path(out)
@@ -28,7 +28,7 @@ def main(name: str, recording: str, out: str) -> None:
     for index in range(len(sequence)):
         frame = sequence[index]
         depth = np.asarray(frame.depth, np.float32)
-        loop = loop or make(name, camera, depth)
+        loop = loop or make(name, camera, depth, float(voxel))
         start, reason = time.perf_counter(), ""
         try:
             pose = loop.add(depth)

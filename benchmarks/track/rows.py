@@ -78,6 +78,8 @@ class Row:
         ``mesh(places)`` is the true surface, in the frame of the true poses.
     scale : float
         Metres per unit of the mesh.
+    voxel : float, optional
+        Grid of the peers' models [m]; by default twice a pixel.
     settings : dict of str to list of str
         What nacre is run with, by the name of the contender: options of ``nacre reconstruct``.
     peers : tuple of str
@@ -95,6 +97,7 @@ class Row:
     recording: Callable[[Places], Path] | None = None
     mesh: Callable[[Places], Path] | None = None
     scale: float = 1.0
+    voxel: float | None = None
     settings: Mapping[str, list[str]] = field(default_factory=lambda: {"nacre": []})
     peers: tuple[str, ...] = ()
     goals: tuple[Goal, ...] = ()

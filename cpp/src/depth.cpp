@@ -9,6 +9,7 @@
 #include "parallel.hpp"
 #include "planar_image.hpp"
 #include "ray_table.hpp"
+#include "simd/edge_row.hpp"
 #include "simd/keep_row.hpp"
 #include "simd/point_row.hpp"
 
@@ -90,6 +91,28 @@ ByteImage keep_pixels(const DepthRef& depth, const Camera& camera, const DepthOp
   return keep;
 }
 
+// The reasons of keep_pixels, pixel by pixel; what went later was isolated.
+MaskImage label(const DepthRef& depth, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
+                const ByteImage& marks, const ByteImage& keep, int num_threads) {
+  const float min_depth = round_up(options.min_depth), max_depth = round_down(options.max_depth);
+  const auto reason = [&](int u, int v, const float* direction_x) {
+    const float z = depth(v, u);
+    if (!is_measurement(z) || std::isnan(direction_x[u])) return PixelLabel::invalid;
+    if (z < min_depth || z > max_depth) return PixelLabel::out_of_range;
+    if (mask.size() > 0 && mask(v, u) == 0) return PixelLabel::masked;
+    if ((marks.row(v)[u] & simd::edge_mark) != 0) return PixelLabel::edge;
+    if ((marks.row(v)[u] & simd::slanted_mark) != 0) return PixelLabel::slanted;
+    return keep.row(v)[u] != 0 ? PixelLabel::kept : PixelLabel::isolated;
+  };
+  MaskImage labels(depth.rows(), depth.cols());
+  parallel_for(depth.rows(), rows_per_block(depth.cols()), num_threads, [&](std::int64_t row) {
+    const int v = static_cast<int>(row);
+    const float* const direction_x = camera.ray_table().row(v).x;
+    for (int u = 0; u < camera.width(); ++u) labels(v, u) = static_cast<std::uint8_t>(reason(u, v, direction_x));
+  });
+  return labels;
+}
+
 }  // namespace
 
 void DepthOptions::check() const {
@@ -128,6 +151,11 @@ DepthImage depth_from_raw(
 
 DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const DepthOptions& options,
                             const MaskRef& mask, DepthReport* report, int num_threads) {
+  return clean_depth(depth, camera, options, mask, nullptr, report, nullptr, num_threads);
+}
+
+DepthImage clean_depth(const DepthRef& depth, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
+                       NoiseCalibration* calibration, DepthReport* report, MaskImage* labels, int num_threads) {
   options.check();
   require_camera_size("depth", depth.rows(), depth.cols(), camera);
   if (mask.size() > 0) require_camera_size("mask", mask.rows(), mask.cols(), camera);
@@ -136,7 +164,10 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
   // The tests see every measurement, so that range and mask do not make edges where there are none.
   const PlanarImage image(depth, camera, num_threads);
   const WindowFits fits = fit_windows(image, camera, num_threads);
-  const NoiseModel noise = options.noise ? *options.noise : estimate_noise(fits, camera, num_threads);
+  if (calibration != nullptr && !options.noise) calibration->add(image, fits, num_threads);
+  const NoiseModel noise = options.noise            ? *options.noise
+                           : calibration != nullptr ? calibration->model()
+                                                    : estimate_noise(fits, camera, num_threads);
   ByteImage marks = mark_edges(depth, image, fits, noise, options, num_threads);
   dilate(options.edge_dilation, num_threads, marks);
 
@@ -162,7 +193,15 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
     counts.num_isolated -= others;
   }
   if (report != nullptr) *report = counts;
+  if (labels != nullptr) *labels = label(depth, camera, options, mask, marks, keep, num_threads);
   return clean;
+}
+
+MaskImage label_pixels(const DepthRef& depth, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
+                       int num_threads) {
+  MaskImage labels;
+  clean_depth(depth, camera, options, mask, nullptr, nullptr, &labels, num_threads);
+  return labels;
 }
 
 Points back_project(const DepthRef& depth, const Camera& camera, int num_threads) {

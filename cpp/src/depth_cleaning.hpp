@@ -27,4 +27,8 @@ void drop_lonely(double max_missing, int num_threads, ByteImage& keep);
 void drop_specks(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options, int num_threads,
                  ByteImage& keep);
 
+// preprocess_depth, where unset noise is what a calibration says once it has seen this image; and label_pixels.
+DepthImage clean_depth(const DepthRef& depth, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
+                       NoiseCalibration* calibration, DepthReport* report, MaskImage* labels, int num_threads);
+
 }  // namespace nacre

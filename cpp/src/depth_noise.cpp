@@ -23,10 +23,10 @@ std::int64_t count_values(const std::vector<float>& values) {
   return count;
 }
 
-// Structured light and stereo match windows, so that their noise is a rough part, independent from pixel to pixel, and a
-// smooth one that neighbours share. The smooth part's correlation is like exp(-(d / 3.3 pixels)^2), as measured on
-// recordings of three such sensors. Of its variance, a quadratic surface fitted to 7 x 7 pixels leaves kSmoothLeft over,
-// and second differences see kSmoothBent.
+// Structured light and stereo match windows, so that their noise is a rough part, independent from pixel to pixel, and
+// a smooth one that neighbours share. The smooth part's correlation is like exp(-(d / 3.3 pixels)^2), as measured on
+// recordings of three such sensors. Of its variance, a quadratic surface fitted to 7 x 7 pixels leaves kSmoothLeft
+// over, and second differences see kSmoothBent.
 constexpr double kSmoothLeft = 0.1192, kSmoothBent = 0.0145;
 // Curved surfaces leave a little more over than they bend: not taken for a smooth part.
 constexpr double kIndependent = 0.95;
@@ -43,12 +43,17 @@ double total_by_left(double bends_by_fits) {
   return std::min(rough + smooth, 1.0 / least);
 }
 
-// The ratio of the variances by bends and by fits, over the windows whose residual is not above a limit.
-double bends_by_fits(const WindowFits& fits, double limit) {
+// The ratio of the variances by bends and by fits, over the windows that stand between two whose residual is not above
+// a limit: were they chosen by their own, the ratio would be too large.
+double bends_by_fits(const WindowFits& fits, float limit) {
+  const auto cols = static_cast<std::size_t>(fits.cols);
   double bends = 0.0, left = 0.0;
-  for (std::size_t i = 0; i < fits.residual.size(); ++i) {
+  for (std::size_t i = 1; i + 1 < fits.residual.size(); ++i) {
+    const std::size_t column = i % cols;
+    if (column == 0 || column + 1 == cols) continue;
+    if (!(fits.residual[i - 1] <= limit) || !(fits.residual[i + 1] <= limit)) continue;
     const auto residual = static_cast<double>(fits.residual[i]);
-    if (!(residual <= limit)) continue;
+    if (!(residual <= 2.0 * static_cast<double>(limit))) continue;  // an edge
     bends += static_cast<double>(fits.roughness[i]) * static_cast<double>(fits.roughness[i]);
     left += residual * residual;
   }
@@ -104,8 +109,8 @@ WindowFits fit_windows(const PlanarImage& image, const Camera& camera, int num_t
                  const std::int64_t first = row * fits.cols;
                  fit_row(image.row(WindowFits::centre(static_cast<int>(row))) + WindowFits::centre(0), image.stride(),
                          fits.cols, rule,
-                         {fits.residual.data() + first, fits.roughness.data() + first, fits.pixel.data() + first, fits.step.data() + first,
-                          fits.slope.data() + first});
+                         {fits.residual.data() + first, fits.roughness.data() + first, fits.pixel.data() + first,
+                          fits.step.data() + first, fits.slope.data() + first});
                });
   return fits;
 }
@@ -145,7 +150,7 @@ std::optional<NoiseScale> measure_noise(const WindowFits& fits, int num_threads)
     scales[k] = parts[k]();
   });
   const double local = *std::max_element(scales.begin(), scales.end());
-  const double total = scales[0] * std::sqrt(total_by_left(bends_by_fits(fits, scales[0])));
+  const double total = scales[0] * std::sqrt(total_by_left(bends_by_fits(fits, static_cast<float>(scales[0]))));
   return NoiseScale{local, std::max(local, total)};
 }
 

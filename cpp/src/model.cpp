@@ -8,6 +8,7 @@
 #include "attribute_fusion.hpp"
 #include "check.hpp"
 #include "consolidation_fold.hpp"
+#include "depth_cleaning.hpp"
 #include "fusion_step.hpp"
 #include "loop_closure.hpp"
 #include "model_correction.hpp"
@@ -128,6 +129,7 @@ struct Model::Impl {
   Frame frame;           // the newest; its memory and the observer's are used again for the next
   SurfaceObserver observer{camera, options.fusion};
   MaskImage region;  // of the newest frame; empty where nothing is left out
+  NoiseCalibration calibration{camera};
   PointModel cloud;
   LoopClosure loops{camera, options};
   std::vector<FrameReport> reports;
@@ -147,6 +149,7 @@ struct Model::Impl {
   }
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
+  NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
   void keep_region(FrameReport& report);
   TrackingResult locate(const FrameExtras& extras, const RegionReport& region) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
@@ -165,10 +168,10 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   report.timestamp = extras.timestamp;
 
   const DepthImage clean =
-      preprocess_depth(depth, camera, options.depth, extras.mask, &report.depth, options.num_threads);
+      clean_depth(depth, camera, options.depth, extras.mask, &calibration, &report.depth, nullptr, options.num_threads);
   report.milliseconds.preprocess = watch.lap();
 
-  make_frame(clean, camera, options.depth.noise, options.num_threads, frame);
+  make_frame(clean, camera, noise(), options.num_threads, frame);
   report.milliseconds.back_project = watch.lap();
 
   keep_region(report);
@@ -329,6 +332,7 @@ const Camera& Model::camera() const { return impl_->camera; }
 const ModelOptions& Model::options() const { return impl_->options; }
 const PointModel& Model::cloud() const { return impl_->cloud; }
 const std::vector<FrameReport>& Model::frames() const { return impl_->reports; }
+NoiseModel Model::noise() const { return impl_->noise(); }
 double Model::spacing() const { return impl_->spacing; }
 
 PointModel Model::cloud_in_camera() const {

@@ -11,6 +11,7 @@ using nacre::DepthReport;
 using nacre::EdgeTest;
 using nacre::Frame;
 using nacre::MaskRef;
+using nacre::NoiseCalibration;
 using nacre::NoiseModel;
 
 std::pair<DepthImage, DepthReport> preprocess_depth(const DepthRef& depth, const Camera& camera,
@@ -39,6 +40,11 @@ void bind_depth(py::module_& m) {
       .def_static("stereo", &NoiseModel::stereo, py::arg("fx"), py::arg("baseline") = 0.05,
                   py::arg("disparity_sigma") = 0.08)
       .def_static("time_of_flight", &NoiseModel::time_of_flight);
+  py::class_<NoiseCalibration>(m, "NoiseCalibration")
+      .def(py::init<const Camera&>(), py::arg("camera"))
+      .def("add", py::overload_cast<const DepthRef&, int>(&NoiseCalibration::add), py::arg("depth"),
+           py::arg("num_threads"), ReleaseGil())
+      .def("model", &NoiseCalibration::model);
   py::class_<DepthOptions>(m, "DepthOptions")
       .def(py::init<>())
       .def_readwrite("edge_test", &DepthOptions::edge_test)
@@ -73,6 +79,8 @@ void bind_depth(py::module_& m) {
 
   m.def("depth_from_raw", &nacre::depth_from_raw, py::arg("raw"), py::arg("depth_scale"), ReleaseGil());
   m.def("preprocess_depth", &preprocess_depth, py::arg("depth"), py::arg("camera"), py::arg("options"), py::arg("mask"),
+        py::arg("num_threads"), ReleaseGil());
+  m.def("label_pixels", &nacre::label_pixels, py::arg("depth"), py::arg("camera"), py::arg("options"), py::arg("mask"),
         py::arg("num_threads"), ReleaseGil());
   m.def("estimate_noise", &nacre::estimate_noise, py::arg("depth"), py::arg("camera"), py::arg("num_threads"),
         ReleaseGil());

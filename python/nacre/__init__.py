@@ -7,12 +7,12 @@ from nacre._core import Camera, __version__
 from nacre.consolidation import Consolidated, consolidate, project_samples
 from nacre.datasets import Sequence, SequenceFrame, open_sequence, write_recording
 from nacre.depth import (
+    PIXEL_LABELS,
     DepthParameters,
     DepthReport,
-    NoiseModel,
     back_project,
     depth_normals,
-    estimate_noise,
+    label_pixels,
     preprocess_depth,
 )
 from nacre.errors import FileFormatError
@@ -25,6 +25,7 @@ from nacre.io.trajectories import Trajectory, associate, read_trajectory, write_
 from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
 from nacre.model import FrameReport, Model, ModelParameters
 from nacre.neighbors import KdTree, RadiusNeighbors
+from nacre.noise import NoiseModel, calibrate_noise, estimate_noise
 from nacre.normals import estimate_normals
 from nacre.region import RegionParameters, RegionReport, select_region
 from nacre.registration import AlignResult, RegistrationParameters, align
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from nacre import evaluation
 
 __all__ = [
+    "PIXEL_LABELS",
     "AlignResult",
     "Camera",
     "CameraFile",
@@ -66,6 +68,7 @@ __all__ = [
     "associate",
     "back_project",
     "built_in_object",
+    "calibrate_noise",
     "consolidate",
     "default_camera",
     "default_threads",
@@ -74,6 +77,7 @@ __all__ = [
     "estimate_normals",
     "evaluation",
     "instruction_set",
+    "label_pixels",
     "open_sequence",
     "preprocess_depth",
     "project_samples",

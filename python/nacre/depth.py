@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-import numbers
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -12,52 +11,27 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre.arrays import as_depth, as_mask
+from nacre.noise import Noise, NoiseModel, NoiseName, as_noise, estimate_noise
 from nacre.parameters import to_core
+
+__all__ = [
+    "PIXEL_LABELS",
+    "DepthParameters",
+    "DepthReport",
+    "Noise",
+    "NoiseModel",
+    "back_project",
+    "depth_normals",
+    "estimate_noise",
+    "label_pixels",
+    "preprocess_depth",
+]
+
+PIXEL_LABELS = ("kept", "invalid", "out_of_range", "masked", "edge", "slanted", "isolated")
+"""What the values of :func:`label_pixels` mean."""
 
 DepthArray = npt.NDArray[np.float32]
 EdgeTest = Literal["inverse_depth", "gradient", "none"]
-
-
-@dataclass(frozen=True)
-class NoiseModel:
-    """
-    The standard deviation of a depth value: ``sigma(z) = constant + quadratic * (z - offset) ** 2``.
-
-    Parameters
-    ----------
-    constant, offset : float
-        [m].
-    quadratic : float
-        [1/m].
-    """
-
-    constant: float = 0.0
-    quadratic: float = 0.0
-    offset: float = 0.0
-
-    @overload
-    def sigma(self, z: float) -> float: ...
-    @overload
-    def sigma(self, z: npt.NDArray[Any]) -> npt.NDArray[Any]: ...
-    def sigma(self, z: float | npt.NDArray[Any]) -> float | npt.NDArray[Any]:
-        """Return the standard deviation at depth ``z``, both in metres."""
-        return self.constant + self.quadratic * (z - self.offset) ** 2
-
-    @classmethod
-    def kinect(cls) -> NoiseModel:
-        """Structured light, Nguyen et al. 2012: 1.2 mm + 1.9 mm (z - 0.4 m)^2."""
-        return cls._from_core(_core.NoiseModel.kinect())
-
-    def to_core(self) -> Any:
-        """Return the C++ model with these values."""
-        return to_core(self, _core.NoiseModel())
-
-    @classmethod
-    def _from_core(cls, core: Any) -> NoiseModel:
-        return cls(*(getattr(core, field.name) for field in fields(cls)))
-
-
-Noise = NoiseModel | float | Literal["kinect"] | None
 
 
 @dataclass(frozen=True)
@@ -65,7 +39,8 @@ class DepthParameters:
     """
     What :func:`preprocess_depth` removes; see there for each field.
 
-    Mirrors the C++ ``DepthOptions``; ``noise=None`` measures the noise from the image itself.
+    Mirrors the C++ ``DepthOptions``; ``noise=None`` measures the noise: from the image itself, or from all
+    images of a model so far.
     """
 
     edge_test: EdgeTest = "inverse_depth"
@@ -77,7 +52,11 @@ class DepthParameters:
     max_slant: float = 1.3962634
     max_missing: float = 0.6
     min_component: int = 20
-    noise: NoiseModel | None = None
+    noise: NoiseModel | NoiseName | None = None
+
+    def for_camera(self, camera: _core.Camera) -> DepthParameters:
+        """Return the same with the noise model of that camera, where only its kind is named."""
+        return replace(self, noise=as_noise("depth.noise", self.noise, camera))
 
 
 @dataclass(frozen=True)
@@ -96,20 +75,6 @@ class DepthReport:
     @classmethod
     def _from_core(cls, core: Any) -> DepthReport:
         return cls(*(getattr(core, field.name) for field in fields(cls)))
-
-
-def as_noise(name: str, value: Noise) -> NoiseModel | None:
-    """Return a noise argument as a model: a number is a constant [m]; None stays None."""
-    expected = f"{name} must be a NoiseModel, a number of metres, 'kinect' or None"
-    if value is None or isinstance(value, NoiseModel):
-        return value
-    if isinstance(value, str):
-        if value != "kinect":
-            raise ValueError(f"{expected}, got {value!r}")
-        return NoiseModel.kinect()
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise TypeError(f"{expected}, got {type(value).__name__}")
-    return NoiseModel(constant=float(value))
 
 
 @overload
@@ -208,9 +173,9 @@ def preprocess_depth(
         A pixel goes where more than this part of its 5 x 5 neighbours is missing.
     min_component : int
         Connected specks of fewer pixels go.
-    noise : NoiseModel, float, "kinect" or None
-        The noise of the depth; a number is a constant standard deviation [m]; None measures it from the
-        image.
+    noise : NoiseModel, float, "kinect", "stereo", "tof", "auto" or None
+        The noise of the depth; a number is a constant standard deviation [m]; a name is that of a kind of
+        sensor (see :class:`NoiseModel`); None and "auto" measure it from the image.
     return_report : bool
         Also return a :class:`DepthReport`.
     num_threads : int
@@ -240,7 +205,7 @@ def preprocess_depth(
         max_slant=max_slant,
         max_missing=max_missing,
         min_component=min_component,
-        noise=as_noise("noise", noise),
+        noise=as_noise("noise", noise, camera),
     )
     shape = (image.shape[0], image.shape[1])
     clean, report = _core.preprocess_depth(
@@ -251,6 +216,51 @@ def preprocess_depth(
         num_threads,
     )
     return (clean, DepthReport._from_core(report)) if return_report else clean
+
+
+def label_pixels(
+    depth: npt.ArrayLike,
+    camera: _core.Camera,
+    parameters: DepthParameters | None = None,
+    *,
+    mask: npt.ArrayLike | None = None,
+    depth_scale: float = 1.0,
+    num_threads: int = 0,
+) -> npt.NDArray[np.uint8]:
+    """
+    Return why :func:`preprocess_depth` removes each pixel.
+
+    Parameters
+    ----------
+    depth : (H, W) array
+        Depth image in units of 1 / ``depth_scale`` metres, any real dtype.
+    camera : Camera
+        The camera of the image.
+    parameters : DepthParameters, optional
+        What is removed.
+    mask : (H, W) array, optional
+        Pixels where it is not 0 are used.
+    depth_scale : float
+        Stored units per metre.
+    num_threads : int
+        0 uses every processor. The result does not depend on it.
+
+    Returns
+    -------
+    labels : (H, W) uint8
+        Indices of :data:`PIXEL_LABELS`, 0 where a pixel is kept. They count up to the :class:`DepthReport`.
+
+    Raises
+    ------
+    ValueError
+        As :func:`preprocess_depth`.
+    """
+    image = as_depth("depth", depth, depth_scale)
+    options = to_core((parameters or DepthParameters()).for_camera(camera), _core.DepthOptions())
+    labels: npt.NDArray[np.uint8] = _core.label_pixels(
+        image, camera, options, as_mask("mask", mask, (image.shape[0], image.shape[1])), num_threads
+    )
+    return labels
 
 
 def back_project(
@@ -309,9 +319,9 @@ def depth_normals(
         The camera of the image.
     depth_scale : float
         Stored units per metre.
-    noise : NoiseModel, float, "kinect" or None
-        The noise of the depth; a number is a constant standard deviation [m]; None measures it from the
-        image.
+    noise : NoiseModel, float, "kinect", "stereo", "tof", "auto" or None
+        The noise of the depth; a number is a constant standard deviation [m]; a name is that of a kind of
+        sensor (see :class:`NoiseModel`); None and "auto" measure it from the image.
     num_threads : int
         0 uses every processor. The result does not depend on it.
 
@@ -326,41 +336,7 @@ def depth_normals(
         Depth and camera differ in size.
     """
     image = as_depth("depth", depth, depth_scale)
-    model = as_noise("noise", noise)
+    model = as_noise("noise", noise, camera)
     core_model = None if model is None else model.to_core()
     normals: npt.NDArray[np.float32] = _core.depth_normals(image, camera, core_model, num_threads)
     return normals.reshape(*image.shape, 3)
-
-
-def estimate_noise(
-    depth: npt.ArrayLike, camera: _core.Camera, *, depth_scale: float = 1.0, num_threads: int = 0
-) -> NoiseModel:
-    """
-    Return the noise of a depth image, measured from the residuals of local surface fits.
-
-    Parameters
-    ----------
-    depth : (H, W) array
-        Depth image in units of 1 / ``depth_scale`` metres.
-    camera : Camera
-        The camera of the image.
-    depth_scale : float
-        Stored units per metre.
-    num_threads : int
-        0 uses every processor. The result does not depend on it.
-
-    Returns
-    -------
-    noise : NoiseModel
-        For a pinhole camera the Kinect's curve scaled to the image, for an orthographic camera a constant. A
-        clean image gives a small positive floor; an image without smooth patches the Kinect's curve itself,
-        or a tenth of a pixel for an orthographic camera.
-
-    Raises
-    ------
-    ValueError
-        Depth and camera differ in size.
-    """
-    return NoiseModel._from_core(
-        _core.estimate_noise(as_depth("depth", depth, depth_scale), camera, num_threads)
-    )

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre import _core, arrays
-from nacre.depth import NoiseModel, as_noise
+from nacre.noise import NoiseModel, NoiseName, as_noise
 from nacre.parameters import to_core
 
 
@@ -152,7 +151,7 @@ class Mesh:
         camera: _core.Camera,
         world_from_camera: npt.ArrayLike,
         *,
-        noise: float | Literal["kinect"] | NoiseModel = 0.0,
+        noise: float | NoiseName | NoiseModel = 0.0,
         edge_mixing: float = 0.0,
         background_depth: float | None = None,
         quantization: float = 0.0,
@@ -164,7 +163,7 @@ class Mesh:
         pose = arrays.as_pose("world_from_camera", world_from_camera).copy()
         pose[:3, 3] -= self._origin
         parameters = _Simulation(
-            noise=as_noise("noise", noise) or NoiseModel(),
+            noise=as_noise("noise", noise, camera) or NoiseModel(),
             edge_mixing=edge_mixing,
             background_depth=_background(background_depth),
             quantization=quantization,

@@ -15,6 +15,7 @@ from nacre import _core
 from nacre._core import Camera
 from nacre.arrays import as_attributes, as_depth, as_mask, as_pose
 from nacre.depth import DepthParameters, DepthReport
+from nacre.noise import NoiseModel
 from nacre.parameters import from_core, to_core, updated
 from nacre.region import RegionParameters, RegionReport
 from nacre.registration import RegistrationParameters
@@ -279,7 +280,8 @@ class Model:
             raise TypeError(f"parameters must be nacre.ModelParameters, got {type(parameters).__name__}")
         if not (np.isfinite(depth_scale) and depth_scale > 0):
             raise ValueError(f"depth_scale must be positive (stored units per metre), got {depth_scale!r}")
-        self.parameters = updated(parameters, changes)
+        parameters = updated(parameters, changes)
+        self.parameters = replace(parameters, depth=parameters.depth.for_camera(camera))
         self._depth_scale = depth_scale
         self._core = _core.Model(camera, to_core(self.parameters, _core.ModelOptions()))
         self._lock = threading.Lock()
@@ -428,6 +430,12 @@ class Model:
         """Distance between neighbouring points [m]; 0 before the first frame."""
         with self._lock:
             return self._core.spacing
+
+    @property
+    def noise(self) -> NoiseModel:
+        """The noise of the depth: as given, or measured from the frames so far."""
+        with self._lock:
+            return NoiseModel._from_core(self._core.noise)
 
     def in_camera(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
         """Return points and normals in the newest registered camera's frame, as the paper keeps its model."""

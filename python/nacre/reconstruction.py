@@ -242,6 +242,7 @@ class Reconstruction:
                 "coverage": self.num_tracked / len(self.frames) if self.frames else None,
                 "num_points": len(self.model),
                 "spacing": self.model.spacing,
+                "noise": dataclasses.asdict(self.model.noise),
                 "milliseconds": {
                     "mean": times.mean() if len(times) else None,
                     "median": np.median(times) if len(times) else None,

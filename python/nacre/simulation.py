@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from nacre import arrays
 from nacre._core import Camera
-from nacre.depth import NoiseModel
 from nacre.mesh import Mesh
+from nacre.noise import NoiseModel, NoiseName
 
 
 def simulate_depth(
@@ -20,7 +20,7 @@ def simulate_depth(
     camera: Camera,
     world_from_camera: npt.ArrayLike,
     *,
-    noise: float | Literal["kinect"] | NoiseModel = 0.0,
+    noise: float | NoiseName | NoiseModel = 0.0,
     edge_mixing: float = 0.0,
     background_depth: float | None = None,
     quantization: float = 0.0,
@@ -46,9 +46,9 @@ def simulate_depth(
         plane.
     world_from_camera : (4, 4) array_like
         The camera's pose in the frame of the vertices; OpenCV axes (x right, y down, z forward).
-    noise : float, "kinect" or nacre.NoiseModel
-        Standard deviation of Gaussian noise along the depth value [m]; "kinect" is that of structured light,
-        1.2 mm + 1.9 mm (z - 0.4 m)^2 [1]_.
+    noise : float, "kinect", "stereo", "tof" or nacre.NoiseModel
+        Standard deviation of Gaussian noise along the depth value, independent from pixel to pixel [m];
+        "kinect" is that of structured light, 1.2 mm + 1.9 mm (z - 0.4 m)^2 [1]_.
     edge_mixing : float or bool
         Pixels within this distance of a depth edge [pixels] see both sides of it: their depth is that of a
         finer image, blurred and sampled down, as the mean of rays weighted by a tent of this radius. Rays

@@ -16,6 +16,7 @@ from nacre.evaluation import (
     completeness,
     f_score,
     normal_error,
+    pose_error,
     relative_pose_error,
     sample_surface,
     surface_accuracy,
@@ -467,6 +468,7 @@ def test_every_result_is_frozen_and_fits_into_json() -> None:
     estimated[1] = NAN_POSE
     results = [
         absolute_trajectory_error(estimated, truth),
+        pose_error(estimated, truth),
         relative_pose_error(estimated, truth),
         surface_accuracy([[0, 0, 1.0], [np.nan, 0, 0]], plane_mesh()),
         completeness(np.zeros((0, 3)), plane_mesh(), num_samples=10),

@@ -1,8 +1,8 @@
 """
 The loops that users compose of other libraries, one module each.
 
-A module has ``make(camera, depth)``, which gets the camera and the first depth image (metres, NaN where
-nothing was measured) and returns a :class:`Loop`; the import of the library belongs into it.
+A module has ``make(camera, voxel)``, which gets the camera and the grid of the model [m] and returns a
+:class:`Loop`; the import of the library belongs into it.
 """
 
 from __future__ import annotations
@@ -42,10 +42,12 @@ class Loop(Protocol):
         """Return the model; (0, 3) where there is none."""
 
 
-def make(name: str, camera: Any, depth: Array) -> Loop:
-    """Return a peer's loop for a camera."""
+def make(name: str, camera: Any, depth: Array, voxel: float = 0.0) -> Loop:
+    """Return a peer's loop for a camera; voxel 0 is twice a pixel of the first image."""
     module = name.removesuffix("_eroded")
-    loop: Loop = importlib.import_module(f"track.peers.{module}").make(camera, depth)
+    loop: Loop = importlib.import_module(f"track.peers.{module}").make(
+        camera, voxel or voxel_size(camera, depth)
+    )
     return loop if module == name else Eroded(loop)
 
 

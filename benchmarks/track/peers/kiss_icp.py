@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 import nacre
-from track.peers import FAR, Array, cut, voxel_size
+from track.peers import FAR, Array, cut
 
 
 class KissLoop:
@@ -37,6 +37,6 @@ class KissLoop:
         return np.asarray(self.odometry.local_map.point_cloud())
 
 
-def make(camera: Any, depth: Array) -> KissLoop:
+def make(camera: Any, voxel: float) -> KissLoop:
     """Return the loop."""
-    return KissLoop(camera, voxel_size(camera, depth))
+    return KissLoop(camera, voxel)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from track.peers import Array, cut, voxel_size
+from track.peers import Array, cut
 
 GATES = (10, 5, 2)
 """Of the stages [voxels]."""
@@ -54,6 +54,6 @@ class IcpLoop:
         return np.asarray(self.model.points)
 
 
-def make(camera: Any, depth: Array) -> IcpLoop:
+def make(camera: Any, voxel: float) -> IcpLoop:
     """Return the loop."""
-    return IcpLoop(camera, voxel_size(camera, depth))
+    return IcpLoop(camera, voxel)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from track.peers import FAR, Array, intrinsics, voxel_size
+from track.peers import FAR, Array, intrinsics
 
 
 class SlamLoop:
@@ -46,6 +46,6 @@ class SlamLoop:
         return self.model.extract_pointcloud(3.0).point.positions.numpy()
 
 
-def make(camera: Any, depth: Array) -> SlamLoop:
+def make(camera: Any, voxel: float) -> SlamLoop:
     """Return the loop."""
-    return SlamLoop(camera, voxel_size(camera, depth))
+    return SlamLoop(camera, voxel)

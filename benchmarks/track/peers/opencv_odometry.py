@@ -43,6 +43,6 @@ class OdometryLoop:
         return np.zeros((0, 3))
 
 
-def make(camera: Any, depth: Array) -> OdometryLoop:
+def make(camera: Any, voxel: float) -> OdometryLoop:
     """Return the loop."""
     return OdometryLoop(camera)

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from track.peers import FAR, Array, cut, intrinsics, voxel_size
+from track.peers import FAR, Array, cut, intrinsics
 from track.peers.opencv_odometry import odometry
 
 
@@ -52,6 +52,6 @@ class TsdfLoop:
         return np.asarray(points).reshape(-1, np.asarray(points).shape[-1])[:, :3]
 
 
-def make(camera: Any, depth: Array) -> TsdfLoop:
+def make(camera: Any, voxel: float) -> TsdfLoop:
     """Return the loop."""
-    return TsdfLoop(camera, voxel_size(camera, depth))
+    return TsdfLoop(camera, voxel)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import nacre
-from track.peers import Array, cut, voxel_size
+from track.peers import Array, cut
 
 
 class VgicpLoop:
@@ -54,6 +54,6 @@ class VgicpLoop:
         return np.asarray(thin.points())[:, :3]
 
 
-def make(camera: Any, depth: Array) -> VgicpLoop:
+def make(camera: Any, voxel: float) -> VgicpLoop:
     """Return the loop."""
-    return VgicpLoop(camera, voxel_size(camera, depth))
+    return VgicpLoop(camera, voxel)

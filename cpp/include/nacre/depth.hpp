@@ -1,6 +1,7 @@
 /// Depth images: cleaning (edge noise above all), back-projection, normals of organised points.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -59,7 +60,8 @@ struct DepthOptions {
   double max_slant = 1.3962634;     ///< inverse-depth test: steeper surfaces are removed [rad]; 80 degrees
   double max_missing = 0.6;         ///< a pixel goes where more than this part of its 5 x 5 neighbours is missing
   int min_component = 20;           ///< connected specks of fewer pixels go
-  std::optional<NoiseModel> noise;  ///< unset: measured from the image itself (estimate_noise)
+  std::optional<NoiseModel> noise;  ///< unset: measured from the image itself (estimate_noise); a Model measures it
+                                    ///< from all images so far (NoiseCalibration)
 
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };
@@ -83,14 +85,51 @@ DepthImage depth_from_raw(
 
 /// The noise of a depth image, from the residuals of local surface fits (robust) and, where the image is quantised to
 /// plateaus, from their steps: for a pinhole camera the Kinect's curve scaled to them, for an orthographic camera a
-/// constant. Where neighbouring pixels are too alike for independent noise, what they share is added. A clean image gives a small positive floor, one without smooth patches the Kinect's curve (orthographic: a
-/// tenth of a pixel).
+/// constant. Where neighbouring pixels are too alike for independent noise, what they share is added. A clean image
+/// gives a small positive floor, one without smooth patches the Kinect's curve (orthographic: a tenth of a pixel).
 NoiseModel estimate_noise(const DepthRef& depth, const Camera& camera, int num_threads = 0);
+
+class PlanarImage;
+struct WindowFits;
+
+/// The noise of a sensor, measured from the images of a recording: what estimate_noise finds in each, pooled, and for a
+/// pinhole camera the curve over depth, where the images show several depths. The order of the images matters little,
+/// the number of threads not at all.
+class NoiseCalibration {
+ public:
+  explicit NoiseCalibration(const Camera& camera);
+
+  /// Throws std::invalid_argument when the depth has not the camera's size. An image without smooth patches adds
+  /// nothing.
+  void add(const DepthRef& depth, int num_threads = 0);
+  /// Of an image that is prepared already; for the library itself.
+  void add(const PlanarImage& image, const WindowFits& fits, int num_threads);
+
+  /// Before anything was added, what estimate_noise says of an empty image.
+  NoiseModel model() const;
+
+ private:
+  struct Mean {
+    double value = 0.0, count = 0.0;
+  };
+  static constexpr std::size_t num_bins = 18;  // of depth, a third of an octave each
+
+  Camera camera_;
+  Mean local_, total_, fitted_;        // logarithms of factors of the sensor's prior
+  std::array<Mean, num_bins> bins_{};  // likewise, of what surface fits leave over
+};
 
 /// A copy of a depth image in which noise is NaN. Throws std::invalid_argument when depth and camera or mask differ in
 /// size, and when the median depth lies outside 0.05-50 m (the message names depth_scale).
 DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const DepthOptions& options = {},
                             const MaskRef& mask = MaskImage(), DepthReport* report = nullptr, int num_threads = 0);
+
+/// What became of a pixel, the first reason that applies.
+enum class PixelLabel : std::uint8_t { kept, invalid, out_of_range, masked, edge, slanted, isolated };
+
+/// Why preprocess_depth removes each pixel: height x width values of PixelLabel, which count up to its DepthReport.
+MaskImage label_pixels(const DepthRef& depth, const Camera& camera, const DepthOptions& options = {},
+                       const MaskRef& mask = MaskImage(), int num_threads = 0);
 
 /// The valid pixels as points of the camera frame, row by row.
 Points back_project(const DepthRef& depth, const Camera& camera, int num_threads = 0);

@@ -121,7 +121,8 @@ class Model {
   PointModel cloud_in_camera() const;  ///< in the newest registered camera's frame
   /// One report per frame that was added. Where a later frame closed a loop, the poses are the corrected ones.
   const std::vector<FrameReport>& frames() const;
-  double spacing() const;  ///< [m]; 0 before the first frame
+  NoiseModel noise() const;  ///< given, or measured from the frames so far
+  double spacing() const;    ///< [m]; 0 before the first frame
 
  private:
   struct Impl;

@@ -94,9 +94,9 @@ NACRE_INLINE void find_roughness(const float* centre, ptrdiff_t stride, float* s
   for (int i = 0; i < columns; ++i) along[i] = bend(centre + i - 2, 1);  // two columns to the left
   for (int i = 0; i < columns; ++i) {
     const float* const p = centre + i;
-    across[i] =
-        ((bend(p - 2 * stride, stride) + bend(p + 2 * stride, stride)) + (bend(p - stride, stride) + bend(p + stride, stride))) +
-        bend(p, stride);
+    across[i] = ((bend(p - 2 * stride, stride) + bend(p + 2 * stride, stride)) +
+                 (bend(p - stride, stride) + bend(p + stride, stride))) +
+                bend(p, stride);
   }
   for (int i = 0; i < counted; ++i) {
     const float* const a = along + i;

@@ -19,8 +19,8 @@ struct WindowRule {
 };
 
 // Of each window: the standard deviation of the values about the surface; the same from the second differences along
-// the central row and column, which see nothing of what neighbours have in common; the change per pixel on a slope of 1;
-// the smallest step from one plateau to the next along the central row and column, NaN where there are not both:
+// the central row and column, which see nothing of what neighbours have in common; the change per pixel on a slope of
+// 1; the smallest step from one plateau to the next along the central row and column, NaN where there are not both:
 // plateaus, and steps (all four in units of the noise); the surface's slope per pixel. NaN where a pixel is missing.
 struct WindowRow {
   float *residual, *roughness, *pixel, *step, *slope;

@@ -119,9 +119,9 @@ def _checked(parameters: Any, key: str, value: Any) -> Any:
             raise CommandError(f"there is no parameter {key!r}{hint}; {known}", 2)
         current, group = getattr(current, part), f"{group}{part}."
     if key == "depth.noise":
-        from nacre.depth import NoiseModel, as_noise
+        from nacre.noise import NoiseModel, as_noise_choice
 
-        return NoiseModel(**value) if isinstance(value, Mapping) else as_noise(key, value)
+        return NoiseModel(**value) if isinstance(value, Mapping) else as_noise_choice(key, value)
     if dataclasses.is_dataclass(current):
         raise CommandError(
             f"{key} is a group; set one of {', '.join(f.name for f in dataclasses.fields(current))}", 2

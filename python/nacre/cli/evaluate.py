@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from nacre import Mesh, Trajectory
-
     from nacre.cli.written import Written
     from nacre.evaluation import SurfaceSamples
     from nacre.evaluation.result import Result
@@ -191,7 +190,7 @@ def _add(figures: Figures, rows: Rows, results: Mapping[str, Result], written: W
 
 
 def _seen(written: Written, mesh: Mesh, samples: SurfaceSamples) -> Any:
-    """Return which samples of the surface the cameras saw from their true poses; None where it is not known."""
+    """Return which samples the cameras saw from their true poses; None where that is not known."""
     from nacre.evaluation import seen_samples
 
     if written.truths is None or written.camera is None:

@@ -40,7 +40,10 @@ def simulate(
     views: Annotated[int, typer.Option(min=1, help="How many depth images.")] = 12,
     step: Annotated[float, typer.Option(help="Turn of the camera from view to view (degrees).")] = 30.0,
     noise: Annotated[
-        str, typer.Option(metavar="METRES|kinect", help="Standard deviation of the depth noise (metres).")
+        str,
+        typer.Option(
+            metavar="METRES|kinect|stereo|tof", help="Standard deviation of the depth noise (metres)."
+        ),
     ] = "0",
     orthographic: Annotated[
         bool, typer.Option("--orthographic", help="Parallel rays instead of a pinhole camera.")
@@ -158,14 +161,16 @@ def _mesh(name: str, scale: float) -> Mesh:
 
 
 def _noise(text: str) -> Any:
-    if text == "kinect":
+    if text in ("kinect", "stereo", "tof"):
         return text
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not (math.isfinite(value) and value >= 0):
-        raise CommandError(f"--noise must be a length in metres or the word kinect, got {text!r}", 2)
+        raise CommandError(
+            f"--noise must be a length in metres or one of kinect, stereo, tof, got {text!r}", 2
+        )
     return value
 
 

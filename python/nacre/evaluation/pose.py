@@ -37,7 +37,7 @@ def pose_error(
     truth: npt.ArrayLike,
     *,
     center: npt.ArrayLike = (0.0, 0.0, 0.0),
-    align: bool | Literal["first"] = "first",
+    align: Literal["first", False] = "first",
 ) -> PoseError:
     """
     Measure the errors of poses where they matter: at the object, not at the camera.
@@ -52,9 +52,9 @@ def pose_error(
         ``world_from_camera`` poses [m]; one that is not finite is not known.
     center : array_like, shape (3,), optional
         A point in the frame of ``truth``, the middle of the object [m].
-    align : "first", True or False, optional
-        "first" moves the estimate so that the first compared frame is without error; True so that the errors
-        of all are least, by the orientations; False compares as they are.
+    align : "first" or False, optional
+        "first" moves the estimate so that the first compared frame is without error; False compares as they
+        are.
 
     Returns
     -------
@@ -69,6 +69,8 @@ def pose_error(
     middle = np.asarray(center, dtype=np.float64)
     if middle.shape != (3,) or not np.isfinite(middle).all():
         raise ValueError(f"center must be three finite numbers, got {center!r}")
+    if align not in ("first", False):
+        raise ValueError(f'align must be "first" or False, got {align!r}')
     if len(poses) != len(true_poses):
         raise ValueError(
             f"truth must have one pose per pose of estimated ({len(poses)}), got {len(true_poses)}"
