@@ -129,6 +129,7 @@ struct Model::Impl {
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
 
   bool was_lost() const { return num_lost > 0; }
+  bool jumped() const;
 
   Impl(const Camera& camera_in, const ModelOptions& options_in) : camera(camera_in), options(options_in) {
     options.check();
@@ -207,13 +208,20 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras) const {
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost(), spacing, options);
+  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost() || jumped(), spacing, options);
+}
+
+// Whether the camera's last motion was none that goes on: views far apart, in any order.
+bool Model::Impl::jumped() const {
+  constexpr double largest_turn = 0.7;
+  if (poses.size() < 2) return false;
+  return Eigen::AngleAxisd(poses[poses.size() - 2].linear().transpose() * poses.back().linear()).angle() > largest_turn;
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
   if (extras.guess) return {*extras.guess};
   const Pose& last = poses.back();
-  if (!options.predict_motion || poses.size() < 2 || was_lost()) return {last};
+  if (!options.predict_motion || poses.size() < 2 || was_lost() || jumped()) return {last};
   Pose predicted = last * (poses[poses.size() - 2].inverse() * last);
   predicted.linear() = Eigen::Quaterniond(predicted.linear()).normalized().toRotationMatrix();
   return {predicted, last};
@@ -243,15 +251,14 @@ void Model::Impl::fold_in(FrameReport& report) {
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
   const auto num_registered = static_cast<std::int32_t>(poses.size() - 1);  // lost frames make no point older
   if (options.fold_in != FoldIn::fuse) {
-    consolidate_frame(cloud, frame, report.world_from_camera, options, spacing,
-                      num_registered);
+    consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, num_registered);
     watch.lap();
     renew_normals(cloud, options);
     report.milliseconds.normals = watch.lap();
     return;
   }
-  report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing,
-                                num_registered, options.fusion, options.num_threads);
+  report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing, num_registered,
+                                options.fusion, options.num_threads);
   while (cloud.size() > options.max_points) {
     spacing *= coarsening;
     thin(cloud, spacing);
