@@ -1,4 +1,4 @@
-"""Views that are far apart and in any order: the camera is searched for everywhere, and lost frames get another try."""
+"""Views far apart and in any order: the camera is searched for everywhere, lost frames get another try."""
 
 import functools
 from collections.abc import Iterable
@@ -44,7 +44,7 @@ def truth(degrees: float, roll: float = 0.0) -> Array:
 
 
 def errors(pose: Array, expected: Array) -> tuple[float, float]:
-    """Return the angle [degrees] and the distance at the object's middle [m] between two poses of a camera."""
+    """Return the angle [degrees] and the distance at the object's middle [m] between two camera poses."""
     cosine = (np.trace(pose[:3, :3].T @ expected[:3, :3]) - 1) / 2
     middle = np.append(thing().bounds.mean(axis=0), 1.0)
     in_first = np.linalg.inv(pose_at(0)) @ middle
@@ -161,6 +161,7 @@ def test_bunny_scans_in_any_order(recordings: Any, seed: int | None) -> None:
     list(done.run([int(i) for i in order]))
     list(done.retry_lost())
     first = done.frames[0].truth
+    assert first is not None
     assert done.num_tracked >= 9
     for frame in done.frames:
         if frame.world_from_camera is None:

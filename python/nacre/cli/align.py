@@ -148,7 +148,10 @@ def _align_globally(terminal: Terminal, source: Path, target: Path, out: Path | 
     }  # fmt: skip
     rows = [
         ("status", result.status.replace("_", " ")),
-        ("overlap", f"{quantity(result.overlap, 'fraction')} (agree within {quantity(result.tolerance, 'm')})"),
+        (
+            "overlap",
+            f"{quantity(result.overlap, 'fraction')} (agree within {quantity(result.tolerance, 'm')})",
+        ),
         ("consistency", quantity(result.consistency, "fraction")),
         ("next best motion", f"{quantity(result.rivalry, 'fraction')} as good"),
         ("residual", f"{quantity(result.rmse, 'm')} RMS"),
