@@ -63,7 +63,7 @@ def camera_at(direction: Array, up: Array, distance: float) -> Array:
 def view(azimuth: float, height: float = 0.3, sigma: float = 0.0005) -> tuple[Array, Array, Array]:
     """Return points and normals that a camera sees, in its frame, and its pose."""
     direction = np.array([np.cos(azimuth), np.sin(azimuth), height])
-    size = np.linalg.norm(thing().bounds[1] - thing().bounds[0])
+    size = float(np.linalg.norm(thing().bounds[1] - thing().bounds[0]))
     pose = camera_at(direction, np.array([0.2, -0.1, 1.0]), 1.8 * size)
     depth = thing().simulate_depth(CAMERA, pose, noise=sigma, seed=int(1000 * azimuth))
     normals = nacre.depth_normals(depth, CAMERA)[np.isfinite(depth)]
@@ -74,7 +74,8 @@ def view(azimuth: float, height: float = 0.3, sigma: float = 0.0005) -> tuple[Ar
 
 def sphere(count: int, seed: int) -> Array:
     directions = np.random.default_rng(seed).normal(size=(count, 3))
-    return 0.1 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    points: Array = 0.1 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    return points
 
 
 @functools.cache
