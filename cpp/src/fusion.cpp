@@ -5,6 +5,7 @@
 #include <limits>
 #include <string>
 
+#include "attribute_fusion.hpp"
 #include "check.hpp"
 #include "fusion_step.hpp"
 #include "image_index.hpp"
@@ -16,11 +17,8 @@
 namespace nacre {
 namespace {
 
-// In frontal measurements of a point's own noise: far surfaces are measured with less weight, not less often.
-constexpr float least_weight = 0.05F;     // less observation than this is none
-constexpr float insertion_weight = 2.0F;  // a new point must be seen by so many pixels of its frame
+constexpr float insertion_weight = 2.0F;  // a new point must be seen by so many pixels; likewise
 constexpr float sheet_cosine = 0.3F;      // normals that differ more belong to different sheets
-constexpr float least_facing = 0.1F;      // surfaces that are seen at a smaller cosine are not judged
 
 // Whether a point with a normal stands for the same piece of surface as another.
 bool same_surface(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, const Eigen::Vector3f& other,
@@ -223,12 +221,14 @@ void remove_violated(PointModel& model, const FusionOptions& options, FusionRepo
   if (report.num_removed > 0) model.keep(flags);
 }
 
+// So many values a point.
 template <class Value>
-void keep_flagged(std::vector<Value>& values, const std::vector<std::uint8_t>& flags) {
+void keep_flagged(std::vector<Value>& values, const std::vector<std::uint8_t>& flags, std::size_t count = 1) {
   if (values.empty()) return;
   std::size_t kept = 0;
   for (std::size_t i = 0; i < flags.size(); ++i) {
-    if (flags[i]) values[kept++] = values[i];
+    if (!flags[i]) continue;
+    for (std::size_t c = 0; c < count; ++c) values[kept++] = values[i * count + c];
   }
   values.resize(kept);
 }
@@ -239,6 +239,9 @@ void PointModel::keep(const std::vector<std::uint8_t>& flags) {
   keep_flagged(points, flags);
   keep_flagged(normals, flags);
   keep_flagged(colors, flags);
+  for (PointAttribute& attribute : attributes) {
+    keep_flagged(attribute.values, flags, static_cast<std::size_t>(attribute.num_channels));
+  }
   keep_flagged(confidence, flags);
   keep_flagged(last_seen, flags);
   keep_flagged(sightings, flags);
@@ -256,32 +259,42 @@ void FusionOptions::check() const {
 
 FusionReport fuse_observed(PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
                            const Pose& world_from_camera, double spacing, std::int32_t frame_index,
-                           const FusionOptions& options, int num_threads) {
+                           const FusionOptions& options, int num_threads,
+                           const std::vector<FrameAttribute>& attributes) {
   FusionReport report;
   const bool with_colors = observer.has_colors() || !model.colors.empty();
   if (with_colors) {
     model.colors.resize(model.points.size(), Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
   }
+  const AttributePlanes planes(attributes, observer, camera, num_threads);
+  const bool with_attributes = !attributes.empty() || !model.attributes.empty();
+  if (with_attributes) fuse_attributes(model, 0, frame, camera, observer, planes, world_from_camera, num_threads);
   Known known =
       update(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, report, num_threads);
   const std::vector<NewPoint> candidates =
       find_new_points(frame, camera, observer, known.covered, spacing, num_threads);
+  const std::int64_t num_known = model.size();
   insert(model, candidates, known, frame, world_from_camera, frame_index, with_colors, report);
+  if (with_attributes) {
+    fuse_attributes(model, num_known, frame, camera, observer, planes, world_from_camera, num_threads);
+  }
   remove_violated(model, options, report);
   return report;
 }
 
 FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, const Pose& world_from_camera,
                   double spacing, std::int32_t frame_index, const FusionOptions& options, const ColorsRef& colors,
-                  int num_threads) {
+                  int num_threads, const std::vector<FrameAttribute>& attributes) {
   options.check();
   require(spacing > 0.0, "spacing", "a positive distance in metres", spacing);
   require(frame.width == camera.width() && frame.height == camera.height(), "frame", "of the camera's size",
           std::to_string(frame.width) + " x " + std::to_string(frame.height));
   require(colors.rows() == 0 || colors.rows() == frame.points.rows(), "colors", "one row per pixel", colors.rows());
+  check_attributes(attributes, camera, model);
   SurfaceObserver observer(camera, options);
   observer.look_at(frame, colors, num_threads);
-  return fuse_observed(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, num_threads);
+  return fuse_observed(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, num_threads,
+                       attributes);
 }
 
 void thin(PointModel& model, double spacing) {

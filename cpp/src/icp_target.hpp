@@ -44,6 +44,7 @@ class IcpTarget {
  public:
   IcpTarget(const AlignCloud& cloud, const AlignOptions& options);
 
+  const IcpCloud& cloud() const { return cloud_; }
   double diameter() const { return diameter_; }  // of the bounding box [m]
   double spacing() const { return spacing_; }    // median distance of nearest neighbours [m]
 
@@ -63,7 +64,9 @@ struct IcpResult : AlignResult {
   double residual_ratio = std::numeric_limits<double>::quiet_NaN();  // residuals to the largest they may be, rms
 };
 
-// align with a prepared target.
+// align with a prepared target. Held: directions that the pairs do not determine stay as they are in every step.
 IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options);
+IcpResult align_held(const IcpTarget& target, const IcpSource& source, const Pose& initial,
+                     const AlignOptions& options);
 
 }  // namespace nacre

@@ -5,9 +5,13 @@
 #include <cmath>
 #include <limits>
 
+#include "attribute_fusion.hpp"
 #include "check.hpp"
 #include "consolidation_fold.hpp"
 #include "fusion_step.hpp"
+#include "loop_closure.hpp"
+#include "model_correction.hpp"
+#include "point_spacing.hpp"
 #include "tracking.hpp"
 
 namespace nacre {
@@ -40,10 +44,11 @@ double spacing_for(const Frame& frame, const Camera& camera) {
   return 2.0 * camera.footprint(*quartile);
 }
 
-void check_extras(const Camera& camera, const FrameExtras& extras) {
+void check_extras(const Camera& camera, const FrameExtras& extras, const PointModel& model) {
   const Eigen::Index pixels = static_cast<Eigen::Index>(camera.width()) * camera.height();
   require(extras.colors.rows() == 0 || extras.colors.rows() == pixels, "colors", "one row per pixel",
           extras.colors.rows());
+  check_attributes(extras.attributes, camera, model);
   require(!extras.keep_guess || extras.guess.has_value(), "keep_guess", "used with a guess", "no guess");
 }
 
@@ -94,12 +99,14 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.predict_motion = false;
   options.relocalise = false;
   options.denoise_samples = false;
+  options.loop_closure = false;
   options.verify = false;
   return options;
 }
 
 void ModelOptions::check() const {
   depth.check();
+  region.check();
   registration.check();
   fusion.check();
   consolidation.check();
@@ -108,9 +115,7 @@ void ModelOptions::check() const {
   require(spacing >= 0.0 && std::isfinite(spacing), "spacing", "0 (automatic) or a positive distance in metres",
           spacing);
   require(max_points >= 100, "max_points", "at least 100", max_points);
-  require(min_overlap >= 0.0 && min_overlap <= 1.0, "min_overlap", "in [0, 1]", min_overlap);
-  require(min_consistency >= 0.0 && min_consistency <= 1.0, "min_consistency", "in [0, 1]", min_consistency);
-  require(max_residual > 0.0, "max_residual", "positive", max_residual);
+  require(min_evidence >= 0.0, "min_evidence", "0 or more", min_evidence);
   require(first_fraction > 0.0 && first_fraction <= 1.0, "first_fraction", "in (0, 1]", first_fraction);
   require(kept_fraction > 0.0 && kept_fraction <= 1.0, "kept_fraction", "in (0, 1]", kept_fraction);
   require(new_fraction >= 0.0 && new_fraction <= 1.0, "new_fraction", "in [0, 1]", new_fraction);
@@ -122,8 +127,11 @@ struct Model::Impl {
   ModelOptions options;  // what the first frame decides is filled in
   Frame frame;           // the newest; its memory and the observer's are used again for the next
   SurfaceObserver observer{camera, options.fusion};
+  MaskImage region;  // of the newest frame; empty where nothing is left out
   PointModel cloud;
+  LoopClosure loops{camera, options};
   std::vector<FrameReport> reports;
+  Sight before;             // of the newest frame that was folded in
   std::vector<Pose> poses;  // of the registered frames, oldest first
   double spacing = 0.0;
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
@@ -140,15 +148,18 @@ struct Model::Impl {
   }
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
-  TrackingResult locate(const FrameExtras& extras) const;
+  void keep_region(FrameReport& report);
+  TrackingResult locate(const FrameExtras& extras, const RegionReport& region) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   WhereElse elsewhere() const;
-  void fold_in(FrameReport& report);
+  void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
+  void fold_in(const FrameExtras& extras, FrameReport& report);
 };
 
-// The loop: clean the image, make points of it, register them to the model, fold them in, renew the normals.
+// The loop: clean the image, make points of it, keep those of interest, register them to the model, correct the model
+// where a loop closes, fold the points in, renew the normals.
 FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& extras) {
-  check_extras(camera, extras);
+  check_extras(camera, extras, cloud);
   StopWatch total, watch;
   FrameReport report;
   report.index = static_cast<std::int64_t>(reports.size());
@@ -159,18 +170,24 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   report.milliseconds.preprocess = watch.lap();
 
   make_frame(clean, camera, options.depth.noise, options.num_threads, frame);
+  report.milliseconds.back_project = watch.lap();
+
+  keep_region(report);
+  report.milliseconds.region = watch.lap();
+
   if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
   const ColorsRef colors(extras.colors);
   observer.look_at(frame, colors, options.num_threads);
-  report.milliseconds.back_project = watch.lap();
+  report.milliseconds.back_project += watch.lap();
 
-  const TrackingResult tracking = locate(extras);
+  const TrackingResult tracking = locate(extras, report.region);
   report.status = tracking.status;
   report.reason = tracking.reason;
   report.world_from_camera = tracking.alignment.target_from_source;
   report.num_inliers = tracking.alignment.num_inliers;
   report.overlap = tracking.alignment.overlap;
   report.consistency = tracking.consistency;
+  report.evidence = tracking.evidence;
   report.rmse = tracking.alignment.rmse;
   report.information = tracking.alignment.information;
   report.weak_directions = tracking.alignment.weak_directions;
@@ -180,9 +197,12 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     report.world_from_camera = poses.empty() ? Pose::Identity() : poses.back();
   } else {
     poses.push_back(report.world_from_camera);
+    if (options.loop_closure && options.fold_in == FoldIn::fuse) close_loops(report, tracking, extras.keep_guess);
+    report.milliseconds.loop_closure = watch.lap();
     if (report.status == FrameStatus::tracked) {
       if (was_lost()) report.status = FrameStatus::relocalised;
-      fold_in(report);
+      fold_in(extras, report);
+      before = {frame.points.col(2), frame.sigma, report.world_from_camera};
     }
   }
   num_lost = report.status == FrameStatus::lost && !poses.empty() ? num_lost + 1 : 0;
@@ -194,11 +214,20 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   return report;
 }
 
-TrackingResult Model::Impl::locate(const FrameExtras& extras) const {
+void Model::Impl::keep_region(FrameReport& report) {
+  report.region.num_inside = report.depth.num_kept;
+  if (!options.region.is_limited()) return;
+  MaskImage found = select_region(frame, camera, options.region, region, &report.region, options.num_threads);
+  nacre::keep_region(found, frame);
+  if (report.region.num_inside > 0) region = std::move(found);
+}
+
+TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport& region_report) const {
   TrackingResult result;
   result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
   if (frame.valid.size() < least_pixels) {
-    result.reason = "only " + std::to_string(frame.valid.size()) + " pixels of the frame are usable";
+    const std::string count = "only " + std::to_string(frame.valid.size()) + " pixels of the frame are usable";
+    result.reason = region_report.reason.empty() ? count : region_report.reason;
     return result;
   }
   if (cloud.size() == 0 || extras.keep_guess) {
@@ -208,7 +237,8 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras) const {
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost() || jumped(), spacing, options);
+  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost() || jumped(), before,
+               options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
 }
 
 // Whether the camera's last motion was none that goes on: views far apart, in any order.
@@ -246,7 +276,36 @@ WhereElse Model::Impl::elsewhere() const {
   return where;
 }
 
-void Model::Impl::fold_in(FrameReport& report) {
+void Model::Impl::close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given) {
+  const std::int32_t oldest_frame = loops.oldest_frame();
+  const LoopReport loop = loops.add_frame({static_cast<std::int32_t>(report.index), frame, observer, tracking.alignment,
+                                           spacing, is_given, was_lost() || tracking.is_to_whole_model});
+  if (loop.corrections.empty()) return;
+  report.loop_frame = loop.frame;
+  report.loop_distance = loop.distance;
+  if (report.status == FrameStatus::weak) {  // what it saw before determines its pose
+    report.status = FrameStatus::tracked;
+    report.reason.clear();
+    report.weak_directions.resize(6, 0);
+  }
+  move_points(cloud, loop.corrections, options.num_threads);
+  report.world_from_camera = loop.corrections.back() * report.world_from_camera;
+  const double noise = static_cast<double>(median_sigma(frame));
+  merge_layers(cloud, oldest_frame, spacing, [&](const Eigen::Vector3f& point) {
+    const double distance = (point.cast<double>() - report.world_from_camera.translation()).norm();
+    const double farther = camera.model() == Camera::Model::pinhole ? distance / loop.depth : 1.0;
+    const double sigma = noise * farther * farther;  // noise grows with the square
+    return spacing_at(static_cast<float>(distance), static_cast<float>(sigma), camera, spacing);
+  });
+  poses.clear();
+  for (FrameReport& earlier : reports) {
+    earlier.world_from_camera = loop.corrections[static_cast<std::size_t>(earlier.index)] * earlier.world_from_camera;
+    if (earlier.status != FrameStatus::lost) poses.push_back(earlier.world_from_camera);
+  }
+  poses.push_back(report.world_from_camera);
+}
+
+void Model::Impl::fold_in(const FrameExtras& extras, FrameReport& report) {
   StopWatch watch;
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
   const auto num_registered = static_cast<std::int32_t>(poses.size() - 1);  // lost frames make no point older
@@ -258,7 +317,7 @@ void Model::Impl::fold_in(FrameReport& report) {
     return;
   }
   report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing, num_registered,
-                                options.fusion, options.num_threads);
+                                options.fusion, options.num_threads, extras.attributes);
   while (cloud.size() > options.max_points) {
     spacing *= coarsening;
     thin(cloud, spacing);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "check.hpp"
+#include "color_registration.hpp"
 #include "icp_target.hpp"
 
 namespace nacre {
@@ -200,10 +201,13 @@ void AlignOptions::check() const {
   require(num_threads >= 0, "num_threads", "0 (all) or more", num_threads);
 }
 
-AlignCloud::AlignCloud(const PointsRef& points_in, const PointsRef& normals_in, const ValuesRef& sigma_in)
-    : points(points_in), normals(normals_in), sigma(sigma_in) {
+AlignCloud::AlignCloud(const PointsRef& points_in, const PointsRef& normals_in, const ValuesRef& sigma_in,
+                       const ValuesRef& brightness_in)
+    : points(points_in), normals(normals_in), sigma(sigma_in), brightness(brightness_in) {
   require(normals.rows() == 0 || normals.rows() == points.rows(), "normals", "one row per point", normals.rows());
   require(sigma.size() == 0 || sigma.size() == points.rows(), "sigma", "one value per point", sigma.size());
+  require(brightness.size() == 0 || brightness.size() == points.rows(), "brightness", "one value per point",
+          brightness.size());
 }
 
 IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options) {
@@ -213,10 +217,21 @@ IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose&
   return iterate(target, source, initial, options, true);
 }
 
+IcpResult align_held(const IcpTarget& target, const IcpSource& source, const Pose& initial,
+                     const AlignOptions& options) {
+  return iterate(target, source, initial, options, true);
+}
+
 AlignResult align(const AlignCloud& source, const AlignCloud& target, const Pose& initial,
                   const AlignOptions& options) {
   options.check();
-  return align_to(IcpTarget(target, options), IcpSource(source, options), initial, options);
+  const IcpTarget prepared_target(target, options);
+  const IcpSource prepared_source(source, options);
+  const IcpResult result = align_to(prepared_target, prepared_source, initial, options);
+  const bool has_colors = source.brightness.size() > 0 && target.brightness.size() > 0;
+  if (result.weak_directions.cols() == 0 || !has_colors) return result;
+  return determine_by_color(prepared_target, prepared_source, BrightCloud(target.points, target.brightness),
+                            BrightCloud(source.points, source.brightness), result, options);
 }
 
 }  // namespace nacre

@@ -125,29 +125,43 @@ PixelWindow ObservationBlock::cover(int i) const {
   return window;
 }
 
-void SurfaceObserver::observe(ObservationBlock& block) const { observe(block, nullptr); }
+void SurfaceObserver::observe(ObservationBlock& block) const {
+  float* const colors[3] = {block.red_, block.green_, block.blue_};
+  observe(block, image_, colors, nullptr);
+}
 
 void SurfaceObserver::observe_and_cover(ObservationBlock& block, float least_cosine) const {
   for (int i = 0; i < block.count_; ++i) {
     block.cover_offset_[i] = std::max(block.spacing_[i], 3.0F * block.sigma_[i]);
   }
   const simd::WindowCover cover = {block.spacing_, block.cover_offset_, least_cosine, block.cover_rows_};
-  observe(block, &cover);
+  float* const colors[3] = {block.red_, block.green_, block.blue_};
+  observe(block, image_, colors, &cover);
 }
 
-void SurfaceObserver::observe(ObservationBlock& b, const simd::WindowCover* cover) const {
-  const bool colored = has_colors();
-  if (!colored) {
-    std::fill_n(b.red_, b.count_, 0.0F);
-    std::fill_n(b.green_, b.count_, 0.0F);
-    std::fill_n(b.blue_, b.count_, 0.0F);
+void SurfaceObserver::observe_planes(ObservationBlock& block, const float* planes, float* average) const {
+  const std::int64_t first = plane_offset(0, 0);
+  simd::SurfaceImage image = image_;
+  image.red = planes + first;
+  image.green = image.red + plane_size();
+  image.blue = image.green + plane_size();
+  constexpr int capacity = ObservationBlock::capacity;
+  float* const channels[3] = {average, average + capacity, average + 2 * capacity};
+  observe(block, image, channels, nullptr);
+}
+
+void SurfaceObserver::observe(ObservationBlock& b, const simd::SurfaceImage& image, float* const channels[3],
+                              const simd::WindowCover* cover) const {
+  if (image.red == nullptr) {
+    for (int c = 0; c < 3; ++c) std::fill_n(channels[c], b.count_, 0.0F);
   }
-  simd::observe_windows()(
-      image_,
-      {b.count_, b.x_, b.y_, b.z_, b.normal_x_, b.normal_y_, b.normal_z_, b.u_, b.v_, b.window_, b.radius_,
-       b.largest_offset_},
-      least_cosine_,
-      {b.weight_, b.offset_, b.seen_normal_x_, b.seen_normal_y_, b.seen_normal_z_, b.red_, b.green_, b.blue_}, cover);
+  simd::observe_windows()(image,
+                          {b.count_, b.x_, b.y_, b.z_, b.normal_x_, b.normal_y_, b.normal_z_, b.u_, b.v_, b.window_,
+                           b.radius_, b.largest_offset_},
+                          least_cosine_,
+                          {b.weight_, b.offset_, b.seen_normal_x_, b.seen_normal_y_, b.seen_normal_z_, channels[0],
+                           channels[1], channels[2]},
+                          cover);
 }
 
 bool SurfaceObserver::sees_through(const Eigen::Vector3f& point, std::int32_t pixel, float margin) const {

@@ -69,6 +69,10 @@ class SurfaceObserver {
   float weight(int u, int v) const { return image_.weight[v * image_.stride + u]; }
 
   bool has_colors() const { return image_.red != nullptr; }
+  Eigen::Vector3f color(int u, int v) const {
+    const std::int64_t pixel = v * image_.stride + u;
+    return {image_.red[pixel], image_.green[pixel], image_.blue[pixel]};
+  }
 
   // The same of a frontal measurement of some noise; sigma 0 stands for the reference.
   float frontal_weight(float sigma) const {
@@ -92,11 +96,21 @@ class SurfaceObserver {
   // normal within an angle of its own.
   void observe_and_cover(ObservationBlock& block, float least_cosine) const;
 
+  // The layout of a plane of values, one a pixel: its size, and where a pixel is. Its borders are zeros.
+  std::int64_t plane_size() const { return (height_ + 2 * simd::largest_window) * image_.stride; }
+  std::int64_t plane_offset(int u, int v) const {
+    return (v + simd::largest_window) * image_.stride + simd::largest_window + u;
+  }
+  // The weighted averages of three planes, one after the other, around the points i of the block, at
+  // average[c * capacity + i].
+  void observe_planes(ObservationBlock& block, const float* planes, float* average) const;
+
   // Whether every pixel around measures something farther than a margin behind a point.
   bool sees_through(const Eigen::Vector3f& point, std::int32_t pixel, float margin) const;
 
  private:
-  void observe(ObservationBlock& block, const simd::WindowCover* cover) const;
+  void observe(ObservationBlock& block, const simd::SurfaceImage& image, float* const channels[3],
+               const simd::WindowCover* cover) const;
   // Radius of the kernel at a depth: wide enough to average the noise, narrow enough to keep the shape.
   float support(float sigma, float footprint) const;
 

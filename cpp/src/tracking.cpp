@@ -2,8 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
+#include "color_registration.hpp"
+#include "frame_samples.hpp"
 #include "icp_target.hpp"
 #include "model_view.hpp"
 #include "parallel.hpp"
@@ -11,6 +12,7 @@
 #include "random.hpp"
 #include "relocalisation.hpp"
 #include "surface_observer.hpp"
+#include "verdict.hpp"
 
 namespace nacre {
 namespace {
@@ -21,38 +23,41 @@ constexpr std::size_t max_target_points = 30000;  // that a frame is registered 
 // Model points that a camera near a pose may see, as a cloud to register to.
 struct View {
   Points points, normals;  // world frame
+  Values brightness;       // empty where the model has no colours
   double thinning = 1.0;   // how much farther apart the points are than the model's
 };
 
 // Points in the image widened by a third on each side, turned away from the camera by at most 120 degrees: one of every
 // n of them, so that at most max_target_points are left.
-View points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera, int num_threads) {
+View points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera,
+                    std::int32_t oldest_frame, int num_threads) {
   constexpr std::int64_t block_size = ModelView::capacity;
   const ModelView model_view(camera, world_from_camera);
   const auto width = static_cast<float>(camera.width()), height = static_cast<float>(camera.height());
   const float margin_u = width / 3.0F, margin_v = height / 3.0F;
   std::vector<std::vector<std::uint32_t>> found(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
-  parallel_blocks(model.size(), block_size, num_threads,
-                  [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
-                    const auto first = static_cast<std::size_t>(begin);
-                    ModelView::Block block;
-                    model_view.project(model.points[first].data(), model.normals[first].data(),
-                                       static_cast<int>(end - begin), block);
-                    std::uint32_t rows[block_size];
-                    std::size_t count = 0;
-                    for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(end - begin); ++i) {
-                      rows[count] = static_cast<std::uint32_t>(begin) + i;
-                      count += static_cast<std::size_t>((block.u[i] > -margin_u) & (block.u[i] < width + margin_u) &
-                                                        (block.v[i] > -margin_v) & (block.v[i] < height + margin_v) &
-                                                        (block.facing[i] > -0.5F));
-                    }
-                    found[static_cast<std::size_t>(number)].assign(rows, rows + count);
-                  });
+  parallel_blocks(
+      model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
+        const auto first = static_cast<std::size_t>(begin);
+        ModelView::Block block;
+        model_view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin),
+                           block);
+        std::uint32_t rows[block_size];
+        std::size_t count = 0;
+        for (std::uint32_t i = 0; i < static_cast<std::uint32_t>(end - begin); ++i) {
+          rows[count] = static_cast<std::uint32_t>(begin) + i;
+          count += static_cast<std::size_t>((block.u[i] > -margin_u) & (block.u[i] < width + margin_u) &
+                                            (block.v[i] > -margin_v) & (block.v[i] < height + margin_v) &
+                                            (block.facing[i] > -0.5F) & (model.last_seen[first + i] >= oldest_frame));
+        }
+        found[static_cast<std::size_t>(number)].assign(rows, rows + count);
+      });
   std::size_t num_found = 0;
   for (const auto& rows : found) num_found += rows.size();
   const std::size_t step = (num_found + max_target_points - 1) / max_target_points;
   const auto count = static_cast<Eigen::Index>(step > 0 ? num_found / step : 0);
-  View view{Points(count, 3), Points(count, 3), std::sqrt(static_cast<double>(std::max<std::size_t>(step, 1)))};
+  View view{Points(count, 3), Points(count, 3), Values(model.colors.empty() ? 0 : count),
+            std::sqrt(static_cast<double>(std::max<std::size_t>(step, 1)))};
   // One of every `step`, at random.
   const auto is_chosen = [&](std::size_t index) { return index % step == random_bits(0, index / step) % step; };
   std::size_t index = 0;
@@ -61,125 +66,11 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
     for (const std::uint32_t row : rows) {
       if (k == count || !is_chosen(index++)) continue;
       view.points.row(k) = model.points[row].transpose();
+      if (view.brightness.size() > 0) view.brightness[k] = luma(model.colors[row]);
       view.normals.row(k++) = model.normals[row].transpose();
     }
   }
   return view;
-}
-
-// Of the view's points that face the camera and project onto a measured pixel: the part that agrees with it, among
-// those that agree and those that the camera sees through. Points behind the measured surface are hidden, not wrong.
-double consistency_of(const View& view, const Frame& frame, const Camera& camera, const Pose& world_from_camera,
-                      double spacing, int num_threads) {
-  struct Counts {
-    std::int64_t agree = 0, violated = 0;
-    Counts& operator+=(const Counts& other) {
-      agree += other.agree;
-      violated += other.violated;
-      return *this;
-    }
-  };
-  constexpr std::int64_t block_size = ModelView::capacity;
-  const ModelView model_view(camera, world_from_camera);
-  const Counts counts =
-      block_reduce(view.points.rows(), block_size, num_threads, Counts{}, [&](std::int64_t begin, std::int64_t end) {
-        ModelView::Block block;
-        model_view.project(view.points.data() + 3 * begin, view.normals.data() + 3 * begin,
-                           static_cast<int>(end - begin), block);
-        Counts sum;
-        for (int i = 0; i < static_cast<int>(end - begin); ++i) {
-          if (!block.inside[i] || !(block.facing[i] > 0.3F)) continue;
-          const std::int32_t pixel = block.pixel[i];
-          const float behind = frame.points(pixel, 2) - block.z[i];
-          if (!std::isfinite(behind)) continue;
-          const float tolerance =
-              std::max(3.0F * static_cast<float>(spacing), 4.0F * frame.sigma[pixel]) / block.facing[i];
-          if (behind > tolerance) {
-            ++sum.violated;
-          } else if (behind > -tolerance) {
-            ++sum.agree;
-          }
-        }
-        return sum;
-      });
-  const std::int64_t judged = counts.agree + counts.violated;
-  return judged > 0 ? static_cast<double>(counts.agree) / static_cast<double>(judged) : 0.0;
-}
-
-// Denoised points of the frame, spread over it at random: noise would shift the matches on curved surfaces.
-struct Samples {
-  Points points, normals;
-  Values noise;  // standard deviation of each measurement [m]
-  Values sigma;  // with what its neighbours are wrong by, too, which no averaging removes [m]
-};
-
-// Depth cameras are also wrong by what neighbouring pixels have in common: millimetres at arm's length, centimetres
-// beyond three metres (Teichman, Miller and Thrun 2013, figure 3).
-float systematic_error(float z) {
-  constexpr float growth = 0.0015F;  // [1/m^2]
-  return growth * z * z * z;
-}
-
-Samples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
-  const std::int64_t count =
-      options.registration.max_samples > 0
-          ? std::min<std::int64_t>(options.registration.max_samples, static_cast<std::int64_t>(frame.valid.size()))
-          : static_cast<std::int64_t>(frame.valid.size());
-  Samples samples{Points(count, 3), Points(count, 3), Values(count), Values(count)};
-  const double stride = static_cast<double>(frame.valid.size()) / static_cast<double>(std::max<std::int64_t>(count, 1));
-  parallel_blocks(count, ObservationBlock::capacity, options.num_threads, [&](auto, auto begin, auto end) {
-    ObservationBlock block;
-    for (std::int64_t i = begin; i < end; ++i) {
-      // One of every `stride` pixels.
-      const double place =
-          (static_cast<double>(i) + random_uniform(options.registration.seed, static_cast<std::uint64_t>(i))) * stride;
-      const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
-      samples.points.row(i) = frame.points.row(row);
-      samples.normals.row(i) = frame.normals.row(row);
-      samples.noise[i] = frame.sigma[row];
-      samples.sigma[i] = std::hypot(frame.sigma[row], systematic_error(frame.points(row, 2)));
-      observer.add(block, samples.points.row(i).transpose(), samples.normals.row(i).transpose(), row, frame.sigma[row]);
-    }
-    if (!options.denoise_samples) return;
-    observer.observe(block);
-    for (std::int64_t i = begin; i < end; ++i) {
-      const Observation seen = block[static_cast<int>(i - begin)];
-      if (!(seen.weight > 0.0F)) continue;
-      samples.points.row(i) += seen.offset * samples.normals.row(i);
-      samples.normals.row(i) = seen.normal.normalized().transpose();
-    }
-  });
-  return samples;
-}
-
-// Strict, for guesses that may be far off: only a registration beyond doubt is believed.
-void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
-  std::ostringstream reason;
-  reason.precision(3);
-  result.status = FrameStatus::lost;
-  const double ratio = result.alignment.residual_ratio;
-  const bool is_close = result.alignment.overlap > 0.35 && result.consistency > 0.9 && ratio < 0.25;
-  if (result.alignment.status == AlignStatus::too_few_pairs) {
-    reason << "too few points of the frame match the model";
-  } else if (!options.verify) {
-    result.status = FrameStatus::tracked;
-  } else if (result.alignment.overlap < options.min_overlap) {
-    reason << "overlap " << result.alignment.overlap << " is below " << options.min_overlap;
-  } else if (result.consistency < options.min_consistency) {
-    reason << "consistency " << result.consistency << " is below " << options.min_consistency;
-  } else if (ratio > options.max_residual) {
-    reason << "residuals are " << ratio << " of the largest that match, above " << options.max_residual;
-  } else if (strict && !is_close) {
-    reason << "not sure enough: overlap " << result.alignment.overlap << ", consistency " << result.consistency
-           << ", residuals " << ratio << " of the largest that match";
-  } else if (result.alignment.weak_directions.cols() > 0) {
-    result.status = FrameStatus::weak;
-    reason << result.alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
-  } else {
-    result.status = FrameStatus::tracked;
-    result.is_beyond_doubt = is_close;
-  }
-  result.reason = reason.str();
 }
 
 double median_reach(const IcpSource& source) {
@@ -195,10 +86,14 @@ struct Search {
   const PointModel& model;
   const Frame& frame;
   const Camera& camera;
+  const SurfaceObserver& observer;
   const ModelOptions& options;
   IcpSource source;
   const Values& noise;  // of the sampled points [m]
-  double spacing;       // of the model [m]
+  const Values depth;   // of each pixel [m]
+  const Sight& before;
+  double spacing;             // of the model [m]
+  std::int32_t oldest_frame;  // see track
 
   bool has_automatic_gate() const { return !(options.registration.max_distance > 0.0); }
 
@@ -225,7 +120,7 @@ struct Search {
 
   // Near: the guess is about right, and a narrow gate is safest. Wide: it is not. Strict: see judge.
   TrackingResult register_from(const Pose& guess, bool wide, bool strict) const {
-    const View view = points_in_view(model, camera, guess, options.num_threads);
+    const View view = points_in_view(model, camera, guess, oldest_frame, options.num_threads);
     AlignOptions align_options = options.registration;
     align_options.max_points = 0;  // the view is thin enough
     const IcpTarget target(AlignCloud(view.points, view.normals), align_options);
@@ -235,17 +130,27 @@ struct Search {
 
     TrackingResult result;
     result.alignment = align_to(target, gated, guess, align_options);
-    result.consistency =
-        consistency_of(view, frame, camera, result.alignment.target_from_source, spacing, options.num_threads);
-    const double turned =
-        Eigen::AngleAxisd(guess.linear().transpose() * result.alignment.target_from_source.linear()).angle();
+    if (result.alignment.weak_directions.cols() > 0 && view.brightness.size() > 0 && observer.has_colors()) {
+      result.alignment = determine_by_color(target, gated, BrightCloud(view.points, view.brightness),
+                                            bright_cloud(frame, observer), result.alignment, align_options);
+    }
+    const Pose& pose = result.alignment.target_from_source;
+    const Sight now{depth, frame.sigma, pose};
+    const double in_view = consistency_of(view.points, view.normals, now, camera, spacing, options.num_threads);
+    const Eigen::Matrix3f rotation = pose.linear().cast<float>();
+    const Eigen::RowVector3f translation = pose.translation().cast<float>().transpose();
+    const Points points = (source.cloud.points * rotation.transpose()).rowwise() + translation;
+    const Points normals = source.cloud.normals * rotation.transpose();
+    const double earlier = consistency_of(points, normals, before, camera, spacing, options.num_threads);
+    result.consistency = std::isfinite(in_view) || std::isfinite(earlier) ? std::fmin(in_view, earlier) : 0.0;
+    const double turned = Eigen::AngleAxisd(guess.linear().transpose() * pose.linear()).angle();
     judge(result, options, strict || turned > far_turn);
     return result;
   }
 
   // Cameras around what a known camera saw: it turned about each of its axes, one way and the other.
   std::vector<Pose> around(const Pose& pose) const {
-    const View view = points_in_view(model, camera, pose, options.num_threads);
+    const View view = points_in_view(model, camera, pose, oldest_frame, options.num_threads);
     std::vector<Pose> poses = {pose};
     if (view.points.rows() == 0) return poses;
     const Eigen::Vector3d center = view.points.colwise().mean().transpose().cast<double>();
@@ -279,34 +184,46 @@ struct Search {
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, double spacing,
-                     const ModelOptions& options) {
-  const Samples samples = sample_frame(frame, observer, options);
-  const Search search{model,
-                      frame,
-                      camera,
-                      options,
-                      IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
-                      samples.noise,
-                      spacing};
+                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
+                     std::int32_t oldest_frame, double spacing, const ModelOptions& options) {
+  const FrameSamples samples = sample_frame(frame, observer, options);
+  Search search{
+      model,         frame,
+      camera,        observer,
+      options,       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
+      samples.noise, frame.points.col(2),
+      before,        spacing,
+      oldest_frame};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
-  for (const bool wide : {false, true}) {
-    if (wide && !search.has_automatic_gate()) break;
-    for (const Pose& guess : guesses) {
-      const TrackingResult result = search.register_from(guess, wide, was_lost);
-      if (result.rank() >= best.rank()) best = result;
-      if (result.is_beyond_doubt) return result;
+  const auto try_guesses = [&] {
+    for (const bool wide : {false, true}) {
+      if (wide && (best.status != FrameStatus::lost || !search.has_automatic_gate())) return;
+      for (const Pose& guess : guesses) {
+        const TrackingResult result = search.register_from(guess, wide, was_lost);
+        if (result.rank() >= best.rank()) best = result;
+        if (result.is_beyond_doubt) return;
+      }
     }
+  };
+  try_guesses();
+  if (best.status != FrameStatus::lost) return best;
+  if (oldest_frame > 0) {
+    search.oldest_frame = 0;
+    try_guesses();
+    best.is_to_whole_model = true;
+    if (best.status != FrameStatus::lost) return best;
   }
-  if (best.status == FrameStatus::lost && !elsewhere.key_poses.empty()) {
-    const TrackingResult found = search.relocalise(elsewhere.key_poses);
+  if (!elsewhere.key_poses.empty()) {
+    TrackingResult found = search.relocalise(elsewhere.key_poses);
+    found.is_to_whole_model = true;
     if (found.status != FrameStatus::lost) return found;
   }
-  if (best.status == FrameStatus::lost && elsewhere.everywhere) {
+  if (elsewhere.everywhere) {
     const std::optional<Pose> pose = fit_anywhere(model, search.source, options.registration);
     if (pose) {
-      const TrackingResult found = search.register_from(*pose, false, false);
+      TrackingResult found = search.register_from(*pose, false, false);
+      found.is_to_whole_model = true;
       if (found.status != FrameStatus::lost) return found;
     }
   }

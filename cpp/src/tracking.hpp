@@ -1,26 +1,13 @@
-// Where is the camera? Registration of a frame to the model, and the verdict on it.
+// Where is the camera? Registration of a frame to the model.
 #pragma once
 
-#include <string>
 #include <vector>
 
-#include "icp_target.hpp"
 #include "nacre/model.hpp"
 #include "surface_observer.hpp"
+#include "verdict.hpp"
 
 namespace nacre {
-
-struct TrackingResult {
-  IcpResult alignment;       // world_from_camera as target_from_source
-  double consistency = 0.0;  // part of the model's points in view that the frame does not see through
-  FrameStatus status = FrameStatus::lost;
-  std::string reason;  // why it is weak or lost
-  // Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
-  bool is_beyond_doubt = false;
-
-  // A frame that is not lost before one that is, then by how much agrees.
-  double rank() const { return (status == FrameStatus::lost ? 0.0 : 1.0) + alignment.overlap * consistency; }
-};
 
 // Where the search for a camera that the guesses do not find may go on.
 struct WhereElse {
@@ -29,9 +16,10 @@ struct WhereElse {
 };
 
 // Tries the guesses (world_from_camera, most trusted first) until one registers the frame; when none does, searches
-// elsewhere.
+// elsewhere. `before` is what the camera saw when it was last registered. Points that were last observed before
+// oldest_frame may have drifted away: they are left out, except by the search.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, double spacing,
-                     const ModelOptions& options);
+                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
+                     std::int32_t oldest_frame, double spacing, const ModelOptions& options);
 
 }  // namespace nacre

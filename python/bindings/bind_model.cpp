@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstring>
 
 #include "bindings.hpp"
@@ -18,12 +19,26 @@ py::array_t<Value> copy_values(const std::vector<Value>& values) {
   return py::array_t<Value>(static_cast<py::ssize_t>(values.size()), values.data());
 }
 
+// name: (points, channels)
+py::dict copy_attributes(const PointModel& cloud) {
+  py::dict result;
+  for (const PointAttribute& attribute : cloud.attributes) {
+    py::array_t<float> array(
+        {static_cast<py::ssize_t>(cloud.size()), static_cast<py::ssize_t>(attribute.num_channels)});
+    std::copy(attribute.values.begin(), attribute.values.end(), array.mutable_data());
+    result[attribute.name.c_str()] = array;
+  }
+  return result;
+}
+
 py::dict milliseconds(const FrameReport& report) {
   const StepTimes& times = report.milliseconds;
   py::dict result;
   result["preprocess"] = times.preprocess;
   result["back_project"] = times.back_project;
+  result["region"] = times.region;
   result["registration"] = times.registration;
+  result["loop_closure"] = times.loop_closure;
   result["fold_in"] = times.fold_in;
   result["normals"] = times.normals;
   result["total"] = times.total;
@@ -31,10 +46,12 @@ py::dict milliseconds(const FrameReport& report) {
 }
 
 FrameReport add_frame(Model& model, const DepthRef& depth, const MaskRef& mask, const ColorsRef& colors,
+                      const std::vector<std::pair<std::string, Attributes>>& attributes,
                       std::optional<double> timestamp, const std::optional<PoseMatrix>& guess, bool keep_guess) {
   FrameExtras extras;
   extras.mask = mask;
   extras.colors = colors;
+  for (const auto& [name, values] : attributes) extras.attributes.push_back({name, values});
   extras.timestamp = timestamp;
   if (guess) extras.guess = to_pose(*guess);
   extras.keep_guess = keep_guess;
@@ -62,6 +79,7 @@ void bind_model(py::module_& m) {
       .def(py::init<>())
       .def_static("preset", &ModelOptions::preset)
       .def_readwrite("depth", &ModelOptions::depth)
+      .def_readwrite("region", &ModelOptions::region)
       .def_readwrite("registration", &ModelOptions::registration)
       .def_readwrite("fold_in", &ModelOptions::fold_in)
       .def_readwrite("fusion", &ModelOptions::fusion)
@@ -71,11 +89,10 @@ void bind_model(py::module_& m) {
       .def_readwrite("max_points", &ModelOptions::max_points)
       .def_readwrite("predict_motion", &ModelOptions::predict_motion)
       .def_readwrite("relocalise", &ModelOptions::relocalise)
+      .def_readwrite("loop_closure", &ModelOptions::loop_closure)
       .def_readwrite("denoise_samples", &ModelOptions::denoise_samples)
       .def_readwrite("verify", &ModelOptions::verify)
-      .def_readwrite("min_overlap", &ModelOptions::min_overlap)
-      .def_readwrite("min_consistency", &ModelOptions::min_consistency)
-      .def_readwrite("max_residual", &ModelOptions::max_residual)
+      .def_readwrite("min_evidence", &ModelOptions::min_evidence)
       .def_readwrite("first_fraction", &ModelOptions::first_fraction)
       .def_readwrite("kept_fraction", &ModelOptions::kept_fraction)
       .def_readwrite("new_fraction", &ModelOptions::new_fraction)
@@ -85,6 +102,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("points", [](const PointModel& cloud) { return copy_rows(cloud.points); })
       .def_property_readonly("normals", [](const PointModel& cloud) { return copy_rows(cloud.normals); })
       .def_property_readonly("colors", [](const PointModel& cloud) { return copy_rows(cloud.colors); })
+      .def_property_readonly("attributes", &copy_attributes)
       .def_property_readonly("confidence", [](const PointModel& cloud) { return copy_values(cloud.confidence); })
       .def_property_readonly("sightings", [](const PointModel& cloud) { return copy_values(cloud.sightings); })
       .def_property_readonly("last_seen", [](const PointModel& cloud) { return copy_values(cloud.last_seen); })
@@ -100,12 +118,16 @@ void bind_model(py::module_& m) {
       .def_readonly("num_inliers", &FrameReport::num_inliers)
       .def_readonly("overlap", &FrameReport::overlap)
       .def_readonly("consistency", &FrameReport::consistency)
+      .def_readonly("evidence", &FrameReport::evidence)
       .def_readonly("rmse", &FrameReport::rmse)
       .def_property_readonly("information",
                              [](const FrameReport& report) { return Eigen::Matrix<double, 6, 6>(report.information); })
       .def_property_readonly("weak_directions",
                              [](const FrameReport& report) { return Twists(report.weak_directions.transpose()); })
+      .def_readonly("loop_frame", &FrameReport::loop_frame)
+      .def_readonly("loop_distance", &FrameReport::loop_distance)
       .def_readonly("depth", &FrameReport::depth)
+      .def_readonly("region", &FrameReport::region)
       .def_property_readonly("num_updated", [](const FrameReport& report) { return report.fusion.num_updated; })
       .def_property_readonly("num_inserted", [](const FrameReport& report) { return report.fusion.num_inserted; })
       .def_property_readonly("num_removed", [](const FrameReport& report) { return report.fusion.num_removed; })
@@ -119,5 +141,6 @@ void bind_model(py::module_& m) {
       .def_property_readonly("camera", &Model::camera)
       .def_property_readonly("cloud", &Model::cloud, py::return_value_policy::reference_internal)
       .def("cloud_in_camera", &Model::cloud_in_camera)
+      .def("pose", [](const Model& model, std::size_t i) { return to_matrix(model.frames().at(i).world_from_camera); })
       .def_property_readonly("spacing", &Model::spacing);
 }

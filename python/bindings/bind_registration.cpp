@@ -45,10 +45,11 @@ void bind_registration(py::module_& m) {
   m.def(
       "align",
       [](const PointsRef& source, const PointsRef& source_normals, const ValuesRef& source_sigma,
-         const PointsRef& target, const PointsRef& target_normals, const ValuesRef& target_sigma,
-         const PoseMatrix& initial, const AlignOptions& options) {
-        return align(AlignCloud(source, source_normals, source_sigma), AlignCloud(target, target_normals, target_sigma),
-                     to_pose(initial), options);
+         const ValuesRef& source_brightness, const PointsRef& target, const PointsRef& target_normals,
+         const ValuesRef& target_sigma, const ValuesRef& target_brightness, const PoseMatrix& initial,
+         const AlignOptions& options) {
+        return align(AlignCloud(source, source_normals, source_sigma, source_brightness),
+                     AlignCloud(target, target_normals, target_sigma, target_brightness), to_pose(initial), options);
       },
       ReleaseGil());
 

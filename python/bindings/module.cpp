@@ -9,6 +9,7 @@ PYBIND11_MODULE(_core, m) {
   bind_depth(m);
   bind_kdtree(m);
   bind_normals(m);
+  bind_region(m);
   bind_registration(m);
   bind_consolidation(m);
   bind_mesh(m);

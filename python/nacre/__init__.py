@@ -26,6 +26,7 @@ from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
 from nacre.model import FrameReport, Model, ModelParameters
 from nacre.neighbors import KdTree, RadiusNeighbors
 from nacre.normals import estimate_normals
+from nacre.region import RegionParameters, RegionReport, select_region
 from nacre.registration import AlignResult, RegistrationParameters, align
 from nacre.simulation import default_camera, simulate_depth, turntable_poses
 from nacre.system import default_threads, instruction_set
@@ -53,6 +54,8 @@ __all__ = [
     "NoiseModel",
     "RadiusNeighbors",
     "RayHits",
+    "RegionParameters",
+    "RegionReport",
     "RegistrationParameters",
     "Sequence",
     "SequenceFrame",
@@ -78,6 +81,7 @@ __all__ = [
     "read_mesh",
     "read_points",
     "read_trajectory",
+    "select_region",
     "simulate_depth",
     "turntable_poses",
     "write_camera",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -123,6 +124,25 @@ def as_mask(name: str, value: npt.ArrayLike | None, shape: tuple[int, int]) -> n
     if array.shape != shape:
         raise ValueError(f"{name} must have the depth image's shape {shape}, got {array.shape}")
     return np.ascontiguousarray(array != 0, dtype=np.uint8)
+
+
+def as_attributes(
+    name: str, value: Mapping[str, npt.ArrayLike] | None, shape: tuple[int, int]
+) -> list[tuple[str, npt.NDArray[np.float32]]]:
+    """Return named images, (H, W) or (H, W, C), as float32 arrays with a row for each pixel."""
+    images = []
+    for key, image in ({} if value is None else dict(value)).items():
+        if not isinstance(key, str) or not key:
+            raise TypeError(f"{name} must be named by words, got {key!r}")
+        array = _real(f"{name}[{key!r}]", image)
+        if array.shape[:2] != shape or array.ndim not in (2, 3) or array.size == 0:
+            raise ValueError(
+                f"{name}[{key!r}] must have the depth image's shape {shape}, or {(*shape, 'C')} with "
+                f"C channels, got {array.shape}"
+            )
+        rows = array.reshape(shape[0] * shape[1], -1)
+        images.append((key, np.ascontiguousarray(rows, dtype=np.float32)))
+    return images
 
 
 def localize(points: FloatArray) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float64]]:

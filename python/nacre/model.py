@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numbers
 import threading
-from dataclasses import dataclass, field, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -12,9 +13,10 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._core import Camera
-from nacre.arrays import as_depth, as_mask, as_pose
+from nacre.arrays import as_attributes, as_depth, as_mask, as_pose
 from nacre.depth import DepthParameters, DepthReport
 from nacre.parameters import from_core, to_core, updated
+from nacre.region import RegionParameters, RegionReport
 from nacre.registration import RegistrationParameters
 
 Preset = Literal["default", "paper"]
@@ -80,7 +82,7 @@ class ModelParameters:
 
     Attributes
     ----------
-    depth, registration, fusion, consolidation, normals
+    depth, region, registration, fusion, consolidation, normals
         Of the steps of the loop. ``consolidation`` and ``normals`` (of the model) are used where ``fold_in``
         is not "fuse".
     fold_in : "fuse", "wlop" or "wlop+"
@@ -96,15 +98,15 @@ class ModelParameters:
     relocalise : bool
         Search around earlier poses where the guesses fail, then everywhere (some tenths of a second; not at
         every frame where that has failed often).
+    loop_closure : bool
+        Where ``fold_in`` is "fuse": correct model and poses where the camera comes back to what it saw
+        before.
     denoise_samples : bool
         Register surface points averaged over their pixels, not single pixels.
     verify : bool
-        Judge registrations, by the three bounds below and by what is beyond doubt.
-    min_overlap, min_consistency : float
-        A frame of which a smaller part matches the model is lost; so is one that sees through more than the
-        rest of what the model shows there.
-    max_residual : float
-        So is one whose residuals exceed this part of the last gate on distances; chance gives 0.58.
+        Judge registrations by their evidence.
+    min_evidence : float
+        A frame with less is lost; see :class:`FrameReport`.
     first_fraction, kept_fraction, new_fraction : float
         WLOP: part of the first frame that becomes the model; part of the model that is kept at each frame;
         new points, as a part of the model.
@@ -113,6 +115,7 @@ class ModelParameters:
     """
 
     depth: DepthParameters = field(default_factory=DepthParameters)
+    region: RegionParameters = field(default_factory=RegionParameters)
     registration: RegistrationParameters = field(default_factory=RegistrationParameters)
     fold_in: Literal["fuse", "wlop", "wlop+"] = "fuse"
     fusion: FusionParameters = field(default_factory=FusionParameters)
@@ -122,11 +125,10 @@ class ModelParameters:
     max_points: int = 500000
     predict_motion: bool = True
     relocalise: bool = True
+    loop_closure: bool = True
     denoise_samples: bool = True
     verify: bool = True
-    min_overlap: float = 0.15
-    min_consistency: float = 0.8
-    max_residual: float = 0.35
+    min_evidence: float = 0.3
     first_fraction: float = 0.5
     kept_fraction: float = 0.9
     new_fraction: float = 0.2
@@ -156,13 +158,24 @@ class FrameReport:
     reason : str
         Why the frame is weak or lost; empty otherwise.
     world_from_camera : (4, 4) float64
-        The camera's pose; of a lost frame the last known one.
+        The camera's pose; of a lost frame the last known one. Where a later frame closes a loop, the reports
+        in ``Model.frames`` have the corrected poses.
     num_inliers, overlap, rmse, information, weak_directions
         Of the registration; see :class:`nacre.AlignResult`.
     consistency : float
-        Part of the model's points in view that the frame does not see through.
+        Part of the model's points in view that the frame does not see through, or of the frame's points that
+        the camera did not see through before, whichever is smaller.
+    evidence : float
+        That the registration is right, against chance: what the residuals tell a match, times overlap^2 and
+        consistency^4. Unrelated surfaces reach 0.25; good registrations have 0.4 to 3.
+    loop_frame : int or None
+        The earlier frame that this one closed a loop with: model and poses were corrected.
+    loop_distance : float
+        Between the surfaces that the two saw, before the correction [m].
     depth : DepthReport
         Pixels that were removed, by reason.
+    region : RegionReport
+        What was left out of the rest.
     num_updated, num_inserted, num_removed : int
         Points of the model that the frame moved, added and removed.
     num_points : int
@@ -181,10 +194,14 @@ class FrameReport:
     num_inliers: int
     overlap: float
     consistency: float
+    evidence: float
     rmse: float
     information: npt.NDArray[np.float64]
     weak_directions: npt.NDArray[np.float64]
+    loop_frame: int | None
+    loop_distance: float
     depth: DepthReport
+    region: RegionReport
     num_updated: int
     num_inserted: int
     num_removed: int
@@ -201,6 +218,7 @@ class FrameReport:
     def _from_core(cls, core: Any) -> FrameReport:
         values = {f.name: getattr(core, f.name) for f in fields(cls)}
         values["depth"] = DepthReport._from_core(core.depth)
+        values["region"] = RegionReport._from_core(core.region)
         return cls(**values)
 
     def __repr__(self) -> str:
@@ -274,6 +292,7 @@ class Model:
         mask: npt.ArrayLike | None = None,
         timestamp: float | None = None,
         *,
+        attributes: Mapping[str, npt.ArrayLike] | None = None,
         guess: npt.ArrayLike | None = None,
         keep_guess: bool = False,
     ) -> FrameReport:
@@ -292,6 +311,9 @@ class Model:
             Pixels where it is 0 are not used.
         timestamp : float, optional
             [s], kept in the report.
+        attributes : mapping of str to (H, W) or (H, W, C) real, optional
+            Anything else that pixels have (an intensity, a temperature, class probabilities), by name; NaN
+            is no value. Fused along with the points, as colours are, where ``fold_in`` is "fuse".
         guess : (4, 4), optional
             A pose (world_from_camera) to start the registration from, in place of the last one.
         keep_guess : bool
@@ -319,12 +341,18 @@ class Model:
                     f"color must be uint8 of shape {(*image.shape, 3)}, got {array.dtype} {array.shape}"
                 )
             colors = np.ascontiguousarray(array).reshape(-1, 3)
+        more = as_attributes("attributes", attributes, (image.shape[0], image.shape[1]))
         pose = None if guess is None else as_pose("guess", guess)
         if timestamp is not None and not isinstance(timestamp, numbers.Real):
             raise TypeError(f"timestamp must be a number of seconds or None, got {timestamp!r}")
         with self._lock:
-            core = self._core.add_frame(image, pixels, colors, timestamp, pose, keep_guess)
+            core = self._core.add_frame(image, pixels, colors, more, timestamp, pose, keep_guess)
             report = FrameReport._from_core(core)
+            if report.loop_frame is not None:
+                self._frames = [
+                    replace(earlier, world_from_camera=self._core.pose(earlier.index))
+                    for earlier in self._frames
+                ]
             self._frames.append(report)
         return report
 
@@ -365,6 +393,13 @@ class Model:
         return np.clip(np.rint(np.nan_to_num(colors)), 0, 255).astype(np.uint8)
 
     @property
+    def attributes(self) -> dict[str, npt.NDArray[np.float32]]:
+        """(N,) or (N, C) for each attribute that a frame had, by name; NaN where never seen; a copy."""
+        with self._lock:
+            attributes = self._core.cloud.attributes
+        return {name: values[:, 0] if values.shape[1] == 1 else values for name, values in attributes.items()}
+
+    @property
     def confidence(self) -> npt.NDArray[np.float32]:
         """(N,) frontal observations that each point stands for; a copy."""
         with self._lock:
@@ -372,7 +407,11 @@ class Model:
 
     @property
     def poses(self) -> npt.NDArray[np.float64]:
-        """(F, 4, 4) world_from_camera of every frame; NaN where the frame is lost."""
+        """
+        (F, 4, 4) world_from_camera of every frame; NaN where the frame is lost.
+
+        Where a later frame closed a loop, the corrected poses.
+        """
         poses = np.full((len(self._frames), 4, 4), np.nan)
         for pose, report in zip(poses, self._frames, strict=True):
             if report.tracked:
@@ -381,7 +420,7 @@ class Model:
 
     @property
     def frames(self) -> tuple[FrameReport, ...]:
-        """The report of every frame that was added."""
+        """The report of every frame that was added, with poses as corrected by later frames."""
         return tuple(self._frames)
 
     @property

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections.abc
 import dataclasses
+import itertools
 import platform
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
@@ -137,19 +138,42 @@ class Reconstruction:
             return FrameRecord(index, None, "LOST", str(error), None, None, error)
         try:
             report = self.model.add_frame(
-                frame.depth, color=frame.color, timestamp=frame.timestamp, guess=guess
+                frame.depth,
+                color=frame.color,
+                mask=frame.mask,
+                timestamp=frame.timestamp,
+                guess=guess,
+                attributes=frame.attributes,
             )
         except ValueError as error:
             return FrameRecord(index, frame.timestamp, "LOST", str(error), None, frame.truth, error)
+        if report.loop_frame is not None:
+            self._take_corrected_poses()
         if self._example is None and report.tracked:
             self._example = index, frame.depth
         return FrameRecord(index, frame.timestamp, report.status, report.reason, report, frame.truth)
+
+    def _take_corrected_poses(self) -> None:
+        reports = self.model.frames
+        self.frames[:] = [
+            record
+            if record.report is None
+            else dataclasses.replace(record, report=reports[record.report.index])
+            for record in self.frames
+        ]
 
     @property
     def counts(self) -> dict[str, int]:
         """How many frames have each status."""
         found = Counter(frame.status for frame in self.frames)
         return {status: found[status] for status in STATUSES}
+
+    @property
+    def loops(self) -> list[FrameRecord]:
+        """The frames that closed a loop."""
+        return [
+            frame for frame in self.frames if frame.report is not None and frame.report.loop_frame is not None
+        ]
 
     @property
     def num_tracked(self) -> int:
@@ -214,6 +238,7 @@ class Reconstruction:
                 "num_frames": len(self.frames),
                 "num_tracked": self.num_tracked,
                 **{f"num_{name.lower()}": counts[name] for name in STATUSES[1:]},
+                "num_loops": len(self.loops),
                 "coverage": self.num_tracked / len(self.frames) if self.frames else None,
                 "num_points": len(self.model),
                 "spacing": self.model.spacing,
@@ -224,7 +249,10 @@ class Reconstruction:
                 },
                 **{name: result_dict(result) for name, result in self.evaluation.items()},
                 "parameters": self.parameters,
-                "frames": [_frame_dict(frame, *errors[i]) for i, frame in enumerate(self.frames)],
+                "frames": [
+                    _frame_dict(frame, *errors[i], self._loop_frame(frame))
+                    for i, frame in enumerate(self.frames)
+                ],
             }
         )
         return figures
@@ -250,6 +278,13 @@ class Reconstruction:
             figures=figures or {},
             parameters=self.parameters,
         )
+
+    def _loop_frame(self, frame: FrameRecord) -> int | None:
+        """Return the place in the recording of the frame that another closed a loop with."""
+        if frame.report is None or frame.report.loop_frame is None:
+            return None
+        given = (other.index for other in self.frames if other.report is not None)
+        return next(itertools.islice(given, frame.report.loop_frame, None))
 
     def _depth_example(self) -> Any:
         from nacre.report import DepthExample
@@ -298,15 +333,19 @@ def _removed(report: FrameReport | None) -> dict[str, int]:
     if report is None:
         return {}
     depth = dataclasses.asdict(report.depth)
-    return {
+    removed = {
         name.removeprefix("num_"): count
         for name, count in depth.items()
         if name not in ("num_pixels", "num_invalid", "num_kept")
     }
+    return {**removed, "outside": report.region.num_outside}
 
 
 def _frame_dict(
-    frame: FrameRecord, translation_error: float | None, rotation_error: float | None
+    frame: FrameRecord,
+    translation_error: float | None,
+    rotation_error: float | None,
+    loop_frame: int | None,
 ) -> dict[str, Any]:
     report = frame.report
     figures: dict[str, Any] = {
@@ -320,11 +359,13 @@ def _frame_dict(
         "rotation_error": rotation_error,
     }
     for name in (
-        "num_inliers", "overlap", "consistency", "rmse", "weak_directions",
+        "num_inliers", "overlap", "consistency", "evidence", "rmse", "weak_directions", "loop_distance",
         "num_updated", "num_inserted", "num_removed", "num_points", "spacing", "milliseconds",
     ):  # fmt: skip
         figures[name] = None if report is None else getattr(report, name)
+    figures["loop_frame"] = loop_frame
     figures["depth"] = None if report is None else dataclasses.asdict(report.depth)
+    figures["region"] = None if report is None else dataclasses.asdict(report.region)
     figures["removed"] = _removed(report)
     return figures
 

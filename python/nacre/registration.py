@@ -118,6 +118,19 @@ def _cloud(
     return points, rows, values
 
 
+def _brightness(name: str, colors: npt.ArrayLike | None, num_points: int) -> npt.NDArray[np.float32]:
+    """Return one value a point (luma of ITU-R BT.601 for three), or none."""
+    if colors is None:
+        return np.zeros(0, np.float32)
+    given = np.asarray(colors)
+    if given.dtype.kind not in "buif":
+        raise TypeError(f"{name} must be an array of real numbers, got dtype {given.dtype}")
+    if given.shape not in ((num_points,), (num_points, 3)):
+        raise ValueError(f"{name} must have shape ({num_points},) or ({num_points}, 3), got {given.shape}")
+    luma = given @ np.array([0.299, 0.587, 0.114]) if given.ndim == 2 else given
+    return np.ascontiguousarray(luma, dtype=np.float32)
+
+
 def _shifted(
     pose: npt.NDArray[np.float64], source: npt.NDArray[Any], target: npt.NDArray[Any]
 ) -> npt.NDArray[np.float64]:
@@ -135,6 +148,8 @@ def align(
     target_normals: npt.ArrayLike | None = None,
     source_sigma: npt.ArrayLike | None = None,
     target_sigma: npt.ArrayLike | None = None,
+    source_colors: npt.ArrayLike | None = None,
+    target_colors: npt.ArrayLike | None = None,
     initial: npt.ArrayLike | None = None,
     method: Method = "symmetric",
     max_iterations: int = 40,
@@ -169,6 +184,10 @@ def align(
         given; then their sides are ignored.
     source_sigma, target_sigma : (N,), (M,) real, optional
         Standard deviation of each point along its normal [m]; pairs count by 1 / (sum of squares).
+    source_colors, target_colors : (N,) or (N, 3), (M,) or (M, 3) real, optional
+        Brightness, or red, green and blue, on a scale to 255; NaN where unknown. Where both clouds have them,
+        they decide the directions of the pose that the shapes leave open (a textured plane, a labelled
+        bottle) and nothing else; gain and offset between the two clouds are found along the way.
     initial : (4, 4), optional
         First guess of ``target_from_source``; the identity by default.
     method : "symmetric", "point_to_plane" or "point_to_point"
@@ -211,6 +230,11 @@ def align(
     ------
     TypeError, ValueError
         Naming the argument that is of the wrong type, shape or range.
+
+    Notes
+    -----
+    Brightness as in Park, Zhou and Koltun 2017, colored point cloud registration revisited, but only along
+    directions that geometry leaves open.
     """
     parameters = RegistrationParameters(
         method=method,
@@ -238,9 +262,11 @@ def align(
         local_source,
         source_rows,
         source_values,
+        _brightness("source_colors", source_colors, len(source_points)),
         local_target,
         target_rows,
         target_values,
+        _brightness("target_colors", target_colors, len(target_points)),
         _shifted(first, source_origin, target_origin),
         to_core(parameters, _core.AlignOptions()),
     )

@@ -19,7 +19,7 @@ LAYERS = [
     ["camera"],
     ["kdtree", "mesh"],
     ["normals", "depth"],
-    ["registration", "consolidation", "fusion", "simulation"],
+    ["registration", "consolidation", "fusion", "region", "simulation"],
     ["global_registration"],
     ["model"],
 ]

@@ -445,30 +445,40 @@ def test_relocalised_after_lost() -> None:
     assert rms(off_thing(model.points)) < 0.0003
 
 
-@pytest.mark.parametrize(("least", "status"), [(0.3, "TRACKED"), (0.97, "LOST")])
-def test_min_overlap_decides(least: float, status: str) -> None:
-    """Some of the second view is new, and matches nothing."""
-    model = object_model(1, min_overlap=least, relocalise=False)
+@pytest.mark.parametrize(("least", "status"), [(0.3, "TRACKED"), (4.0, "LOST")])
+def test_min_evidence_decides(least: float, status: str) -> None:
+    model = object_model(1, min_evidence=least, relocalise=False)
     report = model.add_frame(view(1))
-    assert 0.3 < report.overlap < 0.97
+    assert 0.6 < report.evidence < 4.0
     assert report.status == status
-    assert report.reason == ("" if status == "TRACKED" else f"overlap {report.overlap:.3g} is below 0.97")
+    if status == "LOST":
+        assert report.reason.startswith(f"evidence {report.evidence:.3g} is below 6: overlap ")  # 30 degrees
+        assert f"overlap {report.overlap:.3g}, consistency {report.consistency:.3g}" in report.reason
 
 
-@pytest.mark.parametrize(("least", "status"), [(0.1, "TRACKED"), (0.9, "LOST")])
-def test_min_consistency_decides(least: float, status: str) -> None:
-    """Something in front of half of a wall has gone: the camera sees through it."""
+def test_seeing_through_the_model_is_evidence_against_a_pose() -> None:
+    """Something in front of half of a wall has gone: the rest matches as well as ever."""
     x, y = flat_grid()
     wall = relief() + 0.1
     front = 0.3 + 0.004 * np.cos(170 * x + 2) * np.sin(130 * y + 60 * x)
-    model = nacre.Model(FLAT, min_consistency=least, relocalise=False)
+    model = nacre.Model(FLAT, relocalise=False)
     model.add_frame(np.where(x < 0, front, wall))
     report = model.add_frame(wall)
     assert 0.1 < report.consistency < 0.9
-    assert report.status == status
-    assert report.reason == (
-        "" if status == "TRACKED" else f"consistency {report.consistency:.3g} is below 0.9"
-    )
+    assert report.status == "LOST"
+    assert report.reason.startswith("evidence ")
+
+
+def test_a_surface_where_the_camera_saw_through_before_is_evidence_against_a_pose() -> None:
+    """The same the other way round: what is new would have hidden the wall."""
+    x, y = flat_grid()
+    wall = relief() + 0.1
+    front = 0.3 + 0.004 * np.cos(170 * x + 2) * np.sin(130 * y + 60 * x)
+    model = nacre.Model(FLAT, relocalise=False)
+    model.add_frame(wall)
+    report = model.add_frame(np.where(x < 0, front, wall))
+    assert 0.1 < report.consistency < 0.9
+    assert report.status == "LOST"
 
 
 @pytest.mark.parametrize("index", [0, 1, 3])
@@ -567,9 +577,7 @@ def test_illegal_parameters() -> None:
         ({"spacing": float("nan")}, "spacing must be .* got nan"),
         ({"spacing": float("inf")}, "spacing must be .* got inf"),
         ({"max_points": 5}, "max_points must be at least 100, got 5"),
-        ({"min_overlap": 1.5}, "min_overlap must be in .* got 1.5"),
-        ({"max_residual": float("nan")}, "max_residual must be .* got nan"),
-        ({"min_consistency": float("nan")}, "min_consistency must be in .* got nan"),
+        ({"min_evidence": float("nan")}, "min_evidence must be .* got nan"),
         ({"first_fraction": 0.0}, "first_fraction must be in .* got 0"),
         ({"kept_fraction": -0.1}, "kept_fraction must be in .* got -0.1"),
         ({"new_fraction": 2.0}, "new_fraction must be in .* got 2"),
@@ -724,7 +732,8 @@ def test_reports() -> None:
         assert report.depth.num_pixels == 224 * 224
         assert report.depth.num_kept + report.depth.num_invalid <= 224 * 224
         assert set(report.milliseconds) == {
-            "preprocess", "back_project", "registration", "fold_in", "normals", "total",
+            "preprocess", "back_project", "region", "registration", "loop_closure", "fold_in", "normals",
+            "total",
         }  # fmt: skip
         steps = sum(value for name, value in report.milliseconds.items() if name != "total")
         assert 0 < steps <= report.milliseconds["total"] * 1.001

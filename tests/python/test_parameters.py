@@ -14,6 +14,7 @@ from nacre.parameters import as_choice, from_core, to_core, updated
 
 MIRRORS: dict[type, Any] = {
     nacre.DepthParameters: _core.DepthOptions,
+    nacre.RegionParameters: _core.RegionOptions,
     nacre.RegistrationParameters: _core.AlignOptions,
     nacre.GlobalRegistrationParameters: _core.GlobalAlignOptions,
     FusionParameters: _core.FusionOptions,
@@ -68,6 +69,7 @@ def changed(value: Any, name: str) -> Any:
         "noise": NoiseModel(0.001, 0.002, 0.3),
         "max_depth": 7.5,
         "max_radius": 0.02,
+        **{f"{side}_{axis}": value for axis in "xyz" for side, value in (("min", -0.5), ("max", 1.5))},
     }
     if dataclasses.is_dataclass(value):
         return everything_changed(value)
@@ -152,6 +154,7 @@ PAPER: dict[str, Any] = {
     "predict_motion": False,
     "verify": False,
     "relocalise": False,
+    "loop_closure": False,
     "denoise_samples": False,
 }
 

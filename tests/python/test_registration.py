@@ -633,7 +633,8 @@ def test_defaults_are_those_of_the_core() -> None:
         expected = getattr(core, name)
         expected = expected.name if name == "method" else expected
         assert parameters[name].default == expected, name
-    data = {"source_normals", "target_normals", "source_sigma", "target_sigma", "initial"}
+    data = {f"{cloud}_{name}" for cloud in ("source", "target") for name in ("normals", "sigma", "colors")}
+    data |= {"initial"}
     assert set(parameters) - fields == data | {"source", "target"}
     assert all(parameters[name].default is None for name in data)
 

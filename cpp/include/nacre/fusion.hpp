@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "nacre/camera.hpp"
@@ -10,17 +11,31 @@
 
 namespace nacre {
 
+/// Values of a frame's pixels that are fused along with its points: an intensity, a temperature, class probabilities.
+struct FrameAttribute {
+  std::string name;
+  Attributes values;  ///< height * width rows, row by row, one column a channel; values that are not finite are none
+};
+
+/// The same of a model's points.
+struct PointAttribute {
+  std::string name;
+  int num_channels = 1;
+  std::vector<float> values;  ///< num_channels for each point, NaN where never seen
+};
+
 /// A growing set of oriented points, one array an attribute; all arrays have the same length.
 struct PointModel {
   std::vector<Eigen::Vector3f> points;   ///< world frame [m]
   std::vector<Eigen::Vector3f> normals;  ///< unit length, towards the cameras that saw the point
   std::vector<Eigen::Vector3f>
-      colors;                     ///< red green blue, 0 to 255, NaN where never seen; empty when no frame had colour
-  std::vector<float> confidence;  ///< frontal observations that the point stands for
-  std::vector<std::int32_t> last_seen;   ///< frame that last observed the point
-  std::vector<std::uint8_t> sightings;   ///< frames that observed the point, at most 255
-  std::vector<std::uint8_t> violations;  ///< how often a camera saw through the point since it was last observed;
-                                         ///< of a point with few sightings: how often one looked and did not find it
+      colors;  ///< red green blue, 0 to 255, NaN where never seen; empty when no frame had colour
+  std::vector<PointAttribute> attributes;  ///< those that any frame had, in the order in which they came
+  std::vector<float> confidence;           ///< frontal observations that the point stands for
+  std::vector<std::int32_t> last_seen;     ///< frame that last observed the point
+  std::vector<std::uint8_t> sightings;     ///< frames that observed the point, at most 255
+  std::vector<std::uint8_t> violations;    ///< how often a camera saw through the point since it was last observed;
+                                           ///< of a point with few sightings: how often one looked and did not find it
 
   std::int64_t size() const { return static_cast<std::int64_t>(points.size()); }
   /// Keeps the points whose flag is not 0, in order.
@@ -49,10 +64,12 @@ struct FusionReport {
 /// Folds a frame in: model points that the camera observes move along their normals by the symmetric implicit
 /// moving-least-squares residual; surface that the model lacks is inserted at the given spacing, but no denser than a
 /// pixel and a half of the frame; points that the camera sees through, or that were never confirmed, are removed.
-/// colors is empty or has a row per pixel; the frame has the camera's size.
+/// colors is empty or has a row per pixel; the frame has the camera's size. Colours and attributes are averaged with
+/// the weights of the points; an attribute keeps its number of channels from frame to frame.
 FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, const Pose& world_from_camera,
                   double spacing, std::int32_t frame_index, const FusionOptions& options = {},
-                  const ColorsRef& colors = Colors(), int num_threads = 0);
+                  const ColorsRef& colors = Colors(), int num_threads = 0,
+                  const std::vector<FrameAttribute>& attributes = {});
 
 /// Drops points until neighbours are at least `spacing` apart along the surface; earlier points stay.
 void thin(PointModel& model, double spacing);

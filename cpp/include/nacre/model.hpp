@@ -12,6 +12,7 @@
 #include "nacre/depth.hpp"
 #include "nacre/fusion.hpp"
 #include "nacre/normals.hpp"
+#include "nacre/region.hpp"
 #include "nacre/registration.hpp"
 #include "nacre/types.hpp"
 
@@ -34,6 +35,7 @@ enum class FoldIn {
 
 struct ModelOptions {
   DepthOptions depth;
+  RegionOptions region;
   AlignOptions registration;
   FoldIn fold_in = FoldIn::fuse;
   FusionOptions fusion;
@@ -41,18 +43,17 @@ struct ModelOptions {
   NormalOptions normals;             ///< of the model, where fold_in is not fuse
   double spacing = 0.0;  ///< distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces;
                          ///< new points are also at least a pixel and a half of their frame apart
-  int max_points = 500000;       ///< the model never grows beyond: its spacing is widened instead
-  bool predict_motion = true;    ///< start also from the pose that continues the last motion
-  bool relocalise = true;        ///< search around earlier poses where the guesses fail, then everywhere
-  bool denoise_samples = true;   ///< register surface points averaged over their pixels, not single pixels
-  bool verify = true;            ///< judge registrations, by the three bounds below and by what is beyond doubt
-  double min_overlap = 0.15;     ///< a frame of which a smaller part matches the model is lost
-  double min_consistency = 0.8;  ///< so is one that sees through more than the rest of what the model shows there
-  double max_residual = 0.35;    ///< and one whose residuals exceed this part of the last gate; by chance it is 0.58
-  double first_fraction = 0.5;   ///< wlop: part of the first frame that becomes the model
-  double kept_fraction = 0.9;    ///< wlop: part of the model that is kept at each frame
-  double new_fraction = 0.2;     ///< wlop: new points, as a part of the model
-  int num_threads = 0;           ///< 0: all
+  int max_points = 500000;      ///< the model never grows beyond: its spacing is widened instead
+  bool predict_motion = true;   ///< start also from the pose that continues the last motion
+  bool relocalise = true;       ///< search around earlier poses where the guesses fail, then everywhere
+  bool loop_closure = true;     ///< fuse: correct model and poses where the camera comes back to what it saw before
+  bool denoise_samples = true;  ///< register surface points averaged over their pixels, not single pixels
+  bool verify = true;           ///< judge registrations by their evidence
+  double min_evidence = 0.3;    ///< a frame with less is lost; see FrameReport
+  double first_fraction = 0.5;  ///< wlop: part of the first frame that becomes the model
+  double kept_fraction = 0.9;   ///< wlop: part of the model that is kept at each frame
+  double new_fraction = 0.2;    ///< wlop: new points, as a part of the model
+  int num_threads = 0;          ///< 0: all
 
   /// "default" (what measures best) or "paper" (every number of the 2010 paper); std::invalid_argument otherwise.
   static ModelOptions preset(const std::string& name);
@@ -61,7 +62,8 @@ struct ModelOptions {
 
 /// Wall time of each step of the loop [ms].
 struct StepTimes {
-  double preprocess = 0, back_project = 0, registration = 0, fold_in = 0, normals = 0, total = 0;
+  double preprocess = 0, back_project = 0, region = 0, registration = 0, loop_closure = 0, fold_in = 0, normals = 0,
+         total = 0;
 };
 
 /// What became of one frame.
@@ -73,11 +75,17 @@ struct FrameReport {
   Pose world_from_camera = Pose::Identity();  ///< of a lost frame: the last known pose
   int num_inliers = 0;
   double overlap = 0.0;                   ///< part of the frame that matches the model
-  double consistency = 0.0;               ///< part of the model's points in view that the frame does not see through
+  double consistency = 0.0;               ///< part of the model's points in view that the frame does not see through,
+                                          ///< and of the frame's that the camera did not see through before
+  double evidence = 0.0;                  ///< that the registration is right, against chance: what the residuals tell a
+                                          ///< match, times overlap^2 consistency^4
   double rmse = 0.0;                      ///< of the inliers, along the normals [m]
   Matrix6 information = Matrix6::Zero();  ///< see AlignResult
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult
+  std::optional<std::int64_t> loop_frame;                    ///< the earlier frame that this one closed a loop with
+  double loop_distance = 0.0;                                ///< between the surfaces that the two saw, before [m]
   DepthReport depth;
+  RegionReport region;
   FusionReport fusion;
   std::int64_t num_points = 0;  ///< of the model, after the frame
   double spacing = 0.0;         ///< of the model [m]
@@ -86,11 +94,12 @@ struct FrameReport {
 
 /// What may come with a depth image.
 struct FrameExtras {
-  Colors colors;                    ///< height * width rows, row by row; empty: none
-  MaskImage mask;                   ///< pixels of the object, see MaskImage
-  std::optional<double> timestamp;  ///< [s]
-  std::optional<Pose> guess;        ///< world_from_camera to start the registration from
-  bool keep_guess = false;          ///< take the guess for the pose, without registration
+  Colors colors;                           ///< height * width rows, row by row; empty: none
+  std::vector<FrameAttribute> attributes;  ///< fused along with the points where fold_in is fuse
+  MaskImage mask;                          ///< pixels of the object, see MaskImage
+  std::optional<double> timestamp;         ///< [s]
+  std::optional<Pose> guess;               ///< world_from_camera to start the registration from
+  bool keep_guess = false;                 ///< take the guess for the pose, without registration
 };
 
 /// A 3D model that grows with every depth frame. The world is the first camera's frame unless the first frame comes
@@ -108,10 +117,11 @@ class Model {
 
   const Camera& camera() const;
   const ModelOptions& options() const;
-  const PointModel& cloud() const;                 ///< in the world frame
-  PointModel cloud_in_camera() const;              ///< in the newest registered camera's frame
-  const std::vector<FrameReport>& frames() const;  ///< one report per frame that was added
-  double spacing() const;                          ///< [m]; 0 before the first frame
+  const PointModel& cloud() const;     ///< in the world frame
+  PointModel cloud_in_camera() const;  ///< in the newest registered camera's frame
+  /// One report per frame that was added. Where a later frame closed a loop, the poses are the corrected ones.
+  const std::vector<FrameReport>& frames() const;
+  double spacing() const;  ///< [m]; 0 before the first frame
 
  private:
   struct Impl;

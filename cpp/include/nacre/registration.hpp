@@ -39,12 +39,15 @@ struct AlignOptions {
 };
 
 /// A cloud as align takes it. Empty normals are estimated where the method needs them; empty sigma means equal weights.
+/// Where both clouds have a brightness, it decides the directions of the pose that the shapes leave open.
 struct AlignCloud {
-  PointsRef points;   ///< rows that are not finite are ignored
-  PointsRef normals;  ///< unit length
-  ValuesRef sigma;    ///< standard deviation of each point along its normal [m]
+  PointsRef points;      ///< rows that are not finite are ignored
+  PointsRef normals;     ///< unit length
+  ValuesRef sigma;       ///< standard deviation of each point along its normal [m]
+  ValuesRef brightness;  ///< of each point, on a scale to 255; NaN where unknown
 
-  explicit AlignCloud(const PointsRef& points, const PointsRef& normals = Points(), const ValuesRef& sigma = Values());
+  explicit AlignCloud(const PointsRef& points, const PointsRef& normals = Points(), const ValuesRef& sigma = Values(),
+                      const ValuesRef& brightness = Values());
 };
 
 enum class AlignStatus {

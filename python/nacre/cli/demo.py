@@ -14,6 +14,7 @@ from nacre.cli.results import file_rows, trajectory_rows, write_results
 from nacre.cli.running import run_frames
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
 
+
 def demo(
     out: Annotated[Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.")] = Path(
         "nacre-demo"

@@ -153,7 +153,9 @@ def _surface(
         figures["seen"] = float(seen.mean())
         rows.append(("surface that the cameras saw", f"{100 * figures['seen']:.1f} %; completeness is of it"))
     if written and written.truths is not None:
-        middle = reference.bounds.mean(axis=0) if isinstance(reference, nacre.Mesh) else reference.mean(axis=0)
+        middle = (
+            reference.bounds.mean(axis=0) if isinstance(reference, nacre.Mesh) else reference.mean(axis=0)
+        )
         _add(figures, rows, _frame_results(written, middle), written)
     _add(figures, rows, results)
     if align:

@@ -33,6 +33,28 @@ def reconstruct(
     max_depth: Annotated[
         float | None, typer.Option(help="Farther measurements are not used (metres).", show_default=False)
     ] = None,
+    box: Annotated[
+        tuple[float, float, float, float, float, float] | None,
+        typer.Option(
+            metavar="X0 X1 Y0 Y1 Z0 Z1",
+            help="Model only what is in this box of the camera's frame (metres; x right, y down, z forward).",
+            show_default=False,
+        ),
+    ] = None,
+    object: Annotated[
+        bool,
+        typer.Option(
+            "--object", help="Model only the largest thing that stands on a plane, e.g. a turntable."
+        ),
+    ] = False,
+    masks: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FOLDER",
+            help="Images named as the depth images; black pixels are not used.",
+            show_default="the recording's",
+        ),
+    ] = None,
     every: Annotated[int, typer.Option(min=1, metavar="N", help="Use every N-th frame.")] = 1,
     first: Annotated[int, typer.Option(min=0, metavar="INDEX", help="The first frame, from 0.")] = 0,
     last: Annotated[
@@ -43,6 +65,21 @@ def reconstruct(
         bool,
         typer.Option("--retry/--no-retry", help="At the end, try lost frames again while any is found."),
     ] = True,
+    loop_closure: Annotated[
+        bool | None,
+        typer.Option(
+            "--loop-closure/--no-loop-closure",
+            help="Correct model and poses where the camera comes back to what it saw before.",
+            show_default="on",
+        ),
+    ] = None,
+    attribute: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=FOLDER",
+            help="Images of anything else, named as the depth images; fused along. May be repeated.",
+        ),
+    ] = None,
     preset: PresetOption = None,
     config: ConfigOption = None,
     settings: SetOption = None,
@@ -62,9 +99,23 @@ def reconstruct(
     The frames may be far apart and in any order: a lost camera is searched for everywhere.
     """
     terminal = Terminal(json, quiet, verbose)
-    more = {"depth.min_depth": min_depth, "depth.max_depth": max_depth}
+    more: dict[str, Any] = {
+        "depth.min_depth": min_depth,
+        "depth.max_depth": max_depth,
+        "loop_closure": loop_closure,
+    }
+    sides = ("min_x", "max_x", "min_y", "max_y", "min_z", "max_z")
+    more |= {f"region.{side}": value for side, value in zip(sides, box or (), strict=box is not None)}
+    more["region.object"] = object or None
     parameters, preset_name = model_parameters(preset, config, settings, **more)
     sequence = open_source(source, format, camera, depth_scale)
+    if masks is not None:
+        sequence = sequence.with_masks(masks)
+    for text in attribute or ():
+        name, equals, folder = text.partition("=")
+        if not (name and equals and folder):
+            raise CommandError(f"--attribute needs NAME=FOLDER, got {text!r}", 2)
+        sequence = sequence.with_attribute(name, folder)
     if not color:
         sequence = sequence.without_color()
     indices = range(len(sequence))[first : None if last is None else last + 1 : every]

@@ -41,7 +41,7 @@ def write_results(
         model.points,
         normals=model.normals,
         colors=model.colors,
-        attributes={"confidence": model.confidence},
+        attributes={"confidence": model.confidence, **model.attributes},
         comments=[f"nacre {nacre.__version__}", "metres; the world is the first camera's frame"],
     )
     trajectory = done.trajectory
@@ -82,6 +82,9 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
         ("frames tracked", f"{done.num_tracked} of {len(done.frames)}{extra}"),
         ("model", f"{count(len(done.model))} points, {quantity(done.model.spacing, 'm')} apart"),
     ]
+    if done.loops:
+        last = done.loops[-1]
+        rows.append(("loops closed", f"{len(done.loops)}, the last at frame {last.index}"))
     ate: Any = done.evaluation.get("absolute_trajectory_error")
     if ate is not None and ate.num_compared:
         rows.append(

@@ -1,5 +1,8 @@
 """
-The plain recording: camera.json, depth/, optionally color/ (same stems), groundtruth.txt and timestamps.txt.
+The plain recording: camera.json, depth/, optionally color/, mask/, groundtruth.txt and timestamps.txt.
+
+Colour images and masks (black: not used) have the stems of the depth images, as have images of anything else
+that pixels have, in attributes/NAME/.
 
 ``timestamps.txt`` has one time [s] for each depth image, in name order. Without it the time is its index.
 """
@@ -23,11 +26,17 @@ from nacre.datasets.tum import read_truth
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 from nacre.io.cameras import write_camera
-from nacre.io.images import COLOR_SUFFIXES, DEPTH_SUFFIXES, write_color_png, write_depth_png
+from nacre.io.images import (
+    ATTRIBUTE_SUFFIXES,
+    COLOR_SUFFIXES,
+    DEPTH_SUFFIXES,
+    write_color_png,
+    write_depth_png,
+)
 from nacre.io.trajectories import write_trajectory
 
 FORMAT = "plain"
-LAYOUT = "camera.json and depth/, optionally color/, groundtruth.txt and timestamps.txt"
+LAYOUT = "camera.json and depth/, optionally color/, mask/, groundtruth.txt and timestamps.txt"
 
 _LARGEST_STORED = 65534
 
@@ -48,6 +57,11 @@ def read(folder: Path, given: Given) -> Sequence:
             folder, f"a plain recording needs depth images in depth/; the folder holds {describe(folder)}"
         )
     colors = {path.stem: path for path in files(folder / "color", COLOR_SUFFIXES)}
+    masks = {path.stem: path for path in files(folder / "mask", COLOR_SUFFIXES)}
+    attributes = {
+        inside.name: {path.stem: path for path in files(inside, ATTRIBUTE_SUFFIXES)}
+        for inside in sorted((folder / "attributes").glob("*/"))
+    }
     timestamps = _read_timestamps(folder / "timestamps.txt", len(depth))
     times = np.arange(len(depth), dtype=np.float64) if timestamps is None else timestamps
     truth, poses = read_truth(folder / "groundtruth.txt", times, given.max_difference)
@@ -58,7 +72,13 @@ def read(folder: Path, given: Given) -> Sequence:
         depth_scale=depth_scale,
         sources=[
             FrameSource(
-                i, path, colors.get(path.stem), None if timestamps is None else float(times[i]), poses[i]
+                i,
+                path,
+                colors.get(path.stem),
+                None if timestamps is None else float(times[i]),
+                poses[i],
+                masks.get(path.stem),
+                {name: images[path.stem] for name, images in attributes.items() if path.stem in images},
             )
             for i, path in enumerate(depth)
         ],

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import collections.abc
+import dataclasses
 import logging
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, overload
@@ -15,8 +17,9 @@ import numpy.typing as npt
 
 from nacre import arrays
 from nacre._core import Camera
+from nacre.datasets.listing import files, pair
 from nacre.errors import FileFormatError
-from nacre.io.images import read_color, read_depth
+from nacre.io.images import ATTRIBUTE_SUFFIXES, COLOR_SUFFIXES, read_attribute, read_color, read_depth
 from nacre.io.trajectories import Trajectory
 
 _log = logging.getLogger(__name__)
@@ -43,6 +46,10 @@ class SequenceFrame:
         RGB.
     truth : (4, 4) float64 or None
         ``world_from_camera``, where the recording knows it.
+    mask : (H, W) bool or None
+        The pixels of interest, where the recording says so.
+    attributes : dict of str to (H, W) or (H, W, C) float32
+        Whatever else the recording has for each pixel, by name.
     """
 
     index: int
@@ -51,13 +58,16 @@ class SequenceFrame:
     timestamp: float | None
     color: npt.NDArray[np.uint8] | None
     truth: npt.NDArray[np.float64] | None
+    mask: npt.NDArray[np.bool_] | None = None
+    attributes: Mapping[str, npt.NDArray[np.float32]] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         height, width = self.depth.shape
         parts = [f"index={self.index}", f"depth={width}x{height}"]
         if self.timestamp is not None:
             parts.append(f"timestamp={self.timestamp!r}")
-        parts += [name for name in ("color", "truth") if getattr(self, name) is not None]
+        parts += [name for name in ("color", "truth", "mask") if getattr(self, name) is not None]
+        parts += self.attributes
         return f"SequenceFrame({', '.join(parts)})"
 
 
@@ -70,6 +80,8 @@ class FrameSource:
     color: Path | None = None
     timestamp: float | None = None
     truth: npt.NDArray[np.float64] | None = None
+    mask: Path | None = None
+    attributes: Mapping[str, Path] = field(default_factory=dict)
 
 
 class Sequence(collections.abc.Sequence[SequenceFrame]):
@@ -163,8 +175,47 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
 
     def without_color(self) -> Sequence:
         """Return the same recording with ``color`` None in every view."""
+        return self._with_sources([dataclasses.replace(source, color=None) for source in self._sources])
+
+    def with_masks(self, folder: str | os.PathLike[str]) -> Sequence:
+        """
+        Return the same recording with masks from a folder of images.
+
+        A mask belongs to the depth image of the same stem, or else of the same first number; its pixels that
+        are not black are of interest. A view without a mask is used whole.
+
+        Raises
+        ------
+        FileFormatError
+            None of the folder's images belongs to a depth image.
+        """
+        masks = pair([source.depth for source in self._sources], files(Path(folder), COLOR_SUFFIXES))
+        if not any(masks):
+            raise FileFormatError(Path(folder), "no image here is named as a depth image of the recording is")
         return self._with_sources(
-            [FrameSource(s.index, s.depth, None, s.timestamp, s.truth) for s in self._sources]
+            [dataclasses.replace(s, mask=mask) for s, mask in zip(self._sources, masks, strict=True)]
+        )
+
+    def with_attribute(self, name: str, folder: str | os.PathLike[str]) -> Sequence:
+        """
+        Return the same recording with images of a folder as an attribute of its frames.
+
+        An image (PNG, TIFF, JPEG or ``.npy``, with the values that are stored) belongs to the depth image of
+        the same stem, or else of the same first number.
+
+        Raises
+        ------
+        FileFormatError
+            None of the folder's images belongs to a depth image.
+        """
+        images = pair([source.depth for source in self._sources], files(Path(folder), ATTRIBUTE_SUFFIXES))
+        if not any(images):
+            raise FileFormatError(Path(folder), "no image here is named as a depth image of the recording is")
+        return self._with_sources(
+            [
+                s if image is None else dataclasses.replace(s, attributes={**s.attributes, name: image})
+                for s, image in zip(self._sources, images, strict=True)
+            ]
         )
 
     def _with_sources(self, sources: collections.abc.Sequence[FrameSource]) -> Sequence:
@@ -187,7 +238,16 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         if source.color is not None:
             color = _named(read_color, source.color)
             check_size(source.color, color, self.camera)
-        return SequenceFrame(source.index, depth, self.camera, source.timestamp, color, source.truth)
+        mask = None
+        if source.mask is not None:
+            mask = _named(read_color, source.mask).any(axis=2)
+            check_size(source.mask, mask, self.camera)
+        attributes = {name: _named(read_attribute, path) for name, path in source.attributes.items()}
+        for name, path in source.attributes.items():
+            check_size(path, attributes[name], self.camera)
+        return SequenceFrame(
+            source.index, depth, self.camera, source.timestamp, color, source.truth, mask, attributes
+        )
 
 
 class _FrameIterator(Iterator[SequenceFrame]):

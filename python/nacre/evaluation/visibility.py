@@ -54,7 +54,9 @@ def seen_samples(
     for pose in as_poses("poses", poses):
         if np.isfinite(pose).all():
             rows = np.flatnonzero(~seen)
-            seen[rows] = _seen_from(mesh, samples.points[rows], samples.normals[rows], camera, pose, max_slant)
+            seen[rows] = _seen_from(
+                mesh, samples.points[rows], samples.normals[rows], camera, pose, max_slant
+            )
     return seen
 
 
@@ -69,9 +71,10 @@ def _seen_from(
     local = (points - pose[:3, 3]) @ pose[:3, :3]
     pixels = camera.project(local)
     with np.errstate(invalid="ignore"):
-        inside = (np.abs(pixels - 0.5 * np.array([camera.width - 1, camera.height - 1])) <= (
-            0.5 * np.array([camera.width, camera.height])
-        )).all(axis=1) & (local[:, 2] > 0)
+        inside = (
+            np.abs(pixels - 0.5 * np.array([camera.width - 1, camera.height - 1]))
+            <= (0.5 * np.array([camera.width, camera.height]))
+        ).all(axis=1) & (local[:, 2] > 0)
     if camera.model == "orthographic":
         origins = points - local[:, 2:] * pose[:3, 2]
         pixel = np.full(len(points), camera.pixel_size)

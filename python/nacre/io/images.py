@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 DEPTH_SUFFIXES = (".png", ".pgm", ".npy", ".exr")
+ATTRIBUTE_SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".npy")
 COLOR_SUFFIXES = (".png", ".jpg", ".jpeg", ".ppm", ".bmp", ".webp")
 
 _EXR_DEPTH_CHANNELS = ("Z", "depth", "Depth", "Y", "R")
@@ -77,6 +78,30 @@ def read_color(path: str | os.PathLike[str]) -> npt.NDArray[np.uint8]:
                 path, f"a colour image must have 8 bits per channel, this has mode {image.mode}"
             )
         return np.array(image.convert("RGB"), dtype=np.uint8)
+
+
+def read_attribute(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
+    """
+    Read an image of anything, with the values that are stored, as (H, W) or (H, W, C) float32.
+
+    Raises
+    ------
+    FileFormatError
+        The file is damaged or holds no image.
+    ImportError
+        pillow is not installed, and the file is no ``.npy`` array.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".npy":
+        stored = _read_npy(path)
+    else:
+        with _open_image(path) as image:
+            stored = np.array(image.convert("L") if image.mode in ("1", "P") else image)
+    if stored.ndim not in (2, 3) or stored.size == 0 or stored.dtype.kind not in "buif":
+        raise FileFormatError(
+            path, f"an image must be (H, W) or (H, W, C) numbers, this is {stored.shape} of {stored.dtype}"
+        )
+    return np.ascontiguousarray(stored, dtype=np.float32)
 
 
 def write_depth_png(path: str | os.PathLike[str], depth: npt.ArrayLike) -> None:

@@ -25,7 +25,15 @@ _SIZE = (560, 560)
 _MAIN_SIZE = (680, 640)
 _CAMERA_SIZE = (640, 480)
 _MAX_POINTS = 300_000
-_REASON_COLORS = {"edge": 5, "slanted": 1, "isolated": 3, "out_of_range": 0, "masked": 4, "removed": 5}
+_REASON_COLORS = {
+    "edge": 5,
+    "slanted": 1,
+    "isolated": 3,
+    "out_of_range": 0,
+    "masked": 4,
+    "outside": 2,
+    "removed": 5,
+}
 _MAX_DEPTH_WIDTH = 800
 
 

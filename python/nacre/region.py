@@ -1,0 +1,171 @@
+"""Region of interest: which part of a depth image is modelled."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+from typing import Any, Literal, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre import _core
+from nacre.arrays import as_depth, as_mask
+from nacre.depth import Noise, as_noise
+from nacre.parameters import to_core, updated
+
+Mask = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class RegionParameters:
+    """
+    The region of interest; see :func:`select_region` for each field.
+
+    Mirrors the C++ ``RegionOptions``; the defaults leave nothing out.
+    """
+
+    min_x: float = -math.inf
+    max_x: float = math.inf
+    min_y: float = -math.inf
+    max_y: float = math.inf
+    min_z: float = -math.inf
+    max_z: float = math.inf
+    object: bool = False
+    min_plane: float = 0.1
+    min_object: float = 0.003
+    plane_margin: float = 0.0
+    link_distance: float = 0.0
+    keep_fraction: float = 0.25
+
+
+@dataclass(frozen=True)
+class RegionReport:
+    """
+    What was left out of a frame.
+
+    Attributes
+    ----------
+    num_inside, num_outside : int
+        Pixels with a point.
+    planes : (P, 4) float64
+        The planes that were put aside, largest first: unit normal towards the camera and offset [m], so that
+        ``normal . point = offset`` in the camera's frame.
+    reason : str
+        Why nothing is inside; empty otherwise.
+    """
+
+    num_inside: int
+    num_outside: int
+    planes: npt.NDArray[np.float64]
+    reason: str
+
+    @classmethod
+    def _from_core(cls, core: Any) -> RegionReport:
+        return cls(*(getattr(core, field.name) for field in fields(cls)))
+
+
+@overload
+def select_region(
+    depth: npt.ArrayLike,
+    camera: _core.Camera,
+    *,
+    depth_scale: float = ...,
+    previous: npt.ArrayLike | None = ...,
+    noise: Noise = ...,
+    return_report: Literal[False] = ...,
+    num_threads: int = ...,
+    **changes: Any,
+) -> Mask: ...
+@overload
+def select_region(
+    depth: npt.ArrayLike,
+    camera: _core.Camera,
+    *,
+    depth_scale: float = ...,
+    previous: npt.ArrayLike | None = ...,
+    noise: Noise = ...,
+    return_report: Literal[True],
+    num_threads: int = ...,
+    **changes: Any,
+) -> tuple[Mask, RegionReport]: ...
+def select_region(
+    depth: npt.ArrayLike,
+    camera: _core.Camera,
+    *,
+    depth_scale: float = 1.0,
+    previous: npt.ArrayLike | None = None,
+    noise: Noise = None,
+    return_report: bool = False,
+    num_threads: int = 0,
+    **changes: Any,
+) -> Mask | tuple[Mask, RegionReport]:
+    """
+    Return the pixels of a depth image that belong to a region of interest.
+
+    With ``object=True``, planes on which things stand are found and put aside with all that lies behind them:
+    large planes that other surfaces rise from, as from tables, floors and walls, and not the faces of a box,
+    which fall off. Of the connected things that remain and stand on such a plane the largest is taken, or the
+    one that ``previous`` shows. Where there is no such plane, the largest thing is taken.
+
+    Parameters
+    ----------
+    depth : (H, W) array
+        Depth image in units of 1 / ``depth_scale`` metres, best a cleaned one (:func:`preprocess_depth`).
+    camera : Camera
+        The camera of the image.
+    depth_scale : float
+        Stored units per metre.
+    previous : (H, W) array, optional
+        The mask of the last frame, so that the choice does not jump.
+    noise : NoiseModel, float, "kinect" or None
+        The noise of the depth; a number is a constant standard deviation [m]; None measures it from the
+        image.
+    return_report : bool
+        Also return a :class:`RegionReport`.
+    num_threads : int
+        0 uses every processor. The result does not depend on it.
+    **changes
+        Fields of :class:`RegionParameters`:
+
+        min_x, max_x, min_y, max_y, min_z, max_z : float
+            A box in the camera's frame [m]: x right, y down, z forward. For a camera that stands still before
+            a turning object; with ``object``, the thing within the box.
+        object : bool
+            Only the largest thing that stands on a plane.
+        min_plane : float
+            A supporting plane holds at least this part of the points.
+        min_object : float
+            Things of a smaller part of the image's pixels are none.
+        plane_margin : float
+            So near to a plane a point belongs to it [m]; 0: from the noise and the pixels.
+        link_distance : float
+            Across wider gaps a thing does not go on [m]; 0: from the pixels.
+        keep_fraction : float
+            A thing that shares such a part of its pixels with ``previous`` is the same.
+
+    Returns
+    -------
+    mask : (H, W) bool
+        True inside of the region, where there is a measurement. All False where nothing is inside; the report
+        says why.
+    report : RegionReport
+        If ``return_report``.
+
+    Raises
+    ------
+    ValueError
+        Depth, camera or ``previous`` differ in size; an option is out of its range or does not exist.
+    """
+    image = as_depth("depth", depth, depth_scale)
+    model = as_noise("noise", noise)
+    mask, report = _core.select_region(
+        image,
+        camera,
+        to_core(updated(RegionParameters(), changes), _core.RegionOptions()),
+        as_mask("previous", previous, (image.shape[0], image.shape[1])),
+        None if model is None else model.to_core(),
+        num_threads,
+    )
+    selected: Mask = mask != 0
+    return (selected, RegionReport._from_core(report)) if return_report else selected

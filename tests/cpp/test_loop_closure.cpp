@@ -1,0 +1,298 @@
+#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <cmath>
+#include <cstring>
+
+#include "doctest/doctest.h"
+#include "key_frames.hpp"
+#include "meshes.hpp"
+#include "model_correction.hpp"
+#include "nacre/model.hpp"
+#include "nacre/simulation.hpp"
+#include "random.hpp"
+
+using namespace nacre;
+using namespace nacre_test;
+
+namespace {
+
+constexpr double pi = 3.141592653589793;
+constexpr int frames_per_turn = 72;
+
+Mesh box(const Eigen::Vector3d& center, const Eigen::Vector3d& size, double turn) {
+  std::vector<Eigen::Vector3d> vertices;
+  const Eigen::AngleAxisd rotation(turn, Eigen::Vector3d::UnitY());
+  for (int i = 0; i < 8; ++i) {
+    const Eigen::Vector3d corner((i >> 2 & 1) - 0.5, (i >> 1 & 1) - 0.5, (i & 1) - 0.5);
+    vertices.push_back(center + rotation * corner.cwiseProduct(size));
+  }
+  return to_mesh(vertices, {{0, 1, 3},
+                            {0, 3, 2},
+                            {4, 6, 7},
+                            {4, 7, 5},
+                            {0, 4, 5},
+                            {0, 5, 1},
+                            {2, 3, 7},
+                            {2, 7, 6},
+                            {0, 2, 6},
+                            {0, 6, 4},
+                            {1, 5, 7},
+                            {1, 7, 3}});
+}
+
+// A room of 4 m x 2.6 m x 4 m with boxes along its walls; a camera turns in the middle.
+class Room {
+ public:
+  Room() : tree_(furnished()) {}
+
+  static Camera camera(double focal_error = 0.0) {
+    const double f = 180.0 * (1.0 + focal_error);
+    return Camera::pinhole(208, 156, f, f, 103.5, 77.5);
+  }
+  static Pose pose(int k) {
+    const double a = 2.0 * pi * k / frames_per_turn;
+    Pose pose = Pose::Identity();
+    pose.linear() = (Eigen::AngleAxisd(a, Eigen::Vector3d::UnitY()) *
+                     Eigen::AngleAxisd(0.15 * std::sin(2.0 * a), Eigen::Vector3d::UnitX()))
+                        .toRotationMatrix();
+    pose.translation() = 0.3 * Eigen::Vector3d(std::sin(a), 0.2 * std::sin(3.0 * a), std::cos(a));
+    return pose;
+  }
+  const DepthImage& view(int k) const {
+    DepthImage& image = views_[k];
+    if (image.size() == 0) {
+      SimulationOptions options;
+      options.noise = NoiseModel::kinect();
+      options.seed = static_cast<std::uint64_t>(k);
+      image = simulate_depth(tree_, camera(), pose(k), options);
+    }
+    return image;
+  }
+
+ private:
+  static MeshTree furnished() {
+    Mesh mesh = box(Eigen::Vector3d::Zero(), {4.0, 2.6, 4.0}, 0.0);
+    const auto random = [](int i, int j) { return random_uniform(5, static_cast<std::uint64_t>(10 * i + j)); };
+    for (int i = 0; i < 70; ++i) {
+      const double a = 2.0 * pi * (i + random(i, 0)) / 70.0;
+      const Eigen::Vector3d way(std::sin(a), 0.0, std::cos(a));
+      Eigen::Vector3d place = (1.9 / way.cwiseAbs().maxCoeff() - 0.4 * random(i, 1)) * way;
+      place.y() = 2.2 * random(i, 2) - 1.1;
+      mesh = together(
+          mesh,
+          box(place, Eigen::Vector3d(0.1 + 0.4 * random(i, 3), 0.1 + 0.6 * random(i, 4), 0.1 + 0.4 * random(i, 5)),
+              pi * random(i, 6)));
+    }
+    return MeshTree(mesh.vertices, mesh.triangles);
+  }
+
+  MeshTree tree_;
+  mutable std::map<int, DepthImage> views_;
+};
+
+const Room& room() {
+  static const Room instance;
+  return instance;
+}
+
+// A full turn and 40 degrees more, with a camera whose focal length is given wrong: it takes itself to have turned
+// farther, or less far, than it has.
+Model turned(double focal_error, bool loop_closure, int num_threads = 0) {
+  ModelOptions options;
+  options.loop_closure = loop_closure;
+  options.num_threads = num_threads;
+  Model model(Room::camera(focal_error), options);
+  for (int k = 0; k < frames_per_turn + 8; ++k) model.add_frame(room().view(k));
+  return model;
+}
+
+int num_loops(const Model& model) {
+  int count = 0;
+  for (const FrameReport& report : model.frames()) count += report.loop_frame.has_value() ? 1 : 0;
+  return count;
+}
+
+// Of what the cameras see 1.8 m ahead of them, root mean square [m].
+double trajectory_error(const Model& model) {
+  const Eigen::Vector3d ahead(0.0, 0.0, 1.8);
+  double sum = 0.0;
+  for (const FrameReport& report : model.frames()) {
+    const Pose truth = Room::pose(0).inverse() * Room::pose(static_cast<int>(report.index));
+    sum += (report.world_from_camera * ahead - truth * ahead).squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(model.frames().size()));
+}
+
+// Part of the points that have another layer of the same surface 3 to 15 cm before or behind them.
+double doubled_part(const Model& model) {
+  const PointModel& cloud = model.cloud();
+  const auto reach = static_cast<float>(model.spacing());
+  int doubled = 0, count = 0;
+  for (std::size_t i = 0; i < cloud.points.size(); i += 29, ++count) {
+    for (std::size_t j = 0; j < cloud.points.size(); ++j) {
+      const Eigen::Vector3f difference = cloud.points[j] - cloud.points[i];
+      const float across = std::abs(difference.dot(cloud.normals[i]));
+      if (across > 0.03F && across < 0.15F && difference.squaredNorm() < across * across + reach * reach &&
+          cloud.normals[i].dot(cloud.normals[j]) > 0.8F) {
+        ++doubled;
+        break;
+      }
+    }
+  }
+  return static_cast<double>(doubled) / count;
+}
+
+template <class Value>
+bool same_bits(const std::vector<Value>& a, const std::vector<Value>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Value)) == 0;
+}
+
+PointModel plane(float height, std::int32_t frame, float confidence) {
+  PointModel model;
+  for (int i = 0; i < 20; ++i) {
+    for (int j = 0; j < 20; ++j) {
+      model.points.emplace_back(0.01F * static_cast<float>(i), 0.01F * static_cast<float>(j), height);
+      model.normals.emplace_back(0.0F, 0.0F, 1.0F);
+      model.confidence.push_back(confidence);
+      model.last_seen.push_back(frame);
+      model.violations.push_back(0);
+      model.sightings.push_back(200);
+    }
+  }
+  return model;
+}
+
+void append(PointModel& model, const PointModel& more) {
+  model.points.insert(model.points.end(), more.points.begin(), more.points.end());
+  model.normals.insert(model.normals.end(), more.normals.begin(), more.normals.end());
+  model.confidence.insert(model.confidence.end(), more.confidence.begin(), more.confidence.end());
+  model.last_seen.insert(model.last_seen.end(), more.last_seen.begin(), more.last_seen.end());
+  model.sightings.insert(model.sightings.end(), more.sightings.begin(), more.sightings.end());
+  model.violations.insert(model.violations.end(), more.violations.begin(), more.violations.end());
+}
+
+}  // namespace
+
+TEST_CASE("a full turn with drift closes: poses and model") {
+  for (const double focal_error : {-0.015, 0.015}) {
+    const Model open = turned(focal_error, false), closed = turned(focal_error, true);
+    CHECK(num_loops(open) == 0);
+    REQUIRE(num_loops(closed) >= 1);
+    CHECK(trajectory_error(closed) < 0.6 * trajectory_error(open));
+    CHECK(doubled_part(open) > 0.01);
+    CHECK(doubled_part(closed) < 0.4 * doubled_part(open));
+    for (const FrameReport& report : closed.frames()) {
+      if (!report.loop_frame) continue;
+      CHECK(*report.loop_frame < report.index - frames_per_turn / 2);
+      CHECK(report.loop_distance > 0.0);
+    }
+  }
+}
+
+TEST_CASE("the first camera stays where it is, and the newest is where the model is") {
+  const Model model = turned(0.015, true);
+  REQUIRE(num_loops(model) >= 1);
+  CHECK((model.frames().front().world_from_camera.matrix() - Eigen::Matrix4d::Identity()).norm() < 1e-9);
+  const PointModel seen = model.cloud_in_camera();
+  const Pose last = model.frames().back().world_from_camera;
+  const Eigen::Vector3d moved = last.inverse() * model.cloud().points.front().cast<double>();
+  CHECK((moved - seen.points.front().cast<double>()).norm() < 1e-5);
+}
+
+TEST_CASE("loops close with the same bits for any number of threads") {
+  const Model one = turned(0.015, true, 1), three = turned(0.015, true, 3);
+  REQUIRE(num_loops(one) >= 1);
+  CHECK(num_loops(one) == num_loops(three));
+  CHECK(same_bits(one.cloud().points, three.cloud().points));
+  CHECK(same_bits(one.cloud().normals, three.cloud().normals));
+  for (std::size_t i = 0; i < one.frames().size(); ++i) {
+    CHECK(one.frames()[i].world_from_camera.matrix() == three.frames()[i].world_from_camera.matrix());
+  }
+}
+
+TEST_CASE("poses that are given are not corrected") {
+  Model model(Room::camera(0.015));
+  for (int k = 0; k < frames_per_turn + 8; ++k) {
+    FrameExtras extras;
+    extras.guess = Room::pose(k);
+    extras.keep_guess = true;
+    model.add_frame(room().view(k), extras);
+  }
+  CHECK(num_loops(model) == 0);
+  for (int k = 0; k < frames_per_turn + 8; ++k) {
+    CHECK(model.frames()[static_cast<std::size_t>(k)].world_from_camera.matrix() == Room::pose(k).matrix());
+  }
+}
+
+TEST_CASE("the distance of two views counts turns and, by depth, ways") {
+  Pose turned_view = Pose::Identity(), moved_view = Pose::Identity();
+  turned_view.linear() = Eigen::AngleAxisd(0.2, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  moved_view.translation().x() = 0.3;
+  CHECK(view_distance(Pose::Identity(), turned_view, 2.0) == doctest::Approx(1.0));
+  CHECK(view_distance(Pose::Identity(), moved_view, 2.0) == doctest::Approx(1.0));
+  CHECK(view_distance(Pose::Identity(), moved_view, 4.0) == doctest::Approx(0.5));
+}
+
+TEST_CASE("a cloud is found in its own view, not behind the camera, and seen through where nothing is") {
+  const Camera camera = Room::camera();
+  const Frame frame = make_frame(DepthImage::Constant(156, 208, 1.0F), camera);
+  const FusionOptions options;
+  SurfaceObserver observer(camera, options);
+  observer.look_at(frame, Colors(), 0);
+  const FrameCloud cloud = sample_cloud(frame, observer, {});
+  CHECK(cloud.points.rows() == 3000);
+  CHECK(cloud.depth == doctest::Approx(1.0).epsilon(0.001));
+  CHECK(look_for(cloud, Pose::Identity(), frame, camera, 0.02).seen == 1.0);
+  Pose behind = Pose::Identity(), nearer = Pose::Identity(), farther = Pose::Identity();
+  behind.linear() = Eigen::AngleAxisd(pi, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  nearer.translation().z() = -0.2;
+  farther.translation().z() = 0.2;
+  CHECK(look_for(cloud, behind, frame, camera, 0.02).seen == 0.0);
+  CHECK(look_for(cloud, nearer, frame, camera, 0.02).through > 0.5);
+  CHECK(look_for(cloud, nearer, frame, camera, 0.02).seen == 0.0);
+  CHECK(look_for(cloud, farther, frame, camera, 0.02).through == 0.0);  // hidden
+}
+
+TEST_CASE("points move with the frame that last observed them") {
+  PointModel model = plane(0.0F, 0, 1.0F);
+  model.last_seen[7] = 1;
+  Pose up = Pose::Identity();
+  up.translation().z() = 0.5;
+  move_points(model, {Pose::Identity(), up}, 0);
+  CHECK(model.points[6].z() == 0.0F);
+  CHECK(model.points[7].z() == doctest::Approx(0.5));
+}
+
+TEST_CASE("two layers of one surface become one, weighted by confidence") {
+  PointModel model = plane(0.0F, 0, 3.0F);
+  append(model, plane(0.008F, 50, 1.0F));
+  merge_layers(model, 10, 0.01, [](const Eigen::Vector3f&) { return 0.01; });
+  REQUIRE(model.size() == 400);
+  for (std::size_t i = 0; i < 400; ++i) {
+    CHECK(model.points[i].z() == doctest::Approx(0.002));
+    CHECK(model.confidence[i] == 4.0F);
+    CHECK(model.last_seen[i] == 50);
+    CHECK(model.sightings[i] == 255);
+  }
+}
+
+TEST_CASE("layers that are far apart, face away or are of the same time stay") {
+  const auto merged = [](PointModel more) {
+    PointModel model = plane(0.0F, 0, 1.0F);
+    append(model, more);
+    merge_layers(model, 10, 0.01, [](const Eigen::Vector3f& point) { return point.z() > 0.5F ? 0.06 : 0.01; });
+    return model.size();
+  };
+  CHECK(merged(plane(0.03F, 50, 1.0F)) == 800);
+  CHECK(merged(plane(0.008F, 5, 1.0F)) == 800);
+  PointModel high = plane(0.1F, 50, 1.0F);  // where points are farther apart
+  for (Eigen::Vector3f& point : high.points) point.z() += 0.5F;
+  PointModel low = high;
+  low.last_seen.assign(400, 0);
+  for (Eigen::Vector3f& point : low.points) point.z() += 0.1F;
+  append(low, high);
+  merge_layers(low, 10, 0.01, [](const Eigen::Vector3f& point) { return point.z() > 0.5F ? 0.06 : 0.01; });
+  CHECK(low.size() == 400);
+  PointModel back = plane(-0.008F, 50, 1.0F);
+  for (Eigen::Vector3f& normal : back.normals) normal = -normal;
+  CHECK(merged(back) == 800);
+}
