@@ -139,6 +139,7 @@ struct Model::Impl {
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
 
   bool was_lost() const { return num_lost > 0; }
+  bool jumped() const;
 
   Impl(const Camera& camera_in, const ModelOptions& options_in) : camera(camera_in), options(options_in) {
     options.check();
@@ -239,14 +240,21 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost(), before,
+  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost() || jumped(), before,
                options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
+}
+
+// Whether the camera's last motion was none that goes on: views far apart, in any order.
+bool Model::Impl::jumped() const {
+  constexpr double largest_turn = 0.7;
+  if (poses.size() < 2) return false;
+  return Eigen::AngleAxisd(poses[poses.size() - 2].linear().transpose() * poses.back().linear()).angle() > largest_turn;
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
   if (extras.guess) return {*extras.guess};
   const Pose& last = poses.back();
-  if (!options.predict_motion || poses.size() < 2 || was_lost()) return {last};
+  if (!options.predict_motion || poses.size() < 2 || was_lost() || jumped()) return {last};
   Pose predicted = last * (poses[poses.size() - 2].inverse() * last);
   predicted.linear() = Eigen::Quaterniond(predicted.linear()).normalized().toRotationMatrix();
   return {predicted, last};

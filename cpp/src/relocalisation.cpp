@@ -37,6 +37,8 @@ std::vector<Pose> most_promising(const PointModel& model, const IcpSource& sourc
 
 std::optional<Pose> fit_anywhere(const PointModel& model, const IcpSource& source, const AlignOptions& options) {
   GlobalAlignOptions search_options;
+  // A wrong frame spoils the model: less is believed than of two clouds.
+  search_options.max_residual = 0.6;
   search_options.seed = options.seed;
   search_options.num_threads = options.num_threads;
   const GlobalCloud frame(source.cloud.points, source.cloud.normals, Eigen::Vector3d::Zero());
@@ -44,12 +46,13 @@ std::optional<Pose> fit_anywhere(const PointModel& model, const IcpSource& sourc
   const SearchSide moving(frame, search_options, false), still(whole, search_options, false);
   if (!is_enough(moving) || !is_enough(still)) return std::nullopt;
   const GlobalSearch search(moving, still, search_options);
-  const Verdict verdict = judge(search.run(), search_options, search.tolerance());
-  // Whether a direction of the pose is weak is decided where all of the frame is registered.
-  const bool is_one_place =
-      verdict.status == GlobalAlignStatus::found ||
-      (verdict.status == GlobalAlignStatus::ambiguous && verdict.rivalry <= search_options.max_rivalry);
-  if (!is_one_place) return std::nullopt;
+  const std::vector<SearchCandidate> candidates = search.run();
+  const Verdict verdict = judge(candidates, search_options, search.tolerance());
+  if (verdict.status != GlobalAlignStatus::found) return std::nullopt;
+  const double rival = search_options.max_rivalry * verdict.best.score;
+  const auto num_good = std::count_if(candidates.begin(), candidates.end(),
+                                      [&](const SearchCandidate& candidate) { return candidate.score > rival; });
+  if (num_good > 1) return std::nullopt;
   return verdict.best.alignment.target_from_source;
 }
 

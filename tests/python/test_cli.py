@@ -628,6 +628,20 @@ class TestAlign:
         fails(2, "align", folder / "s.ply", folder / "t.ply", "-o", tmp_path / "no" / "m.ply")
         fails(2, "align", folder / "s.ply", folder / "t.ply", "--method", "foo")
 
+    def test_without_a_first_guess(self, clouds, tmp_path):
+        folder, turn = clouds
+        out = tmp_path / "m.ply"
+        result = run("align", folder / "s.ply", folder / "t.ply", "--global", "-o", out, "--json")
+        assert result.json["status"] in ("found", "ambiguous", "not_found")
+        assert result.code == (0 if result.json["status"] == "found" else 1)
+        if result.json["found"]:
+            np.testing.assert_allclose(result.json["target_from_source"], turn, atol=2e-3)
+        assert out.exists()
+        (tmp_path / "g.txt").write_text("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n")
+        arguments = (folder / "s.ply", folder / "t.ply", "--initial", tmp_path / "g.txt", "--global")
+        assert "--initial" in fails(2, "align", *arguments)
+        assert "--global" in fails(2, "align", folder / "s.ply", folder / "t.ply", "--seen-from-origin")
+
 
 class TestConsolidate:
     @pytest.mark.parametrize("suffix", [".ply", ".pcd"])

@@ -1,4 +1,4 @@
-"""Registration without a first guess: motions that are known, shapes that leave it open, data without an answer."""
+"""Registration without a first guess: known motions, shapes that leave it open, data without an answer."""
 
 import functools
 import inspect
@@ -35,7 +35,7 @@ def moved(pose: Array, points: Array) -> Array:
 
 
 def errors(pose: Array, truth: Array, points: Array) -> tuple[float, float]:
-    """Return the angle between two motions [degrees] and how far apart they take the middle of some points [m]."""
+    """Return the angle between two motions [degrees] and how far apart they take the points' middle [m]."""
     cosine = (np.trace(pose[:3, :3] @ truth[:3, :3].T) - 1) / 2
     middle = points.mean(axis=0, keepdims=True)
     shift = np.linalg.norm(moved(pose, middle) - moved(truth, middle))
@@ -63,7 +63,7 @@ def camera_at(direction: Array, up: Array, distance: float) -> Array:
 def view(azimuth: float, height: float = 0.3, sigma: float = 0.0005) -> tuple[Array, Array, Array]:
     """Return points and normals that a camera sees, in its frame, and its pose."""
     direction = np.array([np.cos(azimuth), np.sin(azimuth), height])
-    size = np.linalg.norm(thing().bounds[1] - thing().bounds[0])
+    size = float(np.linalg.norm(thing().bounds[1] - thing().bounds[0]))
     pose = camera_at(direction, np.array([0.2, -0.1, 1.0]), 1.8 * size)
     depth = thing().simulate_depth(CAMERA, pose, noise=sigma, seed=int(1000 * azimuth))
     normals = nacre.depth_normals(depth, CAMERA)[np.isfinite(depth)]
@@ -74,7 +74,8 @@ def view(azimuth: float, height: float = 0.3, sigma: float = 0.0005) -> tuple[Ar
 
 def sphere(count: int, seed: int) -> Array:
     directions = np.random.default_rng(seed).normal(size=(count, 3))
-    return 0.1 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    points: Array = 0.1 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    return points
 
 
 @functools.cache
@@ -144,7 +145,12 @@ def test_unrelated_shapes_are_not_joined() -> None:
     rng = np.random.default_rng(3)
     box = rng.uniform(-0.25, 0.25, (4000, 3))
     box[np.arange(4000), rng.integers(0, 3, 4000)] = rng.choice([-0.25, 0.25], 4000)
-    for other in (size / 0.3 * sphere(4000, 1), size * box * [1, 0.7, 0.4], size * rng.uniform(-0.3, 0.3, (4000, 3))):
+    others = (
+        size / 0.3 * sphere(4000, 1),
+        size * box * [1, 0.7, 0.4],
+        size * rng.uniform(-0.3, 0.3, (4000, 3)),
+    )
+    for other in others:
         result = nacre.align_global(other, target, target_normals=target_normals)
         assert not result.found, result
 

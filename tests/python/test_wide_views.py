@@ -1,7 +1,6 @@
-"""Views that are far apart and in any order: the camera is searched for everywhere, and lost frames get another try."""
+"""Views far apart and in any order: the camera is searched for everywhere, lost frames get another try."""
 
 import functools
-from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -31,7 +30,8 @@ def pose_at(degrees: float, roll: float = 0.0) -> Array:
     poses = nacre.turntable_poses(thing(), 2, np.radians(degrees))
     turn[:2, :2] = [[np.cos(roll), -np.sin(roll)], [np.sin(roll), np.cos(roll)]]
     assert np.allclose(poses[0], pose)
-    return poses[1] @ turn
+    rolled: Array = poses[1] @ turn
+    return rolled
 
 
 @functools.cache
@@ -44,7 +44,7 @@ def truth(degrees: float, roll: float = 0.0) -> Array:
 
 
 def errors(pose: Array, expected: Array) -> tuple[float, float]:
-    """Return the angle [degrees] and the distance at the object's middle [m] between two poses of a camera."""
+    """Return the angle [degrees] and the distance at the object's middle [m] between two camera poses."""
     cosine = (np.trace(pose[:3, :3].T @ expected[:3, :3]) - 1) / 2
     middle = np.append(thing().bounds.mean(axis=0), 1.0)
     in_first = np.linalg.inv(pose_at(0)) @ middle
@@ -52,19 +52,11 @@ def errors(pose: Array, expected: Array) -> tuple[float, float]:
     return float(np.degrees(np.arccos(np.clip(cosine, -1, 1)))), float(shift)
 
 
-class Views:
-    """A recording of given depth images."""
-
-    def __init__(self, images: Iterable[Array], truths: Iterable[Array] | None = None) -> None:
-        self.images = list(images)
-        self.truths = None if truths is None else list(truths)
-
-    def __len__(self) -> int:
-        return len(self.images)
-
-    def __getitem__(self, index: int) -> SequenceFrame:
-        pose = None if self.truths is None else self.truths[index]
-        return SequenceFrame(index, self.images[index], camera(), timestamp=None, color=None, truth=pose)
+def recording(images: list[Array], truths: list[Array] | None = None) -> list[SequenceFrame]:
+    return [
+        SequenceFrame(i, image, camera(), timestamp=None, color=None, truth=truths[i] if truths else None)
+        for i, image in enumerate(images)
+    ]
 
 
 @pytest.mark.parametrize(("degrees", "roll"), [(60, 3.0), (-75, 1.6), (70, -2.2)])
@@ -105,7 +97,7 @@ ORDER = [0, 180, 120, 240, 60, 300]  # the second shares nothing with the first
 
 def test_views_in_any_order_are_joined() -> None:
     done = Reconstruction(
-        Views([view(degrees) for degrees in ORDER], [pose_at(degrees) for degrees in ORDER]),
+        recording([view(degrees) for degrees in ORDER], [pose_at(degrees) for degrees in ORDER]),
         nacre.Model(camera()),
     )
     list(done.run())
@@ -130,7 +122,7 @@ def test_views_in_any_order_are_joined() -> None:
 
 def test_retry_gives_up_where_nothing_is_found() -> None:
     nothing = np.full_like(view(0), np.nan)
-    done = Reconstruction(Views([view(0), nothing, view(10)]), nacre.Model(camera()))
+    done = Reconstruction(recording([view(0), nothing, view(10)]), nacre.Model(camera()))
     list(done.run())
     before = done.model.points.tobytes()
     assert [frame.index for frame in done.retry_lost()] == [1]
@@ -139,13 +131,13 @@ def test_retry_gives_up_where_nothing_is_found() -> None:
 
 
 def test_retry_does_nothing_where_no_frame_was_lost() -> None:
-    done = Reconstruction(Views([view(0), view(10)]), nacre.Model(camera()))
+    done = Reconstruction(recording([view(0), view(10)]), nacre.Model(camera()))
     list(done.run())
     assert list(done.retry_lost()) == []
 
 
 def test_retry_leaves_frames_that_were_refused() -> None:
-    done = Reconstruction(Views([view(0), np.ones((5, 5), np.float32)]), nacre.Model(camera()))
+    done = Reconstruction(recording([view(0), np.ones((5, 5), np.float32)]), nacre.Model(camera()))
     list(done.run())
     assert done.frames[1].refused
     assert list(done.retry_lost()) == []
@@ -161,6 +153,7 @@ def test_bunny_scans_in_any_order(recordings: Any, seed: int | None) -> None:
     list(done.run([int(i) for i in order]))
     list(done.retry_lost())
     first = done.frames[0].truth
+    assert first is not None
     assert done.num_tracked >= 9
     for frame in done.frames:
         if frame.world_from_camera is None:
