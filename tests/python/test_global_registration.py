@@ -144,7 +144,11 @@ def test_unrelated_shapes_are_not_joined() -> None:
     rng = np.random.default_rng(3)
     box = rng.uniform(-0.25, 0.25, (4000, 3))
     box[np.arange(4000), rng.integers(0, 3, 4000)] = rng.choice([-0.25, 0.25], 4000)
-    for other in (size / 0.3 * sphere(4000, 1), size * box * [1, 0.7, 0.4], size * rng.uniform(-0.3, 0.3, (4000, 3))):
+    for other in (
+        size / 0.3 * sphere(4000, 1),
+        size * box * [1, 0.7, 0.4],
+        size * rng.uniform(-0.3, 0.3, (4000, 3)),
+    ):
         result = nacre.align_global(other, target, target_normals=target_normals)
         assert not result.found, result
 
