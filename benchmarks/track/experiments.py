@@ -79,7 +79,8 @@ def fold_in_forms(places: Places, row: Row) -> dict[str, Figures]:
     assert row.recording is not None
     assert row.mesh is not None
     recording, mesh = row.recording(places), row.mesh(places)
-    results, folder = {}, places.work / "out" / row.name
+    results: dict[str, Figures] = {}
+    folder = places.work / "out" / row.name
     folder.mkdir(parents=True, exist_ok=True)
     for form in ("fuse", "wlop", "wlop+"):
         out = folder / form.replace("+", "-plus")

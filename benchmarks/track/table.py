@@ -51,7 +51,7 @@ def turntable(
     peers: tuple[str, ...] = (),
 ) -> Row:
     """Return an object on a turntable, with mixed pixels at the edges."""
-    options = (*sensor, "--views", views, "--step", step, "--scale", scale)
+    options: tuple[str | float, ...] = (*sensor, "--views", views, "--step", step, "--scale", scale)
     return Row(
         name,
         title,

@@ -53,7 +53,7 @@ double consistency_of(const PointsRef& points, const PointsRef& normals, const S
 
 void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
   constexpr double chance = 0.58;       // the rms of a uniform distribution, 1 / sqrt(3)
-  constexpr double strictness = 1.5;    // times min_evidence
+  constexpr double strictness = 1.2;    // times min_evidence
   constexpr double beyond_doubt = 2.0;  // times min_evidence
   constexpr double least_ratio = 0.01;  // data without noise is no more certain
   std::ostringstream reason;

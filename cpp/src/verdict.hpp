@@ -41,7 +41,7 @@ double consistency_of(const PointsRef& points, const PointsRef& normals, const S
 // Fills in evidence, status, reason and is_beyond_doubt. The evidence is what the matches tell against chance: for each
 // a residual that is small among those that would have matched, ln(0.58 / ratio), where chance gives a ratio of 0.58;
 // times overlap^2, since any two surfaces touch somewhere, and consistency^4, since true ones contradict nowhere.
-// Strict, for guesses that may be far off: twice as much is asked for.
+// Strict, for guesses that may be far off: more is asked for.
 void judge(TrackingResult& result, const ModelOptions& options, bool strict);
 
 }  // namespace nacre

@@ -39,11 +39,11 @@ class SlamLoop:
         self.model.integrate(self.frame, 1.0, FAR, 8.0)
         self.model.synthesize_model_frame(self.cast, 1.0, 0.1, FAR, 8.0, False)
         self.index += 1
-        return self.pose.numpy().copy()
+        return np.array(self.pose.numpy())
 
     def points(self) -> Array:
         """Return the points of the TSDF's surface."""
-        return self.model.extract_pointcloud(3.0).point.positions.numpy()
+        return np.asarray(self.model.extract_pointcloud(3.0).point.positions.numpy())
 
 
 def make(camera: Any, voxel: float) -> SlamLoop:
