@@ -1,0 +1,255 @@
+#include "outline_registration.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "parallel.hpp"
+#include "rigid_motion.hpp"
+
+namespace nacre {
+namespace {
+
+constexpr std::size_t fewest = 40;         // pairs
+constexpr double gate_decay = 0.8;         // at each step
+constexpr double last_gate = 4.0;          // [pixels]
+constexpr double cos_outward = 0.75;       // of the largest angle between matched outlines, and their surfaces
+constexpr double least_agreement = 0.6;    // part of the outline in view that must match
+constexpr double largest_ratio = 0.4;      // residuals to the gate, root mean square; chance gives 0.58
+constexpr double least_information = 0.02;  // per pair, that a direction is known
+constexpr double least_total = 10.0;       // over all pairs
+constexpr double mad_to_sigma = 1.4826;
+
+using Basis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
+struct EdgePair {
+  Eigen::Vector3d lever;  // of the source point about the centre [m]
+  Eigen::Vector3d target_outward, source_outward;
+  double residual, weight = 1.0;
+};
+
+double median_of(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+class EdgeSearch {
+ public:
+  EdgeSearch(const IcpTarget& target, const IcpSource& source, const OutlinePair& outlines, const IcpResult& geometric,
+             const AlignOptions& options)
+      : target_(target), source_(source), outlines_(outlines), options_(options), held_(options) {
+    const double reach = options.final_distance > 0.0 ? options.final_distance : 2.5 * target.spacing();
+    held_.max_distance = reach;
+    held_.max_iterations = 6;
+    const Pose& pose = outlines.before.world_from_camera;
+    edges_ = outlines.target;
+    Eigen::AlignedBox3d box;
+    std::vector<double> pixels;
+    for (OutlinePoint& edge : edges_) {
+      edge = {pose * edge.point, pose.linear() * edge.normal, pose.linear() * edge.outward, edge.pixel};
+      box.extend(edge.point);
+      pixels.push_back(edge.pixel);
+    }
+    pixel_ = median_of(pixels);
+    widest_ = std::max(box.diagonal().norm() / 3.0, last_gate * pixel_);
+    extent_ = extent_of(geometric, reach);
+  }
+
+  double noise() const { return noise_; }
+  double extent() const { return extent_; }
+
+  // Each source edge with the nearest target edge of its kind, if that lies within the gate; robust weights.
+  std::vector<EdgePair> match(const Pose& pose, const Eigen::Vector3d& center, double gate) {
+    const auto count = static_cast<std::int64_t>(outlines_.source.size());
+    std::vector<int> nearest(outlines_.source.size(), -1);
+    parallel_for(count, 32, options_.num_threads, [&](std::int64_t i) {
+      const OutlinePoint edge = moved(i, pose);
+      double least = gate * gate;
+      for (std::size_t k = 0; k < edges_.size(); ++k) {
+        const double squared = (edges_[k].point - edge.point).squaredNorm();
+        if (!(squared < least) || edges_[k].outward.dot(edge.outward) < cos_outward ||
+            edges_[k].normal.dot(edge.normal) < cos_outward) {
+          continue;
+        }
+        least = squared;
+        nearest[static_cast<std::size_t>(i)] = static_cast<int>(k);
+      }
+    });
+    matched_.assign(nearest.size(), 0);
+    std::vector<EdgePair> pairs;
+    std::vector<double> sizes;
+    for (std::size_t i = 0; i < nearest.size(); ++i) {
+      if (nearest[i] < 0) continue;
+      const OutlinePoint edge = moved(static_cast<std::int64_t>(i), pose);
+      const OutlinePoint& other = edges_[static_cast<std::size_t>(nearest[i])];
+      const Eigen::Vector3d across = (edge.outward + other.outward).normalized();
+      matched_[i] = 1;
+      pairs.push_back({edge.point - center, other.outward, edge.outward, (edge.point - other.point).dot(across)});
+      sizes.push_back(std::abs(pairs.back().residual));
+    }
+    if (pairs.size() < fewest) return {};
+    // Pixels are where they are to half a pixel.
+    noise_ = std::max(0.3 * pixel_, mad_to_sigma * median_of(sizes));
+    for (EdgePair& pair : pairs) {
+      const double ratio = pair.residual / (3.0 * noise_);
+      pair.weight = 1.0 / ((1.0 + ratio * ratio) * (1.0 + ratio * ratio));  // Geman and McClure 1985
+    }
+    return pairs;
+  }
+
+  // From a pose at rest on the surface, along the given directions or, without any, all that geometry leaves open.
+  IcpResult run(const IcpResult& start, const Basis* only) {
+    IcpResult result = start;
+    double gate = widest_;
+    for (int round = 0; round < 4; ++round) {
+      const Basis open = only != nullptr ? *only : Basis(result.weak_directions);
+      if (open.cols() == 0) break;
+      const int least_steps = 4;
+      for (int i = 0; i < least_steps || (gate > last_gate * pixel_ && i < 40); ++i) {
+        const std::vector<EdgePair> pairs = match(result.target_from_source, result.center, gate);
+        if (pairs.empty()) return start;
+        step(pairs, open, result);
+        gate = std::max(last_gate * pixel_, gate * gate_decay);
+      }
+      const IcpResult back = align_held(target_, source_, result.target_from_source, held_);
+      if (back.status == AlignStatus::too_few_pairs) return start;
+      const int iterations = result.iterations + back.iterations;
+      result = back;
+      result.status = start.status;
+      result.iterations = iterations;
+    }
+    return result;
+  }
+
+  // Whether the outlines lie on each other better than chance has it.
+  bool agrees(const Pose& pose, const std::vector<EdgePair>& pairs) const {
+    double squares = 0.0;
+    for (const EdgePair& pair : pairs) squares += pair.residual * pair.residual;
+    const double ratio = std::sqrt(squares / static_cast<double>(pairs.size())) / (last_gate * pixel_);
+    std::size_t in_view = 0, agree = 0;
+    const Pose camera_from_world = outlines_.before.world_from_camera.inverse();
+    for (std::size_t i = 0; i < matched_.size(); ++i) {
+      const OutlinePoint edge = moved(static_cast<std::int64_t>(i), pose);
+      agree += static_cast<std::size_t>(matched_[i]);
+      in_view += static_cast<std::size_t>(matched_[i] != 0 || was_in_view(edge, camera_from_world));
+    }
+    return ratio < largest_ratio && static_cast<double>(agree) >= least_agreement * static_cast<double>(in_view);
+  }
+
+  Eigen::MatrixXd agreed_information(const std::vector<EdgePair>& pairs, const Basis& open) const {
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(open.cols(), open.cols());
+    for (const EdgePair& pair : pairs) {
+      const Eigen::VectorXd a = open.transpose() * row_of(pair.lever, pair.target_outward);
+      const Eigen::VectorXd b = open.transpose() * row_of(pair.lever, pair.source_outward);
+      sum += 0.5 * pair.weight * (a * b.transpose() + b * a.transpose());
+    }
+    return sum;
+  }
+
+  Vector6 row_of(const Eigen::Vector3d& lever, const Eigen::Vector3d& outward) const {
+    Vector6 row;
+    row << lever.cross(outward) / extent_, outward;
+    return row;
+  }
+
+  double smallest_gate() const { return last_gate * pixel_; }
+
+ private:
+  OutlinePoint moved(std::int64_t i, const Pose& pose) const {
+    const OutlinePoint& edge = outlines_.source[static_cast<std::size_t>(i)];
+    return {pose * edge.point, pose.linear() * edge.normal, pose.linear() * edge.outward, edge.pixel};
+  }
+
+  bool was_in_view(const OutlinePoint& edge, const Pose& camera_from_world) const {
+    const Eigen::Vector3d point = camera_from_world * edge.point, normal = camera_from_world.linear() * edge.normal;
+    const bool is_orthographic = outlines_.camera.model() == Camera::Model::orthographic;
+    const Eigen::Vector3d sight_line = is_orthographic ? Eigen::Vector3d::UnitZ() : point.normalized();
+    if (!(-normal.dot(sight_line) > 0.6)) return false;
+    const Eigen::Vector2d pixel = outlines_.camera.project(point);
+    const int width = outlines_.camera.width(), height = outlines_.camera.height(), margin = width / 16;
+    if (!(pixel.x() > margin && pixel.y() > margin && pixel.x() < width - margin && pixel.y() < height - margin)) {
+      return false;
+    }
+    const auto row = static_cast<Eigen::Index>(std::lround(pixel.y())) * width + std::lround(pixel.x());
+    const double behind = static_cast<double>(outlines_.before.depth[row]) - point.z();
+    return !(behind < -4.0 * pixel_);  // or hidden
+  }
+
+  double extent_of(const IcpResult& geometric, double reach) const {
+    std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source_.cloud.points.rows()), no_slot);
+    const Gate gate{reach, std::cos(std::min(options_.max_angle, 3.14)), true};
+    const auto pairs = target_.match(source_, source_.levels.back(), geometric.target_from_source, gate, nearest);
+    double squares = 0.0;
+    for (const Pair& pair : pairs) squares += (pair.p - geometric.center).squaredNorm();
+    return std::sqrt(std::max(squares / std::max<double>(1.0, static_cast<double>(pairs.size())), 1e-24));
+  }
+
+  void step(const std::vector<EdgePair>& pairs, const Basis& open, IcpResult& result) const {
+    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(open.cols(), open.cols());
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(open.cols());
+    double weight = 0.0;
+    for (const EdgePair& pair : pairs) {
+      const Eigen::Vector3d across = (pair.target_outward + pair.source_outward).normalized();
+      const Eigen::VectorXd row = open.transpose() * row_of(pair.lever, across);
+      hessian += pair.weight * row * row.transpose();
+      gradient -= pair.weight * pair.residual * row;
+      weight += pair.weight;
+    }
+    hessian.diagonal().array() += 1e-3 * weight;
+    const Vector6 twist = open * hessian.ldlt().solve(gradient);
+    Pose motion = Pose::Identity();
+    const Eigen::Vector3d turn = twist.head<3>() / extent_;
+    if (turn.norm() > 0.0) motion.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+    motion.translation() = result.center - motion.linear() * result.center + Eigen::Vector3d(twist.tail<3>());
+    result.target_from_source = motion * result.target_from_source;
+  }
+
+  const IcpTarget& target_;
+  const IcpSource& source_;
+  const OutlinePair& outlines_;
+  const AlignOptions& options_;
+  AlignOptions held_;  // few steps within the last gate, weak directions held
+  std::vector<OutlinePoint> edges_;  // of the target
+  std::vector<char> matched_;        // source edges, in the last match
+  double pixel_ = 0.0, widest_ = 0.0, extent_ = 1.0, noise_ = 1.0;
+};
+
+}  // namespace
+
+IcpResult determine_by_outline(const IcpTarget& target, const IcpSource& source, const OutlinePair& outlines,
+                               const IcpResult& geometric, const AlignOptions& options) {
+  if (outlines.target.size() < fewest || outlines.source.size() < fewest) return geometric;
+  EdgeSearch search(target, source, outlines, geometric, options);
+  Basis known;
+  IcpResult result = geometric;
+  for (const bool restricted : {false, true}) {
+    const IcpResult found = search.run(geometric, restricted ? &known : nullptr);
+    const std::vector<EdgePair> pairs =
+        search.match(found.target_from_source, found.center, search.smallest_gate());
+    const bool still_fits = found.num_inliers > 0.8 * geometric.num_inliers;
+    if (getenv("NACRE_OUTLINE")) fprintf(stderr, "outline: %zu %zu pairs %zu inliers %d -> %d weak %d -> %d agrees %d noise %g\n", outlines.target.size(), outlines.source.size(), pairs.size(), geometric.num_inliers, found.num_inliers, (int)geometric.weak_directions.cols(), (int)found.weak_directions.cols(), pairs.empty() ? -1 : (int)search.agrees(found.target_from_source, pairs), search.noise());
+    if (pairs.empty() || !still_fits || !search.agrees(found.target_from_source, pairs)) return geometric;
+    const Basis open = found.weak_directions;
+    if (open.cols() == 0) return found;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(search.agreed_information(pairs, open));
+    double weight = 0.0;
+    for (const EdgePair& pair : pairs) weight += pair.weight;
+    const double least = std::max(least_total, least_information * weight);
+    if (getenv("NACRE_OUTLINE")) { for (int i = 0; i < open.cols(); ++i) fprintf(stderr, " %g", eigen.eigenvalues()[i] / weight); fprintf(stderr, "\n"); }
+    const Eigen::Index num_weak = (eigen.eigenvalues().array() < least).count();
+    if (num_weak == open.cols()) return geometric;
+    known = open * eigen.eigenvectors().rightCols(open.cols() - num_weak);
+    result = found;
+    result.weak_directions = open * eigen.eigenvectors().leftCols(num_weak);
+    for (const EdgePair& pair : pairs) {
+      Vector6 row = known * (known.transpose() * search.row_of(pair.lever, pair.target_outward));
+      row.head<3>() *= search.extent();
+      result.information += pair.weight / (search.noise() * search.noise()) * row * row.transpose();
+    }
+    if (num_weak == 0) break;
+  }
+  return result;
+}
+
+}  // namespace nacre
