@@ -49,7 +49,7 @@ class OutlineSearch {
         ++inside;
         const double distance = std::sqrt(static_cast<double>(x * x + y * y));
         if (!(std::abs(depth(u + x, v + y) - z) <= tolerance(u, v, distance))) continue;
-        points[count] = point(u + x, v + y);
+        points[count] = unproject(camera_, u + x, v + y, depth(u + x, v + y));
         pixels[count] = Eigen::Vector2d(x, y);
         offset += pixels[count++];
       }
@@ -107,13 +107,6 @@ class OutlineSearch {
     return most_slope * camera_.footprint(depth(u, v)) * distance +
            6.0 * static_cast<double>(sight_.sigma[v * width_ + u]);
   }
-  Eigen::Vector3d point(int u, int v) const {
-    const Ray ray = camera_.ray(u, v);
-    const double z = depth(u, v);
-    const double scale = z / static_cast<double>(ray.direction_z);
-    return {static_cast<double>(ray.origin_x) + scale * static_cast<double>(ray.direction_x),
-            static_cast<double>(ray.origin_y) + scale * static_cast<double>(ray.direction_y), z};
-  }
 
   const Sight& sight_;
   const Camera& camera_;
@@ -122,6 +115,13 @@ class OutlineSearch {
 };
 
 }  // namespace
+
+Eigen::Vector3d unproject(const Camera& camera, int u, int v, double z) {
+  const Ray ray = camera.ray(u, v);
+  const double scale = z / static_cast<double>(ray.direction_z);
+  return {static_cast<double>(ray.origin_x) + scale * static_cast<double>(ray.direction_x),
+          static_cast<double>(ray.origin_y) + scale * static_cast<double>(ray.direction_y), z};
+}
 
 std::vector<OutlinePoint> find_outline(const Sight& sight, const Camera& camera, std::size_t most, int num_threads) {
   std::vector<OutlinePoint> outline;

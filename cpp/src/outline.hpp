@@ -21,4 +21,7 @@ struct OutlinePoint {
 // occluding edges). At most `most` of them.
 std::vector<OutlinePoint> find_outline(const Sight& sight, const Camera& camera, std::size_t most, int num_threads);
 
+// The point of the camera frame that a pixel sees at z [m].
+Eigen::Vector3d unproject(const Camera& camera, int u, int v, double z);
+
 }  // namespace nacre

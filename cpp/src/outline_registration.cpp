@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "parallel.hpp"
 #include "rigid_motion.hpp"
@@ -14,7 +15,8 @@ constexpr std::size_t fewest = 40;         // pairs
 constexpr double gate_decay = 0.8;         // at each step
 constexpr double last_gate = 4.0;          // [pixels]
 constexpr double cos_outward = 0.75;       // of the largest angle between matched outlines, and their surfaces
-constexpr double least_agreement = 0.6;    // part of the outline in view that must match
+constexpr double least_facing = 0.5;       // cosine between a normal and the direction to the camera
+constexpr double least_agreement = 0.6;    // part of the outline that was in view
 constexpr double largest_ratio = 0.4;      // residuals to the gate, root mean square; chance gives 0.58
 constexpr double least_information = 0.02;  // per pair, that a direction is known
 constexpr double least_total = 10.0;       // over all pairs
@@ -54,6 +56,7 @@ class EdgeSearch {
     pixel_ = median_of(pixels);
     widest_ = std::max(box.diagonal().norm() / 3.0, last_gate * pixel_);
     extent_ = extent_of(geometric, reach);
+    tolerance_ = 2.0 * pixel_ + outlines.noise;
   }
 
   double noise() const { return noise_; }
@@ -127,14 +130,15 @@ class EdgeSearch {
     double squares = 0.0;
     for (const EdgePair& pair : pairs) squares += pair.residual * pair.residual;
     const double ratio = std::sqrt(squares / static_cast<double>(pairs.size())) / (last_gate * pixel_);
-    std::size_t in_view = 0, agree = 0;
+    std::size_t judged = 0, agree = 0;
     const Pose camera_from_world = outlines_.before.world_from_camera.inverse();
     for (std::size_t i = 0; i < matched_.size(); ++i) {
       const OutlinePoint edge = moved(static_cast<std::int64_t>(i), pose);
       agree += static_cast<std::size_t>(matched_[i]);
-      in_view += static_cast<std::size_t>(matched_[i] != 0 || was_in_view(edge, camera_from_world));
+      judged += static_cast<std::size_t>(matched_[i] != 0 || is_contradicted(edge, camera_from_world));
     }
-    return ratio < largest_ratio && static_cast<double>(agree) >= least_agreement * static_cast<double>(in_view);
+    if (getenv("NACRE_OUTLINE")) fprintf(stderr, "ratio %g agree %zu of %zu\n", ratio, agree, judged);
+    return ratio < largest_ratio && static_cast<double>(agree) >= least_agreement * static_cast<double>(judged);
   }
 
   Eigen::MatrixXd agreed_information(const std::vector<EdgePair>& pairs, const Basis& open) const {
@@ -161,19 +165,41 @@ class EdgeSearch {
     return {pose * edge.point, pose.linear() * edge.normal, pose.linear() * edge.outward, edge.pixel};
   }
 
-  bool was_in_view(const OutlinePoint& edge, const Pose& camera_from_world) const {
+  // Whether the camera saw before that the surface does not reach so far, or goes on. A surface that bends away there, or
+  // is hidden, contradicts nothing.
+  bool is_contradicted(const OutlinePoint& edge, const Pose& camera_from_world) const {
     const Eigen::Vector3d point = camera_from_world * edge.point, normal = camera_from_world.linear() * edge.normal;
+    const Eigen::Vector3d outward = camera_from_world.linear() * edge.outward;
     const bool is_orthographic = outlines_.camera.model() == Camera::Model::orthographic;
     const Eigen::Vector3d sight_line = is_orthographic ? Eigen::Vector3d::UnitZ() : point.normalized();
-    if (!(-normal.dot(sight_line) > 0.6)) return false;
-    const Eigen::Vector2d pixel = outlines_.camera.project(point);
-    const int width = outlines_.camera.width(), height = outlines_.camera.height(), margin = width / 16;
-    if (!(pixel.x() > margin && pixel.y() > margin && pixel.x() < width - margin && pixel.y() < height - margin)) {
-      return false;
+    if (!(-normal.dot(sight_line) > least_facing)) return false;
+    const auto here = distance_before(point, normal);
+    if (!here) return false;
+    if (!(*here > -tolerance_)) return true;  // nothing was seen there, or something farther
+    const auto beyond = distance_before(point + 2.0 * last_gate * pixel_ * outward, normal);
+    return beyond && std::abs(*beyond) < tolerance_;
+  }
+
+  // How far before a point of a surface the camera saw something, along its normal [m], averaged over the pixels around;
+  // NaN where it saw nothing, none outside of the image.
+  std::optional<double> distance_before(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
+    const Camera& camera = outlines_.camera;
+    const Eigen::Vector2d pixel = camera.project(point);
+    if (!(pixel.x() > 1.0 && pixel.y() > 1.0 && pixel.x() < camera.width() - 2 && pixel.y() < camera.height() - 2)) {
+      return std::nullopt;
     }
-    const auto row = static_cast<Eigen::Index>(std::lround(pixel.y())) * width + std::lround(pixel.x());
-    const double behind = static_cast<double>(outlines_.before.depth[row]) - point.z();
-    return !(behind < -4.0 * pixel_);  // or hidden
+    const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
+    double sum = 0.0;
+    int count = 0;
+    for (int y = v - 1; y <= v + 1; ++y) {
+      for (int x = u - 1; x <= u + 1; ++x) {
+        const double z = static_cast<double>(outlines_.before.depth[y * camera.width() + x]);
+        if (!std::isfinite(z)) continue;
+        sum += (unproject(camera, x, y, z) - point).dot(normal);
+        ++count;
+      }
+    }
+    return sum / count;
   }
 
   double extent_of(const IcpResult& geometric, double reach) const {
@@ -212,13 +238,14 @@ class EdgeSearch {
   AlignOptions held_;  // few steps within the last gate, weak directions held
   std::vector<OutlinePoint> edges_;  // of the target
   std::vector<char> matched_;        // source edges, in the last match
-  double pixel_ = 0.0, widest_ = 0.0, extent_ = 1.0, noise_ = 1.0;
+  double pixel_ = 0.0, tolerance_ = 0.0, widest_ = 0.0, extent_ = 1.0, noise_ = 1.0;
 };
 
 }  // namespace
 
 IcpResult determine_by_outline(const IcpTarget& target, const IcpSource& source, const OutlinePair& outlines,
                                const IcpResult& geometric, const AlignOptions& options) {
+  if (getenv("NACRE_NOOUT")) return geometric;
   if (outlines.target.size() < fewest || outlines.source.size() < fewest) return geometric;
   EdgeSearch search(target, source, outlines, geometric, options);
   Basis known;

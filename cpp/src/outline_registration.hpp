@@ -11,6 +11,7 @@ struct OutlinePair {
   const Camera& camera;
   const Sight& before;
   std::vector<OutlinePoint> target, source;
+  double noise;  // of a pixel [m]
 };
 
 // Continues a registration that has weak directions: moves the source along them until its outline lies on the one seen
