@@ -92,7 +92,8 @@ class OutlineSearch {
 
     // What begins beyond it.
     for (int step = 1; step <= gap_; ++step) {
-      const int x = static_cast<int>(std::lround(-inward.x() * step)), y = static_cast<int>(std::lround(-inward.y() * step));
+      const int x = static_cast<int>(std::lround(-inward.x() * step)),
+                y = static_cast<int>(std::lround(-inward.y() * step));
       const double behind = depth(u + x, v + y) - (origin + across * x + down * y).z();
       if (!std::isfinite(behind)) continue;
       if (step <= 2 && std::abs(behind) < tolerance(u, v, 0.0)) continue;

@@ -15,10 +15,10 @@ struct OutlinePoint {
   double pixel;             // size of a pixel on the surface, across the outline [m]
 };
 
-// Of what a camera saw, in the camera frame: pixels beside which a flat surface that faces the camera ends, with nothing
-// or something farther behind. Not where the image ends, not where something nearer begins, and not where a surface
-// bends away, since there the outline moves with the camera (Choi, Trevor and Christensen 2013 call the first kind
-// occluding edges). At most `most` of them.
+// Of what a camera saw, in the camera frame: pixels beside which a flat surface that faces the camera ends, with
+// nothing or something farther behind. Not where the image ends, not where something nearer begins, and not where a
+// surface bends away, since there the outline moves with the camera (Choi, Trevor and Christensen 2013 call the first
+// kind occluding edges). At most `most` of them.
 std::vector<OutlinePoint> find_outline(const Sight& sight, const Camera& camera, std::size_t most, int num_threads);
 
 // The point of the camera frame that a pixel sees at z [m].

@@ -11,15 +11,18 @@
 namespace nacre {
 namespace {
 
-constexpr std::size_t fewest = 40;         // pairs
-constexpr double gate_decay = 0.8;         // at each step
-constexpr double last_gate = 4.0;          // [pixels]
-constexpr double cos_outward = 0.75;       // of the largest angle between matched outlines, and their surfaces
-constexpr double least_facing = 0.5;       // cosine between a normal and the direction to the camera
-constexpr double least_agreement = 0.6;    // part of the outline that was in view
-constexpr double largest_ratio = 0.4;      // residuals to the gate, root mean square; chance gives 0.58
-constexpr double least_information = 0.02;  // per pair, that a direction is known
-constexpr double least_total = 10.0;       // over all pairs
+constexpr std::size_t fewest = 40;              // pairs
+constexpr int num_rounds = 4, least_steps = 4;  // after each round of steps, back onto the surface
+constexpr double gate_decay = 0.8;              // at each step
+constexpr double first_gate = 12.0;             // [pixels]; the other is a third of the outline
+constexpr double beyond_doubt = 0.9;            // agreement
+constexpr double last_gate = 4.0;               // [pixels]
+constexpr double cos_outward = 0.75;            // of the largest angle between matched outlines, and their surfaces
+constexpr double least_facing = 0.5;            // cosine between a normal and the direction to the camera
+constexpr double least_agreement = 0.6;         // part of the outline that was in view
+constexpr double largest_ratio = 0.4;           // residuals to the gate, root mean square; chance gives 0.58
+constexpr double least_information = 0.02;      // per pair, that a direction is known
+constexpr double least_total = 10.0;            // over all pairs
 constexpr double mad_to_sigma = 1.4826;
 
 using Basis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
@@ -36,6 +39,12 @@ double median_of(std::vector<double> values) {
   return *middle;
 }
 
+struct Fit {
+  IcpResult result;
+  std::vector<EdgePair> pairs;
+  double agreement = 0.0;  // see EdgeSearch
+};
+
 class EdgeSearch {
  public:
   EdgeSearch(const IcpTarget& target, const IcpSource& source, const OutlinePair& outlines, const IcpResult& geometric,
@@ -49,7 +58,7 @@ class EdgeSearch {
     Eigen::AlignedBox3d box;
     std::vector<double> pixels;
     for (OutlinePoint& edge : edges_) {
-      edge = {pose * edge.point, pose.linear() * edge.normal, pose.linear() * edge.outward, edge.pixel};
+      edge = moved(edge, pose);
       box.extend(edge.point);
       pixels.push_back(edge.pixel);
     }
@@ -59,6 +68,9 @@ class EdgeSearch {
     tolerance_ = 2.0 * pixel_ + outlines.noise;
   }
 
+  double narrow_gate() const { return std::min(first_gate * pixel_, widest_); }
+  double widest_gate() const { return widest_; }
+  double smallest_gate() const { return last_gate * pixel_; }
   double noise() const { return noise_; }
   double extent() const { return extent_; }
 
@@ -67,7 +79,7 @@ class EdgeSearch {
     const auto count = static_cast<std::int64_t>(outlines_.source.size());
     std::vector<int> nearest(outlines_.source.size(), -1);
     parallel_for(count, 32, options_.num_threads, [&](std::int64_t i) {
-      const OutlinePoint edge = moved(i, pose);
+      const OutlinePoint edge = moved(outlines_.source[static_cast<std::size_t>(i)], pose);
       double least = gate * gate;
       for (std::size_t k = 0; k < edges_.size(); ++k) {
         const double squared = (edges_[k].point - edge.point).squaredNorm();
@@ -84,7 +96,7 @@ class EdgeSearch {
     std::vector<double> sizes;
     for (std::size_t i = 0; i < nearest.size(); ++i) {
       if (nearest[i] < 0) continue;
-      const OutlinePoint edge = moved(static_cast<std::int64_t>(i), pose);
+      const OutlinePoint edge = moved(outlines_.source[i], pose);
       const OutlinePoint& other = edges_[static_cast<std::size_t>(nearest[i])];
       const Eigen::Vector3d across = (edge.outward + other.outward).normalized();
       matched_[i] = 1;
@@ -102,18 +114,16 @@ class EdgeSearch {
   }
 
   // From a pose at rest on the surface, along the given directions or, without any, all that geometry leaves open.
-  IcpResult run(const IcpResult& start, const Basis* only) {
+  IcpResult run(const IcpResult& start, double gate, const Basis* only) {
     IcpResult result = start;
-    double gate = widest_;
-    for (int round = 0; round < 4; ++round) {
+    for (int round = 0; round < num_rounds; ++round) {
       const Basis open = only != nullptr ? *only : Basis(result.weak_directions);
       if (open.cols() == 0) break;
-      const int least_steps = 4;
-      for (int i = 0; i < least_steps || (gate > last_gate * pixel_ && i < 40); ++i) {
+      for (int i = 0; i < least_steps || gate > smallest_gate(); ++i) {
         const std::vector<EdgePair> pairs = match(result.target_from_source, result.center, gate);
         if (pairs.empty()) return start;
         step(pairs, open, result);
-        gate = std::max(last_gate * pixel_, gate * gate_decay);
+        gate = std::max(smallest_gate(), gate * gate_decay);
       }
       const IcpResult back = align_held(target_, source_, result.target_from_source, held_);
       if (back.status == AlignStatus::too_few_pairs) return start;
@@ -125,20 +135,29 @@ class EdgeSearch {
     return result;
   }
 
-  // Whether the outlines lie on each other better than chance has it.
-  bool agrees(const Pose& pose, const std::vector<EdgePair>& pairs) const {
+  // The same with its pairs within the last gate, and their agreement; 0 where the surfaces no longer fit.
+  Fit fit(const IcpResult& start, double gate, const Basis* only) {
+    Fit fit;
+    fit.result = run(start, gate, only);
+    fit.pairs = match(fit.result.target_from_source, fit.result.center, smallest_gate());
+    const bool still_fits = fit.result.num_inliers > 0.8 * start.num_inliers;
+    if (still_fits && !fit.pairs.empty()) fit.agreement = agreement(fit.result.target_from_source, fit.pairs);
+    return fit;
+  }
+
+  // Part of the source's outline that matches, of what the camera saw before from where it could tell; 0 where the
+  // matches are no closer than chance has it.
+  double agreement(const Pose& pose, const std::vector<EdgePair>& pairs) const {
     double squares = 0.0;
     for (const EdgePair& pair : pairs) squares += pair.residual * pair.residual;
-    const double ratio = std::sqrt(squares / static_cast<double>(pairs.size())) / (last_gate * pixel_);
-    std::size_t judged = 0, agree = 0;
+    const double ratio = std::sqrt(squares / static_cast<double>(pairs.size())) / smallest_gate();
+    if (!(ratio < largest_ratio)) return 0.0;
     const Pose camera_from_world = outlines_.before.world_from_camera.inverse();
+    std::size_t contradicted = 0;
     for (std::size_t i = 0; i < matched_.size(); ++i) {
-      const OutlinePoint edge = moved(static_cast<std::int64_t>(i), pose);
-      agree += static_cast<std::size_t>(matched_[i]);
-      judged += static_cast<std::size_t>(matched_[i] != 0 || is_contradicted(edge, camera_from_world));
+      if (matched_[i] == 0 && is_contradicted(moved(outlines_.source[i], pose), camera_from_world)) ++contradicted;
     }
-    if (getenv("NACRE_OUTLINE")) fprintf(stderr, "ratio %g agree %zu of %zu\n", ratio, agree, judged);
-    return ratio < largest_ratio && static_cast<double>(agree) >= least_agreement * static_cast<double>(judged);
+    return static_cast<double>(pairs.size()) / static_cast<double>(pairs.size() + contradicted);
   }
 
   Eigen::MatrixXd agreed_information(const std::vector<EdgePair>& pairs, const Basis& open) const {
@@ -157,16 +176,13 @@ class EdgeSearch {
     return row;
   }
 
-  double smallest_gate() const { return last_gate * pixel_; }
-
  private:
-  OutlinePoint moved(std::int64_t i, const Pose& pose) const {
-    const OutlinePoint& edge = outlines_.source[static_cast<std::size_t>(i)];
+  static OutlinePoint moved(const OutlinePoint& edge, const Pose& pose) {
     return {pose * edge.point, pose.linear() * edge.normal, pose.linear() * edge.outward, edge.pixel};
   }
 
-  // Whether the camera saw before that the surface does not reach so far, or goes on. A surface that bends away there, or
-  // is hidden, contradicts nothing.
+  // Whether the camera saw before that the surface does not reach so far, or goes on. A surface that bends away there,
+  // or is hidden, contradicts nothing.
   bool is_contradicted(const OutlinePoint& edge, const Pose& camera_from_world) const {
     const Eigen::Vector3d point = camera_from_world * edge.point, normal = camera_from_world.linear() * edge.normal;
     const Eigen::Vector3d outward = camera_from_world.linear() * edge.outward;
@@ -180,8 +196,8 @@ class EdgeSearch {
     return beyond && std::abs(*beyond) < tolerance_;
   }
 
-  // How far before a point of a surface the camera saw something, along its normal [m], averaged over the pixels around;
-  // NaN where it saw nothing, none outside of the image.
+  // How far before a point of a surface the camera saw something, along its normal [m], averaged over the pixels
+  // around; NaN where it saw nothing, none outside of the image.
   std::optional<double> distance_before(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
     const Camera& camera = outlines_.camera;
     const Eigen::Vector2d pixel = camera.project(point);
@@ -235,7 +251,7 @@ class EdgeSearch {
   const IcpSource& source_;
   const OutlinePair& outlines_;
   const AlignOptions& options_;
-  AlignOptions held_;  // few steps within the last gate, weak directions held
+  AlignOptions held_;                // few steps within the last gate, weak directions held
   std::vector<OutlinePoint> edges_;  // of the target
   std::vector<char> matched_;        // source edges, in the last match
   double pixel_ = 0.0, tolerance_ = 0.0, widest_ = 0.0, extent_ = 1.0, noise_ = 1.0;
@@ -245,25 +261,29 @@ class EdgeSearch {
 
 IcpResult determine_by_outline(const IcpTarget& target, const IcpSource& source, const OutlinePair& outlines,
                                const IcpResult& geometric, const AlignOptions& options) {
-  if (getenv("NACRE_NOOUT")) return geometric;
   if (outlines.target.size() < fewest || outlines.source.size() < fewest) return geometric;
   EdgeSearch search(target, source, outlines, geometric, options);
+  // The nearer solution first: structures repeat.
+  double best = 0.0, gate = 0.0;
+  for (const double first : {search.narrow_gate(), search.widest_gate()}) {
+    const Fit fit = search.fit(geometric, first, nullptr);
+    if (fit.agreement > best) gate = first;
+    best = std::max(best, fit.agreement);
+    if (best > beyond_doubt) break;
+  }
+  if (best < least_agreement) return geometric;
+
   Basis known;
   IcpResult result = geometric;
   for (const bool restricted : {false, true}) {
-    const IcpResult found = search.run(geometric, restricted ? &known : nullptr);
-    const std::vector<EdgePair> pairs =
-        search.match(found.target_from_source, found.center, search.smallest_gate());
-    const bool still_fits = found.num_inliers > 0.8 * geometric.num_inliers;
-    if (getenv("NACRE_OUTLINE")) fprintf(stderr, "outline: %zu %zu pairs %zu inliers %d -> %d weak %d -> %d agrees %d noise %g\n", outlines.target.size(), outlines.source.size(), pairs.size(), geometric.num_inliers, found.num_inliers, (int)geometric.weak_directions.cols(), (int)found.weak_directions.cols(), pairs.empty() ? -1 : (int)search.agrees(found.target_from_source, pairs), search.noise());
-    if (pairs.empty() || !still_fits || !search.agrees(found.target_from_source, pairs)) return geometric;
+    const auto [found, pairs, agreement] = search.fit(geometric, gate, restricted ? &known : nullptr);
+    if (agreement < least_agreement) return geometric;
     const Basis open = found.weak_directions;
     if (open.cols() == 0) return found;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(search.agreed_information(pairs, open));
     double weight = 0.0;
     for (const EdgePair& pair : pairs) weight += pair.weight;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(search.agreed_information(pairs, open));
     const double least = std::max(least_total, least_information * weight);
-    if (getenv("NACRE_OUTLINE")) { for (int i = 0; i < open.cols(); ++i) fprintf(stderr, " %g", eigen.eigenvalues()[i] / weight); fprintf(stderr, "\n"); }
     const Eigen::Index num_weak = (eigen.eigenvalues().array() < least).count();
     if (num_weak == open.cols()) return geometric;
     known = open * eigen.eigenvectors().rightCols(open.cols() - num_weak);

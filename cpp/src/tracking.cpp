@@ -98,6 +98,7 @@ struct Search {
 
   mutable std::optional<OutlinePair> found_outlines = {};
 
+  // Found when they are first asked for.
   const OutlinePair& outlines() const {
     constexpr std::size_t most_before = 2000, most_now = 600;
     if (!found_outlines) {
@@ -144,11 +145,12 @@ struct Search {
 
     TrackingResult result;
     result.alignment = align_to(target, gated, guess, align_options);
-    if (result.alignment.weak_directions.cols() > 0 && view.brightness.size() > 0 && observer.has_colors()) {
+    const Eigen::Index num_weak = result.alignment.weak_directions.cols();
+    if (num_weak > 0 && view.brightness.size() > 0 && observer.has_colors()) {
       result.alignment = determine_by_color(target, gated, BrightCloud(view.points, view.brightness),
                                             bright_cloud(frame, observer), result.alignment, align_options);
     }
-    if (result.alignment.weak_directions.cols() > 0) {
+    if (num_weak > 0 && result.alignment.weak_directions.cols() == num_weak) {
       result.alignment = determine_by_outline(target, gated, outlines(), result.alignment, align_options);
     }
     const Pose& pose = result.alignment.target_from_source;
