@@ -3,10 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
-#include <optional>
 
-#include "parallel.hpp"
-#include "rigid_motion.hpp"
+#include "outline_match.hpp"
 
 namespace nacre {
 namespace {
@@ -17,9 +15,7 @@ constexpr double gate_decay = 0.8;              // at each step
 constexpr double first_gate = 12.0;             // [pixels]; the other is a third of the outline
 constexpr double beyond_doubt = 0.9;            // agreement
 constexpr double last_gate = 4.0;               // [pixels]
-constexpr double cos_outward = 0.75;            // of the largest angle between matched outlines, and their surfaces
-constexpr double least_facing = 0.5;            // cosine between a normal and the direction to the camera
-constexpr double least_agreement = 0.6;         // part of the outline that was in view
+constexpr double least_agreement = 0.6;         // of the outlines
 constexpr double largest_ratio = 0.4;           // residuals to the gate, root mean square; chance gives 0.58
 constexpr double least_information = 0.02;      // per pair, that a direction is known
 constexpr double least_total = 10.0;            // over all pairs
@@ -49,23 +45,24 @@ class EdgeSearch {
  public:
   EdgeSearch(const IcpTarget& target, const IcpSource& source, const OutlinePair& outlines, const IcpResult& geometric,
              const AlignOptions& options)
-      : target_(target), source_(source), outlines_(outlines), options_(options), held_(options) {
+      : target_(target),
+        source_(source),
+        outlines_(outlines),
+        options_(options),
+        held_(options),
+        edges_(moved(outlines.target, outlines.before.world_from_camera)) {
     const double reach = options.final_distance > 0.0 ? options.final_distance : 2.5 * target.spacing();
     held_.max_distance = reach;
     held_.max_iterations = 6;
-    const Pose& pose = outlines.before.world_from_camera;
-    edges_ = outlines.target;
     Eigen::AlignedBox3d box;
     std::vector<double> pixels;
-    for (OutlinePoint& edge : edges_) {
-      edge = moved(edge, pose);
+    for (const OutlinePoint& edge : edges_) {
       box.extend(edge.point);
       pixels.push_back(edge.pixel);
     }
     pixel_ = median_of(pixels);
     widest_ = std::max(box.diagonal().norm() / 3.0, last_gate * pixel_);
     extent_ = extent_of(geometric, reach);
-    tolerance_ = 2.0 * pixel_ + outlines.noise;
   }
 
   double narrow_gate() const { return std::min(first_gate * pixel_, widest_); }
@@ -76,30 +73,14 @@ class EdgeSearch {
 
   // Each source edge with the nearest target edge of its kind, if that lies within the gate; robust weights.
   std::vector<EdgePair> match(const Pose& pose, const Eigen::Vector3d& center, double gate) {
-    const auto count = static_cast<std::int64_t>(outlines_.source.size());
-    std::vector<int> nearest(outlines_.source.size(), -1);
-    parallel_for(count, 32, options_.num_threads, [&](std::int64_t i) {
-      const OutlinePoint edge = moved(outlines_.source[static_cast<std::size_t>(i)], pose);
-      double least = gate * gate;
-      for (std::size_t k = 0; k < edges_.size(); ++k) {
-        const double squared = (edges_[k].point - edge.point).squaredNorm();
-        if (!(squared < least) || edges_[k].outward.dot(edge.outward) < cos_outward ||
-            edges_[k].normal.dot(edge.normal) < cos_outward) {
-          continue;
-        }
-        least = squared;
-        nearest[static_cast<std::size_t>(i)] = static_cast<int>(k);
-      }
-    });
-    matched_.assign(nearest.size(), 0);
+    const std::vector<OutlinePoint> edges = moved(outlines_.source, pose);
+    const std::vector<int> nearest = nearest_edges(edges, edges_, gate, options_.num_threads);
     std::vector<EdgePair> pairs;
     std::vector<double> sizes;
     for (std::size_t i = 0; i < nearest.size(); ++i) {
       if (nearest[i] < 0) continue;
-      const OutlinePoint edge = moved(outlines_.source[i], pose);
-      const OutlinePoint& other = edges_[static_cast<std::size_t>(nearest[i])];
+      const OutlinePoint &edge = edges[i], &other = edges_[static_cast<std::size_t>(nearest[i])];
       const Eigen::Vector3d across = (edge.outward + other.outward).normalized();
-      matched_[i] = 1;
       pairs.push_back({edge.point - center, other.outward, edge.outward, (edge.point - other.point).dot(across)});
       sizes.push_back(std::abs(pairs.back().residual));
     }
@@ -145,19 +126,19 @@ class EdgeSearch {
     return fit;
   }
 
-  // Part of the source's outline that matches, of what the camera saw before from where it could tell; 0 where the
-  // matches are no closer than chance has it.
+  // See agreement_of: of either outline, whichever is less; 0 where the matches are no closer than chance has it.
   double agreement(const Pose& pose, const std::vector<EdgePair>& pairs) const {
     double squares = 0.0;
     for (const EdgePair& pair : pairs) squares += pair.residual * pair.residual;
     const double ratio = std::sqrt(squares / static_cast<double>(pairs.size())) / smallest_gate();
     if (!(ratio < largest_ratio)) return 0.0;
-    const Pose camera_from_world = outlines_.before.world_from_camera.inverse();
-    std::size_t contradicted = 0;
-    for (std::size_t i = 0; i < matched_.size(); ++i) {
-      if (matched_[i] == 0 && is_contradicted(moved(outlines_.source[i], pose), camera_from_world)) ++contradicted;
-    }
-    return static_cast<double>(pairs.size()) / static_cast<double>(pairs.size() + contradicted);
+    const std::vector<OutlinePoint> edges = moved(outlines_.source, pose);
+    const Sight now{outlines_.depth, Values(), pose};
+    const auto part = [&](const auto& outline, const auto& others, const Sight& sight) {
+      const std::vector<int> matches = nearest_edges(outline, others, smallest_gate(), options_.num_threads);
+      return agreement_of(outline, matches, sight, outlines_.camera, pixel_, outlines_.noise);
+    };
+    return std::min(part(edges, edges_, outlines_.before), part(edges_, edges, now));
   }
 
   Eigen::MatrixXd agreed_information(const std::vector<EdgePair>& pairs, const Basis& open) const {
@@ -177,47 +158,6 @@ class EdgeSearch {
   }
 
  private:
-  static OutlinePoint moved(const OutlinePoint& edge, const Pose& pose) {
-    return {pose * edge.point, pose.linear() * edge.normal, pose.linear() * edge.outward, edge.pixel};
-  }
-
-  // Whether the camera saw before that the surface does not reach so far, or goes on. A surface that bends away there,
-  // or is hidden, contradicts nothing.
-  bool is_contradicted(const OutlinePoint& edge, const Pose& camera_from_world) const {
-    const Eigen::Vector3d point = camera_from_world * edge.point, normal = camera_from_world.linear() * edge.normal;
-    const Eigen::Vector3d outward = camera_from_world.linear() * edge.outward;
-    const bool is_orthographic = outlines_.camera.model() == Camera::Model::orthographic;
-    const Eigen::Vector3d sight_line = is_orthographic ? Eigen::Vector3d::UnitZ() : point.normalized();
-    if (!(-normal.dot(sight_line) > least_facing)) return false;
-    const auto here = distance_before(point, normal);
-    if (!here) return false;
-    if (!(*here > -tolerance_)) return true;  // nothing was seen there, or something farther
-    const auto beyond = distance_before(point + 2.0 * last_gate * pixel_ * outward, normal);
-    return beyond && std::abs(*beyond) < tolerance_;
-  }
-
-  // How far before a point of a surface the camera saw something, along its normal [m], averaged over the pixels
-  // around; NaN where it saw nothing, none outside of the image.
-  std::optional<double> distance_before(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
-    const Camera& camera = outlines_.camera;
-    const Eigen::Vector2d pixel = camera.project(point);
-    if (!(pixel.x() > 1.0 && pixel.y() > 1.0 && pixel.x() < camera.width() - 2 && pixel.y() < camera.height() - 2)) {
-      return std::nullopt;
-    }
-    const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
-    double sum = 0.0;
-    int count = 0;
-    for (int y = v - 1; y <= v + 1; ++y) {
-      for (int x = u - 1; x <= u + 1; ++x) {
-        const double z = static_cast<double>(outlines_.before.depth[y * camera.width() + x]);
-        if (!std::isfinite(z)) continue;
-        sum += (unproject(camera, x, y, z) - point).dot(normal);
-        ++count;
-      }
-    }
-    return sum / count;
-  }
-
   double extent_of(const IcpResult& geometric, double reach) const {
     std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source_.cloud.points.rows()), no_slot);
     const Gate gate{reach, std::cos(std::min(options_.max_angle, 3.14)), true};
@@ -253,8 +193,7 @@ class EdgeSearch {
   const AlignOptions& options_;
   AlignOptions held_;                // few steps within the last gate, weak directions held
   std::vector<OutlinePoint> edges_;  // of the target
-  std::vector<char> matched_;        // source edges, in the last match
-  double pixel_ = 0.0, tolerance_ = 0.0, widest_ = 0.0, extent_ = 1.0, noise_ = 1.0;
+  double pixel_ = 0.0, widest_ = 0.0, extent_ = 1.0, noise_ = 1.0;
 };
 
 }  // namespace

@@ -11,7 +11,8 @@ struct OutlinePair {
   const Camera& camera;
   const Sight& before;
   std::vector<OutlinePoint> target, source;
-  double noise;  // of a pixel [m]
+  const Values& depth;  // of each pixel of the source [m]
+  double noise;         // of a pixel [m]
 };
 
 // Continues a registration that has weak directions: moves the source along them until its outline lies on the one seen

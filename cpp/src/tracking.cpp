@@ -104,7 +104,7 @@ struct Search {
     if (!found_outlines) {
       const Sight now{depth, frame.sigma, Pose::Identity()};
       found_outlines.emplace(OutlinePair{camera, before, find_outline(before, camera, most_before, options.num_threads),
-                                         find_outline(now, camera, most_now, options.num_threads),
+                                         find_outline(now, camera, most_now, options.num_threads), depth,
                                          static_cast<double>(median_sigma(frame))});
     }
     return *found_outlines;
