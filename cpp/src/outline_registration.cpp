@@ -17,8 +17,8 @@ constexpr double beyond_doubt = 0.9;            // agreement
 constexpr double last_gate = 4.0;               // [pixels]
 constexpr double least_agreement = 0.6;         // of the outlines
 constexpr double largest_ratio = 0.4;           // residuals to the gate, root mean square; chance gives 0.58
-constexpr double least_information = 0.02;      // per pair, that a direction is known
-constexpr double least_total = 10.0;            // over all pairs
+constexpr double least_information = 0.1;       // per pair, for a direction to be known: outlines that hardly move
+constexpr double least_total = 10.0;            // with it make much of small errors; over all pairs
 constexpr double mad_to_sigma = 1.4826;
 
 using Basis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
