@@ -10,6 +10,7 @@
 namespace nacre {
 namespace {
 
+constexpr int border = 3;              // of an image, where cleaning may have removed pixels
 constexpr int reach = 6;               // of the window that shows the surface [pixels]
 constexpr double least_facing = 0.5;   // cosine between the normal and the direction to the camera
 constexpr double least_offset = 0.25;  // of the window's pixels from its middle, in units of its reach: a half disc
@@ -112,10 +113,25 @@ class OutlineSearch {
   const Sight& sight_;
   const Camera& camera_;
   int width_, height_;
-  int gap_;  // looked across [pixels]
+  int gap_;  // across which something is looked for [pixels]
 };
 
 }  // namespace
+
+bool is_cut_off(const Values& depth, const Camera& camera) {
+  const int width = camera.width(), height = camera.height();
+  int count = 0;
+  const auto look = [&](int u, int v) { count += static_cast<int>(std::isfinite(depth[v * width + u])); };
+  for (int u = 0; u < width; ++u) {
+    look(u, border);
+    look(u, height - 1 - border);
+  }
+  for (int v = 0; v < height; ++v) {
+    look(border, v);
+    look(width - 1 - border, v);
+  }
+  return 10 * count > 2 * (width + height);
+}
 
 Eigen::Vector3d unproject(const Camera& camera, int u, int v, double z) {
   const Ray ray = camera.ray(u, v);

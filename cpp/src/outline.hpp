@@ -21,6 +21,9 @@ struct OutlinePoint {
 // kind occluding edges). At most `most` of them.
 std::vector<OutlinePoint> find_outline(const Sight& sight, const Camera& camera, std::size_t most, int num_threads);
 
+// Whether the image ends before the surfaces do: on more than a tenth of its border.
+bool is_cut_off(const Values& depth, const Camera& camera);
+
 // The point of the camera frame that a pixel sees at z [m].
 Eigen::Vector3d unproject(const Camera& camera, int u, int v, double z);
 

@@ -12,7 +12,7 @@ namespace {
 constexpr std::size_t fewest = 40;              // pairs
 constexpr int num_rounds = 4, least_steps = 4;  // after each round of steps, back onto the surface
 constexpr double gate_decay = 0.8;              // at each step
-constexpr double first_gate = 12.0;             // [pixels]; the other is a third of the outline
+constexpr double first_gate = 12.0;             // [pixels]; of an object seen whole also a third of its size
 constexpr double beyond_doubt = 0.9;            // agreement
 constexpr double last_gate = 4.0;               // [pixels]
 constexpr double least_agreement = 0.6;         // of the outlines
@@ -61,7 +61,10 @@ class EdgeSearch {
       pixels.push_back(edge.pixel);
     }
     pixel_ = median_of(pixels);
-    widest_ = std::max(box.diagonal().norm() / 3.0, last_gate * pixel_);
+    // Outlines that the image cuts off slide along themselves.
+    const bool is_cut =
+        is_cut_off(outlines.depth, outlines.camera) || is_cut_off(outlines.before.depth, outlines.camera);
+    widest_ = std::max(is_cut ? first_gate * pixel_ : box.diagonal().norm() / 3.0, smallest_gate());
     extent_ = extent_of(geometric, reach);
   }
 
@@ -205,6 +208,7 @@ IcpResult determine_by_outline(const IcpTarget& target, const IcpSource& source,
   // The nearer solution first: structures repeat.
   double best = 0.0, gate = 0.0;
   for (const double first : {search.narrow_gate(), search.widest_gate()}) {
+    if (first == gate) break;
     const Fit fit = search.fit(geometric, first, nullptr);
     if (fit.agreement > best) gate = first;
     best = std::max(best, fit.agreement);
@@ -217,13 +221,15 @@ IcpResult determine_by_outline(const IcpTarget& target, const IcpSource& source,
   for (const bool restricted : {false, true}) {
     const auto [found, pairs, agreement] = search.fit(geometric, gate, restricted ? &known : nullptr);
     if (agreement < least_agreement) return geometric;
-    const Basis open = found.weak_directions;
-    if (open.cols() == 0) return found;
+    // What shape says only where outlines took it must be said by the outlines, too.
+    const bool is_shaped = found.weak_directions.cols() == 0;
+    const Basis open = is_shaped ? geometric.weak_directions : found.weak_directions;
     double weight = 0.0;
     for (const EdgePair& pair : pairs) weight += pair.weight;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(search.agreed_information(pairs, open));
     const double least = std::max(least_total, least_information * weight);
     const Eigen::Index num_weak = (eigen.eigenvalues().array() < least).count();
+    if (is_shaped) return num_weak == 0 ? found : geometric;
     if (num_weak == open.cols()) return geometric;
     known = open * eigen.eigenvectors().rightCols(open.cols() - num_weak);
     result = found;

@@ -111,8 +111,8 @@ TEST_CASE("neither the image's border nor where a surface bends away is an outli
 }
 
 TEST_CASE("a board that slides and turns in its plane is recovered to a fraction of a pixel") {
-  for (const Pose& truth :
-       {slid(1.5, 5.3 * pixel, 0.0), slid(4.0, -3.4 * pixel, 2.7 * pixel), slid(10.0, 8.5 * pixel, -6.2 * pixel)}) {
+  for (const Pose& truth : {slid(1.5, 5.3 * pixel, 0.0), slid(4.0, -3.4 * pixel, 2.7 * pixel),
+                            slid(10.0, 8.5 * pixel, -6.2 * pixel), slid(20.0, 22.4 * pixel, -9.2 * pixel)}) {
     const FrameReport report = second_frame(l_shape, l_shape, truth);
     CHECK(report.status == FrameStatus::tracked);
     CHECK(report.weak_directions.cols() == 0);
