@@ -16,9 +16,8 @@ constexpr float kCreaseSlope = 3.0F;
 constexpr float kStepSigmas = 3.0F;
 
 // A pixel looks this far to the side (standard deviation, in pixels), which on a slanted surface is noise of depth:
-// Nguyen et al. 2012 measure 0.8 and more at grazing angles for whole edges; what slants add to the noise of recordings
-// of a Kinect and an Xtion is 0.65.
-constexpr float kLateralSigma = 0.65F;
+// Nguyen et al. 2012, figure 7. What slants add to the noise of recordings of a Kinect and an Xtion is 0.65.
+constexpr float kLateralSigma = 0.8F;
 
 simd::EdgeLimits edge_limits(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options) {
   const Quadratic sigma = image.sigma(noise.local()), unit_slope = image.unit_slope();

@@ -15,12 +15,13 @@ constexpr double damping = 1e-9;          // information per pair, so that there
 constexpr double unknown_chance = 0.008;  // information that normals off by 5 degrees feign
 
 struct Moments {
-  double weight = 0.0, squares = 0.0, weighted_squares = 0.0;
+  double weight = 0.0, agreement = 0.0, squares = 0.0, weighted_squares = 0.0;
   double extent = 0.0;  // sum of w |p - origin|^2
   Eigen::Vector3d p = Eigen::Vector3d::Zero(), q = Eigen::Vector3d::Zero();
 
   Moments& operator+=(const Moments& other) {
     weight += other.weight;
+    agreement += other.agreement;
     squares += other.squares;
     weighted_squares += other.weighted_squares;
     extent += other.extent;
@@ -40,6 +41,7 @@ Moments sum_moments(const std::vector<Pair>& pairs, Metric metric, const Eigen::
       const double r = residual(pair, metric);
       const Eigen::Vector3d p = pair.p - origin;
       sum.weight += pair.weight;
+      sum.agreement += pair.agreement;
       sum.squares += r * r;
       sum.weighted_squares += pair.weight * r * r;
       sum.extent += pair.weight * p.squaredNorm();
@@ -74,7 +76,7 @@ Matrix6 symmetric(const double* upper) {
   return matrix;
 }
 
-simd::PairRow row_of(const Pair& pair, const Eigen::Vector3d& lever, const Eigen::Vector3d& normal) {
+simd::PairRow row_of(const Pair& pair, double weight, const Eigen::Vector3d& lever, const Eigen::Vector3d& normal) {
   simd::PairRow row;
   const bool knows_both = pair.half_difference.allFinite();
   for (int axis = 0; axis < 3; ++axis) {
@@ -83,7 +85,7 @@ simd::PairRow row_of(const Pair& pair, const Eigen::Vector3d& lever, const Eigen
     row.half_difference[axis] = knows_both ? pair.half_difference[axis] : 0.0;
   }
   row.right_side = (pair.q - pair.p).dot(normal);
-  row.weight = pair.weight;
+  row.weight = weight;
   return row;
 }
 
@@ -92,8 +94,9 @@ simd::PairRow row_of(const Pair& pair, const Eigen::Vector3d& lever, const Eigen
 //
 // With rows c(n) for a normal n, normals n +- d of the two points whose errors are independent agree on
 // c(n + d) c(n - d)^T, symmetrised c(n) c(n)^T - c(d) c(d)^T: noise cancels there and not in the hessian.
-NormalEquations build_equations(const std::vector<Pair>& pairs, Metric metric, const Eigen::Vector3d& p_mean,
-                                const Eigen::Vector3d& q_mean, double extent, int num_threads) {
+NormalEquations build_equations(const std::vector<Pair>& pairs, Metric metric, double Pair::*weight,
+                                const Eigen::Vector3d& p_mean, const Eigen::Vector3d& q_mean, double extent,
+                                int num_threads) {
   const auto count = static_cast<std::int64_t>(pairs.size());
   return block_reduce(count, block_size, num_threads, NormalEquations{}, [&](std::int64_t begin, std::int64_t end) {
     NormalEquations sum;
@@ -104,16 +107,17 @@ NormalEquations build_equations(const std::vector<Pair>& pairs, Metric metric, c
       const Pair& pair = pairs[static_cast<std::size_t>(i)];
       const Eigen::Vector3d p = pair.p - p_mean, q = pair.q - q_mean;
       if (metric == Metric::point_to_point) {
-        for (int axis = 0; axis < 3; ++axis) rows[num_rows++] = row_of(pair, p / extent, Eigen::Vector3d::Unit(axis));
-        sum.covariance.noalias() += pair.weight * q * p.transpose();
+        for (int axis = 0; axis < 3; ++axis)
+          rows[num_rows++] = row_of(pair, pair.*weight, p / extent, Eigen::Vector3d::Unit(axis));
+        sum.covariance.noalias() += pair.*weight * q * p.transpose();
       } else if (metric == Metric::point_to_plane) {
         // Chen and Medioni 1992 with small angles: (p + a x p + t - q) . n = 0, q about p's centroid.
-        rows[num_rows++] = row_of(pair, p / extent, pair.normal);
+        rows[num_rows++] = row_of(pair, pair.*weight, p / extent, pair.normal);
       } else {
         // Rusinkiewicz 2019, eq. 9, with the total rotation 2 a~ as the unknown.
-        rows[num_rows++] = row_of(pair, (p + q) * (0.5 / extent), pair.normal);
+        rows[num_rows++] = row_of(pair, pair.*weight, (p + q) * (0.5 / extent), pair.normal);
       }
-      if (!pair.half_difference.allFinite()) weight_of_single += pair.weight;
+      if (!pair.half_difference.allFinite()) weight_of_single += pair.*weight;
     }
     simd::PairEquations sums;
     simd::sum_pair_equations()(rows, num_rows, sums);
@@ -163,10 +167,13 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   step.variance = sums.weighted_squares / sums.weight;
   const double extent = std::sqrt(std::max(sums.extent / sums.weight - p_offset.squaredNorm(), 1e-24));
 
-  const NormalEquations equations = build_equations(pairs, metric, p_mean, q_mean, extent, num_threads);
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(equations.hessian - equations.chance);
-  const Eigen::Index num_weak =
-      weak_threshold > 0.0 ? (eigen.eigenvalues().array() < weak_threshold * sums.weight).count() : 0;
+  const NormalEquations equations = build_equations(pairs, metric, &Pair::weight, p_mean, q_mean, extent, num_threads);
+  const NormalEquations shape =
+      weak_threshold > 0.0 ? build_equations(pairs, metric, &Pair::agreement, p_mean, q_mean, extent, num_threads)
+                           : equations;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(shape.hessian - shape.chance);
+  const double least = weak_threshold * sums.agreement;
+  const Eigen::Index num_weak = weak_threshold > 0.0 ? (eigen.eigenvalues().array() < least).count() : 0;
   step.weak_directions = eigen.eigenvectors().leftCols(num_weak);
   const Eigen::Matrix<double, 6, Eigen::Dynamic> sure = eigen.eigenvectors().rightCols(6 - num_weak);
   Matrix6 damped = equations.hessian;

@@ -14,6 +14,7 @@ struct Pair {
   Eigen::Vector3d normal;           // direction along which the residual counts; not used by point_to_point
   Eigen::Vector3d half_difference;  // of the two points' normals; NaN where only one is known
   double weight;
+  double agreement = 1.0;  // the part of the weight that comes from the residual, at most 1
   double largest_residual = std::numeric_limits<double>::infinity();  // that a match may have [m]
 };
 
@@ -33,8 +34,9 @@ struct IcpStep {
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  // scaled unit twists about center
 };
 
-// Directions in which the normals of source and target agree on less information than weak_threshold, per unit of
-// weight and with rotations in units of the pairs' extent, do not move.
+// Directions in which the normals of source and target agree on less information than weak_threshold, per pair that
+// agrees and with rotations in units of the pairs' extent, do not move: what a shape leaves open does not depend on how
+// well its parts are measured.
 IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, int num_threads);
 
 }  // namespace nacre

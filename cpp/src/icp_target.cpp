@@ -157,7 +157,8 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, std::int64_t count, 
   const bool has_reach = source.reach.size() > 0;
   double widest = gate.distance;
   if (has_reach) {
-    const auto largest_reach = static_cast<double>(source.reach.head(count).maxCoeff());
+    const double largest_reach = std::hypot(static_cast<double>(source.reach.head(count).maxCoeff()),
+                                            static_cast<double>(source.largest_residual.head(count).maxCoeff()));
     widest = gate.is_smallest ? largest_reach : std::max(widest, largest_reach);
   }
 
@@ -181,11 +182,6 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, std::int64_t count, 
         for (std::int64_t i = begin; i < end; ++i) {
           const std::uint32_t match = nearest[static_cast<std::size_t>(i)];
           if (match == no_slot) continue;
-          if (has_reach) {
-            const auto reach = static_cast<double>(source.reach[i]);
-            const double farthest = gate.is_smallest ? reach : std::max(gate.distance, reach);
-            if (squared_distances[i - begin] > farthest * farthest) continue;
-          }
           Pair pair;
           pair.p = moved[i - begin];
           pair.q = cloud_.points.row(match).transpose().cast<double>();
@@ -206,9 +202,12 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, std::int64_t count, 
               if (options_.method == Metric::symmetric) pair.normal = 0.5 * (source_normal + target_normal);
             }
           }
-          if (gate.is_smallest && has_reach) {
+          if (has_reach) {
             pair.largest_residual = static_cast<double>(source.largest_residual[i]);
-            if (std::abs(residual(pair, options_.method)) > pair.largest_residual) continue;
+            const auto reach = static_cast<double>(source.reach[i]), d2 = (pair.p - pair.q).squaredNorm();
+            const double across = residual(pair, options_.method);
+            const bool is_within = std::abs(across) <= pair.largest_residual && d2 - across * across <= reach * reach;
+            if (!is_within && (gate.is_smallest || d2 > gate.distance * gate.distance)) continue;
           }
           double variance = 0.0;
           if (from.sigma.size() > 0) variance += static_cast<double>(from.sigma[i]) * from.sigma[i];

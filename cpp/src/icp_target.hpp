@@ -28,7 +28,8 @@ struct IcpCloud {
 struct IcpSource {
   IcpCloud cloud;
   std::array<std::int64_t, 3> levels;  // few, more, all
-  // For each sample, or empty: how far a match may be when the gate is at its smallest, and its residual [m].
+  // For each sample, or empty: how far a match may be along the surface, and across it, when the gate is at its
+  // smallest [m]. What is near along the surface of a sparse target, but beyond its rim, matches nothing.
   Values reach, largest_residual;
 
   IcpSource(const AlignCloud& cloud, const AlignOptions& options);

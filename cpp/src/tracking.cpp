@@ -112,23 +112,22 @@ struct Search {
 
   bool has_automatic_gate() const { return !(options.registration.max_distance > 0.0); }
 
-  // A match may be as far as the model's points are apart, or as noise takes it; its residual less so, since the model
-  // is known better across its surface than along it.
+  // A match may be about as far along the surface as the model's points are apart, and as far across it as noise and
+  // the shape between the points take it.
   IcpSource with_reach(const View& view, const IcpTarget& target) const {
     IcpSource gated = source;
     const auto count = static_cast<Eigen::Index>(source.cloud.rows.size());
     gated.reach.resize(count);
     gated.largest_residual.resize(count);
+    const double set = options.registration.final_distance;
     // Noise that is large against the surface would match anything.
     const double largest = 0.05 * target.diameter();
     for (Eigen::Index i = 0; i < count; ++i) {
       const float sigma = noise[source.cloud.rows[static_cast<std::size_t>(i)]];
       const double apart = spacing_at(source.cloud.points(i, 2), sigma, camera, spacing);
-      const double noise = 4.0 * static_cast<double>(sigma), set = options.registration.final_distance;
-      gated.reach[i] =
-          static_cast<float>(set > 0.0 ? set : std::min(std::max(2.5 * view.thinning * apart, noise), largest));
-      gated.largest_residual[i] =
-          static_cast<float>(set > 0.0 ? set : std::min(std::max(2.75 * apart, noise), largest));
+      const double across = std::max(2.75 * apart, 4.0 * static_cast<double>(sigma));
+      gated.reach[i] = static_cast<float>(set > 0.0 ? set : std::min(1.5 * view.thinning * apart, largest));
+      gated.largest_residual[i] = static_cast<float>(set > 0.0 ? set : std::min(across, largest));
     }
     return gated;
   }

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre.arrays import as_depth, as_mask
-from nacre.depth import Noise, as_noise
+from nacre.noise import Noise, as_noise
 from nacre.parameters import to_core, updated
 
 Mask = npt.NDArray[np.bool_]
@@ -158,7 +158,7 @@ def select_region(
         Depth, camera or ``previous`` differ in size; an option is out of its range or does not exist.
     """
     image = as_depth("depth", depth, depth_scale)
-    model = as_noise("noise", noise)
+    model = as_noise("noise", noise, camera)
     mask, report = _core.select_region(
         image,
         camera,

@@ -37,14 +37,15 @@ NACRE_INLINE Found test(const float* pixel, ptrdiff_t stride, const EdgeLimits& 
   const F32 bend_lateral = broadcast(limits.bend_lateral) * slope,
             step_lateral = broadcast(limits.step_lateral) * slope;
   Found found = {own<own, slope> step_slant};
-  const F32 bend_both = sqrt(bend_noise * bend_noise + bend_lateral * bend_lateral);
+  const F32 bend_straight = max(bend_noise, bend_crease);
   const F32 step_both = sqrt(step_noise * step_noise + step_lateral * step_lateral);
-  const F32 straight_bend = max(bend_both, bend_crease);
+  const F32 straight_bend = sqrt(bend_straight * bend_straight + bend_lateral * bend_lateral);
   const F32 straight_step = step_both + step_slant;
   test_direction(pixel, 1, straight_bend, straight_step, found);
   test_direction(pixel, stride, straight_bend, straight_step, found);
   const F32 diagonal = broadcast(::sqrtf(2.0F));
-  const F32 diagonal_bend = max(bend_both, bend_crease * diagonal);
+  const F32 bend_across = max(bend_noise, bend_crease * diagonal);
+  const F32 diagonal_bend = sqrt(bend_across * bend_across + bend_lateral * bend_lateral);
   const F32 diagonal_step = step_both + step_slant * diagonal;
   test_direction(pixel, stride + 1, diagonal_bend, diagonal_step, found);
   test_direction(pixel, stride - 1, diagonal_bend, diagonal_step, found);
