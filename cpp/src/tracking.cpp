@@ -7,6 +7,7 @@
 #include "frame_samples.hpp"
 #include "icp_target.hpp"
 #include "model_view.hpp"
+#include "outline_registration.hpp"
 #include "parallel.hpp"
 #include "point_spacing.hpp"
 #include "random.hpp"
@@ -95,6 +96,20 @@ struct Search {
   double spacing;             // of the model [m]
   std::int32_t oldest_frame;  // see track
 
+  mutable std::optional<OutlinePair> found_outlines = {};
+
+  // Found when they are first asked for.
+  const OutlinePair& outlines() const {
+    constexpr std::size_t most_before = 2000, most_now = 600;
+    if (!found_outlines) {
+      const Sight now{depth, frame.sigma, Pose::Identity()};
+      found_outlines.emplace(OutlinePair{camera, before, find_outline(before, camera, most_before, options.num_threads),
+                                         find_outline(now, camera, most_now, options.num_threads), depth,
+                                         static_cast<double>(median_sigma(frame))});
+    }
+    return *found_outlines;
+  }
+
   bool has_automatic_gate() const { return !(options.registration.max_distance > 0.0); }
 
   // A match may be about as far along the surface as the model's points are apart, and as far across it as noise and
@@ -129,9 +144,13 @@ struct Search {
 
     TrackingResult result;
     result.alignment = align_to(target, gated, guess, align_options);
-    if (result.alignment.weak_directions.cols() > 0 && view.brightness.size() > 0 && observer.has_colors()) {
+    const Eigen::Index num_weak = result.alignment.weak_directions.cols();
+    if (num_weak > 0 && view.brightness.size() > 0 && observer.has_colors()) {
       result.alignment = determine_by_color(target, gated, BrightCloud(view.points, view.brightness),
                                             bright_cloud(frame, observer), result.alignment, align_options);
+    }
+    if (num_weak > 0 && result.alignment.weak_directions.cols() == num_weak) {
+      result.alignment = determine_by_outline(target, gated, outlines(), result.alignment, align_options);
     }
     const Pose& pose = result.alignment.target_from_source;
     const Sight now{depth, frame.sigma, pose};
