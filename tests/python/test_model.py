@@ -452,7 +452,7 @@ def test_min_evidence_decides(least: float, status: str) -> None:
     assert 0.6 < report.evidence < 4.0
     assert report.status == status
     if status == "LOST":
-        assert report.reason.startswith(f"evidence {report.evidence:.3g} is below 4.8: overlap ")  # 30 degrees
+        assert report.reason.startswith(f"evidence {report.evidence:.3g} is below 4.8: overlap ")
         assert f"overlap {report.overlap:.3g}, consistency {report.consistency:.3g}" in report.reason
 
 
