@@ -120,11 +120,13 @@ struct Search {
     gated.reach.resize(count);
     gated.largest_residual.resize(count);
     const double set = options.registration.final_distance;
-    // Noise that is large against the surface would match anything.
-    const double largest = 0.05 * target.diameter();
+    // Noise or spacing that is large against one of the surfaces would match anything.
+    const Points& points = source.cloud.points;
+    const auto extent = static_cast<double>((points.colwise().maxCoeff() - points.colwise().minCoeff()).norm());
+    const double largest = 0.03 * std::min(target.diameter(), extent);
     for (Eigen::Index i = 0; i < count; ++i) {
       const float sigma = noise[source.cloud.rows[static_cast<std::size_t>(i)]];
-      const double apart = spacing_at(source.cloud.points(i, 2), sigma, camera, spacing);
+      const double apart = spacing_at(points(i, 2), sigma, camera, spacing);
       const double across = std::max(2.75 * apart, 4.0 * static_cast<double>(sigma));
       gated.reach[i] = static_cast<float>(set > 0.0 ? set : std::min(1.5 * view.thinning * apart, largest));
       gated.largest_residual[i] = static_cast<float>(set > 0.0 ? set : std::min(across, largest));

@@ -262,17 +262,17 @@ TEST_CASE("windows are those of a least squares fit") {
     const PlanarImage image(depth, camera, 1);
     const simd::WindowRule rule = {image.sigma({0.001, 0.0, 0.0}), image.unit_slope(), 30.0F, 3.0F};
     const int count = (w - 2 * simd::fit_radius - 1) / simd::fit_step + 1;
-    std::array<std::vector<float>, 4> first;
+    std::array<std::vector<float>, 5> first;
     for (int v = simd::fit_radius; v + simd::fit_radius < rows; v += 2) {
       for (const Kernels& kernels : all_kernels()) {
         CAPTURE(kernels.name);
-        std::array<std::vector<float>, 4> out;
+        std::array<std::vector<float>, 5> out;
         for (auto& values : out) values.assign(static_cast<std::size_t>(count + 1), 7.0F);
         kernels.fit_windows(image.row(v) + simd::fit_radius, image.stride(), count, rule,
-                            {out[0].data(), out[1].data(), out[2].data(), out[3].data()});
+                            {out[0].data(), out[1].data(), out[2].data(), out[3].data(), out[4].data()});
         for (auto& values : out) REQUIRE(values.back() == 7.0F);
         if (kernels.fit_windows != all_kernels().front().fit_windows) {
-          for (std::size_t k = 0; k < 4; ++k) {
+          for (std::size_t k = 0; k < 5; ++k) {
             REQUIRE(std::memcmp(first[k].data(), out[k].data(), first[k].size() * sizeof(float)) == 0);
           }
           continue;
@@ -296,23 +296,31 @@ TEST_CASE("windows are those of a least squares fit") {
               if (step > 0.0F) smallest = std::min(smallest, step);
             }
           }
+          double bends = 0.0;
+          for (int d = -2; d <= 2; ++d) {
+            const auto at = [&](int du, int dv) { return static_cast<double>(image.row(v + dv)[u + du]); };
+            bends += std::pow(at(d - 1, 0) - 2.0 * at(d, 0) + at(d + 1, 0), 2);
+            bends += std::pow(at(0, d - 1) - 2.0 * at(0, d) + at(0, d + 1), 2);
+          }
           const auto k = static_cast<std::size_t>(j);
           const double unit = static_cast<double>(evaluate(rule.unit, image.row(v)[u]));
           const Eigen::Matrix<double, 6, 1> fit = (design.transpose() * design).inverse() * design.transpose() * values;
           const double residual = (values - design * fit).norm() / std::sqrt(43.0);
           REQUIRE((out[0][k] == out[0][k]) == values.allFinite());
           REQUIRE((out[1][k] == out[1][k]) == values.allFinite());
-          REQUIRE((out[3][k] == out[3][k]) == values.allFinite());
+          REQUIRE((out[2][k] == out[2][k]) == values.allFinite());
+          REQUIRE((out[4][k] == out[4][k]) == values.allFinite());
           if (!values.allFinite()) {
-            REQUIRE(out[2][k] != out[2][k]);
+            REQUIRE(out[3][k] != out[3][k]);
             continue;
           }
           REQUIRE(static_cast<double>(out[0][k]) == doctest::Approx(residual / unit).epsilon(1e-5));
-          REQUIRE(static_cast<double>(out[3][k]) == doctest::Approx(fit.segment<2>(1).norm()).epsilon(1e-5));
+          REQUIRE(static_cast<double>(out[1][k]) == doctest::Approx(std::sqrt(bends / 60.0) / unit).epsilon(1e-5));
+          REQUIRE(static_cast<double>(out[4][k]) == doctest::Approx(fit.segment<2>(1).norm()).epsilon(1e-5));
           const float step = smallest / static_cast<float>(unit);
-          const bool has_step = num_flat >= 6 && step <= rule.max_step && step <= rule.max_step_pixels * out[1][k];
-          REQUIRE((out[2][k] == out[2][k]) == has_step);
-          if (has_step) REQUIRE(out[2][k] == doctest::Approx(step));
+          const bool has_step = num_flat >= 6 && step <= rule.max_step && step <= rule.max_step_pixels * out[2][k];
+          REQUIRE((out[3][k] == out[3][k]) == has_step);
+          if (has_step) REQUIRE(out[3][k] == doctest::Approx(step));
         }
       }
     }
