@@ -11,7 +11,7 @@ namespace nacre {
 // One byte a pixel, not initialised, with a border of zeros, so that small windows need no bounds checks.
 class ByteImage {
  public:
-  static constexpr int kBorder = 2;
+  static constexpr int kBorder = 3;
 
   ByteImage(int width, int height)
       : width_(width),

@@ -122,6 +122,7 @@ void DepthOptions::check() const {
   require(gradient_threshold > 0.0, "gradient_threshold", "a positive depth step in metres", gradient_threshold);
   require(edge_dilation >= 0 && edge_dilation <= 100, "edge_dilation", "0 to 100 pixels", edge_dilation);
   require(edge_sigmas > 0.0, "edge_sigmas", "a positive number of standard deviations", edge_sigmas);
+  require(edge_reprieve >= 0.0, "edge_reprieve", "a number of standard deviations, at least 0", edge_reprieve);
   require(max_slant > 0.0 && max_slant < 1.5707963, "max_slant", "an angle between 0 and pi / 2", max_slant);
   require(max_missing >= 0.0 && max_missing <= 1.0, "max_missing", "a part between 0 and 1", max_missing);
   require(min_component >= 0, "min_component", "a number of pixels, at least 0", min_component);
@@ -168,8 +169,11 @@ DepthImage clean_depth(const DepthRef& depth, const Camera& camera, const DepthO
   const NoiseModel noise = options.noise            ? *options.noise
                            : calibration != nullptr ? calibration->model()
                                                     : estimate_noise(fits, camera, num_threads);
-  ByteImage marks = mark_edges(depth, image, fits, noise, options, num_threads);
-  dilate(options.edge_dilation, num_threads, marks);
+  const ByteImage first_marks = mark_edges(depth, image, fits, noise, options, num_threads);
+  ByteImage marks = dilated(first_marks, options.edge_dilation, num_threads);
+  if (options.edge_test == EdgeTest::inverse_depth) {
+    spare_planar(image, first_marks, noise, options, num_threads, marks);
+  }
 
   DepthReport counts;
   ByteImage keep = keep_pixels(depth, camera, options, mask, marks, num_threads, counts);

@@ -17,7 +17,13 @@ ByteImage mark_planar_edges(const PlanarImage& image, const WindowFits& fits, co
                             const DepthOptions& options, int num_threads);
 
 // Grows the marks by a radius, in both directions of the image.
-void dilate(int radius, int num_threads, ByteImage& marks);
+ByteImage dilated(const ByteImage& marks, int radius, int num_threads);
+
+// Takes the marks from pixels that lie on the plane through the unmarked ones beside them, from these inwards: those
+// that the dilation marked, and one more, which the edge's second difference marked beside it. `first_marks` are those
+// before the dilation.
+void spare_planar(const PlanarImage& image, const ByteImage& first_marks, const NoiseModel& noise,
+                  const DepthOptions& options, int num_threads, ByteImage& marks);
 
 // Drops kept pixels (1) with more than max_missing of their 5 x 5 neighbours missing.
 void drop_lonely(double max_missing, int num_threads, ByteImage& keep);

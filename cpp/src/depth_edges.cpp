@@ -5,6 +5,7 @@
 #include "depth_cleaning.hpp"
 #include "parallel.hpp"
 #include "simd/edge_row.hpp"
+#include "simd/spare_row.hpp"
 
 namespace nacre {
 namespace {
@@ -71,6 +72,12 @@ class SlopeRows {
   int width_, current_ = -1;
 };
 
+ByteImage copy(const ByteImage& image) {
+  ByteImage other(image.width(), image.height());
+  std::copy(image.row(0), image.row(image.height()), other.row(0));
+  return other;
+}
+
 }  // namespace
 
 ByteImage mark_planar_edges(const PlanarImage& image, const WindowFits& fits, const NoiseModel& noise,
@@ -114,7 +121,8 @@ ByteImage mark_gradient_edges(const DepthRef& measured, const DepthOptions& opti
   return marks;
 }
 
-void dilate(int radius, int num_threads, ByteImage& marks) {
+ByteImage dilated(const ByteImage& first_marks, int radius, int num_threads) {
+  ByteImage marks = copy(first_marks);
   for (int step = 0; step < radius; ++step) {
     ByteImage grown(marks.width(), marks.height());
     parallel_for(marks.height(), rows_per_block(marks.width()), num_threads, [&](std::int64_t v) {
@@ -126,6 +134,25 @@ void dilate(int radius, int num_threads, ByteImage& marks) {
       }
     });
     marks = std::move(grown);
+  }
+  return marks;
+}
+
+void spare_planar(const PlanarImage& image, const ByteImage& first_marks, const NoiseModel& noise,
+                  const DepthOptions& options, int num_threads, ByteImage& marks) {
+  if (!(options.edge_reprieve > 0.0)) return;
+  static_assert(ByteImage::kBorder >= simd::side_depth && PlanarImage::kBorder >= simd::side_depth);
+  const simd::SpareRule rule = {image.sigma(noise.local()),
+                                image.unit_slope() * static_cast<float>(std::tan(options.max_slant)),
+                                static_cast<float>(options.edge_reprieve * options.edge_reprieve)};
+  const auto spare_pixels = simd::spare_pixels();
+  for (int step = 0; step <= options.edge_dilation; ++step) {
+    ByteImage spared(marks.width(), marks.height());
+    parallel_for(marks.height(), rows_per_block(marks.width()), num_threads, [&](std::int64_t v) {
+      spare_pixels(image.planar_row(static_cast<int>(v)), rule, {marks.row(v), first_marks.row(v), marks.stride()},
+                   spared.row(v));
+    });
+    marks = std::move(spared);
   }
 }
 

@@ -49,6 +49,7 @@ class DepthParameters:
     gradient_threshold: float = 0.005
     edge_dilation: int = 1
     edge_sigmas: float = 4.0
+    edge_reprieve: float = 3.0
     max_slant: float = 1.3962634
     max_missing: float = 0.6
     min_component: int = 20
@@ -90,6 +91,7 @@ def preprocess_depth(
     gradient_threshold: float = ...,
     edge_dilation: int = ...,
     edge_sigmas: float = ...,
+    edge_reprieve: float = ...,
     max_slant: float = ...,
     max_missing: float = ...,
     min_component: int = ...,
@@ -110,6 +112,7 @@ def preprocess_depth(
     gradient_threshold: float = ...,
     edge_dilation: int = ...,
     edge_sigmas: float = ...,
+    edge_reprieve: float = ...,
     max_slant: float = ...,
     max_missing: float = ...,
     min_component: int = ...,
@@ -129,6 +132,7 @@ def preprocess_depth(
     gradient_threshold: float = 0.005,
     edge_dilation: int = 1,
     edge_sigmas: float = 4.0,
+    edge_reprieve: float = 3.0,
     max_slant: float = 1.3962634,
     max_missing: float = 0.6,
     min_component: int = 20,
@@ -167,6 +171,9 @@ def preprocess_depth(
         Both tests: an edge grows by so many pixels.
     edge_sigmas : float
         Inverse-depth test: the threshold in standard deviations of the second difference.
+    edge_reprieve : float
+        Inverse-depth test: a pixel at an edge stays after all where it is no farther than so many standard
+        deviations from the plane through the surface on one side of it, as no mixed pixel is; 0 for none.
     max_slant : float
         Inverse-depth test: surfaces slanted more than this are removed [rad].
     max_missing : float
@@ -202,6 +209,7 @@ def preprocess_depth(
         gradient_threshold=gradient_threshold,
         edge_dilation=edge_dilation,
         edge_sigmas=edge_sigmas,
+        edge_reprieve=edge_reprieve,
         max_slant=max_slant,
         max_missing=max_missing,
         min_component=min_component,
