@@ -120,7 +120,7 @@ TEST_CASE("a ramp between two surfaces is removed") {
   options.max_missing = 1.0;
   const DepthImage clean = preprocess_depth(depth, orthographic, options);
   CHECK(num_valid(clean.block(0, 60, height, 5)) == 0);
-  CHECK(num_valid(clean.middleRows(1, height - 2)) == (height - 2) * (width - 7));
+  CHECK(num_valid(clean.middleRows(1, height - 2)) == (height - 2) * (width - 5));
 }
 
 TEST_CASE("without an edge test mixtures stay") {
@@ -274,6 +274,7 @@ TEST_CASE("options out of range are named") {
   CHECK(complaint([](DepthOptions& o) { o.gradient_threshold = 0.0; }).find("gradient_threshold") == 0);
   CHECK(complaint([](DepthOptions& o) { o.edge_dilation = -1; }).find("edge_dilation") == 0);
   CHECK(complaint([](DepthOptions& o) { o.edge_sigmas = missing; }).find("edge_sigmas") == 0);
+  CHECK(complaint([](DepthOptions& o) { o.edge_reprieve = -1.0; }).find("edge_reprieve") == 0);
   CHECK(complaint([](DepthOptions& o) { o.max_slant = 1.6; }).find("max_slant") == 0);
   CHECK(complaint([](DepthOptions& o) { o.max_missing = 1.1; }).find("max_missing") == 0);
   CHECK(complaint([](DepthOptions& o) { o.min_component = -1; }).find("min_component") == 0);

@@ -335,6 +335,7 @@ GOOD = np.ones((HEIGHT, WIDTH))
         ),
         (GOOD, {"edge_dilation": -1}, "edge_dilation must be 0 to 100 pixels, got -1"),
         (GOOD, {"edge_sigmas": 0}, "edge_sigmas must be"),
+        (GOOD, {"edge_reprieve": -1}, "edge_reprieve must be"),
         (GOOD, {"max_slant": 2}, "max_slant must be an angle between 0 and pi / 2, got 2"),
         (GOOD, {"max_missing": 2}, "max_missing must be a part between 0 and 1, got 2"),
         (GOOD, {"min_component": -1}, "min_component must be a number of pixels, at least 0, got -1"),
