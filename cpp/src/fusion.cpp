@@ -17,8 +17,10 @@
 namespace nacre {
 namespace {
 
-constexpr float insertion_pixels = 3.0F;  // a new point must be seen by so many pixels of its own slant
-constexpr float sheet_cosine = 0.3F;      // normals that differ more belong to different sheets
+// A new point must be seen by so many pixels of its own slant, which each say less the greater it is, but by no less
+// than one from the front says.
+constexpr float insertion_pixels = 2.0F, insertion_weight = 1.0F;
+constexpr float sheet_cosine = 0.3F;  // normals that differ more belong to different sheets
 
 // Whether a point with a normal stands for the same piece of surface as another.
 bool same_surface(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, const Eigen::Vector3f& other,
@@ -172,7 +174,8 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
       const Observation observed = block[k];
       NewPoint candidate = candidates[static_cast<std::size_t>(k)];
       const float facing = candidate.normal.dot(observer.towards_camera(candidate.point));
-      if (!(observed.weight > insertion_pixels * facing * observer.frontal_weight(block.sigma(k)))) continue;
+      const float least = std::max(insertion_pixels * facing, insertion_weight);
+      if (!(observed.weight > least * observer.frontal_weight(block.sigma(k)))) continue;
       candidate.point += observed.offset * candidate.normal;
       candidate.normal = observed.normal.normalized();
       if (observer.has_colors()) candidate.color = observed.color;

@@ -37,7 +37,8 @@ struct Side {
 // they are too few, too rough or too steep.
 std::optional<Side> fit(const PlanarImage& image, const ByteImage& marks, const simd::SpareRule& rule, int u, int v,
                         std::array<int, 2> ahead) {
-  const double own = image.row(v)[u], variance = std::pow(static_cast<double>(evaluate(rule.sigma, image.row(v)[u])), 2);
+  const double own = image.row(v)[u],
+               variance = std::pow(static_cast<double>(evaluate(rule.sigma, image.row(v)[u])), 2);
   const auto is_unmarked = [&](int x, int y) { return marks.row(y)[x] == 0 && image.row(y)[x] == image.row(y)[x]; };
   if (!is_unmarked(u + ahead[0], v + ahead[1])) return std::nullopt;
   std::vector<Eigen::Vector3d> places;
@@ -102,8 +103,8 @@ TEST_CASE("pixels are spared as least squares say") {
         for (int u = 0; u < w; ++u) {
           CAPTURE(u);
           CAPTURE(v);
-          const bool may_be = marks.row(v)[u] != 0 && (first.row(v)[u] & simd::slanted_mark) == 0 &&
-                              image.row(v)[u] == image.row(v)[u];
+          const bool may_be =
+              marks.row(v)[u] != 0 && (first.row(v)[u] & simd::slanted_mark) == 0 && image.row(v)[u] == image.row(v)[u];
           const std::optional<double> error =
               may_be ? error_of(image, marks, rule, u, v) : std::optional<double>(std::nullopt);
           if (spare_pixels == simd::baseline::spare_pixels) {

@@ -81,8 +81,7 @@ NACRE_INLINE void fit_side(const float* pixel, F32 own, ptrdiff_t ahead, ptrdiff
   const F32 leverage = per_member + (a * a * nxx - (a * x + a * x) * nax + x * x * naa) * (inverse * per_member);
   const Mask counts = is_beside & (n > broadcast(least_members)) &
                       (misfit <= broadcast(largest_misfit) * variance * (n - broadcast(3.0F))) &
-                      (at_along * at_along + at_across * at_across <= steepest * steepest) &
-                      (leverage < best.variance);
+                      (at_along * at_along + at_across * at_across <= steepest * steepest) & (leverage < best.variance);
   best = {select(counts, predicted * predicted, best.error), select(counts, leverage, best.variance)};
 }
 

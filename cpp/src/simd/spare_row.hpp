@@ -23,10 +23,10 @@ struct SpareMarks {
   ptrdiff_t stride;
 };
 
-// The marks of a row, without those of pixels that are near enough to the plane through the unmarked pixels beside them:
-// of the windows of side_depth x (2 side_reach + 1) pixels to the left, to the right, above and below, those with an
-// unmarked pixel next to the marked one, at least half full, and no rougher than noise; and of these the one whose plane
-// is the most certain at the marked pixel.
+// The marks of a row, without those of pixels that are near enough to the plane through the unmarked pixels beside
+// them: of the windows of side_depth x (2 side_reach + 1) pixels to the left, to the right, above and below, those with
+// an unmarked pixel next to the marked one, at least half full, and no rougher than noise; and of these the one whose
+// plane is the most certain at the marked pixel.
 using SparePixels = void(const PlanarRow& row, const SpareRule& rule, const SpareMarks& marks, uint8_t* spared);
 NACRE_DECLARE_KERNEL(SparePixels, spare_pixels)
 
