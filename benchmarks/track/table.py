@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from track import experiments, shapes
-from track.peers import ANY_CAMERA, PINHOLE
+from track.peers import ANY_CAMERA, NEAR, PINHOLE
 from track.recordings import KINECT, ORTHOGRAPHIC, Make, found, plain, simulated, without_frames
 from track.rows import Goal, Places, Row
 
@@ -142,7 +142,7 @@ ROWS = [
         "tum-fr3-teddy, whole view, 200 frames",
         recording=found("tum-fr3-teddy"),
         voxel=0.01,
-        peers=(*ANY_CAMERA, *PINHOLE),
+        peers=(*ANY_CAMERA, *PINHOLE, *NEAR),
         goals=at_most(ate=12, lost=0),
     ),
     Row(
@@ -150,7 +150,7 @@ ROWS = [
         "tum-fr1-rpy, 100 frames of fast rotation",
         recording=found("tum-fr1-rpy"),
         voxel=0.01,
-        peers=(*ANY_CAMERA, *PINHOLE),
+        peers=(*ANY_CAMERA, *PINHOLE, *NEAR),
         goals=at_most(ate=25, lost=0),
     ),
     Row(
@@ -188,6 +188,16 @@ ROWS = [
         measure=experiments.unrelated_pairs,
         goals=at_most(tracked=1),
         note="Each second image is registered to a model of the first; what is tracked is a false accept.",
+    ),
+    Row(
+        "long",
+        "Bunny, 2000 frames of Kinect noise, 16 turns",
+        measure=experiments.long_recording,
+        goals=(
+            *at_least(tracked=2000),
+            *(Goal(name, 10) for name in ("more_points", "more_time", "more_memory")),
+        ),
+        note="Once the surface is covered, time, memory and size are to stay as they are.",
     ),
     Row(
         "fold-in",
