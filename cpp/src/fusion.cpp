@@ -19,7 +19,7 @@ namespace {
 
 // A new point must be seen by so many pixels of its own slant, which each say less the greater it is, but by no less
 // than one from the front says.
-constexpr float insertion_pixels = 2.0F, insertion_weight = 1.0F;
+constexpr float insertion_pixels = 3.0F, insertion_weight = 1.0F;
 constexpr float sheet_cosine = 0.3F;  // normals that differ more belong to different sheets
 
 // Whether a point with a normal stands for the same piece of surface as another.
