@@ -17,7 +17,7 @@
 namespace nacre {
 namespace {
 
-constexpr float insertion_weight = 2.0F;  // a new point must be seen by so many pixels; likewise
+constexpr float insertion_weight = 1.5F;  // a new point must be seen by so many pixels, less at a slant; likewise
 constexpr float sheet_cosine = 0.3F;      // normals that differ more belong to different sheets
 
 // Whether a point with a normal stands for the same piece of surface as another.
@@ -170,9 +170,10 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
     std::size_t kept = 0;
     for (int k = 0; k < block.size(); ++k) {
       const Observation observed = block[k];
-      if (!(observed.weight > insertion_weight * observer.frontal_weight(block.sigma(k)))) continue;
       NewPoint candidate = candidates[static_cast<std::size_t>(k)];
-      candidate.point += observed.offset * candidate.normal;
+      const float facing = candidate.normal.dot(observer.towards_camera(candidate.point));
+      if (!(observed.weight * facing > insertion_weight * observer.frontal_weight(block.sigma(k)))) continue;
+      candidate.point += observed.offset * block.ray(k);
       candidate.normal = observed.normal.normalized();
       if (observer.has_colors()) candidate.color = observed.color;
       candidate.weight = observed.weight;
