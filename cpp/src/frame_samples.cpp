@@ -44,7 +44,7 @@ FrameSamples sample_frame(const Frame& frame, const SurfaceObserver& observer, c
     for (std::int64_t i = begin; i < end; ++i) {
       const Observation seen = block[static_cast<int>(i - begin)];
       if (!(seen.weight > 0.0F)) continue;
-      samples.points.row(i) += seen.offset * samples.normals.row(i);
+      samples.points.row(i) += seen.offset * block.ray(static_cast<int>(i - begin)).transpose();
       samples.normals.row(i) = seen.normal.normalized().transpose();
     }
   });

@@ -17,8 +17,8 @@
 namespace nacre {
 namespace {
 
-// A new point must be seen by so many pixels of its own slant, which each say less the greater it is, but by no less
-// than one from the front says.
+// A new point must be seen by so many pixels of its own slant, and by more the greater it is: by as many as hold the
+// information of so many from the front.
 constexpr float insertion_pixels = 3.0F, insertion_weight = 1.0F;
 constexpr float sheet_cosine = 0.3F;  // normals that differ more belong to different sheets
 
@@ -175,8 +175,8 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
       NewPoint candidate = candidates[static_cast<std::size_t>(k)];
       const float facing = candidate.normal.dot(observer.towards_camera(candidate.point));
       const float least = std::max(insertion_pixels * facing, insertion_weight);
-      if (!(observed.weight > least * observer.frontal_weight(block.sigma(k)))) continue;
-      candidate.point += observed.offset * candidate.normal;
+      if (!(observed.weight * facing > least * observer.frontal_weight(block.sigma(k)))) continue;
+      candidate.point += observed.offset * block.ray(k);
       candidate.normal = observed.normal.normalized();
       if (observer.has_colors()) candidate.color = observed.color;
       candidate.weight = observed.weight;

@@ -11,7 +11,6 @@ namespace nacre {
 
 // In frontal measurements of a point's own noise: far surfaces are measured with less weight, not less often.
 constexpr float least_weight = 0.05F;  // less observation than this is none
-constexpr float least_facing = 0.1F;   // surfaces that are seen at a smaller cosine are not judged
 
 // The noise of a pixel [m]; 0 where nothing was measured.
 inline float sigma_at(const Frame& frame, std::int32_t pixel) {

@@ -14,7 +14,7 @@ struct Pair {
   Eigen::Vector3d normal;           // direction along which the residual counts; not used by point_to_point
   Eigen::Vector3d half_difference;  // of the two points' normals; NaN where only one is known
   double weight;
-  double agreement = 1.0;  // the part of the weight that comes from the residual, at most 1
+  double agreement = 1.0;  // the part of the weight that says how well the two points match, at most 1
   double largest_residual = std::numeric_limits<double>::infinity();  // that a match may have [m]
 };
 

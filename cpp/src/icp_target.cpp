@@ -208,11 +208,16 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, std::int64_t count, 
             const double across = residual(pair, options_.method);
             const bool is_within = std::abs(across) <= pair.largest_residual && d2 - across * across <= reach * reach;
             if (!is_within && (gate.is_smallest || d2 > gate.distance * gate.distance)) continue;
+            // Beyond the model's rim, matches only continue it: the farther along the surface, the less they count.
+            if (gate.is_smallest) {
+              const double part = (d2 - across * across) / (reach * reach);
+              pair.agreement = (1.0 - part) * (1.0 - part);
+            }
           }
           double variance = 0.0;
           if (from.sigma.size() > 0) variance += static_cast<double>(from.sigma[i]) * from.sigma[i];
           if (cloud_.sigma.size() > 0) variance += static_cast<double>(cloud_.sigma[match]) * cloud_.sigma[match];
-          pair.weight = has_sigma ? 1.0 / variance : 1.0;
+          pair.weight = pair.agreement * (has_sigma ? 1.0 / variance : 1.0);
           if (pair.weight > 0.0 && std::isfinite(pair.weight)) pairs.push_back(pair);
         }
       });

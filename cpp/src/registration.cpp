@@ -35,8 +35,9 @@ double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double
   if (robust) {
     for (Pair& pair : pairs) {
       const double ratio = whitened(pair) / (3.0 * scale);
-      pair.agreement = 1.0 / ((1.0 + ratio * ratio) * (1.0 + ratio * ratio));
-      pair.weight *= pair.agreement;
+      const double agreement = 1.0 / ((1.0 + ratio * ratio) * (1.0 + ratio * ratio));
+      pair.agreement *= agreement;
+      pair.weight *= agreement;
     }
   }
   return scale;

@@ -110,6 +110,11 @@ void SurfaceObserver::add(ObservationBlock& block, const Eigen::Vector3f& point,
   block.normal_x_[i] = normal.x();
   block.normal_y_[i] = normal.y();
   block.normal_z_[i] = normal.z();
+  const Eigen::Vector3f back = towards_camera(point);
+  const Eigen::Vector3f ray = back / std::max(normal.dot(back), least_facing);
+  block.ray_x_[i] = ray.x();
+  block.ray_y_[i] = ray.y();
+  block.ray_z_[i] = ray.z();
   block.sigma_[i] = sigma;
   block.u_[i] = pixel % width_;
   block.v_[i] = pixel / width_;
@@ -156,8 +161,8 @@ void SurfaceObserver::observe(ObservationBlock& b, const simd::SurfaceImage& ima
     for (int c = 0; c < 3; ++c) std::fill_n(channels[c], b.count_, 0.0F);
   }
   simd::observe_windows()(image,
-                          {b.count_, b.x_, b.y_, b.z_, b.normal_x_, b.normal_y_, b.normal_z_, b.u_, b.v_, b.window_,
-                           b.radius_, b.largest_offset_},
+                          {b.count_, b.x_, b.y_, b.z_, b.normal_x_, b.normal_y_, b.normal_z_, b.ray_x_, b.ray_y_,
+                           b.ray_z_, b.u_, b.v_, b.window_, b.radius_, b.largest_offset_},
                           least_cosine_,
                           {b.weight_, b.offset_, b.seen_normal_x_, b.seen_normal_y_, b.seen_normal_z_, channels[0],
                            channels[1], channels[2]},

@@ -8,6 +8,8 @@
 
 namespace nacre {
 
+constexpr float least_facing = 0.1F;  // surfaces that are seen at a smaller cosine are not judged
+
 // What the pixels around a surface point say about it.
 struct Observation {
   float weight;
@@ -31,6 +33,8 @@ class ObservationBlock {
 
   int size() const { return count_; }
   float sigma(int i) const { return sigma_[i]; }  // as given to add
+  // Along the viewing ray, as far as takes a point one along its normal.
+  Eigen::Vector3f ray(int i) const { return {ray_x_[i], ray_y_[i], ray_z_[i]}; }
   // Which pixels of a point's window show its surface, after observe_and_cover.
   PixelWindow cover(int i) const;
   Observation operator[](int i) const {
@@ -46,7 +50,8 @@ class ObservationBlock {
   using Column = T[capacity];
 
   int count_ = 0;
-  Column<float> x_, y_, z_, normal_x_, normal_y_, normal_z_, sigma_, spacing_, radius_, largest_offset_;
+  Column<float> x_, y_, z_, normal_x_, normal_y_, normal_z_, ray_x_, ray_y_, ray_z_, sigma_, spacing_, radius_,
+      largest_offset_;
   Column<std::int32_t> u_, v_, window_;
   Column<float> cover_offset_;
   std::uint16_t cover_rows_[capacity * PixelWindow::size];

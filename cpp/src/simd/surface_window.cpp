@@ -10,7 +10,7 @@ namespace {
 constexpr int parts = 16 / lanes;
 
 struct Point {
-  F32 x, y, z, normal_x, normal_y, normal_z;
+  F32 x, y, z, normal_x, normal_y, normal_z, ray_x, ray_y, ray_z;
   F32 squared_radius, inverse_squared_radius, largest_offset, least_cosine;
 };
 
@@ -33,7 +33,9 @@ NACRE_INLINE unsigned add_pixels(const SurfaceImage& image, int64_t start, Mask 
   const F32 pixel_weight = load(image.weight + start);
 
   const F32 along = dx * p.normal_x + dy * p.normal_y + dz * p.normal_z;
-  const F32 squared_across = dx * dx + dy * dy + dz * dz - along * along;
+  // Where the pixel's ray meets the tangent plane, from the point: the pixel's own noise has no part in its weight.
+  const F32 across_x = dx - along * p.ray_x, across_y = dy - along * p.ray_y, across_z = dz - along * p.ray_z;
+  const F32 squared_across = across_x * across_x + across_y * across_y + across_z * across_z;
   const F32 cosine = nx * p.normal_x + ny * p.normal_y + nz * p.normal_z;
   const F32 offset = abs(along);
   const Mask measured = in_window & (pixel_weight > broadcast(0.0F));
@@ -64,6 +66,7 @@ void observe(const SurfaceImage& image, const WindowQueries& queries, float leas
     const Point p = {
         broadcast(queries.x[i]),        broadcast(queries.y[i]),          broadcast(queries.z[i]),
         broadcast(queries.normal_x[i]), broadcast(queries.normal_y[i]),   broadcast(queries.normal_z[i]),
+        broadcast(queries.ray_x[i]),    broadcast(queries.ray_y[i]),      broadcast(queries.ray_z[i]),
         broadcast(squared_radius),      broadcast(1.0F / squared_radius), broadcast(queries.largest_offset[i]),
         broadcast(least_cosine)};
     const Cover cover = {broadcast(asked ? asked->spacing[i] * asked->spacing[i] : 0.0F),
@@ -104,7 +107,7 @@ void fill_surface_row(const FrameRow& row, float reference_sigma, bool orthograp
     const float nx = row.normals[3 * u], ny = row.normals[3 * u + 1], nz = row.normals[3 * u + 2];
     const float ratio = reference_sigma / row.sigma[u];
     const float facing = orthographic ? -nz : -(nx * x + ny * y + nz * z) / ::sqrtf(x * x + y * y + z * z);
-    const float weight = facing * ratio * ratio;
+    const float weight = facing > 0.0F ? ratio * ratio : 0.0F;
     const bool counts = weight > 0.0F;  // not where a value is NaN
     out.x[u] = counts ? x : 0.0F;
     out.y[u] = counts ? y : 0.0F;

@@ -30,7 +30,7 @@ struct SurfaceRow {
   float *x, *y, *z, *normal_x, *normal_y, *normal_z, *weight;
 };
 
-// weight = cos(angle of incidence) (reference_sigma / sigma)^2: information relative to a frontal measurement of the
+// weight = (reference_sigma / sigma)^2, 0 where the surface turns away: information relative to a measurement of the
 // reference noise.
 using FillSurfaceRow = void(const FrameRow& row, float reference_sigma, bool orthographic, const SurfaceRow& out);
 NACRE_DECLARE_KERNEL(FillSurfaceRow, fill_surface_row)
@@ -45,10 +45,11 @@ NACRE_DECLARE_KERNEL(SummarisePixels, summarise_pixels)
 struct WindowQueries {
   int count;
   const float *x, *y, *z, *normal_x, *normal_y, *normal_z;
-  const int32_t *pixel_u, *pixel_v;  // inside the image
-  const int32_t* window;             // 1 to largest_window
-  const float* radius;               // of the support, along the surface [m]
-  const float* largest_offset;       // along the normal [m]
+  const float *ray_x, *ray_y, *ray_z;  // along the ray through the point, as far as takes it 1 along its normal
+  const int32_t *pixel_u, *pixel_v;    // inside the image
+  const int32_t* window;               // 1 to largest_window
+  const float* radius;                 // of the support, along the surface [m]
+  const float* largest_offset;         // along the normal [m]
 };
 
 struct WindowSums {
@@ -67,7 +68,9 @@ struct WindowCover {
 };
 
 // For each point x_i with normal n_i, over the pixels j of its window, with weights w that fall from the pixel's own
-// to 0 at the radius, for pixels whose normal is within an angle of n_i:
+// to 0 at the radius, for pixels whose normal is within an angle of n_i. Distances along the surface are to where the
+// pixels' rays meet the point's tangent plane: if noise along the rays chose the weights, slanted surfaces that are
+// curved would come out too deep.
 //   weight = sum of w,  offset = sum of w (n_i + n_j) / 2 . (q_j - x_i) / weight,  normal = sum of w n_j.
 using ObserveWindows = void(const SurfaceImage& image, const WindowQueries& queries, float least_cosine,
                             const WindowSums& sums, const WindowCover* cover);
