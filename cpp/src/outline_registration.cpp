@@ -9,7 +9,7 @@
 namespace nacre {
 namespace {
 
-constexpr std::size_t fewest = 40;              // pairs
+constexpr std::size_t fewest = 25;              // pairs
 constexpr int num_rounds = 4, least_steps = 4;  // after each round of steps, back onto the surface
 constexpr double gate_decay = 0.8;              // at each step
 constexpr double first_gate = 12.0;             // [pixels]; of an object seen whole also a third of its size
