@@ -78,6 +78,7 @@ struct Model::Impl {
   PointModel cloud;
   LoopClosure loops{camera, options};
   std::vector<FrameReport> reports;
+  Values measured;          // by the newest, before it was cleaned
   Sight before;             // of the newest frame that was folded in
   std::vector<Pose> poses;  // of the registered frames, oldest first
   double spacing = 0.0;
@@ -117,6 +118,8 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
       clean_depth(depth, camera, options.depth, extras.mask, &calibration, &report.depth, nullptr, options.num_threads);
   report.milliseconds.preprocess = watch.lap();
 
+  measured.resize(depth.size());
+  Eigen::Map<DepthImage>(measured.data(), depth.rows(), depth.cols()) = depth;
   make_frame(clean, camera, noise(), options.num_threads, frame);
   report.milliseconds.back_project = watch.lap();
 
@@ -150,7 +153,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     if (report.status == FrameStatus::tracked) {
       if (was_lost()) report.status = FrameStatus::relocalised;
       fold_in(extras, report);
-      before = {frame.points.col(2), frame.sigma, report.world_from_camera};
+      before = {frame.points.col(2), frame.sigma, report.world_from_camera, measured};
     }
   }
   num_lost = report.status == FrameStatus::lost && !poses.empty() ? num_lost + 1 : 0;
@@ -185,7 +188,7 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost() || jumped(), before,
+  return track(cloud, frame, camera, observer, measured, guesses(extras), elsewhere(), was_lost() || jumped(), before,
                options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "parallel.hpp"
@@ -18,11 +19,14 @@ constexpr double most_offset = 0.65;   // has 0.42, a corner of 90 degrees 0.6
 constexpr double least_filled = 0.18;  // part of the window that shows the surface
 constexpr double most_slope = 3.0;     // of depth, in pixels' sizes, along a surface
 
+constexpr double most_off = 4.0;  // of a pixel from its surface, in standard deviations
+
 class OutlineSearch {
  public:
   OutlineSearch(const Sight& sight, const Camera& camera)
       : sight_(sight),
         camera_(camera),
+        measured_(sight.measured.size() > 0 ? sight.measured : sight.depth),
         width_(camera.width()),
         height_(camera.height()),
         gap_(std::max(reach + 2, std::max(width_, height_) / 16)) {}
@@ -98,12 +102,47 @@ class OutlineSearch {
       const double behind = depth(u + x, v + y) - (origin + across * x + down * y).z();
       if (!std::isfinite(behind)) continue;
       if (step <= 2 && std::abs(behind) < tolerance(u, v, 0.0)) continue;
-      return behind > tolerance(u, v, 1.0) ? std::optional<OutlinePoint>(found) : std::nullopt;
+      if (!(behind > tolerance(u, v, 1.0))) return std::nullopt;
+      break;
     }
+    const std::optional<double> end = surface_end(u, v, origin, across, down, -inward);
+    if (!end) return std::nullopt;
+    found.point += *end * outwards;
     return found;
   }
 
  private:
+  // How far from a pixel, along a direction of the image, a flat surface ends [pixels]: half way from the last pixel
+  // that sees it to the first that sees something else or nothing. Pixels between them see both sides of the edge, if
+  // they are not too many: others see a side of the same body at a grazing angle. None where the surface goes on.
+  std::optional<double> surface_end(int u, int v, const Eigen::Vector3d& origin, const Eigen::Vector3d& across,
+                                    const Eigen::Vector3d& down, const Eigen::Vector2d& direction) const {
+    constexpr double stride = 0.5, most_smeared = 2.5;
+    const double off =
+        most_off * static_cast<double>(sight_.sigma[v * width_ + u]) + 0.5 * camera_.footprint(depth(u, v));
+    double last = 0.0;
+    for (double at = 0.5 * stride; at < gap_; at += stride) {
+      const int x = static_cast<int>(std::lround(direction.x() * at)),
+                y = static_cast<int>(std::lround(direction.y() * at));
+      const double z = measured(u + x, v + y);
+      if (std::isfinite(z) && std::abs(z - (origin + across * x + down * y).z()) < off) {
+        last = at;
+        continue;
+      }
+      // The same surface as its neighbour's on the far side?
+      const int next_x = static_cast<int>(std::lround(direction.x() * (at + 1.0))),
+                next_y = static_cast<int>(std::lround(direction.y() * (at + 1.0)));
+      const double next = measured(u + next_x, v + next_y);
+      const bool is_other = !std::isfinite(z) || (std::isfinite(next) && std::abs(next - z) < tolerance(u, v, 1.0));
+      if (is_other) return last + 0.5 * std::min(at - last, most_smeared);
+    }
+    return std::nullopt;
+  }
+
+  double measured(int u, int v) const {
+    const double z = static_cast<double>(measured_[v * width_ + u]);
+    return z > 0.0 ? z : std::numeric_limits<double>::quiet_NaN();
+  }
   double depth(int u, int v) const { return static_cast<double>(sight_.depth[v * width_ + u]); }
   double tolerance(int u, int v, double distance) const {
     return most_slope * camera_.footprint(depth(u, v)) * distance +
@@ -112,6 +151,7 @@ class OutlineSearch {
 
   const Sight& sight_;
   const Camera& camera_;
+  const Values& measured_;
   int width_, height_;
   int gap_;  // across which something is looked for [pixels]
 };

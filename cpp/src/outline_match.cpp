@@ -10,7 +10,8 @@ namespace {
 
 constexpr double cos_alike = 0.75;      // of the largest angle between matched outlines, and their surfaces
 constexpr double least_facing = 0.5;    // cosine between a normal and the direction to the camera
-constexpr double look_beyond = 8.0;     // [pixels]
+constexpr double look_within = 3.0;     // [pixels]: nearer to an edge, pixels see both of its sides
+constexpr double look_beyond = 5.0;     // [pixels]
 constexpr double least_distance = 2.0;  // of a surface from another [pixels]
 
 // How far before a point of a surface a camera saw something, along its normal [m], averaged over the pixels around;
@@ -40,7 +41,7 @@ bool is_contradicted(const OutlinePoint& edge, const Sight& sight, const Camera&
   const Eigen::Vector3d sight_line = is_orthographic ? Eigen::Vector3d::UnitZ() : edge.point.normalized();
   if (!(-edge.normal.dot(sight_line) > least_facing)) return false;
   const double tolerance = least_distance * pixel + noise;
-  const auto here = distance_before(sight, camera, edge.point, edge.normal);
+  const auto here = distance_before(sight, camera, edge.point - look_within * pixel * edge.outward, edge.normal);
   if (!here) return false;
   if (!(*here > -tolerance)) return true;
   const auto beyond = distance_before(sight, camera, edge.point + look_beyond * pixel * edge.outward, edge.normal);

@@ -9,7 +9,7 @@
 namespace nacre {
 namespace {
 
-constexpr std::size_t fewest = 40;              // pairs
+constexpr std::size_t fewest = 25;              // pairs
 constexpr int num_rounds = 4, least_steps = 4;  // after each round of steps, back onto the surface
 constexpr double gate_decay = 0.8;              // at each step
 constexpr double first_gate = 12.0;             // [pixels]; of an object seen whole also a third of its size
@@ -18,7 +18,8 @@ constexpr double last_gate = 4.0;               // [pixels]
 constexpr double least_agreement = 0.6;         // of the outlines
 constexpr double largest_ratio = 0.4;           // residuals to the gate, root mean square; chance gives 0.58
 constexpr double least_information = 0.1;       // per pair, for a direction to be known: outlines that hardly move
-constexpr double least_total = 10.0;            // with it make much of small errors; over all pairs
+                                                // with it make much of small errors
+constexpr double least_noise = 0.3;             // pixels are where they are to half a pixel
 constexpr double mad_to_sigma = 1.4826;
 
 using Basis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
@@ -73,6 +74,8 @@ class EdgeSearch {
   double smallest_gate() const { return last_gate * pixel_; }
   double noise() const { return noise_; }
   double extent() const { return extent_; }
+  // The information that leaves a direction no more uncertain than a pixel.
+  double least_known() const { return std::pow(noise_ / (least_noise * pixel_), 2); }
 
   // Each source edge with the nearest target edge of its kind, if that lies within the gate; robust weights.
   std::vector<EdgePair> match(const Pose& pose, const Eigen::Vector3d& center, double gate) {
@@ -88,8 +91,7 @@ class EdgeSearch {
       sizes.push_back(std::abs(pairs.back().residual));
     }
     if (pairs.size() < fewest) return {};
-    // Pixels are where they are to half a pixel.
-    noise_ = std::max(0.3 * pixel_, mad_to_sigma * median_of(sizes));
+    noise_ = std::max(least_noise * pixel_, mad_to_sigma * median_of(sizes));
     for (EdgePair& pair : pairs) {
       const double ratio = pair.residual / (3.0 * noise_);
       pair.weight = 1.0 / ((1.0 + ratio * ratio) * (1.0 + ratio * ratio));  // Geman and McClure 1985
@@ -227,7 +229,7 @@ IcpResult determine_by_outline(const IcpTarget& target, const IcpSource& source,
     double weight = 0.0;
     for (const EdgePair& pair : pairs) weight += pair.weight;
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(search.agreed_information(pairs, open));
-    const double least = std::max(least_total, least_information * weight);
+    const double least = std::max(search.least_known(), least_information * weight);
     const Eigen::Index num_weak = (eigen.eigenvalues().array() < least).count();
     if (is_shaped) return num_weak == 0 ? found : geometric;
     if (num_weak == open.cols()) return geometric;

@@ -90,8 +90,9 @@ struct Search {
   const SurfaceObserver& observer;
   const ModelOptions& options;
   IcpSource source;
-  const Values& noise;  // of the sampled points [m]
-  const Values depth;   // of each pixel [m]
+  const Values& noise;     // of the sampled points [m]
+  const Values depth;      // of each pixel [m]
+  const Values& measured;  // see Sight
   const Sight& before;
   double spacing;             // of the model [m]
   std::int32_t oldest_frame;  // see track
@@ -102,7 +103,7 @@ struct Search {
   const OutlinePair& outlines() const {
     constexpr std::size_t most_before = 2000, most_now = 600;
     if (!found_outlines) {
-      const Sight now{depth, frame.sigma, Pose::Identity()};
+      const Sight now{depth, frame.sigma, Pose::Identity(), measured};
       found_outlines.emplace(OutlinePair{camera, before, find_outline(before, camera, most_before, options.num_threads),
                                          find_outline(now, camera, most_now, options.num_threads), depth,
                                          static_cast<double>(median_sigma(frame))});
@@ -204,16 +205,17 @@ struct Search {
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
-                     std::int32_t oldest_frame, double spacing, const ModelOptions& options) {
+                     const Values& measured, const std::vector<Pose>& guesses, const WhereElse& elsewhere,
+                     bool was_lost, const Sight& before, std::int32_t oldest_frame, double spacing,
+                     const ModelOptions& options) {
   const FrameSamples samples = sample_frame(frame, observer, options);
   Search search{
       model,         frame,
       camera,        observer,
       options,       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
       samples.noise, frame.points.col(2),
-      before,        spacing,
-      oldest_frame};
+      measured,      before,
+      spacing,       oldest_frame};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
   const auto try_guesses = [&] {

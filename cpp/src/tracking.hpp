@@ -19,7 +19,8 @@ struct WhereElse {
 // elsewhere. `before` is what the camera saw when it was last registered. Points that were last observed before
 // oldest_frame may have drifted away: they are left out, except by the search.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
-                     std::int32_t oldest_frame, double spacing, const ModelOptions& options);
+                     const Values& measured, const std::vector<Pose>& guesses, const WhereElse& elsewhere,
+                     bool was_lost, const Sight& before, std::int32_t oldest_frame, double spacing,
+                     const ModelOptions& options);
 
 }  // namespace nacre

@@ -30,6 +30,7 @@ struct TrackingResult {
 struct Sight {
   Values depth, sigma;  // of each pixel [m], NaN where nothing was measured
   Pose world_from_camera = Pose::Identity();
+  Values measured = {};  // the depth before it was cleaned, 0 or NaN for none; empty: the same
 };
 
 // Of oriented points that face the camera and project onto a measured pixel: the part that agrees with it, among those

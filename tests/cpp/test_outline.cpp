@@ -86,11 +86,41 @@ TEST_CASE("the outline of a square lies on its sides and points away from it") {
   CHECK(outline.size() > 250);  // of 4 x 80 pixels
   for (const OutlinePoint& edge : outline) {
     const double x = std::abs(edge.point.x()), y = std::abs(edge.point.y());
+    if (std::min(x, y) < 0.06) CHECK(std::abs(std::max(x, y) - 0.08) < 0.6 * pixel);
     CHECK(std::abs(std::max(x, y) - 0.08) < 1.1 * pixel);
     CHECK(edge.normal.z() < -0.99);
     CHECK(edge.outward.dot(edge.point) > 0.0);
     if (std::min(x, y) < 0.06) CHECK((x > y ? std::abs(edge.outward.x()) : std::abs(edge.outward.y())) > 0.98);
     CHECK(edge.pixel == doctest::Approx(pixel).epsilon(0.1));
+  }
+}
+
+TEST_CASE("an outline lies between what was kept and what is beyond, however much cleaning took") {
+  DepthImage measured = view(square, Pose::Identity(), 1);
+  DepthImage clean = measured;
+  const auto index = [](double at, int count) { return static_cast<int>(std::lround(at / pixel + 0.5 * (count - 1))); };
+  const int left = index(-0.08, camera.width()), right = index(0.08, camera.width()), removed = 3;
+  for (int v = 0; v < camera.height(); ++v) {
+    for (int u = 0; u < camera.width(); ++u) {
+      if (u < left + removed || u > right - removed) clean(v, u) = missing;
+    }
+  }
+  Sight sight;
+  sight.depth = Eigen::Map<const Values>(clean.data(), clean.size());
+  sight.sigma = Values::Constant(clean.size(), static_cast<float>(noise));
+  for (const bool knows_measured : {false, true}) {
+    CAPTURE(knows_measured);
+    if (knows_measured) sight.measured = Eigen::Map<const Values>(measured.data(), measured.size());
+    double sum = 0.0;
+    int count = 0;
+    for (const OutlinePoint& edge : find_outline(sight, camera, 100000, 1)) {
+      if (std::abs(edge.point.y()) > 0.06) continue;
+      sum += std::abs(edge.point.x()) - 0.08;
+      ++count;
+    }
+    REQUIRE(count > 80);
+    if (knows_measured) CHECK(std::abs(sum / count) < 0.55 * pixel);
+    if (!knows_measured) CHECK(sum / count < -2.0 * pixel);
   }
 }
 
