@@ -204,8 +204,8 @@ struct Search {
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const std::vector<Pose>& guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
-                     std::int32_t oldest_frame, double spacing, const ModelOptions& options) {
+                     std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
+                     PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing, const ModelOptions& options) {
   const FrameSamples samples = sample_frame(frame, observer, options);
   Search search{
       model,         frame,
@@ -216,6 +216,8 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
       oldest_frame};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
+  const std::optional<Pose> predicted = hypothesis.predict(search.source, options.registration);
+  if (predicted) guesses.insert(guesses.begin(), *predicted);
   const auto try_guesses = [&] {
     for (const bool wide : {false, true}) {
       if (wide && (best.status != FrameStatus::lost || !search.has_automatic_gate())) return;
@@ -234,18 +236,25 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
     best.is_to_whole_model = true;
     if (best.status != FrameStatus::lost) return best;
   }
-  if (!elsewhere.key_poses.empty()) {
+  const bool goes_on = predicted && hypothesis.is_confirmed_by(best);
+  if (!goes_on && !elsewhere.key_poses.empty()) {
     TrackingResult found = search.relocalise(elsewhere.key_poses);
     found.is_to_whole_model = true;
     if (found.status != FrameStatus::lost) return found;
+    if (found.rank() > best.rank()) best = found;
   }
-  if (elsewhere.everywhere) {
+  if (!goes_on && elsewhere.everywhere) {
     const std::optional<Pose> pose = fit_anywhere(model, search.source, options.registration);
     if (pose) {
       TrackingResult found = search.register_from(*pose, false, false);
       found.is_to_whole_model = true;
       if (found.status != FrameStatus::lost) return found;
+      if (found.rank() > best.rank()) best = found;
     }
+  }
+  if (options.relocalise && options.verify && hypothesis.weigh(best, search.source)) {
+    best.status = FrameStatus::tracked;
+    best.reason.clear();
   }
   return best;
 }

@@ -62,9 +62,11 @@ void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
   const double overlap = result.alignment.overlap;
   const double ratio = std::max(least_ratio, result.alignment.residual_ratio);
   result.evidence = overlap * overlap * std::pow(result.consistency, 4) * std::max(0.0, std::log(chance / ratio));
+  result.recognition = overlap * std::pow(result.consistency, 8) * std::max(0.0, std::log(chance / ratio)) *
+                       result.alignment.normal_information;
   const double least = options.min_evidence * (strict ? strictness : 1.0);
   if (result.alignment.status == AlignStatus::too_few_pairs) {
-    result.evidence = 0.0;
+    result.evidence = result.recognition = 0.0;
     reason << "too few points of the frame match the model";
   } else if (options.verify && !(result.evidence >= least)) {
     reason << "evidence " << result.evidence << " is below " << least << ": overlap " << overlap << ", consistency "
