@@ -10,7 +10,7 @@ namespace {
 // Of 438 places where an image of one room or object fitted a model of another best, one in ten had a recognition above
 // `chance`, six above 0.6, none above 1.02; there are none above `chance` where the model is of more than one image.
 constexpr double chance = 0.3;         // what a view says is what its recognition has beyond
-constexpr double enough = 0.6;         // from several views
+constexpr double enough = 0.45;        // from several views
 constexpr double enough_alone = 1.3;   // from a single one
 constexpr double least_step = 0.1;     // between views that count, as view_distance: noise makes no new view
 constexpr double largest_gap = 0.2;    // between the places by model and by motion, as view_distance

@@ -5,6 +5,7 @@
 #include <limits>
 #include <sstream>
 
+#include "frame_samples.hpp"
 #include "model_view.hpp"
 #include "parallel.hpp"
 
@@ -36,8 +37,8 @@ double consistency_of(const PointsRef& points, const PointsRef& normals, const S
           const std::int32_t pixel = block.pixel[i];
           const float behind = sight.depth[pixel] - block.z[i];
           if (!std::isfinite(behind)) continue;
-          const float tolerance =
-              std::max(3.0F * static_cast<float>(spacing), 4.0F * sight.sigma[pixel]) / block.facing[i];
+          const float error = std::hypot(4.0F * sight.sigma[pixel], 2.0F * systematic_error(sight.depth[pixel]));
+          const float tolerance = std::max(3.0F * static_cast<float>(spacing), error) / block.facing[i];
           if (behind > tolerance) {
             ++sum.violated;
           } else if (behind > -tolerance) {
