@@ -78,9 +78,9 @@ struct Model::Impl {
   PointModel cloud;
   LoopClosure loops{camera, options};
   std::vector<FrameReport> reports;
-  Sight before;             // of the newest frame that was folded in
+  Sight before;                // of the newest frame that was folded in
   PlaceHypothesis hypothesis;  // while the camera is lost
-  std::vector<Pose> poses;  // of the registered frames, oldest first
+  std::vector<Pose> poses;     // of the registered frames, oldest first
   double spacing = 0.0;
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
 
@@ -187,8 +187,8 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost() || jumped(), before,
-               hypothesis, options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
+  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost() || jumped(), before, hypothesis,
+               options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
 }
 
 // Whether the camera's last motion was none that goes on: views far apart, in any order.

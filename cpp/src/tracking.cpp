@@ -91,7 +91,7 @@ struct Search {
   const ModelOptions& options;
   IcpSource source;
   const Values& noise;  // of the sampled points [m]
-  const Values depth;   // of each pixel [m]
+  const Sight now;      // from the origin: where the camera is, is to be found
   const Sight& before;
   double spacing;             // of the model [m]
   std::int32_t oldest_frame;  // see track
@@ -102,9 +102,8 @@ struct Search {
   const OutlinePair& outlines() const {
     constexpr std::size_t most_before = 2000, most_now = 600;
     if (!found_outlines) {
-      const Sight now{depth, frame.sigma, Pose::Identity()};
       found_outlines.emplace(OutlinePair{camera, before, find_outline(before, camera, most_before, options.num_threads),
-                                         find_outline(now, camera, most_now, options.num_threads), depth,
+                                         find_outline(now, camera, most_now, options.num_threads), now.depth,
                                          static_cast<double>(median_sigma(frame))});
     }
     return *found_outlines;
@@ -155,13 +154,13 @@ struct Search {
       result.alignment = determine_by_outline(target, gated, outlines(), result.alignment, align_options);
     }
     const Pose& pose = result.alignment.target_from_source;
-    const Sight now{depth, frame.sigma, pose};
-    const double in_view = consistency_of(view.points, view.normals, now, camera, spacing, options.num_threads);
+    const double in_view = consistency_of(view.points, view.normals, now, pose, camera, spacing, options.num_threads);
     const Eigen::Matrix3f rotation = pose.linear().cast<float>();
     const Eigen::RowVector3f translation = pose.translation().cast<float>().transpose();
     const Points points = (source.cloud.points * rotation.transpose()).rowwise() + translation;
     const Points normals = source.cloud.normals * rotation.transpose();
-    const double earlier = consistency_of(points, normals, before, camera, spacing, options.num_threads);
+    const double earlier =
+        consistency_of(points, normals, before, before.world_from_camera, camera, spacing, options.num_threads);
     result.consistency = std::isfinite(in_view) || std::isfinite(earlier) ? std::fmin(in_view, earlier) : 0.0;
     const double turned = Eigen::AngleAxisd(guess.linear().transpose() * pose.linear()).angle();
     judge(result, options, strict || turned > far_turn);
@@ -205,13 +204,14 @@ struct Search {
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
                      std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
-                     PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing, const ModelOptions& options) {
+                     PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing,
+                     const ModelOptions& options) {
   const FrameSamples samples = sample_frame(frame, observer, options);
   Search search{
       model,         frame,
       camera,        observer,
       options,       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
-      samples.noise, frame.points.col(2),
+      samples.noise, Sight{frame.points.col(2), frame.sigma},
       before,        spacing,
       oldest_frame};
   TrackingResult best;
@@ -246,7 +246,7 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
   if (!goes_on && elsewhere.everywhere) {
     const std::optional<Pose> pose = fit_anywhere(model, search.source, options.registration);
     if (pose) {
-      TrackingResult found = search.register_from(*pose, false, false);
+      TrackingResult found = search.register_from(*pose, false, true);
       found.is_to_whole_model = true;
       if (found.status != FrameStatus::lost) return found;
       if (found.rank() > best.rank()) best = found;

@@ -22,6 +22,7 @@ struct WhereElse {
 // convincing, `hypothesis` may become so over several frames.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
                      std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost, const Sight& before,
-                     PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing, const ModelOptions& options);
+                     PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing,
+                     const ModelOptions& options);
 
 }  // namespace nacre

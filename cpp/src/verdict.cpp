@@ -23,10 +23,10 @@ struct Counts {
 
 }  // namespace
 
-double consistency_of(const PointsRef& points, const PointsRef& normals, const Sight& sight, const Camera& camera,
-                      double spacing, int num_threads) {
+double consistency_of(const PointsRef& points, const PointsRef& normals, const Sight& sight,
+                      const Pose& world_from_camera, const Camera& camera, double spacing, int num_threads) {
   constexpr std::int64_t block_size = ModelView::capacity, least_judged = 20;
-  const ModelView model_view(camera, sight.world_from_camera);
+  const ModelView model_view(camera, world_from_camera);
   const Counts counts =
       block_reduce(points.rows(), block_size, num_threads, Counts{}, [&](std::int64_t begin, std::int64_t end) {
         ModelView::Block block;

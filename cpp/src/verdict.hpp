@@ -33,16 +33,16 @@ struct Sight {
   Pose world_from_camera = Pose::Identity();
 };
 
-// Of oriented points that face the camera and project onto a measured pixel: the part that agrees with it, among those
-// that agree and those that the camera sees through. Points behind the measured surface are hidden, not wrong. NaN
-// where too few of the points can be judged.
-double consistency_of(const PointsRef& points, const PointsRef& normals, const Sight& sight, const Camera& camera,
-                      double spacing, int num_threads);
+// Of oriented points that face a camera at a pose and project onto a pixel that it measured: the part that agrees with
+// it, among those that agree and those that the camera sees through. Points behind the measured surface are hidden, not
+// wrong. NaN where too few of the points can be judged.
+double consistency_of(const PointsRef& points, const PointsRef& normals, const Sight& sight,
+                      const Pose& world_from_camera, const Camera& camera, double spacing, int num_threads);
 
-// Fills in evidence, recognition, status, reason and is_beyond_doubt. The evidence is what the matches tell against chance: for each
-// a residual that is small among those that would have matched, ln(0.58 / ratio), where chance gives a ratio of 0.58;
-// times overlap^2, since any two surfaces touch somewhere, and consistency^4, since true ones contradict nowhere.
-// Strict, for guesses that may be far off: more is asked for.
+// Fills in evidence, recognition, status, reason and is_beyond_doubt. The evidence is what the matches tell against
+// chance: for each a residual that is small among those that would have matched, ln(0.58 / ratio), where chance gives a
+// ratio of 0.58; times overlap^2, since any two surfaces touch somewhere, and consistency^4, since true ones contradict
+// nowhere. Strict, for guesses that may be far off: more is asked for.
 //
 // The recognition is evidence for a place that nothing but the frame speaks for. New surface does not speak against it
 // (overlap, not its square), contradictions do the more (consistency^8), and what the residuals tell counts as much as
