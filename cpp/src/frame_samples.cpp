@@ -7,7 +7,6 @@
 #include "random.hpp"
 
 namespace nacre {
-namespace {
 
 // Depth cameras are also systematically wrong, the more the farther they see, which averaging does not remove
 // (Teichman, Miller and Thrun 2013). The form and the figure are what tracked best on recordings of structured light in
@@ -16,8 +15,6 @@ float systematic_error(float z) {
   constexpr float growth = 0.0015F;  // [1/m^2]
   return growth * z * z * z;
 }
-
-}  // namespace
 
 FrameSamples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
   const std::int64_t count =

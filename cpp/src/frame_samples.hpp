@@ -7,6 +7,9 @@
 
 namespace nacre {
 
+// What a depth camera is wrong by beyond its noise, so that no averaging removes it: a standard deviation [m].
+float systematic_error(float z);
+
 // Denoised points of a frame, spread over it at random: noise would shift the matches on curved surfaces.
 struct FrameSamples {
   Points points, normals;  // camera frame

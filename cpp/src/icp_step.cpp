@@ -154,6 +154,30 @@ Eigen::Matrix3d closest_rotation(const Eigen::Matrix3d& covariance) {
 
 }  // namespace
 
+double normal_information(const std::vector<Pair>& pairs, Metric metric) {
+  constexpr double least_variance = 1e-3;  // of each component: normals are no more certain than 2 degrees
+  Eigen::Vector3d source_sum = Eigen::Vector3d::Zero(), target_sum = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d squares = Eigen::Matrix3d::Zero(), differences = Eigen::Matrix3d::Zero();
+  double count = 0.0;
+  for (const Pair& pair : pairs) {
+    if (!pair.half_difference.allFinite()) continue;
+    const Eigen::Vector3d target =
+        metric == Metric::symmetric ? Eigen::Vector3d(pair.normal - pair.half_difference) : pair.normal;
+    const Eigen::Vector3d difference = 2.0 * pair.half_difference, source = target + difference;
+    source_sum += source;
+    target_sum += target;
+    squares += source * source.transpose() + target * target.transpose();
+    differences += difference * difference.transpose();
+    count += 1.0;
+  }
+  if (!(count > 0.0)) return 0.0;
+  const Eigen::Matrix3d floor = least_variance * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d apart = differences / count + floor;
+  const Eigen::Matrix3d independent =
+      (squares - (source_sum * source_sum.transpose() + target_sum * target_sum.transpose()) / count) / count + floor;
+  return std::max(0.0, 0.5 * std::log(independent.determinant() / apart.determinant()));
+}
+
 IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, int num_threads) {
   IcpStep step;
   if (pairs.empty()) return step;

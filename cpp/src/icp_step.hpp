@@ -34,6 +34,10 @@ struct IcpStep {
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  // scaled unit twists about center
 };
 
+// What the normals of a source and of the target tell about each other, for each pair: their mutual information, were
+// they Gaussian [nats]. Large where they vary together over the surface; nothing on a plane, however well it fits.
+double normal_information(const std::vector<Pair>& pairs, Metric metric);
+
 // Directions in which the normals of source and target agree on less information than weak_threshold, per pair that
 // agrees and with rotations in units of the pairs' extent, do not move: what a shape leaves open does not depend on how
 // well its parts are measured.

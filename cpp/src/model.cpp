@@ -78,9 +78,10 @@ struct Model::Impl {
   PointModel cloud;
   LoopClosure loops{camera, options};
   std::vector<FrameReport> reports;
-  Values measured;          // by the newest, before it was cleaned
-  Sight before;             // of the newest frame that was folded in
-  std::vector<Pose> poses;  // of the registered frames, oldest first
+  Values measured;             // by the newest, before it was cleaned
+  Sight before;                // of the newest frame that was folded in
+  PlaceHypothesis hypothesis;  // while the camera is lost
+  std::vector<Pose> poses;     // of the registered frames, oldest first
   double spacing = 0.0;
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
 
@@ -98,7 +99,7 @@ struct Model::Impl {
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
   NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
   void keep_region(FrameReport& report);
-  TrackingResult locate(const FrameExtras& extras, const RegionReport& region) const;
+  TrackingResult locate(const FrameExtras& extras, const RegionReport& region);
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   WhereElse elsewhere() const;
   void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
@@ -147,6 +148,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   if (report.status == FrameStatus::lost) {
     report.world_from_camera = poses.empty() ? Pose::Identity() : poses.back();
   } else {
+    hypothesis.forget();
     poses.push_back(report.world_from_camera);
     if (options.loop_closure && options.fold_in == FoldIn::fuse) close_loops(report, tracking, extras.keep_guess);
     report.milliseconds.loop_closure = watch.lap();
@@ -173,7 +175,7 @@ void Model::Impl::keep_region(FrameReport& report) {
   if (report.region.num_inside > 0) region = std::move(found);
 }
 
-TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport& region_report) const {
+TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport& region_report) {
   TrackingResult result;
   result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
   if (frame.valid.size() < least_pixels) {
@@ -189,7 +191,7 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport
     return result;
   }
   return track(cloud, frame, camera, observer, measured, guesses(extras), elsewhere(), was_lost() || jumped(), before,
-               options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
+               hypothesis, options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
 }
 
 // Whether the camera's last motion was none that goes on: views far apart, in any order.

@@ -168,6 +168,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   result.overlap = static_cast<double>(pairs.size()) / static_cast<double>(schedule.num_samples());
   result.rmse = last.rmse;
   result.residual_ratio = residual_ratio_of(pairs, options.method);
+  result.normal_information = normal_information(pairs, options.method);
   result.center = last.center;
   result.information = last.hessian / std::max(last.variance, resolution * resolution);
   result.weak_directions = last.weak_directions;

@@ -90,9 +90,8 @@ struct Search {
   const SurfaceObserver& observer;
   const ModelOptions& options;
   IcpSource source;
-  const Values& noise;     // of the sampled points [m]
-  const Values depth;      // of each pixel [m]
-  const Values& measured;  // see Sight
+  const Values& noise;  // of the sampled points [m]
+  const Sight now;      // from the origin: where the camera is, is to be found
   const Sight& before;
   double spacing;             // of the model [m]
   std::int32_t oldest_frame;  // see track
@@ -103,9 +102,8 @@ struct Search {
   const OutlinePair& outlines() const {
     constexpr std::size_t most_before = 2000, most_now = 600;
     if (!found_outlines) {
-      const Sight now{depth, frame.sigma, Pose::Identity(), measured};
       found_outlines.emplace(OutlinePair{camera, before, find_outline(before, camera, most_before, options.num_threads),
-                                         find_outline(now, camera, most_now, options.num_threads), depth,
+                                         find_outline(now, camera, most_now, options.num_threads), now.depth,
                                          static_cast<double>(median_sigma(frame))});
     }
     return *found_outlines;
@@ -156,13 +154,13 @@ struct Search {
       result.alignment = determine_by_outline(target, gated, outlines(), result.alignment, align_options);
     }
     const Pose& pose = result.alignment.target_from_source;
-    const Sight now{depth, frame.sigma, pose};
-    const double in_view = consistency_of(view.points, view.normals, now, camera, spacing, options.num_threads);
+    const double in_view = consistency_of(view.points, view.normals, now, pose, camera, spacing, options.num_threads);
     const Eigen::Matrix3f rotation = pose.linear().cast<float>();
     const Eigen::RowVector3f translation = pose.translation().cast<float>().transpose();
     const Points points = (source.cloud.points * rotation.transpose()).rowwise() + translation;
     const Points normals = source.cloud.normals * rotation.transpose();
-    const double earlier = consistency_of(points, normals, before, camera, spacing, options.num_threads);
+    const double earlier =
+        consistency_of(points, normals, before, before.world_from_camera, camera, spacing, options.num_threads);
     result.consistency = std::isfinite(in_view) || std::isfinite(earlier) ? std::fmin(in_view, earlier) : 0.0;
     const double turned = Eigen::AngleAxisd(guess.linear().transpose() * pose.linear()).angle();
     judge(result, options, strict || turned > far_turn);
@@ -205,19 +203,21 @@ struct Search {
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const Values& measured, const std::vector<Pose>& guesses, const WhereElse& elsewhere,
-                     bool was_lost, const Sight& before, std::int32_t oldest_frame, double spacing,
+                     const Values& measured, std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost,
+                     const Sight& before, PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing,
                      const ModelOptions& options) {
   const FrameSamples samples = sample_frame(frame, observer, options);
   Search search{
       model,         frame,
       camera,        observer,
       options,       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
-      samples.noise, frame.points.col(2),
-      measured,      before,
-      spacing,       oldest_frame};
+      samples.noise, Sight{frame.points.col(2), frame.sigma, Pose::Identity(), measured},
+      before,        spacing,
+      oldest_frame};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
+  const std::optional<Pose> predicted = hypothesis.predict(search.source, options.registration);
+  if (predicted) guesses.insert(guesses.begin(), *predicted);
   const auto try_guesses = [&] {
     for (const bool wide : {false, true}) {
       if (wide && (best.status != FrameStatus::lost || !search.has_automatic_gate())) return;
@@ -236,18 +236,25 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
     best.is_to_whole_model = true;
     if (best.status != FrameStatus::lost) return best;
   }
-  if (!elsewhere.key_poses.empty()) {
+  const bool goes_on = predicted && hypothesis.is_confirmed_by(best);
+  if (!goes_on && !elsewhere.key_poses.empty()) {
     TrackingResult found = search.relocalise(elsewhere.key_poses);
     found.is_to_whole_model = true;
     if (found.status != FrameStatus::lost) return found;
+    if (found.rank() > best.rank()) best = found;
   }
-  if (elsewhere.everywhere) {
+  if (!goes_on && elsewhere.everywhere) {
     const std::optional<Pose> pose = fit_anywhere(model, search.source, options.registration);
     if (pose) {
-      TrackingResult found = search.register_from(*pose, false, false);
+      TrackingResult found = search.register_from(*pose, false, true);
       found.is_to_whole_model = true;
       if (found.status != FrameStatus::lost) return found;
+      if (found.rank() > best.rank()) best = found;
     }
+  }
+  if (options.relocalise && options.verify && hypothesis.weigh(best, search.source)) {
+    best.status = FrameStatus::tracked;
+    best.reason.clear();
   }
   return best;
 }

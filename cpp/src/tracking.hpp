@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "nacre/model.hpp"
+#include "place_hypothesis.hpp"
 #include "surface_observer.hpp"
 #include "verdict.hpp"
 
@@ -17,10 +18,11 @@ struct WhereElse {
 
 // Tries the guesses (world_from_camera, most trusted first) until one registers the frame; when none does, searches
 // elsewhere. `before` is what the camera saw when it was last registered. Points that were last observed before
-// oldest_frame may have drifted away: they are left out, except by the search.
+// oldest_frame may have drifted away: they are left out, except by the search. Where no single registration is
+// convincing, `hypothesis` may become so over several frames.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const Values& measured, const std::vector<Pose>& guesses, const WhereElse& elsewhere,
-                     bool was_lost, const Sight& before, std::int32_t oldest_frame, double spacing,
+                     const Values& measured, std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost,
+                     const Sight& before, PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing,
                      const ModelOptions& options);
 
 }  // namespace nacre

@@ -5,6 +5,7 @@
 #include <limits>
 #include <sstream>
 
+#include "frame_samples.hpp"
 #include "model_view.hpp"
 #include "parallel.hpp"
 
@@ -22,10 +23,10 @@ struct Counts {
 
 }  // namespace
 
-double consistency_of(const PointsRef& points, const PointsRef& normals, const Sight& sight, const Camera& camera,
-                      double spacing, int num_threads) {
+double consistency_of(const PointsRef& points, const PointsRef& normals, const Sight& sight,
+                      const Pose& world_from_camera, const Camera& camera, double spacing, int num_threads) {
   constexpr std::int64_t block_size = ModelView::capacity, least_judged = 20;
-  const ModelView model_view(camera, sight.world_from_camera);
+  const ModelView model_view(camera, world_from_camera);
   const Counts counts =
       block_reduce(points.rows(), block_size, num_threads, Counts{}, [&](std::int64_t begin, std::int64_t end) {
         ModelView::Block block;
@@ -36,8 +37,8 @@ double consistency_of(const PointsRef& points, const PointsRef& normals, const S
           const std::int32_t pixel = block.pixel[i];
           const float behind = sight.depth[pixel] - block.z[i];
           if (!std::isfinite(behind)) continue;
-          const float tolerance =
-              std::max(3.0F * static_cast<float>(spacing), 4.0F * sight.sigma[pixel]) / block.facing[i];
+          const float error = std::hypot(4.0F * sight.sigma[pixel], 2.0F * systematic_error(sight.depth[pixel]));
+          const float tolerance = std::max(3.0F * static_cast<float>(spacing), error) / block.facing[i];
           if (behind > tolerance) {
             ++sum.violated;
           } else if (behind > -tolerance) {
@@ -62,9 +63,11 @@ void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
   const double overlap = result.alignment.overlap;
   const double ratio = std::max(least_ratio, result.alignment.residual_ratio);
   result.evidence = overlap * overlap * std::pow(result.consistency, 4) * std::max(0.0, std::log(chance / ratio));
+  result.recognition = overlap * std::pow(result.consistency, 8) * std::max(0.0, std::log(chance / ratio)) *
+                       result.alignment.normal_information;
   const double least = options.min_evidence * (strict ? strictness : 1.0);
   if (result.alignment.status == AlignStatus::too_few_pairs) {
-    result.evidence = 0.0;
+    result.evidence = result.recognition = 0.0;
     reason << "too few points of the frame match the model";
   } else if (options.verify && !(result.evidence >= least)) {
     reason << "evidence " << result.evidence << " is below " << least << ": overlap " << overlap << ", consistency "

@@ -15,15 +15,16 @@ struct TrackingResult {
   // Part of the model's points in view that the frame does not see through, or of the frame's points that the camera
   // did not see through before, whichever is smaller.
   double consistency = 0.0;
-  double evidence = 0.0;  // see judge
+  double evidence = 0.0;     // see judge
+  double recognition = 0.0;  // see judge
   FrameStatus status = FrameStatus::lost;
   std::string reason;  // why it is weak or lost
   // Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
   bool is_beyond_doubt = false;
   bool is_to_whole_model = false;  // older points included
 
-  // A frame that is not lost before one that is, then by the evidence.
-  double rank() const { return (status == FrameStatus::lost ? 0.0 : 1000.0) + evidence; }
+  // A frame that is not lost before one that is.
+  double rank() const { return status == FrameStatus::lost ? recognition : 1000.0 + evidence; }
 };
 
 // What a camera saw from one place.
@@ -33,16 +34,20 @@ struct Sight {
   Values measured = {};  // the depth before it was cleaned, 0 or NaN for none; empty: the same
 };
 
-// Of oriented points that face the camera and project onto a measured pixel: the part that agrees with it, among those
-// that agree and those that the camera sees through. Points behind the measured surface are hidden, not wrong. NaN
-// where too few of the points can be judged.
-double consistency_of(const PointsRef& points, const PointsRef& normals, const Sight& sight, const Camera& camera,
-                      double spacing, int num_threads);
+// Of oriented points that face a camera at a pose and project onto a pixel that it measured: the part that agrees with
+// it, among those that agree and those that the camera sees through. Points behind the measured surface are hidden, not
+// wrong. NaN where too few of the points can be judged.
+double consistency_of(const PointsRef& points, const PointsRef& normals, const Sight& sight,
+                      const Pose& world_from_camera, const Camera& camera, double spacing, int num_threads);
 
-// Fills in evidence, status, reason and is_beyond_doubt. The evidence is what the matches tell against chance: for each
-// a residual that is small among those that would have matched, ln(0.58 / ratio), where chance gives a ratio of 0.58;
-// times overlap^2, since any two surfaces touch somewhere, and consistency^4, since true ones contradict nowhere.
-// Strict, for guesses that may be far off: more is asked for.
+// Fills in evidence, recognition, status, reason and is_beyond_doubt. The evidence is what the matches tell against
+// chance: for each a residual that is small among those that would have matched, ln(0.58 / ratio), where chance gives a
+// ratio of 0.58; times overlap^2, since any two surfaces touch somewhere, and consistency^4, since true ones contradict
+// nowhere. Strict, for guesses that may be far off: more is asked for.
+//
+// The recognition is evidence for a place that nothing but the frame speaks for. New surface does not speak against it
+// (overlap, not its square), contradictions do the more (consistency^8), and what the residuals tell counts as much as
+// the normals agree: see normal_information. Where only a plane of the one fits a plane of the other it is 0.
 void judge(TrackingResult& result, const ModelOptions& options, bool strict);
 
 }  // namespace nacre
