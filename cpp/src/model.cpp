@@ -12,6 +12,7 @@
 #include "fusion_step.hpp"
 #include "loop_closure.hpp"
 #include "model_correction.hpp"
+#include "object_view.hpp"
 #include "point_spacing.hpp"
 #include "tracking.hpp"
 
@@ -80,6 +81,7 @@ struct Model::Impl {
   std::vector<FrameReport> reports;
   Sight before;             // of the newest frame that was folded in
   std::vector<Pose> poses;  // of the registered frames, oldest first
+  std::vector<ObjectView> views;
   double spacing = 0.0;
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
 
@@ -99,7 +101,9 @@ struct Model::Impl {
   void keep_region(FrameReport& report);
   TrackingResult locate(const FrameExtras& extras, const RegionReport& region) const;
   std::vector<Pose> guesses(const FrameExtras& extras) const;
-  WhereElse elsewhere() const;
+  WhereElse elsewhere(const RegionReport& region) const;
+  std::optional<ObjectView> view_of_object(const RegionReport& region) const;
+  void keep_view(const FrameReport& report);
   void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
   void fold_in(const FrameExtras& extras, FrameReport& report);
 };
@@ -151,6 +155,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
       if (was_lost()) report.status = FrameStatus::relocalised;
       fold_in(extras, report);
       before = {frame.points.col(2), frame.sigma, report.world_from_camera};
+      keep_view(report);
     }
   }
   num_lost = report.status == FrameStatus::lost && !poses.empty() ? num_lost + 1 : 0;
@@ -185,7 +190,7 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(), was_lost() || jumped(), before,
+  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(region_report), was_lost() || jumped(), before,
                options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
 }
 
@@ -207,12 +212,14 @@ std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
 
 // Some of the newest poses from which the camera looked in different directions; and everywhere, but not at every frame
 // where that has been to no avail.
-WhereElse Model::Impl::elsewhere() const {
+WhereElse Model::Impl::elsewhere(const RegionReport& region_report) const {
   constexpr std::size_t most = 8;
   constexpr double least_angle = 0.35;
   constexpr std::int64_t patience = 8;
   WhereElse where;
   if (!options.relocalise) return where;
+  where.views = &views;
+  where.view = view_of_object(region_report);
   where.everywhere = num_lost < patience || num_lost % patience == 0;
   std::vector<Pose>& chosen = where.key_poses;
   for (auto pose = poses.rbegin(); pose != poses.rend() && chosen.size() < most; ++pose) {
@@ -222,6 +229,29 @@ WhereElse Model::Impl::elsewhere() const {
     if (is_new) chosen.push_back(*pose);
   }
   return where;
+}
+
+// Of the newest frame, where it shows an object that stands on a plane.
+std::optional<ObjectView> Model::Impl::view_of_object(const RegionReport& report) const {
+  if (report.support < 0) return std::nullopt;
+  return object_view(frame, region, report.planes[static_cast<std::size_t>(report.support)],
+                     sample_frame(frame, observer, options), options.registration.seed);
+}
+
+// Views from different directions, for the search on the plane.
+void Model::Impl::keep_view(const FrameReport& report) {
+  constexpr std::size_t most_views = 24;
+  constexpr double least_angle = 0.35;
+  const Pose& pose = report.world_from_camera;
+  const bool is_new = std::all_of(views.begin(), views.end(), [&](const ObjectView& view) {
+    return Eigen::AngleAxisd(view.world_from_camera.linear().transpose() * pose.linear()).angle() > least_angle;
+  });
+  if (!options.relocalise || views.size() >= most_views || !is_new) return;
+  std::optional<ObjectView> view = view_of_object(report.region);
+  if (!view) return;
+  view->frame = static_cast<std::int32_t>(report.index);
+  view->world_from_camera = pose;
+  views.push_back(std::move(*view));
 }
 
 void Model::Impl::close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given) {
@@ -251,6 +281,9 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
     if (earlier.status != FrameStatus::lost) poses.push_back(earlier.world_from_camera);
   }
   poses.push_back(report.world_from_camera);
+  for (ObjectView& view : views) {
+    view.world_from_camera = loop.corrections[static_cast<std::size_t>(view.frame)] * view.world_from_camera;
+  }
 }
 
 void Model::Impl::fold_in(const FrameExtras& extras, FrameReport& report) {

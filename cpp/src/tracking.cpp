@@ -9,6 +9,7 @@
 #include "model_view.hpp"
 #include "outline_registration.hpp"
 #include "parallel.hpp"
+#include "plane_search.hpp"
 #include "point_spacing.hpp"
 #include "random.hpp"
 #include "relocalisation.hpp"
@@ -201,6 +202,17 @@ struct Search {
   }
 };
 
+// What the search on the plane found needs no other verdict: it has seen all other places.
+TrackingResult on_plane(const PlaneFit& fit) {
+  TrackingResult result;
+  result.alignment = fit.alignment;
+  result.consistency = fit.consistency;
+  result.status = FrameStatus::tracked;
+  result.evidence = fit.score;
+  result.is_to_whole_model = true;
+  return result;
+}
+
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
@@ -233,6 +245,10 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
     try_guesses();
     best.is_to_whole_model = true;
     if (best.status != FrameStatus::lost) return best;
+  }
+  if (elsewhere.view && !elsewhere.views->empty()) {
+    const auto fit = fit_on_plane(model, *elsewhere.views, *elsewhere.view, camera, options.registration);
+    if (fit) return on_plane(*fit);
   }
   if (!elsewhere.key_poses.empty()) {
     TrackingResult found = search.relocalise(elsewhere.key_poses);

@@ -1,0 +1,141 @@
+#include "plane_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "parallel.hpp"
+#include "plane_registration.hpp"
+#include "rigid_motion.hpp"
+
+namespace nacre {
+namespace {
+
+constexpr int num_angles = 72;  // from which the search starts
+constexpr std::size_t num_candidates = 10;
+constexpr Eigen::Index coarse_samples = 300;
+constexpr double same_turn = 0.15;   // [rad]
+constexpr double same_shift = 0.08;  // of the object's size
+constexpr double first_gate = 0.25;  // of the object's size
+constexpr double least_score = 0.1, least_overlap = 0.1, most_rivalry = 0.5;
+
+struct Candidate {
+  IcpResult alignment;
+  double score = -1e9, overlap = 0.0, agree = 0.0, through = 0.0;
+};
+
+class Search {
+ public:
+  Search(const PointModel& model, const std::vector<ObjectView>& views, const ObjectView& frame, const Camera& camera,
+         const AlignOptions& options)
+      : views_(views),
+        frame_(frame),
+        camera_(camera),
+        options_(single_threaded(options)),
+        num_threads_(options.num_threads),
+        source_(AlignCloud(frame.points, frame.normals), options_),
+        target_(AlignCloud(rows_of(model.points), rows_of(model.normals)), options_) {
+    const ObjectView& first = views.front();
+    plane_ = first.world_from_camera * first.foot();
+    normal_ = plane_.linear().col(2);
+    Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+    for (const ObjectView& view : views)
+      middle += view.world_from_camera * view.body() / static_cast<double>(views.size());
+    plane_.translation() += middle - plane_.translation() - normal_.dot(middle - plane_.translation()) * normal_;
+    foot_ = frame.foot();
+    const Eigen::Vector3d body = frame.body() - foot_.translation();
+    foot_.translation() += body - foot_.linear().col(2).dot(body) * foot_.linear().col(2);
+  }
+
+  std::vector<Candidate> run() const {
+    std::vector<Candidate> candidates(num_angles);
+    parallel_for(num_angles, 2, num_threads_, [&](std::int64_t i) {
+      Pose turn = Pose::Identity();
+      turn.linear() = Eigen::AngleAxisd(static_cast<double>(i) * 2.0 * EIGEN_PI / num_angles, Eigen::Vector3d::UnitZ())
+                          .toRotationMatrix();
+      const PlaneGates gates{first_gate * frame_.size, 3.0 * frame_.tolerance, 14, coarse_samples};
+      candidates[static_cast<std::size_t>(i)] = align(plane_ * turn * foot_.inverse(), gates, coarse_samples);
+    });
+    candidates = different(std::move(candidates), num_candidates);
+    parallel_for(static_cast<std::int64_t>(candidates.size()), 1, num_threads_, [&](std::int64_t i) {
+      Candidate& candidate = candidates[static_cast<std::size_t>(i)];
+      const PlaneGates gates{4.0 * frame_.tolerance, 2.0 * frame_.tolerance, 30, frame_.points.rows()};
+      candidate = align(candidate.alignment.target_from_source, gates, frame_.points.rows());
+    });
+    return different(std::move(candidates), candidates.size());
+  }
+
+ private:
+  static AlignOptions single_threaded(AlignOptions options) {
+    options.method = Metric::symmetric;
+    options.num_threads = 1;
+    return options;
+  }
+  static PointsRef rows_of(const std::vector<Eigen::Vector3f>& vectors) {
+    return Eigen::Map<const Points>(vectors.front().data(), static_cast<Eigen::Index>(vectors.size()), 3);
+  }
+
+  Candidate align(const Pose& guess, const PlaneGates& gates, Eigen::Index num_samples) const {
+    Candidate candidate;
+    candidate.alignment = align_on_plane(target_, source_, guess, normal_, gates);
+    if (candidate.alignment.status == AlignStatus::too_few_pairs) return candidate;
+    candidate.score = 0.0;
+    const Pose& pose = candidate.alignment.target_from_source;
+    for (const ObjectView& view : views_) {
+      const Pose view_from_frame = view.world_from_camera.inverse() * pose;
+      const ViewEvidence forward = look_at(frame_, view, view_from_frame, camera_, num_samples);
+      const ViewEvidence backward = look_at(view, frame_, view_from_frame.inverse(), camera_, num_samples);
+      candidate.score += forward.score() + backward.score();
+      candidate.overlap = std::max(candidate.overlap, std::max(forward.agree, backward.agree));
+      candidate.agree += forward.agree + backward.agree;
+      candidate.through += forward.through + backward.through;
+    }
+    return candidate;
+  }
+
+  std::vector<Candidate> different(std::vector<Candidate> candidates, std::size_t most) const {
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
+    const Eigen::Vector3d middle = frame_.body();
+    std::vector<Candidate> kept;
+    for (const Candidate& candidate : candidates) {
+      if (kept.size() == most) break;
+      const Pose& pose = candidate.alignment.target_from_source;
+      const auto is_known = [&](const Candidate& other) {
+        const Pose& other_pose = other.alignment.target_from_source;
+        return Eigen::AngleAxisd(pose.linear().transpose() * other_pose.linear()).angle() < same_turn &&
+               (pose * middle - other_pose * middle).norm() < same_shift * frame_.size;
+      };
+      if (std::none_of(kept.begin(), kept.end(), is_known)) kept.push_back(candidate);
+    }
+    return kept;
+  }
+
+  const std::vector<ObjectView>& views_;
+  const ObjectView& frame_;
+  const Camera& camera_;
+  AlignOptions options_;
+  int num_threads_;
+  IcpSource source_;
+  IcpTarget target_;
+  Pose plane_, foot_;  // world and camera, from a frame in the plane below the object's middle
+  Eigen::Vector3d normal_;
+};
+
+}  // namespace
+
+std::optional<PlaneFit> fit_on_plane(const PointModel& model, const std::vector<ObjectView>& views,
+                                     const ObjectView& frame, const Camera& camera, const AlignOptions& options) {
+  if (model.size() == 0 || views.empty()) return std::nullopt;
+  const std::vector<Candidate> candidates = Search(model, views, frame, camera, options).run();
+  const Candidate& best = candidates.front();
+  if (getenv("DOG")) for (std::size_t i = 0; i < std::min<std::size_t>(3, candidates.size()); ++i) fprintf(stderr, "  plane %zu score %.3f overlap %.3f agree %.3f through %.3f icp %.3f\n", i, candidates[i].score, candidates[i].overlap, candidates[i].agree, candidates[i].through, candidates[i].alignment.overlap);
+  const double rival = candidates.size() > 1 ? candidates[1].score : -1e9;
+  if (!(best.score > least_score) || !(best.overlap > least_overlap) || rival > most_rivalry * best.score) {
+    return std::nullopt;
+  }
+  PlaneFit fit{best.alignment, best.score, rival, best.overlap, best.agree / (best.agree + best.through)};
+  fit.alignment.target_from_source = orthonormal(fit.alignment.target_from_source);
+  return fit;
+}
+
+}  // namespace nacre
