@@ -12,7 +12,7 @@ namespace {
 
 constexpr int num_angles = 72;  // from which the search starts
 constexpr std::size_t num_candidates = 10;
-constexpr Eigen::Index coarse_samples = 300;
+constexpr Eigen::Index coarse_samples = 300, climb_samples = 800;
 constexpr double same_turn = 0.15;   // [rad]
 constexpr double same_shift = 0.08;  // of the object's size
 constexpr double first_gate = 0.25;  // of the object's size
@@ -59,7 +59,7 @@ class Search {
     parallel_for(static_cast<std::int64_t>(candidates.size()), 1, num_threads_, [&](std::int64_t i) {
       Candidate& candidate = candidates[static_cast<std::size_t>(i)];
       const PlaneGates gates{4.0 * frame_.tolerance, 2.0 * frame_.tolerance, 30, frame_.points.rows()};
-      candidate = align(candidate.alignment.target_from_source, gates, frame_.points.rows());
+      candidate = climb(align(candidate.alignment.target_from_source, gates, frame_.points.rows()));
     });
     return different(std::move(candidates), candidates.size());
   }
@@ -77,8 +77,12 @@ class Search {
   Candidate align(const Pose& guess, const PlaneGates& gates, Eigen::Index num_samples) const {
     Candidate candidate;
     candidate.alignment = align_on_plane(target_, source_, guess, normal_, gates);
-    if (candidate.alignment.status == AlignStatus::too_few_pairs) return candidate;
-    candidate.score = 0.0;
+    if (candidate.alignment.status != AlignStatus::too_few_pairs) weigh(candidate, num_samples);
+    return candidate;
+  }
+
+  void weigh(Candidate& candidate, Eigen::Index num_samples) const {
+    candidate.score = candidate.overlap = candidate.agree = candidate.through = 0.0;
     const Pose& pose = candidate.alignment.target_from_source;
     for (const ObjectView& view : views_) {
       const Pose view_from_frame = view.world_from_camera.inverse() * pose;
@@ -89,7 +93,39 @@ class Search {
       candidate.agree += forward.agree + backward.agree;
       candidate.through += forward.through + backward.through;
     }
-    return candidate;
+  }
+
+  // Depth that is wrong by the same over a patch pulls surfaces off each other's outlines: the pattern search of Hooke
+  // and Jeeves 1961 on the score, in which outlines count.
+  Candidate climb(Candidate best) const {
+    if (best.alignment.status == AlignStatus::too_few_pairs) return best;
+    weigh(best, climb_samples);
+    const Eigen::Vector3d axes[] = {normal_, plane_.linear().col(0), plane_.linear().col(1)};
+    for (double step = frame_.tolerance; step > 0.1 * frame_.tolerance; step *= 0.5) {
+      bool is_better = true;
+      for (int round = 0; round < 8 && is_better; ++round) {
+        is_better = false;
+        for (int direction = 0; direction < 6; ++direction) {
+          const Eigen::Vector3d& axis = axes[direction / 2];
+          const double length = direction % 2 == 0 ? step : -step;
+          Candidate next = best;
+          Pose& pose = next.alignment.target_from_source;
+          if (direction < 2) {
+            const Eigen::Vector3d center = pose * frame_.body();
+            pose = Eigen::Translation3d(center) * Eigen::AngleAxisd(3.0 * length / frame_.size, axis) *
+                   Eigen::Translation3d(-center) * pose;
+          } else {
+            pose.pretranslate(length * axis);
+          }
+          weigh(next, climb_samples);
+          if (next.score <= best.score) continue;
+          best = next;
+          is_better = true;
+        }
+      }
+    }
+    weigh(best, frame_.points.rows());
+    return best;
   }
 
   std::vector<Candidate> different(std::vector<Candidate> candidates, std::size_t most) const {
