@@ -14,7 +14,9 @@
 #include "model_correction.hpp"
 #include "object_view.hpp"
 #include "point_spacing.hpp"
+#include "rigid_motion.hpp"
 #include "tracking.hpp"
+#include "view_adjustment.hpp"
 
 namespace nacre {
 namespace {
@@ -104,6 +106,7 @@ struct Model::Impl {
   WhereElse elsewhere(const RegionReport& region) const;
   std::optional<ObjectView> view_of_object(const RegionReport& region) const;
   void keep_view(const FrameReport& report);
+  void adjust(FrameReport& report);
   void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
   void fold_in(const FrameExtras& extras, FrameReport& report);
 };
@@ -153,9 +156,10 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     report.milliseconds.loop_closure = watch.lap();
     if (report.status == FrameStatus::tracked) {
       if (was_lost()) report.status = FrameStatus::relocalised;
+      keep_view(report);
+      if (tracking.is_on_plane) adjust(report);
       fold_in(extras, report);
       before = {frame.points.col(2), frame.sigma, report.world_from_camera};
-      keep_view(report);
     }
   }
   num_lost = report.status == FrameStatus::lost && !poses.empty() ? num_lost + 1 : 0;
@@ -252,6 +256,38 @@ void Model::Impl::keep_view(const FrameReport& report) {
   view->frame = static_cast<std::int32_t>(report.index);
   view->world_from_camera = pose;
   views.push_back(std::move(*view));
+}
+
+// Views far apart see little of the same surface: all of them together determine the newest, and each other.
+void Model::Impl::adjust(FrameReport& report) {
+  if (views.empty() || views.back().frame != report.index) return;
+  const std::vector<Pose> adjusted = adjust_views(views, options.num_threads);
+  // Each frame moves with the view that it is nearest to.
+  const auto motion_of = [&](const Pose& pose) {
+    std::size_t nearest = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      const double angle = Eigen::AngleAxisd(views[k].world_from_camera.linear().transpose() * pose.linear()).angle();
+      if (angle >= least) continue;
+      least = angle;
+      nearest = k;
+    }
+    return orthonormal(adjusted[nearest] * views[nearest].world_from_camera.inverse());
+  };
+  std::vector<Pose> motions, motions_of_registered;
+  for (Pose& pose : poses) {
+    motions_of_registered.push_back(motion_of(pose));
+    pose = motions_of_registered.back() * pose;
+  }
+  for (FrameReport& earlier : reports) {
+    motions.push_back(motion_of(earlier.world_from_camera));
+    earlier.world_from_camera = motions.back() * earlier.world_from_camera;
+  }
+  motions.push_back(motion_of(report.world_from_camera));
+  report.world_from_camera = motions.back() * report.world_from_camera;
+  move_points(cloud, motions_of_registered, options.num_threads);
+  if (options.loop_closure && options.fold_in == FoldIn::fuse) loops.move(motions);
+  for (std::size_t k = 0; k < views.size(); ++k) views[k].world_from_camera = adjusted[k];
 }
 
 void Model::Impl::close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given) {

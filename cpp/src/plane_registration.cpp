@@ -10,8 +10,37 @@ constexpr double cos_angle = 0.7;  // between normals that match
 constexpr double decay = 0.7;
 constexpr std::size_t least_pairs = 30;
 
-// The robust scale of the residuals, and the weights of Geman and McClure 1985.
-void weight_pairs(std::vector<Pair>& pairs, double floor) {
+// Least squares of the residuals, about the middle of the pairs.
+Pose plane_step(const std::vector<Pair>& pairs, const Eigen::Vector3d& normal) {
+  PlaneMotion motion{normal, Eigen::Vector3d::Zero()};
+  for (const Pair& pair : pairs) motion.center += pair.p / static_cast<double>(pairs.size());
+  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  for (const Pair& pair : pairs) {
+    const Eigen::Vector3d row = motion.row(pair);
+    hessian += pair.weight * row * row.transpose();
+    gradient -= pair.weight * row * residual(pair, Metric::symmetric);
+  }
+  hessian.diagonal().array() += 1e-9 * hessian.trace();
+  return motion.apply(hessian.ldlt().solve(gradient));
+}
+
+}  // namespace
+
+Eigen::Vector3d PlaneMotion::row(const Pair& pair) const {
+  const Eigen::Vector3d x = normal.unitOrthogonal(), y = normal.cross(x);
+  return {normal.cross(pair.p - center).dot(pair.normal), x.dot(pair.normal), y.dot(pair.normal)};
+}
+
+Pose PlaneMotion::apply(const Eigen::Vector3d& angle_and_shift) const {
+  const Eigen::Vector3d x = normal.unitOrthogonal(), y = normal.cross(x);
+  Pose motion = Pose::Identity();
+  motion.linear() = Eigen::AngleAxisd(angle_and_shift[0], normal).toRotationMatrix();
+  motion.translation() = center - motion.linear() * center + angle_and_shift[1] * x + angle_and_shift[2] * y;
+  return motion;
+}
+
+void weight_robustly(std::vector<Pair>& pairs, double floor) {
   std::vector<double> sizes;
   sizes.reserve(pairs.size());
   for (const Pair& pair : pairs) sizes.push_back(std::abs(residual(pair, Metric::symmetric)));
@@ -24,28 +53,6 @@ void weight_pairs(std::vector<Pair>& pairs, double floor) {
     pair.weight = pair.agreement;
   }
 }
-
-// Least squares of the residuals in the angle about the normal and the shift across it, all about the pairs' middle.
-Pose plane_step(const std::vector<Pair>& pairs, const Eigen::Vector3d& normal) {
-  const Eigen::Vector3d x = normal.unitOrthogonal(), y = normal.cross(x);
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  for (const Pair& pair : pairs) center += pair.p / static_cast<double>(pairs.size());
-  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-  for (const Pair& pair : pairs) {
-    const Eigen::Vector3d row(normal.cross(pair.p - center).dot(pair.normal), x.dot(pair.normal), y.dot(pair.normal));
-    hessian += pair.weight * row * row.transpose();
-    gradient -= pair.weight * row * residual(pair, Metric::symmetric);
-  }
-  hessian.diagonal().array() += 1e-9 * hessian.trace();
-  const Eigen::Vector3d solution = hessian.ldlt().solve(gradient);
-  Pose motion = Pose::Identity();
-  motion.linear() = Eigen::AngleAxisd(solution[0], normal).toRotationMatrix();
-  motion.translation() = center - motion.linear() * center + solution[1] * x + solution[2] * y;
-  return motion;
-}
-
-}  // namespace
 
 IcpResult align_on_plane(const IcpTarget& target, const IcpSource& source, const Pose& initial,
                          const Eigen::Vector3d& normal, const PlaneGates& gates) {
@@ -61,7 +68,7 @@ IcpResult align_on_plane(const IcpTarget& target, const IcpSource& source, const
   for (int i = 0; i < gates.max_iterations && !at_rest; ++i) {
     std::vector<Pair> pairs = target.match(source, count, pose, {distance, cos_angle, false}, nearest);
     if (pairs.size() < least_pairs) return result;
-    weight_pairs(pairs, floor);
+    weight_robustly(pairs, floor);
     const Pose motion = plane_step(pairs, normal);
     pose = motion * pose;
     const bool is_smallest = distance <= gates.last;
@@ -71,7 +78,7 @@ IcpResult align_on_plane(const IcpTarget& target, const IcpSource& source, const
   }
   std::vector<Pair> pairs = target.match(source, count, pose, {gates.last, cos_angle, false}, nearest);
   if (pairs.size() < least_pairs) return result;
-  weight_pairs(pairs, floor);
+  weight_robustly(pairs, floor);
   const IcpStep last = solve_step(pairs, Metric::symmetric, 0.0, 1);
   result.target_from_source = pose;
   result.status = at_rest ? AlignStatus::converged : AlignStatus::max_iterations;

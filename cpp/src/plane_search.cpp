@@ -16,7 +16,8 @@ constexpr Eigen::Index coarse_samples = 300, climb_samples = 800;
 constexpr double same_turn = 0.15;   // [rad]
 constexpr double same_shift = 0.08;  // of the object's size
 constexpr double first_gate = 0.25;  // of the object's size
-constexpr double least_score = 0.1, least_overlap = 0.1, most_rivalry = 0.5;
+constexpr double least_score = 0.1, least_overlap = 0.1;  // parts of the samples
+constexpr double least_consistency = 0.85;
 
 struct Candidate {
   IcpResult alignment;
@@ -62,6 +63,13 @@ class Search {
       candidate = climb(align(candidate.alignment.target_from_source, gates, frame_.points.rows()));
     });
     return different(std::move(candidates), candidates.size());
+  }
+
+  // The surfaces decide in the end, closer than the score asks for.
+  IcpResult settle(const Candidate& candidate) const {
+    const PlaneGates gates{2.0 * frame_.tolerance, frame_.tolerance, 30, frame_.points.rows()};
+    const IcpResult settled = align_on_plane(target_, source_, candidate.alignment.target_from_source, normal_, gates);
+    return settled.status != AlignStatus::too_few_pairs ? settled : candidate.alignment;
   }
 
  private:
@@ -162,14 +170,17 @@ class Search {
 std::optional<PlaneFit> fit_on_plane(const PointModel& model, const std::vector<ObjectView>& views,
                                      const ObjectView& frame, const Camera& camera, const AlignOptions& options) {
   if (model.size() == 0 || views.empty()) return std::nullopt;
-  const std::vector<Candidate> candidates = Search(model, views, frame, camera, options).run();
+  const Search search(model, views, frame, camera, options);
+  const std::vector<Candidate> candidates = search.run();
   const Candidate& best = candidates.front();
-  if (getenv("DOG")) for (std::size_t i = 0; i < std::min<std::size_t>(3, candidates.size()); ++i) fprintf(stderr, "  plane %zu score %.3f overlap %.3f agree %.3f through %.3f icp %.3f\n", i, candidates[i].score, candidates[i].overlap, candidates[i].agree, candidates[i].through, candidates[i].alignment.overlap);
-  const double rival = candidates.size() > 1 ? candidates[1].score : -1e9;
-  if (!(best.score > least_score) || !(best.overlap > least_overlap) || rival > most_rivalry * best.score) {
-    return std::nullopt;
-  }
-  PlaneFit fit{best.alignment, best.score, rival, best.overlap, best.agree / (best.agree + best.through)};
+  if (!(best.score > least_score) || !(best.overlap > least_overlap)) return std::nullopt;
+  PlaneFit fit;
+  fit.score = best.score;
+  fit.overlap = best.overlap;
+  fit.consistency = best.agree / (best.agree + best.through);
+  const bool has_rival = candidates.size() > 1 && candidates[1].score > 0.0;  // not contradicted
+  if (has_rival || fit.consistency < least_consistency) return std::nullopt;
+  fit.alignment = search.settle(best);
   fit.alignment.target_from_source = orthonormal(fit.alignment.target_from_source);
   return fit;
 }

@@ -209,7 +209,7 @@ TrackingResult on_plane(const PlaneFit& fit) {
   result.consistency = fit.consistency;
   result.status = FrameStatus::tracked;
   result.evidence = fit.score;
-  result.is_to_whole_model = true;
+  result.is_to_whole_model = result.is_on_plane = true;
   return result;
 }
 
