@@ -194,8 +194,8 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(region_report), was_lost() || jumped(), before,
-               options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
+  return track(cloud, frame, camera, observer, guesses(extras), elsewhere(region_report), was_lost() || jumped(),
+               before, options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
 }
 
 // Whether the camera's last motion was none that goes on: views far apart, in any order.

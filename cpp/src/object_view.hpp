@@ -18,8 +18,8 @@ struct ObjectView {
   double tolerance = 0.0;  // [m]; to which two views of a surface agree
   double size = 0.0;       // of the bounding box of what is seen [m]
 
-  // Towards the camera by what stereo bends, on the plane.
-  Pose foot() const;             // camera from a frame in the plane: z is its normal, the origin below the object's middle
+  // The camera from a frame in the plane: z is its normal, the origin below the middle of what is seen.
+  Pose foot() const;
   Eigen::Vector3d body() const;  // about the middle of the object, of which the view shows the front, camera frame
 };
 

@@ -13,11 +13,11 @@ namespace {
 constexpr int num_angles = 72;  // from which the search starts
 constexpr std::size_t num_candidates = 10;
 constexpr Eigen::Index coarse_samples = 300, climb_samples = 800;
-constexpr double same_turn = 0.15;   // [rad]
-constexpr double same_shift = 0.08;  // of the object's size
-constexpr double first_gate = 0.25;  // of the object's size
+constexpr double same_turn = 0.15;                        // [rad]
+constexpr double same_shift = 0.08;                       // of the object's size
+constexpr double first_gate = 0.25;                       // of the object's size
 constexpr double least_score = 0.1, least_overlap = 0.1;  // parts of the samples
-constexpr double least_consistency = 0.85;
+constexpr double least_consistency = 0.75;
 
 struct Candidate {
   IcpResult alignment;

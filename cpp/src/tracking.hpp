@@ -14,7 +14,7 @@ namespace nacre {
 struct WhereElse {
   const std::vector<ObjectView>* views = nullptr;  // of an object that stands on a plane: it may have turned on it
   std::optional<ObjectView> view;                  // the same of the frame
-  std::vector<Pose> key_poses;  // and around them
+  std::vector<Pose> key_poses;                     // and around them
   bool everywhere = false;
 };
 

@@ -14,8 +14,8 @@ namespace {
 
 constexpr int num_iterations = 12;
 constexpr Eigen::Index num_samples = 800;
-constexpr double cos_angle = 0.7;          // between normals that match
-constexpr std::size_t least_pairs = 40;    // of two views that see the same surface
+constexpr double cos_angle = 0.7;                                 // between normals that match
+constexpr std::size_t least_pairs = 40;                           // of two views that see the same surface
 constexpr double first_gate = 2.0, last_gate = 1.0, decay = 0.8;  // in tolerances
 
 struct Side {
@@ -41,10 +41,9 @@ std::vector<Pose> adjust_views(const std::vector<ObjectView>& views, int num_thr
   });
   const Eigen::Vector3d normal = poses.front().linear() * views.front().support.normal;
   const PlaneMotion motion{normal, poses.front() * views.front().body()};
-  const double tolerance =
-      std::max_element(views.begin(), views.end(), [](const ObjectView& a, const ObjectView& b) {
-        return a.tolerance < b.tolerance;
-      })->tolerance;
+  const double tolerance = std::max_element(views.begin(), views.end(), [](const ObjectView& a, const ObjectView& b) {
+                             return a.tolerance < b.tolerance;
+                           })->tolerance;
 
   const auto count = static_cast<Eigen::Index>(views.size());
   double gate = first_gate;
@@ -55,8 +54,9 @@ std::vector<Pose> adjust_views(const std::vector<ObjectView>& views, int num_thr
       if (i == j) return;
       const IcpSource& source = sides[i]->source;
       std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
-      std::vector<Pair> pairs = sides[j]->target.match(source, source.cloud.points.rows(), poses[j].inverse() * poses[i],
-                                                       {gate * tolerance, cos_angle, false}, nearest);
+      std::vector<Pair> pairs =
+          sides[j]->target.match(source, source.cloud.points.rows(), poses[j].inverse() * poses[i],
+                                 {gate * tolerance, cos_angle, false}, nearest);
       if (pairs.size() < least_pairs) return;
       weight_robustly(pairs, 0.05 * tolerance);
       for (Pair& pair : pairs) {

@@ -8,7 +8,8 @@
 namespace nacre {
 
 // The views' poses (world_from_camera) after the surfaces of all pairs of views have been brought onto each other (as
-// Lu and Milios 1997 do with range scans). The first stays; the others turn about the plane's normal and move across it.
+// Lu and Milios 1997 do with range scans). The first stays; the others turn about the plane's normal and move across
+// it.
 std::vector<Pose> adjust_views(const std::vector<ObjectView>& views, int num_threads);
 
 }  // namespace nacre
