@@ -168,8 +168,8 @@ ROWS = [
         recording=plain("dog", found("realsense-turntable-dog/data1"), "depth_*.png", DOG_CAMERA),
         settings={"nacre": ["--object"]},
         goals=at_least(tracked=6),
-        note="A toy on a sheet of paper, turned by 28 to 92 degrees from view to view; nacre with `--object`. There are "
-        "no true poses; see the picture.",
+        note="A toy on a sheet of paper, turned by 28 to 92 degrees from view to view; nacre with `--object`. "
+        "There are no true poses; see the picture.",
     ),
     *(
         Row(
