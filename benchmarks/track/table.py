@@ -168,7 +168,7 @@ ROWS = [
         recording=plain("dog", found("realsense-turntable-dog/data1"), "depth_*.png", DOG_CAMERA),
         settings={"nacre": ["--object"]},
         goals=at_least(tracked=6),
-        note="A toy on a sheet of paper, turned by 28 to 92 degrees from view to view; nacre with `--object`. "
+        note="A toy on a sheet of paper, turned by 28 to 92 degrees between views; nacre with `--object`. "
         "There are no true poses; see the picture.",
     ),
     *(
