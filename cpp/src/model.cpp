@@ -235,6 +235,15 @@ WhereElse Model::Impl::elsewhere(const RegionReport& region_report) const {
   return where;
 }
 
+// Moves the pose of a frame, and turns with it what is told about the pose's uncertainty.
+static void correct(FrameReport& report, const Pose& correction) {
+  report.world_from_camera = correction * report.world_from_camera;
+  Matrix6 turn = Matrix6::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = correction.linear();
+  report.information = turn * report.information * turn.transpose();
+  report.weak_directions = turn * report.weak_directions;
+}
+
 // Of the newest frame, where it shows an object that stands on a plane.
 std::optional<ObjectView> Model::Impl::view_of_object(const RegionReport& report) const {
   if (report.support < 0) return std::nullopt;
@@ -281,10 +290,10 @@ void Model::Impl::adjust(FrameReport& report) {
   }
   for (FrameReport& earlier : reports) {
     motions.push_back(motion_of(earlier.world_from_camera));
-    earlier.world_from_camera = motions.back() * earlier.world_from_camera;
+    correct(earlier, motions.back());
   }
   motions.push_back(motion_of(report.world_from_camera));
-  report.world_from_camera = motions.back() * report.world_from_camera;
+  correct(report, motions.back());
   move_points(cloud, motions_of_registered, options.num_threads);
   if (options.loop_closure && options.fold_in == FoldIn::fuse) loops.move(motions);
   for (std::size_t k = 0; k < views.size(); ++k) views[k].world_from_camera = adjusted[k];
@@ -303,7 +312,7 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
     report.weak_directions.resize(6, 0);
   }
   move_points(cloud, loop.corrections, options.num_threads);
-  report.world_from_camera = loop.corrections.back() * report.world_from_camera;
+  correct(report, loop.corrections.back());
   const double noise = static_cast<double>(median_sigma(frame));
   merge_layers(cloud, oldest_frame, spacing, [&](const Eigen::Vector3f& point) {
     const double distance = (point.cast<double>() - report.world_from_camera.translation()).norm();
@@ -313,7 +322,7 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
   });
   poses.clear();
   for (FrameReport& earlier : reports) {
-    earlier.world_from_camera = loop.corrections[static_cast<std::size_t>(earlier.index)] * earlier.world_from_camera;
+    correct(earlier, loop.corrections[static_cast<std::size_t>(earlier.index)]);
     if (earlier.status != FrameStatus::lost) poses.push_back(earlier.world_from_camera);
   }
   poses.push_back(report.world_from_camera);
