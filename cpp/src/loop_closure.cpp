@@ -156,6 +156,15 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
   return report;
 }
 
+void LoopClosure::move(const std::vector<Pose>& motions) {
+  std::vector<Pose> poses = graph_.poses();
+  for (std::size_t k = 0; k < poses.size(); ++k) {
+    poses[k] = motions[static_cast<std::size_t>(key_frames_[k].frame)] * poses[k];
+  }
+  graph_.set_poses(poses);
+  for (Stop& stop : stops_) stop.pose = motions[static_cast<std::size_t>(stop.frame)] * stop.pose;
+}
+
 // Registers a frame to the clouds of key frames.
 std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, const FrameCloud& cloud,
                                                      const std::vector<int>& candidates) const {

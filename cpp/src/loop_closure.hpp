@@ -35,6 +35,8 @@ class LoopClosure {
   LoopClosure(const Camera& camera, const ModelOptions& options) : camera_(camera), options_(options) {}
 
   LoopReport add_frame(const LoopFrame& now);
+  // The frames have moved, each by its motion.
+  void move(const std::vector<Pose>& motions);
 
   // Of what was last seen by earlier frames it is not known whether it is still in place.
   std::int32_t oldest_frame() const;

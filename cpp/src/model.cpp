@@ -12,8 +12,11 @@
 #include "fusion_step.hpp"
 #include "loop_closure.hpp"
 #include "model_correction.hpp"
+#include "object_view.hpp"
 #include "point_spacing.hpp"
+#include "rigid_motion.hpp"
 #include "tracking.hpp"
+#include "view_adjustment.hpp"
 
 namespace nacre {
 namespace {
@@ -82,6 +85,7 @@ struct Model::Impl {
   Sight before;                // of the newest frame that was folded in
   PlaceHypothesis hypothesis;  // while the camera is lost
   std::vector<Pose> poses;     // of the registered frames, oldest first
+  std::vector<ObjectView> views;
   double spacing = 0.0;
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
 
@@ -101,7 +105,10 @@ struct Model::Impl {
   void keep_region(FrameReport& report);
   TrackingResult locate(const FrameExtras& extras, const RegionReport& region);
   std::vector<Pose> guesses(const FrameExtras& extras) const;
-  WhereElse elsewhere() const;
+  WhereElse elsewhere(const RegionReport& region) const;
+  std::optional<ObjectView> view_of_object(const RegionReport& region) const;
+  void keep_view(const FrameReport& report);
+  void adjust(FrameReport& report);
   void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
   void fold_in(const FrameExtras& extras, FrameReport& report);
 };
@@ -154,6 +161,8 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     report.milliseconds.loop_closure = watch.lap();
     if (report.status == FrameStatus::tracked) {
       if (was_lost()) report.status = FrameStatus::relocalised;
+      keep_view(report);
+      if (tracking.is_on_plane) adjust(report);
       fold_in(extras, report);
       before = {frame.points.col(2), frame.sigma, report.world_from_camera, measured};
     }
@@ -190,8 +199,9 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, measured, guesses(extras), elsewhere(), was_lost() || jumped(), before,
-               hypothesis, options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
+  return track(cloud, frame, camera, observer, measured, guesses(extras), elsewhere(region_report),
+               was_lost() || jumped(), before, hypothesis,
+               options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
 }
 
 // Whether the camera's last motion was none that goes on: views far apart, in any order.
@@ -212,12 +222,14 @@ std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
 
 // Some of the newest poses from which the camera looked in different directions; and everywhere, but not at every frame
 // where that has been to no avail.
-WhereElse Model::Impl::elsewhere() const {
+WhereElse Model::Impl::elsewhere(const RegionReport& region_report) const {
   constexpr std::size_t most = 8;
   constexpr double least_angle = 0.35;
   constexpr std::int64_t patience = 8;
   WhereElse where;
   if (!options.relocalise) return where;
+  where.views = &views;
+  where.view = view_of_object(region_report);
   where.everywhere = num_lost < patience || num_lost % patience == 0;
   std::vector<Pose>& chosen = where.key_poses;
   for (auto pose = poses.rbegin(); pose != poses.rend() && chosen.size() < most; ++pose) {
@@ -236,6 +248,61 @@ static void correct(FrameReport& report, const Pose& correction) {
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = correction.linear();
   report.information = turn * report.information * turn.transpose();
   report.weak_directions = turn * report.weak_directions;
+}
+
+// Of the newest frame, where it shows an object that stands on a plane.
+std::optional<ObjectView> Model::Impl::view_of_object(const RegionReport& report) const {
+  if (report.support < 0) return std::nullopt;
+  return object_view(frame, region, report.planes[static_cast<std::size_t>(report.support)],
+                     sample_frame(frame, observer, options), options.registration.seed);
+}
+
+// Views from different directions, for the search on the plane.
+void Model::Impl::keep_view(const FrameReport& report) {
+  constexpr std::size_t most_views = 24;
+  constexpr double least_angle = 0.35;
+  const Pose& pose = report.world_from_camera;
+  const bool is_new = std::all_of(views.begin(), views.end(), [&](const ObjectView& view) {
+    return Eigen::AngleAxisd(view.world_from_camera.linear().transpose() * pose.linear()).angle() > least_angle;
+  });
+  if (!options.relocalise || views.size() >= most_views || !is_new) return;
+  std::optional<ObjectView> view = view_of_object(report.region);
+  if (!view) return;
+  view->frame = static_cast<std::int32_t>(report.index);
+  view->world_from_camera = pose;
+  views.push_back(std::move(*view));
+}
+
+// Views far apart see little of the same surface: all of them together determine the newest, and each other.
+void Model::Impl::adjust(FrameReport& report) {
+  if (views.empty() || views.back().frame != report.index) return;
+  const std::vector<Pose> adjusted = adjust_views(views, options.num_threads);
+  // Each frame moves with the view that it is nearest to.
+  const auto motion_of = [&](const Pose& pose) {
+    std::size_t nearest = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      const double angle = Eigen::AngleAxisd(views[k].world_from_camera.linear().transpose() * pose.linear()).angle();
+      if (angle >= least) continue;
+      least = angle;
+      nearest = k;
+    }
+    return orthonormal(adjusted[nearest] * views[nearest].world_from_camera.inverse());
+  };
+  std::vector<Pose> motions, motions_of_registered;
+  for (Pose& pose : poses) {
+    motions_of_registered.push_back(motion_of(pose));
+    pose = motions_of_registered.back() * pose;
+  }
+  for (FrameReport& earlier : reports) {
+    motions.push_back(motion_of(earlier.world_from_camera));
+    correct(earlier, motions.back());
+  }
+  motions.push_back(motion_of(report.world_from_camera));
+  correct(report, motions.back());
+  move_points(cloud, motions_of_registered, options.num_threads);
+  if (options.loop_closure && options.fold_in == FoldIn::fuse) loops.move(motions);
+  for (std::size_t k = 0; k < views.size(); ++k) views[k].world_from_camera = adjusted[k];
 }
 
 void Model::Impl::close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given) {
@@ -265,6 +332,9 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
     if (earlier.status != FrameStatus::lost) poses.push_back(earlier.world_from_camera);
   }
   poses.push_back(report.world_from_camera);
+  for (ObjectView& view : views) {
+    view.world_from_camera = loop.corrections[static_cast<std::size_t>(view.frame)] * view.world_from_camera;
+  }
 }
 
 void Model::Impl::fold_in(const FrameExtras& extras, FrameReport& report) {

@@ -157,6 +157,27 @@ void draw_group(const Frame& frame, const CoarseFrame& coarse, const Camera& cam
   });
 }
 
+// The plane to which the lower end of a thing is nearest.
+int support_of(const Frame& frame, const MaskImage& mask, const std::vector<SupportPlane>& planes) {
+  constexpr double lower_end = 0.02;  // of the points
+  int support = -1;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t k = 0; k < planes.size(); ++k) {
+    std::vector<double> heights;
+    for (Eigen::Index row = 0; row < mask.size(); ++row) {
+      if (mask.data()[row] == 0 || !frame.points.row(row).allFinite()) continue;
+      heights.push_back(planes[k].normal.dot(frame.points.row(row).transpose().cast<double>()) - planes[k].offset);
+    }
+    if (heights.empty()) return -1;
+    const auto low = heights.begin() + static_cast<std::ptrdiff_t>(lower_end * static_cast<double>(heights.size()));
+    std::nth_element(heights.begin(), low, heights.end());
+    if (*low >= least) continue;
+    least = *low;
+    support = static_cast<int>(k);
+  }
+  return support;
+}
+
 void select_object(const Frame& frame, const Camera& camera, const RegionOptions& options, const MaskRef& previous,
                    int num_threads, MaskImage& mask, RegionReport& report) {
   const CoarseFrame coarse(frame, camera, mask);
@@ -178,6 +199,7 @@ void select_object(const Frame& frame, const Camera& camera, const RegionOptions
     return;
   }
   draw_group(frame, coarse, camera, groups, chosen, report.planes, options, num_threads, mask);
+  report.support = support_of(frame, mask, report.planes);
 }
 
 }  // namespace

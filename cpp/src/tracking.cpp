@@ -9,6 +9,7 @@
 #include "model_view.hpp"
 #include "outline_registration.hpp"
 #include "parallel.hpp"
+#include "plane_search.hpp"
 #include "point_spacing.hpp"
 #include "random.hpp"
 #include "relocalisation.hpp"
@@ -200,6 +201,17 @@ struct Search {
   }
 };
 
+// What the search on the plane found needs no other verdict: it has seen all other places.
+TrackingResult on_plane(const PlaneFit& fit) {
+  TrackingResult result;
+  result.alignment = fit.alignment;
+  result.consistency = fit.consistency;
+  result.status = FrameStatus::tracked;
+  result.evidence = fit.score;
+  result.is_to_whole_model = result.is_on_plane = true;
+  return result;
+}
+
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
@@ -235,6 +247,10 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
     try_guesses();
     best.is_to_whole_model = true;
     if (best.status != FrameStatus::lost) return best;
+  }
+  if (elsewhere.view && !elsewhere.views->empty()) {
+    const auto fit = fit_on_plane(model, *elsewhere.views, *elsewhere.view, camera, options.registration);
+    if (fit) return on_plane(*fit);
   }
   const bool goes_on = predicted && hypothesis.is_confirmed_by(best);
   if (!goes_on && !elsewhere.key_poses.empty()) {

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "nacre/model.hpp"
+#include "object_view.hpp"
 #include "place_hypothesis.hpp"
 #include "surface_observer.hpp"
 #include "verdict.hpp"
@@ -12,7 +13,9 @@ namespace nacre {
 
 // Where the search for a camera that the guesses do not find may go on.
 struct WhereElse {
-  std::vector<Pose> key_poses;  // and around them
+  const std::vector<ObjectView>* views = nullptr;  // of an object that stands on a plane: it may have turned on it
+  std::optional<ObjectView> view;                  // the same of the frame
+  std::vector<Pose> key_poses;                     // and around them
   bool everywhere = false;
 };
 

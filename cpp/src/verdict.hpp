@@ -22,6 +22,7 @@ struct TrackingResult {
   // Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
   bool is_beyond_doubt = false;
   bool is_to_whole_model = false;  // older points included
+  bool is_on_plane = false;        // found by the search on the plane
 
   // A frame that is not lost before one that is.
   double rank() const { return status == FrameStatus::lost ? recognition : 1000.0 + evidence; }

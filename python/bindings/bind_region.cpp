@@ -41,6 +41,7 @@ void bind_region(py::module_& m) {
   py::class_<RegionReport>(m, "RegionReport")
       .def_readonly("num_inside", &RegionReport::num_inside)
       .def_readonly("num_outside", &RegionReport::num_outside)
+      .def_readonly("support", &RegionReport::support)
       .def_readonly("reason", &RegionReport::reason)
       .def_property_readonly("planes", [](const RegionReport& report) {
         Eigen::Matrix<double, Eigen::Dynamic, 4, Eigen::RowMajor> planes(report.planes.size(), 4);

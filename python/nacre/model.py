@@ -97,8 +97,9 @@ class ModelParameters:
     predict_motion : bool
         Start also from the pose that continues the last motion.
     relocalise : bool
-        Search around earlier poses where the guesses fail, then everywhere (some tenths of a second; not at
-        every frame where that has failed often).
+        Search where the guesses fail: for an object that turned by any angle on the plane on which it stands
+        (``region.object``), around earlier poses, then everywhere (some tenths of a second; not at every
+        frame where that has failed often).
     loop_closure : bool
         Where ``fold_in`` is "fuse": correct model and poses where the camera comes back to what it saw
         before.
@@ -168,7 +169,8 @@ class FrameReport:
         the camera did not see through before, whichever is smaller.
     evidence : float
         That the registration is right, against chance: what the residuals tell a match, times overlap^2 and
-        consistency^4. Unrelated surfaces seldom reach 0.3; good registrations have 0.35 to 3.
+        consistency^4. Unrelated surfaces seldom reach 0.3; good registrations have 0.35 to 3. Of an object
+        that was found turned on its supporting plane: what agrees less what contradicts, as parts.
     loop_frame : int or None
         The earlier frame that this one closed a loop with: model and poses were corrected.
     loop_distance : float

@@ -51,6 +51,8 @@ class RegionReport:
     planes : (P, 4) float64
         The planes that were put aside, largest first: unit normal towards the camera and offset [m], so that
         ``normal . point = offset`` in the camera's frame.
+    support : int
+        The row of ``planes`` that the thing stands on; -1 where there is none.
     reason : str
         Why nothing is inside; empty otherwise.
     """
@@ -58,6 +60,7 @@ class RegionReport:
     num_inside: int
     num_outside: int
     planes: npt.NDArray[np.float64]
+    support: int
     reason: str
 
     @classmethod

@@ -277,6 +277,43 @@ def test_without_the_region_the_background_holds_the_pose() -> None:
     assert np.nanmax(angles) > 19
 
 
+def scattered(degrees: tuple[int, ...], **options: Any) -> nacre.Model:
+    model = nacre.Model(CAMERA, **{"region.object": True}, **options)
+    for angle in degrees:
+        model.add_frame(scene(angle))
+    return model
+
+
+@pytest.mark.parametrize("step", [60, 45, 75])
+def test_an_object_that_turns_far_on_its_plane(step: int) -> None:
+    model = scattered(tuple(range(0, 360, step)))
+    assert [frame.status for frame in model.frames] == ["TRACKED"] * len(range(0, 360, step))
+    angles, distances = errors(model, step)
+    assert angles.max() < 3
+    assert distances.max() < 0.003
+
+
+def test_the_search_on_the_plane_has_the_same_bits_for_any_number_of_threads() -> None:
+    degrees = (0, 60, 120, 180)
+    one, two = scattered(degrees, num_threads=1), scattered(degrees, num_threads=2)
+    np.testing.assert_array_equal(one.poses, two.poses)
+    np.testing.assert_array_equal(one.points, two.points)
+
+
+def test_another_object_on_the_same_plane_is_lost() -> None:
+    model = scattered((0, 60))
+    for degrees in (0, 30, 60):
+        other = box((0, FLOOR + 0.05, 0), (0.08, 0.1, 0.13), degrees)
+        assert model.add_frame(depth_of(other, table(), wall())).status == "LOST"
+
+
+def test_the_supporting_plane_is_named() -> None:
+    _, report = select(depth_of(nacre.built_in_object(), table(), wall()), object=True)
+    up = np.linalg.inv(camera_pose())[:3, 1]
+    assert report.planes[report.support, :3] @ up > 0.999
+    assert select(depth_of(nacre.built_in_object()), object=True)[1].support == -1
+
+
 def test_a_frame_without_an_object_is_lost_and_says_why() -> None:
     model = nacre.Model(CAMERA, **{"region.object": True})
     model.add_frame(scene(0))
@@ -363,3 +400,15 @@ def test_the_command_line_takes_object_box_and_masks(recording: Path, tmp_path: 
     assert frames("--box", *box)[0]["region"]["num_inside"] < 40000
     masked = frames("--masks", str(masks))
     assert [frame["depth"]["num_masked"] > 50000 for frame in masked] == [False, True]
+
+
+@pytest.mark.data
+def test_a_toy_that_was_turned_far_is_joined(recordings: Path) -> None:
+    """Measured by the marks on the sheet, the toy turned by 68, 60, 92, 55, 58 and 28 degrees."""
+    camera = nacre.Camera(width=640, height=480, fx=616.87, fy=617.06, cx=319.57, cy=233.06)
+    model = nacre.Model(camera, **{"region.object": True})
+    for i in range(6):
+        depth = read_depth(recordings / "realsense-turntable-dog" / "data1" / f"depth_{i}.png")
+        assert model.add_frame(depth / np.float32(1000)).status == "TRACKED"
+    turned_by = np.degrees(np.arccos((np.trace(model.poses[:, :3, :3], axis1=1, axis2=2) - 1) / 2))
+    np.testing.assert_allclose(turned_by, [0, 67.6, 127.8, 140.4, 85.5, 27.7], atol=6)

@@ -45,7 +45,8 @@ struct ModelOptions {
                          ///< new points are also at least a pixel and a half of their frame apart
   int max_points = 500000;      ///< the model never grows beyond: its spacing is widened instead
   bool predict_motion = true;   ///< start also from the pose that continues the last motion
-  bool relocalise = true;       ///< search around earlier poses where the guesses fail, then everywhere
+  bool relocalise = true;       ///< search where the guesses fail: for an object that turned on its supporting plane,
+                                ///< around earlier poses, everywhere
   bool loop_closure = true;     ///< fuse: correct model and poses where the camera comes back to what it saw before
   bool denoise_samples = true;  ///< register surface points averaged over their pixels, not single pixels
   bool verify = true;           ///< judge registrations by their evidence
@@ -78,7 +79,8 @@ struct FrameReport {
   double consistency = 0.0;               ///< part of the model's points in view that the frame does not see through,
                                           ///< and of the frame's that the camera did not see through before
   double evidence = 0.0;                  ///< that the registration is right, against chance: what the residuals tell a
-                                          ///< match, times overlap^2 consistency^4
+                                          ///< match, times overlap^2 consistency^4; of an object that was found turned
+                                          ///< on its supporting plane: what agrees less what contradicts, as parts
   double rmse = 0.0;                      ///< of the inliers, along the normals [m]
   Matrix6 information = Matrix6::Zero();  ///< see AlignResult
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult

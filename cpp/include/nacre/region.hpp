@@ -43,6 +43,7 @@ struct RegionReport {
   std::int64_t num_inside = 0;       ///< pixels with a point
   std::int64_t num_outside = 0;      ///< likewise
   std::vector<SupportPlane> planes;  ///< that were put aside, largest first
+  int support = -1;                  ///< of the planes, the one that the thing stands on; -1: none
   std::string reason;                ///< why nothing is inside; empty otherwise
 };
 

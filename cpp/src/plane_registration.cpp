@@ -1,0 +1,95 @@
+#include "plane_registration.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace nacre {
+namespace {
+
+constexpr double cos_angle = 0.7;  // between normals that match
+constexpr double decay = 0.7;
+constexpr std::size_t least_pairs = 30;
+
+// Least squares of the residuals, about the middle of the pairs.
+Pose plane_step(const std::vector<Pair>& pairs, const Eigen::Vector3d& normal) {
+  PlaneMotion motion{normal, Eigen::Vector3d::Zero()};
+  for (const Pair& pair : pairs) motion.center += pair.p / static_cast<double>(pairs.size());
+  Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+  for (const Pair& pair : pairs) {
+    const Eigen::Vector3d row = motion.row(pair);
+    hessian += pair.weight * row * row.transpose();
+    gradient -= pair.weight * row * residual(pair, Metric::symmetric);
+  }
+  hessian.diagonal().array() += 1e-9 * hessian.trace();
+  return motion.apply(hessian.ldlt().solve(gradient));
+}
+
+}  // namespace
+
+Eigen::Vector3d PlaneMotion::row(const Pair& pair) const {
+  const Eigen::Vector3d x = normal.unitOrthogonal(), y = normal.cross(x);
+  return {normal.cross(pair.p - center).dot(pair.normal), x.dot(pair.normal), y.dot(pair.normal)};
+}
+
+Pose PlaneMotion::apply(const Eigen::Vector3d& angle_and_shift) const {
+  const Eigen::Vector3d x = normal.unitOrthogonal(), y = normal.cross(x);
+  Pose motion = Pose::Identity();
+  motion.linear() = Eigen::AngleAxisd(angle_and_shift[0], normal).toRotationMatrix();
+  motion.translation() = center - motion.linear() * center + angle_and_shift[1] * x + angle_and_shift[2] * y;
+  return motion;
+}
+
+void weight_robustly(std::vector<Pair>& pairs, double floor) {
+  std::vector<double> sizes;
+  sizes.reserve(pairs.size());
+  for (const Pair& pair : pairs) sizes.push_back(std::abs(residual(pair, Metric::symmetric)));
+  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
+  std::nth_element(sizes.begin(), middle, sizes.end());
+  const double scale = std::max(floor, 1.4826 * *middle);
+  for (Pair& pair : pairs) {
+    const double ratio = residual(pair, Metric::symmetric) / (3.0 * scale);
+    pair.agreement = 1.0 / ((1.0 + ratio * ratio) * (1.0 + ratio * ratio));
+    pair.weight = pair.agreement;
+  }
+}
+
+IcpResult align_on_plane(const IcpTarget& target, const IcpSource& source, const Pose& initial,
+                         const Eigen::Vector3d& normal, const PlaneGates& gates) {
+  IcpResult result;
+  result.target_from_source = initial;
+  result.rmse = std::numeric_limits<double>::quiet_NaN();
+  const std::int64_t count = std::min<std::int64_t>(gates.num_samples, source.cloud.points.rows());
+  const double floor = 0.05 * gates.last;
+  std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
+  Pose pose = initial;
+  bool at_rest = false;
+  double distance = gates.first;
+  for (int i = 0; i < gates.max_iterations && !at_rest; ++i) {
+    std::vector<Pair> pairs = target.match(source, count, pose, {distance, cos_angle, false}, nearest);
+    if (pairs.size() < least_pairs) return result;
+    weight_robustly(pairs, floor);
+    const Pose motion = plane_step(pairs, normal);
+    pose = motion * pose;
+    const bool is_smallest = distance <= gates.last;
+    at_rest = is_smallest && (motion * pairs.front().p - pairs.front().p).norm() < 0.1 * floor;
+    distance = std::max(gates.last, decay * distance);
+    result.iterations = i + 1;
+  }
+  std::vector<Pair> pairs = target.match(source, count, pose, {gates.last, cos_angle, false}, nearest);
+  if (pairs.size() < least_pairs) return result;
+  weight_robustly(pairs, floor);
+  const IcpStep last = solve_step(pairs, Metric::symmetric, 0.0, 1);
+  result.target_from_source = pose;
+  result.status = at_rest ? AlignStatus::converged : AlignStatus::max_iterations;
+  result.num_inliers = static_cast<int>(pairs.size());
+  result.overlap = static_cast<double>(pairs.size()) / static_cast<double>(count);
+  result.rmse = last.rmse;
+  result.residual_ratio = last.rmse / gates.last;
+  result.center = last.center;
+  result.information = last.hessian / std::max(last.variance, floor * floor);
+  result.weak_directions.resize(6, 0);
+  return result;
+}
+
+}  // namespace nacre
