@@ -14,9 +14,11 @@ from nacre.arrays import as_depth, as_pose
 from nacre.depth import back_project, preprocess_depth
 
 _BLOCK = 4  # pixels, each way, whose inverse depths are averaged
-_LEAST_TURN, _MOST_TURN = 0.1, 0.6  # between two views that are compared [rad]
-_MOST_VIEWS = 32
+LEAST_TURN, _MOST_TURN = 0.1, 0.6  # between two views that are compared [rad]
+MOST_VIEWS = 24
+LEAST_VIEWS = 5  # those have enough pairs
 _STEPS = 8
+_AT_REST = 0.1  # of a standard deviation
 _LEAST_PAIRS = 6
 _LEAST_SIGMAS = 5.0
 _GATE = 0.05  # of the depth: surfaces that are farther apart are not the same
@@ -84,9 +86,7 @@ class DepthCalibration:
         return corrected.astype(np.float32)
 
 
-def calibrate_depth(
-    views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera: Camera
-) -> DepthCalibration:
+def calibrate_depth(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera: Camera) -> DepthCalibration:
     """
     Find the systematic error of depth that makes overlapping views agree best.
 
@@ -99,7 +99,7 @@ def calibrate_depth(
     ----------
     views : iterable of (depth, world_from_camera)
         Depth images (H, W) in metres and poses (4, 4), in the order of the recording. Views that turned by
-        less than 0.1 rad are skipped; at most 32 are used.
+        less than 0.1 rad are skipped; at most 24 are used.
     camera : Camera
         A pinhole camera.
 
@@ -119,7 +119,7 @@ def calibrate_depth(
         _Pair(a, b)
         for step in (1, 2)
         for a, b in zip(chosen, chosen[step:], strict=False)
-        if _LEAST_TURN <= _turn(a.pose, b.pose) <= _MOST_TURN
+        if LEAST_TURN <= turn_between(a.pose, b.pose) <= _MOST_TURN
     ]
     tilt, sigma = 0.0, math.inf
     for _ in range(_STEPS):
@@ -127,10 +127,13 @@ def calibrate_depth(
         weight = sum(information for _, information in found)
         if len(found) < 2 or not weight > 0.0:
             return DepthCalibration(0.0, math.inf, len(found))
+        before = tilt
         tilt = sum(information * value for value, information in found) / weight
         # From the scatter, as neighbours share their errors; two pairs share a view.
         scatter = sum((information * (value - tilt)) ** 2 for value, information in found)
         sigma = math.sqrt(2.0 * scatter) / weight
+        if abs(tilt - before) < _AT_REST * sigma:
+            break
         for pair in pairs:
             pair.follow(tilt)
     return DepthCalibration(tilt, sigma, len(found))
@@ -158,12 +161,12 @@ class _Pair:
         target, source = _corrected(self.first.points, tilt), _corrected(self.second.points, tilt)
         normals, source_normals = _normals(target).reshape(-1, 3), _normals(source).reshape(-1, 3)
         rotation, shift = self.motion[:3, :3], self.motion[:3, 3]
-        moved = source.reshape(-1, 3) @ rotation.T + shift
-        rows = _blocks_that_see(moved, tilt, camera)
-        matched = rows >= 0
-        p, q, n = moved[matched], target.reshape(-1, 3)[rows[matched]], normals[rows[matched]]
+        moved = _turned(source.reshape(-1, 3), rotation) + shift
+        seen_by = _blocks_that_see(moved, camera)
+        matched = seen_by >= 0
+        p, q, n = moved[matched], target.reshape(-1, 3)[seen_by[matched]], normals[seen_by[matched]]
         residual = np.einsum("ij,ij->i", q - p, n)
-        facing = np.einsum("ij,ij->i", source_normals[matched] @ rotation.T, n)
+        facing = np.einsum("ij,ij->i", _turned(source_normals[matched], rotation), n)
         good = (np.abs(residual) < _GATE * q[:, 2]) & (facing > 0.85)
         if good.sum() < 200:
             return None
@@ -171,21 +174,21 @@ class _Pair:
         # Both derivatives at the middle of the two points: at the points themselves, their noise would
         # favour whatever makes the scene smaller.
         middle = 0.5 * (p + q)
-        local = (middle - shift) @ rotation
-        slope = np.einsum("ij,ij->i", n, middle * middle[:, :1] - (local * local[:, :1]) @ rotation.T)
+        local = _turned(middle - shift, rotation.T)
+        slope = np.einsum("ij,ij->i", n, middle * middle[:, :1] - _turned(local * local[:, :1], rotation))
         rows_of_pose = -np.concatenate([np.cross(p, n), n], axis=1)
         depth = q[:, 2]
         noise = depth**2 / np.median(depth**2)
         whitened = residual / noise
         scale = 1.4826 * max(float(np.median(np.abs(whitened))), 1e-9)
         weight = 1.0 / (noise * scale * (1.0 + (whitened / (3.0 * scale)) ** 2)) ** 2
-        weighted = rows_of_pose * weight[:, None]
-        hessian = weighted.T @ rows_of_pose
-        hessian += 1e-9 * np.trace(hessian) * np.eye(6)
-        of_slope = np.linalg.solve(hessian, weighted.T @ slope)
-        of_residual = np.linalg.solve(hessian, weighted.T @ residual)
-        information = float(weight @ slope**2 - (weighted.T @ slope) @ of_slope)
-        gradient = float((weight * slope) @ residual - (weighted.T @ slope) @ of_residual)
+        # Sums by einsum: those of a BLAS depend on its threads.
+        rows = np.column_stack([rows_of_pose, slope, residual])
+        sums = np.einsum("n,ni,nj->ij", weight, rows, rows)
+        hessian = sums[:6, :6] + 1e-9 * np.trace(sums[:6, :6]) * np.eye(6)
+        of_slope, of_residual = np.linalg.solve(hessian, sums[:6, 6:]).T
+        information = float(sums[6, 6] - sums[:6, 6] @ of_slope)
+        gradient = float(sums[6, 7] - sums[:6, 6] @ of_residual)
         if not information > 0.0:
             return None
         self._solution = (of_residual, of_slope, tilt)
@@ -205,26 +208,27 @@ class _Pair:
 
 def _choose(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera: Camera) -> Sequence[_View]:
     chosen: list[_View] = []
+    rays = _rays(camera)
     for depth, pose in views:
         matrix = as_pose("world_from_camera", pose)
-        if len(chosen) == _MOST_VIEWS:
+        if len(chosen) == MOST_VIEWS:
             break
-        if not chosen or _turn(chosen[-1].pose, matrix) >= _LEAST_TURN:
-            chosen.append(_View(_average(preprocess_depth(_checked(depth, camera), camera), camera), matrix))
+        if not chosen or turn_between(chosen[-1].pose, matrix) >= LEAST_TURN:
+            chosen.append(_View(_average(preprocess_depth(_checked(depth, camera), camera), rays), matrix))
     return chosen
 
 
-def _average(depth: npt.NDArray[np.float32], camera: Camera) -> Array:
+def _average(depth: npt.NDArray[np.float32], rays: Array) -> Array:
     """Return one point for each block of pixels, from the mean of their inverse depths."""
     height, width = (size // _BLOCK * _BLOCK for size in depth.shape)
     cut = (slice(height), slice(width))
     split = (height // _BLOCK, _BLOCK, width // _BLOCK, _BLOCK)
     inverse = np.moveaxis(1.0 / depth[cut].astype(np.float64).reshape(split), 2, 1)
-    rays = np.moveaxis(_rays(camera)[cut].reshape(*split, 3), 2, 1)
+    directions = np.moveaxis(rays[cut].reshape(*split, 3), 2, 1)
     inverse = inverse.reshape(*inverse.shape[:2], -1)
     whole = np.isfinite(inverse).all(axis=2)
     z = np.where(whole, 1.0 / np.where(whole[..., None], inverse, 1.0).mean(axis=2), np.nan)
-    return rays.mean(axis=(2, 3)) * z[..., None]
+    return directions.mean(axis=(2, 3)) * z[..., None]
 
 
 def _corrected(points: Array, tilt: float) -> Array:
@@ -245,7 +249,7 @@ def _normals(points: Array) -> Array:
     return normals
 
 
-def _blocks_that_see(points: Array, tilt: float, camera: Camera) -> npt.NDArray[np.int64]:
+def _blocks_that_see(points: Array, camera: Camera) -> npt.NDArray[np.int64]:
     """Return the block of pixels that sees each point, -1 where none does."""
     ahead = np.isfinite(points).all(axis=1) & (points[:, 2] > 0.0)
     pixels = camera.project(np.where(ahead[:, None], points, [0.0, 0.0, 1.0]))
@@ -261,13 +265,20 @@ def _rays(camera: Camera) -> Array:
     size = camera.height * camera.width
     # A depth that is the pixel's number, so that pixels without a ray show as those left out.
     depth = 1.0 + np.arange(size, dtype=np.float64) / size
-    points = back_project(depth.reshape(camera.height, camera.width).astype(np.float32), camera).astype(np.float64)
+    points = back_project(depth.reshape(camera.height, camera.width).astype(np.float32), camera).astype(
+        np.float64
+    )
     rays = np.full((size, 3), np.nan)
     rays[np.rint((points[:, 2] - 1.0) * size).astype(np.int64)] = points / points[:, 2:]
     return rays.reshape(camera.height, camera.width, 3)
 
 
-def _turn(a: Array, b: Array) -> float:
+def _turned(points: Array, rotation: Array) -> Array:
+    return np.einsum("nj,ij->ni", points, rotation)
+
+
+def turn_between(a: Array, b: Array) -> float:
+    """Return the angle between the directions of two poses [rad]."""
     trace = float(np.trace(a[:3, :3].T @ b[:3, :3]))
     return math.acos(min(1.0, max(-1.0, 0.5 * (trace - 1.0))))
 
@@ -283,7 +294,7 @@ def _rotation(vector: Array) -> Array:
 
 
 def can_calibrate(camera: Camera) -> bool:
-    """Say whether a camera is one of those whose depth can be calibrated: pinhole, with depth along the axis."""
+    """Say whether the depth of a camera can be calibrated: pinhole, with depth along its axis."""
     return camera.model == "pinhole" and camera.depth == "z"
 
 
