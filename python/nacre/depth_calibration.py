@@ -21,6 +21,7 @@ _STEPS = 8
 _AT_REST = 0.1  # of a standard deviation
 _LEAST_PAIRS = 6
 _LEAST_SIGMAS = 5.0
+_LEAST_TILT = 0.002  # about the noise of the inverse depth of one pixel, structured light [1/m]
 _GATE = 0.05  # of the depth: surfaces that are farther apart are not the same
 _MOST_CHANGE = 0.5  # a correction that changes depth by more is none
 
@@ -53,8 +54,9 @@ class DepthCalibration:
 
     @property
     def is_significant(self) -> bool:
-        """Whether there is an error beyond doubt: five standard deviations, and six pairs of views."""
-        return self.num_pairs >= _LEAST_PAIRS and abs(self.tilt) > _LEAST_SIGMAS * self.sigma
+        """Whether an error that matters (0.002 / m) is beyond doubt: six pairs of views, five standard deviations."""
+        is_sure = self.num_pairs >= _LEAST_PAIRS and abs(self.tilt) > _LEAST_SIGMAS * self.sigma
+        return is_sure and abs(self.tilt) > _LEAST_TILT
 
     def correct(self, depth: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.float32]:
         """
@@ -226,9 +228,10 @@ def _average(depth: npt.NDArray[np.float32], rays: Array) -> Array:
     inverse = np.moveaxis(1.0 / depth[cut].astype(np.float64).reshape(split), 2, 1)
     directions = np.moveaxis(rays[cut].reshape(*split, 3), 2, 1)
     inverse = inverse.reshape(*inverse.shape[:2], -1)
-    whole = np.isfinite(inverse).all(axis=2)
+    whole: npt.NDArray[np.bool_] = np.asarray(np.isfinite(inverse).all(axis=2))
     z = np.where(whole, 1.0 / np.where(whole[..., None], inverse, 1.0).mean(axis=2), np.nan)
-    return directions.mean(axis=(2, 3)) * z[..., None]
+    points: Array = directions.mean(axis=(2, 3)) * z[..., None]
+    return points
 
 
 def _corrected(points: Array, tilt: float) -> Array:
@@ -274,7 +277,8 @@ def _rays(camera: Camera) -> Array:
 
 
 def _turned(points: Array, rotation: Array) -> Array:
-    return np.einsum("nj,ij->ni", points, rotation)
+    turned: Array = np.einsum("nj,ij->ni", points, rotation)
+    return turned
 
 
 def turn_between(a: Array, b: Array) -> float:

@@ -9,7 +9,7 @@ from nacre.cli.running import run_frames
 from nacre.cli.terminal import Terminal
 
 if TYPE_CHECKING:
-    from nacre import DepthCalibration, ModelParameters
+    from nacre import DepthCalibration
     from nacre.datasets import Sequence as Recording
     from nacre.reconstruction import FrameRecord, Reconstruction
 
@@ -47,18 +47,15 @@ class Views:
 
 
 def run_calibrated(
-    terminal: Terminal,
-    recording: Recording,
-    parameters: ModelParameters,
-    indices: Sequence[int],
-    calibrate: bool,
+    terminal: Terminal, done: Reconstruction, recording: Recording, indices: Sequence[int]
 ) -> tuple[Reconstruction, DepthCalibration | None, bool]:
     """
-    Run the frames of a recording, with its depth corrected where that is known to be wrong.
+    Run the frames of a recording; where they show that its depth is wrong, run them again with it corrected.
 
     Returns
     -------
     done : Reconstruction
+        The given one, or a new one.
     calibration : DepthCalibration or None
         What was found, whether or not it was used; None where nothing could be.
     interrupted : bool
@@ -67,9 +64,6 @@ def run_calibrated(
     import nacre
     from nacre.reconstruction import Reconstruction
 
-    done = Reconstruction(recording, nacre.Model(recording.camera, parameters=parameters))
-    if not calibrate:
-        return done, None, run_frames(terminal, done, indices)
     views = Views()
     interrupted = run_frames(terminal, done, indices, views.add)
     calibration = None if interrupted else views.calibrate(recording)
@@ -80,7 +74,7 @@ def run_calibrated(
             "beginning again with corrected depth"
         )
         recording = recording.with_depth_calibration(calibration)
-        done = Reconstruction(recording, nacre.Model(recording.camera, parameters=parameters))
+        done = Reconstruction(recording, nacre.Model(recording.camera, parameters=done.model.parameters))
         rest = indices
     if rest and not interrupted:
         interrupted = run_frames(terminal, done, rest)

@@ -11,7 +11,7 @@ import typer
 from nacre.cli.calibrating import run_calibrated
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
 from nacre.cli.results import file_rows, trajectory_rows, write_results
-from nacre.cli.running import retry_lost
+from nacre.cli.running import retry_lost, run_frames
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
 
@@ -130,16 +130,21 @@ def reconstruct(
     indices = range(len(sequence))[first : None if last is None else last + 1 : every]
     if not indices:
         raise CommandError(f"no frames are left of {len(sequence)} (0 to {len(sequence) - 1})", 2)
+    import nacre
     from nacre.depth_calibration import can_calibrate
-    from nacre.region import RegionParameters
+    from nacre.reconstruction import Reconstruction
 
+    done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
     writable_folder(out)
     words = describe(sequence, indices)
     terminal.say(f"{sequence.name}: {words}")
     # What turns before a camera that stands still is not one scene with what is around it.
-    whole = masks is None and parameters.region == RegionParameters()
-    wanted = calibrate and whole and preset_name != "paper" and can_calibrate(sequence.camera)
-    done, calibration, interrupted = run_calibrated(terminal, sequence, parameters, indices, wanted)
+    whole = masks is None and parameters.region == nacre.RegionParameters()
+    calibration = None
+    if calibrate and whole and preset_name != "paper" and can_calibrate(sequence.camera):
+        done, calibration, interrupted = run_calibrated(terminal, done, sequence, indices)
+    else:
+        interrupted = run_frames(terminal, done, indices)
     if retry and not interrupted:
         interrupted = retry_lost(terminal, done)
     done.evaluate_trajectory()
