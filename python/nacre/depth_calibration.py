@@ -20,7 +20,7 @@ LEAST_VIEWS = 5  # those have enough pairs
 _STEPS = 8
 _AT_REST = 0.1  # of a standard deviation
 _LEAST_PAIRS = 6
-_LEAST_SIGMAS = 5.0
+_LEAST_SIGMAS = 7.0
 _LEAST_TILT = 0.002  # about the noise of the inverse depth of one pixel, structured light [1/m]
 _GATE = 0.05  # of the depth: surfaces that are farther apart are not the same
 _MOST_CHANGE = 0.5  # a correction that changes depth by more is none
@@ -54,7 +54,7 @@ class DepthCalibration:
 
     @property
     def is_significant(self) -> bool:
-        """Whether an error that matters (0.002 / m) is beyond doubt: six pairs of views, five standard deviations."""
+        """Whether the error matters (0.002 / m) and is beyond doubt (seven sigma, six pairs)."""
         is_sure = self.num_pairs >= _LEAST_PAIRS and abs(self.tilt) > _LEAST_SIGMAS * self.sigma
         return is_sure and abs(self.tilt) > _LEAST_TILT
 
@@ -162,8 +162,10 @@ class _Pair:
         self._solution = None
         target, source = _corrected(self.first.points, tilt), _corrected(self.second.points, tilt)
         normals, source_normals = _normals(target).reshape(-1, 3), _normals(source).reshape(-1, 3)
+        smooth = np.isfinite(source_normals[:, 0])
+        source_normals = source_normals[smooth]
         rotation, shift = self.motion[:3, :3], self.motion[:3, 3]
-        moved = _turned(source.reshape(-1, 3), rotation) + shift
+        moved = _turned(source.reshape(-1, 3)[smooth], rotation) + shift
         seen_by = _blocks_that_see(moved, camera)
         matched = seen_by >= 0
         p, q, n = moved[matched], target.reshape(-1, 3)[seen_by[matched]], normals[seen_by[matched]]
@@ -245,7 +247,7 @@ def _normals(points: Array) -> Array:
     across = points[1:-1, 2:] - points[1:-1, :-2]
     down = points[2:, 1:-1] - points[:-2, 1:-1]
     product = np.cross(down, across)
-    product /= np.linalg.norm(product, axis=2, keepdims=True)
+    product /= np.sqrt(np.einsum("...i,...i->...", product, product))[..., None]
     steep = np.maximum(np.abs(across[..., 2]), np.abs(down[..., 2])) > 0.1 * points[1:-1, 1:-1, 2]
     product[steep] = np.nan
     normals[1:-1, 1:-1] = product
@@ -254,13 +256,11 @@ def _normals(points: Array) -> Array:
 
 def _blocks_that_see(points: Array, camera: Camera) -> npt.NDArray[np.int64]:
     """Return the block of pixels that sees each point, -1 where none does."""
-    ahead = np.isfinite(points).all(axis=1) & (points[:, 2] > 0.0)
-    pixels = camera.project(np.where(ahead[:, None], points, [0.0, 0.0, 1.0]))
     columns, rows = (camera.width // _BLOCK, camera.height // _BLOCK)
-    ahead &= np.isfinite(pixels).all(axis=1)
-    place = np.floor((np.where(ahead[:, None], pixels, 0.0) + 0.5) / _BLOCK).astype(np.int64)
-    inside = ahead & (place >= 0).all(axis=1) & (place < [columns, rows]).all(axis=1)
-    return np.where(inside, place[:, 1] * columns + place[:, 0], -1)
+    u, v = camera.project(points).T  # NaN behind the camera
+    column, row = np.floor((u + 0.5) / _BLOCK), np.floor((v + 0.5) / _BLOCK)
+    inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+    return np.where(inside, np.nan_to_num(row) * columns + np.nan_to_num(column), -1.0).astype(np.int64)
 
 
 def _rays(camera: Camera) -> Array:
@@ -283,7 +283,7 @@ def _turned(points: Array, rotation: Array) -> Array:
 
 def turn_between(a: Array, b: Array) -> float:
     """Return the angle between the directions of two poses [rad]."""
-    trace = float(np.trace(a[:3, :3].T @ b[:3, :3]))
+    trace = float(np.sum(a[:3, :3] * b[:3, :3]))
     return math.acos(min(1.0, max(-1.0, 0.5 * (trace - 1.0))))
 
 
@@ -293,8 +293,10 @@ def _rotation(vector: Array) -> Array:
     x, y, z = vector
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     if angle < 1e-12:
-        return np.eye(3) + cross
-    return np.eye(3) + math.sin(angle) / angle * cross + (1.0 - math.cos(angle)) / angle**2 * cross @ cross
+        return np.eye(3)
+    rotation: Array = np.eye(3) + math.sin(angle) / angle * cross
+    rotation += (1.0 - math.cos(angle)) / angle**2 * cross @ cross
+    return rotation
 
 
 def can_calibrate(camera: Camera) -> bool:

@@ -1,5 +1,6 @@
 """The systematic error of depth that overlapping views give away."""
 
+import json
 import math
 
 import numpy as np
@@ -100,6 +101,58 @@ def test_a_wrong_focal_length_is_not_taken_for_it(room):
     depths, poses = room
     camera = nacre.Camera(width=320, height=240, fx=252, fy=252, cx=159.5, cy=119.5)
     assert not nacre.calibrate_depth(zip(depths, poses, strict=True), camera).is_significant
+
+
+def test_a_recording_that_can_be_read_only_once_is_enough(room):
+    depths, poses = room
+    once = ((depth, matrix) for depth, matrix in zip(depths, poses, strict=True))
+    assert nacre.calibrate_depth(once, CAMERA) == nacre.calibrate_depth(
+        zip(depths, poses, strict=True), CAMERA
+    )
+
+
+def reconstruct(recording, out, *more):
+    """Run the command; return its report."""
+    pytest.importorskip("typer")
+    from nacre.cli import main
+
+    with pytest.raises(SystemExit) as stopped:
+        main(["reconstruct", str(recording), "-o", str(out), "--quiet", *more])
+    assert stopped.value.code == 0
+    return json.loads((out / "report.json").read_text())
+
+
+def test_reconstruct_corrects_what_it_finds(room, tmp_path):
+    depths, poses = room
+    wrong = [depth / (1.0 + 0.02 * SIDE * depth) for depth in depths]
+    nacre.write_recording(tmp_path / "recording", CAMERA, wrong, depth_scale=5000, poses=poses)
+    corrected = reconstruct(tmp_path / "recording", tmp_path / "corrected")
+    as_measured = reconstruct(tmp_path / "recording", tmp_path / "measured", "--no-calibrate")
+    assert corrected["depth_calibration"]["used"]
+    assert corrected["depth_calibration"]["tilt"] == pytest.approx(0.02, rel=0.1)
+    assert as_measured["depth_calibration"] is None
+    assert corrected["num_tracked"] == len(corrected["frames"]) == 10
+    errors = [done["absolute_trajectory_error"]["rmse"] for done in (corrected, as_measured)]
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_reconstruct_leaves_good_depth_alone(room, tmp_path):
+    depths, poses = room
+    nacre.write_recording(tmp_path / "recording", CAMERA, depths, depth_scale=5000, poses=poses)
+    report = reconstruct(tmp_path / "recording", tmp_path / "out")
+    assert not report["depth_calibration"]["used"]
+    same = reconstruct(tmp_path / "recording", tmp_path / "same", "--no-calibrate")
+    assert (tmp_path / "same" / "trajectory.txt").read_text() == (
+        tmp_path / "out" / "trajectory.txt"
+    ).read_text()
+    assert report["num_tracked"] == same["num_tracked"]
+
+
+def test_only_whole_views_are_calibrated(room, tmp_path):
+    depths, _ = room
+    nacre.write_recording(tmp_path / "recording", CAMERA, depths, depth_scale=5000)
+    box = ("--box", "-4", "4", "-4", "4", "0", "9")
+    assert reconstruct(tmp_path / "recording", tmp_path / "out", *box)["depth_calibration"] is None
 
 
 def test_a_camera_that_does_not_turn_says_nothing(room):
