@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import resource
 import time
 from pathlib import Path
 from typing import Any
@@ -116,6 +117,44 @@ def batch(recording: Path, fused: Path, out: Path, num_points: int) -> Path:
     nacre.write_points(out / "model.ply", done.points)
     (out / "report.json").write_text(json.dumps(report))
     return out
+
+
+def long_recording(places: Places, row: Row) -> dict[str, Figures]:
+    """Turn the bunny before a Kinect for 2000 frames: time, memory and size once its surface is covered."""
+    import nacre
+
+    mesh = nacre.read_mesh(places.bunny)
+    camera = nacre.Camera(320, 240, 262.5, 262.5, 159.5, 119.5)
+    per_turn, num_frames, part = 120, 2000, 200
+    poses = nacre.turntable_poses(mesh, per_turn, 2 * math.pi / per_turn, camera=camera, distance=0.4)
+    model = nacre.Model(camera)
+    tracked, seconds, points, resident = 0, [], [], []
+    for i in range(num_frames):
+        depth = mesh.simulate_depth(camera, poses[i % per_turn], noise="kinect", edge_mixing=1.0, seed=i)
+        start = time.process_time()
+        tracked += model.add_frame(depth).status == "TRACKED"
+        seconds.append(time.process_time() - start)
+        points.append(len(model.points))
+        resident.append(resident_memory())
+    early, late = slice(part, 2 * part), slice(num_frames - part, num_frames)
+    return {
+        "nacre": {
+            "frames": num_frames,
+            "tracked": tracked,
+            "points": points[-1],
+            "more_points": 100 * (points[-1] / points[2 * part] - 1),
+            "more_time": 100 * (np.mean(seconds[late]) / np.mean(seconds[early]) - 1),
+            "more_memory": resident[-1] - resident[2 * part],
+            "processor": sum(seconds),
+        }
+    }
+
+
+def resident_memory() -> float:
+    """Return what this process holds in memory [MB]; NaN where the system does not tell."""
+    file = Path("/proc/self/statm")
+    pages = int(file.read_text().split()[1]) if file.exists() else math.nan
+    return pages * resource.getpagesize() / 1e6
 
 
 def unrelated_pairs(places: Places, row: Row) -> dict[str, Figures]:

@@ -224,6 +224,15 @@ WhereElse Model::Impl::elsewhere() const {
   return where;
 }
 
+// Moves the pose of a frame, and turns with it what is told about the pose's uncertainty.
+static void correct(FrameReport& report, const Pose& correction) {
+  report.world_from_camera = correction * report.world_from_camera;
+  Matrix6 turn = Matrix6::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = correction.linear();
+  report.information = turn * report.information * turn.transpose();
+  report.weak_directions = turn * report.weak_directions;
+}
+
 void Model::Impl::close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given) {
   const std::int32_t oldest_frame = loops.oldest_frame();
   const LoopReport loop = loops.add_frame({static_cast<std::int32_t>(report.index), frame, observer, tracking.alignment,
@@ -237,7 +246,7 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
     report.weak_directions.resize(6, 0);
   }
   move_points(cloud, loop.corrections, options.num_threads);
-  report.world_from_camera = loop.corrections.back() * report.world_from_camera;
+  correct(report, loop.corrections.back());
   const double noise = static_cast<double>(median_sigma(frame));
   merge_layers(cloud, oldest_frame, spacing, [&](const Eigen::Vector3f& point) {
     const double distance = (point.cast<double>() - report.world_from_camera.translation()).norm();
@@ -247,7 +256,7 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
   });
   poses.clear();
   for (FrameReport& earlier : reports) {
-    earlier.world_from_camera = loop.corrections[static_cast<std::size_t>(earlier.index)] * earlier.world_from_camera;
+    correct(earlier, loop.corrections[static_cast<std::size_t>(earlier.index)]);
     if (earlier.status != FrameStatus::lost) poses.push_back(earlier.world_from_camera);
   }
   poses.push_back(report.world_from_camera);

@@ -272,7 +272,9 @@ class Reconstruction:
         return ReportData(
             title=title,
             source=source,
-            frames=[_entry(frame, *errors[i]) for i, frame in enumerate(self.frames)],
+            frames=[
+                _entry(frame, *errors[i], self._loop_frame(frame)) for i, frame in enumerate(self.frames)
+            ],
             model=model,
             depth=self._depth_example(),
             evaluation={label(name): result for name, result in self.evaluation.items()},
@@ -371,7 +373,12 @@ def _frame_dict(
     return figures
 
 
-def _entry(frame: FrameRecord, translation_error: float | None, rotation_error: float | None) -> FrameEntry:
+def _entry(
+    frame: FrameRecord,
+    translation_error: float | None,
+    rotation_error: float | None,
+    loop_frame: int | None,
+) -> FrameEntry:
     from nacre.report import FrameEntry
 
     report = frame.report
@@ -389,4 +396,5 @@ def _entry(frame: FrameRecord, translation_error: float | None, rotation_error: 
         rotation_error=rotation_error,
         num_points=None if report is None else report.num_points,
         removed=_removed(report),
+        loop_frame=loop_frame,
     )

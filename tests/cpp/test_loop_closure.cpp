@@ -1,4 +1,5 @@
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -196,6 +197,27 @@ TEST_CASE("the first camera stays where it is, and the newest is where the model
   const Pose last = model.frames().back().world_from_camera;
   const Eigen::Vector3d moved = last.inverse() * model.cloud().points.front().cast<double>();
   CHECK((moved - seen.points.front().cast<double>()).norm() < 1e-5);
+}
+
+TEST_CASE("what is known of a pose turns with it") {
+  Model model(Room::camera(0.015));
+  std::vector<FrameReport> told;
+  for (int k = 0; k < frames_per_turn + 8; ++k) told.push_back(model.add_frame(room().view(k)));
+  REQUIRE(num_loops(model) >= 1);
+  const auto in_camera = [](const FrameReport& report) {
+    Matrix6 turn = Matrix6::Zero();
+    turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = report.world_from_camera.linear().transpose();
+    return Matrix6(turn * report.information * turn.transpose());
+  };
+  double greatest_turn = 0.0;
+  for (std::size_t k = 0; k < told.size(); ++k) {
+    const FrameReport& corrected = model.frames()[k];
+    const Matrix6 expected = in_camera(told[k]);
+    CHECK((in_camera(corrected) - expected).norm() <= 1e-9 * expected.norm());
+    greatest_turn = std::max(greatest_turn, (corrected.information - told[k].information).norm() /
+                                                std::max(told[k].information.norm(), 1e-300));
+  }
+  CHECK(greatest_turn > 1e-3);
 }
 
 TEST_CASE("loops close with the same bits for any number of threads") {

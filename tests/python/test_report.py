@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from collections.abc import Iterator
@@ -306,6 +307,14 @@ class TestPage:
         tracked = render_page(ReportData("x", frames=entries(12)))
         assert '<rect class="lost"' not in tracked
         assert 'class="verdict ok"' in tracked
+
+    def test_loops_are_marked_and_named(self) -> None:
+        frames = entries(12)
+        frames[9] = dataclasses.replace(frames[9], loop_frame=2)
+        page = render_page(ReportData("x", frames=frames))
+        assert '<rect class="loop"' in page
+        assert "closes a loop with frame 2" in PageCheck(page).text
+        assert "loop closed" not in PageCheck(render_page(ReportData("x", frames=entries(12)))).text
 
     def test_the_same_data_gives_the_same_bytes(self, page: str, tmp_path: Path) -> None:
         write_report(tmp_path / "report.html", example_data())

@@ -8,6 +8,7 @@ A module has ``make(camera, voxel)``, which gets the camera and the grid of the 
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,6 +18,7 @@ Array = npt.NDArray[Any]
 
 ANY_CAMERA = ("open3d_icp", "open3d_icp_eroded", "small_gicp_vgicp_eroded", "kiss_icp_eroded")
 PINHOLE = ("open3d_odometry", "open3d_slam", "opencv_odometry", "opencv_tsdf")
+NEAR = tuple(f"{name}_near" for name in ("open3d_icp", *PINHOLE))
 
 TITLES = {
     "open3d_icp": "Open3D: ICP to a voxel model",
@@ -28,8 +30,12 @@ TITLES = {
     "small_gicp_vgicp_eroded": "small_gicp: VGICP to a voxel map, 2 px eroded",
     "kiss_icp_eroded": "KISS-ICP, 2 px eroded",
 }
+TITLES |= {name: f"{TITLES[name.removesuffix('_near')]}, cut at 1.5 m by hand" for name in NEAR}
+
 FAR = 3.0
 """Farther measurements are not used by peers [m]: the default of Open3D's RGB-D images, odometry and SLAM."""
+CUT = 1.5
+"""Where it is cut for the loops that get it cut by hand [m]."""
 
 
 class Loop(Protocol):
@@ -44,22 +50,21 @@ class Loop(Protocol):
 
 def make(name: str, camera: Any, depth: Array, voxel: float = 0.0) -> Loop:
     """Return a peer's loop for a camera; voxel 0 is twice a pixel of the first image."""
-    module = name.removesuffix("_eroded")
-    loop: Loop = importlib.import_module(f"track.peers.{module}").make(
-        camera, voxel or voxel_size(camera, depth)
-    )
-    return loop if module == name else Eroded(loop)
+    ending = next((ending for ending in CHANGES if name.endswith(ending)), "")
+    module = importlib.import_module(f"track.peers.{name.removesuffix(ending)}")
+    loop: Loop = module.make(camera, voxel or voxel_size(camera, depth))
+    return Changed(loop, CHANGES[ending]) if ending else loop
 
 
-class Eroded:
-    """Gives a loop images without the pixels that are two or less from a jump of depth or a missing pixel."""
+class Changed:
+    """Gives a loop images that are changed first."""
 
-    def __init__(self, loop: Loop) -> None:
-        self._loop = loop
+    def __init__(self, loop: Loop, change: Callable[[Array], Array]) -> None:
+        self._loop, self._change = loop, change
 
     def add(self, depth: Array) -> Array | None:
-        """Erode the image first."""
-        return self._loop.add(erode(depth))
+        """Change the image, then track."""
+        return self._loop.add(self._change(depth))
 
     def points(self) -> Array:
         """Return the model."""
@@ -82,6 +87,15 @@ def erode(depth: Array, pixels: int = 2, jump: float = 0.02) -> Array:
         wide = np.pad(edge, 1)
         edge = wide[1:-1, 1:-1] | wide[:-2, 1:-1] | wide[2:, 1:-1] | wide[1:-1, :-2] | wide[1:-1, 2:]
     return np.where(edge, np.float32(np.nan), depth)
+
+
+def cut_by_hand(depth: Array) -> Array:
+    """Remove what is farther than 1.5 m."""
+    return np.where(depth < CUT, depth, np.float32(np.nan))
+
+
+CHANGES = {"_eroded": erode, "_near": cut_by_hand}
+"""Of the images, by the ending of the loop's name."""
 
 
 def voxel_size(camera: Any, depth: Array) -> float:

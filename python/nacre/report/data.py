@@ -29,6 +29,7 @@ class FrameEntry:
     removed: Mapping[str, int] = field(
         default_factory=dict
     )  #: pixels removed from the depth image, by reason
+    loop_frame: int | None = None  #: the earlier frame that this one closed a loop with
 
 
 @dataclass(frozen=True, eq=False)

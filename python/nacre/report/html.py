@@ -338,13 +338,18 @@ def _table_section(frames: Sequence[FrameEntry]) -> str:
         )
         rows.append(
             f'<tr><td class="number">{frame.index}</td><td class="status-{status}">{status}</td>'
-            f"{cells}<td>{escape(frame.reason)}</td></tr>"
+            f"{cells}<td>{escape(_remark(frame))}</td></tr>"
         )
     return (
         f'<h2>Table of frames</h2><details><summary>{title}</summary><div class="wide"><table>'
         f'<tr><th class="number">Frame</th><th>Status</th>{heads}<th></th></tr>{"".join(rows)}'
         "</table></div></details>"
     )
+
+
+def _remark(frame: FrameEntry) -> str:
+    loop = "" if frame.loop_frame is None else f"closes a loop with frame {frame.loop_frame}"
+    return "; ".join(part for part in (frame.reason, loop) if part)
 
 
 def _heading(text: str) -> str:
@@ -400,19 +405,26 @@ def _positions(frames: Sequence[FrameEntry], pose: Callable[[FrameEntry], Any]) 
 
 
 def _marks(frames: Sequence[FrameEntry]) -> list[Mark]:
-    statuses = np.array([frame.status.upper() for frame in frames])
     return [
-        Mark(first, end - 1, status.lower())
-        for status in ("LOST", "WEAK", "RELOCALISED")
-        for first, end in runs(statuses == status)
+        Mark(first, end - 1, kind)
+        for kind, (_, chosen) in _MARKED.items()
+        for first, end in runs(np.array([chosen(frame) for frame in frames], dtype=bool))
     ]
 
 
 def _mark_keys(frames: Sequence[FrameEntry]) -> str:
-    present = {frame.status.upper() for frame in frames}
     keys = "".join(
-        f'<span class="key"><i class="k-{status.lower()}"></i>{status}</span>'
-        for status in ("LOST", "WEAK", "RELOCALISED")
-        if status in present
+        f'<span class="key"><i class="k-{kind}"></i>{name}</span>'
+        for kind, (name, chosen) in _MARKED.items()
+        if any(chosen(frame) for frame in frames)
     )
     return f'<p class="note">{keys}</p>' if keys else ""
+
+
+_MARKED: dict[str, tuple[str, Callable[[FrameEntry], bool]]] = {
+    "lost": ("LOST", lambda frame: frame.status.upper() == "LOST"),
+    "weak": ("WEAK", lambda frame: frame.status.upper() == "WEAK"),
+    "relocalised": ("RELOCALISED", lambda frame: frame.status.upper() == "RELOCALISED"),
+    "loop": ("loop closed", lambda frame: frame.loop_frame is not None),
+}
+"""Frames that charts set off, by class of the style sheet."""
