@@ -94,7 +94,8 @@ def calibrate_depth(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera
 
     Two views of one surface from different directions see it in different columns; what the tilt of the
     inverse depth and their relative pose together explain is fitted to all pairs of successive views that
-    are 0.1 to 0.6 rad apart (point to plane, Gauss and Newton, robust). Poses need to be about right only.
+    are 0.1 to 0.6 rad apart (point to plane, Gauss and Newton, robust; with a focal length of each pair's
+    own, which is not kept, as a wrong one would look like a tilt). Poses need to be about right only.
     The idea, to calibrate depth by what overlaps in a recording, is that of Teichman, Miller and Thrun 2013.
 
     Parameters
@@ -180,6 +181,9 @@ class _Pair:
         middle = 0.5 * (p + q)
         local = _turned(middle - shift, rotation.T)
         slope = np.einsum("ij,ij->i", n, middle * middle[:, :1] - _turned(local * local[:, :1], rotation))
+        # A wrong focal length would show as a tilt, too: each pair has its own, and it is forgotten.
+        wide, wide_local = middle * [1.0, 1.0, 0.0], local * [1.0, 1.0, 0.0]
+        of_focal_length = np.einsum("ij,ij->i", n, wide - _turned(wide_local, rotation))
         rows_of_pose = -np.concatenate([np.cross(p, n), n], axis=1)
         depth = q[:, 2]
         noise = depth**2 / np.median(depth**2)
@@ -187,12 +191,12 @@ class _Pair:
         scale = 1.4826 * max(float(np.median(np.abs(whitened))), 1e-9)
         weight = 1.0 / (noise * scale * (1.0 + (whitened / (3.0 * scale)) ** 2)) ** 2
         # Sums by einsum: those of a BLAS depend on its threads.
-        rows = np.column_stack([rows_of_pose, slope, residual])
+        rows = np.column_stack([rows_of_pose, of_focal_length, slope, residual])
         sums = np.einsum("n,ni,nj->ij", weight, rows, rows)
-        hessian = sums[:6, :6] + 1e-9 * np.trace(sums[:6, :6]) * np.eye(6)
-        of_slope, of_residual = np.linalg.solve(hessian, sums[:6, 6:]).T
-        information = float(sums[6, 6] - sums[:6, 6] @ of_slope)
-        gradient = float(sums[6, 7] - sums[:6, 6] @ of_residual)
+        hessian = sums[:7, :7] + 1e-9 * np.trace(sums[:7, :7]) * np.eye(7)
+        of_slope, of_residual = np.linalg.solve(hessian, sums[:7, 7:]).T
+        information = float(sums[7, 7] - sums[:7, 7] @ of_slope)
+        gradient = float(sums[7, 8] - sums[:7, 7] @ of_residual)
         if not information > 0.0:
             return None
         self._solution = (of_residual, of_slope, tilt)
@@ -206,7 +210,7 @@ class _Pair:
         twist = -of_residual - (tilt - before) * of_slope
         motion = np.eye(4)
         motion[:3, :3] = _rotation(twist[:3])
-        motion[:3, 3] = twist[3:]
+        motion[:3, 3] = twist[3:6]
         self.motion = motion @ self.motion
 
 
