@@ -18,6 +18,7 @@ LEAST_TURN, _MOST_TURN = 0.1, 0.6  # between two views that are compared [rad]
 MOST_VIEWS = 24
 LEAST_VIEWS = 5  # those have enough pairs
 _STEPS = 8
+_LEAST_PART = 1e-4  # of the information on the tilt that the other unknowns leave; rounding leaves less
 _AT_REST = 0.1  # of a standard deviation
 _LEAST_PAIRS = 6
 _LEAST_SIGMAS = 7.0
@@ -197,7 +198,7 @@ class _Pair:
         of_slope, of_residual = np.linalg.solve(hessian, sums[:7, 7:]).T
         information = float(sums[7, 7] - sums[:7, 7] @ of_slope)
         gradient = float(sums[7, 8] - sums[:7, 7] @ of_residual)
-        if not information > 0.0:
+        if not information > _LEAST_PART * float(sums[7, 7]):
             return None
         self._solution = (of_residual, of_slope, tilt)
         return tilt - gradient / information, information
