@@ -15,7 +15,7 @@ constexpr Eigen::Index least_samples = 100;
 constexpr Eigen::Index most_samples = 2000;
 constexpr double largest_part = 0.03;  // of the object's size, that the tolerance may be
 constexpr double body_depth = 0.9;     // from the middle of what is seen to that of the body, in radii of what is seen
-constexpr float least_facing = 0.3F;   // cosine
+constexpr float least_cosine_to_camera = 0.3F;  // cosine
 
 }  // namespace
 
@@ -83,9 +83,9 @@ ViewEvidence look_at(const ObjectView& moved, const ObjectView& seen, const Pose
       if (!block.inside[i]) continue;
       const float behind = seen.depth[block.pixel[i]] - block.z[i];
       if (!std::isfinite(behind)) continue;
-      const float margin = 2.0F * tolerance / std::max(block.facing[i], least_facing);
+      const float margin = 2.0F * tolerance / std::max(block.facing[i], least_cosine_to_camera);
       if (behind > margin) through += 1.0F;
-      if (!(block.facing[i] > least_facing) || seen.region.data()[block.pixel[i]] == 0) continue;
+      if (!(block.facing[i] > least_cosine_to_camera) || seen.region.data()[block.pixel[i]] == 0) continue;
       if (behind < -margin) hidden += 1.0F;
       const float ratio = behind * block.facing[i] / tolerance;
       agree += std::max(0.0F, 1.0F - ratio * ratio);

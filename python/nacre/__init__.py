@@ -15,6 +15,7 @@ from nacre.depth import (
     label_pixels,
     preprocess_depth,
 )
+from nacre.depth_calibration import DepthCalibration, calibrate_depth
 from nacre.errors import FileFormatError
 from nacre.global_registration import GlobalAlignResult, GlobalRegistrationParameters, align_global
 from nacre.io.cameras import CameraFile, read_camera, write_camera
@@ -43,6 +44,7 @@ __all__ = [
     "ClosestPoints",
     "Cloud",
     "Consolidated",
+    "DepthCalibration",
     "DepthParameters",
     "DepthReport",
     "FileFormatError",
@@ -68,6 +70,7 @@ __all__ = [
     "associate",
     "back_project",
     "built_in_object",
+    "calibrate_depth",
     "calibrate_noise",
     "consolidate",
     "default_camera",

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from nacre.cli.calibrating import run_calibrated
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
 from nacre.cli.results import file_rows, trajectory_rows, write_results
 from nacre.cli.running import retry_lost, run_frames
@@ -73,6 +75,13 @@ def reconstruct(
             show_default="on",
         ),
     ] = None,
+    calibrate: Annotated[
+        bool,
+        typer.Option(
+            "--calibrate/--no-calibrate",
+            help="Where views in several directions show that depth is systematically wrong, correct it.",
+        ),
+    ] = True,
     attribute: Annotated[
         list[str] | None,
         typer.Option(
@@ -122,13 +131,20 @@ def reconstruct(
     if not indices:
         raise CommandError(f"no frames are left of {len(sequence)} (0 to {len(sequence) - 1})", 2)
     import nacre
+    from nacre.depth_calibration import can_calibrate
     from nacre.reconstruction import Reconstruction
 
     done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
     writable_folder(out)
     words = describe(sequence, indices)
     terminal.say(f"{sequence.name}: {words}")
-    interrupted = run_frames(terminal, done, indices)
+    # What turns before a camera that stands still is not one scene with what is around it.
+    whole = masks is None and parameters.region == nacre.RegionParameters()
+    calibration = None
+    if calibrate and whole and preset_name != "paper" and can_calibrate(sequence.camera):
+        done, calibration, interrupted = run_calibrated(terminal, done, sequence, indices)
+    else:
+        interrupted = run_frames(terminal, done, indices)
     if retry and not interrupted:
         interrupted = retry_lost(terminal, done)
     done.evaluate_trajectory()
@@ -137,7 +153,13 @@ def reconstruct(
         done,
         title=sequence.name,
         source=words,
-        document={"recording": recording(sequence), "preset": preset_name, "interrupted": interrupted},
+        document={
+            "recording": recording(sequence),
+            "preset": preset_name,
+            "interrupted": interrupted,
+            "depth_calibration": calibration
+            and dataclasses.asdict(calibration) | {"used": calibration.is_significant},
+        },
     )
     if json:
         print(to_json(report))

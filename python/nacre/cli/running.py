@@ -5,14 +5,14 @@ from __future__ import annotations
 import logging
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from nacre.cli.terminal import CommandError, Terminal
 
 if TYPE_CHECKING:
-    from nacre.reconstruction import Reconstruction
+    from nacre.reconstruction import FrameRecord, Reconstruction
 
 _log = logging.getLogger(__name__)
 
@@ -44,9 +44,14 @@ def interruptible() -> Iterator[Interruption]:
         signal.signal(signal.SIGINT, before)
 
 
-def run_frames(terminal: Terminal, done: Reconstruction, indices: Sequence[int]) -> bool:
-    """Run the frames of a recording; return whether Ctrl-C stopped it."""
-    accepted = False
+def run_frames(
+    terminal: Terminal,
+    done: Reconstruction,
+    indices: Sequence[int],
+    until: Callable[[FrameRecord], bool] | None = None,
+) -> bool:
+    """Run the frames of a recording, at most until one says so; return whether Ctrl-C stopped it."""
+    accepted = any(frame.report is not None for frame in done.frames)
     with interruptible() as interruption, terminal.progress("frames", len(indices)) as advance:
         for frame in done.run(indices):
             if frame.refused and not accepted:
@@ -56,7 +61,7 @@ def run_frames(terminal: Terminal, done: Reconstruction, indices: Sequence[int])
                 _log.info("frame %d: %s: %s", frame.index, frame.status, frame.reason)
             lost = done.counts["LOST"]
             advance(f"{len(done.model):,} points" + f", {lost} lost" * bool(lost))
-            if interruption.wanted:
+            if interruption.wanted or (until is not None and until(frame)):
                 break
     return interruption.wanted
 

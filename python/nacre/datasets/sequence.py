@@ -18,6 +18,7 @@ import numpy.typing as npt
 from nacre import arrays
 from nacre._core import Camera
 from nacre.datasets.listing import files, pair
+from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
 from nacre.io.images import ATTRIBUTE_SUFFIXES, COLOR_SUFFIXES, read_attribute, read_color, read_depth
 from nacre.io.trajectories import Trajectory
@@ -218,7 +219,19 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
             ]
         )
 
-    def _with_sources(self, sources: collections.abc.Sequence[FrameSource]) -> Sequence:
+    def with_depth_calibration(self, calibration: DepthCalibration) -> Sequence:
+        """Return the same recording with a systematic error of its depth corrected in every view."""
+
+        def load(path: Path) -> npt.NDArray[np.float32]:
+            depth = self._load_depth(path)
+            check_size(path, depth, self.camera)
+            return calibration.correct(depth, self.camera)
+
+        return self._with_sources(self._sources, load)
+
+    def _with_sources(
+        self, sources: collections.abc.Sequence[FrameSource], load_depth: DepthLoader | None = None
+    ) -> Sequence:
         return Sequence(
             self.path,
             format=self.format,
@@ -227,7 +240,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
             sources=sources,
             truth=self.truth,
             estimate=self.estimate,
-            load_depth=self._load_depth,
+            load_depth=load_depth or self._load_depth,
             name=self.name,
         )
 

@@ -1,0 +1,321 @@
+"""A systematic error of depth cameras, found from a recording that was tracked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre._core import Camera
+from nacre.arrays import as_depth, as_pose
+from nacre.depth import back_project, preprocess_depth
+
+_BLOCK = 4  # pixels, each way, whose inverse depths are averaged
+LEAST_TURN, _MOST_TURN = 0.1, 0.6  # between two views that are compared [rad]
+MOST_VIEWS = 24
+LEAST_VIEWS = 5  # those have enough pairs
+_STEPS = 8
+_LEAST_PART = 1e-4  # of the information on the tilt that the other unknowns leave; rounding leaves less
+_AT_REST = 0.1  # of a standard deviation
+_LEAST_PAIRS = 6
+_LEAST_SIGMAS = 7.0
+_LEAST_TILT = 0.002  # about the noise of the inverse depth of one pixel, structured light [1/m]
+_GATE = 0.05  # of the depth: surfaces that are farther apart are not the same
+_MOST_CHANGE = 0.5  # a correction that changes depth by more is none
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DepthCalibration:
+    """
+    How the inverse depth of a camera is off from one side of the image to the other.
+
+    Structured light and stereo measure a disparity along the image's rows, which is ``fx * baseline``
+    times the inverse depth. Where pattern and camera, or the two cameras, do not fit each other quite in
+    direction or focal length, it is off in proportion to the column, and so is the inverse depth.
+
+    Attributes
+    ----------
+    tilt : float
+        Measured less true inverse depth, for each unit of x / z (1/m): a depth z at x / z = 1 is about
+        ``tilt * z**2`` too small.
+    sigma : float
+        Its standard deviation, from how much pairs of views differ (1/m); infinite with fewer than two.
+    num_pairs : int
+        Pairs of views that it is from.
+    """
+
+    tilt: float
+    sigma: float
+    num_pairs: int
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether the error matters (0.002 / m) and is beyond doubt (seven sigma, six pairs)."""
+        is_sure = self.num_pairs >= _LEAST_PAIRS and abs(self.tilt) > _LEAST_SIGMAS * self.sigma
+        return is_sure and abs(self.tilt) > _LEAST_TILT
+
+    def correct(self, depth: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.float32]:
+        """
+        Return a depth image without the error.
+
+        Parameters
+        ----------
+        depth : (H, W) array
+            Metres.
+        camera : Camera
+            A pinhole camera.
+
+        Returns
+        -------
+        (H, W) float32
+            Metres; NaN where the correction would be more than a half, which no calibration reaches.
+
+        Raises
+        ------
+        ValueError
+            If the camera is not a pinhole camera or the image does not have its size.
+        """
+        _check_camera(camera)
+        image = _checked(depth, camera)
+        side = _rays(camera)[..., 0]
+        with np.errstate(invalid="ignore"):
+            factor = 1.0 - self.tilt * side * image
+            corrected = np.where(np.abs(factor - 1.0) < _MOST_CHANGE, image / factor, np.nan)
+        return corrected.astype(np.float32)
+
+
+def calibrate_depth(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera: Camera) -> DepthCalibration:
+    """
+    Find the systematic error of depth that makes overlapping views agree best.
+
+    Two views of one surface from different directions see it in different columns; what the tilt of the
+    inverse depth and their relative pose together explain is fitted to all pairs of successive views that
+    are 0.1 to 0.6 rad apart (point to plane, Gauss and Newton, robust; with a focal length of each pair's
+    own, which is not kept, as a wrong one would look like a tilt). Poses need to be about right only.
+    The idea, to calibrate depth by what overlaps in a recording, is that of Teichman, Miller and Thrun 2013.
+
+    Parameters
+    ----------
+    views : iterable of (depth, world_from_camera)
+        Depth images (H, W) in metres and poses (4, 4), in the order of the recording. Views that turned by
+        less than 0.1 rad are skipped; at most 24 are used.
+    camera : Camera
+        A pinhole camera.
+
+    Returns
+    -------
+    DepthCalibration
+        With ``num_pairs`` 0 where no two views tell anything.
+
+    Raises
+    ------
+    ValueError
+        If the camera is not a pinhole camera, or an image or a pose does not fit.
+    """
+    _check_camera(camera)
+    chosen = _choose(views, camera)
+    pairs = [
+        _Pair(a, b)
+        for step in (1, 2)
+        for a, b in zip(chosen, chosen[step:], strict=False)
+        if LEAST_TURN <= turn_between(a.pose, b.pose) <= _MOST_TURN
+    ]
+    tilt, sigma = 0.0, math.inf
+    for _ in range(_STEPS):
+        found = [fit for pair in pairs if (fit := pair.step(tilt, camera)) is not None]
+        weight = sum(information for _, information in found)
+        if len(found) < 2 or not weight > 0.0:
+            return DepthCalibration(0.0, math.inf, len(found))
+        before = tilt
+        tilt = sum(information * value for value, information in found) / weight
+        # From the scatter, as neighbours share their errors; two pairs share a view.
+        scatter = sum((information * (value - tilt)) ** 2 for value, information in found)
+        sigma = math.sqrt(2.0 * scatter) / weight
+        if abs(tilt - before) < _AT_REST * sigma:
+            break
+        for pair in pairs:
+            pair.follow(tilt)
+    return DepthCalibration(tilt, sigma, len(found))
+
+
+@dataclass(frozen=True)
+class _View:
+    """A view in blocks of pixels: points as measured, NaN where there are none; its pose."""
+
+    points: Array
+    pose: Array
+
+
+class _Pair:
+    """Two views, their relative pose, and what they say of the tilt."""
+
+    def __init__(self, first: _View, second: _View) -> None:
+        self.first, self.second = first, second
+        self.motion = np.linalg.inv(first.pose) @ second.pose
+        self._solution: tuple[Array, Array, float] | None = None
+
+    def step(self, tilt: float, camera: Camera) -> tuple[float, float] | None:
+        """Linearise at the pose and a tilt; return the tilt that fits best and its information."""
+        self._solution = None
+        target, source = _corrected(self.first.points, tilt), _corrected(self.second.points, tilt)
+        normals, source_normals = _normals(target).reshape(-1, 3), _normals(source).reshape(-1, 3)
+        smooth = np.isfinite(source_normals[:, 0])
+        source_normals = source_normals[smooth]
+        rotation, shift = self.motion[:3, :3], self.motion[:3, 3]
+        moved = _turned(source.reshape(-1, 3)[smooth], rotation) + shift
+        seen_by = _blocks_that_see(moved, camera)
+        matched = seen_by >= 0
+        p, q, n = moved[matched], target.reshape(-1, 3)[seen_by[matched]], normals[seen_by[matched]]
+        residual = np.einsum("ij,ij->i", q - p, n)
+        facing = np.einsum("ij,ij->i", _turned(source_normals[matched], rotation), n)
+        good = (np.abs(residual) < _GATE * q[:, 2]) & (facing > 0.85)
+        if good.sum() < 200:
+            return None
+        p, q, n, residual = p[good], q[good], n[good], residual[good]
+        # Both derivatives at the middle of the two points: at the points themselves, their noise would
+        # favour whatever makes the scene smaller.
+        middle = 0.5 * (p + q)
+        local = _turned(middle - shift, rotation.T)
+        slope = np.einsum("ij,ij->i", n, middle * middle[:, :1] - _turned(local * local[:, :1], rotation))
+        # A wrong focal length would show as a tilt, too: each pair has its own, and it is forgotten.
+        wide, wide_local = middle * [1.0, 1.0, 0.0], local * [1.0, 1.0, 0.0]
+        of_focal_length = np.einsum("ij,ij->i", n, wide - _turned(wide_local, rotation))
+        rows_of_pose = -np.concatenate([np.cross(p, n), n], axis=1)
+        depth = q[:, 2]
+        noise = depth**2 / np.median(depth**2)
+        whitened = residual / noise
+        scale = 1.4826 * max(float(np.median(np.abs(whitened))), 1e-9)
+        weight = 1.0 / (noise * scale * (1.0 + (whitened / (3.0 * scale)) ** 2)) ** 2
+        # Sums by einsum: those of a BLAS depend on its threads.
+        rows = np.column_stack([rows_of_pose, of_focal_length, slope, residual])
+        sums = np.einsum("n,ni,nj->ij", weight, rows, rows)
+        hessian = sums[:7, :7] + 1e-9 * np.trace(sums[:7, :7]) * np.eye(7)
+        of_slope, of_residual = np.linalg.solve(hessian, sums[:7, 7:]).T
+        information = float(sums[7, 7] - sums[:7, 7] @ of_slope)
+        gradient = float(sums[7, 8] - sums[:7, 7] @ of_residual)
+        if not information > _LEAST_PART * float(sums[7, 7]):
+            return None
+        self._solution = (of_residual, of_slope, tilt)
+        return tilt - gradient / information, information
+
+    def follow(self, tilt: float) -> None:
+        """Take the pose that belongs to a tilt."""
+        if self._solution is None:
+            return
+        of_residual, of_slope, before = self._solution
+        twist = -of_residual - (tilt - before) * of_slope
+        motion = np.eye(4)
+        motion[:3, :3] = _rotation(twist[:3])
+        motion[:3, 3] = twist[3:6]
+        self.motion = motion @ self.motion
+
+
+def _choose(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera: Camera) -> Sequence[_View]:
+    chosen: list[_View] = []
+    rays = _rays(camera)
+    for depth, pose in views:
+        matrix = as_pose("world_from_camera", pose)
+        if len(chosen) == MOST_VIEWS:
+            break
+        if not chosen or turn_between(chosen[-1].pose, matrix) >= LEAST_TURN:
+            chosen.append(_View(_average(preprocess_depth(_checked(depth, camera), camera), rays), matrix))
+    return chosen
+
+
+def _average(depth: npt.NDArray[np.float32], rays: Array) -> Array:
+    """Return one point for each block of pixels, from the mean of their inverse depths."""
+    height, width = (size // _BLOCK * _BLOCK for size in depth.shape)
+    cut = (slice(height), slice(width))
+    split = (height // _BLOCK, _BLOCK, width // _BLOCK, _BLOCK)
+    inverse = np.moveaxis(1.0 / depth[cut].astype(np.float64).reshape(split), 2, 1)
+    directions = np.moveaxis(rays[cut].reshape(*split, 3), 2, 1)
+    inverse = inverse.reshape(*inverse.shape[:2], -1)
+    whole: npt.NDArray[np.bool_] = np.asarray(np.isfinite(inverse).all(axis=2))
+    z = np.where(whole, 1.0 / np.where(whole[..., None], inverse, 1.0).mean(axis=2), np.nan)
+    points: Array = directions.mean(axis=(2, 3)) * z[..., None]
+    return points
+
+
+def _corrected(points: Array, tilt: float) -> Array:
+    """Return measured points without the tilt: 1 / z less tilt * x / z."""
+    return points / (1.0 - tilt * points[..., :1])
+
+
+def _normals(points: Array) -> Array:
+    """Return normals from the neighbours to all sides, towards the camera; NaN beside steps."""
+    normals = np.full(points.shape, np.nan)
+    across = points[1:-1, 2:] - points[1:-1, :-2]
+    down = points[2:, 1:-1] - points[:-2, 1:-1]
+    product = np.cross(down, across)
+    product /= np.sqrt(np.einsum("...i,...i->...", product, product))[..., None]
+    steep = np.maximum(np.abs(across[..., 2]), np.abs(down[..., 2])) > 0.1 * points[1:-1, 1:-1, 2]
+    product[steep] = np.nan
+    normals[1:-1, 1:-1] = product
+    return normals
+
+
+def _blocks_that_see(points: Array, camera: Camera) -> npt.NDArray[np.int64]:
+    """Return the block of pixels that sees each point, -1 where none does."""
+    columns, rows = (camera.width // _BLOCK, camera.height // _BLOCK)
+    u, v = camera.project(points).T  # NaN behind the camera
+    column, row = np.floor((u + 0.5) / _BLOCK), np.floor((v + 0.5) / _BLOCK)
+    inside = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+    return np.where(inside, np.nan_to_num(row) * columns + np.nan_to_num(column), -1.0).astype(np.int64)
+
+
+def _rays(camera: Camera) -> Array:
+    """Return (x / z, y / z, 1) of every pixel; NaN where the distortion model ends before the image does."""
+    size = camera.height * camera.width
+    # A depth that is the pixel's number, so that pixels without a ray show as those left out.
+    depth = 1.0 + np.arange(size, dtype=np.float64) / size
+    points = back_project(depth.reshape(camera.height, camera.width).astype(np.float32), camera).astype(
+        np.float64
+    )
+    rays = np.full((size, 3), np.nan)
+    rays[np.rint((points[:, 2] - 1.0) * size).astype(np.int64)] = points / points[:, 2:]
+    return rays.reshape(camera.height, camera.width, 3)
+
+
+def _turned(points: Array, rotation: Array) -> Array:
+    turned: Array = np.einsum("nj,ij->ni", points, rotation)
+    return turned
+
+
+def turn_between(a: Array, b: Array) -> float:
+    """Return the angle between the directions of two poses [rad]."""
+    trace = float(np.sum(a[:3, :3] * b[:3, :3]))
+    return math.acos(min(1.0, max(-1.0, 0.5 * (trace - 1.0))))
+
+
+def _rotation(vector: Array) -> Array:
+    """Return the rotation matrix of a rotation vector, Rodrigues' formula."""
+    angle = float(np.linalg.norm(vector))
+    x, y, z = vector
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    if angle < 1e-12:
+        return np.eye(3)
+    rotation: Array = np.eye(3) + math.sin(angle) / angle * cross
+    rotation += (1.0 - math.cos(angle)) / angle**2 * cross @ cross
+    return rotation
+
+
+def can_calibrate(camera: Camera) -> bool:
+    """Say whether the depth of a camera can be calibrated: pinhole, with depth along its axis."""
+    return camera.model == "pinhole" and camera.depth == "z"
+
+
+def _checked(depth: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.float32]:
+    image = as_depth("depth", depth)
+    if image.shape != (camera.height, camera.width):
+        raise ValueError(f"depth: expected {camera.height} x {camera.width} pixels, got {image.shape}")
+    return image
+
+
+def _check_camera(camera: Camera) -> None:
+    if not can_calibrate(camera):
+        raise ValueError(f"camera: expected a pinhole camera with depth along its axis, got {camera!r}")

@@ -1,0 +1,226 @@
+"""The systematic error of depth that overlapping views give away."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+import nacre
+
+CAMERA = nacre.Camera(width=320, height=240, fx=260, fy=260, cx=159.5, cy=119.5)
+SIDE = ((np.arange(320) - 159.5) / 260)[None, :]
+DOWN = ((np.arange(240) - 119.5) / 260)[:, None]
+
+
+def boxes(*corners):
+    """A mesh of axis-aligned boxes."""
+    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    vertices, triangles = [], []
+    for low, high in corners:
+        first = len(vertices)
+        vertices += [[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)]
+        for a, b, c, d in faces:
+            triangles += [(first + a, first + b, first + c), (first + a, first + c, first + d)]
+    return nacre.Mesh(np.array(vertices, float), np.array(triangles))
+
+
+def pose(yaw, pitch):
+    """A camera near the middle of the room."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    d, t = math.cos(pitch), math.sin(pitch)
+    matrix = np.eye(4)
+    turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    matrix[:3, :3] = turn @ np.array([[1, 0, 0], [0, d, -t], [0, t, d]])
+    matrix[:3, 3] = 0.05 * np.array([s, 0, c])
+    return matrix
+
+
+@pytest.fixture(scope="module")
+def room():
+    """Views of a furnished room, 6 degrees apart, with the noise of structured light; and their poses."""
+    rng = np.random.default_rng(0)
+    furniture = []
+    for _ in range(40):
+        angle, distance = rng.uniform(-math.pi, math.pi), rng.uniform(1.0, 2.6)
+        x, z = distance * math.sin(angle), distance * math.cos(angle)
+        a, b = rng.uniform(0.08, 0.3, 2)
+        furniture.append(((x - a, rng.uniform(-0.9, 0.9), z - b), (x + a, 1.2, z + b)))
+    mesh = boxes(((-3.0, -1.4, -3.2), (3.2, 1.2, 3.0)), *furniture)
+    poses = [pose(math.radians(6 * i), -0.35 + 0.05 * math.sin(i)) for i in range(12)]
+    noise = nacre.NoiseModel.kinect()
+    depths = [
+        mesh.simulate_depth(CAMERA, matrix, noise=noise, edge_mixing=1.0, seed=i)
+        for i, matrix in enumerate(poses)
+    ]
+    return depths, poses
+
+
+@pytest.mark.parametrize("tilt", [-0.02, 0.01, 0.03])
+def test_it_finds_the_error_that_was_made(room, tilt):
+    depths, poses = room
+    wrong = [depth / (1.0 + tilt * SIDE * depth) for depth in depths]
+    found = nacre.calibrate_depth(zip(wrong, poses, strict=True), CAMERA)
+    assert found.is_significant
+    assert found.num_pairs == 21
+    assert abs(found.tilt - tilt) < max(5 * found.sigma, 0.05 * abs(tilt))
+    for depth, image in zip(depths, wrong, strict=True):
+        off = np.nanmax(np.abs(found.correct(image, CAMERA) - depth))
+        assert off < 0.2 * np.nanmax(np.abs(image - depth))
+
+
+def test_it_does_not_need_exact_poses(room):
+    depths, poses = room
+    rng = np.random.default_rng(1)
+    near = []
+    for matrix in poses:
+        shaken = matrix @ pose(*rng.normal(0.0, 0.01, 2))
+        shaken[:3, 3] += rng.normal(0.0, 0.02, 3)
+        near.append(shaken)
+    wrong = [depth / (1.0 + 0.02 * SIDE * depth) for depth in depths]
+    found = nacre.calibrate_depth(zip(wrong, near, strict=True), CAMERA)
+    assert found.is_significant
+    assert found.tilt == pytest.approx(0.02, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "distort",
+    [
+        lambda z: z,
+        lambda z: z + 0.01 * z**2,
+        lambda z: z * (1 + 0.03 * (SIDE**2 + DOWN**2)),
+        lambda z: z / (1 + 0.01 * DOWN * z),
+    ],
+    ids=["none", "grows with depth", "radial", "tilted down the image"],
+)
+def test_other_errors_are_not_taken_for_it(room, distort):
+    depths, poses = room
+    found = nacre.calibrate_depth(zip(map(distort, depths), poses, strict=True), CAMERA)
+    assert not found.is_significant
+
+
+def test_a_wrong_focal_length_is_not_taken_for_it(room):
+    depths, poses = room
+    camera = nacre.Camera(width=320, height=240, fx=252, fy=252, cx=159.5, cy=119.5)
+    assert not nacre.calibrate_depth(zip(depths, poses, strict=True), camera).is_significant
+
+
+def test_a_recording_that_can_be_read_only_once_is_enough(room):
+    depths, poses = room
+    once = ((depth, matrix) for depth, matrix in zip(depths, poses, strict=True))
+    assert nacre.calibrate_depth(once, CAMERA) == nacre.calibrate_depth(
+        zip(depths, poses, strict=True), CAMERA
+    )
+
+
+def reconstruct(recording, out, *more):
+    """Run the command; return its report."""
+    pytest.importorskip("typer")
+    from nacre.cli import main
+
+    with pytest.raises(SystemExit) as stopped:
+        main(["reconstruct", str(recording), "-o", str(out), "--quiet", *more])
+    assert stopped.value.code == 0
+    return json.loads((out / "report.json").read_text())
+
+
+def test_reconstruct_corrects_what_it_finds(room, tmp_path):
+    depths, poses = room
+    wrong = [depth / (1.0 + 0.01 * SIDE * depth) for depth in depths]
+    nacre.write_recording(tmp_path / "recording", CAMERA, wrong, depth_scale=5000, poses=poses)
+    report = reconstruct(tmp_path / "recording", tmp_path / "out")
+    found = report["depth_calibration"]
+    assert found.pop("used")
+    assert found["tilt"] == pytest.approx(0.01, rel=0.1)
+    assert reconstruct(tmp_path / "recording", tmp_path / "o", "--no-calibrate")["depth_calibration"] is None
+
+    corrected = nacre.open_sequence(tmp_path / "recording").with_depth_calibration(
+        nacre.DepthCalibration(**found)
+    )
+    model = nacre.Model(CAMERA)
+    for frame in corrected:
+        model.add_frame(frame.depth)
+    assert [frame["status"] for frame in report["frames"]] == [frame.status for frame in model.frames]
+    assert report["num_points"] == len(model)
+
+
+def test_reconstruct_leaves_good_depth_alone(room, tmp_path):
+    depths, poses = room
+    nacre.write_recording(tmp_path / "recording", CAMERA, depths, depth_scale=5000, poses=poses)
+    report = reconstruct(tmp_path / "recording", tmp_path / "out")
+    assert report["depth_calibration"] is None or not report["depth_calibration"]["used"]
+    same = reconstruct(tmp_path / "recording", tmp_path / "same", "--no-calibrate")
+    assert (tmp_path / "same" / "trajectory.txt").read_text() == (
+        tmp_path / "out" / "trajectory.txt"
+    ).read_text()
+    assert report["num_tracked"] == same["num_tracked"]
+
+
+def test_a_camera_that_does_not_turn_says_nothing(room):
+    depths, poses = room
+    found = nacre.calibrate_depth([(depths[0], poses[0])] * 5, CAMERA)
+    assert (found.tilt, found.sigma, found.num_pairs) == (0.0, math.inf, 0)
+    assert not found.is_significant
+
+
+def test_a_wall_says_nothing():
+    wall = np.full((240, 320), 2.0, np.float32)
+    found = nacre.calibrate_depth([(wall, pose(0.2 * i, 0.0)) for i in range(6)], CAMERA)
+    assert not found.is_significant
+
+
+def test_an_error_that_does_not_matter_is_left_alone():
+    assert nacre.DepthCalibration(0.003, 0.0001, 6).is_significant
+    assert not nacre.DepthCalibration(0.001, 0.0001, 6).is_significant
+    assert not nacre.DepthCalibration(0.003, 0.001, 6).is_significant
+    assert not nacre.DepthCalibration(0.003, 0.0001, 5).is_significant
+
+
+def test_correction_is_of_inverse_depth():
+    depth = np.full((240, 320), 2.0, np.float32)
+    depth[0, 0] = np.nan
+    inverse = 1.0 / nacre.DepthCalibration(0.02, 0.001, 9).correct(depth, CAMERA)
+    expected = np.broadcast_to(0.5 - 0.02 * SIDE, depth.shape)
+    np.testing.assert_allclose(inverse.ravel()[1:], expected.ravel()[1:], rtol=1e-6)
+    assert np.isnan(inverse[0, 0])
+
+
+def test_what_is_too_far_for_a_correction_is_dropped():
+    depth = np.full((240, 320), 200.0, np.float32)
+    corrected = nacre.DepthCalibration(0.02, 0.001, 9).correct(depth, CAMERA)
+    assert np.isnan(corrected[:, [0, -1]]).all()
+    assert np.isfinite(corrected[:, 159]).all()
+
+
+def test_pixels_without_a_ray_have_no_depth():
+    ends = nacre.Camera(
+        width=320, height=240, fx=160, fy=160, cx=159.5, cy=119.5, distortion=(-0.3, 0.0, 0.0, 0.0, 0.0)
+    )
+    depth = np.full((240, 320), 2.0, np.float32)
+    corrected = nacre.DepthCalibration(0.01, 0.001, 9).correct(depth, ends)
+    assert np.isfinite(corrected).sum() == len(nacre.back_project(depth, ends)) < depth.size
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        nacre.Camera.orthographic(width=320, height=240, pixel_size=0.001),
+        nacre.Camera(width=320, height=240, fx=260, fy=260, cx=159.5, cy=119.5, depth="radial"),
+    ],
+    ids=["orthographic", "radial"],
+)
+def test_other_cameras_are_refused(camera):
+    with pytest.raises(ValueError, match="camera: expected a pinhole camera"):
+        nacre.calibrate_depth([], camera)
+    with pytest.raises(ValueError, match="camera: expected a pinhole camera"):
+        nacre.DepthCalibration(0.01, 0.001, 9).correct(np.ones((240, 320), np.float32), camera)
+
+
+def test_an_image_of_another_size_is_refused():
+    with pytest.raises(ValueError, match="depth: expected 240 x 320 pixels"):
+        nacre.calibrate_depth([(np.ones((4, 5), np.float32), np.eye(4))], CAMERA)
+
+
+def test_a_pose_that_is_none_is_refused():
+    with pytest.raises(ValueError, match="world_from_camera"):
+        nacre.calibrate_depth([(np.ones((240, 320), np.float32), np.eye(3))], CAMERA)
