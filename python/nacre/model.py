@@ -408,6 +408,12 @@ class Model:
             return self._core.cloud.confidence
 
     @property
+    def last_seen(self) -> npt.NDArray[np.int32]:
+        """(N,) the last frame that observed each point, counting those with a pose from 0; a copy."""
+        with self._lock:
+            return self._core.cloud.last_seen
+
+    @property
     def poses(self) -> npt.NDArray[np.float64]:
         """
         (F, 4, 4) world_from_camera of every frame; NaN where the frame is lost.

@@ -19,6 +19,7 @@ from nacre.cli.info import info
 from nacre.cli.reconstruct import reconstruct
 from nacre.cli.simulate import simulate
 from nacre.cli.terminal import CommandError, set_verbosity
+from nacre.cli.view import view
 from nacre.errors import FileFormatError
 
 app = typer.Typer(
@@ -53,6 +54,7 @@ def _nacre(
 for command, example in (
     (demo, "nacre demo -o nacre-demo"),
     (reconstruct, "nacre reconstruct rgbd_dataset_freiburg3_teddy -o teddy"),
+    (view, "nacre view teddy"),
     (
         simulate,
         "nacre simulate bunny.ply -o bunny-recording --views 12 --step 30 --noise 0.0005 --orthographic",

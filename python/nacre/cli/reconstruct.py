@@ -12,6 +12,7 @@ from nacre.cli.results import file_rows, trajectory_rows, write_results
 from nacre.cli.running import retry_lost, run_frames
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
+from nacre.cli.view import PortOption
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
@@ -80,6 +81,10 @@ def reconstruct(
             help="Images of anything else, named as the depth images; fused along. May be repeated.",
         ),
     ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="Show the model in the browser while it grows.")
+    ] = False,
+    port: PortOption = 8080,
     preset: PresetOption = None,
     config: ConfigOption = None,
     settings: SetOption = None,
@@ -128,7 +133,13 @@ def reconstruct(
     writable_folder(out)
     words = describe(sequence, indices)
     terminal.say(f"{sequence.name}: {words}")
-    interrupted = run_frames(terminal, done, indices)
+    live = None
+    if view:
+        from nacre.viewer import LiveView
+
+        live = LiveView(done, sequence.name, port=port)
+        terminal.say(f"the model is at {live.viewer.url}")
+    interrupted = run_frames(terminal, done, indices, live.add if live else None)
     if retry and not interrupted:
         interrupted = retry_lost(terminal, done)
     done.evaluate_trajectory()
@@ -142,6 +153,12 @@ def reconstruct(
     if json:
         print(to_json(report))
     terminal.say(table([*trajectory_rows(done), *file_rows(out)]))
+    if live is not None:
+        live.finish()
+        if not interrupted:
+            terminal.say(f"the model stays at {live.viewer.url}; Ctrl-C ends it")
+            live.viewer.wait()
+        live.viewer.close()
     if interrupted:
         terminal.say(
             f"interrupted after {len(done.frames)} of {len(indices)} frames; what there is was written"

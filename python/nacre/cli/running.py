@@ -5,14 +5,14 @@ from __future__ import annotations
 import logging
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from nacre.cli.terminal import CommandError, Terminal
 
 if TYPE_CHECKING:
-    from nacre.reconstruction import Reconstruction
+    from nacre.reconstruction import FrameRecord, Reconstruction
 
 _log = logging.getLogger(__name__)
 
@@ -44,8 +44,13 @@ def interruptible() -> Iterator[Interruption]:
         signal.signal(signal.SIGINT, before)
 
 
-def run_frames(terminal: Terminal, done: Reconstruction, indices: Sequence[int]) -> bool:
-    """Run the frames of a recording; return whether Ctrl-C stopped it."""
+def run_frames(
+    terminal: Terminal,
+    done: Reconstruction,
+    indices: Sequence[int],
+    watch: Callable[[FrameRecord], None] | None = None,
+) -> bool:
+    """Run the frames of a recording, show each to who watches; return whether Ctrl-C stopped it."""
     accepted = False
     with interruptible() as interruption, terminal.progress("frames", len(indices)) as advance:
         for frame in done.run(indices):
@@ -54,6 +59,8 @@ def run_frames(terminal: Terminal, done: Reconstruction, indices: Sequence[int])
             accepted |= frame.report is not None
             if frame.status in ("LOST", "WEAK"):
                 _log.info("frame %d: %s: %s", frame.index, frame.status, frame.reason)
+            if watch is not None:
+                watch(frame)
             lost = done.counts["LOST"]
             advance(f"{len(done.model):,} points" + f", {lost} lost" * bool(lost))
             if interruption.wanted:
