@@ -15,6 +15,7 @@ from nacre import _core
 from nacre._core import Camera
 from nacre.arrays import as_attributes, as_depth, as_mask, as_pose
 from nacre.depth import DepthParameters, DepthReport
+from nacre.exchange import ExchangeablePoints
 from nacre.noise import NoiseModel
 from nacre.parameters import from_core, to_core, updated
 from nacre.region import RegionParameters, RegionReport
@@ -230,7 +231,7 @@ class FrameReport:
         )
 
 
-class Model:
+class Model(ExchangeablePoints):
     """
     A 3D model that grows with every depth frame.
 
