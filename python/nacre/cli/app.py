@@ -17,6 +17,7 @@ from nacre.cli.demo import demo
 from nacre.cli.doctor import doctor
 from nacre.cli.evaluate import evaluate
 from nacre.cli.info import info
+from nacre.cli.mesh import mesh
 from nacre.cli.reconstruct import reconstruct
 from nacre.cli.simulate import simulate
 from nacre.cli.terminal import CommandError, set_verbosity
@@ -55,6 +56,7 @@ for command, example in (
     (demo, "nacre demo -o nacre-demo"),
     (reconstruct, "nacre reconstruct rgbd_dataset_freiburg3_teddy -o teddy"),
     (view, "nacre view teddy"),
+    (mesh, "nacre mesh teddy -o teddy-mesh.ply"),
     (
         simulate,
         "nacre simulate bunny.ply -o bunny-recording --views 12 --step 30 --noise 0.0005 --orthographic",
