@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from nacre._core import Camera
-from nacre.datasets import icl_nuim, images, plain, redwood, seven_scenes, stanford, tum
+from nacre.datasets import icl_nuim, images, plain, redwood, seven_scenes, stanford, stray_scanner, tum
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files
 from nacre.datasets.sequence import Sequence, check_first_view
@@ -29,7 +29,7 @@ class Reader(NamedTuple):
 # The first that recognises a folder opens it.
 READERS = {
     module.FORMAT: Reader(module.LAYOUT, module.recognise, module.read)
-    for module in (icl_nuim, tum, plain, seven_scenes, stanford, redwood, images)
+    for module in (icl_nuim, tum, stray_scanner, plain, seven_scenes, stanford, redwood, images)
 }
 
 
@@ -49,8 +49,9 @@ def open_sequence(
     path : path-like
         The folder of the recording, or a single range scan.
     format : str, optional
-        ``"tum"``, ``"redwood"`` (also Open3D), ``"7-scenes"``, ``"icl-nuim"``, ``"plain"`` (camera.json and
-        depth/), ``"stanford"`` (range scans), or ``"images"`` (a folder of depth images). None recognises it.
+        ``"tum"``, ``"redwood"`` (also Open3D), ``"7-scenes"``, ``"icl-nuim"``, ``"stray-scanner"``,
+        ``"plain"`` (camera.json and depth/), ``"stanford"`` (range scans), or ``"images"`` (a folder of depth
+        images). None recognises it.
     camera : Camera or path-like, optional
         The depth camera, or a camera file, in place of what the recording or its format says.
     depth_scale : float, optional
