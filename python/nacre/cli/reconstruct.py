@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 def reconstruct(
     source: Annotated[
-        Path, typer.Argument(metavar="SOURCE", help="The recording: a folder.", show_default=False)
+        Path, typer.Argument(metavar="SOURCE", help="The recording: a folder or a .bag.", show_default=False)
     ],
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.", show_default=False)
@@ -95,8 +95,8 @@ def reconstruct(
     """
     Make a model from a recording of a depth camera.
 
-    The recording may be TUM RGB-D, Redwood/Open3D, 7-Scenes, ICL-NUIM, Stray Scanner, Stanford range
-    scans, a plain recording (camera.json and depth/), or a folder of depth images with --camera and
+    The recording may be TUM RGB-D, Redwood/Open3D, 7-Scenes, ICL-NUIM, ROS 1 or 2 (RealSense too), Stray
+    Scanner, Stanford range scans, a plain recording (camera.json and depth/), or a folder of depth images with --camera and
     --depth-scale; its format is recognised.
 
     OUT gets model.ply (points with normals, in the first camera's frame), trajectory.txt, report.json and
