@@ -96,8 +96,8 @@ def reconstruct(
     Make a model from a recording of a depth camera.
 
     The recording may be TUM RGB-D, Redwood/Open3D, 7-Scenes, ICL-NUIM, ROS 1 or 2 (RealSense too), Stray
-    Scanner, Stanford range scans, a plain recording (camera.json and depth/), or a folder of depth images with --camera and
-    --depth-scale; its format is recognised.
+    Scanner, Stanford range scans, a plain recording (camera.json and depth/), or a folder of depth images
+    with --camera and --depth-scale; its format is recognised.
 
     OUT gets model.ply (points with normals, in the first camera's frame), trajectory.txt, report.json and
     report.html. A frame that cannot be read or registered is LOST and changes nothing.

@@ -68,8 +68,8 @@ class _Bag:
         except ImportError as error:
             raise ImportError(_MISSING) from error
         self.path = path
-        self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
         try:
+            self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
             self._reader.open()
         except Exception as error:  # rosbags has several, and lets through what damaged files cause
             raise FileFormatError(path, f"not a whole ROS recording: {error}") from error
