@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from nacre._core import Camera
 from nacre.datasets.given import Given
+from nacre.datasets.listing import describe
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 
@@ -41,6 +42,9 @@ def read(path: Path, given: Given) -> Sequence:
     The depth topic is the one that is aligned to the colours, if there is one. Images of 16 bits are
     millimetres unless a RealSense recording tells its depth units, or the caller does.
     """
+    if not recognise(path):
+        holds = f"; the folder holds {describe(path)}" if path.is_dir() else ""
+        raise FileFormatError(path, f"a ROS recording is {LAYOUT}{holds}")
     bag = _Bag(path, given.depth_scale)
     camera = given.camera or bag.camera()
     colors = bag.colors(given.max_difference)
