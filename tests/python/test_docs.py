@@ -1,4 +1,4 @@
-"""The documentation: what it shows runs, and where Sphinx and Doxygen are there, it builds without a warning."""
+"""The documentation: what it shows runs; where Sphinx and Doxygen are, it builds without a warning."""
 
 from __future__ import annotations
 
