@@ -9,6 +9,8 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+from headings import link_to
+
 Result = dict[str, Any]
 
 
@@ -43,7 +45,7 @@ def summary(run: dict[str, Any]) -> str:
         heads += [f"nacre, {plural(threads)} [ms]", "fastest peer [ms]", "times faster"]
     rows = []
     for name, about in run["workloads"].items():
-        row = [f"[{about['title']}](#{name})"]
+        row = [link_to(about["title"])]
         for threads in run["threads"]:
             if not results(run, name, threads):
                 row += ["not run", "-", "-"]
@@ -117,7 +119,7 @@ def workload(run: dict[str, Any], name: str) -> str:
         line += [figure(last["errors"].get(key)) for key in errors]
         line += [f"{last['memory'] / about['items']:,.0f}" if last["memory"] is not None else "-"]
         lines.append(line)
-    title = f'<a name="{name}"></a>\n### {about["title"]}\n\n`{name}`. {about["note"]}'.rstrip()
+    title = f"### {about['title']}\n\n`{name}`. {about['note']}".rstrip()
     text = f"{title}\n\n{table(heads, lines)}"
     if about["limits"]:
         allowed = " and ".join(f"{key} up to {limit:g}" for key, limit in about["limits"].items())

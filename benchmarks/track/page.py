@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from headings import link_to
+
 from track.figures import BY_NAME as FIGURES
 from track.figures import FIGURES as ALL
 from track.rows import Goal, Row
@@ -51,7 +53,7 @@ def summary(results: Mapping[str, Any]) -> str:
             f"{'**' if not goal.is_reached(figures) else ''}"
             for goal in row.goals
         ]
-        rows.append([f"[{row.title}](#{row.name})", "; ".join(states)])
+        rows.append([link_to(row.title), "; ".join(states)])
     text = "Each figure with its goal in brackets; what misses its goal is bold."
     return f"## In short\n\n{text}\n\n{table(['on', 'reached'], rows)}"
 
@@ -70,7 +72,7 @@ def section(row: Row, result: Mapping[str, Any]) -> str:
         else:
             rows.append([name, *(number(figures.get(figure.name), figure.digits) for figure in shown)])
     note = f"{row.note}\n\n" if row.note else ""
-    return f'<a id="{row.name}"></a>\n\n## {row.title}\n\n{note}{table(heads, rows)}'
+    return f"## {row.title}\n\n{note}{table(heads, rows)}"
 
 
 def missed(results: Mapping[str, Any], rows: list[Row]) -> list[str]:

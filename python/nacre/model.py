@@ -15,6 +15,7 @@ from nacre import _core
 from nacre._core import Camera
 from nacre.arrays import as_attributes, as_depth, as_mask, as_pose
 from nacre.depth import DepthParameters, DepthReport
+from nacre.exchange import ExchangeablePoints
 from nacre.noise import NoiseModel
 from nacre.parameters import from_core, to_core, updated
 from nacre.region import RegionParameters, RegionReport
@@ -232,7 +233,7 @@ class FrameReport:
         )
 
 
-class Model:
+class Model(ExchangeablePoints):
     """
     A 3D model that grows with every depth frame.
 
@@ -408,6 +409,12 @@ class Model:
         """(N,) frontal observations that each point stands for; a copy."""
         with self._lock:
             return self._core.cloud.confidence
+
+    @property
+    def last_seen(self) -> npt.NDArray[np.int32]:
+        """(N,) the last frame that observed each point, counting those with a pose from 0; a copy."""
+        with self._lock:
+            return self._core.cloud.last_seen
 
     @property
     def poses(self) -> npt.NDArray[np.float64]:

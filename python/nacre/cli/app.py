@@ -14,17 +14,19 @@ import typer
 from nacre.cli.align import align
 from nacre.cli.consolidate import consolidate
 from nacre.cli.demo import demo
+from nacre.cli.doctor import doctor
 from nacre.cli.evaluate import evaluate
 from nacre.cli.info import info
+from nacre.cli.mesh import mesh
 from nacre.cli.reconstruct import reconstruct
 from nacre.cli.simulate import simulate
 from nacre.cli.terminal import CommandError, set_verbosity
+from nacre.cli.view import view
 from nacre.errors import FileFormatError
 
 app = typer.Typer(
     name="nacre",
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
@@ -53,6 +55,8 @@ def _nacre(
 for command, example in (
     (demo, "nacre demo -o nacre-demo"),
     (reconstruct, "nacre reconstruct rgbd_dataset_freiburg3_teddy -o teddy"),
+    (view, "nacre view teddy"),
+    (mesh, "nacre mesh teddy -o teddy-mesh.ply"),
     (
         simulate,
         "nacre simulate bunny.ply -o bunny-recording --views 12 --step 30 --noise 0.0005 --orthographic",
@@ -61,12 +65,13 @@ for command, example in (
     (align, "nacre align scan2.ply scan1.ply -o moved.ply"),
     (consolidate, "nacre consolidate noisy.ply thin.ply --radius 0.008 --num-points 2000"),
     (info, "nacre info rgbd_dataset_freiburg3_teddy"),
+    (doctor, "nacre doctor --json"),
 ):
     paragraphs = (" ".join(text.split()) for text in (command.__doc__ or "").split("\n\n"))
     app.command(
         help="\n\n".join(paragraphs),
         epilog=f"Example: [bold]{example}[/bold]",
-        no_args_is_help=command is not demo,
+        no_args_is_help=command not in (demo, doctor),
     )(command)
 
 

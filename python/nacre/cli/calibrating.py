@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from nacre import DepthCalibration
     from nacre.datasets import Sequence as Recording
     from nacre.reconstruction import FrameRecord, Reconstruction
+    from nacre.viewer import LiveView
 
 
 class Views:
@@ -47,10 +48,16 @@ class Views:
 
 
 def run_calibrated(
-    terminal: Terminal, done: Reconstruction, recording: Recording, indices: Sequence[int]
+    terminal: Terminal,
+    done: Reconstruction,
+    recording: Recording,
+    indices: Sequence[int],
+    live: LiveView | None = None,
 ) -> tuple[Reconstruction, DepthCalibration | None, bool]:
     """
     Run the frames of a recording; where they show that its depth is wrong, run them again with it corrected.
+
+    ``live`` shows the run that is going on.
 
     Returns
     -------
@@ -64,8 +71,9 @@ def run_calibrated(
     import nacre
     from nacre.reconstruction import Reconstruction
 
+    watch = live.add if live else None
     views = Views()
-    interrupted = run_frames(terminal, done, indices, views.add)
+    interrupted = run_frames(terminal, done, indices, views.add, watch)
     calibration = None if interrupted else views.calibrate(recording)
     rest = indices[len(done.frames) :]
     if calibration is not None and calibration.is_significant:
@@ -76,6 +84,8 @@ def run_calibrated(
         recording = recording.with_depth_calibration(calibration)
         done = Reconstruction(recording, nacre.Model(recording.camera, parameters=done.model.parameters))
         rest = indices
+        if live is not None:
+            live.begin_again(done)
     if rest and not interrupted:
-        interrupted = run_frames(terminal, done, rest)
+        interrupted = run_frames(terminal, done, rest, watch=watch)
     return done, calibration, interrupted

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from nacre import Mesh, Trajectory
-    from nacre.cli.written import Written
     from nacre.evaluation import SurfaceSamples
     from nacre.evaluation.result import Result
+    from nacre.written import Written
 
     Matrix = npt.NDArray[np.float64]
 
@@ -91,7 +91,7 @@ def evaluate(
     is_surface = truth is not None and truth.suffix.lower() in MESH_SUFFIXES + POINT_SUFFIXES
     written = None
     if estimate.is_dir():
-        from nacre.cli.written import Written
+        from nacre.written import Written
 
         if not (estimate / "report.json").is_file():
             raise CommandError(

@@ -30,7 +30,7 @@ def info(
     terminal = Terminal(json, quiet, verbose)
     if not source.exists():
         raise CommandError(f"no such file or folder: {source}", 2)
-    if source.is_dir() or format is not None:
+    if source.is_dir() or source.suffix.lower() == ".bag" or format is not None:
         figures, rows = _recording(open_source(source, format, camera, depth_scale))
     elif source.suffix.lower() in POINT_SUFFIXES and not (
         source.suffix.lower() == ".ply" and has_faces(source)

@@ -14,6 +14,7 @@ from nacre.cli.results import file_rows, trajectory_rows, write_results
 from nacre.cli.running import retry_lost, run_frames
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
+from nacre.cli.view import PortOption
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 
 def reconstruct(
     source: Annotated[
-        Path, typer.Argument(metavar="SOURCE", help="The recording: a folder.", show_default=False)
+        Path, typer.Argument(metavar="SOURCE", help="The recording: a folder or a .bag.", show_default=False)
     ],
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.", show_default=False)
@@ -89,6 +90,10 @@ def reconstruct(
             help="Images of anything else, named as the depth images; fused along. May be repeated.",
         ),
     ] = None,
+    view: Annotated[
+        bool, typer.Option("--view", help="Show the model in the browser while it grows.")
+    ] = False,
+    port: PortOption = 8080,
     preset: PresetOption = None,
     config: ConfigOption = None,
     settings: SetOption = None,
@@ -99,9 +104,9 @@ def reconstruct(
     """
     Make a model from a recording of a depth camera.
 
-    The recording may be TUM RGB-D, Redwood/Open3D, 7-Scenes, ICL-NUIM, Stanford range scans, a plain
-    recording (camera.json and depth/), or a folder of depth images with --camera and --depth-scale; its
-    format is recognised.
+    The recording may be TUM RGB-D, Redwood/Open3D, 7-Scenes, ICL-NUIM, ROS 1 or 2 (RealSense too), Stray
+    Scanner, Stanford range scans, a plain recording (camera.json and depth/), or a folder of depth images
+    with --camera and --depth-scale; its format is recognised.
 
     OUT gets model.ply (points with normals, in the first camera's frame), trajectory.txt, report.json and
     report.html. A frame that cannot be read or registered is LOST and changes nothing.
@@ -138,13 +143,19 @@ def reconstruct(
     writable_folder(out)
     words = describe(sequence, indices)
     terminal.say(f"{sequence.name}: {words}")
+    live = None
+    if view:
+        from nacre.viewer import LiveView
+
+        live = LiveView(done, sequence.name, port=port)
+        terminal.say(f"the model is at {live.viewer.url}")
     # What turns before a camera that stands still is not one scene with what is around it.
     whole = masks is None and parameters.region == nacre.RegionParameters()
     calibration = None
     if calibrate and whole and preset_name != "paper" and can_calibrate(sequence.camera):
-        done, calibration, interrupted = run_calibrated(terminal, done, sequence, indices)
+        done, calibration, interrupted = run_calibrated(terminal, done, sequence, indices, live)
     else:
-        interrupted = run_frames(terminal, done, indices)
+        interrupted = run_frames(terminal, done, indices, watch=live.add if live else None)
     if retry and not interrupted:
         interrupted = retry_lost(terminal, done)
     done.evaluate_trajectory()
@@ -164,6 +175,12 @@ def reconstruct(
     if json:
         print(to_json(report))
     terminal.say(table([*trajectory_rows(done), *file_rows(out)]))
+    if live is not None:
+        live.finish()
+        if not interrupted:
+            terminal.say(f"the model stays at {live.viewer.url}; Ctrl-C ends it")
+            live.viewer.wait()
+        live.viewer.close()
     if interrupted:
         terminal.say(
             f"interrupted after {len(done.frames)} of {len(indices)} frames; what there is was written"

@@ -41,7 +41,7 @@ def write_results(
         model.points,
         normals=model.normals,
         colors=model.colors,
-        attributes={"confidence": model.confidence, **model.attributes},
+        attributes={"confidence": model.confidence, "last_seen": model.last_seen, **model.attributes},
         comments=[f"nacre {nacre.__version__}", "metres; the world is the first camera's frame"],
     )
     trajectory = done.trajectory

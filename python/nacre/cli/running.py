@@ -49,8 +49,9 @@ def run_frames(
     done: Reconstruction,
     indices: Sequence[int],
     until: Callable[[FrameRecord], bool] | None = None,
+    watch: Callable[[FrameRecord], None] | None = None,
 ) -> bool:
-    """Run the frames of a recording, at most until one says so; return whether Ctrl-C stopped it."""
+    """Run frames, show each to who watches, at most until one says so; return whether Ctrl-C stopped it."""
     accepted = any(frame.report is not None for frame in done.frames)
     with interruptible() as interruption, terminal.progress("frames", len(indices)) as advance:
         for frame in done.run(indices):
@@ -59,6 +60,8 @@ def run_frames(
             accepted |= frame.report is not None
             if frame.status in ("LOST", "WEAK"):
                 _log.info("frame %d: %s: %s", frame.index, frame.status, frame.reason)
+            if watch is not None:
+                watch(frame)
             lost = done.counts["LOST"]
             advance(f"{len(done.model):,} points" + f", {lost} lost" * bool(lost))
             if interruption.wanted or (until is not None and until(frame)):

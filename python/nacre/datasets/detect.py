@@ -9,7 +9,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 from nacre._core import Camera
-from nacre.datasets import icl_nuim, images, plain, redwood, seven_scenes, stanford, tum
+from nacre.datasets import (
+    icl_nuim,
+    images,
+    plain,
+    redwood,
+    rosbag,
+    seven_scenes,
+    stanford,
+    stray_scanner,
+    tum,
+)
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files
 from nacre.datasets.sequence import Sequence, check_first_view
@@ -29,7 +39,7 @@ class Reader(NamedTuple):
 # The first that recognises a folder opens it.
 READERS = {
     module.FORMAT: Reader(module.LAYOUT, module.recognise, module.read)
-    for module in (icl_nuim, tum, plain, seven_scenes, stanford, redwood, images)
+    for module in (rosbag, icl_nuim, tum, stray_scanner, plain, seven_scenes, stanford, redwood, images)
 }
 
 
@@ -47,10 +57,11 @@ def open_sequence(
     Parameters
     ----------
     path : path-like
-        The folder of the recording, or a single range scan.
+        The folder of the recording, a ``.bag`` file, or a single range scan.
     format : str, optional
-        ``"tum"``, ``"redwood"`` (also Open3D), ``"7-scenes"``, ``"icl-nuim"``, ``"plain"`` (camera.json and
-        depth/), ``"stanford"`` (range scans), or ``"images"`` (a folder of depth images). None recognises it.
+        ``"tum"``, ``"redwood"`` (also Open3D), ``"7-scenes"``, ``"icl-nuim"``, ``"stray-scanner"``,
+        ``"rosbag"`` (ROS 1 and 2, RealSense), ``"plain"`` (camera.json and depth/), ``"stanford"`` (range
+        scans), or ``"images"`` (a folder of depth images). None recognises it.
     camera : Camera or path-like, optional
         The depth camera, or a camera file, in place of what the recording or its format says.
     depth_scale : float, optional
@@ -105,10 +116,11 @@ def _named(format: str) -> Reader:
 
 def _recognised(path: Path, given: Given) -> Reader:
     if not path.is_dir():
-        if stanford.recognise(path):
-            return READERS[stanford.FORMAT]
+        for module in (stanford, rosbag):
+            if module.recognise(path):
+                return READERS[module.FORMAT]
         raise FileFormatError(
-            path, "not a recording: a recording is a folder, or a range scan (.ply with a range_grid)"
+            path, "not a recording: a recording is a folder, a .bag, or a range scan (.ply with a range_grid)"
         )
     for name, reader in READERS.items():
         if reader.recognise(path) and not (name == images.FORMAT and _needs_more(path, given)):

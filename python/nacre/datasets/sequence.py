@@ -26,6 +26,7 @@ from nacre.io.trajectories import Trajectory
 _log = logging.getLogger(__name__)
 
 DepthLoader = Callable[[Path], npt.NDArray[np.float32]]
+ColorLoader = Callable[[Path], npt.NDArray[np.uint8]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +122,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         truth: Trajectory | None = None,
         estimate: Trajectory | None = None,
         load_depth: DepthLoader | None = None,
+        load_color: ColorLoader = read_color,
         name: str | None = None,
     ) -> None:
         self.path = path
@@ -132,6 +134,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         self.estimate = estimate
         self._sources = tuple(sources)
         self._load_depth = load_depth or partial(load_depth_metres, depth_scale=depth_scale)
+        self._load_color = load_color
 
     def __len__(self) -> int:
         return len(self._sources)
@@ -241,6 +244,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
             truth=self.truth,
             estimate=self.estimate,
             load_depth=load_depth or self._load_depth,
+            load_color=self._load_color,
             name=self.name,
         )
 
@@ -249,7 +253,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         check_size(source.depth, depth, self.camera)
         color = None
         if source.color is not None:
-            color = _named(read_color, source.color)
+            color = _named(self._load_color, source.color)
             check_size(source.color, color, self.camera)
         mask = None
         if source.mask is not None:
@@ -311,7 +315,7 @@ def check_first_view(sequence: Sequence) -> Sequence:
         if source.color is None:
             break
         try:
-            check_size(source.color, _named(read_color, source.color), sequence.camera)
+            check_size(source.color, _named(sequence._load_color, source.color), sequence.camera)
         except FileFormatError as error:
             _log.warning("colour is left out: %s", error)
             return sequence.without_color()

@@ -1,0 +1,48 @@
+"""``nacre view``: what a reconstruction wrote, in the browser."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nacre.cli.terminal import Quiet, Terminal, Verbose, table
+
+PortOption = Annotated[
+    int, typer.Option(min=0, max=65535, metavar="PORT", help="Where the viewer listens; the next free one.")
+]
+
+
+def view(
+    folder: Annotated[
+        Path, typer.Argument(metavar="OUT", help="What nacre reconstruct wrote.", show_default=False)
+    ],
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write a page that opens without a server instead.", show_default=False
+        ),
+    ] = None,
+    port: PortOption = 8080,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+) -> None:
+    """
+    Look at a reconstruction in the browser.
+
+    The page shows the model, coloured by shading, normal, confidence or age, the camera's path, and for
+    each frame its depth image with removed pixels marked, and its figures. It needs the extra "view".
+    """
+    terminal = Terminal(False, quiet, verbose)
+    from nacre.viewer import Viewer, export_html, written_story
+
+    story = written_story(folder)
+    if html is not None:
+        export_html(story, html)
+        terminal.say(table([("page", str(html))]))
+        return
+    viewer = Viewer(story, port=port)
+    terminal.say(f"the model is at {viewer.url}; Ctrl-C ends it")
+    viewer.wait()
+    viewer.close()

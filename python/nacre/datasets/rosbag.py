@@ -1,0 +1,235 @@
+"""ROS 1 and 2 recordings (.bag, folders with metadata.yaml), RealSense's among them; read by rosbags."""
+
+from __future__ import annotations
+
+import io
+import re
+import weakref
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre._core import Camera
+from nacre.datasets.given import Given
+from nacre.datasets.listing import describe
+from nacre.datasets.sequence import FrameSource, Sequence
+from nacre.errors import FileFormatError
+
+FORMAT = "rosbag"
+LAYOUT = "a .bag file (ROS 1, RealSense) or a ROS 2 folder (metadata.yaml), with depth images and camera_info"
+
+_IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
+_INFO = "sensor_msgs/msg/CameraInfo"
+_MISSING = 'ROS recordings need rosbags: pip install "nacre[ros]"'
+_MILLIMETRES, _METRES = ("16UC1", "mono16", "Z16"), ("32FC1",)
+_CHANNELS = {"rgb8": (0, 1, 2), "bgr8": (2, 1, 0), "rgba8": (0, 1, 2), "bgra8": (2, 1, 0), "mono8": (0, 0, 0)}
+
+
+def recognise(path: Path) -> bool:
+    """Say whether this is a ROS recording: a .bag file, or a folder with metadata.yaml and bags."""
+    if path.is_file():
+        return path.suffix == ".bag"
+    return (path / "metadata.yaml").is_file() and any(path.glob(pattern) for pattern in ("*.db3*", "*.mcap"))
+
+
+def read(path: Path, given: Given) -> Sequence:
+    """
+    Open a ROS recording.
+
+    The depth topic is the one that is aligned to the colours, if there is one. Images of 16 bits are
+    millimetres unless a RealSense recording tells its depth units, or the caller does.
+    """
+    if not recognise(path):
+        holds = f"; the folder holds {describe(path)}" if path.is_dir() else ""
+        raise FileFormatError(path, f"a ROS recording is {LAYOUT}{holds}")
+    bag = _Bag(path, given.depth_scale)
+    camera = given.camera or bag.camera()
+    colors = bag.colors(given.max_difference)
+    return Sequence(
+        path,
+        format=FORMAT,
+        camera=camera,
+        depth_scale=bag.depth_scale,
+        sources=[
+            FrameSource(i, bag.place(bag.depth_topic, time), color, 1e-9 * time)
+            for i, (time, color) in enumerate(zip(bag.times, colors, strict=True))
+        ],
+        load_depth=bag.depth,
+        load_color=bag.color,
+    )
+
+
+class _Bag:
+    """An open recording; images are read when they are asked for."""
+
+    def __init__(self, path: Path, depth_scale: float | None) -> None:
+        try:
+            from rosbags.highlevel import AnyReader
+            from rosbags.typesys import Stores, get_typestore
+        except ImportError as error:
+            raise ImportError(_MISSING) from error
+        self.path = path
+        try:
+            self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+            self._reader.open()
+        except Exception as error:  # rosbags has several, and lets through what damaged files cause
+            raise FileFormatError(path, f"not a whole ROS recording: {error}") from error
+        weakref.finalize(self, self._reader.close)
+        topics = [c.topic for c in self._reader.connections if c.msgtype in _IMAGES]
+        depth = [topic for topic in topics if re.search("depth", topic, re.IGNORECASE)]
+        if not depth:
+            raise FileFormatError(
+                path, f"no topic of depth images; there are {', '.join(sorted(topics)) or 'no images'}"
+            )
+        self.depth_topic = min(depth, key=_preference)
+        self._color_topics = [
+            t for t in topics if re.search("colou?r|rgb", t, re.IGNORECASE) and t not in depth
+        ]
+        self.times = [time for _, time, _ in self._messages(self.depth_topic)]
+        self.depth_scale = depth_scale if depth_scale is not None else self._depth_scale()
+
+    def camera(self) -> Camera:
+        """Return the camera of the depth images."""
+        near = [c for c in self._reader.connections if c.msgtype == _INFO]
+        if not near:
+            raise FileFormatError(self.path, "no camera_info; give the camera")
+        chosen = max(near, key=lambda c: _common(c.topic, self.depth_topic))
+        for connection, _, data in self._reader.messages([chosen]):
+            info: Any = self._reader.deserialize(data, connection.msgtype)
+            matrix, coefficients = (
+                np.asarray(getattr(info, name if hasattr(info, name) else name.upper()), np.float64)
+                for name in ("k", "d")  # capitals in ROS 1
+            )
+            matrix = matrix.reshape(3, 3)
+            distortion = coefficients if len(coefficients) in (4, 5) else np.zeros(5)
+            try:
+                return Camera(
+                    info.width, info.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2],
+                    distortion=list(distortion),
+                )  # fmt: skip
+            except ValueError as error:
+                raise FileFormatError(self.path, f"{chosen.topic}: {error}") from error
+        raise FileFormatError(self.path, f"{chosen.topic} is empty; give the camera")
+
+    def colors(self, max_difference: float) -> list[Path | None]:
+        """Return for each depth image the colour image that is nearest in time."""
+        for topic in sorted(self._color_topics, key=_preference):
+            times = np.array([time for _, time, _ in self._messages(topic)])
+            if not len(times):
+                continue
+            found: list[Path | None] = []
+            for time in self.times:
+                nearest = int(times[np.abs(times - time).argmin()])
+                is_near = abs(nearest - time) <= 1e9 * max_difference
+                found.append(self.place(topic, nearest) if is_near else None)
+            return found
+        return [None] * len(self.times)
+
+    def place(self, topic: str, time: int) -> Path:
+        """Name an image, for errors and for reading it."""
+        return self.path / topic.strip("/") / f"{time}"
+
+    def depth(self, place: Path) -> npt.NDArray[np.float32]:
+        """Read a depth image [m]."""
+        message = self._message(place)
+        is_raw = hasattr(message, "encoding")
+        encoding = message.encoding if is_raw else message.format.split(";")[0].strip()
+        if encoding not in _MILLIMETRES + _METRES:
+            known = ", ".join(_MILLIMETRES + _METRES)
+            raise FileFormatError(place, f"depth images are {known}, this one is {encoding}")
+        image = _pixels(message, place) if is_raw else _compressed_depth(message, place)
+        metres = np.array(image if encoding in _METRES else image / self.depth_scale, np.float32)
+        metres[~(metres > 0) | ~np.isfinite(metres) | (image == 65535)] = np.nan
+        return metres
+
+    def color(self, place: Path) -> npt.NDArray[np.uint8]:
+        """Read a colour image."""
+        message = self._message(place)
+        if not hasattr(message, "encoding"):
+            return _decoded(message, place)
+        if message.encoding not in _CHANNELS:
+            raise FileFormatError(
+                place, f"colour images are {', '.join(_CHANNELS)}, this is {message.encoding}"
+            )
+        pixels = _pixels(message, place)
+        pixels = pixels if pixels.ndim == 3 else pixels[..., None]
+        return np.ascontiguousarray(pixels[..., _CHANNELS[message.encoding]])
+
+    def _depth_scale(self) -> float:
+        units = [c for c in self._reader.connections if c.topic.endswith("option/Depth_Units/value")]
+        for connection, _, data in self._reader.messages(units) if units else ():
+            message: Any = self._reader.deserialize(data, connection.msgtype)
+            if message.data > 0:
+                return float(round(1 / message.data, 3))
+        return 1000.0
+
+    def _messages(self, topic: str, time: int | None = None) -> Any:
+        connections = [c for c in self._reader.connections if c.topic == topic]
+        return self._reader.messages(connections, time, None if time is None else time + 1)
+
+    def _message(self, place: Path) -> Any:
+        topic, time = "/" + place.parent.relative_to(self.path).as_posix(), int(place.name)
+        for connection, _, data in self._messages(topic, time):
+            with suppress(AssertionError):
+                return self._reader.deserialize(data, connection.msgtype)
+        raise FileFormatError(place, "the message is missing or damaged")
+
+
+def _preference(topic: str) -> tuple[bool, bool, str]:
+    """Rank topics: aligned to the colours first, raw images before compressed ones."""
+    return (
+        re.search("aligned|registered", topic) is None,
+        re.search("compressed", topic, re.IGNORECASE) is not None,
+        topic,
+    )
+
+
+def _common(a: str, b: str) -> int:
+    """Return how many parts of two topics are the same from the start."""
+    parts = zip(a.split("/"), b.split("/"), strict=False)
+    return next((i for i, (x, y) in enumerate(parts) if x != y), min(a.count("/"), b.count("/")) + 1)
+
+
+def _pixels(message: Any, place: Path) -> npt.NDArray[Any]:
+    """Return the pixels of an uncompressed image, (H, W) or (H, W, C)."""
+    encoding = message.encoding
+    if encoding in _CHANNELS:
+        dtype, channels = np.dtype("u1"), 1 if encoding == "mono8" else len(encoding) - 1
+    else:
+        dtype, channels = np.dtype("f4" if encoding in _METRES else "u2"), 1
+    dtype = dtype.newbyteorder(">" if message.is_bigendian else "<")
+    row = message.width * channels * dtype.itemsize
+    data = np.asarray(message.data, np.uint8).reshape(-1)
+    if message.step < row or len(data) < message.height * message.step:
+        raise FileFormatError(place, f"the image of {message.width} x {message.height} is cut short")
+    rows = data[: message.height * message.step].reshape(message.height, message.step)[:, :row]
+    image = np.ascontiguousarray(rows).view(dtype).reshape(message.height, message.width, channels)
+    return image[..., 0] if channels == 1 else image
+
+
+def _compressed_depth(message: Any, place: Path) -> npt.NDArray[Any]:
+    """Return the pixels of a compressedDepth image: a header of 12 bytes, then a PNG of 16 bits."""
+    from PIL import Image, UnidentifiedImageError
+
+    data = bytes(message.data)
+    start = data.find(b"\x89PNG")
+    if start < 0 or "32FC1" in message.format:
+        raise FileFormatError(place, f"compressed depth must be a PNG of 16 bits, this is {message.format!r}")
+    try:
+        return np.asarray(Image.open(io.BytesIO(data[start:])), dtype=np.uint16)
+    except (UnidentifiedImageError, OSError, SyntaxError) as error:
+        raise FileFormatError(place, f"the PNG is damaged: {error}") from error
+
+
+def _decoded(message: Any, place: Path) -> npt.NDArray[np.uint8]:
+    """Return the pixels of a compressed colour image."""
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(io.BytesIO(bytes(message.data))) as image:
+            return np.array(image.convert("RGB"), dtype=np.uint8)
+    except (UnidentifiedImageError, OSError, SyntaxError) as error:
+        raise FileFormatError(place, f"the image is damaged: {error}") from error

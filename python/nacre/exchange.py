@@ -1,0 +1,87 @@
+"""What other libraries, and notebooks, get of a model."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+
+class ExchangeablePoints(ABC):
+    """Gives points to other libraries, which are imported when they are asked for."""
+
+    @property
+    @abstractmethod
+    def points(self) -> npt.NDArray[np.float32]:
+        """(N, 3) [m]."""
+
+    @property
+    @abstractmethod
+    def normals(self) -> npt.NDArray[np.float32]:
+        """(N, 3) unit vectors."""
+
+    @property
+    @abstractmethod
+    def colors(self) -> npt.NDArray[np.uint8] | None:
+        """(N, 3), or None."""
+
+    def to_open3d(self) -> Any:
+        """
+        Return the points as an ``open3d.geometry.PointCloud``, with normals, and colours where there are any.
+
+        Raises
+        ------
+        ImportError
+            When Open3D is missing, with the command that installs it.
+        """
+        try:
+            from open3d import geometry, utility
+        except ImportError as error:
+            raise ImportError("to_open3d needs Open3D: pip install open3d") from error
+        cloud = geometry.PointCloud(utility.Vector3dVector(self.points.astype(np.float64)))
+        cloud.normals = utility.Vector3dVector(self.normals.astype(np.float64))
+        if self.colors is not None:
+            cloud.colors = utility.Vector3dVector(self.colors / 255.0)
+        return cloud
+
+    def to_trimesh(self) -> Any:
+        """
+        Return the points as a ``trimesh.PointCloud``, with colours where there are any.
+
+        It has no place for normals: they are in its ``metadata["normals"]``.
+
+        Raises
+        ------
+        ImportError
+            When trimesh is missing, with the command that installs it.
+        """
+        try:
+            import trimesh
+        except ImportError as error:
+            raise ImportError("to_trimesh needs trimesh: pip install trimesh") from error
+        return trimesh.PointCloud(self.points, colors=self.colors, metadata={"normals": self.normals})
+
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        """Return the points (N, 3), so that NumPy's functions take the model itself."""
+        if copy is False:
+            raise ValueError("copy must be True or None: the points of a model are always copied, got False")
+        points = self.points
+        return points if dtype is None else points.astype(dtype, copy=False)
+
+    def _repr_png_(self) -> bytes | None:
+        """Return a picture of the points, which notebooks show in place of the words of ``repr``."""
+        from nacre.report.pictures import OBLIQUE
+        from nacre.report.png import encode_png
+        from nacre.report.render import measure_spacing, render_points
+        from nacre.report.view import View
+
+        points = self.points
+        if not len(points):
+            return None
+        view = View.fit(points, OBLIQUE, size=(480, 400))
+        image = render_points(
+            points, self.normals, self.colors, view=view, spacing=measure_spacing(points), background=None
+        )
+        return encode_png(image)

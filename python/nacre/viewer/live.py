@@ -1,0 +1,59 @@
+"""Keeping a viewer up to date while a reconstruction runs."""
+
+from __future__ import annotations
+
+import time
+
+from nacre.reconstruction import FrameRecord, Reconstruction
+from nacre.viewer.page import Viewer
+from nacre.viewer.story import Moment, Snapshot, Story
+
+_SHARE = 5.0
+
+
+class LiveView:
+    """
+    A viewer of a reconstruction that is running. It takes a sixth of the time at most.
+
+    Parameters
+    ----------
+    done : Reconstruction
+        The run.
+    title : str
+        Of the page.
+    host, port : str, int
+        See :class:`Viewer`.
+    """
+
+    def __init__(
+        self, done: Reconstruction, title: str, *, host: str = "127.0.0.1", port: int = 8080
+    ) -> None:
+        self._done = done
+        self.story = Story(title, done.model.camera, depth_of=lambda index: self._done.sequence[index].depth)
+        self.viewer = Viewer(self.story, host=host, port=port, parameters=done.model.parameters.depth)
+        self._next = 0.0
+
+    def begin_again(self, done: Reconstruction) -> None:
+        """Show another run from now on."""
+        self._done = done
+        self.story.clear()
+
+    def add(self, record: FrameRecord) -> None:
+        """Note a frame; show it if there is time."""
+        self.story.add(Moment.of(record))
+        if time.monotonic() >= self._next:
+            self.show()
+
+    def show(self) -> None:
+        """Show the newest frame and the model as it is now."""
+        start = time.monotonic()
+        if len(self._done.model):
+            self.story.set_snapshot(Snapshot.of(self._done.model))
+        self.viewer.refresh()
+        now = time.monotonic()
+        self._next = now + _SHARE * (now - start)
+
+    def finish(self) -> None:
+        """Show the end: poses as loops have corrected them, frames that were found after all."""
+        self.story.moments[:] = [Moment.of(record) for record in self._done.frames]
+        self.show()

@@ -1,0 +1,274 @@
+"""The page: the scene with its controls, served to a browser; and a file that shows it without a server."""
+
+from __future__ import annotations
+
+import io
+import os
+import threading
+from contextlib import redirect_stdout
+from html import escape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre import back_project, preprocess_depth
+from nacre.depth import DepthParameters
+from nacre.errors import FileFormatError
+from nacre.io.atomic import atomic_writer
+from nacre.viewer.colors import STATUS_COLORS, color_kinds
+from nacre.viewer.depth_picture import depth_picture
+from nacre.viewer.scene import Scene, extent
+from nacre.viewer.story import Moment, Snapshot, Story
+
+_MISSING = 'the viewer needs viser: pip install "nacre[view]"'
+
+
+class Viewer:
+    """
+    Shows a story in the browser.
+
+    Parameters
+    ----------
+    story : Story
+        May grow while it is shown; call :meth:`refresh` then.
+    host, port : str, int
+        Where to listen; another port is taken where this one is in use.
+    parameters : DepthParameters, optional
+        What is marked as removed in depth images.
+
+    Raises
+    ------
+    ImportError
+        When viser is missing, with the command that installs it.
+    """
+
+    def __init__(
+        self,
+        story: Story,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        parameters: DepthParameters | None = None,
+    ) -> None:
+        self.story = story
+        self._parameters = parameters
+        self._server = _server(host, port)
+        self._scene = Scene(self._server.scene, story.camera)
+        self._lock = threading.RLock()
+        self._size = 0.0
+        self._shown: tuple[Snapshot, str, float] | None = None
+        self._is_moving = False  # the slider, by this class and not by a person
+        self._build()
+        self.refresh()
+
+    @property
+    def url(self) -> str:
+        """Where the page is."""
+        return f"http://{self._server.get_host()}:{self._server.get_port()}"
+
+    @property
+    def place(self) -> int:
+        """Which frame is shown, as a place in the story's list."""
+        return min(int(self._time.value), len(self.story.moments) - 1)
+
+    def refresh(self) -> None:
+        """Show what the story has gained; the newest frame, unless a person has chosen another one."""
+        with self._lock:
+            last = max(len(self.story.moments) - 1, 0)
+            self._time.max = max(last, 1)
+            if self._follow.value and self._time.value != last:
+                self._is_moving = True
+                self._time.value = last
+                self._is_moving = False
+            self._strip.content = status_strip(self.story.moments)
+            self._draw()
+
+    def wait(self) -> None:
+        """Serve until Ctrl-C."""
+        try:
+            threading.Event().wait()
+        except KeyboardInterrupt:
+            return
+
+    def close(self) -> None:
+        """Stop serving."""
+        _stop(self._server)
+
+    def _build(self) -> None:
+        gui = self._server.gui
+        gui.configure_theme(show_share_button=False, dark_mode=True)
+        gui.main_panel.dock_right()
+        self._title = gui.add_markdown(f"## {self.story.title}")
+        self._summary = gui.add_markdown("")
+        self._picture = gui.add_image(np.full((3, 4, 3), 24, np.uint8), label="Depth", format="png")
+        self._time = gui.add_slider("frame", min=0, max=1, step=1, initial_value=0)
+        self._strip = gui.add_html("")
+        self._follow = gui.add_checkbox("follow the newest", True)
+        self._figures = gui.add_markdown("")
+        with gui.add_folder("Look"):
+            self._kind = gui.add_dropdown("colour by", ("shading",), initial_value="shading")
+            self._point_size = gui.add_slider("point size", min=0.2, max=3.0, step=0.1, initial_value=1.0)
+            self._own_points = gui.add_checkbox("points of this frame", False)
+        self._time.on_update(self._on_time)
+        for control in (self._kind, self._point_size, self._own_points, self._follow):
+            control.on_update(lambda _: self.refresh())
+
+    def _on_time(self, _: Any) -> None:
+        if self._is_moving:
+            return
+        with self._lock:
+            self._follow.value = self.place == len(self.story.moments) - 1
+            self._draw()
+
+    def _draw(self) -> None:
+        """Draw the frame that is chosen."""
+        if not self.story.moments:
+            return
+        place = self.place
+        moment = self.story.moments[place]
+        with self._server.atomic():
+            cloud = self.story.snapshot_at(place)
+            if cloud is not None and len(cloud.points):
+                self._show_cloud(cloud)
+            if self._size:
+                self._scene.show_cameras(self.story, place, 0.12 * self._size)
+            self._figures.content = figures_table(moment)
+            self._summary.content = summary(self.story)
+            self._show_depth(moment)
+
+    def _show_cloud(self, cloud: Snapshot) -> None:
+        kinds = color_kinds(cloud)
+        if tuple(self._kind.options) != kinds:
+            self._kind.options = kinds
+            self._kind.value = kinds[0]
+        wanted = (cloud, self._kind.value, self._point_size.value)
+        if self._shown != wanted:
+            self._shown = wanted
+            self._scene.show_cloud(*wanted)
+        if not self._size:
+            self._size = extent(cloud)
+            look_at(self._server.initial_camera, cloud, self._size)
+
+    def _show_depth(self, moment: Moment) -> None:
+        depth = self._depth(moment)
+        self._picture.visible = depth is not None
+        if depth is None or self.story.camera is None:
+            return
+        self._picture.image = depth_picture(depth, self.story.camera, self._parameters)
+        wanted = self._own_points.value and moment.world_from_camera is not None
+        points = np.zeros((0, 3), np.float32)
+        if wanted and moment.world_from_camera is not None:
+            clean = preprocess_depth(depth, self.story.camera)
+            pose = moment.world_from_camera.astype(np.float32)
+            points = back_project(clean, self.story.camera) @ pose[:3, :3].T + pose[:3, 3]
+        spacing = self._shown[0].spacing if self._shown else 0.001
+        self._scene.show_points(points, 0.6 * spacing, bool(len(points)))
+
+    def _depth(self, moment: Moment) -> npt.NDArray[np.float32] | None:
+        if self.story.depth_of is None:
+            return None
+        try:
+            return self.story.depth_of(moment.index)
+        except (FileFormatError, OSError):
+            return None
+
+
+def look_at(camera: Any, cloud: Snapshot, size: float) -> None:
+    """Put the browser's camera above and beside the first depth camera, so that it sees the whole model."""
+    middle = np.median(cloud.points, axis=0).astype(np.float64)
+    camera.look_at = middle
+    camera.position = middle + size * np.array([-0.45, -0.45, -1.0])
+    camera.up = (0.0, -1.0, 0.0)
+
+
+def summary(story: Story) -> str:
+    """Return in a line how many frames there are of each status."""
+    counts = {status: sum(moment.status == status for moment in story.moments) for status in STATUS_COLORS}
+    parts = [f"{number} {status}" for status, number in counts.items() if number]
+    return f"{len(story.moments)} frames: {', '.join(parts)}"
+
+
+def figures_table(moment: Moment) -> str:
+    """Return what is known of a frame as Markdown."""
+    reason = f": {moment.reason}" if moment.reason else ""
+    rows = "".join(f"\n| {name} | {value} |" for name, value in moment.figures.items())
+    table = f"\n\n| | |\n|---|---|{rows}" if rows else ""
+    return f"**frame {moment.index}, {moment.status}**{reason}{table}"
+
+
+def status_strip(moments: list[Moment], width: int = 1000) -> str:
+    """Return a bar of all frames in the colours of their statuses, for the time line."""
+    if not moments:
+        return ""
+    step = width / len(moments)
+    bars, start = [], 0
+    for end in range(1, len(moments) + 1):
+        if end == len(moments) or moments[end].status != moments[start].status:
+            color = "rgb({},{},{})".format(*STATUS_COLORS[moments[start].status])
+            bars.append(
+                f'<rect x="{start * step:.1f}" width="{(end - start) * step:.1f}" height="20" fill="{color}">'
+                f"<title>{escape(moments[start].status)}</title></rect>"
+            )
+            start = end
+    return (
+        f'<svg viewBox="0 0 {width} 20" preserveAspectRatio="none" '
+        f'style="width:100%;height:8px;display:block">{"".join(bars)}</svg>'
+    )
+
+
+def export_html(story: Story, path: str | os.PathLike[str], *, seconds: float = 8.0) -> None:
+    """
+    Write a page that opens from disk: the model grows as it did, over some seconds.
+
+    Parameters
+    ----------
+    story : Story
+        At least one state of the model.
+    path : path-like
+        The file, usually ``view.html``; it appears when it is complete.
+    seconds : float
+        How long it takes.
+
+    Raises
+    ------
+    ImportError
+        When viser is missing.
+    ValueError
+        When the story has no model.
+    """
+    states = story.snapshots
+    if not states:
+        raise ValueError("story must hold a state of the model to export, got none")
+    server = _server("127.0.0.1", 0)
+    try:
+        serializer = server.get_scene_serializer()
+        scene = Scene(server.scene, story.camera)
+        last = states[-1][1]
+        size, kind = extent(last), color_kinds(last)[0]
+        look_at(server.initial_camera, last, size)
+        for place, cloud in states:
+            scene.show_cloud(cloud, kind if kind in color_kinds(cloud) else "shading")
+            scene.show_cameras(story, place, 0.12 * size)
+            if len(states) > 1:
+                serializer.insert_sleep(seconds / len(states))
+        page = serializer.as_html(dark_mode=True)
+    finally:
+        _stop(server)
+    with atomic_writer(Path(path)) as stream:
+        stream.write(page.encode())
+
+
+def _server(host: str, port: int) -> Any:
+    try:
+        import viser
+    except ImportError as error:
+        raise ImportError(_MISSING) from error
+    with redirect_stdout(io.StringIO()):  # its banner
+        return viser.ViserServer(host=host, port=port, verbose=False)
+
+
+def _stop(server: Any) -> None:
+    with redirect_stdout(io.StringIO()):
+        server.stop()

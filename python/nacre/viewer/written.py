@@ -1,0 +1,84 @@
+"""The story of what ``nacre reconstruct`` wrote."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre.errors import FileFormatError
+from nacre.io.points import read_points
+from nacre.viewer.story import Moment, Snapshot, Story, words
+from nacre.written import Written
+
+
+def written_story(folder: str | os.PathLike[str]) -> Story:
+    """
+    Read what a reconstruction wrote.
+
+    Depth images are shown where the recording is still in its place.
+
+    Parameters
+    ----------
+    folder : path-like
+        ``OUT``; it holds ``model.ply`` and ``report.json``.
+
+    Raises
+    ------
+    FileFormatError, OSError
+        When a file is damaged or missing.
+    """
+    out = Written(Path(folder))
+    story = Story(out.report.get("title") or Path(folder).name, out.camera, depth_of=_recorded_depth(out))
+    placed = out.truth_from_world
+    world_from_truth = None if placed is None else np.asarray(np.linalg.inv(placed), np.float64)
+    for frame in out.frames:
+        story.add(_moment(frame, world_from_truth))
+    model = read_points(Path(folder) / "model.ply")
+    normals = model.normals
+    if normals is None:
+        raise FileFormatError(Path(folder) / "model.ply", "a model of nacre reconstruct has normals")
+    attributes = model.attributes
+    cloud = Snapshot(
+        np.asarray(model.points, np.float32),
+        np.asarray(normals, np.float32),
+        float(out.report.get("spacing") or 0.0) or 0.001,
+        model.colors,
+        attributes.get("confidence"),
+        attributes.get("last_seen"),
+    )
+    story.set_snapshot(cloud)
+    return story
+
+
+def _moment(frame: dict[str, Any], world_from_truth: npt.NDArray[np.float64] | None) -> Moment:
+    pose, truth = frame["world_from_camera"], frame["truth"]
+    names = ("overlap", "consistency", "evidence", "rmse", "num_inliers", "num_points")
+    figures = {name: frame.get(name) for name in names}
+    figures["milliseconds"] = (frame.get("milliseconds") or {}).get("total")
+    return Moment(
+        frame["index"],
+        frame["status"],
+        frame.get("reason") or "",
+        None if pose is None else np.array(pose, np.float64),
+        None if truth is None or world_from_truth is None else world_from_truth @ np.array(truth),
+        words(**figures),
+    )
+
+
+def _recorded_depth(out: Written) -> Any:
+    """Return what reads a depth image of the recording, or None where the recording is gone."""
+    recording = out.report.get("recording") or {}
+    path = recording.get("path")
+    if path is None or not Path(path).exists():
+        return None
+    from nacre.datasets import open_sequence
+
+    try:
+        sequence = open_sequence(path, format=recording.get("format"))
+    except (FileFormatError, ValueError, OSError):
+        return None
+    return lambda index: sequence[index].depth

@@ -1,0 +1,78 @@
+"""What other libraries and notebooks get of a model."""
+
+from __future__ import annotations
+
+import io
+import math
+import pickle
+import sys
+
+import numpy as np
+import pytest
+
+import nacre
+
+
+@pytest.fixture(scope="module")
+def model() -> nacre.Model:
+    mesh = nacre.built_in_object()
+    camera = nacre.Camera(160, 120, 131, 131, 79.5, 59.5)
+    model = nacre.Model(camera)
+    red = np.full((120, 160, 3), (200, 10, 10), np.uint8)
+    for pose in nacre.turntable_poses(mesh, 2, math.radians(5), camera=camera, distance=0.3):
+        model.add_frame(mesh.simulate_depth(camera, pose, noise=0.0005), color=red)
+    return model
+
+
+def test_numpy_takes_the_model_for_its_points(model: nacre.Model) -> None:
+    assert np.array_equal(np.asarray(model), model.points)
+    assert np.asarray(model, dtype=np.float64).dtype == np.float64
+    assert np.mean(model, axis=0).shape == (3,)
+
+
+def test_its_memory_is_not_shared(model: nacre.Model) -> None:
+    with pytest.raises(ValueError, match="copy must be True or None"):
+        model.__array__(copy=False)
+
+
+def test_open3d_gets_points_normals_and_colours(model: nacre.Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    open3d = pytest.importorskip("open3d")
+    cloud = model.to_open3d()
+    assert isinstance(cloud, open3d.geometry.PointCloud)
+    assert np.allclose(np.asarray(cloud.points), model.points)
+    assert np.allclose(np.asarray(cloud.normals), model.normals)
+    assert np.allclose(np.asarray(cloud.colors)[0], np.array([200, 10, 10]) / 255)
+
+
+def test_trimesh_gets_points_normals_and_colours(model: nacre.Model) -> None:
+    pytest.importorskip("trimesh")
+    cloud = model.to_trimesh()
+    assert np.allclose(cloud.vertices, model.points)
+    assert np.allclose(cloud.metadata["normals"], model.normals)
+    assert cloud.colors[0, :3].tolist() == [200, 10, 10]
+
+
+@pytest.mark.parametrize("name", ["open3d", "trimesh"])
+def test_a_missing_library_comes_with_the_command_that_installs_it(
+    name: str, model: nacre.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(ImportError, match=f"pip install {name}"):
+        getattr(model, f"to_{name}")()
+
+
+def test_notebooks_get_a_picture(model: nacre.Model) -> None:
+    image = pytest.importorskip("PIL.Image").open(io.BytesIO(model._repr_png_()))
+    assert image.size == (480, 400)
+    shown = np.asarray(image.convert("RGBA"))[..., 3] > 0
+    assert 0.05 < shown.mean() < 0.95
+    assert nacre.Model(model.camera)._repr_png_() is None
+
+
+def test_parameters_and_results_can_be_pickled(model: nacre.Model) -> None:
+    report = pickle.loads(pickle.dumps(model.frames[1]))
+    assert np.array_equal(report.world_from_camera, model.frames[1].world_from_camera)
+    for thing in (model.parameters, model.noise, model.camera):
+        assert pickle.loads(pickle.dumps(thing)) == thing
+    found = nacre.align(model.points, model.points)
+    assert np.array_equal(pickle.loads(pickle.dumps(found)).target_from_source, found.target_from_source)

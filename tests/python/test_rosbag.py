@@ -1,0 +1,227 @@
+"""ROS recordings, written here with rosbags: raw, compressed, RealSense's; and what is missing or damaged."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nacre
+
+Image = pytest.importorskip("PIL.Image")
+pytest.importorskip("rosbags")
+from rosbags.rosbag1 import Writer as Writer1  # noqa: E402
+from rosbags.rosbag2 import StoragePlugin  # noqa: E402
+from rosbags.rosbag2 import Writer as Writer2  # noqa: E402
+from rosbags.typesys import Stores, get_typestore  # noqa: E402
+
+WIDTH, HEIGHT, FRAMES = 64, 48, 3
+SECOND = 1_000_000_000
+
+
+def depth_image(i: int) -> np.ndarray:
+    image = np.full((HEIGHT, WIDTH), 700 + i, np.uint16)
+    image[0], image[1] = 0, 65535
+    return image
+
+
+def color_image(i: int) -> np.ndarray:
+    image = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
+    image[..., 0], image[..., 2] = 200, i
+    return image
+
+
+class Recorder:
+    """Writes messages of a ROS version."""
+
+    def __init__(self, path: Path, version: int, storage: StoragePlugin = StoragePlugin.SQLITE3) -> None:
+        self.version = version
+        self.types = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
+        self.writer: Any = Writer1(path) if version == 1 else Writer2(path, version=9, storage_plugin=storage)
+        self.connections: dict[str, Any] = {}
+        self.writer.open()
+
+    def close(self) -> None:
+        self.writer.close()
+
+    def write(self, topic: str, kind: str, time: float, **fields: Any) -> None:
+        if topic not in self.connections:
+            self.connections[topic] = self.writer.add_connection(topic, kind, typestore=self.types)
+        message = self.types.types[kind](**fields)
+        serialize = self.types.serialize_ros1 if self.version == 1 else self.types.serialize_cdr
+        self.writer.write(self.connections[topic], int(time * SECOND), serialize(message, kind))
+
+    def header(self, time: float) -> Any:
+        stamp = self.types.types["builtin_interfaces/msg/Time"](int(time), int(time % 1 * SECOND))
+        extra = {"seq": 0} if self.version == 1 else {}
+        return self.types.types["std_msgs/msg/Header"](stamp=stamp, frame_id="camera", **extra)
+
+    def image(self, topic: str, time: float, pixels: np.ndarray, encoding: str, step: int = 0) -> None:
+        row = pixels.reshape(len(pixels), -1).view(np.uint8)
+        self.write(
+            topic, "sensor_msgs/msg/Image", time, header=self.header(time), height=pixels.shape[0],
+            width=pixels.shape[1], encoding=encoding, is_bigendian=0, step=step or row.shape[1],
+            data=row.reshape(-1),
+        )  # fmt: skip
+
+    def compressed(self, topic: str, time: float, data: bytes, format: str) -> None:
+        self.write(
+            topic, "sensor_msgs/msg/CompressedImage", time, header=self.header(time), format=format,
+            data=np.frombuffer(data, np.uint8),
+        )  # fmt: skip
+
+    def info(self, topic: str, fx: float = 60.0) -> None:
+        roi = self.types.types["sensor_msgs/msg/RegionOfInterest"](0, 0, 0, 0, False)
+        matrix = np.array([fx, 0, 31.5, 0, 61.0, 23.5, 0, 0, 1])
+        capital = str.upper if self.version == 1 else str
+        fields = {"d": np.zeros(5), "k": matrix, "r": np.eye(3).reshape(-1), "p": np.zeros(12)}
+        self.write(
+            topic, "sensor_msgs/msg/CameraInfo", 1.0, header=self.header(1.0), height=HEIGHT, width=WIDTH,
+            distortion_model="plumb_bob", binning_x=0, binning_y=0, roi=roi,
+            **{capital(name): value for name, value in fields.items()},
+        )  # fmt: skip
+
+
+def png(image: np.ndarray) -> bytes:
+    stream = io.BytesIO()
+    Image.fromarray(image).save(stream, format="PNG")
+    return stream.getvalue()
+
+
+def record(path: Path, version: int, storage: StoragePlugin = StoragePlugin.SQLITE3) -> Path:
+    recorder = Recorder(path, version, storage)
+    recorder.info("/camera/depth/camera_info", 40.0)
+    recorder.info("/camera/aligned_depth_to_color/camera_info")
+    for i in range(FRAMES):
+        time = 1.0 + i / 30
+        recorder.image("/camera/depth/image_rect_raw", time, depth_image(50), "16UC1")
+        recorder.image("/camera/aligned_depth_to_color/image_raw", time, depth_image(i), "16UC1")
+        if i != 1:
+            recorder.image("/camera/color/image_raw", time + 0.005, color_image(i), "rgb8")
+    recorder.close()
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "version", "storage"),
+    [("a.bag", 1, None), ("two", 2, StoragePlugin.SQLITE3), ("three", 2, StoragePlugin.MCAP)],
+)
+def test_both_versions_are_recognised_and_read(
+    name: str, version: int, storage: StoragePlugin | None, tmp_path: Path
+) -> None:
+    sequence = nacre.open_sequence(record(tmp_path / name, version, storage or StoragePlugin.SQLITE3))
+    assert (sequence.format, len(sequence), sequence.depth_scale) == ("rosbag", FRAMES, 1000)
+    assert sequence.camera == nacre.Camera(WIDTH, HEIGHT, 60, 61, 31.5, 23.5)
+    frames = list(sequence)
+    for i, frame in enumerate(frames):
+        assert np.isnan(frame.depth[:2]).all()
+        assert frame.depth[5, 5] == pytest.approx(0.7 + 0.001 * i)
+        assert frame.timestamp == pytest.approx(1.0 + i / 30)
+    assert frames[1].color is None
+    assert frames[2].color is not None
+    assert frames[2].color[0, 0].tolist() == [200, 0, 2]
+    assert sequence[2].depth[5, 5] == pytest.approx(0.702)
+    assert [frame.index for frame in sequence[1:]] == [1, 2]
+
+
+def test_the_units_of_a_realsense_recording(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "d435.bag", 1)
+    recorder.info("/device_0/sensor_0/Depth_0/info/camera_info")
+    recorder.write("/device_0/sensor_0/option/Depth_Units/value", "std_msgs/msg/Float32", 1.0, data=0.0001)
+    recorder.image("/device_0/sensor_0/Depth_0/image/data", 1.0, depth_image(0) * 10, "mono16")
+    recorder.close()
+    sequence = nacre.open_sequence(tmp_path / "d435.bag")
+    assert sequence.depth_scale == pytest.approx(10000)
+    assert sequence[0].depth[5, 5] == pytest.approx(0.7)
+    scaled = nacre.open_sequence(tmp_path / "d435.bag", depth_scale=5000)
+    assert scaled[0].depth[5, 5] == pytest.approx(1.4)
+
+
+def test_float_images_are_metres(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "r", 2)
+    recorder.info("/depth/camera_info")
+    recorder.image("/depth/image", 1.0, np.full((HEIGHT, WIDTH), 0.75, np.float32), "32FC1")
+    recorder.close()
+    assert nacre.open_sequence(tmp_path / "r")[0].depth[5, 5] == 0.75
+
+
+def test_compressed_images(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "r", 2)
+    recorder.info("/depth/camera_info")
+    topic = "/depth/image_raw/compressedDepth"
+    recorder.compressed(topic, 1.0, bytes(12) + png(depth_image(0)), "16UC1; compressedDepth png")
+    recorder.compressed("/color/image_raw/compressed", 1.0, png(color_image(7)), "rgb8; png compressed bgr8")
+    recorder.close()
+    frame = nacre.open_sequence(tmp_path / "r")[0]
+    assert frame.depth[5, 5] == pytest.approx(0.7)
+    assert frame.color is not None
+    assert frame.color[0, 0].tolist() == [200, 0, 7]
+
+
+def test_rows_may_be_padded_and_channels_swapped(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "r", 2)
+    recorder.info("/depth/camera_info")
+    padded = np.concatenate([depth_image(0), np.zeros((HEIGHT, 4), np.uint16)], axis=1)
+    fields = {"height": HEIGHT, "width": WIDTH, "encoding": "16UC1", "is_bigendian": 0}
+    recorder.write(
+        "/depth/image", "sensor_msgs/msg/Image", 1.0, header=recorder.header(1.0), step=2 * WIDTH + 8,
+        data=padded.view(np.uint8).reshape(-1), **fields,
+    )  # fmt: skip
+    recorder.image("/color/image", 1.0, color_image(3)[..., ::-1], "bgr8")
+    recorder.close()
+    frame = nacre.open_sequence(tmp_path / "r")[0]
+    assert frame.depth[-1, -1] == pytest.approx(0.7)
+    assert frame.color is not None
+    assert frame.color[0, 0].tolist() == [200, 0, 3]
+
+
+class TestBroken:
+    def test_no_depth(self, tmp_path: Path) -> None:
+        recorder = Recorder(tmp_path / "r.bag", 1)
+        recorder.image("/color/image", 1.0, color_image(0), "rgb8")
+        recorder.close()
+        with pytest.raises(nacre.FileFormatError, match="no topic of depth images; there are /color/image"):
+            nacre.open_sequence(tmp_path / "r.bag")
+
+    def test_no_camera(self, tmp_path: Path) -> None:
+        recorder = Recorder(tmp_path / "r.bag", 1)
+        recorder.image("/depth/image", 1.0, depth_image(0), "16UC1")
+        recorder.close()
+        with pytest.raises(nacre.FileFormatError, match="no camera_info; give the camera"):
+            nacre.open_sequence(tmp_path / "r.bag")
+        camera = nacre.Camera(WIDTH, HEIGHT, 60, 60, 31.5, 23.5)
+        assert nacre.open_sequence(tmp_path / "r.bag", camera=camera)[0].depth.shape == (HEIGHT, WIDTH)
+
+    def test_another_encoding(self, tmp_path: Path) -> None:
+        recorder = Recorder(tmp_path / "r.bag", 1)
+        recorder.info("/depth/camera_info")
+        recorder.image("/depth/image", 1.0, depth_image(0).astype(np.uint8), "8UC1")
+        recorder.close()
+        with pytest.raises(nacre.FileFormatError, match=r"depth images are 16UC1, .*, this one is 8UC1"):
+            nacre.open_sequence(tmp_path / "r.bag")[0]
+
+    def test_an_image_that_is_cut_short(self, tmp_path: Path) -> None:
+        recorder = Recorder(tmp_path / "r.bag", 1)
+        recorder.info("/depth/camera_info")
+        recorder.image("/depth/image", 1.0, depth_image(0), "16UC1", step=4 * WIDTH)
+        recorder.close()
+        with pytest.raises(nacre.FileFormatError, match="64 x 48 is cut short"):
+            nacre.open_sequence(tmp_path / "r.bag")[0]
+
+    @pytest.mark.parametrize("part", [0.0, 0.3, 0.9])
+    def test_a_file_that_is_cut_short(self, part: float, tmp_path: Path) -> None:
+        whole = record(tmp_path / "r.bag", 1).read_bytes()
+        (tmp_path / "r.bag").write_bytes(whole[: int(part * len(whole))])
+        with pytest.raises(nacre.FileFormatError, match=r"r\.bag: not a whole ROS recording"):
+            nacre.open_sequence(tmp_path / "r.bag")
+
+    def test_without_rosbags(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        import sys
+
+        path = record(tmp_path / "r.bag", 1)
+        monkeypatch.setitem(sys.modules, "rosbags.highlevel", None)
+        with pytest.raises(ImportError, match=r'pip install "nacre\[ros\]"'):
+            nacre.open_sequence(path)
