@@ -102,7 +102,7 @@ ROWS = [
             f"{title}, 12 views every 30 degrees, sigma 0.5 mm",
             12,
             30,
-            at_most(rotation=0.1, translation=0.2) + SHAPE,
+            at_most(final_rotation=0.3, final_translation=1.0, rms=0.167),
             surface=mesh(file),
             scale=scale,
             peers=("open3d_icp_eroded",),
@@ -125,8 +125,9 @@ ROWS = [
             ("bunny", "Bunny", bunny, 1.0, 120, 3, ("open3d_icp_eroded", "open3d_slam", "opencv_tsdf")),
             ("bunny", "Bunny", bunny, 1.0, 36, 10, ("open3d_icp_eroded", "open3d_slam", "opencv_tsdf")),
             *(
-                (name, title, mesh(file), scale, 36, 10, ("open3d_icp_eroded",))
+                (name, title, mesh(file), scale, views, step, ("open3d_icp_eroded",))
                 for name, (file, scale, title) in OTHERS.items()
+                for views, step in ((120, 3), (36, 10))
             ),
         ]
     ),
