@@ -126,7 +126,8 @@ TEST_CASE("a steep surface is covered like one that faces the camera") {
     const auto plane = [&](double x, double) { return 0.5 + std::tan(slant) * x; };
     fuse(model, to_frame(image_of(plane, sigma), sigma), camera(), Pose::Identity(), spacing, 0);
     const double area = 0.1 * 0.08 / std::cos(slant);
-    CHECK(static_cast<double>(model.size()) > 0.6 * area / (spacing * spacing));
+    // New points lie on the rays of pixels: at 55 degrees two steps down the slope are 1.7 spacings.
+    CHECK(static_cast<double>(model.size()) > 0.5 * area / (spacing * spacing));
   }
 }
 

@@ -48,7 +48,8 @@ def test_channels_are_fused_as_colours_are() -> None:
     model = grown([{"same": color, "one": color[..., 1]} for color in colors], colors)
     assert model.attributes["same"].shape == (len(model), 3)
     assert model.colors is not None
-    np.testing.assert_allclose(model.attributes["same"], model.colors, atol=0.51)
+    # Colours are rounded; those of a new point are averaged before its normal is.
+    np.testing.assert_allclose(model.attributes["same"], model.colors, atol=0.6)
     np.testing.assert_allclose(model.attributes["one"], model.attributes["same"][:, 1], rtol=1e-5)
 
 
