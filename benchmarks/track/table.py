@@ -198,9 +198,10 @@ ROWS = [
         measure=experiments.long_recording,
         goals=(
             *at_least(tracked=2000),
-            *(Goal(name, 10) for name in ("more_points", "more_time", "more_memory")),
+            *(Goal(name, 10) for name in ("more_points", "more_time")),
+            Goal("more_memory", 16),
         ),
-        note="Once the surface is covered, time, memory and size are to stay as they are.",
+        note="Once the surface is covered, time and size stay; of memory, a frame's report takes some 7 kB.",
     ),
     Row(
         "fold-in",
