@@ -289,18 +289,15 @@ void Model::Impl::adjust(FrameReport& report) {
     }
     return orthonormal(adjusted[nearest] * views[nearest].world_from_camera.inverse());
   };
-  std::vector<Pose> motions, motions_of_registered;
-  for (Pose& pose : poses) {
-    motions_of_registered.push_back(motion_of(pose));
-    pose = motions_of_registered.back() * pose;
-  }
+  for (Pose& pose : poses) pose = motion_of(pose) * pose;
+  std::vector<Pose> motions;
   for (FrameReport& earlier : reports) {
     motions.push_back(motion_of(earlier.world_from_camera));
     correct(earlier, motions.back());
   }
   motions.push_back(motion_of(report.world_from_camera));
   correct(report, motions.back());
-  move_points(cloud, motions_of_registered, options.num_threads);
+  move_points(cloud, motions, options.num_threads);
   if (options.loop_closure && options.fold_in == FoldIn::fuse) loops.move(motions);
   for (std::size_t k = 0; k < views.size(); ++k) views[k].world_from_camera = adjusted[k];
 }
@@ -340,15 +337,15 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
 void Model::Impl::fold_in(const FrameExtras& extras, FrameReport& report) {
   StopWatch watch;
   if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
-  const auto num_registered = static_cast<std::int32_t>(poses.size() - 1);  // lost frames make no point older
+  const auto index = static_cast<std::int32_t>(report.index);
   if (options.fold_in != FoldIn::fuse) {
-    consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, num_registered);
+    consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
     watch.lap();
     renew_normals(cloud, options);
     report.milliseconds.normals = watch.lap();
     return;
   }
-  report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing, num_registered,
+  report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing, index,
                                 options.fusion, options.num_threads, extras.attributes);
   while (cloud.size() > options.max_points) {
     spacing *= coarsening;

@@ -412,7 +412,7 @@ class Model(ExchangeablePoints):
 
     @property
     def last_seen(self) -> npt.NDArray[np.int32]:
-        """(N,) the last frame that observed each point, counting those with a pose from 0; a copy."""
+        """(N,) the index of the last frame that observed each point; a copy."""
         with self._lock:
             return self._core.cloud.last_seen
 

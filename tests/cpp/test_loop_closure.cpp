@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 
 #include "doctest/doctest.h"
 #include "key_frames.hpp"
@@ -218,6 +219,24 @@ TEST_CASE("what is known of a pose turns with it") {
                                                 std::max(told[k].information.norm(), 1e-300));
   }
   CHECK(greatest_turn > 1e-3);
+}
+
+TEST_CASE("lost frames do not mix up which points a loop moves") {
+  const auto with_blanks = [](int num_blank) {
+    Model model(Room::camera(0.015));
+    const DepthImage blank = DepthImage::Constant(156, 208, std::numeric_limits<float>::quiet_NaN());
+    for (int k = 0; k < frames_per_turn + 8; ++k) {
+      model.add_frame(room().view(k));
+      for (int i = 0; k == 3 && i < num_blank; ++i) {
+        CHECK(model.add_frame(blank).status == FrameStatus::lost);
+      }
+    }
+    return model;
+  };
+  const Model without = with_blanks(0), with = with_blanks(12);
+  REQUIRE(num_loops(without) >= 1);
+  REQUIRE(num_loops(with) == num_loops(without));
+  CHECK(doubled_part(with) < doubled_part(without) + 0.01);
 }
 
 TEST_CASE("loops close with the same bits for any number of threads") {
