@@ -37,7 +37,8 @@ by the same command. [`benchmarks/README.md`](../benchmarks/README.md) says how.
 
 Errors of poses are those throughout, the greatest of all frames, with the first frame in its place; the
 shift is that of the object's middle. A model's RMS and bias (positive: outside) are to the true surface;
-what is covered is the part of the surface that the cameras saw within 3 mm of a model point.
+what is covered is the part of the surface that the cameras saw within 3 mm of a model point. A dash
+is what was not measured.
 """
 
 
