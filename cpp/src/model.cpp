@@ -81,11 +81,11 @@ struct Model::Impl {
   PointModel cloud;
   LoopClosure loops{camera, options};
   std::vector<FrameReport> reports;
-  Values measured;             // by the newest, before it was cleaned
-  Sight before;                // of the newest frame that was folded in
-  PlaceHypothesis hypothesis;  // while the camera is lost
-  std::vector<Pose> poses;     // of the registered frames, oldest first
-  std::vector<ObjectView> views;
+  Values measured;                // by the newest, before it was cleaned
+  Sight before;                   // of the newest frame that was folded in
+  PlaceHypothesis hypothesis;     // while the camera is lost
+  std::vector<Pose> poses;        // of the registered frames, oldest first
+  std::vector<ObjectView> views;  // of an object that stands on a plane, from different directions
   double spacing = 0.0;
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
 
@@ -229,7 +229,7 @@ WhereElse Model::Impl::elsewhere(const RegionReport& region_report) const {
   WhereElse where;
   if (!options.relocalise) return where;
   where.views = &views;
-  where.view = view_of_object(region_report);
+  where.view_of_frame = [&] { return view_of_object(region_report); };
   where.everywhere = num_lost < patience || num_lost % patience == 0;
   std::vector<Pose>& chosen = where.key_poses;
   for (auto pose = poses.rbegin(); pose != poses.rend() && chosen.size() < most; ++pose) {

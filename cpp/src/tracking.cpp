@@ -248,8 +248,9 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
     best.is_to_whole_model = true;
     if (best.status != FrameStatus::lost) return best;
   }
-  if (elsewhere.view && !elsewhere.views->empty()) {
-    const auto fit = fit_on_plane(model, *elsewhere.views, *elsewhere.view, camera, options.registration);
+  if (elsewhere.views != nullptr && !elsewhere.views->empty()) {
+    const std::optional<ObjectView> view = elsewhere.view_of_frame();
+    const auto fit = view ? fit_on_plane(model, *elsewhere.views, *view, camera, options.registration) : std::nullopt;
     if (fit) return on_plane(*fit);
   }
   const bool goes_on = predicted && hypothesis.is_confirmed_by(best);

@@ -1,6 +1,7 @@
 // Where is the camera? Registration of a frame to the model.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "nacre/model.hpp"
@@ -14,8 +15,8 @@ namespace nacre {
 // Where the search for a camera that the guesses do not find may go on.
 struct WhereElse {
   const std::vector<ObjectView>* views = nullptr;  // of an object that stands on a plane: it may have turned on it
-  std::optional<ObjectView> view;                  // the same of the frame
-  std::vector<Pose> key_poses;                     // and around them
+  std::function<std::optional<ObjectView>()> view_of_frame;  // the same of the frame, made when it is needed
+  std::vector<Pose> key_poses;                               // and around them
   bool everywhere = false;
 };
 

@@ -135,6 +135,17 @@ def test_a_run_is_shown_while_it_grows(out: Path) -> None:
         live.viewer.close()
 
 
+def test_what_a_frame_does_not_have_is_not_left_from_another(out: Path) -> None:
+    page = viewer.Viewer(viewer.written_story(out), port=0)
+    try:
+        assert "/path" in page._scene._drawn
+        page._scene.show_cameras(page.story, 0, 0.02)  # one camera makes no path
+        assert "/path" not in page._scene._drawn
+        assert "/camera" in page._scene._drawn
+    finally:
+        page.close()
+
+
 def test_nothing_to_export_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="story must hold a state of the model"):
         viewer.export_html(viewer.Story("x", None), tmp_path / "x.html")

@@ -34,6 +34,7 @@ class Scene:
         scene.set_up_direction("-y")  # the world is the first camera's frame: x right, y down, z forward
         self._scene = scene
         self._corners = frustum_corners(camera)
+        self._drawn: dict[str, Any] = {}  # lines, by name
 
     def show_cloud(self, cloud: Snapshot, kind: str, point_size: float = 1.0) -> None:
         """Draw the model; the size of points is in spacings."""
@@ -82,13 +83,16 @@ class Scene:
         self, name: str, parts: Sequence[Array], colors: Sequence[tuple[int, int, int]], thickness: float
     ) -> None:
         """Draw (S, 2, 3) segments, each part in its colour; the thickness is in pixels."""
+        before = self._drawn.pop(name, None)
+        if before is not None:
+            before.remove()
         if not sum(len(part) for part in parts):
             return
         shades = [
             np.broadcast_to(np.array(color, np.uint8), (len(part), 2, 3))
             for part, color in zip(parts, colors, strict=True)
         ]
-        self._scene.add_line_segments(
+        self._drawn[name] = self._scene.add_line_segments(
             name,
             np.concatenate(parts).astype(np.float32),
             np.concatenate(shades),
