@@ -111,6 +111,43 @@ TEST_CASE("normals stay certain under noise, and do not reach across edges") {
   CHECK(worst < 0.7);
 }
 
+TEST_CASE("normals do not reach across steps that are no steeper than surfaces") {
+  const NoiseModel noise{0.0005, 0.0, 0.0};
+  const Camera flat = Camera::orthographic(width, height, 0.001);
+  for (const double step : {0.004, 0.006}) {
+    CAPTURE(step);
+    DepthImage depth = DepthImage::Constant(height, width, 0.5F);
+    depth.rightCols(60) += static_cast<float>(step);
+    add_noise(depth, noise, 9);
+    const Frame frame = make_frame(depth, flat, noise);
+    double squares = 0.0;
+    int beside = 0;
+    for (const std::int32_t row : frame.valid) {
+      const int from_step = std::abs(2 * (row % width - (width - 60)) + 1);
+      if (from_step > 3) continue;
+      squares += std::pow(angle(frame, row, {0.0, 0.0, -1.0}), 2);
+      ++beside;
+    }
+    CHECK(beside > 0.95 * 4 * height);
+    CHECK(std::sqrt(squares / beside) < 0.3);  // 0.7 if they do
+  }
+}
+
+TEST_CASE("noise does not flatten steep surfaces") {
+  const NoiseModel noise{0.0005, 0.0, 0.0};
+  const Camera flat = Camera::orthographic(width, height, 0.001);
+  for (const double slant : {0.9, 1.1, 1.25}) {
+    CAPTURE(slant);
+    const Plane plane = slanted_plane(0.6, slant, 0.3);
+    DepthImage depth = render(flat, plane);
+    add_noise(depth, noise, 4);
+    const Frame frame = make_frame(depth, flat, noise);
+    double facing = 0.0;
+    for (const std::int32_t row : frame.valid) facing += std::acos(-frame.normals(row, 2));
+    CHECK(facing / static_cast<double>(frame.valid.size()) == doctest::Approx(slant).epsilon(0.01));
+  }
+}
+
 TEST_CASE("a frame has a row per pixel, and NaN where nothing fits") {
   DepthImage depth = DepthImage::Constant(height, width, 1.0F);
   depth.rightCols(60).setConstant(missing);

@@ -1,4 +1,4 @@
-// Groups of 16 pixels. Where all their windows are complete, sums over columns and then over rows: about 12 (2 r + 1)
+// Groups of 16 pixels. Where all their windows are complete, sums over columns and then over rows: about 14 (2 r + 1)
 // operations a vector. Else the windows are looked at tap by tap: 6 operations a tap, 25 a row. A 640 x 480 frame with
 // windows of 5 x 5 takes one thread 0.65 ms with AVX-512, one with 7 x 7 to 11 x 11 and many holes 1.3 ms.
 #include "normal_row.hpp"
@@ -13,6 +13,8 @@ constexpr int group = 16;  // pixels that go the same way, whatever the number o
 constexpr int parts = group / lanes;
 constexpr int chunk = 64;  // pixels that are written together
 
+constexpr float largest_misfit = 2.0F;  // of a plane: squared residuals per degree of freedom, in variances
+
 constexpr float full_window(int radius) { return static_cast<float>((2 * radius + 1) * (2 * radius + 1)); }
 // Sum of du^2 over a full window.
 constexpr float full_spread(int radius) {
@@ -20,22 +22,31 @@ constexpr float full_spread(int radius) {
 }
 
 struct Pixels {
-  F32 value, gate_base, gate_slope;
+  F32 value, gate_base, gate_slope, variance;
 };
 
 // Sums over the members of each pixel's window: du and dv from the pixel, w the value minus the pixel's own.
 struct Moments {
-  F32 n, u, v, uu, uv, vv, w, uw, vw;
+  F32 n, u, v, uu, uv, vv, w, uw, vw, ww;
 };
+
+NACRE_INLINE Moments operator+(const Moments& a, const Moments& b) {
+  return {a.n + b.n,   a.u + b.u, a.v + b.v,   a.uu + b.uu, a.uv + b.uv,
+          a.vv + b.vv, a.w + b.w, a.uw + b.uw, a.vw + b.vw, a.ww + b.ww};
+}
+NACRE_INLINE Moments operator-(const Moments& a, const Moments& b) {
+  return {a.n - b.n,   a.u - b.u, a.v - b.v,   a.uu - b.uu, a.uv - b.uv,
+          a.vv - b.vv, a.w - b.w, a.uw - b.uw, a.vw - b.vw, a.ww - b.ww};
+}
 
 // The sums over the members in one row of the windows. Three counts are packed in one integer:
 // n + 2^8 sum (du + radius) + 2^16 sum du^2.
 struct RowSums {
   I32 counts;
-  F32 w;
+  F32 w, ww;
 };
 
-template <int radius, int du>
+template <int radius, int du, int last>
 NACRE_INLINE void add_taps(const float* row, F32 own, const F32 (&limits)[radius + 1], RowSums& sums,
                            F32 (&odd_w)[radius]) {
   constexpr int distance = du < 0 ? -du : du;
@@ -44,26 +55,28 @@ NACRE_INLINE void add_taps(const float* row, F32 own, const F32 (&limits)[radius
   const Mask member = abs(difference) <= limits[distance];
   sums.counts = add_where(member, sums.counts, broadcast(1 + (du + radius) * (1 << 8) + du * du * (1 << 16)));
   sums.w = add_where(member, sums.w, difference);
+  sums.ww = add_where(member, sums.ww, difference * difference);
   if constexpr (du < 0) odd_w[distance - 1] = sub_where(member, odd_w[distance - 1], difference);
   if constexpr (du > 0) odd_w[distance - 1] = add_where(member, odd_w[distance - 1], difference);
-  if constexpr (du < radius) add_taps<radius, du + 1>(row, own, limits, sums, odd_w);
+  if constexpr (du < last) add_taps<radius, du + 1, last>(row, own, limits, sums, odd_w);
 }
 
-template <int radius>
-NACRE_INLINE Moments sum_members(const float* pixel, ptrdiff_t stride, const Pixels& p) {
+// Over the columns from left to right and the rows from top to bottom.
+template <int radius, int left, int right>
+NACRE_INLINE Moments sum_members(const float* pixel, ptrdiff_t stride, const Pixels& p, int top, int bottom) {
   const F32 zero = broadcast(0.0F), shift = broadcast(static_cast<float>(radius));
   const I32 byte = broadcast(255);
-  Moments m = {zero, zero, zero, zero, zero, zero, zero, zero, zero};
+  Moments m = {zero, zero, zero, zero, zero, zero, zero, zero, zero, zero};
   F32 odd_w[radius];  // sums of w at du minus w at -du
   for (F32& w : odd_w) w = zero;
-  for (int dv = -radius; dv <= radius; ++dv) {
+  for (int dv = top; dv <= bottom; ++dv) {
     F32 limits[radius + 1];
     for (int du = 0; du <= radius; ++du) {
       const int distance = dv < 0 ? (-dv > du ? -dv : du) : (dv > du ? dv : du);
       limits[du] = p.gate_base + broadcast(static_cast<float>(distance)) * p.gate_slope;
     }
-    RowSums row = {broadcast(0), zero};
-    add_taps<radius, -radius>(pixel + dv * stride, p.value, limits, row, odd_w);
+    RowSums row = {broadcast(0), zero, zero};
+    add_taps<radius, left, right>(pixel + dv * stride, p.value, limits, row, odd_w);
     const F32 n = to_float(row.counts & byte), v = broadcast(static_cast<float>(dv));
     const F32 u = to_float(shift_right<8>(row.counts) & byte) - shift * n;
     m.n += n;
@@ -73,15 +86,16 @@ NACRE_INLINE Moments sum_members(const float* pixel, ptrdiff_t stride, const Pix
     m.uv += v * u;
     m.vv += v * v * n;
     m.w += row.w;
+    m.ww += row.ww;
     m.vw += v * row.w;
   }
   for (int du = 1; du <= radius; ++du) m.uw += broadcast(static_cast<float>(du)) * odd_w[du - 1];
   return m;
 }
 
-// value = own + w + du at_u + dv at_v; NaN where there is no plane.
+// value = own + w + du at_u + dv at_v; NaN where there is no plane. Squared residuals per degree of freedom.
 struct Planes {
-  F32 w, at_u, at_v;
+  F32 w, at_u, at_v, misfit;
 };
 
 // The normal equations times the number of members, so that the matrix is of integers.
@@ -92,14 +106,15 @@ NACRE_INLINE Planes fit(const Moments& m, float min_count, float min_determinant
   const Mask found = (m.n >= broadcast(min_count)) & (determinant >= broadcast(min_determinant) * (m.n * m.n));
   const F32 inverse = broadcast(1.0F) / (determinant * m.n), scale = inverse * m.n;
   const F32 at_u = select(found, (vv * uw - uv * vw) * scale, broadcast(NAN)), at_v = (uu * vw - uv * uw) * scale;
-  return {(m.w - m.u * at_u - m.v * at_v) * (inverse * determinant), at_u, at_v};
+  const F32 misfit = (m.n * m.ww - m.w * m.w - at_u * uw - at_v * vw) / (m.n * (m.n - broadcast(3.0F)));
+  return {(m.w - m.u * at_u - m.v * at_v) * (inverse * determinant), at_u, at_v, misfit};
 }
 
 // Sums over the columns of the windows of a group, of the values about an origin; their least and largest.
 template <int radius>
 struct ColumnSums {
   static constexpr int columns = (group + 2 * radius + lanes - 1) / lanes * lanes;
-  float w[columns], vw[columns], least[columns], most[columns];
+  float w[columns], vw[columns], ww[columns], least[columns], most[columns];
 };
 
 template <int radius>
@@ -108,16 +123,18 @@ NACRE_INLINE void sum_columns(const float* pixel, ptrdiff_t stride, ColumnSums<r
   for (int i = 0; i < ColumnSums<radius>::columns; i += lanes) {
     const float* const column = pixel - radius + i;
     const F32 centre = load(column) - origin;
-    F32 w = centre, vw = broadcast(0.0F), least = centre, most = centre;
+    F32 w = centre, vw = broadcast(0.0F), ww = centre * centre, least = centre, most = centre;
     for (int dv = 1; dv <= radius; ++dv) {
       const F32 above = load(column - dv * stride) - origin, below = load(column + dv * stride) - origin;
       w += above + below;
+      ww += above * above + below * below;
       vw += broadcast(static_cast<float>(dv)) * (below - above);
       least = min(least, min(above, below));
       most = max(most, max(above, below));
     }
     store(sums.w + i, w);
     store(sums.vw + i, vw);
+    store(sums.ww + i, ww);
     store(sums.least + i, least);
     store(sums.most + i, most);
   }
@@ -158,7 +175,7 @@ NACRE_INLINE bool may_be_complete(const float* pixel, ptrdiff_t stride, const Gr
 }
 
 // The planes of complete windows. False where one of the pixels with this radius has a window that is not: a member is
-// missing, or might differ too much; or where the origin lies too far off for exact sums.
+// missing, or might differ too much, or the plane is no plane; or where the origin lies too far off for exact sums.
 template <int radius>
 NACRE_INLINE bool fit_complete(const ColumnSums<radius>& columns, float group_origin, const Group& g,
                                Planes (&planes)[parts]) {
@@ -169,10 +186,12 @@ NACRE_INLINE bool fit_complete(const ColumnSums<radius>& columns, float group_or
     const int middle = part * lanes + radius;
     const F32 own = g.pixels[part].value - origin, gate = g.pixels[part].gate_base + g.pixels[part].gate_slope;
     F32 w = load(columns.w + middle), uw = broadcast(0.0F), vw = load(columns.vw + middle);
+    F32 ww = load(columns.ww + middle);
     F32 least = load(columns.least + middle), most = load(columns.most + middle);
     for (int du = 1; du <= radius; ++du) {
       const F32 left = load(columns.w + middle - du), right = load(columns.w + middle + du);
       w += left + right;
+      ww += load(columns.ww + middle - du) + load(columns.ww + middle + du);
       uw += broadcast(static_cast<float>(du)) * (right - left);
       vw += load(columns.vw + middle - du) + load(columns.vw + middle + du);
       least = min(least, min(load(columns.least + middle - du), load(columns.least + middle + du)));
@@ -181,10 +200,45 @@ NACRE_INLINE bool fit_complete(const ColumnSums<radius>& columns, float group_or
     // The sum is NaN where a member is missing.
     const Mask complete =
         (w == w) & (most - own <= gate) & (own - least <= gate) & (abs(own) <= gate * broadcast(far_gates));
-    if (any(has_radius<radius>(g, part) & (!complete))) return false;
-    planes[part] = {w * per_pixel - own, uw * per_spread, vw * per_spread};
+    const F32 at_u = uw * per_spread, at_v = vw * per_spread;
+    const F32 misfit =
+        (ww - w * w * per_pixel - uw * at_u - vw * at_v) * broadcast(1.0F / (full_window(radius) - 3.0F));
+    const Mask is_plane = misfit <= broadcast(largest_misfit) * g.pixels[part].variance;
+    if (any(has_radius<radius>(g, part) & (!(complete & is_plane)))) return false;
+    planes[part] = {w * per_pixel - own, at_u, at_v, misfit};
   }
   return true;
+}
+
+NACRE_INLINE Planes chosen(Mask here, const Planes& a, const Planes& b) {
+  return {select(here, a.w, b.w), select(here, a.at_u, b.at_u), select(here, a.at_v, b.at_v),
+          select(here, a.misfit, b.misfit)};
+}
+
+// Where the members are of no plane, there may be a step among them: then those to one side of the pixel are better.
+template <int radius>
+NACRE_INLINE Planes fit_members(const float* pixel, ptrdiff_t stride, const Group& g, int part,
+                                const NormalRule& rule) {
+  constexpr float spread = full_spread(radius);
+  const Pixels& p = g.pixels[part];
+  const auto fitted = [&](const Moments& m) {
+    return fit(m, rule.min_filled * full_window(radius), rule.min_spread * spread * spread);
+  };
+  const Moments above = sum_members<radius, -radius, radius>(pixel, stride, p, -radius, -1);
+  const Moments level = sum_members<radius, -radius, radius>(pixel, stride, p, 0, 0);
+  const Moments below = sum_members<radius, -radius, radius>(pixel, stride, p, 1, radius);
+  const Moments all = above + level + below;
+  Planes best = fitted(all);
+  const Mask is_rough = has_radius<radius>(g, part) & (best.misfit > broadcast(largest_misfit) * p.variance);
+  if (!any(is_rough)) return best;
+  const Moments left = sum_members<radius, -radius, -1>(pixel, stride, p, -radius, radius);
+  const Moments column = sum_members<radius, 0, 0>(pixel, stride, p, -radius, radius);
+  const Planes sides[] = {fitted(left + column), fitted(all - left), fitted(above + level), fitted(level + below)};
+  for (const Planes& side : sides) {
+    const Mask is_plane = side.misfit <= broadcast(largest_misfit) * p.variance;
+    best = chosen(is_rough & (side.at_u == side.at_u) & is_plane & (side.misfit < best.misfit), side, best);
+  }
+  return best;
 }
 
 template <int radius>
@@ -203,17 +257,14 @@ NACRE_INLINE void fit_radius(const PlanarRow& row, const NormalRule& rule, int b
     const float* const pixel = row.values + begin + k * group;
     Planes planes[parts];
     if (!complete[k] || !fit_complete<radius>(columns[k], pixel[group / 2], g, planes)) {
-      constexpr float spread = full_spread(radius);
       for (int part = 0; part < parts; ++part) {
-        planes[part] = fit(sum_members<radius>(pixel + part * lanes, row.stride, g.pixels[part]),
-                           rule.min_filled * full_window(radius), rule.min_spread * spread * spread);
+        planes[part] = fit_members<radius>(pixel + part * lanes, row.stride, g, part, rule);
       }
     }
     for (int part = 0; part < parts; ++part) {
       const Mask here = has_radius<radius>(g, part);
       Planes& kept = g.planes[part];
-      kept = {select(here, planes[part].w, kept.w), select(here, planes[part].at_u, kept.at_u),
-              select(here, planes[part].at_v, kept.at_v)};
+      kept = chosen(here, planes[part], kept);
     }
   }
 }
@@ -282,9 +333,11 @@ int fit_normals(const PlanarRow& row, const NormalRule& rule, const RayRow& rays
     for (int k = 0; k < num_groups; ++k) {
       for (int part = 0; part < parts; ++part) {
         const F32 value = load(row.values + begin + k * group + part * lanes);
-        groups[k].pixels[part] = {value, evaluate(rule.gate_base, value), evaluate(rule.gate_slope, value)};
+        const F32 sigma = evaluate(rule.sigma, value);
+        groups[k].pixels[part] = {value, evaluate(rule.gate_base, value), evaluate(rule.gate_slope, value),
+                                  sigma * sigma};
         groups[k].radius[part] = window_radius(rule, value);
-        groups[k].planes[part] = {missing, missing, missing};
+        groups[k].planes[part] = {missing, missing, missing, missing};
       }
     }
     fit_radius<2>(row, rule, begin, groups, num_groups);

@@ -21,8 +21,10 @@ struct NormalRule {
 };
 
 // The plane value = w + du a_u + dv a_v, fitted by least squares to each pixel's window, as a unit normal towards the
-// camera, three floats a pixel; NaN where the members are too few or in a line. Unless `valid` is null, the pixels that
-// have a normal go there, counted from `first`, and their number is returned.
+// camera, three floats a pixel; NaN where the members are too few or in a line. Where they lie off the plane by more
+// than noise, one of the halves of the window that begin at the pixel may have a better one (Kuwahara 1976): a step is
+// on the other side. Unless `valid` is null, the pixels that have a normal go there, counted from `first`, and their
+// number is returned.
 //
 // A plane a x + b y + c z = 1 is 1/z = a x/z + b y/z + c: its normal, away from the camera, is (a, b, c). The plane
 // z = a x + b y + c of an orthographic camera has the normal (a, b, -1), towards it.
