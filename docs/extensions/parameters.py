@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import inspect
+import re
 from typing import Any
 
 import numpydoc.docscrape
@@ -20,6 +21,9 @@ def descriptions(text: str | None, section: str) -> dict[str, list[str]]:
     for entry in numpydoc.docscrape.NumpyDocString(inspect.cleandoc(text or ""))[section]:
         for name in entry.name.split(", "):
             found[name] = entry.desc
+        if entry.name.startswith("**"):  # keywords, described as a list of their own
+            rest = "\n".join(entry.desc[1:])
+            found |= descriptions(f"\n\n{section}\n{'-' * len(section)}\n{inspect.cleandoc(rest)}", section)
     return found
 
 
@@ -48,17 +52,21 @@ class Parameters(Directive):
         else:
             said = descriptions(owner.__doc__, "Attributes")
         prefix = self.options.get("prefix", "")
-        lines = [".. list-table::", "   :header-rows: 1", "   :widths: 25 15 60", ""]
-        lines += ["   * - parameter", "     - default", "     -"]
+        lines = ["| parameter | default | |", "|---|---|---|"]
         for name in names:
             if name not in known or name not in said:
                 raise self.error(f"{self.arguments[0]} has no described field {name!r}")
             default = getattr(defaults, name)
-            lines += [f"   * - ``{prefix}{name}``", f"     - ``{default!r}``"]
-            lines += [f"     - {said[name][0]}", *(f"       {line}" for line in said[name][1:])]
+            lines.append(f"| `{prefix}{name}` | `{default!r}` | {markdown(' '.join(said[name]))} |")
         node = nodes.container()
         self.state.nested_parse(StringList(lines, source="parameters"), self.content_offset, node)
         return node.children
+
+
+def markdown(text: str) -> str:
+    """Return a line of a docstring as Markdown in a table."""
+    roles = re.sub(r":(\w+):`([^`]+)`", r"{py:\1}`\2`", text)
+    return re.sub(r" \[\d\]_", "", roles).replace("|", "\\|")
 
 
 def load(path: str) -> Any:

@@ -94,7 +94,7 @@ def registration(table: Turntable, size):
             both, facing, colors, view=view, size=size, spacing=1.3 * table.camera.pixel_size
         )
         panels.append((caption, panel))
-    return draw.sheet(panels)
+    return draw.sheet(panels, columns=2)
 
 
 def growing(table: Turntable, sigma: float, size):
