@@ -9,7 +9,6 @@ from docutils import nodes
 from latex2mathml.converter import convert
 from sphinx.application import Sphinx
 
-
 BOLD = {chr(ord("a") + i): chr(0x1D41A + i) for i in range(26)} | {
     chr(ord("A") + i): chr(0x1D400 + i) for i in range(26)
 }

@@ -38,7 +38,7 @@ def font(size: int) -> ImageFont.ImageFont | ImageFont.FreeTypeFont:
 
 
 def points_panel(points, normals=None, colors=None, *, view=None, view_from="front", size=(360, 360), **more):
-    """Draw points as a closed, shaded surface, at twice the size and then smaller, so that edges are smooth."""
+    """Draw points as a closed, shaded surface: at twice the size, then smaller, for smooth edges."""
     large = (2 * size[0], 2 * size[1])
     if view is None:
         view = View.fit(points, view_from, size=large)
@@ -96,7 +96,7 @@ def chart(
     limits: tuple[float, float, float, float] | None = None,
     level: tuple[float, str] | None = None,
 ):
-    """Draw curves over common axes; ``limits`` are x and y from and to, ``level`` a line across with a name."""
+    """Draw curves over common axes; ``limits``: x and y from and to; ``level``: a line across, named."""
     scale = 2
     xs, ys = (np.concatenate([np.asarray(getattr(c, axis), float) for c in curves]) for axis in "xy")
     x0, x1, y0, y1 = limits or (np.nanmin(xs), np.nanmax(xs), min(0.0, np.nanmin(ys)), 1.06 * np.nanmax(ys))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import draw
 import numpy as np
 import scenes
@@ -91,7 +89,7 @@ def anywhere(table: Turntable, size):
     last = 2
     target, target_normals = table.cloud(0, NOISE)
     source, source_normals = table.cloud(last, NOISE)
-    between = -(table.truth(0)[:3, 2] + table.truth(last)[:3, 2])
+    between = -(table.truth(0)[:3, 2] + table.truth(last)[:3, 2]) - (0, 0.4, 0)
     away = scenes.rotation((1, 2, 0.5), 2.5)
     away[:3, 3] = target.mean(axis=0) - moved(source, away).mean(axis=0) + [0.1, -0.03, 0]
     source, source_normals = moved(source, away), source_normals @ away[:3, :3].T
@@ -113,7 +111,7 @@ def anywhere(table: Turntable, size):
         both = np.concatenate([target, moved(source, pose)])
         facing = np.concatenate([target_normals, source_normals @ pose[:3, :3].T])
         colors = draw.two_colors(target, source)
-        more = {"view_from": between + [0, -0.4, 0], "spacing": 1.4 * table.camera.pixel_size}
+        more = {"view_from": between, "spacing": 1.4 * table.camera.pixel_size}
         panels.append((caption, draw.points_panel(both, facing, colors, size=size, **more)))
     return draw.sheet(panels)
 

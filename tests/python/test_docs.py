@@ -12,7 +12,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = sorted((ROOT / "docs").glob("*.md"))
+DOCS = ROOT / "docs"
+PAGES = sorted(DOCS.rglob("*.md"))
+
+
+def name_of(page: Path) -> str:
+    """Return how a page is called within the documentation."""
+    return str(page.relative_to(DOCS).with_suffix(""))
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -22,7 +28,7 @@ def blocks(page: Path, language: str) -> list[str]:
     )
 
 
-@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python")], ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [p for p in PAGES if blocks(p, "python")], ids=name_of)
 def test_the_python_of_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
@@ -30,7 +36,7 @@ def test_the_python_of_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pyte
         exec(compile(block, page.name, "exec"), names)
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_commands_of_a_page_exist(page: Path) -> None:
     from nacre.cli.app import app
 
@@ -53,5 +59,8 @@ def test_it_builds_without_a_warning(tmp_path: Path) -> None:
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    for name in ("index", "start", "reference/python", "reference/cpp"):
-        assert (tmp_path / "docs" / f"{name}.html").is_file()
+    for page in PAGES:
+        assert (tmp_path / page.relative_to(ROOT)).with_suffix(".html").is_file()
+    registration = (tmp_path / "docs" / "algorithms" / "registration.html").read_text(encoding="utf-8")
+    assert "<math" in registration  # equations need no script
+    assert "registration.max_iterations" in registration  # parameters come from the code
