@@ -42,7 +42,7 @@ class Turntable:
         return np.linalg.inv(self.poses[0]) @ self.poses[k]
 
     def errors(self, points):
-        """Return signed distances [m] of points of the first camera's frame from the object, outside positive."""
+        """Return how far outside the object points of the first camera's frame are [m]."""
         closest = self.mesh.closest(moved(points, self.poses[0]))
         away = moved(points, self.poses[0]) - closest.points
         return np.einsum("ij,ij->i", away, closest.normals)

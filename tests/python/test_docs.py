@@ -64,3 +64,6 @@ def test_it_builds_without_a_warning(tmp_path: Path) -> None:
     registration = (tmp_path / "docs" / "algorithms" / "registration.html").read_text(encoding="utf-8")
     assert "<math" in registration  # equations need no script
     assert "registration.max_iterations" in registration  # parameters come from the code
+    cpp = (tmp_path / "docs" / "reference" / "cpp.html").read_text(encoding="utf-8")
+    for name in ("add_frame", "to_string", "MeshTree", "NACRE_VERSION", "PointsDouble"):
+        assert name in cpp, f"the C++ reference lacks {name}"
