@@ -1,4 +1,4 @@
-"""The constants that the pages on algorithms name are those of the code: who changes one changes the other."""
+"""The constants that the pages on algorithms name are those of the code."""
 
 from __future__ import annotations
 
