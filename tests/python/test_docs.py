@@ -45,11 +45,30 @@ def test_commands_of_a_page_exist(page: Path) -> None:
         assert set(re.findall(r"^nacre (\w+)", block, re.MULTILINE)) <= known
 
 
+@pytest.mark.parametrize("page", [*PAGES, ROOT / "README.md"], ids=lambda page: page.stem)
+def test_options_of_commands_exist(page: Path) -> None:
+    from typer.main import get_command
+
+    from nacre.cli.app import app
+
+    commands = get_command(app).commands  # type: ignore[attr-defined]
+    text = page.read_text(encoding="utf-8")
+    for line in re.findall(r"^nacre \w.*|`nacre \w[^`]*`", text, re.MULTILINE):
+        name, *words = line.strip("`").split()[1:]
+        if name not in commands:
+            continue  # a sentence that begins with nacre
+        known = {option for parameter in commands[name].params for option in parameter.opts}
+        known |= {option for parameter in commands[name].params for option in parameter.secondary_opts}
+        asked = {word.partition("=")[0] for word in words if re.match(r"-{1,2}[a-z]", word)}
+        assert asked <= known | {"--help"}, line
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("doxygen") is None, reason="no Doxygen")
 def test_it_builds_without_a_warning(tmp_path: Path) -> None:
     pytest.importorskip("sphinx")
     pytest.importorskip("breathe")
+    pytest.importorskip("latex2mathml")
     path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
     done = subprocess.run(
         [ROOT / "docs" / "build", tmp_path],
