@@ -15,6 +15,7 @@ from pathlib import Path
 import draw
 import paper
 import steps
+import surfaces
 from scenes import Turntable
 
 import nacre
@@ -33,6 +34,7 @@ def figures(mesh: nacre.Mesh, small: bool = False):
         "model-noiseless": functools.partial(paper.growing, sigma=0.0),
         "model-noisy": functools.partial(paper.growing, sigma=paper.NOISE),
         **steps.FIGURES,
+        **surfaces.FIGURES,
     }
     return {name: functools.partial(draw_one, table, size=size) for name, draw_one in each.items()}
 

@@ -82,6 +82,9 @@ CONSTANTS = [
     ("objects", "0.75 of those", "plane_search.cpp", "least_consistency = 0.75"),
     ("objects", "At least 25 pairs", "outline_registration.cpp", "fewest = 25"),
     ("objects", "0.6 of both outlines", "outline_registration.cpp", "least_agreement = 0.6"),
+    ("meshing", "$2.5 s$", "../../python/nacre/meshing.py", "_BAND = 2.5"),
+    ("meshing", "$1.5 s$", "../../python/nacre/meshing.py", "_REACH = 1.5"),
+    ("simulation", "over 8 x 8 rays", "simulation.cpp", "rays_per_radius = 4"),
     ("neighbours", "blocks of 16", "simd/block_layout.hpp", "block_points = 16"),
 ]
 
