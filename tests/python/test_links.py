@@ -18,9 +18,14 @@ CITED = re.compile(r"`((?:cpp|python|tests|docs|benchmarks|examples)/[\w./-]+\.(
 
 def prose(path: Path) -> str:
     """Return a text without its code, but with directives, which look like code."""
-    text = path.read_text(encoding="utf-8")
-    text = re.sub(r"^```(?!\{)\w*\n.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
-    return re.sub(r"`[^`\n]*\]\([^`\n]*`", "", text)
+    lines, fence = [], ""
+    for line in path.read_text(encoding="utf-8").splitlines():
+        mark = re.match(r"(```+)(.*)", line)
+        if mark:
+            fence = "" if fence else mark[2].strip() or "text"
+        if not fence or fence.startswith("{"):
+            lines.append(re.sub(r"`[^`]*\]\([^`]*`", "", line))
+    return "\n".join(lines)
 
 
 def anchors(path: Path) -> set[str]:
@@ -58,6 +63,8 @@ def test_a_dead_link_is_found(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("# A `b`: c\n[x](#a-b-c) [y](#nothing) [z](gone.md) [w](https://example.org)\n")
     assert dead_links(page) == ["#nothing", "gone.md"]
+    page.write_text("```{note}\nx\n```\n[x](gone.md)\n```sh\n[y](code.md)\n```\n[z](lost.md)\n")
+    assert dead_links(page) == ["gone.md", "lost.md"]
 
 
 @pytest.mark.parametrize("path", TEXTS, ids=lambda path: str(path.relative_to(ROOT)))
