@@ -29,7 +29,7 @@ __all__ = [
 
 BLUE, ORANGE, GREEN, PINK, SKY, RED, GREY = range(7)  # of CATEGORIES
 INK, FAINT = (40, 40, 40), (215, 215, 215)
-MARGIN, CAPTION = 12, 34
+MARGIN, PAGE = 12, 760  # pixels
 
 
 def font(size: int) -> ImageFont.ImageFont | ImageFont.FreeTypeFont:
@@ -145,20 +145,19 @@ def chart(
 
 
 def sheet(panels: Sequence[tuple[str, np.ndarray]], columns: int | None = None):
-    """Put panels of one size beside and below each other, each with a caption."""
+    """Put panels of one size beside and below each other, with captions that stay legible on a page."""
     columns = columns or len(panels)
     height, width = panels[0][1].shape[:2]
     rows = -(-len(panels) // columns)
-    size = (
-        columns * (width + MARGIN) + MARGIN,
-        rows * (height + CAPTION) + MARGIN,
-    )
-    picture = Image.new("RGB", size, "white")
+    full_width = columns * (width + MARGIN) + MARGIN
+    text = round(15 * max(1.0, full_width / PAGE))
+    row_height = height + 2 * text + 4
+    picture = Image.new("RGB", (full_width, rows * row_height + MARGIN), "white")
     pen = ImageDraw.Draw(picture)
     for i, (caption, panel) in enumerate(panels):
-        u, v = MARGIN + (i % columns) * (width + MARGIN), MARGIN + (i // columns) * (height + CAPTION)
+        u, v = MARGIN + (i % columns) * (width + MARGIN), MARGIN + (i // columns) * row_height
         picture.paste(Image.fromarray(panel), (u, v))
-        pen.text((u + width / 2, v + height + 7), caption, INK, font(15), anchor="mt")
+        pen.text((u + width / 2, v + height + text // 2), caption, INK, font(text), anchor="mt")
     return np.asarray(picture)
 
 

@@ -57,7 +57,7 @@ def normals(table: Turntable, size):
             ("shaded by the normals", draw.points_panel(points, found, **more)),
             ("normals as colours", draw.points_panel(points, None, color, **more)),
             (
-                f"their errors, 0 to 20 degrees, median {np.median(off):.1f}",
+                f"errors, 0 to 20 degrees, median {np.median(off):.1f}",
                 draw.points_panel(points, None, draw.by_value(off, 0, 20), **more),
             ),
         ]
