@@ -49,6 +49,23 @@ def test_methods_of_documented_classes_have_docstrings() -> None:
     assert silent == []
 
 
+def test_functions_describe_their_arguments() -> None:
+    """Each argument by name, or the function where they are described."""
+    silent = []
+    names = documented("autofunction") | {f"evaluation.{name}" for name in nacre.evaluation.__all__}
+    for name in sorted(names):
+        head, _, last = f"nacre.{name}".rpartition(".")
+        function = getattr(importlib.import_module(head), last)
+        if not inspect.isfunction(function):
+            continue
+        text = inspect.getdoc(function) or ""
+        for argument in inspect.signature(function).parameters:
+            described = re.search(rf"^[\w *,]*\b{argument}\b[\w *,]*( :|$)", text, re.MULTILINE)
+            if not described and not re.search(r"(?:those of|see)\s+:func:", text):
+                silent.append(f"{name}: {argument}")
+    assert silent == []
+
+
 def test_every_public_header_is_in_the_reference() -> None:
     text = (ROOT / "docs" / "reference" / "cpp.md").read_text(encoding="utf-8")
     headings = re.findall(r"^## .*`nacre/(\w+)\.hpp`$", text, re.MULTILINE)
