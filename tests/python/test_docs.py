@@ -82,6 +82,7 @@ def test_it_builds_without_a_warning(tmp_path: Path) -> None:
         assert (tmp_path / page.relative_to(ROOT)).with_suffix(".html").is_file()
     registration = (tmp_path / "docs" / "algorithms" / "registration.html").read_text(encoding="utf-8")
     assert "<math" in registration  # equations need no script
+    assert re.findall(r'<(?:script|link|img)[^>]*(?:src|href)="http', registration) == []  # nor the network
     assert "registration.max_iterations" in registration  # parameters come from the code
     cpp = (tmp_path / "docs" / "reference" / "cpp.html").read_text(encoding="utf-8")
     for name in ("add_frame", "to_string", "MeshTree", "NACRE_VERSION", "PointsDouble"):
