@@ -5,6 +5,7 @@
 
 #include "icp_target.hpp"
 #include "rigid_motion.hpp"
+#include "view_adjustment.hpp"
 
 namespace nacre {
 namespace {
@@ -20,8 +21,12 @@ constexpr double reach = 0.12;               // drift that is looked for, as a p
 constexpr double drift = 0.005;              // of a step: [rad], and as a part of the depth
 constexpr double weak_drift = 10.0 * drift;  // where the registration leaves a direction open
 constexpr double loop_error = 0.25 * drift;
-constexpr double optimism = 25.0;     // of the covariance that a registration claims
-constexpr double most_stretch = 4.0;  // of an edge, in standard deviations
+constexpr double optimism = 25.0;                 // of the covariance that a registration claims
+constexpr double most_stretch = 4.0;              // of an edge, in standard deviations
+constexpr int ring_steps = 3;                     // from view to view around a ring, at least
+constexpr std::size_t most_in_ring = 64;          // views
+constexpr double ring_tolerance = 1.5;            // in spacings
+constexpr double most_surprise = 4.0 * optimism;  // squared, per unknown, of the newest view's registration
 
 double rms_distance(const Points& points, const Pose& a, const Pose& b) {
   double sum = 0.0;
@@ -127,6 +132,12 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
     node = most_seen >= 0 ? most_seen : stops_.back().key_frame;
   }
   stops_.push_back({frame.index, node, pose});
+  if (is_new) {
+    const bool is_ring = closes_ring(in_view);
+    seen_with_.push_back(in_view);
+    for (const int k : in_view) seen_with_[static_cast<std::size_t>(k)].push_back(node);
+    if (is_ring && (!found || agrees)) return adjust_ring(frame, in_view);
+  }
   if (!found || !is_new) return report;
 
   found->node = node;
@@ -264,6 +275,51 @@ std::vector<Pose> LoopClosure::close(const std::vector<Match>& matches, double d
   const std::vector<Pose> motions = corrections(before, frame + 1);
   for (Stop& stop : stops_) stop.pose = motions[static_cast<std::size_t>(stop.frame)] * stop.pose;
   return motions;
+}
+
+// Whether key frames that are all in view now have been tied to each other by a long way only.
+bool LoopClosure::closes_ring(const std::vector<int>& in_view) const {
+  if (in_view.empty()) return false;
+  std::vector<int> steps(seen_with_.size(), -1), queue = {*std::max_element(in_view.begin(), in_view.end())};
+  steps[static_cast<std::size_t>(queue.front())] = 0;
+  for (std::size_t next = 0; next < queue.size(); ++next) {
+    for (const int other : seen_with_[static_cast<std::size_t>(queue[next])]) {
+      int& step = steps[static_cast<std::size_t>(other)];
+      if (step >= 0) continue;
+      step = steps[static_cast<std::size_t>(queue[next])] + 1;
+      queue.push_back(other);
+    }
+  }
+  return std::any_of(in_view.begin(), in_view.end(),
+                     [&](int k) { return steps[static_cast<std::size_t>(k)] >= ring_steps; });
+}
+
+// A ring of views is closed, and what has drifted is less than would show: the views together determine each other
+// better than each did when it was the newest.
+LoopReport LoopClosure::adjust_ring(const LoopFrame& frame, const std::vector<int>& in_view) {
+  LoopReport report;
+  if (key_frames_.size() > most_in_ring || graph_.has_fixed()) return report;
+  std::vector<AdjustableView> views;
+  for (int k = 0; k < num_key_frames(); ++k) {
+    const FrameCloud& cloud = key_frames_[static_cast<std::size_t>(k)].cloud;
+    views.push_back({pose_of(k), cloud.points, cloud.normals});
+  }
+  const std::vector<Pose> before = graph_.poses();
+  const std::vector<Pose> adjusted = adjust_views(views, MotionBasis::all(frame.alignment.center),
+                                                  ring_tolerance * frame.spacing, options_.num_threads);
+  // The newest was registered to all the others: they may not contradict that.
+  const Eigen::Translation3d to_center(-frame.alignment.center);
+  const Vector6 twist = log_motion(to_center * (adjusted.back() * before.back().inverse()) * to_center.inverse());
+  if (twist.dot(frame.alignment.information * twist) > 6.0 * most_surprise) return report;
+  graph_.set_poses(adjusted);
+  graph_.measure_edges();
+  report.corrections = corrections(before, frame.index + 1);
+  for (Stop& stop : stops_) stop.pose = report.corrections[static_cast<std::size_t>(stop.frame)] * stop.pose;
+  report.frame = key_frames_[static_cast<std::size_t>(in_view.front())].frame;
+  const Pose& pose = frame.alignment.target_from_source;
+  report.distance = rms_distance(key_frames_.back().cloud.points, report.corrections.back() * pose, pose);
+  report.depth = key_frames_.back().cloud.depth;
+  return report;
 }
 
 // Of each frame: between those of the stops before and after it.

@@ -66,11 +66,14 @@ class LoopClosure {
   std::optional<Match> match(const LoopFrame& frame, const FrameCloud& cloud, const std::vector<int>& candidates) const;
   PoseEdge edge(int from, int to, const Pose& pose, const AlignResult& alignment, double depth, bool is_loop) const;
   std::vector<Pose> close(const std::vector<Match>& matches, double depth, std::int32_t frame);
+  bool closes_ring(const std::vector<int>& in_view) const;
+  LoopReport adjust_ring(const LoopFrame& frame, const std::vector<int>& in_view);
   std::vector<Pose> corrections(const std::vector<Pose>& before, std::int32_t num_frames) const;
 
   const Camera& camera_;
   const ModelOptions& options_;
-  std::vector<KeyFrame> key_frames_;  // nodes of the graph
+  std::vector<KeyFrame> key_frames_;         // nodes of the graph
+  std::vector<std::vector<int>> seen_with_;  // the earlier key frames in view when one was made, and the later ones
   PoseGraph graph_;
   std::vector<Stop> stops_;
   std::int32_t first_in_place_ = 0;  // the frame that was last registered to the whole model

@@ -276,7 +276,16 @@ void Model::Impl::keep_view(const FrameReport& report) {
 // Views far apart see little of the same surface: all of them together determine the newest, and each other.
 void Model::Impl::adjust(FrameReport& report) {
   if (views.empty() || views.back().frame != report.index) return;
-  const std::vector<Pose> adjusted = adjust_views(views, options.num_threads);
+  std::vector<AdjustableView> adjustable;
+  double tolerance = 0.0;
+  for (const ObjectView& view : views) {
+    adjustable.push_back({view.world_from_camera, view.points, view.normals});
+    tolerance = std::max(tolerance, view.tolerance);
+  }
+  const ObjectView& first = views.front();
+  const MotionBasis motions = MotionBasis::on_plane(first.world_from_camera.linear() * first.support.normal,
+                                                    first.world_from_camera * first.body());
+  const std::vector<Pose> adjusted = adjust_views(adjustable, motions, tolerance, options.num_threads);
   // Each frame moves with the view that it is nearest to.
   const auto motion_of = [&](const Pose& pose) {
     std::size_t nearest = 0;
@@ -290,15 +299,15 @@ void Model::Impl::adjust(FrameReport& report) {
     return orthonormal(adjusted[nearest] * views[nearest].world_from_camera.inverse());
   };
   for (Pose& pose : poses) pose = motion_of(pose) * pose;
-  std::vector<Pose> motions;
+  std::vector<Pose> corrections;
   for (FrameReport& earlier : reports) {
-    motions.push_back(motion_of(earlier.world_from_camera));
-    correct(earlier, motions.back());
+    corrections.push_back(motion_of(earlier.world_from_camera));
+    correct(earlier, corrections.back());
   }
-  motions.push_back(motion_of(report.world_from_camera));
-  correct(report, motions.back());
-  move_points(cloud, motions, options.num_threads);
-  if (options.loop_closure && options.fold_in == FoldIn::fuse) loops.move(motions);
+  corrections.push_back(motion_of(report.world_from_camera));
+  correct(report, corrections.back());
+  move_points(cloud, corrections, options.num_threads);
+  if (options.loop_closure && options.fold_in == FoldIn::fuse) loops.move(corrections);
   for (std::size_t k = 0; k < views.size(); ++k) views[k].world_from_camera = adjusted[k];
 }
 

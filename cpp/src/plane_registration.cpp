@@ -12,33 +12,20 @@ constexpr std::size_t least_pairs = 30;
 
 // Least squares of the residuals, about the middle of the pairs.
 Pose plane_step(const std::vector<Pair>& pairs, const Eigen::Vector3d& normal) {
-  PlaneMotion motion{normal, Eigen::Vector3d::Zero()};
+  MotionBasis motion = MotionBasis::on_plane(normal, Eigen::Vector3d::Zero());
   for (const Pair& pair : pairs) motion.center += pair.p / static_cast<double>(pairs.size());
   Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
   Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
   for (const Pair& pair : pairs) {
-    const Eigen::Vector3d row = motion.row(pair);
+    const MotionBasis::Amounts row = motion.row(pair);
     hessian += pair.weight * row * row.transpose();
     gradient -= pair.weight * row * residual(pair, Metric::symmetric);
   }
   hessian.diagonal().array() += 1e-9 * hessian.trace();
-  return motion.apply(hessian.ldlt().solve(gradient));
+  return motion.apply(Eigen::Vector3d(hessian.ldlt().solve(gradient)));
 }
 
 }  // namespace
-
-Eigen::Vector3d PlaneMotion::row(const Pair& pair) const {
-  const Eigen::Vector3d x = normal.unitOrthogonal(), y = normal.cross(x);
-  return {normal.cross(pair.p - center).dot(pair.normal), x.dot(pair.normal), y.dot(pair.normal)};
-}
-
-Pose PlaneMotion::apply(const Eigen::Vector3d& angle_and_shift) const {
-  const Eigen::Vector3d x = normal.unitOrthogonal(), y = normal.cross(x);
-  Pose motion = Pose::Identity();
-  motion.linear() = Eigen::AngleAxisd(angle_and_shift[0], normal).toRotationMatrix();
-  motion.translation() = center - motion.linear() * center + angle_and_shift[1] * x + angle_and_shift[2] * y;
-  return motion;
-}
 
 void weight_robustly(std::vector<Pair>& pairs, double floor) {
   std::vector<double> sizes;

@@ -2,17 +2,9 @@
 #pragma once
 
 #include "icp_target.hpp"
+#include "motion_basis.hpp"
 
 namespace nacre {
-
-// A turn about the normal of a plane (unit length) through a point, and a shift across it.
-struct PlaneMotion {
-  Eigen::Vector3d normal, center;
-
-  // How a residual changes with angle and shift.
-  Eigen::Vector3d row(const Pair& pair) const;
-  Pose apply(const Eigen::Vector3d& angle_and_shift) const;
-};
 
 // Weights of Geman and McClure 1985, scaled by the median residual but at least by floor [m].
 void weight_robustly(std::vector<Pair>& pairs, double floor);

@@ -39,6 +39,15 @@ int PoseGraph::add_node(const Pose& world_from_node, bool is_fixed) {
 
 void PoseGraph::add_edge(const PoseEdge& edge) { edges_.push_back(edge); }
 
+void PoseGraph::measure_edges() {
+  for (PoseEdge& edge : edges_) {
+    edge.from_from_to =
+        poses_[static_cast<std::size_t>(edge.from)].inverse() * poses_[static_cast<std::size_t>(edge.to)];
+  }
+}
+
+bool PoseGraph::has_fixed() const { return num_unknowns_ < 6 * (num_nodes() - 1); }
+
 double PoseGraph::squared_error(std::size_t i, const std::vector<Pose>& poses) const {
   const PoseEdge& edge = edges_[i];
   const Pose from_to = poses[static_cast<std::size_t>(edge.from)].inverse() * poses[static_cast<std::size_t>(edge.to)];

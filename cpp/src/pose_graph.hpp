@@ -36,6 +36,8 @@ class PoseGraph {
   const std::vector<PoseEdge>& edges() const { return edges_; }
   const std::vector<Pose>& poses() const { return poses_; }
   void set_poses(const std::vector<Pose>& poses) { poses_ = poses; }
+  void measure_edges();    // as the poses are now
+  bool has_fixed() const;  // nodes beside the first
 
   // Moves the nodes to the least squares of all residuals (Gauss and Newton, damped after Levenberg and Marquardt).
   // Loops are measured more finely than the way between their ends, so that a wrong one does not keep its residual: it

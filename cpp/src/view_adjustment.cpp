@@ -16,6 +16,7 @@ constexpr int num_iterations = 12;
 constexpr Eigen::Index num_samples = 800;
 constexpr double cos_angle = 0.7;                                 // between normals that match
 constexpr std::size_t least_pairs = 40;                           // of two views that see the same surface
+constexpr double still = 1e-6;                                    // motions of all views together [rad], [m]
 constexpr double first_gate = 2.0, last_gate = 1.0, decay = 0.8;  // in tolerances
 
 struct Side {
@@ -25,41 +26,48 @@ struct Side {
 
 }  // namespace
 
-std::vector<Pose> adjust_views(const std::vector<ObjectView>& views, int num_threads) {
+std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const MotionBasis& motions, double tolerance,
+                               int num_threads) {
   std::vector<Pose> poses;
-  for (const ObjectView& view : views) poses.push_back(view.world_from_camera);
+  for (const AdjustableView& view : views) poses.push_back(view.world_from_camera);
   if (views.size() < 3) return poses;
   AlignOptions options;
   options.max_samples = static_cast<int>(num_samples);
   options.num_threads = 1;
   std::vector<std::unique_ptr<Side>> sides(views.size());
   parallel_for(static_cast<std::int64_t>(views.size()), 1, num_threads, [&](std::int64_t i) {
-    const ObjectView& view = views[static_cast<std::size_t>(i)];
+    const AdjustableView& view = views[static_cast<std::size_t>(i)];
     const AlignCloud cloud(view.points, view.normals);
     sides[static_cast<std::size_t>(i)] =
         std::make_unique<Side>(Side{IcpSource(cloud, options), IcpTarget(cloud, options)});
   });
-  const Eigen::Vector3d normal = poses.front().linear() * views.front().support.normal;
-  const PlaneMotion motion{normal, poses.front() * views.front().body()};
-  const double tolerance = std::max_element(views.begin(), views.end(), [](const ObjectView& a, const ObjectView& b) {
-                             return a.tolerance < b.tolerance;
-                           })->tolerance;
-
   const auto count = static_cast<Eigen::Index>(views.size());
+  const Eigen::Index freedom = motions.twists.cols();
+  std::vector<std::uint8_t> see_the_same(views.size() * views.size(), 1);
+  for (std::size_t i = 0; i < views.size(); ++i) see_the_same[i * views.size() + i] = 0;
   double gate = first_gate;
   for (int iteration = 0; iteration < num_iterations; ++iteration) {
-    std::vector<std::vector<Pair>> matches(views.size() * views.size());
+    std::vector<std::vector<Pair>> matches(see_the_same.size());
     parallel_for(count * count, 1, num_threads, [&](std::int64_t k) {
       const auto i = static_cast<std::size_t>(k / count), j = static_cast<std::size_t>(k % count);
-      if (i == j) return;
+      if (see_the_same[static_cast<std::size_t>(k)] == 0) return;
       const IcpSource& source = sides[i]->source;
       std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
       std::vector<Pair> pairs =
           sides[j]->target.match(source, source.cloud.points.rows(), poses[j].inverse() * poses[i],
                                  {gate * tolerance, cos_angle, false}, nearest);
-      if (pairs.size() < least_pairs) return;
+      if (pairs.size() < least_pairs) {
+        if (gate == last_gate) see_the_same[static_cast<std::size_t>(k)] = 0;
+        return;
+      }
       weight_robustly(pairs, 0.05 * tolerance);
+      const double reach = gate * tolerance;
       for (Pair& pair : pairs) {
+        // Beyond a view's rim, matches only continue it: the farther along the surface, the less they count.
+        const double across = residual(pair, Metric::symmetric),
+                     along = (pair.p - pair.q).squaredNorm() - across * across;
+        const double part = std::max(0.0, 1.0 - along / (reach * reach));
+        pair.weight *= part * part;
         pair.p = poses[j] * pair.p;
         pair.q = poses[j] * pair.q;
         pair.normal = poses[j].linear() * pair.normal;
@@ -67,30 +75,35 @@ std::vector<Pose> adjust_views(const std::vector<ObjectView>& views, int num_thr
       matches[static_cast<std::size_t>(k)] = std::move(pairs);
     });
     // Each residual grows with the motion of one view and shrinks with that of the other.
-    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(3 * count, 3 * count);
-    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(3 * count);
+    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(freedom * count, freedom * count);
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(freedom * count);
     for (Eigen::Index k = 0; k < count * count; ++k) {
-      const Eigen::Index i = 3 * (k / count), j = 3 * (k % count);
+      if (matches[static_cast<std::size_t>(k)].empty()) continue;
+      Matrix6 squares = Matrix6::Zero();
+      Vector6 right_side = Vector6::Zero();
       for (const Pair& pair : matches[static_cast<std::size_t>(k)]) {
-        const Eigen::Vector3d row = motion.row(pair);
-        const Eigen::Matrix3d square = pair.weight * row * row.transpose();
-        const Eigen::Vector3d side = pair.weight * residual(pair, Metric::symmetric) * row;
-        hessian.block<3, 3>(i, i) += square;
-        hessian.block<3, 3>(j, j) += square;
-        hessian.block<3, 3>(i, j) -= square;
-        hessian.block<3, 3>(j, i) -= square;
-        gradient.segment<3>(i) -= side;
-        gradient.segment<3>(j) += side;
+        const MotionBasis::Amounts row = motions.row(pair);
+        squares.topLeftCorner(freedom, freedom).noalias() += pair.weight * row * row.transpose();
+        right_side.head(freedom) += pair.weight * residual(pair, Metric::symmetric) * row;
       }
+      const Eigen::Index i = freedom * (k / count), j = freedom * (k % count);
+      const auto square = squares.topLeftCorner(freedom, freedom);
+      hessian.block(i, i, freedom, freedom) += square;
+      hessian.block(j, j, freedom, freedom) += square;
+      hessian.block(i, j, freedom, freedom) -= square;
+      hessian.block(j, i, freedom, freedom) -= square;
+      gradient.segment(i, freedom) -= right_side.head(freedom);
+      gradient.segment(j, freedom) += right_side.head(freedom);
     }
-    hessian.diagonal().array() += 1e-6 * hessian.trace() / static_cast<double>(3 * count);
-    const Eigen::Index rest = 3 * (count - 1);
+    hessian.diagonal().array() += 1e-6 * hessian.trace() / static_cast<double>(freedom * count);
+    const Eigen::Index rest = freedom * (count - 1);
     const Eigen::VectorXd solution =
         Eigen::MatrixXd(hessian.bottomRightCorner(rest, rest)).ldlt().solve(gradient.tail(rest));
     for (Eigen::Index k = 1; k < count; ++k) {
       Pose& pose = poses[static_cast<std::size_t>(k)];
-      pose = orthonormal(motion.apply(solution.segment<3>(3 * (k - 1))) * pose);
+      pose = orthonormal(motions.apply(solution.segment(freedom * (k - 1), freedom)) * pose);
     }
+    if (gate == last_gate && solution.norm() < still) break;
     gate = std::max(last_gate, decay * gate);
   }
   return poses;

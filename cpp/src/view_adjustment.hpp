@@ -1,15 +1,23 @@
-// Views of an object on a plane, all registered to each other at once.
+// Views of a surface, all registered to each other at once.
 #pragma once
 
 #include <vector>
 
-#include "object_view.hpp"
+#include "motion_basis.hpp"
+#include "nacre/registration.hpp"
 
 namespace nacre {
 
-// The views' poses (world_from_camera) after the surfaces of all pairs of views have been brought onto each other (as
-// Lu and Milios 1997 do with range scans). The first stays; the others turn about the plane's normal and move across
-// it.
-std::vector<Pose> adjust_views(const std::vector<ObjectView>& views, int num_threads);
+struct AdjustableView {
+  Pose world_from_camera;
+  const Points& points;  // in random order, camera frame
+  const Points& normals;
+};
+
+// The views' poses after the surfaces of all pairs of views have been brought onto each other (as Lu and Milios 1997 do
+// with range scans): points match up to about the tolerance [m]. The first view stays; the others make the motions of
+// the basis.
+std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const MotionBasis& motions, double tolerance,
+                               int num_threads);
 
 }  // namespace nacre

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <limits>
 
+#include "depth_images.hpp"
 #include "doctest/doctest.h"
 #include "key_frames.hpp"
 #include "meshes.hpp"
@@ -262,6 +263,84 @@ TEST_CASE("poses that are given are not corrected") {
   for (int k = 0; k < frames_per_turn + 8; ++k) {
     CHECK(model.frames()[static_cast<std::size_t>(k)].world_from_camera.matrix() == Room::pose(k).matrix());
   }
+}
+
+// The built-in object on a turntable, twelve views around it.
+class Turntable {
+ public:
+  static constexpr int num_views = 12;
+
+  static Pose pose(int k) {
+    Pose pose = Pose::Identity();
+    pose.linear() = Eigen::AngleAxisd(2.0 * pi * k / num_views, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    pose.translation() = middle() - pose.linear() * (0.5 * Eigen::Vector3d::UnitZ());
+    return pose;
+  }
+  static const Mesh& object() {
+    static const Mesh mesh = built_in_object();
+    return mesh;
+  }
+  static Eigen::Vector3d middle() {
+    const Eigen::Vector3f low = object().vertices.colwise().minCoeff(), high = object().vertices.colwise().maxCoeff();
+    return (0.5F * (low + high)).cast<double>();
+  }
+  static Model scanned(std::uint64_t seed, bool close_loops, bool is_given = false, int num_threads = 0) {
+    const Camera camera = Camera::orthographic(130, 160, 0.0015);
+    ModelOptions options;
+    options.loop_closure = close_loops;
+    options.num_threads = num_threads;
+    Model model(camera, options);
+    for (int k = 0; k < num_views; ++k) {
+      FrameExtras extras;
+      if (k == 0 || is_given) extras.guess = pose(k);
+      extras.keep_guess = is_given || k == 0;
+      DepthImage depth = clean(camera)[static_cast<std::size_t>(k)];
+      add_noise(depth, {0.0005, 0.0, 0.0}, seed * num_views + static_cast<std::uint64_t>(k));
+      model.add_frame(depth, extras);
+    }
+    return model;
+  }
+  static const std::vector<DepthImage>& clean(const Camera& camera) {
+    static std::vector<DepthImage> images;
+    if (images.empty()) {
+      const MeshTree tree(object().vertices, object().triangles);
+      for (int k = 0; k < num_views; ++k) images.push_back(simulate_depth(tree, camera, pose(k)));
+    }
+    return images;
+  }
+  static double largest_turn(const Model& model) {
+    double most = 0.0;
+    for (const FrameReport& report : model.frames()) {
+      REQUIRE(report.status == FrameStatus::tracked);
+      const Eigen::Matrix3d truth = pose(static_cast<int>(report.index)).linear();
+      most = std::max(most, Eigen::AngleAxisd(truth.transpose() * report.world_from_camera.linear()).angle());
+    }
+    return most;
+  }
+};
+
+TEST_CASE("views around an object determine each other better than each did when it was the newest") {
+  double alone = 0.0, together = 0.0;
+  for (const std::uint64_t seed : {1U, 2U, 3U}) {
+    const Model closed = Turntable::scanned(seed, true);
+    CHECK(num_loops(closed) == 1);
+    together += Turntable::largest_turn(closed);
+    alone += Turntable::largest_turn(Turntable::scanned(seed, false));
+  }
+  CHECK(together < 0.7 * alone);
+  CHECK(together / 3.0 < 0.0025);
+}
+
+TEST_CASE("a ring of views closes with the same bits for any number of threads") {
+  const Model one = Turntable::scanned(1, true, false, 1), three = Turntable::scanned(1, true, false, 3);
+  CHECK(num_loops(one) == 1);
+  CHECK(same_bits(one.cloud().points, three.cloud().points));
+}
+
+TEST_CASE("a ring of given poses stays as it is") {
+  const Model model = Turntable::scanned(1, true, true);
+  CHECK(num_loops(model) == 0);
+  CHECK(Turntable::largest_turn(model) == 0.0);
 }
 
 TEST_CASE("the distance of two views counts turns and, by depth, ways") {
