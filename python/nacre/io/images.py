@@ -104,20 +104,20 @@ def read_attribute(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
     return np.ascontiguousarray(stored, dtype=np.float32)
 
 
-def write_depth_png(path: str | os.PathLike[str], depth: npt.ArrayLike) -> None:
-    """Write (H, W) uint16 stored depth units as a 16-bit PNG, atomically."""
+def write_depth_png(path: str | os.PathLike[str], depth: npt.ArrayLike, *, fast: bool = False) -> None:
+    """Write (H, W) uint16 stored depth units as a 16-bit PNG, atomically; ``fast`` compresses less."""
     array = np.ascontiguousarray(depth)
     if array.dtype != np.uint16 or array.ndim != 2:
         raise ValueError(f"depth must be (H, W) uint16, got {array.shape} of {array.dtype}")
-    _write_png(path, array)
+    _write_png(path, array, fast)
 
 
-def write_color_png(path: str | os.PathLike[str], color: npt.ArrayLike) -> None:
-    """Write an (H, W, 3) uint8 RGB image as a PNG, atomically."""
+def write_color_png(path: str | os.PathLike[str], color: npt.ArrayLike, *, fast: bool = False) -> None:
+    """Write an (H, W, 3) uint8 RGB image as a PNG, atomically; ``fast`` compresses less."""
     array = np.ascontiguousarray(color)
     if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3:
         raise ValueError(f"color must be (H, W, 3) uint8, got {array.shape} of {array.dtype}")
-    _write_png(path, array)
+    _write_png(path, array, fast)
 
 
 def _pillow() -> Any:
@@ -130,10 +130,10 @@ def _pillow() -> Any:
     return PIL.Image
 
 
-def _write_png(path: str | os.PathLike[str], array: npt.NDArray[Any]) -> None:
+def _write_png(path: str | os.PathLike[str], array: npt.NDArray[Any], fast: bool) -> None:
     image = _pillow().fromarray(array)
     with atomic_writer(path) as stream:
-        image.save(stream, format="PNG")
+        image.save(stream, format="PNG", compress_level=1 if fast else 6)
 
 
 @contextmanager
