@@ -203,7 +203,9 @@ def reconstruct(
             "interrupted": interrupted,
             "depth_calibration": calibration
             and dataclasses.asdict(calibration) | {"used": calibration.is_significant},
+            "live": None if feed is None else feed.figures,
         },
+        figures=None if feed is None else dict(feed.rows),
     )
     if json:
         print(to_json(report))

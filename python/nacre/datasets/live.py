@@ -105,9 +105,10 @@ class LiveQueue(Iterator[Item], Generic[Item]):
             self._thread.join(self.timeout)
 
     def _start(self) -> None:
-        if not self._started and not self._closed:
-            self._started = True
-            self._thread.start()
+        with self._changed:
+            if not self._started and not self._closed:
+                self._thread.start()
+                self._started = True
 
     def _has_news(self) -> bool:
         return bool(self._waiting) or self._ended or self._closed

@@ -1,4 +1,4 @@
-"""ROS 1 and 2 recordings (.bag, folders with metadata.yaml), RealSense's among them; read by rosbags."""
+"""ROS 1 and 2 recordings (.bag, .mcap, .db3, folders of them), RealSense's among them; read by rosbags."""
 
 from __future__ import annotations
 
@@ -19,7 +19,11 @@ from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 
 FORMAT = "rosbag"
-LAYOUT = "a .bag file (ROS 1, RealSense) or a ROS 2 folder (metadata.yaml), with depth images and camera_info"
+LAYOUT = (
+    "a .bag (ROS 1, RealSense), .mcap or .db3 (ROS 2, RealSense) or a ROS 2 folder (metadata.yaml), "
+    "with depth images and camera_info"
+)
+SUFFIXES = (".bag", ".mcap", ".db3")
 
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO = "sensor_msgs/msg/CameraInfo"
@@ -29,9 +33,9 @@ _CHANNELS = {"rgb8": (0, 1, 2), "bgr8": (2, 1, 0), "rgba8": (0, 1, 2), "bgra8": 
 
 
 def recognise(path: Path) -> bool:
-    """Say whether this is a ROS recording: a .bag file, or a folder with metadata.yaml and bags."""
+    """Say whether this is a ROS recording: a file of one, or a folder with metadata.yaml and bags."""
     if path.is_file():
-        return path.suffix == ".bag"
+        return path.suffix in SUFFIXES
     return (path / "metadata.yaml").is_file() and any(path.glob(pattern) for pattern in ("*.db3*", "*.mcap"))
 
 
@@ -162,8 +166,9 @@ class _Bag:
         units = [c for c in self._reader.connections if c.topic.endswith("option/Depth_Units/value")]
         for connection, _, data in self._reader.messages(units) if units else ():
             message: Any = self._reader.deserialize(data, connection.msgtype)
-            if message.data > 0:
-                return float(round(1 / message.data, 3))
+            with suppress(ValueError):  # a text in the SDK's .db3
+                if float(message.data) > 0:
+                    return round(1 / float(message.data), 3)
         return 1000.0
 
     def _messages(self, topic: str, time: int | None = None) -> Any:

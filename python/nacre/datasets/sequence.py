@@ -32,7 +32,8 @@ MaskLoader = Callable[[Path], npt.NDArray[np.bool_]]
 
 def load_mask(path: Path) -> npt.NDArray[np.bool_]:
     """Read an image as a mask: pixels that are not black are of interest."""
-    return read_color(path).any(axis=2)
+    mask: npt.NDArray[np.bool_] = read_color(path).any(axis=2)
+    return mask
 
 
 @dataclass(frozen=True, eq=False)
