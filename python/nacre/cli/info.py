@@ -30,7 +30,9 @@ def info(
     terminal = Terminal(json, quiet, verbose)
     if not source.exists():
         raise CommandError(f"no such file or folder: {source}", 2)
-    if source.is_dir() or source.suffix.lower() == ".bag" or format is not None:
+    from nacre.datasets.detect import FILE_SUFFIXES
+
+    if source.is_dir() or source.suffix.lower() in FILE_SUFFIXES or format is not None:
         figures, rows = _recording(open_source(source, format, camera, depth_scale))
     elif source.suffix.lower() in POINT_SUFFIXES and not (
         source.suffix.lower() == ".ply" and has_faces(source)
@@ -45,8 +47,9 @@ def info(
         figures, rows = _mesh(source)
     else:
         known = ", ".join(dict.fromkeys(POINT_SUFFIXES + MESH_SUFFIXES))
+        recordings = ", ".join(FILE_SUFFIXES)
         raise CommandError(
-            f"{source}: neither a recording (a folder) nor a file of points or triangles ({known})", 2
+            f"{source}: neither a recording (a folder, {recordings}) nor points or triangles ({known})", 2
         )
     terminal.answer(figures, rows)
 

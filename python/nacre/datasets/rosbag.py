@@ -17,6 +17,7 @@ from nacre.datasets.given import Given
 from nacre.datasets.listing import describe
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
+from nacre.io.images import decode_color
 
 FORMAT = "rosbag"
 LAYOUT = (
@@ -80,7 +81,10 @@ class _Bag:
             self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
             self._reader.open()
         except Exception as error:  # rosbags has several, and lets through what damaged files cause
-            raise FileFormatError(path, f"not a whole ROS recording: {error}") from error
+            hint = ""
+            if path.suffix == ".mcap" and path.stat().st_size:
+                hint = f" (ROS 2 is read; what was cut short: mcap recover {path.name} -o whole.mcap)"
+            raise FileFormatError(path, f"not a whole ROS recording: {error}{hint}") from error
         weakref.finalize(self, self._reader.close)
         topics = [c.topic for c in self._reader.connections if c.msgtype in _IMAGES]
         depth = [topic for topic in topics if re.search("depth", topic, re.IGNORECASE)]
@@ -153,7 +157,7 @@ class _Bag:
         """Read a colour image."""
         message = self._message(place)
         if not hasattr(message, "encoding"):
-            return _decoded(message, place)
+            return decode_color(io.BytesIO(bytes(message.data)), place)
         if message.encoding not in _CHANNELS:
             raise FileFormatError(
                 place, f"colour images are {', '.join(_CHANNELS)}, this is {message.encoding}"
@@ -227,14 +231,3 @@ def _compressed_depth(message: Any, place: Path) -> npt.NDArray[Any]:
         return np.asarray(Image.open(io.BytesIO(data[start:])), dtype=np.uint16)
     except (UnidentifiedImageError, OSError, SyntaxError) as error:
         raise FileFormatError(place, f"the PNG is damaged: {error}") from error
-
-
-def _decoded(message: Any, place: Path) -> npt.NDArray[np.uint8]:
-    """Return the pixels of a compressed colour image."""
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        with Image.open(io.BytesIO(bytes(message.data))) as image:
-            return np.array(image.convert("RGB"), dtype=np.uint8)
-    except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise FileFormatError(place, f"the image is damaged: {error}") from error

@@ -32,8 +32,7 @@ MaskLoader = Callable[[Path], npt.NDArray[np.bool_]]
 
 def load_mask(path: Path) -> npt.NDArray[np.bool_]:
     """Read an image as a mask: pixels that are not black are of interest."""
-    mask: npt.NDArray[np.bool_] = read_color(path).any(axis=2)
-    return mask
+    return np.asarray(read_color(path).any(axis=2), np.bool_)
 
 
 @dataclass(frozen=True, eq=False)
