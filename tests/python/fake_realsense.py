@@ -1,4 +1,4 @@
-"""A RealSense camera that is not there: as much of pyrealsense2 as the reader uses, for tests without hardware."""
+"""A RealSense camera that is not there: as much of pyrealsense2 as the reader uses."""
 
 from __future__ import annotations
 
@@ -96,9 +96,7 @@ class Library:
         return pipeline
 
     def pipeline(self) -> Any:
-        return SimpleNamespace(
-            start=self.start, stop=self.stop, try_wait_for_frames=self.try_wait_for_frames
-        )
+        return SimpleNamespace(start=self.start, stop=self.stop, try_wait_for_frames=self.try_wait_for_frames)
 
     def start(self, config: Any) -> Any:
         if self.busy:

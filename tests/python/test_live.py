@@ -151,7 +151,7 @@ class TestGrowing:
         growing = GrowingRecording(tmp_path / "r", CAMERA, 1000, "wave")
         (tmp_path / "r" / "depth").rmdir()
         growing.add(frame(0))
-        with pytest.raises(nacre.CameraError, match="images cannot be kept in .*r: No such file"):
+        with pytest.raises(nacre.CameraError, match=r"images cannot be kept in .*r: No such file"):
             growing.close()
 
 
@@ -189,7 +189,9 @@ class TestRealTime:
         monkeypatch.setattr(Reconstruction, "_add", slowly)
         write_wave(tmp_path / "r", 40, 0.001)
         with pytest.raises(SystemExit) as end:
-            main(["reconstruct", str(tmp_path / "r"), "-o", str(tmp_path / "out"), "--realtime", "--no-retry"])
+            main(
+                ["reconstruct", str(tmp_path / "r"), "-o", str(tmp_path / "out"), "--realtime", "--no-retry"]
+            )
         assert not end.value.code
         report = json.loads((tmp_path / "out" / "report.json").read_text())
         live = report["live"]

@@ -284,6 +284,8 @@ class TestTheCommand:
         assert run(["reconstruct", "realsense:7", "-o", out, "--depth-scale", "1000"]) == 2
         assert "--depth-scale is for recordings, and realsense:7 is a camera" in capsys.readouterr().err
         monkeypatch.setattr(realsense, "_library", lambda: fake.Library())
-        nacre.write_recording(tmp_path / "out" / "recording", nacre.Camera(4, 3, 5, 5, 1.5, 1), [], depth_scale=1)
+        nacre.write_recording(
+            tmp_path / "out" / "recording", nacre.Camera(4, 3, 5, 5, 1.5, 1), [], depth_scale=1
+        )
         assert run(["reconstruct", "realsense", "-o", out]) == 2
         assert "holds a recording already; give another folder" in capsys.readouterr().err

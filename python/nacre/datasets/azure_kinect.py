@@ -81,7 +81,7 @@ def _advice(name: str) -> str:
     return (
         f"mkdir -p images/depth && ffmpeg -dump_attachment:t:0 images/calibration.json -i {name} -map 0:1 "
         "-fps_mode passthrough images/depth/%05d.png, then give images (0:1 is the depth track, 0:0 where "
-        "there is no colour; for colours, Open3D's azure_kinect_mkv_reader.py writes a folder that is read too)"
+        "there is no colour; for colours, give the folder that Open3D's azure_kinect_mkv_reader.py writes)"
     )
 
 
