@@ -272,6 +272,19 @@ class TestTheCommand:
         assert report["num_frames"] == 5
         assert report["live"]["stopped"] == "Fake D435 0815 was unplugged"
 
+    def test_info_tells_of_a_camera(
+        self, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        from nacre.cli.app import run
+
+        library = fake.Library(confident=True)
+        monkeypatch.setattr(realsense, "_library", lambda: library)
+        assert run(["info", "realsense"]) == 0
+        told = capsys.readouterr().out
+        assert "Fake D435, serial number 0815" in told
+        assert "pinhole camera 96 x 72" in told
+        assert library.stopped
+
     def test_no_camera_and_wrong_usage(
         self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
     ) -> None:

@@ -178,6 +178,35 @@ def test_rows_may_be_padded_and_channels_swapped(tmp_path: Path) -> None:
     assert frame.color[0, 0].tolist() == [200, 0, 3]
 
 
+def test_pixels_of_no_confidence_are_masked(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "l515.bag", 1)
+    recorder.info("/device_0/sensor_0/Depth_0/info/camera_info")
+    recorder.image("/device_0/sensor_0/Depth_0/image/data", 1.0, depth_image(0), "mono16")
+    confidence = np.full((HEIGHT, WIDTH), 240, np.uint8)
+    confidence[:, :10] = 0
+    recorder.image("/device_0/sensor_0/Confidence_0/image/data", 1.001, confidence, "8UC1")
+    recorder.close()
+    frame = nacre.open_sequence(tmp_path / "l515.bag")[0]
+    assert frame.color is None
+    assert frame.mask is not None
+    assert not frame.mask[:, :10].any()
+    assert frame.mask[:, 10:].all()
+
+
+@pytest.mark.parametrize(("fx", "are_used"), [(60.2, True), (90.0, False)])
+def test_colours_of_another_camera_do_not_lie_over_depth(
+    fx: float, are_used: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    recorder = Recorder(tmp_path / "d435.bag", 1)
+    recorder.info("/device_0/sensor_0/Depth_0/info/camera_info", 60.0)
+    recorder.info("/device_0/sensor_1/Color_0/info/camera_info", fx)
+    recorder.image("/device_0/sensor_0/Depth_0/image/data", 1.0, depth_image(0), "mono16")
+    recorder.image("/device_0/sensor_1/Color_0/image/data", 1.0, color_image(0), "rgb8")
+    recorder.close()
+    assert nacre.open_sequence(tmp_path / "d435.bag").has_color == are_used
+    assert ("its camera is not that of" in caplog.text) != are_used
+
+
 class TestBroken:
     def test_no_depth(self, tmp_path: Path) -> None:
         recorder = Recorder(tmp_path / "r.bag", 1)

@@ -11,7 +11,7 @@ from nacre.cli.terminal import CommandError
 from nacre.errors import CameraError
 
 if TYPE_CHECKING:
-    from nacre.datasets import LiveQueue, Sequence
+    from nacre.datasets import LiveQueue, RealSense, Sequence
 
 _CAMERA = "realsense"
 
@@ -81,13 +81,20 @@ def is_camera(source: Path) -> bool:
     return (str(source) == _CAMERA or str(source).startswith(f"{_CAMERA}:")) and not source.exists()
 
 
-def camera_feed(source: Path, out: Path, color: bool, pick: tuple[int, int | None, int]) -> LiveFeed:
-    """Start a camera, ``realsense``, ``realsense:SERIAL`` or ``realsense:FILE``, recording to ``out``."""
-    from nacre.datasets import GrowingRecording, LiveQueue, RealSense
+def open_camera(source: Path, color: bool = True) -> RealSense:
+    """Start a camera: ``realsense``, ``realsense:SERIAL`` or ``realsense:FILE``."""
+    from nacre.datasets import RealSense
 
     name = str(source).partition(":")[2] or None
     file = name if name is not None and (Path(name).suffix or Path(name).exists()) else None
-    camera = RealSense(None if file else name, file=file, color=color)
+    return RealSense(None if file else name, file=file, color=color)
+
+
+def camera_feed(source: Path, out: Path, color: bool, pick: tuple[int, int | None, int]) -> LiveFeed:
+    """Start a camera and keep what is used of it in ``out``."""
+    from nacre.datasets import GrowingRecording, LiveQueue
+
+    camera = open_camera(source, color)
     try:
         title = f"{camera.name} {camera.serial}"
         sequence = GrowingRecording(out / "recording", camera.camera, camera.depth_scale, title)

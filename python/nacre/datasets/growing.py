@@ -15,7 +15,7 @@ from nacre.datasets.sequence import FrameSource, Sequence, SequenceFrame
 from nacre.errors import CameraError
 from nacre.io.atomic import atomic_writer
 from nacre.io.cameras import write_camera
-from nacre.io.images import write_color_png, write_depth_png
+from nacre.io.images import write_color_jpeg, write_color_png, write_depth_png
 
 _MOST_UNWRITTEN = 16
 
@@ -25,7 +25,7 @@ class GrowingRecording(Sequence):
     A plain recording that views are added to; a thread of its own writes them.
 
     What is in the folder is a whole recording at any moment, but for the time stamps, which :meth:`close`
-    writes.
+    writes. Colours are kept as JPEG, for the time that PNG takes.
 
     Parameters
     ----------
@@ -62,13 +62,13 @@ class GrowingRecording(Sequence):
     def add(self, frame: SequenceFrame) -> int:
         """Keep a view and return its index; waits where the disk is far behind."""
         index = len(self._grown)
-        name = f"{index:06d}.png"
+        name = f"{index:06d}"
         source = FrameSource(
             index,
-            self.path / "depth" / name,
-            None if frame.color is None else self.path / "color" / name,
+            self.path / "depth" / f"{name}.png",
+            None if frame.color is None else self.path / "color" / f"{name}.jpg",
             frame.timestamp,
-            mask=None if frame.mask is None else self.path / "mask" / name,
+            mask=None if frame.mask is None else self.path / "mask" / f"{name}.png",
         )
         self._unwritten.append(self._writer.submit(self._write, frame, source))
         self._settle(_MOST_UNWRITTEN)
@@ -104,10 +104,10 @@ class GrowingRecording(Sequence):
         stored = np.rint(np.nan_to_num(frame.depth) * self.depth_scale)
         write_depth_png(source.depth, np.where(stored < 65535, stored, 0).astype(np.uint16), fast=True)
         if source.color is not None and frame.color is not None:
-            write_color_png(source.color, frame.color, fast=True)
+            write_color_jpeg(source.color, frame.color)
         if source.mask is not None and frame.mask is not None:
             white = np.repeat(frame.mask[..., None], 3, axis=2).astype(np.uint8) * 255
-            write_color_png(source.mask, white, fast=True)
+            write_color_png(source.mask, white)
 
     def _read(self, source: FrameSource) -> SequenceFrame:
         if self._newest is not None and source.index == self._newest.index:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import logging
 import re
 import weakref
 from contextlib import suppress
@@ -18,6 +19,8 @@ from nacre.datasets.listing import describe
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.images import decode_color
+
+_log = logging.getLogger(__name__)
 
 FORMAT = "rosbag"
 LAYOUT = (
@@ -45,25 +48,29 @@ def read(path: Path, given: Given) -> Sequence:
     Open a ROS recording.
 
     The depth topic is the one that is aligned to the colours, if there is one. Images of 16 bits are
-    millimetres unless a RealSense recording tells its depth units, or the caller does.
+    millimetres unless a RealSense recording tells its depth units, or the caller does. Where there is a topic
+    of confidence, pixels whose confidence is 0 are not used. Colours of a camera with other intrinsics do not
+    lie over the depth images, and are left out.
     """
     if not recognise(path):
         holds = f"; the folder holds {describe(path)}" if path.is_dir() else ""
         raise FileFormatError(path, f"a ROS recording is {LAYOUT}{holds}")
     bag = _Bag(path, given.depth_scale)
     camera = given.camera or bag.camera()
-    colors = bag.colors(given.max_difference)
+    colors = bag.nearest(bag.color_topics, given.max_difference)
+    confidence = bag.nearest(bag.confidence_topics, given.max_difference)
     return Sequence(
         path,
         format=FORMAT,
         camera=camera,
         depth_scale=bag.depth_scale,
         sources=[
-            FrameSource(i, bag.place(bag.depth_topic, time), color, 1e-9 * time)
-            for i, (time, color) in enumerate(zip(bag.times, colors, strict=True))
+            FrameSource(i, bag.place(bag.depth_topic, time), color, 1e-9 * time, mask=mask)
+            for i, (time, color, mask) in enumerate(zip(bag.times, colors, confidence, strict=True))
         ],
         load_depth=bag.depth,
         load_color=bag.color,
+        load_mask=bag.is_sure,
     )
 
 
@@ -87,14 +94,20 @@ class _Bag:
             raise FileFormatError(path, f"not a whole ROS recording: {error}{hint}") from error
         weakref.finalize(self, self._reader.close)
         topics = [c.topic for c in self._reader.connections if c.msgtype in _IMAGES]
-        depth = [topic for topic in topics if re.search("depth", topic, re.IGNORECASE)]
+        sure = [topic for topic in topics if re.search("confidence", topic, re.IGNORECASE)]
+        depth = [t for t in topics if re.search("depth", t, re.IGNORECASE) and t not in sure]
         if not depth:
             raise FileFormatError(
                 path, f"no topic of depth images; there are {', '.join(sorted(topics)) or 'no images'}"
             )
         self.depth_topic = min(depth, key=_preference)
-        self._color_topics = [
-            t for t in topics if re.search("colou?r|rgb", t, re.IGNORECASE) and t not in depth
+        self.confidence_topics = [topic for topic in sure if self._has_camera_of_depth(topic)]
+        self.color_topics = [
+            topic
+            for topic in topics
+            if re.search("colou?r|rgb", topic, re.IGNORECASE)
+            and topic not in depth
+            and self._has_camera_of_depth(topic)
         ]
         self.times = [time for _, time, _ in self._messages(self.depth_topic)]
         self.depth_scale = depth_scale if depth_scale is not None else self._depth_scale()
@@ -105,26 +118,47 @@ class _Bag:
         if not near:
             raise FileFormatError(self.path, "no camera_info; give the camera")
         chosen = max(near, key=lambda c: _common(c.topic, self.depth_topic))
-        for connection, _, data in self._reader.messages([chosen]):
-            info: Any = self._reader.deserialize(data, connection.msgtype)
-            matrix, coefficients = (
-                np.asarray(getattr(info, name if hasattr(info, name) else name.upper()), np.float64)
-                for name in ("k", "d")  # capitals in ROS 1
-            )
-            matrix = matrix.reshape(3, 3)
-            distortion = coefficients if len(coefficients) in (4, 5) else np.zeros(5)
-            try:
-                return Camera(
-                    info.width, info.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2],
-                    distortion=list(distortion),
-                )  # fmt: skip
-            except ValueError as error:
-                raise FileFormatError(self.path, f"{chosen.topic}: {error}") from error
-        raise FileFormatError(self.path, f"{chosen.topic} is empty; give the camera")
+        info = self._first(chosen)
+        if info is None:
+            raise FileFormatError(self.path, f"{chosen.topic} is empty; give the camera")
+        matrix, coefficients = _intrinsics(info)
+        distortion = coefficients if len(coefficients) in (4, 5) else np.zeros(5)
+        try:
+            return Camera(
+                info.width, info.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2],
+                distortion=list(distortion),
+            )  # fmt: skip
+        except ValueError as error:
+            raise FileFormatError(self.path, f"{chosen.topic}: {error}") from error
 
-    def colors(self, max_difference: float) -> list[Path | None]:
-        """Return for each depth image the colour image that is nearest in time."""
-        for topic in sorted(self._color_topics, key=_preference):
+    def _has_camera_of_depth(self, topic: str) -> bool:
+        """Say whether an image's own camera is the depth images', as far as they tell their cameras."""
+        matrices = []
+        for image in (topic, self.depth_topic):
+            own = [
+                c
+                for c in self._reader.connections
+                if c.msgtype == _INFO
+                and image.startswith(c.topic.rpartition("/")[0].removesuffix("/info") + "/")
+            ]
+            info = self._first(max(own, key=lambda c: len(c.topic))) if own else None
+            if info is None:
+                return True
+            matrices.append(_intrinsics(info)[0])
+        if np.allclose(matrices[0], matrices[1], rtol=0.01, atol=0.01 * matrices[0][0, 0]):
+            return True
+        _log.warning("%s: %s is left out: its camera is not that of %s", self.path, topic, self.depth_topic)
+        return False
+
+    def _first(self, connection: Any) -> Any:
+        """Return the first message of a connection, or None."""
+        for _, _, data in self._reader.messages([connection]):
+            return self._reader.deserialize(data, connection.msgtype)
+        return None
+
+    def nearest(self, topics: list[str], max_difference: float) -> list[Path | None]:
+        """Return for each depth image the image of the best topic that is nearest in time."""
+        for topic in sorted(topics, key=_preference):
             times = np.array([time for _, time, _ in self._messages(topic)])
             if not len(times):
                 continue
@@ -166,6 +200,13 @@ class _Bag:
         pixels = pixels if pixels.ndim == 3 else pixels[..., None]
         return np.ascontiguousarray(pixels[..., _CHANNELS[message.encoding]])
 
+    def is_sure(self, place: Path) -> npt.NDArray[np.bool_]:
+        """Read where an image of confidence is not 0."""
+        message = self._message(place)
+        if not hasattr(message, "encoding"):
+            return np.asarray(decode_color(io.BytesIO(bytes(message.data)), place).any(axis=2), np.bool_)
+        return np.asarray(_pixels(message, place) > 0, np.bool_)
+
     def _depth_scale(self) -> float:
         units = [c for c in self._reader.connections if c.topic.endswith("option/Depth_Units/value")]
         for connection, _, data in self._reader.messages(units) if units else ():
@@ -187,6 +228,15 @@ class _Bag:
         raise FileFormatError(place, "the message is missing or damaged")
 
 
+def _intrinsics(info: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return the matrix and the distortion of a camera_info; capitals in ROS 1."""
+    matrix, distortion = (
+        np.asarray(getattr(info, name if hasattr(info, name) else name.upper()), np.float64)
+        for name in ("k", "d")
+    )
+    return matrix.reshape(3, 3), distortion
+
+
 def _preference(topic: str) -> tuple[bool, bool, str]:
     """Rank topics: aligned to the colours first, raw images before compressed ones."""
     return (
@@ -205,8 +255,8 @@ def _common(a: str, b: str) -> int:
 def _pixels(message: Any, place: Path) -> npt.NDArray[Any]:
     """Return the pixels of an uncompressed image, (H, W) or (H, W, C)."""
     encoding = message.encoding
-    if encoding in _CHANNELS:
-        dtype, channels = np.dtype("u1"), 1 if encoding == "mono8" else len(encoding) - 1
+    if encoding in _CHANNELS or encoding == "8UC1":
+        dtype, channels = np.dtype("u1"), 1 if encoding in ("mono8", "8UC1") else len(encoding) - 1
     else:
         dtype, channels = np.dtype("f4" if encoding in _METRES else "u2"), 1
     dtype = dtype.newbyteorder(">" if message.is_bigendian else "<")

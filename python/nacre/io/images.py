@@ -120,15 +120,24 @@ def write_depth_png(path: str | os.PathLike[str], depth: npt.ArrayLike, *, fast:
     array = np.ascontiguousarray(depth)
     if array.dtype != np.uint16 or array.ndim != 2:
         raise ValueError(f"depth must be (H, W) uint16, got {array.shape} of {array.dtype}")
-    _write_png(path, array, fast)
+    _write_image(path, array, "PNG", compress_level=1 if fast else 6)
 
 
-def write_color_png(path: str | os.PathLike[str], color: npt.ArrayLike, *, fast: bool = False) -> None:
-    """Write an (H, W, 3) uint8 RGB image as a PNG, atomically; ``fast`` compresses less."""
-    array = np.ascontiguousarray(color)
+def write_color_png(path: str | os.PathLike[str], color: npt.ArrayLike) -> None:
+    """Write an (H, W, 3) uint8 RGB image as a PNG, atomically."""
+    _write_image(path, _checked_color(color), "PNG")
+
+
+def write_color_jpeg(path: str | os.PathLike[str], color: npt.ArrayLike) -> None:
+    """Write an (H, W, 3) uint8 RGB image as a JPEG, atomically: in a tenth of a PNG's time, but not exact."""
+    _write_image(path, _checked_color(color), "JPEG", quality=95)
+
+
+def _checked_color(color: npt.ArrayLike) -> npt.NDArray[np.uint8]:
+    array: npt.NDArray[Any] = np.ascontiguousarray(color)
     if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3:
         raise ValueError(f"color must be (H, W, 3) uint8, got {array.shape} of {array.dtype}")
-    _write_png(path, array, fast)
+    return array
 
 
 def _pillow() -> Any:
@@ -141,10 +150,10 @@ def _pillow() -> Any:
     return PIL.Image
 
 
-def _write_png(path: str | os.PathLike[str], array: npt.NDArray[Any], fast: bool) -> None:
+def _write_image(path: str | os.PathLike[str], array: npt.NDArray[Any], format: str, **options: Any) -> None:
     image = _pillow().fromarray(array)
     with atomic_writer(path) as stream:
-        image.save(stream, format="PNG", compress_level=1 if fast else 6)
+        image.save(stream, format=format, **options)
 
 
 @contextmanager
