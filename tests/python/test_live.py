@@ -204,4 +204,5 @@ class TestRealTime:
         assert indices[-1] == 39
         told = f"{live['num_dropped']} of 40: they came faster than they could be registered"
         assert told in capsys.readouterr().out
+        assert report["source"].endswith(f"{live['num_dropped']} of 40 frames dropped")
         assert told in (tmp_path / "out" / "report.html").read_text()

@@ -66,6 +66,11 @@ class LiveFeed:
         }
 
     @property
+    def summary(self) -> str:
+        """In a few words what became of the frames that came."""
+        return f"{self._queue.num_dropped} of {self._queue.num_received} frames dropped"
+
+    @property
     def rows(self) -> list[tuple[str, str]]:
         """The same in words."""
         came, dropped = self._queue.num_received, self._queue.num_dropped

@@ -196,7 +196,7 @@ def reconstruct(
         out,
         done,
         title=sequence.name,
-        source=words,
+        source=words if feed is None else f"{words}; {feed.summary}",
         document={
             "recording": recording(sequence),
             "preset": preset_name,

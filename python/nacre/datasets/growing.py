@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
@@ -58,6 +59,7 @@ class GrowingRecording(Sequence):
         self._sources = self._grown
         self._writer = ThreadPoolExecutor(1, "nacre-recording")
         self._unwritten: deque[Future[None]] = deque()
+        self._settling = threading.Lock()
 
     def add(self, frame: SequenceFrame) -> int:
         """Keep a view and return its index; waits where the disk is far behind."""
@@ -94,11 +96,12 @@ class GrowingRecording(Sequence):
 
     def _settle(self, most: int) -> None:
         """Wait until at most so many views are not yet written."""
-        while len(self._unwritten) > most:
-            try:
-                self._unwritten.popleft().result()
-            except OSError as error:
-                raise CameraError(f"images cannot be kept in {self.path}: {error.strerror}") from error
+        with self._settling:  # a viewer reads from threads of its own
+            while len(self._unwritten) > most:
+                try:
+                    self._unwritten.popleft().result()
+                except OSError as error:
+                    raise CameraError(f"images cannot be kept in {self.path}: {error.strerror}") from error
 
     def _write(self, frame: SequenceFrame, source: FrameSource) -> None:
         stored = np.rint(np.nan_to_num(frame.depth) * self.depth_scale)
