@@ -515,7 +515,9 @@ def test_a_file_that_is_no_recording(tmp_path):
         open_sequence(tmp_path / "a.avi")
 
 
-NAMES = "tum redwood 7-scenes 7_Scenes icl-nuim stray-scanner rosbag plain stanford images"
+NAMES = (
+    "tum redwood 7-scenes 7_Scenes icl-nuim stray-scanner rosbag record3d azure-kinect plain stanford images"
+)
 
 
 @pytest.mark.parametrize("name", NAMES.split())

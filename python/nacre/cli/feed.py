@@ -107,11 +107,13 @@ def camera_feed(source: Path, out: Path, color: bool, pick: tuple[int, int | Non
         camera.close()
         raise CommandError(f"{error}; -o names the folder", 2) from error
 
+    queue = LiveQueue(camera, timeout=2 * camera.timeout)  # the camera itself knows better what is wrong
+
     def close() -> None:
         camera.close()
         sequence.close()
 
-    return LiveFeed(sequence, LiveQueue(camera), sequence.add, pick, close)
+    return LiveFeed(sequence, queue, sequence.add, pick, close)
 
 
 def real_time_feed(sequence: Sequence, indices: range) -> LiveFeed:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from nacre._core import Camera
 from nacre.datasets.given import Given
-from nacre.datasets.listing import files
+from nacre.datasets.listing import describe, files
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.images import DEPTH_SUFFIXES, read_depth
@@ -62,7 +62,9 @@ def read(path: Path, given: Given) -> Sequence:
         raise FileFormatError(path, f"an .mkv is read by way of its images: {_advice(path.name)}")
     depth = _images(path)
     if not depth:
-        raise FileFormatError(path, f"no depth images: {_advice('REC.mkv')}")
+        raise FileFormatError(
+            path, f"no depth images, the folder holds {describe(path)}: {_advice('REC.mkv')}"
+        )
     height, width = read_depth(depth[0]).shape
     return Sequence(
         path,
