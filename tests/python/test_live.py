@@ -165,6 +165,37 @@ def write_wave(folder: Path, count: int = 8, seconds: float | None = 1 / 30) -> 
     return folder
 
 
+class TestFeed:
+    def test_where_nothing_is_dropped_it_is_the_same_run(self, tmp_path: Path) -> None:
+        from nacre.cli.feed import LiveFeed, real_time_feed
+        from nacre.reconstruction import Reconstruction
+
+        sequence = nacre.open_sequence(write_wave(tmp_path / "r", 6, 0.001))
+        plain = Reconstruction(sequence, nacre.Model(CAMERA))
+        list(plain.run())
+        played = Reconstruction(sequence, nacre.Model(CAMERA))
+        feed = real_time_feed(sequence, range(6))
+        list(played.run(feed))
+        assert feed.figures["num_dropped"] == 0
+        growing = GrowingRecording(tmp_path / "kept", CAMERA, 1000, "wave")
+        live = Reconstruction(growing, nacre.Model(CAMERA))
+        frames = LiveQueue((frame(i) for i in range(6)), size=6)
+        list(live.run(LiveFeed(growing, frames, growing.add, close=growing.close)))
+        for run in (played, live):
+            np.testing.assert_array_equal(run.model.points, plain.model.points)
+            np.testing.assert_array_equal(run.poses, plain.poses)
+
+    def test_frames_are_picked(self, tmp_path: Path) -> None:
+        from nacre.cli.feed import LiveFeed
+
+        growing = GrowingRecording(tmp_path / "r", CAMERA, 1000, "wave")
+        frames = LiveQueue((frame(i) for i in range(9)), size=9)
+        feed = LiveFeed(growing, frames, growing.add, (1, 7, 2), growing.close)
+        assert list(feed) == [1, 3, 5]
+        feed.close()
+        assert nacre.open_sequence(tmp_path / "r").timestamp(5) == frame(5).timestamp
+
+
 class TestRealTime:
     @pytest.mark.parametrize("seconds", [0.02, None])
     def test_each_view_comes_at_its_time(self, seconds: float | None, tmp_path: Path) -> None:
