@@ -117,9 +117,9 @@ def reconstruct(
     """
     Make a model from a recording of a depth camera.
 
-    The recording may be TUM RGB-D, Redwood/Open3D, 7-Scenes, ICL-NUIM, ROS 1 or 2 (RealSense too), Stray
-    Scanner, Stanford range scans, a plain recording (camera.json and depth/), or a folder of depth images
-    with --camera and --depth-scale; its format is recognised.
+    The recording may be TUM RGB-D, Redwood/Open3D, 7-Scenes, ICL-NUIM, ROS 1 or 2 (MCAP and RealSense too),
+    Record3D, Stray Scanner, images of an Azure Kinect, Stanford range scans, a plain recording (camera.json
+    and depth/), or a folder of depth images with --camera and --depth-scale; its format is recognised.
 
     SOURCE realsense is a camera: it runs until Ctrl-C or --last, and OUT/recording keeps what was used.
     Where frames come faster than they can be registered, the oldest are dropped and counted.

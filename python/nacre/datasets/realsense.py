@@ -6,6 +6,7 @@ import logging
 import os
 import time
 from collections.abc import Iterator
+from contextlib import suppress
 from types import TracebackType
 from typing import Any
 
@@ -116,7 +117,8 @@ class RealSense:
         """Stop the camera."""
         if not self._closed:
             self._closed = True
-            self._pipeline.stop()
+            with suppress(RuntimeError):  # of a camera that is gone
+                self._pipeline.stop()
 
     def __iter__(self) -> Iterator[SequenceFrame]:
         index, last = 0, None
@@ -133,9 +135,9 @@ class RealSense:
             index += 1
 
     def _next(self) -> Any:
-        """Return the next frames, or None at the end of a recording."""
+        """Return the next frames; None at the end of a recording, and of a camera that was closed."""
         rs, end = self._rs, time.monotonic() + self.timeout
-        while time.monotonic() < end:
+        while not self._closed and time.monotonic() < end:
             try:
                 arrived, frames = self._pipeline.try_wait_for_frames(200)
             except RuntimeError as error:
@@ -149,6 +151,8 @@ class RealSense:
                     return None
             elif self.serial not in _serials(rs):
                 raise CameraError(f"{self.name} {self.serial} was unplugged")
+        if self._closed:
+            return None
         raise CameraError(
             f"{self.name} gave no frame for {self.timeout:g} s: plug it in again, into a USB 3 port"
         )
