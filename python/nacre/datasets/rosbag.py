@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import logging
 import re
+import struct
 import weakref
 from contextlib import suppress
 from pathlib import Path
@@ -223,9 +224,21 @@ class _Bag:
     def _message(self, place: Path) -> Any:
         topic, time = "/" + place.parent.relative_to(self.path).as_posix(), int(place.name)
         for connection, _, data in self._messages(topic, time):
-            with suppress(AssertionError):
-                return self._reader.deserialize(data, connection.msgtype)
+            whole = data if self._reader.is2 or connection.msgtype != _IMAGES[0] else _without_tail(data)
+            with suppress(AssertionError, ValueError):
+                return self._reader.deserialize(whole, connection.msgtype)
         raise FileFormatError(place, "the message is missing or damaged")
+
+
+def _without_tail(data: bytes) -> bytes:
+    """Return an image of ROS 1 without the depth units that RealSense's recorder writes behind its end."""
+    at = 12  # sequence number and time stamp
+    try:
+        for fixed in (8, 5):  # after frame_id: height, width; after the encoding: endianness and step
+            at += 4 + struct.unpack_from("<I", data, at)[0] + fixed
+        return data[: at + 4 + struct.unpack_from("<I", data, at)[0]]
+    except struct.error:
+        return data
 
 
 def _intrinsics(info: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
