@@ -156,3 +156,18 @@ def test_info_tells_of_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     told = capsys.readouterr().out
     assert "rosbag" in told
     assert "3" in told
+
+
+def test_flipped_bytes_give_nothing_but_nacres_own_error(tmp_path: Path) -> None:
+    whole = write(tmp_path / "a.mcap", "NONE").read_bytes()
+    generator = np.random.default_rng(0)
+    num_broken = 0
+    for _ in range(40):
+        data = np.frombuffer(whole, np.uint8).copy()
+        data[generator.integers(len(data), size=3)] = generator.integers(256, size=3)
+        (tmp_path / "a.mcap").write_bytes(data.tobytes())
+        try:
+            list(nacre.open_sequence(tmp_path / "a.mcap"))
+        except nacre.FileFormatError:
+            num_broken += 1
+    assert num_broken > 5

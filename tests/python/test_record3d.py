@@ -214,3 +214,18 @@ class TestBroken:
         monkeypatch.setitem(sys.modules, "liblzfse", None)
         with pytest.raises(ImportError, match=r'pip install "nacre\[record3d\]"'):
             nacre.open_sequence(path)
+
+    def test_flipped_bytes_give_nothing_but_nacres_own_error(self, tmp_path: Path) -> None:
+        files = {n: d for n, d in contents().items() if n == "metadata" or "/0." in n}
+        whole = packed(tmp_path / "a.r3d", files).read_bytes()
+        generator = np.random.default_rng(0)
+        num_broken = 0
+        for _ in range(40):
+            data = np.frombuffer(whole, np.uint8).copy()
+            data[generator.integers(len(data), size=20)] = generator.integers(256, size=20)
+            (tmp_path / "a.r3d").write_bytes(data.tobytes())
+            try:
+                list(nacre.open_sequence(tmp_path / "a.r3d"))
+            except nacre.FileFormatError:
+                num_broken += 1
+        assert num_broken > 5

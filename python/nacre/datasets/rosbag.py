@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import logging
 import re
-import struct
 import weakref
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,15 @@ import numpy.typing as npt
 from nacre._core import Camera
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe
+from nacre.datasets.ros_messages import (
+    CHANNELS,
+    METRES,
+    MILLIMETRES,
+    compressed_depth,
+    intrinsics,
+    pixels,
+    without_tail,
+)
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.images import decode_color
@@ -33,8 +42,6 @@ SUFFIXES = (".bag", ".mcap", ".db3")
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO = "sensor_msgs/msg/CameraInfo"
 _MISSING = 'ROS recordings need rosbags: pip install "nacre[ros]"'
-_MILLIMETRES, _METRES = ("16UC1", "mono16", "Z16"), ("32FC1",)
-_CHANNELS = {"rgb8": (0, 1, 2), "bgr8": (2, 1, 0), "rgba8": (0, 1, 2), "bgra8": (2, 1, 0), "mono8": (0, 0, 0)}
 
 
 def recognise(path: Path) -> bool:
@@ -88,6 +95,10 @@ class _Bag:
         try:
             self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
             self._reader.open()
+            if not all(
+                isinstance(name, str) for c in self._reader.connections for name in (c.topic, c.msgtype)
+            ):
+                raise ValueError("a topic has no name")
         except Exception as error:  # rosbags has several, and lets through what damaged files cause
             hint = ""
             if path.suffix == ".mcap" and path.stat().st_size:
@@ -122,7 +133,7 @@ class _Bag:
         info = self._first(chosen)
         if info is None:
             raise FileFormatError(self.path, f"{chosen.topic} is empty; give the camera")
-        matrix, coefficients = _intrinsics(info)
+        matrix, coefficients = intrinsics(info)
         distortion = coefficients if len(coefficients) in (4, 5) else np.zeros(5)
         try:
             return Camera(
@@ -145,7 +156,7 @@ class _Bag:
             info = self._first(max(own, key=lambda c: len(c.topic))) if own else None
             if info is None:
                 return True
-            matrices.append(_intrinsics(info)[0])
+            matrices.append(intrinsics(info)[0])
         if np.allclose(matrices[0], matrices[1], rtol=0.01, atol=0.01 * matrices[0][0, 0]):
             return True
         _log.warning("%s: %s is left out: its camera is not that of %s", self.path, topic, self.depth_topic)
@@ -153,8 +164,8 @@ class _Bag:
 
     def _first(self, connection: Any) -> Any:
         """Return the first message of a connection, or None."""
-        for _, _, data in self._reader.messages([connection]):
-            return self._reader.deserialize(data, connection.msgtype)
+        for _, _, data in self._read([connection]):
+            return self._decoded(connection, data, self.path / connection.topic.strip("/"))
         return None
 
     def nearest(self, topics: list[str], max_difference: float) -> list[Path | None]:
@@ -180,11 +191,11 @@ class _Bag:
         message = self._message(place)
         is_raw = hasattr(message, "encoding")
         encoding = message.encoding if is_raw else message.format.split(";")[0].strip()
-        if encoding not in _MILLIMETRES + _METRES:
-            known = ", ".join(_MILLIMETRES + _METRES)
+        if encoding not in MILLIMETRES + METRES:
+            known = ", ".join(MILLIMETRES + METRES)
             raise FileFormatError(place, f"depth images are {known}, this one is {encoding}")
-        image = _pixels(message, place) if is_raw else _compressed_depth(message, place)
-        metres = np.array(image if encoding in _METRES else image / self.depth_scale, np.float32)
+        image = pixels(message, place) if is_raw else compressed_depth(message, place)
+        metres = np.array(image if encoding in METRES else image / self.depth_scale, np.float32)
         metres[~(metres > 0) | ~np.isfinite(metres) | (image == 65535)] = np.nan
         return metres
 
@@ -193,61 +204,53 @@ class _Bag:
         message = self._message(place)
         if not hasattr(message, "encoding"):
             return decode_color(io.BytesIO(bytes(message.data)), place)
-        if message.encoding not in _CHANNELS:
+        if message.encoding not in CHANNELS:
             raise FileFormatError(
-                place, f"colour images are {', '.join(_CHANNELS)}, this is {message.encoding}"
+                place, f"colour images are {', '.join(CHANNELS)}, this is {message.encoding}"
             )
-        pixels = _pixels(message, place)
-        pixels = pixels if pixels.ndim == 3 else pixels[..., None]
-        return np.ascontiguousarray(pixels[..., _CHANNELS[message.encoding]])
+        image = pixels(message, place)
+        image = image if image.ndim == 3 else image[..., None]
+        return np.ascontiguousarray(image[..., CHANNELS[message.encoding]])
 
     def is_sure(self, place: Path) -> npt.NDArray[np.bool_]:
         """Read where an image of confidence is not 0."""
         message = self._message(place)
         if not hasattr(message, "encoding"):
             return np.asarray(decode_color(io.BytesIO(bytes(message.data)), place).any(axis=2), np.bool_)
-        return np.asarray(_pixels(message, place) > 0, np.bool_)
+        return np.asarray(pixels(message, place) > 0, np.bool_)
 
     def _depth_scale(self) -> float:
-        units = [c for c in self._reader.connections if c.topic.endswith("option/Depth_Units/value")]
-        for connection, _, data in self._reader.messages(units) if units else ():
-            message: Any = self._reader.deserialize(data, connection.msgtype)
-            with suppress(ValueError):  # a text in the SDK's .db3
-                if float(message.data) > 0:
-                    return round(1 / float(message.data), 3)
+        for connection in self._reader.connections:
+            if connection.topic.endswith("option/Depth_Units/value"):
+                message = self._first(connection)
+                with suppress(ValueError, TypeError, AttributeError):  # a text in the SDK's .db3
+                    if float(message.data) > 0:
+                        return round(1 / float(message.data), 3)
         return 1000.0
 
-    def _messages(self, topic: str, time: int | None = None) -> Any:
+    def _messages(self, topic: str, time: int | None = None) -> Iterator[tuple[Any, int, bytes]]:
         connections = [c for c in self._reader.connections if c.topic == topic]
-        return self._reader.messages(connections, time, None if time is None else time + 1)
+        return self._read(connections, time, None if time is None else time + 1)
+
+    def _read(self, connections: list[Any], *times: int | None) -> Iterator[tuple[Any, int, bytes]]:
+        try:
+            yield from self._reader.messages(connections, *times)
+        except Exception as error:  # rosbags', and those of its decompressors
+            raise FileFormatError(self.path, f"damaged in {connections[0].topic}: {error}") from error
 
     def _message(self, place: Path) -> Any:
         topic, time = "/" + place.parent.relative_to(self.path).as_posix(), int(place.name)
         for connection, _, data in self._messages(topic, time):
-            whole = data if self._reader.is2 or connection.msgtype != _IMAGES[0] else _without_tail(data)
-            with suppress(AssertionError, ValueError):
-                return self._reader.deserialize(whole, connection.msgtype)
-        raise FileFormatError(place, "the message is missing or damaged")
+            return self._decoded(connection, data, place)
+        raise FileFormatError(place, "the message is missing")
 
-
-def _without_tail(data: bytes) -> bytes:
-    """Return an image of ROS 1 without the depth units that RealSense's recorder writes behind its end."""
-    at = 12  # sequence number and time stamp
-    try:
-        for fixed in (8, 5):  # after frame_id: height, width; after the encoding: endianness and step
-            at += 4 + struct.unpack_from("<I", data, at)[0] + fixed
-        return data[: at + 4 + struct.unpack_from("<I", data, at)[0]]
-    except struct.error:
-        return data
-
-
-def _intrinsics(info: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Return the matrix and the distortion of a camera_info; capitals in ROS 1."""
-    matrix, distortion = (
-        np.asarray(getattr(info, name if hasattr(info, name) else name.upper()), np.float64)
-        for name in ("k", "d")
-    )
-    return matrix.reshape(3, 3), distortion
+    def _decoded(self, connection: Any, data: bytes, place: Path) -> Any:
+        if connection.msgtype == _IMAGES[0] and not self._reader.is2:
+            data = without_tail(data)
+        try:
+            return self._reader.deserialize(data, connection.msgtype)
+        except Exception as error:  # rosbags' own, and whatever damaged lengths cause
+            raise FileFormatError(place, f"the message is damaged: {error!r}") from error
 
 
 def _preference(topic: str) -> tuple[bool, bool, str]:
@@ -263,34 +266,3 @@ def _common(a: str, b: str) -> int:
     """Return how many parts of two topics are the same from the start."""
     parts = zip(a.split("/"), b.split("/"), strict=False)
     return next((i for i, (x, y) in enumerate(parts) if x != y), min(a.count("/"), b.count("/")) + 1)
-
-
-def _pixels(message: Any, place: Path) -> npt.NDArray[Any]:
-    """Return the pixels of an uncompressed image, (H, W) or (H, W, C)."""
-    encoding = message.encoding
-    if encoding in _CHANNELS or encoding == "8UC1":
-        dtype, channels = np.dtype("u1"), 1 if encoding in ("mono8", "8UC1") else len(encoding) - 1
-    else:
-        dtype, channels = np.dtype("f4" if encoding in _METRES else "u2"), 1
-    dtype = dtype.newbyteorder(">" if message.is_bigendian else "<")
-    row = message.width * channels * dtype.itemsize
-    data = np.asarray(message.data, np.uint8).reshape(-1)
-    if message.step < row or len(data) < message.height * message.step:
-        raise FileFormatError(place, f"the image of {message.width} x {message.height} is cut short")
-    rows = data[: message.height * message.step].reshape(message.height, message.step)[:, :row]
-    image = np.ascontiguousarray(rows).view(dtype).reshape(message.height, message.width, channels)
-    return image[..., 0] if channels == 1 else image
-
-
-def _compressed_depth(message: Any, place: Path) -> npt.NDArray[Any]:
-    """Return the pixels of a compressedDepth image: a header of 12 bytes, then a PNG of 16 bits."""
-    from PIL import Image, UnidentifiedImageError
-
-    data = bytes(message.data)
-    start = data.find(b"\x89PNG")
-    if start < 0 or "32FC1" in message.format:
-        raise FileFormatError(place, f"compressed depth must be a PNG of 16 bits, this is {message.format!r}")
-    try:
-        return np.asarray(Image.open(io.BytesIO(data[start:])), dtype=np.uint16)
-    except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise FileFormatError(place, f"the PNG is damaged: {error}") from error
