@@ -159,7 +159,14 @@ class _Bag:
             matrices.append(intrinsics(info)[0])
         if np.allclose(matrices[0], matrices[1], rtol=0.01, atol=0.01 * matrices[0][0, 0]):
             return True
-        _log.warning("%s: %s is left out: its camera is not that of %s", self.path, topic, self.depth_topic)
+        hint = (
+            f"; nacre reconstruct realsense:{self.path} lays colours over depth"
+            if "/device_" in topic
+            else ""
+        )
+        _log.warning(
+            "%s: %s is left out: its camera is not that of %s%s", self.path, topic, self.depth_topic, hint
+        )
         return False
 
     def _first(self, connection: Any) -> Any:
