@@ -15,6 +15,13 @@ def in_real_time(sequence: Sequence, indices: Iterable[int]) -> Iterator[int]:
     Yield indices of a recording when their time has come, the first one at once.
 
     Views without time stamps come 30 times a second, and so does a view that is stamped before the last one.
+
+    Parameters
+    ----------
+    sequence : Sequence
+        The recording.
+    indices : iterable of int
+        Which of its views, in their order.
     """
     start: float | None = None
     last: float | None = None
