@@ -58,7 +58,7 @@ py::array_t<double> project(const Camera& camera,
   py::array_t<double> pixels({count, py::ssize_t{2}});
   const double* const source = points.data();
   double* const target = pixels.mutable_data();
-  const py::gil_scoped_release release;
+  const Released release;
   for (py::ssize_t i = 0; i < count; ++i) {
     Eigen::Map<Eigen::Vector2d>(target + 2 * i) = camera.project(Eigen::Map<const Eigen::Vector3d>(source + 3 * i));
   }

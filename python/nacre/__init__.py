@@ -28,6 +28,7 @@ from nacre.model import FrameReport, Model, ModelParameters
 from nacre.neighbors import KdTree, RadiusNeighbors
 from nacre.noise import NoiseModel, calibrate_noise, estimate_noise
 from nacre.normals import estimate_normals
+from nacre.progress import Cancelled
 from nacre.region import RegionParameters, RegionReport, select_region
 from nacre.registration import AlignResult, RegistrationParameters, align
 from nacre.simulation import default_camera, simulate_depth, turntable_poses
@@ -41,6 +42,7 @@ __all__ = [
     "AlignResult",
     "Camera",
     "CameraFile",
+    "Cancelled",
     "ClosestPoints",
     "Cloud",
     "Consolidated",
