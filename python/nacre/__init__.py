@@ -1,6 +1,7 @@
 """nacre grows a 3D model from depth-camera images, layer by layer."""
 
 import importlib
+import logging
 from typing import TYPE_CHECKING, Any
 
 from nacre._core import Camera, __version__
@@ -36,6 +37,7 @@ from nacre.system import default_threads, instruction_set
 
 if TYPE_CHECKING:
     from nacre import evaluation
+    from nacre.reconstructing import reconstruct
 
 __all__ = [
     "PIXEL_LABELS",
@@ -90,6 +92,7 @@ __all__ = [
     "read_mesh",
     "read_points",
     "read_trajectory",
+    "reconstruct",
     "select_region",
     "simulate_depth",
     "turntable_poses",
@@ -101,8 +104,13 @@ __all__ = [
 ]
 
 
+logging.getLogger("nacre").addHandler(logging.NullHandler())
+
+
 def __getattr__(name: str) -> Any:
-    """Import ``nacre.evaluation`` when it is first asked for: most programs never do."""
+    """Import ``nacre.evaluation`` and what needs it when first asked for: most programs never do."""
     if name == "evaluation":
         return importlib.import_module("nacre.evaluation")
+    if name == "reconstruct":
+        return importlib.import_module("nacre.reconstructing").reconstruct
     raise AttributeError(f"module 'nacre' has no attribute {name!r}")

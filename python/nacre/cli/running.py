@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -13,9 +12,6 @@ from nacre.cli.terminal import CommandError, Terminal
 
 if TYPE_CHECKING:
     from nacre.reconstruction import FrameRecord, Reconstruction
-
-_log = logging.getLogger(__name__)
-
 
 class Interruption:
     """Whether Ctrl-C was pressed."""
@@ -58,8 +54,6 @@ def run_frames(
             if frame.refused and not accepted:
                 raise CommandError(f"frame {frame.index}: {advice(frame.reason)}")
             accepted |= frame.report is not None
-            if frame.status in ("LOST", "WEAK"):
-                _log.info("frame %d: %s: %s", frame.index, frame.status, frame.reason)
             if watch is not None:
                 watch(frame)
             lost = done.counts["LOST"]
@@ -76,8 +70,6 @@ def retry_lost(terminal: Terminal, done: Reconstruction) -> bool:
         return False
     with interruptible() as interruption, terminal.progress("lost frames", num_lost) as advance:
         for frame in done.retry_lost():
-            if frame.world_from_camera is not None:
-                _log.info("frame %d: found after all", frame.index)
             advance(f"{num_lost - done.counts['LOST']} found")
             if interruption.wanted:
                 break
