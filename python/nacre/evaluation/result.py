@@ -35,6 +35,11 @@ def plain(value: Any) -> Any:
 class Result:
     """Base of the evaluation results, which are frozen dataclasses."""
 
+    def __repr__(self) -> str:
+        units = self.units()
+        shown = (f.name for f in dataclasses.fields(self) if f.repr)  # type: ignore[arg-type]
+        return f"{type(self).__name__}({', '.join(_told(n, getattr(self, n), units[n]) for n in shown)})"
+
     def as_dict(self) -> dict[str, Any]:
         """Return every field under its name, as plain Python values that JSON can hold (NaN becomes None)."""
         return {name: plain(getattr(self, name)) for name in self.units()}
@@ -45,3 +50,10 @@ class Result:
         hints = get_type_hints(cls, include_extras=True)
         fields = dataclasses.fields(cls)  # type: ignore[arg-type]
         return {field.name: getattr(hints[field.name], "__metadata__", ("",))[0] for field in fields}
+
+
+def _told(name: str, value: Any, unit: str) -> str:
+    if isinstance(value, np.ndarray):
+        return f"{name}={value.dtype}{list(value.shape)}"
+    text = f"{value:.4g}" if isinstance(value, float) else repr(value)
+    return f"{name}={text} {unit}" if unit in ("m", "rad") else f"{name}={text}"

@@ -22,7 +22,7 @@ class SurfaceSamples(NamedTuple):
     triangles: npt.NDArray[np.intp]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SurfaceAccuracy(Result):
     """Distances from model points to the reference surface; made by :func:`surface_accuracy`."""
 
@@ -36,7 +36,7 @@ class SurfaceAccuracy(Result):
     distances: Array = field(repr=False)  #: one per point [m], NaN where the point is not finite
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Completeness(Result):
     """How much of the reference surface the model covers; made by :func:`completeness`."""
 
@@ -48,7 +48,7 @@ class Completeness(Result):
     num_samples: Count  #: surface samples that were asked for and seen
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class FScore(Result):
     """Precision, recall and their harmonic mean for each threshold; made by :func:`f_score`."""
 

@@ -13,7 +13,7 @@ from nacre.evaluation.result import Array, Count, Fraction, Metres, Radians, Res
 from nacre.io.trajectories import associate
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AbsoluteTrajectoryError(Result):
     """
     How far each estimated pose is from its true pose; made by :func:`absolute_trajectory_error`.
@@ -38,7 +38,7 @@ class AbsoluteTrajectoryError(Result):
     rotation_errors: Array = field(repr=False)  #: likewise
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RelativePoseError(Result):
     """How far the motion over a fixed interval is from the true motion; see :func:`relative_pose_error`."""
 
