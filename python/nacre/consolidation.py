@@ -14,6 +14,7 @@ from nacre import _core
 from nacre.arrays import FloatArray, as_count, as_length, as_matching_points, as_points
 from nacre.parameters import as_choice
 from nacre.progress import as_progress
+from nacre.values import Value
 
 _METHODS = {
     "wlop": _core.ConsolidationMethod.wlop,
@@ -24,7 +25,7 @@ _THETAS = {"huang": _core.Theta.huang, "printed": _core.Theta.printed}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Consolidated:
+class Consolidated(Value):
     """
     A consolidated point set.
 

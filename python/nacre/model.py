@@ -20,6 +20,7 @@ from nacre.noise import NoiseModel
 from nacre.parameters import from_core, to_core, updated
 from nacre.region import RegionParameters, RegionReport
 from nacre.registration import RegistrationParameters
+from nacre.values import Value
 
 Preset = Literal["default", "paper"]
 
@@ -143,8 +144,8 @@ class ModelParameters:
         return from_core(cls, _core.ModelOptions.preset(name))
 
 
-@dataclass(frozen=True)
-class FrameReport:
+@dataclass(frozen=True, eq=False, repr=False)
+class FrameReport(Value):
     """
     What became of one frame.
 
@@ -368,6 +369,12 @@ class Model(ExchangeablePoints):
         """Return the number of points."""
         with self._lock:
             return len(self._core.cloud)
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        raise TypeError(
+            "a Model cannot be pickled or copied: pickle what it holds (model.points, model.normals, "
+            "model.poses, model.frames, model.parameters), or write it with nacre.write_points"
+        )
 
     def __repr__(self) -> str:
         reports = self.frames

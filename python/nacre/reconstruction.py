@@ -25,6 +25,7 @@ from nacre.evaluation.result import Result, plain
 from nacre.io.trajectories import Trajectory
 from nacre.model import FrameReport, Model
 from nacre.progress import as_progress
+from nacre.values import Value
 
 if TYPE_CHECKING:
     from nacre.report import FrameEntry, ReportData
@@ -38,8 +39,8 @@ _RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
 _LONG = {"errors", "translation_errors", "rotation_errors", "distances"}
 
 
-@dataclass(frozen=True, eq=False)
-class FrameRecord:
+@dataclass(frozen=True, eq=False, repr=False)
+class FrameRecord(Value):
     """
     What became of one frame of a recording.
 
@@ -321,7 +322,20 @@ class Reconstruction:
         return figures
 
     def report_data(self, title: str, source: str, figures: Mapping[str, Any] | None = None) -> ReportData:
-        """Return what :func:`nacre.report.write_report` shows."""
+        """
+        Return what :func:`nacre.report.write_report` shows.
+
+        Parameters
+        ----------
+        title, source : str
+            Of the page, and in words where the frames come from.
+        figures : mapping, optional
+            More numbers for the page, by name.
+
+        Returns
+        -------
+        ReportData
+        """
         from nacre.report import ModelCloud, ReportData
         from nacre.report.text import label
 
@@ -376,7 +390,7 @@ class Reconstruction:
 
 
 def plain_tree(value: Any) -> Any:
-    """Turn nested mappings with arrays and numbers that are not finite into what JSON knows."""
+    """Return nested mappings, arrays and numbers as what JSON knows: what is not finite is None."""
     if isinstance(value, Mapping):
         return {str(name): plain_tree(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):

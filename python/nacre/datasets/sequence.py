@@ -22,6 +22,7 @@ from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
 from nacre.io.images import ATTRIBUTE_SUFFIXES, COLOR_SUFFIXES, read_attribute, read_color, read_depth
 from nacre.io.trajectories import Trajectory
+from nacre.values import Value
 
 _log = logging.getLogger(__name__)
 
@@ -29,8 +30,8 @@ DepthLoader = Callable[[Path], npt.NDArray[np.float32]]
 ColorLoader = Callable[[Path], npt.NDArray[np.uint8]]
 
 
-@dataclass(frozen=True, eq=False)
-class SequenceFrame:
+@dataclass(frozen=True, eq=False, repr=False)
+class SequenceFrame(Value):
     """
     One view of a recording.
 
@@ -206,6 +207,17 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
 
         An image (PNG, TIFF, JPEG or ``.npy``, with the values that are stored) belongs to the depth image of
         the same stem, or else of the same first number.
+
+        Parameters
+        ----------
+        name : str
+            Of the attribute.
+        folder : path-like
+            Of the images.
+
+        Returns
+        -------
+        Sequence
 
         Raises
         ------

@@ -160,7 +160,7 @@ def relative_pose_error(
     Measure the drift: the error of the motion over a fixed interval (RPE, Sturm et al. 2012).
 
     Every pair of poses that lie ``delta`` apart counts. The result does not depend on the frames of reference
-    of the two trajectories. Arguments that are not listed are those of :func:`absolute_trajectory_error`.
+    of the two trajectories.
 
     Parameters
     ----------
@@ -171,6 +171,8 @@ def relative_pose_error(
     unit : {"frames", "seconds"}, optional
         "frames" counts rows of ``estimated``; "seconds" needs ``timestamps`` and takes the pose nearest to
         the end of the interval.
+    valid, timestamps, truth_timestamps, max_time_difference
+        As in :func:`absolute_trajectory_error`.
 
     Returns
     -------

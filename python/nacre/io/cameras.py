@@ -45,6 +45,16 @@ def read_camera(path: str | os.PathLike[str]) -> CameraFile:
 
     Open3D stores ``intrinsic_matrix`` column by column.
 
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    CameraFile
+        The camera, and the depth scale where the file has one.
+
     Raises
     ------
     FileFormatError

@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import arrays
+from nacre.values import Value
 
 Columns = dict[str, npt.NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cloud:
+class Cloud(Value):
     """
     The points of a file with everything that the file holds for each of them.
 

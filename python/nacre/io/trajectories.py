@@ -11,12 +11,13 @@ import numpy.typing as npt
 
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
+from nacre.values import Value
 
 Float64 = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Value):
     """
     Poses over time.
 
@@ -195,6 +196,16 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     - 7-Scenes ``.pose.txt``: one 4x4 matrix, its time is 0.
 
     Lines that start with ``#`` are comments. Matrices are camera to world; their rotations are made exact.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    Trajectory
+        Times [s] and ``world_from_camera`` [m].
 
     Raises
     ------
