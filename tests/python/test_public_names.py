@@ -95,7 +95,7 @@ def test_a_function_tells_what_it_takes_gives_and_raises(name: str) -> None:
         assert "Parameters" in sections
     if "Parameters" in sections:
         for parameter in taken:
-            assert re.search(rf"^\W*(\w+, )*{parameter}\b", text, re.MULTILINE), parameter
+            assert re.search(rf"^\W*(\w+, \**)*{parameter}\b", text, re.MULTILINE), parameter
     given = signature.return_annotation not in (None, "None", inspect.Signature.empty)
     told = re.search(r"\b(Return|[Yy]ield)", text) is not None
     assert not given or {"Returns", "Yields"} & sections or ("Parameters" not in sections and told)
