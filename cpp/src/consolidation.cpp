@@ -349,8 +349,9 @@ BasicConsolidated<Matrix> consolidate_cloud(const Cloud& points, const Consolida
     sample_order.cubes.push_back(order.cubes[i]);
   }
   const Cargo cargo{attributes, result.attributes};
-  result.points = project<Cloud, Matrix>(samples, std::move(sample_order), points, std::move(order), lattice, options,
-                                         ProjectionHints(), attributes.cols() > 0 ? &cargo : nullptr, &result.iterations);
+  result.points =
+      project<Cloud, Matrix>(samples, std::move(sample_order), points, std::move(order), lattice, options,
+                             ProjectionHints(), attributes.cols() > 0 ? &cargo : nullptr, &result.iterations);
   return result;
 }
 

@@ -21,9 +21,9 @@ int main(int argc, char** argv) {
   for (int view = 0; view < 12; ++view) {
     // The camera looks at the centre from 0.4 m, y down: half a turn about x, then about the vertical.
     nacre::Pose pose = nacre::Pose::Identity();
-    pose.linear() = (Eigen::AngleAxisd(view * pi / 6, Eigen::Vector3d::UnitY()) *
-                     Eigen::AngleAxisd(pi, Eigen::Vector3d::UnitX()))
-                        .toRotationMatrix();
+    pose.linear() =
+        (Eigen::AngleAxisd(view * pi / 6, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(pi, Eigen::Vector3d::UnitX()))
+            .toRotationMatrix();
     pose.translation() = center - 0.4 * pose.linear().col(2);
     if (view == 0) world_from_first = pose;
 

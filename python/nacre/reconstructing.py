@@ -7,8 +7,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from nacre._core import Camera
-from nacre.datasets import SequenceFrame, open_sequence
 from nacre.datasets import Sequence as Recording
+from nacre.datasets import SequenceFrame, open_sequence
 from nacre.model import Model, ModelParameters, Preset
 from nacre.reconstruction import FrameRecord, Reconstruction
 
@@ -66,13 +66,13 @@ def reconstruct(
     frames: Sequence[SequenceFrame]
     if isinstance(source, (str, os.PathLike)):
         frames = open_sequence(source, format=format, camera=camera, depth_scale=depth_scale)
-    elif isinstance(source, Sequence):
+    elif not isinstance(source, Sequence):
+        raise TypeError(f"source must be a path or a sequence of frames, got {type(source).__name__}")
+    else:
         for name, value in (("format", format), ("camera", camera), ("depth_scale", depth_scale)):
             if value is not None:
                 raise ValueError(f"{name} is for a source that is a path: this one is open, got {value!r}")
         frames = source
-    else:
-        raise TypeError(f"source must be a path or a sequence of frames, got {type(source).__name__}")
     if not len(frames):
         raise ValueError("source must have at least one frame, got none")
     of_all = frames.camera if isinstance(frames, Recording) else frames[0].camera

@@ -91,10 +91,10 @@ def test_misuse(frames: list[nacre.SequenceFrame], source: object, arguments: di
         nacre.reconstruct(frames if source == "frames" else source, **arguments)
 
 
-def test_what_happens_is_logged(
-    frames: list[nacre.SequenceFrame], caplog: pytest.LogCaptureFixture
-) -> None:
-    nothing = nacre.SequenceFrame(9, np.full((120, 160), np.nan, np.float32), frames[0].camera, 9.0, None, None)
+def test_what_happens_is_logged(frames: list[nacre.SequenceFrame], caplog: pytest.LogCaptureFixture) -> None:
+    nothing = nacre.SequenceFrame(
+        9, np.full((120, 160), np.nan, np.float32), frames[0].camera, 9.0, None, None
+    )
     with caplog.at_level(logging.DEBUG, "nacre"):
         nacre.reconstruct([*frames[:2], nothing, frames[2]], retry=False)
     told = [(record.levelname, record.getMessage()) for record in caplog.records]

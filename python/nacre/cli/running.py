@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -12,6 +13,7 @@ from nacre.cli.terminal import CommandError, Terminal
 
 if TYPE_CHECKING:
     from nacre.reconstruction import FrameRecord, Reconstruction
+
 
 class Interruption:
     """Whether Ctrl-C was pressed."""
@@ -52,7 +54,7 @@ def run_frames(
     with interruptible() as interruption, terminal.progress("frames", len(indices)) as advance:
         for frame in done.run(indices):
             if frame.refused and not accepted:
-                raise CommandError(f"frame {frame.index}: {advice(frame.reason)}")
+                raise CommandError(f"frame {frame.index}: {advice(frame.reason, done.sequence)}")
             accepted |= frame.report is not None
             if watch is not None:
                 watch(frame)
@@ -76,6 +78,16 @@ def retry_lost(terminal: Terminal, done: Reconstruction) -> bool:
     return interruption.wanted
 
 
-def advice(reason: str) -> str:
-    """Return a message of the library in the words of the command line."""
-    return reason.replace("check depth_scale,", "give --depth-scale,").replace("depth_scale", "--depth-scale")
+def advice(reason: str, recording: object = None) -> str:
+    """Return a message of the library in the words of the command line, with the depth scale that would do."""
+    words = reason.replace("check depth_scale,", "give --depth-scale,").replace(
+        "depth_scale", "--depth-scale"
+    )
+    found = re.search(r"got a median of ([\d.e+-]+) m", reason)
+    scale = getattr(recording, "depth_scale", None)
+    if found is None or scale is None:
+        return words
+    stored = float(found[1]) * scale
+    fitting = [f"{s:g} ({stored / s:.2g} m)" for s in (1, 1000, 5000, 10000, 1e6) if 0.2 < stored / s < 10]
+    tried = f"; it was read with {scale:g}"
+    return words + tried + (f", and would make sense with {' or '.join(fitting)}" if fitting else "")

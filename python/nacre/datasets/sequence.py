@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from nacre import arrays
 from nacre._core import Camera
+from nacre.datasets.doubt import doubt_about
 from nacre.datasets.listing import files, pair
 from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
@@ -318,12 +319,17 @@ def check_first_view(sequence: Sequence) -> Sequence:
 
     Colour images of another size cannot be used pixel by pixel: the sequence then comes back without colour.
     """
+    first_error: FileFormatError | None = None
     for source in sequence._sources:
         try:
             depth = _named(sequence._load_depth, source.depth)
-        except FileFormatError:
+        except FileFormatError as error:
+            first_error = first_error or error
             continue
         check_size(source.depth, depth, sequence.camera)
+        doubt = doubt_about(depth)
+        if doubt is not None:
+            _log.warning("%s: %s", source.depth, doubt)
         if source.color is None:
             break
         try:
@@ -332,6 +338,12 @@ def check_first_view(sequence: Sequence) -> Sequence:
             _log.warning("colour is left out: %s", error)
             return sequence.without_color()
         break
+    else:
+        if first_error is not None:
+            raise FileFormatError(
+                sequence.path,
+                f"none of its {len(sequence)} depth images can be read; the first: {first_error}",
+            )
     return sequence
 
 
