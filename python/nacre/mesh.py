@@ -179,7 +179,8 @@ class Mesh:
 
         Parameters
         ----------
-        camera, world_from_camera, noise, edge_mixing, background_depth, quantization, dropout, seed, num_threads
+        camera, world_from_camera, noise, edge_mixing, background_depth
+        quantization, dropout, seed, num_threads
             As in :func:`nacre.simulate_depth`.
 
         Returns

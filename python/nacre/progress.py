@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import Any
 
 
-class Cancelled(Exception):
+class Cancelled(Exception):  # noqa: N818  no error, as KeyboardInterrupt is none
     """
     Raised by a progress callback to end the call; to return False is the same.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, cast
 
 from nacre._core import Camera
 from nacre.datasets import Sequence as Recording
@@ -72,7 +72,7 @@ def reconstruct(
         for name, value in (("format", format), ("camera", camera), ("depth_scale", depth_scale)):
             if value is not None:
                 raise ValueError(f"{name} is for a source that is a path: this one is open, got {value!r}")
-        frames = source
+        frames = cast(Sequence[SequenceFrame], source)
     if not len(frames):
         raise ValueError("source must have at least one frame, got none")
     of_all = frames.camera if isinstance(frames, Recording) else frames[0].camera

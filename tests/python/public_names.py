@@ -40,7 +40,7 @@ def functions() -> dict[str, Callable[..., Any]]:
         if not inspect.isclass(value):
             found[name] = value
             continue
-        for method, function in vars(value).items():
+        for method in vars(value):
             if not method.startswith("_") and callable(inspect.unwrap(getattr(value, method))):
                 found[f"{name}.{method}"] = getattr(value, method)
     return found
@@ -58,9 +58,9 @@ def objects(folder: Path) -> dict[str, Any]:
     camera = nacre.Camera(160, 120, 131, 131, 79.5, 59.5)
     poses = nacre.turntable_poses(mesh, 3, 0.1, camera=camera, distance=0.3)
     frames = [
-        nacre.SequenceFrame(i, mesh.simulate_depth(camera, pose, noise=0.0003, seed=i), camera, None, None, pose)
+        nacre.SequenceFrame(i, mesh.simulate_depth(camera, pose, seed=i), camera, None, None, pose)
         for i, pose in enumerate(poses)
-    ]  # fmt: skip
+    ]
     done = nacre.reconstruct(frames)
     points = done.model.points
     tree = nacre.KdTree(points)

@@ -100,7 +100,7 @@ MISTAKES: dict[str, tuple[Callable[[Path], str], list[str]]] = {
     ),
     "a camera of another resolution": (
         lambda d: reconstruct(
-            images(d / "r", np.ones((48, 64), np.uint16)), "--camera", camera_file(d, width=640, depth_scale=1)
+            images(d / "r", np.ones((48, 64), np.uint16)), "--camera", camera_file(d, width=640)
         ),
         ["is 64 wide and 48 high, but the camera is 640 by 48; give the camera that took it"],
     ),

@@ -22,9 +22,9 @@ def frames() -> list[nacre.SequenceFrame]:
     camera = nacre.Camera(160, 120, 131, 131, 79.5, 59.5)
     poses = nacre.turntable_poses(mesh, 5, 0.15, camera=camera, distance=0.3)
     return [
-        nacre.SequenceFrame(i, mesh.simulate_depth(camera, pose, noise=0.0003, seed=i), camera, 0.1 * i, None, pose)
+        nacre.SequenceFrame(i, mesh.simulate_depth(camera, pose, seed=i), camera, 0.1 * i, None, pose)
         for i, pose in enumerate(poses)
-    ]  # fmt: skip
+    ]
 
 
 def test_one_call_makes_a_model_of_a_list_of_frames(frames: list[nacre.SequenceFrame]) -> None:

@@ -71,7 +71,7 @@ def retry_lost(terminal: Terminal, done: Reconstruction) -> bool:
     if not num_lost:
         return False
     with interruptible() as interruption, terminal.progress("lost frames", num_lost) as advance:
-        for frame in done.retry_lost():
+        for _ in done.retry_lost():
             advance(f"{num_lost - done.counts['LOST']} found")
             if interruption.wanted:
                 break
@@ -79,7 +79,7 @@ def retry_lost(terminal: Terminal, done: Reconstruction) -> bool:
 
 
 def advice(reason: str, recording: object = None) -> str:
-    """Return a message of the library in the words of the command line, with the depth scale that would do."""
+    """Return a message of the library in the words of the command line, with a depth scale that fits."""
     words = reason.replace("check depth_scale,", "give --depth-scale,").replace(
         "depth_scale", "--depth-scale"
     )
