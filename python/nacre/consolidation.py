@@ -58,6 +58,12 @@ class Consolidated(Value):
         ended = f", cancelled after {self.iterations} iterations" * self.cancelled
         return f"Consolidated({len(self.points)} points {self.points.dtype}{carried}{ended})"
 
+    def _repr_png_(self) -> bytes | None:
+        from nacre.inline_pictures import picture_of_points
+
+        normals, colors = self.attributes.get("normals"), self.attributes.get("colors")
+        return picture_of_points(self.points, normals, colors)
+
 
 def consolidate(
     points: npt.ArrayLike,

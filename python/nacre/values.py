@@ -37,7 +37,11 @@ def told(value: Any) -> str:
 
 def _same(a: Any, b: Any) -> bool:
     if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
-        return a.dtype == b.dtype and np.array_equal(a, b, equal_nan=a.dtype.kind in "fc")
+        if a.dtype != b.dtype or a.shape != b.shape:
+            return False
+        if a.dtype == object:  # lists of varying length
+            return all(_same(x, y) for x, y in zip(a.flat, b.flat, strict=True))
+        return np.array_equal(a, b, equal_nan=a.dtype.kind in "fc")
     if isinstance(a, Mapping) and isinstance(b, Mapping):
         return a.keys() == b.keys() and all(_same(a[key], b[key]) for key in a)
     if isinstance(a, float) and isinstance(b, float):

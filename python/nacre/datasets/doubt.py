@@ -22,7 +22,7 @@ def doubt_about(depth: npt.NDArray[np.floating[Any]]) -> str | None:
     part = float(np.mean(measured == np.float32(middle)))
     if part > _ONE_VALUE and len(measured) > 1000:
         return (
-            f"{part:.0%} of the measurements are the same, {middle:.4g} m: is that the largest value that the "
-            "camera or the file can hold? A max_depth (--max-depth) below it leaves them out"
+            f"{part:.0%} of the measurements are the same, {middle:.4g} m: is that the largest value that "
+            "the camera or the file can hold? A max_depth (--max-depth) below it leaves them out"
         )
     return None

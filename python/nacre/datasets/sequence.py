@@ -74,6 +74,11 @@ class SequenceFrame(Value):
         parts += self.attributes
         return f"SequenceFrame({', '.join(parts)})"
 
+    def _repr_png_(self) -> bytes | None:
+        from nacre.inline_pictures import picture_of_depth
+
+        return picture_of_depth(self.depth)
+
 
 @dataclass(frozen=True, eq=False)
 class FrameSource:

@@ -60,6 +60,11 @@ class Cloud(Value):
             parts.append(f"path={str(self.path)!r}")
         return f"Cloud({', '.join(parts)})"
 
+    def _repr_png_(self) -> bytes | None:
+        from nacre.inline_pictures import picture_of_points
+
+        return picture_of_points(self.points, self.normals, self.colors)
+
 
 def gather_columns(columns: Columns, names: tuple[str, ...]) -> npt.NDArray[Any]:
     """Return these columns side by side as a C-contiguous (N, len(names)) array of their common type."""
