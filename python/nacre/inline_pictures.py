@@ -12,7 +12,7 @@ _MOST_POINTS = 100_000
 
 
 def picture_of_points(points: npt.ArrayLike, normals: Any = None, colors: Any = None) -> bytes | None:
-    """Return a PNG image of points from above at an angle, shaded by their normals; None where there are none."""
+    """Return a PNG image of points from above at an angle, shaded by normals; None where there are none."""
     from nacre.normals import estimate_normals
     from nacre.report.pictures import OBLIQUE
     from nacre.report.png import encode_png
@@ -29,7 +29,9 @@ def picture_of_points(points: npt.ArrayLike, normals: Any = None, colors: Any = 
     if normals is not None:
         sides = normals[rows]
     elif len(shown) >= 3:
-        sides = estimate_normals(shown, viewpoint=shown.mean(axis=0) - 1e3 * np.asarray(view.view_from_model)[2])
+        sides = estimate_normals(
+            shown, viewpoint=shown.mean(axis=0) - 1e3 * np.asarray(view.view_from_model)[2]
+        )
     else:
         sides = None
     image = render_points(

@@ -49,9 +49,7 @@ def environment(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 
 
 def run(*words: str, cwd: Path | None = None, **environment: str) -> str:
-    return subprocess.run(
-        words, env=environment, cwd=cwd, capture_output=True, text=True, check=False
-    ).stdout
+    return subprocess.run(words, env=environment, cwd=cwd, capture_output=True, text=True, check=False).stdout
 
 
 def offered(shell: str, script: str, typed: str, folder: Path, environment: dict[str, str]) -> str:

@@ -37,7 +37,8 @@ def images(folder: Path, stored: np.ndarray, names: tuple[str, ...] = ("0001", "
 
 def camera_file(folder: Path, **changes: object) -> Path:
     path = folder / "given.json"
-    path.write_text(json.dumps({k: v for k, v in {**CAMERA, **changes}.items() if v is not None}))
+    document = {**CAMERA, "depth_scale": 1000, **changes}
+    path.write_text(json.dumps({key: value for key, value in document.items() if value is not None}))
     return path
 
 
@@ -74,13 +75,13 @@ MISTAKES: dict[str, tuple[Callable[[Path], str], list[str]]] = {
     ),
     "all-zero depth": (
         lambda d: reconstruct(
-            images(d / "r", np.zeros((48, 64), np.uint16)), "--camera", camera_file(d, depth_scale=1000)
+            images(d / "r", np.zeros((48, 64), np.uint16)), "--camera", camera_file(d)
         ),
         ["warning: ", "no pixel has a measurement", "are these the depth images"],
     ),
     "8-bit depth": (
         lambda d: reconstruct(
-            images(d / "r", (255 * metres()).astype(np.uint8)), "--camera", camera_file(d, depth_scale=1000)
+            images(d / "r", (255 * metres()).astype(np.uint8)), "--camera", camera_file(d)
         ),
         ["none of its 2 depth images can be read", "8-bit", "save the depth itself"],
     ),
@@ -94,7 +95,7 @@ MISTAKES: dict[str, tuple[Callable[[Path], str], list[str]]] = {
     ),
     "an incomplete camera file": (
         lambda d: reconstruct(
-            images(d / "r", np.ones((48, 64), np.uint16)), "--camera", camera_file(d, fy=None, depth_scale=1)
+            images(d / "r", np.ones((48, 64), np.uint16)), "--camera", camera_file(d, fy=None)
         ),
         ["'fy' is missing; a pinhole camera has model, width, height, fx, fy, cx and cy"],
     ),

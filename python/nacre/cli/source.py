@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from nacre.datasets import Sequence
 
 
-
 def complete_format(incomplete: str) -> list[str]:
     """Return the formats that begin so, for the shell."""
     from nacre.datasets.detect import READERS
@@ -27,7 +26,8 @@ FormatOption = Annotated[
     str | None,
     typer.Option(
         autocompletion=complete_format,
-        help="tum, redwood, 7-scenes, icl-nuim, plain, stanford or images.", show_default="recognised"
+        help="tum, redwood, 7-scenes, icl-nuim, plain, stanford or images.",
+        show_default="recognised",
     ),
 ]
 CameraOption = Annotated[
