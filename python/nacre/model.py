@@ -219,6 +219,11 @@ class FrameReport(Value):
         """Whether the camera's pose is known: every status but LOST."""
         return self.status != "LOST"
 
+    @property
+    def corrects_earlier(self) -> bool:
+        """Whether poses of earlier frames may have changed: a loop was closed, or views of an object adjusted."""
+        return self.loop_frame is not None or self.region.support >= 0
+
     @classmethod
     def _from_core(cls, core: Any) -> FrameReport:
         values = {f.name: getattr(core, f.name) for f in fields(cls)}
@@ -360,7 +365,7 @@ class Model(ExchangeablePoints):
         num_known = len(self._frames)
         new = [FrameReport._from_core(self._core.report(i)) for i in range(num_known, self._core.num_frames)]
         known = self._frames
-        if any(report.loop_frame is not None for report in new):
+        if any(report.corrects_earlier for report in new):
             known = [replace(report, world_from_camera=self._core.pose(report.index)) for report in known]
         self._frames = known + new if new else known
         return self._frames

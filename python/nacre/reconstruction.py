@@ -200,7 +200,7 @@ class Reconstruction:
             _log.info("frame %d: skipped, the model refused it: %s", index, error)
             return FrameRecord(index, frame.timestamp, "LOST", str(error), None, frame.truth, error)
         self._tell(index, report)
-        if report.loop_frame is not None:
+        if report.corrects_earlier:
             self._take_corrected_poses()
         if self._example is None and report.tracked:
             self._example = index, frame.depth

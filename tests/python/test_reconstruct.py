@@ -104,6 +104,16 @@ def test_what_happens_is_logged(frames: list[nacre.SequenceFrame], caplog: pytes
     assert {record.name for record in caplog.records} == {"nacre.reconstruction"}
 
 
+def test_reports_have_the_poses_that_later_views_of_an_object_adjusted() -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(Path(__file__).resolve().parents[2] / "examples" / "python")
+        from simulated import turntable
+    done = nacre.reconstruct(list(turntable(6)), region={"object": True})
+    expected = [done.model._core.pose(i) for i in range(6)]
+    assert np.array_equal([frame.world_from_camera for frame in done.frames], expected)
+    assert np.array_equal(done.model.poses, expected)
+
+
 def test_the_library_says_nothing_unless_asked() -> None:
     code = "import nacre, logging; logging.getLogger('nacre').warning('not seen')"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
