@@ -9,6 +9,7 @@
 
 namespace nacre {
 
+/// The form of WLOP.
 enum class ConsolidationMethod {
   wlop,       ///< Huang et al. 2009, density weights for both sets: the paper's form
   wlop_plus,  ///< repaired for incremental use: tangential, bounded repulsion that fades where there are no neighbours
@@ -22,6 +23,7 @@ enum class Theta {
   printed  ///< exp(-4 r^2 / h), as printed in the 2010 paper; cut at h
 };
 
+/// How consolidate and project_samples work.
 struct ConsolidateOptions {
   ConsolidationMethod method = ConsolidationMethod::wlop;
   double radius = 0.008;  ///< support radius h [m], of which the samples' spacing should be at most half
@@ -37,6 +39,7 @@ struct ConsolidateOptions {
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };
 
+/// A consolidated point set.
 template <class PointMatrix>
 struct BasicConsolidated {
   PointMatrix points;
@@ -45,7 +48,9 @@ struct BasicConsolidated {
   int iterations = 0;                 ///< that were done; where progress ended it, attributes are the sources' own
 };
 
+/// Of float coordinates.
 using Consolidated = BasicConsolidated<Points>;
+/// Of double coordinates.
 using ConsolidatedDouble = BasicConsolidated<PointsDouble>;
 
 /// num_points of the input, chosen at random, moved as project_samples does; in the order of their sources. Input rows

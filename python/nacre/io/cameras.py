@@ -48,12 +48,11 @@ def read_camera(path: str | os.PathLike[str]) -> CameraFile:
     Parameters
     ----------
     path : path-like
-        The file.
+        The file to read.
 
     Returns
     -------
     CameraFile
-        The camera, and the depth scale where the file has one.
 
     Raises
     ------

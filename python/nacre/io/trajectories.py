@@ -200,12 +200,11 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     Parameters
     ----------
     path : path-like
-        The file.
+        The file to read.
 
     Returns
     -------
     Trajectory
-        Times [s] and ``world_from_camera`` [m].
 
     Raises
     ------
