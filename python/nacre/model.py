@@ -221,7 +221,7 @@ class FrameReport(Value):
 
     @property
     def corrects_earlier(self) -> bool:
-        """Whether poses of earlier frames may have changed: a loop was closed, or views of an object adjusted."""
+        """Whether earlier poses may have changed: a loop was closed, or views of an object adjusted."""
         return self.loop_frame is not None or self.region.support >= 0
 
     @classmethod
