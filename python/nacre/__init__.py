@@ -1,6 +1,7 @@
 """nacre grows a 3D model from depth-camera images, layer by layer."""
 
 import importlib
+import logging
 from typing import TYPE_CHECKING, Any
 
 from nacre._core import Camera, __version__
@@ -28,6 +29,7 @@ from nacre.model import FrameReport, Model, ModelParameters
 from nacre.neighbors import KdTree, RadiusNeighbors
 from nacre.noise import NoiseModel, calibrate_noise, estimate_noise
 from nacre.normals import estimate_normals
+from nacre.progress import Cancelled
 from nacre.region import RegionParameters, RegionReport, select_region
 from nacre.registration import AlignResult, RegistrationParameters, align
 from nacre.simulation import default_camera, simulate_depth, turntable_poses
@@ -35,6 +37,7 @@ from nacre.system import default_threads, instruction_set
 
 if TYPE_CHECKING:
     from nacre import evaluation
+    from nacre.reconstructing import reconstruct
 
 __all__ = [
     "PIXEL_LABELS",
@@ -42,6 +45,7 @@ __all__ = [
     "Camera",
     "CameraError",
     "CameraFile",
+    "Cancelled",
     "ClosestPoints",
     "Cloud",
     "Consolidated",
@@ -89,6 +93,7 @@ __all__ = [
     "read_mesh",
     "read_points",
     "read_trajectory",
+    "reconstruct",
     "select_region",
     "simulate_depth",
     "turntable_poses",
@@ -100,8 +105,13 @@ __all__ = [
 ]
 
 
+logging.getLogger("nacre").addHandler(logging.NullHandler())
+
+
 def __getattr__(name: str) -> Any:
-    """Import ``nacre.evaluation`` when it is first asked for: most programs never do."""
+    """Import ``nacre.evaluation`` and what needs it when first asked for: most programs never do."""
     if name == "evaluation":
         return importlib.import_module("nacre.evaluation")
+    if name == "reconstruct":
+        return importlib.import_module("nacre.reconstructing").reconstruct
     raise AttributeError(f"module 'nacre' has no attribute {name!r}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import sys
 import traceback
 from collections.abc import Sequence
@@ -22,7 +23,7 @@ from nacre.cli.reconstruct import reconstruct
 from nacre.cli.simulate import simulate
 from nacre.cli.terminal import CommandError, set_verbosity
 from nacre.cli.view import view
-from nacre.errors import CameraError, FileFormatError
+from nacre.errors import CameraError, FileFormatError, meant
 
 app = typer.Typer(
     name="nacre",
@@ -95,12 +96,14 @@ def explain(error: Exception) -> tuple[str, int]:
     """Return what to say about an error, and the exit code."""
     if hasattr(error, "format_message"):  # the parser's: wrong usage, or help where arguments are missing
         context = getattr(error, "ctx", None)
-        message = error.format_message()
+        message = error.format_message().replace("Value error, ", "")
         if type(error).__name__ == "NoArgsIsHelpError":
             print(message)
             return "", 0 if context is not None and context.parent is None else 2
         hint = f" (see {context.command_path} --help)" if context is not None else ""
-        return message.rstrip(".") + hint, 2
+        choice = re.search(r"(\S+) is not one of (.+)", message)
+        near = meant(choice[1].strip("'"), re.findall(r"'([^']+)'", choice[2])) if choice else ""
+        return message.rstrip(".") + near + hint, 2
     if isinstance(error, CommandError):
         return str(error), error.code
     if isinstance(error, (CameraError, FileFormatError)):

@@ -227,7 +227,9 @@ def reconstruct(
     if done.num_tracked == 0:
         reasons = list(dict.fromkeys(frame.reason for frame in done.frames))
         others = " (and other reasons)" * (len(reasons) > 1)
-        raise CommandError(f"every frame was lost: {reasons[0]}{others}")
+        raise CommandError(
+            f"every frame was lost: {reasons[0]}{others}; nacre info {source} looks at its depth"
+        )
 
 
 def describe(sequence: Sequence, indices: range) -> str:

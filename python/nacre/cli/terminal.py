@@ -104,6 +104,15 @@ def table(rows: Sequence[tuple[str, str]]) -> str:
     return "\n".join(f"{name:<{width}}  {value}".rstrip() for name, value in rows)
 
 
+def written_file(folder: Path, name: str) -> Path:
+    """Return a file that ``nacre reconstruct`` writes, or say that this is not one of its folders."""
+    path = folder / name
+    if not path.is_file():
+        what = f"{folder} has no {name}" if folder.is_dir() else f"there is no folder {folder}"
+        raise CommandError(f"{what}; give the folder that nacre reconstruct wrote to (its -o)", 2)
+    return path
+
+
 def writable_folder(path: Path) -> Path:
     """Make a folder for results, or say at once that nothing can be written there."""
     import tempfile

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from nacre.cli.terminal import Quiet, Terminal, Verbose, table
+from nacre.cli.terminal import Quiet, Terminal, Verbose, table, written_file
 
 PortOption = Annotated[
     int, typer.Option(min=0, max=65535, metavar="PORT", help="Where the viewer listens; the next free one.")
@@ -42,6 +42,7 @@ def view(
     terminal = Terminal(False, quiet, verbose)
     from nacre.viewer import Viewer, export_html, export_rrd, written_story
 
+    written_file(folder, "report.json")
     story = written_story(folder)
     if html is not None:
         export_html(story, html)

@@ -25,9 +25,9 @@ from nacre.datasets import (
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files
 from nacre.datasets.sequence import Sequence, check_first_view
-from nacre.errors import FileFormatError
+from nacre.errors import FileFormatError, meant
 from nacre.io.cameras import read_camera
-from nacre.io.images import DEPTH_SUFFIXES
+from nacre.io.images import COLOR_SUFFIXES, DEPTH_SUFFIXES
 
 
 class Reader(NamedTuple):
@@ -100,7 +100,8 @@ def open_sequence(
     """
     folder = Path(path)
     if not folder.exists():
-        raise FileNotFoundError(f"no such recording: {folder}")
+        beside = [p.name for p in folder.parent.iterdir()] if folder.parent.is_dir() else []
+        raise FileNotFoundError(f"no such recording: {folder}{meant(folder.name, beside)}")
     if depth_scale is not None and not (math.isfinite(depth_scale) and depth_scale > 0):
         raise ValueError(
             f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}"
@@ -118,7 +119,8 @@ def open_sequence(
 def _named(format: str) -> Reader:
     key = format.lower().replace("_", "-")
     if key not in READERS:
-        raise ValueError(f"format must be one of {', '.join(map(repr, READERS))}, got {format!r}")
+        known = ", ".join(map(repr, READERS))
+        raise ValueError(f"format must be one of {known}, got {format!r}{meant(key, READERS)}")
     return READERS[key]
 
 
@@ -144,7 +146,7 @@ def _needs_more(folder: Path, given: Given) -> bool:
 
 def _explanation(folder: Path) -> str:
     if not any(folder.iterdir()):
-        return "the folder is empty"
+        return "the folder is empty: give the one that holds the depth images, or copy them there"
     known = "".join(f"\n  {name}: {reader.layout}" for name, reader in READERS.items())
     hint = _hint(folder)
     return (
@@ -165,6 +167,13 @@ def _hint(folder: Path) -> str | None:
         return (
             "This is almost a TUM recording: depth.txt is missing, the list with a line 'timestamp file' for "
             "each depth image. (A plain recording needs camera.json instead.)"
+            + _listing_command(folder, depth)
+        )
+    colors = [f"{name}/" for name in ("rgb", "color", "image", ".") if files(folder / name, COLOR_SUFFIXES)]
+    if colors and not images.recognise(folder):
+        return (
+            f"There are colour images (in {colors[0].replace('./', 'the folder itself')}), but nothing that "
+            "looks like depth: nacre needs depth images, in depth/ or with 'depth' in their names."
         )
     bags = files(folder, rosbag.SUFFIXES)
     if bags:
@@ -178,3 +187,12 @@ def _hint(folder: Path) -> str | None:
     if names:
         return f"Give one of the folders in it: {', '.join(names[:8])}."
     return None
+
+
+def _listing_command(folder: Path, depth: list[Path]) -> str:
+    """Say how to make depth.txt, where the images are named by their times."""
+    if not redwood.has_time_names(depth):
+        return ""
+    suffix = depth[0].suffix
+    command = f'for f in depth/*{suffix}; do echo "$(basename "$f" {suffix}) $f"; done > depth.txt'
+    return f" Its images are named by their times: (cd '{folder}' && {command}) makes it."

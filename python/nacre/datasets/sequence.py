@@ -17,11 +17,13 @@ import numpy.typing as npt
 
 from nacre import arrays
 from nacre._core import Camera
+from nacre.datasets.doubt import doubt_about
 from nacre.datasets.listing import files, pair
 from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
 from nacre.io.images import ATTRIBUTE_SUFFIXES, COLOR_SUFFIXES, read_attribute, read_color, read_depth
 from nacre.io.trajectories import Trajectory
+from nacre.values import Value
 
 _log = logging.getLogger(__name__)
 
@@ -35,8 +37,8 @@ def load_mask(path: Path) -> npt.NDArray[np.bool_]:
     return np.asarray(read_color(path).any(axis=2), np.bool_)
 
 
-@dataclass(frozen=True, eq=False)
-class SequenceFrame:
+@dataclass(frozen=True, eq=False, repr=False)
+class SequenceFrame(Value):
     """
     One view of a recording.
 
@@ -77,6 +79,11 @@ class SequenceFrame:
         parts += [name for name in ("color", "truth", "mask") if getattr(self, name) is not None]
         parts += self.attributes
         return f"SequenceFrame({', '.join(parts)})"
+
+    def _repr_png_(self) -> bytes | None:
+        from nacre.inline_pictures import picture_of_depth
+
+        return picture_of_depth(self.depth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,6 +227,17 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         An image (PNG, TIFF, JPEG or ``.npy``, with the values that are stored) belongs to the depth image of
         the same stem, or else of the same first number.
 
+        Parameters
+        ----------
+        name : str
+            Of the attribute.
+        folder : path-like
+            Of the images.
+
+        Returns
+        -------
+        Sequence
+
         Raises
         ------
         FileFormatError
@@ -323,12 +341,17 @@ def check_first_view(sequence: Sequence) -> Sequence:
 
     Colour images of another size cannot be used pixel by pixel: the sequence then comes back without colour.
     """
+    first_error: FileFormatError | None = None
     for source in sequence._sources:
         try:
             depth = _named(sequence._load_depth, source.depth)
-        except FileFormatError:
+        except FileFormatError as error:
+            first_error = first_error or error
             continue
         check_size(source.depth, depth, sequence.camera)
+        doubt = doubt_about(depth)
+        if doubt is not None:
+            _log.warning("%s: %s", source.depth, doubt)
         if source.color is None:
             break
         try:
@@ -337,6 +360,12 @@ def check_first_view(sequence: Sequence) -> Sequence:
             _log.warning("colour is left out: %s", error)
             return sequence.without_color()
         break
+    else:
+        if first_error is not None:
+            raise FileFormatError(
+                sequence.path,
+                f"none of its {len(sequence)} depth images can be read; the first: {first_error}",
+            )
     return sequence
 
 

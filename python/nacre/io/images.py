@@ -182,7 +182,9 @@ def _read_png(path: Path) -> npt.NDArray[Any]:
     with _open_image(path) as image:
         if not image.mode.startswith("I"):
             raise FileFormatError(
-                path, f"a depth image must have 16 bits and one channel, this is 8-bit with mode {image.mode}"
+                path,
+                f"a depth image must have 16 bits and one channel, this is 8-bit with mode {image.mode}; "
+                "save the depth itself, in millimetres say, not a picture of it",
             )
         return np.array(image).astype(np.uint16, copy=False)
 
