@@ -12,25 +12,6 @@ import pytest
 
 import nacre
 
-LOADED = """
-import sys
-before = set(sys.modules)
-import time
-start = time.perf_counter()
-import nacre
-seconds = time.perf_counter() - start
-loaded = {name.partition(".")[0] for name in set(sys.modules) - before} - sys.stdlib_module_names
-print(seconds)
-print(*sorted(loaded))
-"""
-
-
-def test_import_loads_numpy_and_nothing_else() -> None:
-    output = subprocess.run([sys.executable, "-c", LOADED], capture_output=True, text=True, check=True).stdout
-    seconds, loaded = output.splitlines()
-    print(f"import nacre: {1e3 * float(seconds):.0f} ms")
-    assert {name for name in loaded.split() if not name.startswith("_nacre")} == {"nacre", "numpy"}
-
 
 def test_version_is_the_headers(root: Path) -> None:
     header = (root / "cpp" / "include" / "nacre" / "version.hpp").read_text()
