@@ -138,7 +138,7 @@ def measure_spacing(points: npt.ArrayLike) -> Array:
     Return how far each point's disk must reach to meet the disks around it.
 
     That is the distance to the fourth neighbour: on a regular lattice all of the ring, at a border still the
-    half of it. Outliers get two medians.
+    half of it. Outliers get twice what the points around them have, which far from cameras are sparse.
     """
     from nacre import KdTree
 
@@ -147,11 +147,24 @@ def measure_spacing(points: npt.ArrayLike) -> Array:
     finite = np.isfinite(cloud).all(axis=1)
     usable = cloud[finite]
     if len(usable) > 1:
-        distance = np.asarray(KdTree(usable).query(usable, k=min(5, len(usable)))[0], dtype=np.float64)[:, -1]
+        distances, neighbors = KdTree(usable).query(usable, k=min(5, len(usable)))
+        distance = np.asarray(distances, dtype=np.float64)[:, -1]
         typical = float(np.median(distance))
         if typical > 0:
-            spacing[finite] = np.clip(distance, 0.05 * typical, 2 * typical)
+            around = np.maximum(np.median(distance[neighbors], axis=1), typical)
+            most = np.minimum(2 * around, 12 * typical)
+            spacing[finite] = np.clip(distance, 0.05 * typical, most)
     return spacing
+
+
+def nearest_distances(points: npt.ArrayLike) -> Array:
+    """Return how far each point is from the nearest other one; 0 for a lone point."""
+    from nacre import KdTree
+
+    cloud = as_points("points", points)
+    if len(cloud) < 2:
+        return np.zeros(len(cloud))
+    return np.asarray(KdTree(cloud).query(cloud, k=2)[0], dtype=np.float64)[:, 1]
 
 
 def _normals_towards(view: View, cloud: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:

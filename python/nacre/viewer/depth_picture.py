@@ -8,7 +8,7 @@ import numpy.typing as npt
 from nacre import Camera
 from nacre.depth import PIXEL_LABELS, DepthParameters, label_pixels
 from nacre.report.colormap import category_rgb, viridis
-from nacre.report.pictures import reason_color
+from nacre.report.depth_pictures import reason_color
 
 
 def depth_picture(
