@@ -300,9 +300,9 @@ class Reconstruction:
         """Return the depth image of the first frame that was tracked and of the first one that was not."""
         from nacre.report import DepthExample
 
-        groups = [(f for f in self.frames if f.status == status) for status in ("TRACKED", "LOST", "WEAK")]
         examples = []
-        for frame in (next(group, None) for group in groups):
+        for status in ("TRACKED", "LOST", "WEAK"):
+            frame = next((frame for frame in self.frames if frame.status == status), None)
             if frame is None or frame.report is None:
                 continue
             given = self._kept.get(frame.status)

@@ -319,8 +319,9 @@ def _axis_labels(x_label: str, y_label: str, width: int, height: int) -> str:
 
 
 def _svg(parts: Sequence[str], width: int, height: int, description: str) -> str:
+    kind = ' class="broad"' if width > 800 else ""
     return (
-        f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{escape(description, quote=True)}">'
+        f'<svg{kind} viewBox="0 0 {width} {height}" role="img" aria-label="{escape(description, quote=True)}">'
         f"{''.join(parts)}</svg>"
     )
 

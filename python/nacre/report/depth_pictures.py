@@ -85,14 +85,16 @@ def draw_depth(example: DepthExample) -> DepthPictures:
         draw(
             "As measured",
             by_depth(measured)[::step, ::step],
+            "depth",
             alt=f"The {of}: near yellow, {quantity(low, 'm')}, far violet, {quantity(high, 'm')}",
         ),
         draw(
             "What was removed",
             marked[::step, ::step],
+            "depth",
             alt=f"The {of}, grey, with the {part} that cleaning removed in colour{f': {causes}' * bool(causes)}",
         ),
-        draw("As used", by_depth(kept)[::step, ::step], alt=f"The {of} without what was removed"),
+        draw("As used", by_depth(kept)[::step, ::step], "depth", alt=f"The {of} without what was removed"),
     )
     return DepthPictures(pictures, tuple(removed), int(measured.sum()), (low, high))
 

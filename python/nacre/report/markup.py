@@ -42,7 +42,7 @@ def slug(text: str) -> str:
 
 def chart(caption: str, svg: str, keys: str = "", note: str = "") -> str:
     """Return a chart with its title and keys; narrow screens scroll it."""
-    told = f' <span class="note">{escape(note)}</span>' if note else ""
+    told = f'<span class="note">, {escape(note)}</span>' if note else ""
     lines = f"<b>{escape(caption)}</b>{told}" + (f"<br>{keys}" if keys else "")
     return (
         f'<figure class="chart"><figcaption>{lines}</figcaption>'
@@ -89,13 +89,12 @@ def color_bar(
         marks = [v for v in (m * 10.0**d for d in range(-3, 6) for m in (1, 1.5, 2, 3, 5, 7)) if low <= v <= high]
     else:
         marks = ticks(low, high, 4)
-    parts, last = [], -1.0
+    shown = [(0.0, f"{low:.3g}"), (1.0, f"{high:.3g}")] if high > low else []
     for value in marks:
         at = place(value)
-        if at - last < 0.11 or not 0.0 <= at <= 1.0:
-            continue
-        last = at
-        parts.append(f'<span style="left:{100 * at:.1f}%">{number(value)}</span>')
+        if all(abs(at - other) > 0.13 for other, _ in shown):
+            shown.append((at, number(value)))
+    parts = [f'<span style="left:{100 * at:.1f}%">{text}</span>' for at, text in sorted(shown)]
     scale = " (logarithmic)" if logarithmic else ""
     return (
         f'<div class="bar"><div class="bar-title">{escape(title)}{f" [{escape(unit)}]" if unit else ""}{scale}</div>'

@@ -19,7 +19,7 @@ def encode_small_png(image: Bytes, max_bytes: int = 1 << 62) -> bytes:
     image : numpy.ndarray of uint8, shape (H, W, 3) or (H, W, 4)
         RGB or RGBA.
     max_bytes : int, optional
-        The file gets fewer colours, and then fewer pixels, until it is no larger.
+        The file gets 128 colours, and then fewer pixels, until it is no larger.
 
     Returns
     -------
@@ -32,8 +32,8 @@ def encode_small_png(image: Bytes, max_bytes: int = 1 << 62) -> bytes:
         data = encode_indexed_png(indices, palette)
         if len(data) <= max_bytes or min(pixels.shape[:2]) < 16:
             return data
-        if num_colors > 32:
-            num_colors //= 2
+        if num_colors > 128:
+            num_colors = 128
         else:
             pixels = _halved(pixels)
 

@@ -25,7 +25,7 @@ _SIZE = (560, 560)
 _MAIN_SIZE = (680, 640)
 _CAMERA_SIZE = (640, 480)
 _MAX_POINTS = 300_000
-_MAX_BYTES = 85_000  # of a picture's file
+_MAX_BYTES = {"main": 150_000, "camera": 100_000, "side": 70_000, "attribute": 85_000, "depth": 50_000}
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,9 @@ class ModelPictures:
     scale_bar: tuple[str, float]  #: its length in words, and as a part of a side picture's width
 
 
-def draw(caption: str, image: npt.NDArray[np.uint8], note: str = "", alt: str = "") -> Picture:
-    """Return an image as a picture whose file is small."""
-    data = base64.b64encode(encode_small_png(image, _MAX_BYTES)).decode("ascii")
+def draw(caption: str, image: npt.NDArray[np.uint8], kind: str, *, note: str = "", alt: str = "") -> Picture:
+    """Return an image as a picture whose file is as small as its kind asks for."""
+    data = base64.b64encode(encode_small_png(image, _MAX_BYTES[kind])).decode("ascii")
     return Picture(caption, f"data:image/png;base64,{data}", (image.shape[1], image.shape[0]), note, alt)
 
 
@@ -73,22 +73,26 @@ def draw_model(model: ModelCloud, frames: Sequence[FrameEntry] = ()) -> ModelPic
     points = model.points
     if not len(points):
         return None
-    reach = measure_spacing(points)
+    sides, scale = _fit_sides(points, 0.001)
+    is_scene = model.normals is not None and _is_scene(points, model.normals, sides)
+    if is_scene:
+        sides, scale = _fit_sides(points, 0.02)  # what lies far away would make the rest tiny
+    reach = measure_spacing(points, 5 if is_scene else 2)
 
     def picture(
-        caption: str, view: View, colors: npt.NDArray[np.uint8] | None = None, by: str = "shaded grey"
+        caption: str,
+        view: View,
+        kind: str,
+        colors: npt.NDArray[np.uint8] | None = None,
+        by: str = "shaded grey",
     ) -> Picture:
         hidden = model.normals is not None and is_inside_out(points, model.normals, view)
         image = render_points(
             points, model.normals, colors, view=view, spacing=reach, hide_reverse=hidden, background=None
         )
         alt = f"The model, {by}: {caption.lower()}"
-        return draw(caption, image, "reverse sides left out" if hidden else "", alt)
+        return draw(caption, image, kind, note="reverse sides left out" if hidden else "", alt=alt)
 
-    sides, scale = _fit_sides(points, 0.001)
-    is_scene = model.normals is not None and _is_scene(points, model.normals, sides)
-    if is_scene:
-        sides, scale = _fit_sides(points, 0.02)  # what lies far away would make the rest tiny
     poses = [f for f in frames if f.world_from_camera is not None and f.status.upper() != "LOST"]
     main = View.fit(points, OBLIQUE, size=_MAIN_SIZE, outliers=0.004)
     views = {
@@ -111,7 +115,10 @@ def draw_model(model: ModelCloud, frames: Sequence[FrameEntry] = ()) -> ModelPic
     def attribute(name: str, values: npt.NDArray[np.float64]) -> Attribute:
         low, high = (float(bound) for bound in np.percentile(values, (2, 98)))
         shades = viridis(_positions(values, low, high))
-        shown = [picture(f"{name}, {where}", view, shades, f"{name.lower()} as colour") for where, view in few]
+        shown = [
+            picture(f"{name}, {where}", view, "attribute", shades, f"{name.lower()} as colour")
+            for where, view in few
+        ]
         return Attribute(tuple(shown), (low, high), float(np.median(values)))
 
     confidence = None
@@ -120,11 +127,14 @@ def draw_model(model: ModelCloud, frames: Sequence[FrameEntry] = ()) -> ModelPic
         confidence = attribute("Confidence", known)
     colors: tuple[Picture, ...] = ()
     if model.colors is not None:
-        colors = tuple(picture(f"Colour, {where}", view, model.colors, "in its colours") for where, view in few)
+        colors = tuple(
+            picture(f"Colour, {where}", view, "attribute", model.colors, "in its colours")
+            for where, view in few
+        )
     return ModelPictures(
-        main=picture("The model", main),
-        cameras=tuple(picture(_capital(name), view) for name, view in cameras.items()),
-        sides=tuple(picture(side.capitalize(), view) for side, view in sides.items()),
+        main=picture("The model", main, "main"),
+        cameras=tuple(picture(_capital(name), view, "camera") for name, view in cameras.items()),
+        sides=tuple(picture(side.capitalize(), view, "side") for side, view in sides.items()),
         spacing=attribute("Spacing", spacing),
         confidence=confidence,
         colors=colors,
@@ -137,12 +147,14 @@ def _capital(text: str) -> str:
 
 
 def _fit_sides(points: npt.NDArray[Any], outliers: float) -> tuple[dict[str, View], float]:
-    """Return the views of the six sides and their common scale [m per pixel]."""
-    scale = max(
-        View.fit(points, side, size=_SIZE, outliers=outliers).metres_per_pixel for side in SIDES
-    )
+    """Return the views of the six sides, no higher than one of them asks for, and their scale [m per pixel]."""
+    scale = max(View.fit(points, side, size=_SIZE, outliers=outliers).metres_per_pixel for side in SIDES)
+    low, high = np.percentile(points, (100 * outliers, 100 - 100 * outliers), axis=0)
+    tallest = float(max(high[1] - low[1], high[2] - low[2]))  # y is down, but in the views along it
+    height = int(np.clip(tallest / scale / 0.9, 0.5 * _SIZE[1], _SIZE[1]))
     sides = {
-        side: View.fit(points, side, size=_SIZE, metres_per_pixel=scale, outliers=outliers) for side in SIDES
+        side: View.fit(points, side, size=(_SIZE[0], height), metres_per_pixel=scale, outliers=outliers)
+        for side in SIDES
     }
     return sides, scale
 

@@ -133,12 +133,12 @@ def _reverse_parts(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) ->
     return float(reverse[order[nearest]].mean()), float(reverse.mean())
 
 
-def measure_spacing(points: npt.ArrayLike) -> Array:
+def measure_spacing(points: npt.ArrayLike, most: float = 2.0) -> Array:
     """
     Return how far each point's disk must reach to meet the disks around it.
 
     That is the distance to the fourth neighbour: on a regular lattice all of the ring, at a border still the
-    half of it. Outliers get twice what the points around them have, which far from cameras are sparse.
+    half of it. None gets more than ``most`` medians: outliers stay small, or far walls become closed.
     """
     from nacre import KdTree
 
@@ -147,13 +147,10 @@ def measure_spacing(points: npt.ArrayLike) -> Array:
     finite = np.isfinite(cloud).all(axis=1)
     usable = cloud[finite]
     if len(usable) > 1:
-        distances, neighbors = KdTree(usable).query(usable, k=min(5, len(usable)))
-        distance = np.asarray(distances, dtype=np.float64)[:, -1]
+        distance = np.asarray(KdTree(usable).query(usable, k=min(5, len(usable)))[0], dtype=np.float64)[:, -1]
         typical = float(np.median(distance))
         if typical > 0:
-            around = np.maximum(np.median(distance[neighbors], axis=1), typical)
-            most = np.minimum(2 * around, 12 * typical)
-            spacing[finite] = np.clip(distance, 0.05 * typical, most)
+            spacing[finite] = np.clip(distance, 0.05 * typical, most * typical)
     return spacing
 
 

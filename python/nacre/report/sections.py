@@ -15,7 +15,7 @@ from nacre.report.markup import chart, color_bar, heading, keys, pictures, value
 from nacre.report.pictures import Attribute, ModelPictures, is_logarithmic
 from nacre.report.text import count, label, quantity
 
-_USED, _MISSING, _DROPPED = 7, 6, 8  # indices of the palette
+_USED, _MISSING, _DROPPED, _OUTSIDE = 7, 6, 8, 9  # indices of the palette
 
 
 def model_section(model: ModelPictures | None) -> str:
@@ -126,7 +126,7 @@ def funnel_section(frames: Sequence[FrameEntry]) -> str:
             left -= sum(gone.values())
             rows.append(_funnel_row(name, left, total, sum(gone.values()), gone))
     dropped = sum(_num_usable(frame) for frame in known if not _is_folded_in(frame))
-    rows.append(_funnel_row("of frames that were folded in", left - dropped, total, dropped))
+    rows.append(_funnel_row("in frames that were folded in", left - dropped, total, dropped))
     moved = sum(frame.num_updated or 0 for frame in known)
     added = sum(frame.num_inserted or 0 for frame in known)
     points = next((frame.num_points for frame in reversed(known) if frame.num_points is not None), None)
@@ -134,6 +134,8 @@ def funnel_section(frames: Sequence[FrameEntry]) -> str:
         f"These pixels moved points of the model {count(moved)} times and added {count(added)} points"
         + (f", of which {count(points)} are left" if points is not None and points <= added else "")
         + ". A point stands for many pixels: it is moved again by each frame that sees it."
+        if added
+        else "Nothing came into the model."
     )
     parts = [heading("Where the points were lost", "funnel"), f'<div class="funnel">{"".join(rows)}</div>']
     parts.append(f'<p class="note">{told}</p>')
@@ -163,7 +165,11 @@ def _funnel_chart(frames: Sequence[FrameEntry], reasons: Sequence[str]) -> str:
         ("folded in", np.array(folded, float), _USED),
         ("usable, but LOST or WEAK", np.array(dropped, float), _DROPPED),
         *(
-            (label(reason).lower(), np.array([float(f.removed.get(reason, 0)) for f in frames]), reason_color(reason, i))
+            (
+                label(reason).lower(),
+                np.array([float(f.removed.get(reason, 0)) for f in frames]),
+                _OUTSIDE if reason == "outside" else reason_color(reason, i),
+            )
             for i, reason in enumerate(reasons)
         ),
         ("not measured", missing, _MISSING),

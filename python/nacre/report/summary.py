@@ -68,6 +68,10 @@ def summarize(data: ReportData) -> Summary:
         num_frames, num_tracked = len(data.frames), sum(is_tracked(frame) for frame in data.frames)
         part = quantity(num_tracked / num_frames, "fraction")
         tiles.append(Tile("Frames tracked", f"{count(num_tracked)} / {count(num_frames)}", part))
+    matching = [f.overlap for f in data.frames if is_tracked(f) and f.num_inliers and f.overlap is not None]
+    if matching:
+        typical = 100 * float(np.median(matching))
+        sentences.append(f"Typically {typical:.0f} % of a frame matches the model")
     if data.model is not None:
         num_points = int(np.isfinite(np.asarray(data.model.points)).all(axis=1).sum())
         sentences.append(f"The model has {count(num_points)} points")

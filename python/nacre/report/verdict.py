@@ -74,6 +74,7 @@ def judge(data: ReportData, trajectory: AbsoluteTrajectoryError | None) -> Verdi
 
     advice = _NEXT_STEPS[_cause(bad)] if bad else ""
     if not num_tracked:
+        tracked = f"None of the {count(num_frames)} frames could be registered" if num_frames > 1 else "It is lost"
         reason = Counter(plain_reason(frame.reason) for frame in bad).most_common(1)[0][0]
         told = f": {reason}" if reason else ""
         return Verdict("lost", "Failed: no frame could be used", f"{tracked}{told}", advice)
@@ -129,13 +130,13 @@ def stretches(frames: Sequence[FrameEntry]) -> list[Stretch]:
 def plain_reason(reason: str) -> str:
     """Return a frame's reason without the figures that differ from frame to frame."""
     if reason.startswith("evidence "):
-        return "too little of it agrees with the model"
+        return "too little agrees with the model"
     if re.match(r"only 0 pixels", reason):
-        return "no pixel of it is usable"
+        return "no usable pixel"
     if re.match(r"only \d+ pixels", reason):
-        return "too few of its pixels are usable"
+        return "too few usable pixels"
     if "direction(s)" in reason:
-        return "its shape leaves directions of the pose open"
+        return "the shape leaves directions of the pose open"
     return reason
 
 
