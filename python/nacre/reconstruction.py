@@ -265,7 +265,7 @@ class Reconstruction:
         *,
         interrupted: bool = False,
     ) -> ReportData:
-        """Return what :func:`nacre.report.write_report` shows; it reads some frames of the recording again."""
+        """Return what :func:`nacre.report.write_report` shows; it reads some frames again."""
         from nacre.report import ModelCloud, ReportData
         from nacre.report.text import label
 

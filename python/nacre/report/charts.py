@@ -158,9 +158,7 @@ def map_chart(
                 parts.append(f'<text class="tick mid" x="{at:.1f}" y="{y:.1f}">{number(tick)}</text>')
             else:
                 parts.append(f'<path class="grid" d="M{_LEFT} {at:.1f}h{inner[0]:g}"/>')
-                parts.append(
-                    f'<text class="tick end" x="{_LEFT - 6}" y="{at + 4:.1f}">{number(tick)}</text>'
-                )
+                parts.append(f'<text class="tick end" x="{_LEFT - 6}" y="{at + 4:.1f}">{number(tick)}</text>')
     for name, xy, color in tracks:
         thinned = xy[:: max(len(xy) // 1500, 1)]
         style = " wide" if name == "truth" else ""
@@ -320,10 +318,8 @@ def _axis_labels(x_label: str, y_label: str, width: int, height: int) -> str:
 
 def _svg(parts: Sequence[str], width: int, height: int, description: str) -> str:
     kind = ' class="broad"' if width > 800 else ""
-    return (
-        f'<svg{kind} viewBox="0 0 {width} {height}" role="img" aria-label="{escape(description, quote=True)}">'
-        f"{''.join(parts)}</svg>"
-    )
+    alt = escape(description, quote=True)
+    return f'<svg{kind} viewBox="0 0 {width} {height}" role="img" aria-label="{alt}">{"".join(parts)}</svg>'
 
 
 def _described(series: Sequence[Series], y_label: str) -> str:

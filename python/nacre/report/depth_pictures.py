@@ -92,7 +92,7 @@ def draw_depth(example: DepthExample) -> DepthPictures:
             "What was removed",
             marked[::step, ::step],
             "depth",
-            alt=f"The {of}, grey, with the {part} that cleaning removed in colour{f': {causes}' * bool(causes)}",
+            alt=f"The {of}, grey, with what cleaning removed in colour, {part}{f': {causes}' * bool(causes)}",
         ),
         draw("As used", by_depth(kept)[::step, ::step], "depth", alt=f"The {of} without what was removed"),
     )

@@ -67,7 +67,9 @@ def _error_charts(frames: Sequence[FrameEntry], error: AbsoluteTrajectoryError |
     charts = []
     if np.isfinite(translation).any():
         unit, factor = length_unit(float(np.nanmax(translation)))
-        charts.append(_line(frames, "Position error", [Series("", translation * factor)], f"position [{unit}]"))
+        charts.append(
+            _line(frames, "Position error", [Series("", translation * factor)], f"position [{unit}]")
+        )
     if np.isfinite(rotation).any():
         one = [Series("", np.degrees(rotation))]
         charts.append(_line(frames, "Rotation error", one, "rotation [\N{DEGREE SIGN}]"))
@@ -85,7 +87,10 @@ def frames_section(frames: Sequence[FrameEntry], parameters: Mapping[str, Any]) 
     charts = []
     overlap, consistency = registered(lambda f: f.overlap), registered(lambda f: f.consistency)
     if np.isfinite(overlap).any():
-        both = [Series("matches the model", 100 * overlap, 0), Series("not seen through", 100 * consistency, 2)]
+        both = [
+            Series("matches the model", 100 * overlap, 0),
+            Series("not seen through", 100 * consistency, 2),
+        ]
         both = [one for one in both if np.isfinite(one.values).any()]
         charts.append(_line(frames, "Overlap and consistency", both, "part of the frame [%]", y_max=100))
     evidence = registered(lambda frame: frame.evidence)
@@ -93,13 +98,25 @@ def frames_section(frames: Sequence[FrameEntry], parameters: Mapping[str, Any]) 
         least = parameters.get("min_evidence")
         told = f"a frame below {least:g} is lost" if isinstance(least, float) else ""
         charts.append(
-            _line(frames, "Evidence that it is right", [Series("", evidence)], "evidence", note=told, level=least)
+            _line(
+                frames,
+                "Evidence that it is right",
+                [Series("", evidence)],
+                "evidence",
+                note=told,
+                level=least,
+            )
         )
     rmse = registered(lambda frame: frame.rmse)
     if np.isfinite(rmse).any():
         unit, factor = length_unit(float(np.nanmax(rmse)))
         charts.append(
-            _line(frames, "Residual of the registration (RMS)", [Series("", rmse * factor)], f"residual [{unit}]")
+            _line(
+                frames,
+                "Residual of the registration (RMS)",
+                [Series("", rmse * factor)],
+                f"residual [{unit}]",
+            )
         )
     num_points = values(frames, lambda frame: frame.num_points)
     if np.nanmax(num_points, initial=0) > 0:
@@ -147,7 +164,9 @@ def time_section(frames: Sequence[FrameEntry]) -> str:
     indices = [frame.index for frame in frames]
     svg = stacked_chart(steps, y_label="time [ms]", indices=indices, width=1080, height=210)
     title = "Time per step of each frame"
-    return heading("Time", "time") + chart(title, svg, keys(steps, told), "median of a frame and part of the whole")
+    return heading("Time", "time") + chart(
+        title, svg, keys(steps, told), "median of a frame and part of the whole"
+    )
 
 
 def _steps(frames: Sequence[FrameEntry]) -> list[Series]:

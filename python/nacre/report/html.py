@@ -67,8 +67,8 @@ def render_page(data: ReportData) -> str:
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(data.title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n<main>\n"
         f"{_header(data, summary, model)}\n{_contents(body)}\n{body}\n"
-        f"<footer>Made by nacre {escape(__version__)}. Poses are camera to world; the world is the first camera's "
-        "frame.</footer>\n</main>\n</body>\n</html>\n"
+        f"<footer>Made by nacre {escape(__version__)}. Poses are camera to world; the world is the "
+        "first camera's frame.</footer>\n</main>\n</body>\n</html>\n"
     )
 
 
@@ -113,7 +113,8 @@ def _strip(frames: Sequence[FrameEntry]) -> str:
     counts = Counter(states)
     shown = [name for name in ("TRACKED", "RELOCALISED", "WEAK", "LOST") if counts[name]]
     told = "".join(
-        f'<span class="key"><i class="k-{name.lower()} full"></i>{count(counts[name])} {name}</span>' for name in shown
+        f'<span class="key"><i class="k-{name.lower()} full"></i>{count(counts[name])} {name}</span>'
+        for name in shown
     )
     lost = [frame.index for frame in frames if frame.status.upper() == "LOST"]
     alt = ", ".join(f"{counts[name]} {name}" for name in shown) + (f"; lost: {ranges(lost)}" if lost else "")

@@ -27,7 +27,8 @@ def pictures(shown: Iterable[Picture], layout: str, kind: str = "") -> str:
     """Return pictures with their captions, side by side."""
     figures = "".join(
         f'<figure class="picture {kind}"><img src="{picture.uri}" width="{picture.size[0]}" '
-        f'height="{picture.size[1]}" data-name="{slug(picture.caption)}" alt="{escape(picture.alt or picture.caption, quote=True)}">'
+        f'height="{picture.size[1]}" data-name="{slug(picture.caption)}" '
+        f'alt="{escape(picture.alt or picture.caption, quote=True)}">'
         f"<figcaption><b>{escape(picture.caption)}</b>{escape(f', {picture.note}' if picture.note else '')}"
         "</figcaption></figure>"
         for picture in shown
@@ -44,23 +45,33 @@ def chart(caption: str, svg: str, keys: str = "", note: str = "") -> str:
     """Return a chart with its title and keys; narrow screens scroll it."""
     told = f'<span class="note">, {escape(note)}</span>' if note else ""
     lines = f"<b>{escape(caption)}</b>{told}" + (f"<br>{keys}" if keys else "")
-    return (
-        f'<figure class="chart"><figcaption>{lines}</figcaption>'
-        f'<div class="scroll" tabindex="0" role="group" aria-label="{escape(caption, quote=True)}">{svg}</div></figure>'
-    )
+    return f'<figure class="chart"><figcaption>{lines}</figcaption>{scrolled(svg, caption)}</figure>'
+
+
+def scrolled(wide: str, name: str) -> str:
+    """Return something wide in a frame that narrow screens scroll, also by keyboard."""
+    alt = escape(name, quote=True)
+    return f'<div class="scroll" tabindex="0" role="group" aria-label="{alt}">{wide}</div>'
 
 
 def keys(series: Sequence[Series], notes: Sequence[str] = ()) -> str:
     """Return the colours of a chart with their names, and a word about each."""
     told = notes or [""] * len(series)
     return "".join(
-        f'<span class="key"><i class="k{one.color}"></i>{escape(one.name)}{escape(f" {note}" if note else "")}</span>'
+        f'<span class="key"><i class="k{one.color}"></i>{escape(f"{one.name} {note}".rstrip())}</span>'
         for one, note in zip(series, told, strict=True)
     )
 
 
 def color_bar(
-    title: str, low: float, high: float, unit: str, *, kind: str = "", logarithmic: bool = False, inverse: bool = False
+    title: str,
+    low: float,
+    high: float,
+    unit: str,
+    *,
+    kind: str = "",
+    logarithmic: bool = False,
+    inverse: bool = False,
 ) -> str:
     """
     Return a bar of colours with round numbers beneath; ``unit`` "m" is shown as mm or m.
@@ -86,18 +97,20 @@ def color_bar(
         steps = (1,) if len(decades) > 3 else (1, 3)
         marks = [m * 10.0**d for d in decades for m in steps if low <= m * 10.0**d <= high]
     elif inverse:
-        marks = [v for v in (m * 10.0**d for d in range(-3, 6) for m in (1, 1.5, 2, 3, 5, 7)) if low <= v <= high]
+        marks = [
+            v for v in (m * 10.0**d for d in range(-3, 6) for m in (1, 1.5, 2, 3, 5, 7)) if low <= v <= high
+        ]
     else:
         marks = ticks(low, high, 4)
-    shown = [(0.0, f"{low:.3g}"), (1.0, f"{high:.3g}")] if high > low else []
+    shown = [(place(end), number(float(f"{end:.3g}"))) for end in (low, high)] if high > low else []
     for value in marks:
         at = place(value)
-        if all(abs(at - other) > 0.13 for other, _ in shown):
+        if all(abs(at - other) > 0.15 for other, _ in shown):
             shown.append((at, number(value)))
     parts = [f'<span style="left:{100 * at:.1f}%">{text}</span>' for at, text in sorted(shown)]
-    scale = " (logarithmic)" if logarithmic else ""
+    title += f" [{unit}]" * bool(unit) + " (logarithmic)" * logarithmic
     return (
-        f'<div class="bar"><div class="bar-title">{escape(title)}{f" [{escape(unit)}]" if unit else ""}{scale}</div>'
+        f'<div class="bar"><div class="bar-title">{escape(title)}</div>'
         f'<div class="ramp {kind}"></div><div class="ramp-ticks">{"".join(parts)}</div></div>'
     )
 
@@ -109,7 +122,9 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], *, caption: str =
     body = "".join(
         "<tr>"
         + "".join(
-            f'<td class="number">{escape(cell)}</td>' if i or heads else f'<th scope="row">{escape(cell)}</th>'
+            f'<td class="number">{escape(cell)}</td>'
+            if i or heads
+            else f'<th scope="row">{escape(cell)}</th>'
             for i, cell in enumerate(row)
         )
         + "</tr>"
@@ -127,7 +142,9 @@ def values(frames: Sequence[FrameEntry], value: Callable[[FrameEntry], float | N
 def positions(frames: Sequence[FrameEntry], pose: Callable[[FrameEntry], Any]) -> Array:
     """Return the place of a pose of every frame, (F, 3); NaN where it is not known."""
     missing = np.full(3, np.nan)
-    rows = [missing if (p := pose(frame)) is None else np.asarray(p, dtype=np.float64)[:3, 3] for frame in frames]
+    rows = [
+        missing if (p := pose(frame)) is None else np.asarray(p, dtype=np.float64)[:3, 3] for frame in frames
+    ]
     return np.array(rows).reshape(-1, 3)
 
 

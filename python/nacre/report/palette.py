@@ -40,7 +40,7 @@ def encode_small_png(image: Bytes, max_bytes: int = 1 << 62) -> bytes:
 
 def quantize(image: Bytes, num_colors: int = 256) -> tuple[Bytes, Bytes]:
     """
-    Choose the colours that stand for those of an image, by median cut (Heckbert 1982) of the largest variance.
+    Choose the colours that stand for those of an image: median cut (Heckbert 1982) of the largest variance.
 
     Returns
     -------
@@ -80,18 +80,19 @@ def _median_cut(
 ) -> npt.NDArray[np.int64]:
     """Return to which of ``num_colors`` boxes each colour belongs."""
     boxes = [np.arange(len(colors))]
-    spreads = [_spread(colors, counts)]
+    spreads = np.zeros((num_colors, colors.shape[1]))
+    spreads[0] = _spread(colors, counts)
     while len(boxes) < num_colors:
-        largest = int(np.argmax([spread.max() for spread in spreads]))
-        if spreads[largest].max() <= 0:
+        largest, axis = divmod(int(spreads.argmax()), colors.shape[1])
+        if spreads[largest, axis] <= 0:
             break
-        box, axis = boxes[largest], int(spreads[largest].argmax())
+        box = boxes[largest]
         box = box[np.argsort(colors[box, axis], kind="stable")]
         heavy = np.cumsum(counts[box])
         cut = int(np.clip(np.searchsorted(heavy, heavy[-1] / 2), 1, len(box) - 1))
-        parts = box[:cut], box[cut:]
-        boxes[largest : largest + 1] = parts
-        spreads[largest : largest + 1] = [_spread(colors[part], counts[part]) for part in parts]
+        for place, part in ((largest, box[:cut]), (len(boxes), box[cut:])):
+            boxes[place : place + 1] = [part]
+            spreads[place] = _spread(colors[part], counts[part])
     member = np.empty(len(colors), dtype=np.int64)
     for i, box in enumerate(boxes):
         member[box] = i

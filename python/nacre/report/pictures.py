@@ -147,7 +147,7 @@ def _capital(text: str) -> str:
 
 
 def _fit_sides(points: npt.NDArray[Any], outliers: float) -> tuple[dict[str, View], float]:
-    """Return the views of the six sides, no higher than one of them asks for, and their scale [m per pixel]."""
+    """Return the views of the six sides, no higher than needed, and their scale [m per pixel]."""
     scale = max(View.fit(points, side, size=_SIZE, outliers=outliers).metres_per_pixel for side in SIDES)
     low, high = np.percentile(points, (100 * outliers, 100 - 100 * outliers), axis=0)
     tallest = float(max(high[1] - low[1], high[2] - low[2]))  # y is down, but in the views along it

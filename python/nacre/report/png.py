@@ -53,11 +53,10 @@ def encode_indexed_png(indices: npt.NDArray[np.uint8], palette: npt.NDArray[np.u
     """
     height, width = indices.shape
     plain = np.concatenate([np.zeros((height, 1), np.uint8), indices], axis=1).tobytes()
-    smallest = min((zlib.compress(rows, 9) for rows in (plain, _filter_rows(indices, 1))), key=len)
     chunks = [
         (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0)),
         (b"PLTE", palette[:, :3].tobytes()),
-        (b"IDAT", smallest),
+        (b"IDAT", zlib.compress(plain, 7)),
         (b"IEND", b""),
     ]
     if palette.shape[1] == 4:

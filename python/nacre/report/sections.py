@@ -36,15 +36,22 @@ def model_section(model: ModelPictures | None) -> str:
         "in all six pictures</p></div>"
     )
     low, high = model.spacing.range
-    bar = color_bar("Distance to the nearest point", low, high, "m") if high > 0 else ""
-    told = f"Half of the points have a neighbour within {quantity(model.spacing.typical, 'm')}; even colour is even sampling."
+    log = is_logarithmic(low, high)
+    bar = color_bar("Distance to the nearest point", low, high, "m", logarithmic=log) if high > 0 else ""
+    typical = quantity(model.spacing.typical, "m")
+    told = f"Half of the points have a neighbour within {typical}; even colour is even sampling."
     parts.append(_attribute("How evenly the points are spread", model.spacing, bar, told))
     if model.confidence is not None:
         low, high = model.confidence.range
         bar = color_bar(
-            "Frontal observations that a point stands for", low, high, "", logarithmic=is_logarithmic(low, high)
+            "Frontal observations that a point stands for",
+            low,
+            high,
+            "",
+            logarithmic=is_logarithmic(low, high),
         )
-        told = f"The median is {model.confidence.typical:.3g}. Dark is what few frames saw, from afar or at a slant."
+        typical = f"{model.confidence.typical:.3g}"
+        told = f"The median is {typical}. Dark is what few frames saw, from afar or at a slant."
         parts.append(_attribute("How well each point is known", model.confidence, bar, told))
     if model.colors:
         parts.append('<h3 class="sub">Colour</h3>' + pictures(model.colors, "two"))
@@ -150,10 +157,16 @@ def _funnel_row(name: str, num: int, total: int, gone: int = 0, reasons: dict[st
         for reason, number in (reasons or {}).items()
         if number
     )
-    lost = f"\N{MINUS SIGN}{quantity(gone / total, 'fraction')}{f': {causes}' if ',' in causes else ''}" if gone else ""
+    lost = (
+        f"\N{MINUS SIGN}{quantity(gone / total, 'fraction')}{f': {causes}' if ',' in causes else ''}"
+        if gone
+        else ""
+    )
     return (
-        f'<div class="row"><span>{escape(name)}</span><div class="track"><i style="width:{100 * num / total:.2f}%"></i></div>'
-        f"<b>{quantity(num / total, 'fraction')}</b><small>{count(num)}</small><small>{escape(lost)}</small></div>"
+        f'<div class="row"><span>{escape(name)}</span>'
+        f'<div class="track"><i style="width:{100 * num / total:.2f}%"></i></div>'
+        f"<b>{quantity(num / total, 'fraction')}</b><small>{count(num)}</small>"
+        f"<small>{escape(lost)}</small></div>"
     )
 
 

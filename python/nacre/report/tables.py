@@ -10,7 +10,7 @@ import numpy as np
 
 from nacre.evaluation.result import Result
 from nacre.report.data import FrameEntry, ReportData
-from nacre.report.markup import heading, table, values
+from nacre.report.markup import heading, scrolled, table, values
 from nacre.report.summary import Summary, total_milliseconds
 from nacre.report.text import count, flatten, label, quantity
 from nacre.report.verdict import stretches
@@ -34,8 +34,8 @@ def attention_section(frames: Sequence[FrameEntry]) -> str:
     head = "".join(f'<th scope="col">{name}</th>' for name in ("Frames", "How many", "State", "Why"))
     return (
         heading("Frames to look at", "look")
-        + f'<div class="scroll" tabindex="0" role="group" aria-label="Frames to look at"><table><tr>{head}</tr>{rows}'
-        f"</table></div>{more}"
+        + scrolled(f"<table><tr>{head}</tr>{rows}</table>", "Frames to look at")
+        + more
     )
 
 
@@ -94,7 +94,8 @@ def parameters_section(data: ReportData) -> str:
     entries = "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in rows)
     return (
         heading("Parameters", "parameters")
-        + f'<details><summary>All {len(rows)} of them</summary><dl class="parameters">{entries}</dl></details>'
+        + f"<details><summary>All {len(rows)} of them</summary>"
+        + f'<dl class="parameters">{entries}</dl></details>'
     )
 
 
@@ -120,10 +121,16 @@ def frames_table_section(frames: Sequence[FrameEntry]) -> str:
     ]
     columns = [column for column in columns if np.isfinite(values(chosen, column[1])).any()]
     heads = "".join(f'<th class="number" scope="col">{name}</th>' for name, _, _ in columns)
+    head = (
+        f'<tr><th class="number" scope="col">Frame</th><th scope="col">State</th>{heads}'
+        '<th scope="col">Remark</th></tr>'
+    )
     rows = []
     for frame in chosen:
         status = escape(frame.status.upper())
-        cells = "".join(f'<td class="number">{quantity(value(frame), unit)}</td>' for _, value, unit in columns)
+        cells = "".join(
+            f'<td class="number">{quantity(value(frame), unit)}</td>' for _, value, unit in columns
+        )
         rows.append(
             f'<tr><td class="number">{frame.index}</td><td class="status-{status}">{status}</td>'
             f"{cells}<td>{escape(_remark(frame))}</td></tr>"
@@ -131,9 +138,8 @@ def frames_table_section(frames: Sequence[FrameEntry]) -> str:
     return (
         heading("Table of frames", "table")
         + f'<details class="screen"><summary>{title}</summary>'
-        + '<div class="scroll" tabindex="0" role="group" aria-label="Table of frames"><table>'
-        + f'<tr><th class="number" scope="col">Frame</th><th scope="col">State</th>{heads}<th scope="col">Remark</th></tr>'
-        + f"{''.join(rows)}</table></div></details>"
+        + scrolled(f"<table>{head}{''.join(rows)}</table>", "Table of frames")
+        + "</details>"
     )
 
 

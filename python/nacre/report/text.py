@@ -61,7 +61,7 @@ def count(value: int) -> str:
 
 
 def ranges(indices: Sequence[int], most: int = 4) -> str:
-    """Return frames in words: "frame 3", "frames 10 to 19, 30 and 2 more"; the longest runs where they are many."""
+    """Return frames in words: "frame 3", "frames 10 to 19, 30 and 2 more"."""
     runs: list[list[int]] = []
     for index in sorted(indices):
         if runs and index == runs[-1][1] + 1:

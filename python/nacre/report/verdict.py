@@ -18,16 +18,16 @@ from nacre.report.text import count, quantity, ranges
 _MAX_DRIFT = 0.05
 
 _NEXT_STEPS = {
-    "empty": "The depth images hold no measurement: is it the right folder or topic, and is the depth scale right? "
-    "nacre info shows what is in the recording.",
-    "unusable": "Hardly a pixel was left after cleaning: is the depth scale right, and do --min-depth, --max-depth, "
-    "--box and masks leave what is of interest?",
-    "registration": "Is the depth scale right (nacre info shows the median depth)? Does each frame overlap what was seen "
-    "before? Does an object turn before a background that stands still (--object)?",
-    "region": "Nothing was found to model: is there a thing that stands on a plane (--object), or one inside of the box?",
+    "empty": "The depth images hold no measurement: is it the right folder or topic, and the right "
+    "depth scale? nacre info shows what is in the recording.",
+    "unusable": "Hardly a pixel was left after cleaning: is the depth scale right, and do --min-depth, "
+    "--max-depth, --box and masks leave what is of interest?",
+    "registration": "Is the depth scale right (nacre info shows the median depth)? Does each frame overlap "
+    "what was seen before? Does an object turn before a background that stands still (--object)?",
+    "region": "Nothing was found to model: does a thing stand on a plane (--object), is one in the box?",
     "unreadable": "These images could not be used: are the files whole, and is it the right camera?",
-    "weak": "WEAK frames have a pose but were not folded in: what they see, a wall or a smooth cylinder, leaves "
-    "directions open. Move so that corners or texture come into view.",
+    "weak": "WEAK frames have a pose but were not folded in: what they see, a wall or a smooth cylinder, "
+    "leaves directions open. Move so that corners or texture come into view.",
 }
 
 
@@ -61,7 +61,9 @@ def judge(data: ReportData, trajectory: AbsoluteTrajectoryError | None) -> Verdi
     num_lost, num_weak, num_frames = statuses["LOST"], statuses["WEAK"], len(frames)
     num_tracked = num_frames - num_lost
     bad = [frame for frame in frames if frame.status.upper() in ("LOST", "WEAK")]
-    extra = [f"{count(num_lost)} lost"] * bool(num_lost) + [f"{count(num_weak)} with weak geometry"] * bool(num_weak)
+    extra = [f"{count(num_lost)} lost"] * bool(num_lost) + [f"{count(num_weak)} with weak geometry"] * bool(
+        num_weak
+    )
     tracked = f"{count(num_tracked)} of {count(num_frames)} frames were tracked"
     if not num_lost:
         tracked = f"All {count(num_frames)} frames were tracked" if num_frames > 1 else "There is one frame"
@@ -74,7 +76,9 @@ def judge(data: ReportData, trajectory: AbsoluteTrajectoryError | None) -> Verdi
 
     advice = _NEXT_STEPS[_cause(bad)] if bad else ""
     if not num_tracked:
-        tracked = f"None of the {count(num_frames)} frames could be registered" if num_frames > 1 else "It is lost"
+        tracked = (
+            f"None of the {count(num_frames)} frames could be registered" if num_frames > 1 else "It is lost"
+        )
         reason = Counter(plain_reason(frame.reason) for frame in bad).most_common(1)[0][0]
         told = f": {reason}" if reason else ""
         return Verdict("lost", "Failed: no frame could be used", f"{tracked}{told}", advice)
@@ -110,7 +114,12 @@ def stretches(frames: Sequence[FrameEntry]) -> list[Stretch]:
     for i, frame in enumerate(frames):
         if frame.status.upper() not in ("LOST", "WEAK"):
             continue
-        if i and groups and groups[-1][-1] is frames[i - 1] and groups[-1][-1].status.upper() == frame.status.upper():
+        if (
+            i
+            and groups
+            and groups[-1][-1] is frames[i - 1]
+            and groups[-1][-1].status.upper() == frame.status.upper()
+        ):
             groups[-1].append(frame)
         else:
             groups.append([frame])
