@@ -26,16 +26,15 @@ def encode_small_png(image: Bytes, max_bytes: int = 1 << 62) -> bytes:
     bytes
     """
     pixels = np.asarray(image)
-    num_colors = 256
     while True:
-        palette, indices = quantize(pixels, num_colors)
+        palette, indices = quantize(pixels)
         data = encode_indexed_png(indices, palette)
+        if len(data) > max_bytes and len(palette) > 128:
+            palette, rows = _reduced(palette.astype(np.float64), np.bincount(indices.ravel()), 128)
+            data = encode_indexed_png(rows[indices], palette)
         if len(data) <= max_bytes or min(pixels.shape[:2]) < 16:
             return data
-        if num_colors > 128:
-            num_colors = 128
-        else:
-            pixels = _halved(pixels)
+        pixels = _halved(pixels)
 
 
 def quantize(image: Bytes, num_colors: int = 256) -> tuple[Bytes, Bytes]:
@@ -54,25 +53,28 @@ def quantize(image: Bytes, num_colors: int = 256) -> tuple[Bytes, Bytes]:
     if channels == 4:
         wide[wide[:, 3] == 0] = 0  # what is not seen has no colour
     packed = wide.view(np.uint32).ravel()
-    found, inverse, counts = np.unique(packed, return_inverse=True, return_counts=True)
-    if len(found) > num_colors:
-        coarse = (wide & np.uint8(0xFC)).view(np.uint32).ravel()
-        found, inverse, counts = np.unique(coarse, return_inverse=True, return_counts=True)
-    colors = np.ascontiguousarray(found).view(np.uint8).reshape(-1, 4)[:, :channels].astype(np.float64)
-    if len(found) > num_colors:
-        sums = [np.bincount(inverse, weights=wide[:, c], minlength=len(found)) for c in range(channels)]
-        colors = np.stack(sums, axis=1) / counts[:, None]
+    if len(np.unique(packed[::7])) > num_colors:  # surely too many: count similar ones together
+        packed = packed & np.uint32(0xFCFCFCFC)
+    _, inverse, counts = np.unique(packed, return_inverse=True, return_counts=True)
+    sums = [np.bincount(inverse, weights=wide[:, c]) for c in range(channels)]
+    palette, rows = _reduced(np.stack(sums, axis=1) / counts[:, None], counts, num_colors)
+    return palette, rows[inverse].reshape(height, width)
+
+
+def _reduced(
+    colors: npt.NDArray[np.float64], counts: npt.NDArray[np.int64], num_colors: int
+) -> tuple[Bytes, Bytes]:
+    """Return a palette for colours that occur so often, and the row that each of them gets."""
+    member = np.arange(len(colors))
+    if len(colors) > num_colors:
         member = _median_cut(colors, counts.astype(np.float64), num_colors)
-    else:
-        member = np.arange(len(found))
     weight = np.bincount(member, weights=counts)
-    sums = [np.bincount(member, weights=counts * colors[:, c]) for c in range(channels)]
+    sums = [np.bincount(member, weights=counts * channel) for channel in colors.T]
     palette = np.stack(sums, axis=1) / weight[:, None]
-    order = np.argsort(palette @ np.array([0.3, 0.6, 0.1, 1.0])[:channels], kind="stable")
-    rank = np.empty_like(order)
+    order = np.argsort(palette @ np.array([0.3, 0.6, 0.1, 1.0])[: colors.shape[1]], kind="stable")
+    rank = np.empty(len(order), dtype=np.uint8)
     rank[order] = np.arange(len(order))
-    indices = rank[member][inverse].astype(np.uint8).reshape(height, width)
-    return palette[order].round().astype(np.uint8), indices
+    return palette[order].round().astype(np.uint8), rank[member]
 
 
 def _median_cut(
