@@ -1,11 +1,13 @@
 """The documentation's configuration: ``sphinx-build -W -c docs . build/docs`` (see ``docs/build``)."""
 
 import os
+import sys
 from pathlib import Path
 
 import nacre
 
 ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT / "docs" / "extensions"))
 
 project = "nacre"
 author = "The nacre authors"
@@ -23,8 +25,9 @@ include_patterns = [
     "third_party/README.md",
 ]
 exclude_patterns = ["build", ".venv", "**/results/**"]
-extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "breathe"]
-myst_enable_extensions = ["dollarmath", "deflist"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "breathe", "mathml", "parameters"]
+html_math_renderer = "mathml"
+myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3
 
 autodoc_default_options = {"members": True, "show-inheritance": False}

@@ -26,6 +26,7 @@ struct RayTable;
 /// An immutable camera; copies are cheap and share the ray table. Pixel centres are integers.
 class Camera {
  public:
+  /// How rays run: through one point, or in parallel.
   enum class Model { pinhole, orthographic };
   /// Brown-Conrady coefficients k1 k2 p1 p2 k3 (OpenCV's order).
   using Distortion = std::array<double, 5>;

@@ -8,6 +8,7 @@
 
 namespace nacre {
 
+/// The form of WLOP.
 enum class ConsolidationMethod {
   wlop,       ///< Huang et al. 2009, density weights for both sets: the paper's form
   wlop_plus,  ///< repaired for incremental use: tangential, bounded repulsion that fades where there are no neighbours
@@ -21,6 +22,7 @@ enum class Theta {
   printed  ///< exp(-4 r^2 / h), as printed in the 2010 paper; cut at h
 };
 
+/// How consolidate and project_samples work.
 struct ConsolidateOptions {
   ConsolidationMethod method = ConsolidationMethod::wlop;
   double radius = 0.008;  ///< support radius h [m], of which the samples' spacing should be at most half
@@ -34,6 +36,7 @@ struct ConsolidateOptions {
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };
 
+/// A consolidated point set.
 template <class PointMatrix>
 struct BasicConsolidated {
   PointMatrix points;
@@ -41,7 +44,9 @@ struct BasicConsolidated {
   std::vector<std::int64_t> sources;  ///< the input point that each point started from
 };
 
+/// Of float coordinates.
 using Consolidated = BasicConsolidated<Points>;
+/// Of double coordinates.
 using ConsolidatedDouble = BasicConsolidated<PointsDouble>;
 
 /// num_points of the input, chosen at random, moved as project_samples does; in the order of their sources. Input rows

@@ -42,6 +42,7 @@ struct PointModel {
   void keep(const std::vector<std::uint8_t>& flags);
 };
 
+/// How fuse works.
 struct FusionOptions {
   double support = 0.0;  ///< observations farther from a model point do not move it [m]; 0: from noise and pixels
   double max_angle = 1.0471976;  ///< nor do those whose normal differs more [rad]; 60 degrees
@@ -55,6 +56,7 @@ struct FusionOptions {
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };
 
+/// How many points of the model a frame changed.
 struct FusionReport {
   std::int64_t num_updated = 0;
   std::int64_t num_inserted = 0;

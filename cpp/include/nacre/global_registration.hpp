@@ -8,6 +8,7 @@
 
 namespace nacre {
 
+/// How align_global works.
 struct GlobalAlignOptions {
   int num_rotations = 288;       ///< spread over all rotations, from which the search starts
   int num_candidates = 16;       ///< of them are refined
@@ -38,14 +39,17 @@ struct GlobalCloud {
                        const std::optional<Eigen::Vector3d>& viewpoint = std::nullopt);
 };
 
+/// What a search came to.
 enum class GlobalAlignStatus {
   found,           ///< one motion, and no other, explains both clouds
   ambiguous,       ///< several different motions explain them about as well
   not_found,       ///< no motion does; the result is the best there is
   too_few_points,  ///< nothing to search with: the motion is the identity
 };
+/// found, ambiguous, not_found, too_few_points.
 const char* to_string(GlobalAlignStatus status);
 
+/// The outcome of align_global.
 struct GlobalAlignResult {
   GlobalAlignStatus status = GlobalAlignStatus::too_few_points;
   AlignResult alignment;     ///< of the last registration

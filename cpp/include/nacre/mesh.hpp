@@ -8,12 +8,14 @@
 
 namespace nacre {
 
+/// Three vertices a row.
 using Triangles = Eigen::Matrix<std::int32_t, Eigen::Dynamic, 3, Eigen::RowMajor>;
 using TrianglesRef = Eigen::Ref<const Triangles>;
 
 using PointsDouble = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 using PointsDoubleRef = Eigen::Ref<const PointsDouble>;
 
+/// A triangle mesh.
 struct Mesh {
   Points vertices;      ///< [m]
   Triangles triangles;  ///< vertex indices, counter-clockwise seen from outside
@@ -34,6 +36,7 @@ class MeshTree {
   MeshTree(MeshTree&&) noexcept;
   MeshTree& operator=(MeshTree&&) noexcept;
 
+  /// What a ray hit.
   struct Hit {
     double distance = -1.0;  ///< in units of |direction|; negative: nothing was hit
     std::int32_t triangle = -1;
@@ -42,6 +45,7 @@ class MeshTree {
   /// no ray slips between triangles that share vertices. A ray that is not finite, or has no direction, hits nothing.
   Hit cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) const;
 
+  /// What rays hit, one a row.
   struct Hits {
     Eigen::VectorXd distances;                                 ///< NaN: nothing was hit
     Eigen::Matrix<std::int32_t, Eigen::Dynamic, 1> triangles;  ///< -1: nothing was hit
@@ -49,6 +53,7 @@ class MeshTree {
   /// One ray a row.
   Hits cast(const PointsDoubleRef& origins, const PointsDoubleRef& directions, int num_threads = 0) const;
 
+  /// The nearest point of the surface.
   struct Closest {
     Eigen::Vector3d point = Eigen::Vector3d::Zero();
     std::int32_t triangle = -1;
@@ -57,6 +62,7 @@ class MeshTree {
   /// The point of the surface nearest to a point; NaN and triangle -1 for one that is not finite.
   Closest closest(const Eigen::Vector3d& point) const;
 
+  /// The nearest points of the surface, one a row.
   struct ClosestPoints {
     PointsDouble points;
     PointsDouble normals;  ///< of the triangles

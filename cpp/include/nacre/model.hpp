@@ -18,6 +18,7 @@
 
 namespace nacre {
 
+/// What became of a frame.
 enum class FrameStatus {
   tracked,      ///< registered and folded in
   weak,         ///< registered, but the data leaves a direction of the pose open: not folded in
@@ -33,6 +34,7 @@ enum class FoldIn {
   wlop_plus  ///< WLOP repaired for incremental use
 };
 
+/// All options of a model.
 struct ModelOptions {
   DepthOptions depth;
   RegionOptions region;

@@ -8,6 +8,7 @@
 
 namespace nacre {
 
+/// How estimate_normals works.
 struct NormalOptions {
   int k = 16;                                                   ///< neighbours, the point itself included; at least 3
   double max_radius = std::numeric_limits<double>::infinity();  ///< farther neighbours are not used [m]

@@ -39,6 +39,7 @@ struct SupportPlane {
   double offset = 0.0;  ///< [m]
 };
 
+/// What was left out of a frame.
 struct RegionReport {
   std::int64_t num_inside = 0;       ///< pixels with a point
   std::int64_t num_outside = 0;      ///< likewise

@@ -16,6 +16,7 @@ enum class Metric {
   symmetric        ///< ((p - q) . (n_p + n_q))^2, Rusinkiewicz 2019
 };
 
+/// How align works.
 struct AlignOptions {
   Metric method = Metric::symmetric;
   int max_iterations = 40;
@@ -50,13 +51,16 @@ struct AlignCloud {
                       const ValuesRef& brightness = Values());
 };
 
+/// How a registration ended.
 enum class AlignStatus {
   converged,       ///< the last steps were below the accuracy of the data
   max_iterations,  ///< still moving
   too_few_pairs,   ///< nothing, or too little, matched: the transform is the initial one
 };
+/// converged, max_iterations, too_few_pairs.
 const char* to_string(AlignStatus status);
 
+/// The outcome of align.
 struct AlignResult {
   Pose target_from_source = Pose::Identity();
   AlignStatus status = AlignStatus::too_few_pairs;

@@ -10,6 +10,7 @@
 
 namespace nacre {
 
+/// What a simulated camera does to depth.
 struct SimulationOptions {
   NoiseModel noise;          ///< Gaussian, along the depth value; all zero: none
   double edge_mixing = 0.0;  ///< pixels within this distance of a depth edge see both sides of it [pixels]; 0: none

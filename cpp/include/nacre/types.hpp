@@ -14,6 +14,7 @@ namespace nacre {
 
 /// N x 3 float coordinates [m], one point a row, contiguous: the layout of a NumPy array.
 using Points = Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor>;
+/// Such an array of the caller's, not copied.
 using PointsRef = Eigen::Ref<const Points>;
 
 /// The same in double precision, for coordinates far from the origin.
@@ -44,7 +45,9 @@ using MaskRef = Eigen::Ref<const MaskImage>;
 /// Unaligned, so that a client built with other vector flags shares its layout.
 using Pose = Eigen::Transform<double, 3, Eigen::Isometry, Eigen::DontAlign>;
 
+/// Of twists: rotation [rad] first, then translation [m].
 using Matrix6 = Eigen::Matrix<double, 6, 6, Eigen::DontAlign>;
+/// A twist: rotation [rad] first, then translation [m].
 using Vector6 = Eigen::Matrix<double, 6, 1, Eigen::DontAlign>;
 
 }  // namespace nacre

@@ -45,6 +45,15 @@ def read_camera(path: str | os.PathLike[str]) -> CameraFile:
 
     Open3D stores ``intrinsic_matrix`` column by column.
 
+    Parameters
+    ----------
+    path : path-like
+        The file to read.
+
+    Returns
+    -------
+    CameraFile
+
     Raises
     ------
     FileFormatError

@@ -196,6 +196,15 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
 
     Lines that start with ``#`` are comments. Matrices are camera to world; their rotations are made exact.
 
+    Parameters
+    ----------
+    path : path-like
+        The file to read.
+
+    Returns
+    -------
+    Trajectory
+
     Raises
     ------
     FileFormatError

@@ -1,0 +1,112 @@
+"""The constants that the pages on algorithms name are those of the code."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = ROOT / "docs" / "algorithms"
+SOURCES = ROOT / "cpp" / "src"
+
+# page, what it says; file, what it says there.
+CONSTANTS = [
+    ("depth", r"3\, d\, s_w", "depth_edges.cpp", "kCreaseSlope = 3.0F"),
+    ("depth", r"(0.8\, k \sqrt 6\, g)^2", "depth_edges.cpp", "kLateralSigma = 0.8F"),
+    ("depth", r"(3 \sqrt 2\, \sigma_w)^2", "depth_edges.cpp", "kStepSigmas = 3.0F"),
+    ("depth", r"$1.5\,\sigma_w^2$", "simd/spare_row.cpp", "largest_misfit = 1.5F"),
+    ("depth", "3 x 5 next to it", "simd/spare_row.hpp", "side_depth = 3, side_reach = 2"),
+    ("noise", "0.1192", "depth_noise.cpp", "kSmoothLeft = 0.1192"),
+    ("noise", "0.0145", "depth_noise.cpp", "kSmoothBent = 0.0145"),
+    ("noise", "at most 0.85 of it", "depth_noise.cpp", "kMostShared = 0.85"),
+    ("noise", "The 0.4-quantile", "depth_noise.cpp", "quantile(fits.residual, 0.4)"),
+    ("noise", "more than a tenth of the windows", "depth_noise.cpp", "kMinStepped = 0.1"),
+    ("noise", "18 bins", "../include/nacre/depth.hpp", "num_bins = 18"),
+    ("noise", "at least a hundredth", "noise_calibration.cpp", "kMostFrames = 100.0"),
+    ("noise", "prior by a hundredth", "noise_calibration.cpp", "kPriorWeight = 0.01"),
+    ("noise", r"0.0015\,\mathrm m^{-2}", "frame_samples.cpp", "growth = 0.0015F"),
+    ("normals", r"4\sqrt 2\,\sigma_w + 5.67\,\delta\,s_w", "organized_normals.cpp", "kGateSlope = 5.67F"),
+    ("normals", r"0.07\, s_w", "organized_normals.cpp", "kSlopeSigma = 0.07F"),
+    ("normals", "less than 0.4 of the window", "organized_normals.cpp", "kMinFilled = 0.4F"),
+    ("normals", "below 0.005", "simd/plane_fit.cpp", "line_share = 0.005"),
+    ("normals", r"$\lambda > 0.22$", "simd/plane_fit.cpp", "space_share = 0.22"),
+    ("registration", "a quarter of the target's diameter", "registration.cpp", "0.25 * target.diameter()"),
+    ("registration", "2.5 times the target's spacing", "registration.cpp", "2.5 * target.spacing()"),
+    ("registration", r"at least $4 s$", "registration.cpp", "4.0 * residual_scale"),
+    ("registration", r"6 \cdot 0.04\, s^2", "registration.cpp", "6.0 * 0.04 * scale * scale"),
+    ("registration", "at most 30 000", "tracking.cpp", "max_target_points = 30000"),
+    ("registration", "1.5 times the distance", "tracking.cpp", "1.5 * view.thinning * apart"),
+    ("registration", "2.75 times that", "tracking.cpp", "2.75 * apart"),
+    ("registration", "a correlation of 0.6", "color_registration.cpp", "least_correlation = 0.6"),
+    ("global", r"0.003\, D", "global_search.cpp", "least_tolerance = 0.003"),
+    ("global", r"from $0.25 D$ to $0.04 D$", "global_search.cpp", "first_gate = 0.25, coarse_gate = 0.04"),
+    ("global", r"$0.06 D$", "global_search.cpp", "refined_gate = 0.06"),
+    ("global", "by 0.26 rad", "global_search.cpp", "same_turn = 0.26"),
+    ("global", "0.7\n   radii", "global_search.cpp", "body_depth = 0.7"),
+    ("global", "24 neighbours", "denoised_cloud.cpp", "num_neighbors = 24"),
+    ("global", r"A - 3 F - \tfrac12 H", "global_search.hpp", "agree - 3.0 * free - 0.5 * hidden"),
+    ("tracking", r"O^2\, C^4", "verdict.cpp", "overlap * overlap * std::pow(result.consistency, 4)"),
+    ("tracking", "0.58", "verdict.cpp", "chance = 0.58"),
+    ("tracking", "1.2 times as much", "verdict.cpp", "strictness = 1.2"),
+    ("tracking", "twice `min_evidence`", "verdict.cpp", "beyond_doubt = 2.0"),
+    ("tracking", "more than 0.35 rad from its guess", "tracking.cpp", "far_turn = 0.35"),
+    ("tracking", "more than 0.7\nrad", "model.cpp", "largest_turn = 0.7"),
+    ("tracking", "at every eighth", "model.cpp", "patience = 8"),
+    ("tracking", r"$\mathcal R - 0.3$", "place_hypothesis.cpp", "chance = 0.3;"),
+    ("tracking", "0.45 from at least two views", "place_hypothesis.cpp", "enough = 0.45"),
+    ("tracking", r"\mathcal R \ge 1.3", "place_hypothesis.cpp", "enough_alone = 1.3"),
+    ("fusion", r"$6\sigma$ within 3 to 4", "surface_observer.cpp", "6.0F * sigma, 3.0F * footprint, 4.0F"),
+    ("fusion", r"\max(3 \cos\theta, 1)", "fusion.cpp", "insertion_pixels = 3.0F, insertion_weight = 1.0F"),
+    ("fusion", "1.5\\ \\mathrm{pixels", "point_spacing.hpp", "least_pixels = 1.5"),
+    ("fusion", "multiplied by 1.25", "model.cpp", "coarsening = 1.25"),
+    ("consolidation", "(0.02 h)^2", "consolidation.cpp", "4e-4 * reach * reach"),
+    ("consolidation", "at least $0.1/h$", "consolidation.cpp", "0.1 / reach"),
+    ("consolidation", "at most $h/4$", "consolidation.cpp", "0.25 * reach"),
+    ("consolidation", "cells of $h/4$", "consolidation.cpp", "cells_a_radius = 4.0"),
+    ("loops", "0.2 rad, or of 0.15", "key_frames.cpp", "turn = 0.2, part_of_depth = 0.15"),
+    ("loops", "the last twelve stops", "loop_closure.cpp", "stops_in_place = 12"),
+    ("loops", "an overlap\n   of 0.3", "loop_closure.cpp", "least_overlap = 0.3"),
+    ("loops", "at most 0.35 of the largest", "loop_closure.cpp", "largest_ratio = 0.35"),
+    ("loops", "at most 500", "loop_closure.cpp", "most_key_frames = 500"),
+    ("loops", "25 times the\ncovariance", "loop_closure.cpp", "optimism = 25.0"),
+    ("loops", "0.005 rad", "loop_closure.cpp", "drift = 0.005"),
+    ("loops", "more than four standard deviations", "loop_closure.cpp", "most_stretch = 4.0"),
+    ("loops", "more than about 0.12 of the depth", "loop_closure.cpp", "reach = 0.12"),
+    ("objects", "160 hypotheses", "support_planes.cpp", "num_hypotheses = 160"),
+    ("objects", "at most 20 000", "coarse_frame.hpp", "most_cells = 20000"),
+    ("objects", "within 0.008 of its distance", "support_planes.hpp", "bend = 0.008F"),
+    ("objects", "(0.3 of its size)", "support_planes.cpp", "small_part = 0.3"),
+    ("objects", "72 angles", "plane_search.cpp", "num_angles = 72"),
+    ("objects", "0.75 of those", "plane_search.cpp", "least_consistency = 0.75"),
+    ("objects", "At least 25 pairs", "outline_registration.cpp", "fewest = 25"),
+    ("objects", "0.6 of both outlines", "outline_registration.cpp", "least_agreement = 0.6"),
+    ("meshing", "$2.5 s$", "../../python/nacre/meshing.py", "_BAND = 2.5"),
+    ("meshing", "$1.5 s$", "../../python/nacre/meshing.py", "_REACH = 1.5"),
+    ("simulation", "over 8 x 8 rays", "simulation.cpp", "rays_per_radius = 4"),
+    ("neighbours", "blocks of 16", "simd/block_layout.hpp", "block_points = 16"),
+]
+
+
+def flat(text: str) -> str:
+    """Return a text with every run of white space as one blank."""
+    return re.sub(r"\s+", " ", text)
+
+
+@pytest.mark.parametrize(("page", "said", "file", "coded"), CONSTANTS)
+def test_what_a_page_says_is_coded(page: str, said: str, file: str, coded: str) -> None:
+    assert flat(said) in flat((PAGES / f"{page}.md").read_text(encoding="utf-8")), f"{page}.md has changed"
+    source = (SOURCES / file).read_text(encoding="utf-8")
+    assert flat(coded) in flat(source), f"{file} has changed: does {page}.md still tell the truth?"
+
+
+@pytest.mark.parametrize("page", sorted(PAGES.glob("*.md")), ids=lambda page: page.stem)
+def test_a_page_has_what_a_reader_expects(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    assert "../images/" in text or page.stem == "index"
+    if page.stem not in ("index", "paper"):
+        for heading in ("## Parameters", "## Limits"):
+            assert heading in text
+        assert "`cpp/src/" in text  # where it is coded
+        assert "$" in text or page.stem == "neighbours"
