@@ -127,7 +127,8 @@ def core(cloud: Snapshot) -> npt.NDArray[np.float32]:
     """Return the best known quarter of a model's points: of a room, what was looked at, not its far walls."""
     if cloud.confidence is None or len(cloud.points) < 4:
         return cloud.points
-    return cloud.points[cloud.confidence >= np.percentile(cloud.confidence, 75)]
+    known: npt.NDArray[np.float32] = cloud.points[cloud.confidence >= np.percentile(cloud.confidence, 75)]
+    return known
 
 
 def _chain(positions: Array) -> Array:
