@@ -16,7 +16,7 @@ from nacre.depth import (
     preprocess_depth,
 )
 from nacre.depth_calibration import DepthCalibration, calibrate_depth
-from nacre.errors import FileFormatError
+from nacre.errors import CameraError, FileFormatError
 from nacre.global_registration import GlobalAlignResult, GlobalRegistrationParameters, align_global
 from nacre.io.cameras import CameraFile, read_camera, write_camera
 from nacre.io.cloud import Cloud
@@ -40,6 +40,7 @@ __all__ = [
     "PIXEL_LABELS",
     "AlignResult",
     "Camera",
+    "CameraError",
     "CameraFile",
     "ClosestPoints",
     "Cloud",

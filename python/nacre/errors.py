@@ -40,3 +40,7 @@ class FileFormatError(ValueError):
         place = f", line {self.line}" if self.line is not None else ""
         place += f", byte {self.offset}" if self.offset is not None else ""
         return f"{self.path}{place}: {self.reason}"
+
+
+class CameraError(RuntimeError):
+    """A camera that is not there, or that gives no more frames; the message says what to do."""

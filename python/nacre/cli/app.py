@@ -22,7 +22,7 @@ from nacre.cli.reconstruct import reconstruct
 from nacre.cli.simulate import simulate
 from nacre.cli.terminal import CommandError, set_verbosity
 from nacre.cli.view import view
-from nacre.errors import FileFormatError
+from nacre.errors import CameraError, FileFormatError
 
 app = typer.Typer(
     name="nacre",
@@ -103,7 +103,7 @@ def explain(error: Exception) -> tuple[str, int]:
         return message.rstrip(".") + hint, 2
     if isinstance(error, CommandError):
         return str(error), error.code
-    if isinstance(error, FileFormatError):
+    if isinstance(error, (CameraError, FileFormatError)):
         return str(error), 1
     if isinstance(error, OSError):
         name = f": {os.fspath(error.filename)}" if error.filename is not None else ""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -47,13 +47,14 @@ def interruptible() -> Iterator[Interruption]:
 def run_frames(
     terminal: Terminal,
     done: Reconstruction,
-    indices: Sequence[int],
+    indices: Iterable[int],
     until: Callable[[FrameRecord], bool] | None = None,
     watch: Callable[[FrameRecord], None] | None = None,
 ) -> bool:
     """Run frames, show each to who watches, at most until one says so; return whether Ctrl-C stopped it."""
     accepted = any(frame.report is not None for frame in done.frames)
-    with interruptible() as interruption, terminal.progress("frames", len(indices)) as advance:
+    total = len(indices) if isinstance(indices, Sized) else None
+    with interruptible() as interruption, terminal.progress("frames", total) as advance:
         for frame in done.run(indices):
             if frame.refused and not accepted:
                 raise CommandError(f"frame {frame.index}: {advice(frame.reason)}")

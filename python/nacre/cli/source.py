@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 FormatOption = Annotated[
     str | None,
     typer.Option(
-        help="tum, redwood, 7-scenes, icl-nuim, plain, stanford or images.", show_default="recognised"
+        help="tum, redwood, 7-scenes, icl-nuim, rosbag, record3d, stray-scanner, azure-kinect, plain, "
+        "stanford or images.",
+        show_default="recognised",
     ),
 ]
 CameraOption = Annotated[

@@ -69,8 +69,8 @@ class Terminal:
             print(table(rows))
 
     @contextmanager
-    def progress(self, description: str, total: int) -> Iterator[Callable[[str], None]]:
-        """Show a bar on stderr, where that is a terminal; yields what advances it."""
+    def progress(self, description: str, total: int | None) -> Iterator[Callable[[str], None]]:
+        """Show a bar on stderr, where that is a terminal; yields what advances it. None: nobody knows."""
         if self.quiet or not sys.stderr.isatty():
             yield lambda note: None
             return

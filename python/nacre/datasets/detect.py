@@ -10,9 +10,11 @@ from typing import NamedTuple
 
 from nacre._core import Camera
 from nacre.datasets import (
+    azure_kinect,
     icl_nuim,
     images,
     plain,
+    record3d,
     redwood,
     rosbag,
     seven_scenes,
@@ -39,8 +41,13 @@ class Reader(NamedTuple):
 # The first that recognises a folder opens it.
 READERS = {
     module.FORMAT: Reader(module.LAYOUT, module.recognise, module.read)
-    for module in (rosbag, icl_nuim, tum, stray_scanner, plain, seven_scenes, stanford, redwood, images)
-}
+    for module in (
+        rosbag, record3d, azure_kinect, icl_nuim, tum, stray_scanner, plain, seven_scenes, stanford, redwood,
+        images,
+    )
+}  # fmt: skip
+# Recordings that are one file; .ply may be a range scan or a point file.
+FILE_SUFFIXES = (*rosbag.SUFFIXES, *record3d.SUFFIXES, *azure_kinect.SUFFIXES)
 
 
 def open_sequence(
@@ -57,11 +64,12 @@ def open_sequence(
     Parameters
     ----------
     path : path-like
-        The folder of the recording, a ``.bag`` file, or a single range scan.
+        The folder of the recording, a file (``.bag``, ``.mcap``, ``.db3``, ``.r3d``), or a single range scan.
     format : str, optional
         ``"tum"``, ``"redwood"`` (also Open3D), ``"7-scenes"``, ``"icl-nuim"``, ``"stray-scanner"``,
-        ``"rosbag"`` (ROS 1 and 2, RealSense), ``"plain"`` (camera.json and depth/), ``"stanford"`` (range
-        scans), or ``"images"`` (a folder of depth images). None recognises it.
+        ``"rosbag"`` (ROS 1 and 2, MCAP, RealSense), ``"record3d"``, ``"azure-kinect"`` (images of an
+        ``.mkv``), ``"plain"`` (camera.json and depth/), ``"stanford"`` (range scans), or ``"images"`` (a
+        folder of depth images). None recognises it.
     camera : Camera or path-like, optional
         The depth camera, or a camera file, in place of what the recording or its format says.
     depth_scale : float, optional
@@ -116,11 +124,13 @@ def _named(format: str) -> Reader:
 
 def _recognised(path: Path, given: Given) -> Reader:
     if not path.is_dir():
-        for module in (stanford, rosbag):
+        for module in (stanford, rosbag, record3d, azure_kinect):
             if module.recognise(path):
                 return READERS[module.FORMAT]
         raise FileFormatError(
-            path, "not a recording: a recording is a folder, a .bag, or a range scan (.ply with a range_grid)"
+            path,
+            "not a recording: a recording is a folder, a .bag, .mcap, .db3 or .r3d, or a range scan (.ply "
+            "with a range_grid)",
         )
     for name, reader in READERS.items():
         if reader.recognise(path) and not (name == images.FORMAT and _needs_more(path, given)):
@@ -156,6 +166,13 @@ def _hint(folder: Path) -> str | None:
             "This is almost a TUM recording: depth.txt is missing, the list with a line 'timestamp file' for "
             "each depth image. (A plain recording needs camera.json instead.)"
         )
+    bags = files(folder, rosbag.SUFFIXES)
+    if bags:
+        return f"A ROS 2 recording has metadata.yaml, which is missing; give a file alone: {bags[0].name}."
+    for module in (record3d, azure_kinect, stray_scanner):
+        lacking: str | None = module.missing(folder)
+        if lacking is not None:
+            return lacking
     inside = [p for p in sorted(folder.iterdir()) if p.is_dir() and not p.name.startswith(".")]
     names = [p.name for p in inside if any(r.recognise(p) for n, r in READERS.items() if n != images.FORMAT)]
     if names:

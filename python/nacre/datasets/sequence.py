@@ -27,6 +27,12 @@ _log = logging.getLogger(__name__)
 
 DepthLoader = Callable[[Path], npt.NDArray[np.float32]]
 ColorLoader = Callable[[Path], npt.NDArray[np.uint8]]
+MaskLoader = Callable[[Path], npt.NDArray[np.bool_]]
+
+
+def load_mask(path: Path) -> npt.NDArray[np.bool_]:
+    """Read an image as a mask: pixels that are not black are of interest."""
+    return np.asarray(read_color(path).any(axis=2), np.bool_)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +129,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         estimate: Trajectory | None = None,
         load_depth: DepthLoader | None = None,
         load_color: ColorLoader = read_color,
+        load_mask: MaskLoader = load_mask,
         name: str | None = None,
     ) -> None:
         self.path = path
@@ -132,9 +139,10 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         self.depth_scale = depth_scale
         self.truth = truth
         self.estimate = estimate
-        self._sources = tuple(sources)
+        self._sources: collections.abc.Sequence[FrameSource] = tuple(sources)
         self._load_depth = load_depth or partial(load_depth_metres, depth_scale=depth_scale)
         self._load_color = load_color
+        self._load_mask = load_mask
 
     def __len__(self) -> int:
         return len(self._sources)
@@ -177,6 +185,10 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         """Return the depth file of a view."""
         return self._sources[index].depth
 
+    def timestamp(self, index: int) -> float | None:
+        """Return when a view was taken [s]; None where that is not known."""
+        return self._sources[index].timestamp
+
     def without_color(self) -> Sequence:
         """Return the same recording with ``color`` None in every view."""
         return self._with_sources([dataclasses.replace(source, color=None) for source in self._sources])
@@ -197,7 +209,8 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         if not any(masks):
             raise FileFormatError(Path(folder), "no image here is named as a depth image of the recording is")
         return self._with_sources(
-            [dataclasses.replace(s, mask=mask) for s, mask in zip(self._sources, masks, strict=True)]
+            [dataclasses.replace(s, mask=mask) for s, mask in zip(self._sources, masks, strict=True)],
+            load_mask=load_mask,
         )
 
     def with_attribute(self, name: str, folder: str | os.PathLike[str]) -> Sequence:
@@ -233,7 +246,10 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         return self._with_sources(self._sources, load)
 
     def _with_sources(
-        self, sources: collections.abc.Sequence[FrameSource], load_depth: DepthLoader | None = None
+        self,
+        sources: collections.abc.Sequence[FrameSource],
+        load_depth: DepthLoader | None = None,
+        load_mask: MaskLoader | None = None,
     ) -> Sequence:
         return Sequence(
             self.path,
@@ -245,6 +261,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
             estimate=self.estimate,
             load_depth=load_depth or self._load_depth,
             load_color=self._load_color,
+            load_mask=load_mask or self._load_mask,
             name=self.name,
         )
 
@@ -257,7 +274,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
             check_size(source.color, color, self.camera)
         mask = None
         if source.mask is not None:
-            mask = _named(read_color, source.mask).any(axis=2)
+            mask = _named(self._load_mask, source.mask)
             check_size(source.mask, mask, self.camera)
         attributes = {name: _named(read_attribute, path) for name, path in source.attributes.items()}
         for name, path in source.attributes.items():
