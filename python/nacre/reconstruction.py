@@ -18,7 +18,7 @@ import numpy.typing as npt
 
 from nacre._core import __version__
 from nacre.datasets.sequence import SequenceFrame
-from nacre.depth import preprocess_depth
+from nacre.depth import PIXEL_LABELS, label_pixels
 from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result, plain
@@ -28,7 +28,7 @@ from nacre.progress import as_progress
 from nacre.values import Value
 
 if TYPE_CHECKING:
-    from nacre.report import FrameEntry, ReportData
+    from nacre.report import DepthExample, FrameEntry, ReportData
 
 _log = logging.getLogger(__name__)
 
@@ -108,7 +108,7 @@ class Reconstruction:
         self.frames: list[FrameRecord] = []
         self.evaluation: dict[str, Result] = {}
         self.cancelled = False
-        self._example: tuple[int, npt.NDArray[np.float32]] | None = None
+        self._kept: dict[str, SequenceFrame] = {}  # the first frame of each status
 
     def __repr__(self) -> str:
         ended = ", cancelled" * self.cancelled
@@ -202,8 +202,7 @@ class Reconstruction:
         self._tell(index, report)
         if report.corrects_earlier:
             self._take_corrected_poses()
-        if self._example is None and report.tracked:
-            self._example = index, frame.depth
+        self._kept.setdefault(report.status, frame)
         return FrameRecord(index, frame.timestamp, report.status, report.reason, report, frame.truth)
 
     def _tell(self, index: int, report: FrameReport) -> None:
@@ -321,9 +320,16 @@ class Reconstruction:
         )
         return figures
 
-    def report_data(self, title: str, source: str, figures: Mapping[str, Any] | None = None) -> ReportData:
+    def report_data(
+        self,
+        title: str,
+        source: str,
+        figures: Mapping[str, Any] | None = None,
+        *,
+        interrupted: bool = False,
+    ) -> ReportData:
         """
-        Return what :func:`nacre.report.write_report` shows.
+        Return what :func:`nacre.report.write_report` shows; it reads some frames again.
 
         Parameters
         ----------
@@ -331,6 +337,8 @@ class Reconstruction:
             Of the page, and in words where the frames come from.
         figures : mapping, optional
             More numbers for the page, by name.
+        interrupted : bool
+            Whether the run ended before the recording did.
 
         Returns
         -------
@@ -352,10 +360,11 @@ class Reconstruction:
                 _entry(frame, *errors[i], self._loop_frame(frame)) for i, frame in enumerate(self.frames)
             ],
             model=model,
-            depth=self._depth_example(),
+            depth=self._depth_examples(),
             evaluation={label(name): result for name, result in self.evaluation.items()},
             figures=figures or {},
             parameters=self.parameters,
+            interrupted=interrupted,
         )
 
     def _loop_frame(self, frame: FrameRecord) -> int | None:
@@ -365,19 +374,29 @@ class Reconstruction:
         given = (other.index for other in self.frames if other.report is not None)
         return next(itertools.islice(given, frame.report.loop_frame, None))
 
-    def _depth_example(self) -> Any:
+    def _depth_examples(self) -> list[DepthExample]:
+        """Return the depth image of the first frame that was tracked and of the first one that was not."""
         from nacre.report import DepthExample
 
-        if self._example is None:
-            return None
-        index, before = self._example
-        options = self.model.parameters.depth
-        after = preprocess_depth(
-            before,
-            self.model.camera,
-            **{field.name: getattr(options, field.name) for field in dataclasses.fields(options)},
-        )
-        return DepthExample(before, after, index=index)
+        examples = []
+        for status in ("TRACKED", "LOST", "WEAK"):
+            frame = next((frame for frame in self.frames if frame.status == status), None)
+            if frame is None or frame.report is None:
+                continue
+            given = self._kept.get(frame.status)
+            if given is None or given.index != frame.index:
+                try:
+                    given = self.sequence[frame.index]
+                except (FileFormatError, OSError, LookupError):
+                    continue
+            labels = label_pixels(
+                given.depth, self.model.camera, self.model.parameters.depth, mask=given.mask
+            )
+            reasons = np.where(labels > 1, labels - 1, 0)
+            after = np.where(labels == 0, given.depth, np.nan)
+            note = "" if frame.status == "TRACKED" else f"the first that is {frame.status}"
+            examples.append(DepthExample(given.depth, after, reasons, PIXEL_LABELS[2:], frame.index, note))
+        return examples
 
     def _frame_errors(self) -> list[tuple[float | None, float | None]]:
         ate: Any = self.evaluation.get("absolute_trajectory_error")
@@ -470,7 +489,13 @@ def _entry(
         truth=frame.truth,
         translation_error=translation_error,
         rotation_error=rotation_error,
+        consistency=None if report is None else report.consistency,
+        evidence=None if report is None else report.evidence,
         num_points=None if report is None else report.num_points,
+        num_pixels=None if report is None else report.depth.num_pixels,
+        num_measured=None if report is None else report.depth.num_pixels - report.depth.num_invalid,
         removed=_removed(report),
+        num_updated=None if report is None else report.num_updated,
+        num_inserted=None if report is None else report.num_inserted,
         loop_frame=loop_frame,
     )
