@@ -292,7 +292,7 @@ class Projection {
 template <class Cloud, class Matrix>
 Matrix project(const Cloud& samples, CellOrder sample_order, const Cloud& points, CellOrder point_order,
                const CellLattice& lattice, const ConsolidateOptions& options, const ProjectionHints& hints,
-               const Cargo* cargo) {
+               const Cargo* cargo, int* iterations) {
   const Form form = form_of(options);
   const Scaling scaling{lattice.center, form.scale};
   const PointBlocks point_blocks(points, std::move(point_order), scaling, options.num_threads);
@@ -302,6 +302,8 @@ Matrix project(const Cloud& samples, CellOrder sample_order, const Cloud& points
   Projection projection(moved, point_blocks, options, form, hints);
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
     projection.move(iteration == 0, iteration + 1 == options.iterations ? cargo : nullptr);
+    if (iterations != nullptr) *iterations = iteration + 1;
+    if (options.progress && !options.progress(iteration + 1, options.iterations)) break;
   }
   Matrix result = samples;
   parallel_for(blocks.num_points(), 16384, options.num_threads, [&](std::int64_t i) {
@@ -347,8 +349,9 @@ BasicConsolidated<Matrix> consolidate_cloud(const Cloud& points, const Consolida
     sample_order.cubes.push_back(order.cubes[i]);
   }
   const Cargo cargo{attributes, result.attributes};
-  result.points = project<Cloud, Matrix>(samples, std::move(sample_order), points, std::move(order), lattice, options,
-                                         ProjectionHints(), attributes.cols() > 0 ? &cargo : nullptr);
+  result.points =
+      project<Cloud, Matrix>(samples, std::move(sample_order), points, std::move(order), lattice, options,
+                             ProjectionHints(), attributes.cols() > 0 ? &cargo : nullptr, &result.iterations);
   return result;
 }
 
@@ -375,7 +378,8 @@ Matrix project_cloud(const Cloud& samples, const Cloud& points, const Consolidat
   const CellLattice lattice =
       cell_lattice<Cloud>({&points, &samples}, options.radius / cells_a_radius, options.num_threads);
   return project<Cloud, Matrix>(samples, cell_order(samples, lattice, options.num_threads), points,
-                                cell_order(points, lattice, options.num_threads), lattice, options, hints, nullptr);
+                                cell_order(points, lattice, options.num_threads), lattice, options, hints, nullptr,
+                                nullptr);
 }
 
 }  // namespace

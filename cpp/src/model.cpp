@@ -12,6 +12,7 @@
 #include "fusion_step.hpp"
 #include "loop_closure.hpp"
 #include "model_correction.hpp"
+#include "nacre/cancel.hpp"
 #include "object_view.hpp"
 #include "point_spacing.hpp"
 #include "rigid_motion.hpp"
@@ -368,6 +369,7 @@ Model::Model(Model&&) noexcept = default;
 Model& Model::operator=(Model&&) noexcept = default;
 
 FrameReport Model::add_frame(const DepthRef& depth, const FrameExtras& extras) {
+  const CancelScope whole(nullptr);  // stopped halfway, the model would be neither the one nor the other
   return impl_->add_frame(depth, extras);
 }
 

@@ -13,6 +13,8 @@
 #include <system_error>
 #include <thread>
 
+#include "nacre/cancel.hpp"
+
 #if defined(__unix__) || defined(__APPLE__)
 #define NACRE_POSIX
 #include <pthread.h>
@@ -142,6 +144,7 @@ class ThreadPool {
       for (;;) {
         const std::int64_t block = job.next_block.fetch_add(1, std::memory_order_relaxed);
         if (block >= job.num_blocks) return;
+        CancelScope::check();  // of the caller: the other threads have none
         job.run(job.context, block);
       }
     } catch (...) {
@@ -197,7 +200,10 @@ void run_blocks(std::int64_t num_blocks, int num_threads, void (*run)(void*, std
   const std::int64_t threads =
       std::min<std::int64_t>({num_blocks, resolve_threads(num_threads), std::int64_t{most_workers} + 1});
   if (threads <= 1) {
-    for (std::int64_t block = 0; block < num_blocks; ++block) run(context, block);
+    for (std::int64_t block = 0; block < num_blocks; ++block) {
+      CancelScope::check();
+      run(context, block);
+    }
     return;
   }
   Job job;

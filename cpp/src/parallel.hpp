@@ -14,7 +14,7 @@ namespace nacre {
 int resolve_threads(int num_threads);
 
 // run(context, block) for each block of [0, num_blocks), in any order, on the caller's and up to num_threads - 1 other
-// threads. The first exception stops the loop and is rethrown.
+// threads. The first exception stops the loop and is rethrown; so does the caller's CancelScope.
 void run_blocks(std::int64_t num_blocks, int num_threads, void (*run)(void* context, std::int64_t block),
                 void* context);
 

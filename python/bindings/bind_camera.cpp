@@ -58,7 +58,7 @@ py::array_t<double> project(const Camera& camera,
   py::array_t<double> pixels({count, py::ssize_t{2}});
   const double* const source = points.data();
   double* const target = pixels.mutable_data();
-  const py::gil_scoped_release release;
+  const Released release;
   for (py::ssize_t i = 0; i < count; ++i) {
     Eigen::Map<Eigen::Vector2d>(target + 2 * i) = camera.project(Eigen::Map<const Eigen::Vector3d>(source + 3 * i));
   }
@@ -112,12 +112,12 @@ ValueError
       .def_static("orthographic", &Camera::orthographic, py::arg("width"), py::arg("height"), py::arg("pixel_size"),
                   "A camera with parallel rays: x = (u - (width - 1) / 2) pixel_size [m].")
       .def_property_readonly("model", &model_name, "'pinhole' or 'orthographic'")
-      .def_property_readonly("width", &Camera::width)
-      .def_property_readonly("height", &Camera::height)
-      .def_property_readonly("fx", &Camera::fx)
-      .def_property_readonly("fy", &Camera::fy)
-      .def_property_readonly("cx", &Camera::cx)
-      .def_property_readonly("cy", &Camera::cy)
+      .def_property_readonly("width", &Camera::width, "[pixels]")
+      .def_property_readonly("height", &Camera::height, "[pixels]")
+      .def_property_readonly("fx", &Camera::fx, "[pixels]")
+      .def_property_readonly("fy", &Camera::fy, "[pixels]")
+      .def_property_readonly("cx", &Camera::cx, "[pixels]")
+      .def_property_readonly("cy", &Camera::cy, "[pixels]")
       .def_property_readonly("distortion", &distortion_tuple, "k1 k2 p1 p2 k3")
       .def_property_readonly("depth", &depth_name, "'z' or 'radial'")
       .def_property_readonly(

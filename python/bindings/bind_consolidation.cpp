@@ -12,14 +12,23 @@ py::array_t<T> to_array(std::vector<T>&& values) {
   return py::array_t<T>(static_cast<py::ssize_t>(kept->size()), kept->data(), owner);
 }
 
+// `progress` gets the iterations done and wanted; a false answer ends them.
 template <class Cloud>
-py::tuple consolidate(const Cloud& points, const ConsolidateOptions& options, const nacre::AttributesRef& attributes) {
+py::tuple consolidate(const Cloud& points, ConsolidateOptions options, const nacre::AttributesRef& attributes,
+                      const std::optional<py::function>& progress) {
+  if (progress) {
+    options.progress = [&progress](int done, int total) {
+      const py::gil_scoped_acquire locked;
+      return (*progress)(done, total).cast<bool>();
+    };
+  }
   decltype(nacre::consolidate(points, options, attributes)) result;
   {
-    const py::gil_scoped_release unlocked;
+    const Released unlocked;
     result = nacre::consolidate(points, options, attributes);
   }
-  return py::make_tuple(std::move(result.points), std::move(result.attributes), to_array(std::move(result.sources)));
+  return py::make_tuple(std::move(result.points), std::move(result.attributes), to_array(std::move(result.sources)),
+                        result.iterations);
 }
 
 template <class Cloud>
@@ -51,9 +60,9 @@ void bind_consolidation(py::module_& m) {
 
   // The arguments are noconvert, so that each array meets the overload of its own precision.
   m.def("consolidate", &consolidate<nacre::PointsRef>, py::arg("points").noconvert(), py::arg("options"),
-        py::arg("attributes"), "Points, attributes and sources; see nacre.consolidate.");
+        py::arg("attributes"), py::arg("progress"), "Points, attributes, sources, iterations; see nacre.consolidate.");
   m.def("consolidate", &consolidate<nacre::PointsDoubleRef>, py::arg("points").noconvert(), py::arg("options"),
-        py::arg("attributes"), "Points, attributes and sources; see nacre.consolidate.");
+        py::arg("attributes"), py::arg("progress"), "Points, attributes, sources, iterations; see nacre.consolidate.");
 
   py::class_<nacre::ProjectionHints>(m, "ProjectionHints")
       .def(py::init<>())

@@ -25,7 +25,7 @@ py::tuple query(const KdTree& tree, const Points& queries, int k, double max_dis
   std::int64_t* const to_indices = indices.mutable_data();
   Distance* const to_distances = distances.mutable_data();
   {
-    const py::gil_scoped_release release;
+    const Released release;
     tree.query_into(queries, k, max_distance, num_threads, to_indices, to_distances);
   }
   return py::make_tuple(distances, indices);
@@ -35,7 +35,7 @@ template <class Points>
 py::tuple query_radius(const KdTree& tree, const Points& queries, double radius, int num_threads) {
   nacre::RadiusNeighbors found;
   {
-    const py::gil_scoped_release release;
+    const Released release;
     found = tree.query_radius(queries, radius, num_threads);
   }
   return py::make_tuple(as_array(std::move(found.offsets)), as_array(std::move(found.indices)),

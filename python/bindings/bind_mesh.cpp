@@ -12,7 +12,7 @@ py::tuple cast_rays(const MeshTree& tree, const PointsDoubleRef& origins, const 
                     int num_threads) {
   MeshTree::Hits hits;
   {
-    const py::gil_scoped_release release;
+    const Released release;
     hits = tree.cast(origins, directions, num_threads);
   }
   return py::make_tuple(std::move(hits.distances), std::move(hits.triangles));
@@ -21,7 +21,7 @@ py::tuple cast_rays(const MeshTree& tree, const PointsDoubleRef& origins, const 
 py::tuple closest_points(const MeshTree& tree, const PointsDoubleRef& points, int num_threads) {
   MeshTree::ClosestPoints found;
   {
-    const py::gil_scoped_release release;
+    const Released release;
     found = tree.closest(points, num_threads);
   }
   return py::make_tuple(std::move(found.points), std::move(found.normals), std::move(found.distances),
@@ -31,7 +31,7 @@ py::tuple closest_points(const MeshTree& tree, const PointsDoubleRef& points, in
 py::tuple make_built_in_object() {
   nacre::Mesh mesh;
   {
-    const py::gil_scoped_release release;
+    const Released release;
     mesh = nacre::built_in_object();
   }
   return py::make_tuple(std::move(mesh.vertices), std::move(mesh.triangles));

@@ -7,12 +7,30 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include "nacre/cancel.hpp"
 #include "nacre/types.hpp"
 #include "nacre/version.hpp"
 
 namespace py = pybind11;
 
-using ReleaseGil = py::call_guard<py::gil_scoped_release>;
+// While it lives, Python's other threads run, and signals are heard: what their handlers raise (Ctrl-C's
+// KeyboardInterrupt) ends the call.
+class Released {
+ public:
+  Released() : signals_(&hear_signals) {}
+
+ private:
+  static bool hear_signals() {
+    const py::gil_scoped_acquire locked;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    return false;
+  }
+
+  py::gil_scoped_release unlocked_;
+  nacre::CancelScope signals_;
+};
+
+using ReleaseGil = py::call_guard<Released>;
 
 // Poses cross the border as 4 x 4 matrices.
 using PoseMatrix = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;

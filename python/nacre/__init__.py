@@ -1,46 +1,51 @@
 """nacre grows a 3D model from depth-camera images, layer by layer."""
 
 import importlib
+import importlib.util
+import logging
 from typing import TYPE_CHECKING, Any
-
-from nacre._core import Camera, __version__
-from nacre.consolidation import Consolidated, consolidate, project_samples
-from nacre.datasets import Sequence, SequenceFrame, open_sequence, write_recording
-from nacre.depth import (
-    PIXEL_LABELS,
-    DepthParameters,
-    DepthReport,
-    back_project,
-    depth_normals,
-    label_pixels,
-    preprocess_depth,
-)
-from nacre.depth_calibration import DepthCalibration, calibrate_depth
-from nacre.errors import FileFormatError
-from nacre.global_registration import GlobalAlignResult, GlobalRegistrationParameters, align_global
-from nacre.io.cameras import CameraFile, read_camera, write_camera
-from nacre.io.cloud import Cloud
-from nacre.io.meshes import read_mesh, write_mesh
-from nacre.io.points import read_points, write_points
-from nacre.io.trajectories import Trajectory, associate, read_trajectory, write_trajectory
-from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
-from nacre.model import FrameReport, Model, ModelParameters
-from nacre.neighbors import KdTree, RadiusNeighbors
-from nacre.noise import NoiseModel, calibrate_noise, estimate_noise
-from nacre.normals import estimate_normals
-from nacre.region import RegionParameters, RegionReport, select_region
-from nacre.registration import AlignResult, RegistrationParameters, align
-from nacre.simulation import default_camera, simulate_depth, turntable_poses
-from nacre.system import default_threads, instruction_set
 
 if TYPE_CHECKING:
     from nacre import evaluation
+    from nacre._core import Camera, __version__
+    from nacre.consolidation import Consolidated, consolidate, project_samples
+    from nacre.datasets import Sequence, SequenceFrame, open_sequence, write_recording
+    from nacre.depth import (
+        PIXEL_LABELS,
+        DepthParameters,
+        DepthReport,
+        back_project,
+        depth_normals,
+        label_pixels,
+        preprocess_depth,
+    )
+    from nacre.depth_calibration import DepthCalibration, calibrate_depth
+    from nacre.errors import CameraError, FileFormatError
+    from nacre.global_registration import GlobalAlignResult, GlobalRegistrationParameters, align_global
+    from nacre.io.cameras import CameraFile, read_camera, write_camera
+    from nacre.io.cloud import Cloud
+    from nacre.io.meshes import read_mesh, write_mesh
+    from nacre.io.points import read_points, write_points
+    from nacre.io.trajectories import Trajectory, associate, read_trajectory, write_trajectory
+    from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
+    from nacre.model import FrameReport, Model, ModelParameters
+    from nacre.neighbors import KdTree, RadiusNeighbors
+    from nacre.noise import NoiseModel, calibrate_noise, estimate_noise
+    from nacre.normals import estimate_normals
+    from nacre.progress import Cancelled
+    from nacre.reconstructing import reconstruct
+    from nacre.region import RegionParameters, RegionReport, select_region
+    from nacre.registration import AlignResult, RegistrationParameters, align
+    from nacre.simulation import default_camera, simulate_depth, turntable_poses
+    from nacre.system import default_threads, instruction_set
 
 __all__ = [
     "PIXEL_LABELS",
     "AlignResult",
     "Camera",
+    "CameraError",
     "CameraFile",
+    "Cancelled",
     "ClosestPoints",
     "Cloud",
     "Consolidated",
@@ -88,6 +93,7 @@ __all__ = [
     "read_mesh",
     "read_points",
     "read_trajectory",
+    "reconstruct",
     "select_region",
     "simulate_depth",
     "turntable_poses",
@@ -98,9 +104,49 @@ __all__ = [
     "write_trajectory",
 ]
 
+# Where each name is, so that it is imported when it is first asked for: most programs need few of them.
+_NAMES = {
+    "_core": "Camera __version__",
+    "consolidation": "Consolidated consolidate project_samples",
+    "datasets": "Sequence SequenceFrame open_sequence write_recording",
+    "depth": "PIXEL_LABELS DepthParameters DepthReport back_project depth_normals label_pixels "
+    "preprocess_depth",
+    "depth_calibration": "DepthCalibration calibrate_depth",
+    "errors": "CameraError FileFormatError",
+    "global_registration": "GlobalAlignResult GlobalRegistrationParameters align_global",
+    "io.cameras": "CameraFile read_camera write_camera",
+    "io.cloud": "Cloud",
+    "io.meshes": "read_mesh write_mesh",
+    "io.points": "read_points write_points",
+    "io.trajectories": "Trajectory associate read_trajectory write_trajectory",
+    "mesh": "ClosestPoints Mesh RayHits built_in_object",
+    "model": "FrameReport Model ModelParameters",
+    "neighbors": "KdTree RadiusNeighbors",
+    "noise": "NoiseModel calibrate_noise estimate_noise",
+    "normals": "estimate_normals",
+    "progress": "Cancelled",
+    "reconstructing": "reconstruct",
+    "region": "RegionParameters RegionReport select_region",
+    "registration": "AlignResult RegistrationParameters align",
+    "simulation": "default_camera simulate_depth turntable_poses",
+    "system": "default_threads instruction_set",
+}
+_MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
+
+
+logging.getLogger("nacre").addHandler(logging.NullHandler())
+
 
 def __getattr__(name: str) -> Any:
-    """Import ``nacre.evaluation`` when it is first asked for: most programs never do."""
-    if name == "evaluation":
-        return importlib.import_module("nacre.evaluation")
+    """Import a public name, or a module of the package, when it is first asked for."""
+    if name in _MODULES:
+        value = getattr(importlib.import_module(f"nacre.{_MODULES[name]}"), name)
+        globals()[name] = value
+        return value
+    if not name.startswith("__") and importlib.util.find_spec(f"nacre.{name}") is not None:
+        return importlib.import_module(f"nacre.{name}")
     raise AttributeError(f"module 'nacre' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -904,6 +904,7 @@ class Model:
         arg6: bool,
     ) -> FrameReport: ...
     def cloud_in_camera(self) -> PointModel: ...
+    def report(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> FrameReport: ...
     def pose(
         self, arg0: typing.SupportsInt | typing.SupportsIndex
     ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[4, 4]"]: ...
@@ -913,6 +914,8 @@ class Model:
     def cloud(self) -> PointModel: ...
     @property
     def noise(self) -> NoiseModel: ...
+    @property
+    def num_frames(self) -> int: ...
     @property
     def spacing(self) -> float: ...
 
@@ -948,13 +951,15 @@ def consolidate(
     points: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
     options: ConsolidateOptions,
     attributes: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
+    progress: collections.abc.Callable[..., typing.Any] | None,
 ) -> tuple[
     typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]"],
     typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"],
     numpy.typing.NDArray[numpy.int64],
+    int,
 ]:
     """
-    Points, attributes and sources; see nacre.consolidate.
+    Points, attributes, sources, iterations; see nacre.consolidate.
     """
 
 @typing.overload
@@ -962,13 +967,15 @@ def consolidate(
     points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"],
     options: ConsolidateOptions,
     attributes: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
+    progress: collections.abc.Callable[..., typing.Any] | None,
 ) -> tuple[
     typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"],
     typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"],
     numpy.typing.NDArray[numpy.int64],
+    int,
 ]:
     """
-    Points, attributes and sources; see nacre.consolidate.
+    Points, attributes, sources, iterations; see nacre.consolidate.
     """
 
 def default_threads() -> int: ...

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,8 @@ import numpy.typing as npt
 from nacre import _core
 from nacre.arrays import FloatArray, as_count, as_length, as_matching_points, as_points
 from nacre.parameters import as_choice
+from nacre.progress import as_progress
+from nacre.values import Value
 
 _METHODS = {
     "wlop": _core.ConsolidationMethod.wlop,
@@ -23,7 +25,7 @@ _THETAS = {"huang": _core.Theta.huang, "printed": _core.Theta.printed}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Consolidated:
+class Consolidated(Value):
     """
     A consolidated point set.
 
@@ -35,18 +37,32 @@ class Consolidated:
         What was carried along, in the input's dtypes.
     sources : (K,) int64 array, ascending
         The row of the input that each point started from.
+    iterations : int
+        That were done.
+    cancelled : bool
+        Whether ``progress`` ended it before the last iteration: the points are where they had come to by
+        then, the attributes those of their sources.
     """
 
     points: FloatArray
     attributes: dict[str, npt.NDArray[Any]]
     sources: npt.NDArray[np.int64]
+    iterations: int
+    cancelled: bool
 
     def __len__(self) -> int:
         return len(self.points)
 
     def __repr__(self) -> str:
         carried = "".join(f", {name} {a.dtype}{list(a.shape)}" for name, a in self.attributes.items())
-        return f"Consolidated({len(self.points)} points {self.points.dtype}{carried})"
+        ended = f", cancelled after {self.iterations} iterations" * self.cancelled
+        return f"Consolidated({len(self.points)} points {self.points.dtype}{carried}{ended})"
+
+    def _repr_png_(self) -> bytes | None:
+        from nacre.inline_pictures import picture_of_points
+
+        normals, colors = self.attributes.get("normals"), self.attributes.get("colors")
+        return picture_of_points(self.points, normals, colors)
 
 
 def consolidate(
@@ -61,6 +77,7 @@ def consolidate(
     attributes: npt.ArrayLike | Mapping[str, npt.ArrayLike] | None = None,
     seed: int = 0,
     num_threads: int = 0,
+    progress: Callable[[int, int], bool | None] | None = None,
 ) -> Consolidated:
     """
     Replace a noisy point set by fewer, evenly spread points near its local medians (WLOP).
@@ -102,6 +119,10 @@ def consolidate(
         Of the random choice, not negative.
     num_threads : int
         0 uses all. The result has the same bits for any number.
+    progress : callable, optional
+        Called after each iteration with how many are done and how many there are; what has been reached is
+        the result where it returns False. What it raises comes out of ``consolidate``, as does Ctrl-C within
+        an iteration.
 
     Returns
     -------
@@ -130,8 +151,9 @@ def consolidate(
     options.num_points = max(1, min(wanted, len(array)))
     options.seed = as_count("seed", seed)
     cargo = _Cargo(attributes, len(array))
-    moved, carried, sources = _core.consolidate(array, options, cargo.columns)
-    return Consolidated(moved, cargo.unpack(carried, sources), sources)
+    told = None if progress is None else as_progress("progress", progress)
+    moved, carried, sources, done = _core.consolidate(array, options, cargo.columns, told)
+    return Consolidated(moved, cargo.unpack(carried, sources), sources, done, done < options.iterations)
 
 
 def project_samples(

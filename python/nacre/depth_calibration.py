@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -12,6 +13,8 @@ import numpy.typing as npt
 from nacre._core import Camera
 from nacre.arrays import as_depth, as_pose
 from nacre.depth import back_project, preprocess_depth
+
+_log = logging.getLogger(__name__)
 
 _BLOCK = 4  # pixels, each way, whose inverse depths are averaged
 LEAST_TURN, _MOST_TURN = 0.1, 0.6  # between two views that are compared [rad]
@@ -140,6 +143,7 @@ def calibrate_depth(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera
             break
         for pair in pairs:
             pair.follow(tilt)
+    _log.info("depth is tilted by %.4f / m, sigma %.4f / m, by %d pairs of views", tilt, sigma, len(found))
     return DepthCalibration(tilt, sigma, len(found))
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 
@@ -40,3 +42,13 @@ class FileFormatError(ValueError):
         place = f", line {self.line}" if self.line is not None else ""
         place += f", byte {self.offset}" if self.offset is not None else ""
         return f"{self.path}{place}: {self.reason}"
+
+
+class CameraError(RuntimeError):
+    """A camera that is not there, or that gives no more frames; the message says what to do."""
+
+
+def meant(word: object, known: Iterable[str]) -> str:
+    """Return " (did you mean 'x'?)" with the known word that is nearest to a wrong one, or nothing."""
+    near = difflib.get_close_matches(str(word), list(known), 1)
+    return f" (did you mean {near[0]!r}?)" if near else ""

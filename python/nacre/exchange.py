@@ -72,16 +72,6 @@ class ExchangeablePoints(ABC):
 
     def _repr_png_(self) -> bytes | None:
         """Return a picture of the points, which notebooks show in place of the words of ``repr``."""
-        from nacre.report.pictures import OBLIQUE
-        from nacre.report.png import encode_png
-        from nacre.report.render import measure_spacing, render_points
-        from nacre.report.view import View
+        from nacre.inline_pictures import picture_of_points
 
-        points = self.points
-        if not len(points):
-            return None
-        view = View.fit(points, OBLIQUE, size=(480, 400))
-        image = render_points(
-            points, self.normals, self.colors, view=view, spacing=measure_spacing(points), background=None
-        )
-        return encode_png(image)
+        return picture_of_points(self.points, self.normals, self.colors)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from nacre import _core
 from nacre.arrays import FloatArray, as_matching_points, as_points, as_vector, localize
 from nacre.parameters import to_core
+from nacre.values import Value
 
 
 @dataclass(frozen=True)
@@ -33,8 +34,8 @@ class GlobalRegistrationParameters:
     num_threads: int = 0
 
 
-@dataclass(frozen=True)
-class GlobalAlignResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class GlobalAlignResult(Value):
     """
     The outcome of :func:`align_global`.
 

@@ -10,10 +10,11 @@ import numpy.typing as npt
 from nacre import _core, arrays
 from nacre.noise import NoiseModel, NoiseName, as_noise
 from nacre.parameters import to_core
+from nacre.values import Value
 
 
-@dataclasses.dataclass(frozen=True)
-class RayHits:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class RayHits(Value):
     """
     What rays hit, one row per ray.
 
@@ -29,8 +30,8 @@ class RayHits:
     triangles: npt.NDArray[np.int32]
 
 
-@dataclasses.dataclass(frozen=True)
-class ClosestPoints:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ClosestPoints(Value):
     """
     The points of a mesh that are nearest to given points, one row per point.
 
@@ -122,7 +123,21 @@ class Mesh:
         return ClosestPoints(nearest + self._origin, normals, distances, triangles)
 
     def distance(self, points: npt.ArrayLike, *, num_threads: int = 0) -> npt.NDArray[np.float64]:
-        """Return the unsigned distance of each point to the surface, (N, 3) -> (N,) [m]."""
+        """
+        Return the unsigned distance of each point to the surface.
+
+        Parameters
+        ----------
+        points : (N, 3) array_like of real numbers
+            [m].
+        num_threads : int
+            0: all.
+
+        Returns
+        -------
+        (N,) float64
+            [m].
+        """
         return self.closest(points, num_threads=num_threads).distances
 
     def cast(self, origins: npt.ArrayLike, directions: npt.ArrayLike, *, num_threads: int = 0) -> RayHits:
@@ -159,7 +174,25 @@ class Mesh:
         seed: int = 0,
         num_threads: int = 0,
     ) -> npt.NDArray[np.float32]:
-        """Return the depth image that a camera sees; see :func:`nacre.simulate_depth`."""
+        """
+        Return the depth image that a camera sees.
+
+        Parameters
+        ----------
+        camera, world_from_camera, noise, edge_mixing, background_depth
+        quantization, dropout, seed, num_threads
+            As in :func:`nacre.simulate_depth`.
+
+        Returns
+        -------
+        (H, W) float32
+            In the camera's depth kind [m]; NaN where nothing is seen.
+
+        Raises
+        ------
+        TypeError, ValueError
+            Naming the argument, what was expected and what came.
+        """
         pose = arrays.as_pose("world_from_camera", world_from_camera).copy()
         pose[:3, 3] -= self._origin
         parameters = _Simulation(

@@ -20,6 +20,7 @@ from nacre.noise import NoiseModel
 from nacre.parameters import from_core, to_core, updated
 from nacre.region import RegionParameters, RegionReport
 from nacre.registration import RegistrationParameters
+from nacre.values import Value
 
 Preset = Literal["default", "paper"]
 
@@ -143,8 +144,8 @@ class ModelParameters:
         return from_core(cls, _core.ModelOptions.preset(name))
 
 
-@dataclass(frozen=True)
-class FrameReport:
+@dataclass(frozen=True, eq=False, repr=False)
+class FrameReport(Value):
     """
     What became of one frame.
 
@@ -217,6 +218,11 @@ class FrameReport:
     def tracked(self) -> bool:
         """Whether the camera's pose is known: every status but LOST."""
         return self.status != "LOST"
+
+    @property
+    def corrects_earlier(self) -> bool:
+        """Whether earlier poses may have changed: a loop was closed, or views of an object adjusted."""
+        return self.loop_frame is not None or self.region.support >= 0
 
     @classmethod
     def _from_core(cls, core: Any) -> FrameReport:
@@ -351,24 +357,33 @@ class Model(ExchangeablePoints):
         if timestamp is not None and not isinstance(timestamp, numbers.Real):
             raise TypeError(f"timestamp must be a number of seconds or None, got {timestamp!r}")
         with self._lock:
-            core = self._core.add_frame(image, pixels, colors, more, timestamp, pose, keep_guess)
-            report = FrameReport._from_core(core)
-            if report.loop_frame is not None:
-                self._frames = [
-                    replace(earlier, world_from_camera=self._core.pose(earlier.index))
-                    for earlier in self._frames
-                ]
-            self._frames.append(report)
-        return report
+            self._core.add_frame(image, pixels, colors, more, timestamp, pose, keep_guess)
+            return self._reports()[-1]
+
+    def _reports(self) -> list[FrameReport]:
+        """Return the reports of all frames, those too after whose fusion Ctrl-C came before this."""
+        num_known = len(self._frames)
+        new = [FrameReport._from_core(self._core.report(i)) for i in range(num_known, self._core.num_frames)]
+        known = self._frames
+        if any(report.corrects_earlier for report in new):
+            known = [replace(report, world_from_camera=self._core.pose(report.index)) for report in known]
+        self._frames = known + new if new else known
+        return self._frames
 
     def __len__(self) -> int:
         """Return the number of points."""
         with self._lock:
             return len(self._core.cloud)
 
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        raise TypeError(
+            "a Model cannot be pickled or copied: pickle what it holds (model.points, model.normals, "
+            "model.poses, model.frames, model.parameters), or write it with nacre.write_points"
+        )
+
     def __repr__(self) -> str:
-        tracked = sum(report.tracked for report in self._frames)
-        frames = f"{tracked} of {len(self._frames)} frames tracked"
+        reports = self.frames
+        frames = f"{sum(report.tracked for report in reports)} of {len(reports)} frames tracked"
         return f"Model({len(self)} points, {frames}, spacing={self.spacing:.4g} m)"
 
     @property
@@ -423,8 +438,9 @@ class Model(ExchangeablePoints):
 
         Where a later frame closed a loop, the corrected poses.
         """
-        poses = np.full((len(self._frames), 4, 4), np.nan)
-        for pose, report in zip(poses, self._frames, strict=True):
+        frames = self.frames
+        poses = np.full((len(frames), 4, 4), np.nan)
+        for pose, report in zip(poses, frames, strict=True):
             if report.tracked:
                 pose[:] = report.world_from_camera
         return poses
@@ -432,7 +448,8 @@ class Model(ExchangeablePoints):
     @property
     def frames(self) -> tuple[FrameReport, ...]:
         """The report of every frame that was added, with poses as corrected by later frames."""
-        return tuple(self._frames)
+        with self._lock:
+            return tuple(self._reports())
 
     @property
     def spacing(self) -> float:

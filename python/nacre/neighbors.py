@@ -12,12 +12,13 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre.arrays import FloatArray, as_count, as_length, as_points
+from nacre.values import Value
 
 IndexArray = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class RadiusNeighbors(Sequence[tuple[FloatArray, IndexArray]]):
+class RadiusNeighbors(Value, Sequence[tuple[FloatArray, IndexArray]]):
     """
     All neighbours within a radius, each query's after the other's.
 

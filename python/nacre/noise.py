@@ -60,13 +60,13 @@ class NoiseModel:
 
     @classmethod
     def kinect(cls) -> NoiseModel:
-        """Structured light, Nguyen et al. 2012: 1.2 mm + 1.9 mm (z - 0.4 m)^2."""
+        """Return that of structured light, Nguyen et al. 2012: 1.2 mm + 1.9 mm (z - 0.4 m)^2."""
         return cls._from_core(_core.NoiseModel.kinect())
 
     @classmethod
     def stereo(cls, fx: float, baseline: float = 0.05, disparity_sigma: float = 0.08) -> NoiseModel:
         """
-        Two cameras: ``disparity_sigma z^2 / (fx baseline)``.
+        Return that of two cameras: ``disparity_sigma z^2 / (fx baseline)``.
 
         Parameters
         ----------
@@ -76,12 +76,16 @@ class NoiseModel:
             Between the cameras [m].
         disparity_sigma : float
             Of the match [pixels]. The defaults are those of a RealSense D435 on good texture.
+
+        Returns
+        -------
+        NoiseModel
         """
         return cls._from_core(_core.NoiseModel.stereo(fx, baseline, disparity_sigma))
 
     @classmethod
     def time_of_flight(cls) -> NoiseModel:
-        """Time of flight, Fankhauser et al. 2015 (Kinect v2): 1.5 mm - 0.5 mm z + 0.3 mm z^2."""
+        """Return that of time of flight, Fankhauser et al. 2015: 1.5 mm - 0.5 mm z + 0.3 mm z^2."""
         return cls._from_core(_core.NoiseModel.time_of_flight())
 
     def to_core(self) -> Any:

@@ -6,6 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
+from nacre.errors import meant
+
 Core = TypeVar("Core")
 Parameters = TypeVar("Parameters")
 
@@ -26,7 +28,8 @@ def to_core(parameters: Any, core: Core) -> Core:
             members = type(current).__members__
             if value.replace("+", "_plus") not in members:
                 names = ", ".join(repr(name.replace("_plus", "+")) for name in members)
-                raise ValueError(f"{field.name} must be one of {names}, got {value!r}")
+                hint = meant(value, (name.replace("_plus", "+") for name in members))
+                raise ValueError(f"{field.name} must be one of {names}, got {value!r}{hint}")
             value = members[value.replace("+", "_plus")]
         try:
             setattr(core, field.name, value)
@@ -68,7 +71,8 @@ def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
         names = [field.name for field in dataclasses.fields(parameters)]  # type: ignore[arg-type]
         if head not in names or (dot and not rest):
             raise ValueError(
-                f"there is no parameter {name!r} in {type(parameters).__name__}; it has {', '.join(names)}"
+                f"there is no parameter {name!r} in {type(parameters).__name__}{meant(head, names)}; "
+                f"it has {', '.join(names)}"
             )
         current = getattr(parameters, head)
         if rest:
@@ -84,5 +88,7 @@ def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
 def as_choice(name: str, value: Any, choices: Mapping[str, Core]) -> Core:
     """Return what ``value`` stands for among the named choices."""
     if not isinstance(value, str) or value not in choices:
-        raise ValueError(f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}")
+        raise ValueError(
+            f"{name} must be one of {', '.join(map(repr, choices))}, got {value!r}{meant(value, choices)}"
+        )
     return choices[value]

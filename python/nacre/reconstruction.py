@@ -5,9 +5,10 @@ from __future__ import annotations
 import collections.abc
 import dataclasses
 import itertools
+import logging
 import platform
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -17,15 +18,19 @@ import numpy.typing as npt
 
 from nacre._core import __version__
 from nacre.datasets.sequence import SequenceFrame
-from nacre.depth import preprocess_depth
+from nacre.depth import PIXEL_LABELS, label_pixels
 from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result, plain
 from nacre.io.trajectories import Trajectory
 from nacre.model import FrameReport, Model
+from nacre.progress import as_progress
+from nacre.values import Value
 
 if TYPE_CHECKING:
-    from nacre.report import FrameEntry, ReportData
+    from nacre.report import DepthExample, FrameEntry, ReportData
+
+_log = logging.getLogger(__name__)
 
 STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
 _RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
@@ -34,8 +39,8 @@ _RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
 _LONG = {"errors", "translation_errors", "rotation_errors", "distances"}
 
 
-@dataclass(frozen=True, eq=False)
-class FrameRecord:
+@dataclass(frozen=True, eq=False, repr=False)
+class FrameRecord(Value):
     """
     What became of one frame of a recording.
 
@@ -93,6 +98,8 @@ class Reconstruction:
         Those that are done.
     evaluation : dict of str to a result of ``nacre.evaluation``
         What is known beyond the trajectory's errors, by name; may be added to.
+    cancelled : bool
+        Whether a progress callback ended :meth:`complete` before its last frame.
     """
 
     def __init__(self, sequence: collections.abc.Sequence[SequenceFrame], model: Model) -> None:
@@ -100,7 +107,50 @@ class Reconstruction:
         self.model = model
         self.frames: list[FrameRecord] = []
         self.evaluation: dict[str, Result] = {}
-        self._example: tuple[int, npt.NDArray[np.float32]] | None = None
+        self.cancelled = False
+        self._kept: dict[str, SequenceFrame] = {}  # the first frame of each status
+
+    def __repr__(self) -> str:
+        ended = ", cancelled" * self.cancelled
+        return (
+            f"Reconstruction({len(self.frames)} of {len(self.sequence)} frames done, "
+            f"{self.num_tracked} tracked, {len(self.model)} points{ended})"
+        )
+
+    def complete(
+        self,
+        indices: Iterable[int] | None = None,
+        *,
+        progress: Callable[[FrameRecord], bool | None] | None = None,
+        retry: bool = True,
+    ) -> Reconstruction:
+        """
+        Run frames to the end, go over the lost ones again, and evaluate the trajectory where truth is known.
+
+        Parameters
+        ----------
+        indices : iterable of int, optional
+            Of the recording's frames; all of them by default.
+        progress : callable, optional
+            Called with each :class:`FrameRecord` when it is done. To return False, or to raise
+            :class:`nacre.Cancelled`, ends the run; what is done is kept, and ``cancelled`` says so. Other
+            exceptions, Ctrl-C too, come out of this call, and what is done is kept all the same.
+        retry : bool
+            Whether lost frames are tried again at the end.
+
+        Returns
+        -------
+        Reconstruction
+            This one.
+        """
+        goes_on = as_progress("progress", progress) if progress is not None else None
+        for frame in itertools.chain(self.run(indices), self.retry_lost() if retry else ()):
+            if goes_on is not None and not goes_on(frame):
+                self.cancelled = True
+                _log.info("cancelled after %d frames", len(self.frames))
+                break
+        self.evaluate_trajectory()
+        return self
 
     def run(self, indices: Iterable[int] | None = None) -> Iterator[FrameRecord]:
         """Add frames to the model, those with the given indices or all, and yield each when it is done."""
@@ -135,6 +185,7 @@ class Reconstruction:
         try:
             frame = self.sequence[index]
         except (FileFormatError, OSError) as error:
+            _log.info("frame %d: skipped, it cannot be read: %s", index, error)
             return FrameRecord(index, None, "LOST", str(error), None, None, error)
         try:
             report = self.model.add_frame(
@@ -146,12 +197,23 @@ class Reconstruction:
                 attributes=frame.attributes,
             )
         except ValueError as error:
+            _log.info("frame %d: skipped, the model refused it: %s", index, error)
             return FrameRecord(index, frame.timestamp, "LOST", str(error), None, frame.truth, error)
-        if report.loop_frame is not None:
+        self._tell(index, report)
+        if report.corrects_earlier:
             self._take_corrected_poses()
-        if self._example is None and report.tracked:
-            self._example = index, frame.depth
+        self._kept.setdefault(report.status, frame)
         return FrameRecord(index, frame.timestamp, report.status, report.reason, report, frame.truth)
+
+    def _tell(self, index: int, report: FrameReport) -> None:
+        if report.status != "TRACKED":
+            _log.info("frame %d: %s%s", index, report.status, f": {report.reason}" * bool(report.reason))
+        _log.debug(
+            "frame %d: %s, overlap %.2f, %d points, %.1f ms",
+            index, report.status, report.overlap, report.num_points, report.milliseconds["total"],
+        )  # fmt: skip
+        if report.loop_frame is not None:
+            _log.info("frame %d: closed a loop, %.4f m wide", index, report.loop_distance)
 
     def _take_corrected_poses(self) -> None:
         reports = self.model.frames
@@ -258,8 +320,30 @@ class Reconstruction:
         )
         return figures
 
-    def report_data(self, title: str, source: str, figures: Mapping[str, Any] | None = None) -> ReportData:
-        """Return what :func:`nacre.report.write_report` shows."""
+    def report_data(
+        self,
+        title: str,
+        source: str,
+        figures: Mapping[str, Any] | None = None,
+        *,
+        interrupted: bool = False,
+    ) -> ReportData:
+        """
+        Return what :func:`nacre.report.write_report` shows; it reads some frames again.
+
+        Parameters
+        ----------
+        title, source : str
+            Of the page, and in words where the frames come from.
+        figures : mapping, optional
+            More numbers for the page, by name.
+        interrupted : bool
+            Whether the run ended before the recording did.
+
+        Returns
+        -------
+        ReportData
+        """
         from nacre.report import ModelCloud, ReportData
         from nacre.report.text import label
 
@@ -276,10 +360,11 @@ class Reconstruction:
                 _entry(frame, *errors[i], self._loop_frame(frame)) for i, frame in enumerate(self.frames)
             ],
             model=model,
-            depth=self._depth_example(),
+            depth=self._depth_examples(),
             evaluation={label(name): result for name, result in self.evaluation.items()},
             figures=figures or {},
             parameters=self.parameters,
+            interrupted=interrupted,
         )
 
     def _loop_frame(self, frame: FrameRecord) -> int | None:
@@ -289,19 +374,29 @@ class Reconstruction:
         given = (other.index for other in self.frames if other.report is not None)
         return next(itertools.islice(given, frame.report.loop_frame, None))
 
-    def _depth_example(self) -> Any:
+    def _depth_examples(self) -> list[DepthExample]:
+        """Return the depth image of the first frame that was tracked and of the first one that was not."""
         from nacre.report import DepthExample
 
-        if self._example is None:
-            return None
-        index, before = self._example
-        options = self.model.parameters.depth
-        after = preprocess_depth(
-            before,
-            self.model.camera,
-            **{field.name: getattr(options, field.name) for field in dataclasses.fields(options)},
-        )
-        return DepthExample(before, after, index=index)
+        examples = []
+        for status in ("TRACKED", "LOST", "WEAK"):
+            frame = next((frame for frame in self.frames if frame.status == status), None)
+            if frame is None or frame.report is None:
+                continue
+            given = self._kept.get(frame.status)
+            if given is None or given.index != frame.index:
+                try:
+                    given = self.sequence[frame.index]
+                except (FileFormatError, OSError, LookupError):
+                    continue
+            labels = label_pixels(
+                given.depth, self.model.camera, self.model.parameters.depth, mask=given.mask
+            )
+            reasons = np.where(labels > 1, labels - 1, 0)
+            after = np.where(labels == 0, given.depth, np.nan)
+            note = "" if frame.status == "TRACKED" else f"the first that is {frame.status}"
+            examples.append(DepthExample(given.depth, after, reasons, PIXEL_LABELS[2:], frame.index, note))
+        return examples
 
     def _frame_errors(self) -> list[tuple[float | None, float | None]]:
         ate: Any = self.evaluation.get("absolute_trajectory_error")
@@ -314,7 +409,7 @@ class Reconstruction:
 
 
 def plain_tree(value: Any) -> Any:
-    """Turn nested mappings with arrays and numbers that are not finite into what JSON knows."""
+    """Return nested mappings, arrays and numbers as what JSON knows: what is not finite is None."""
     if isinstance(value, Mapping):
         return {str(name): plain_tree(item) for name, item in value.items()}
     if isinstance(value, (list, tuple)):
@@ -394,7 +489,13 @@ def _entry(
         truth=frame.truth,
         translation_error=translation_error,
         rotation_error=rotation_error,
+        consistency=None if report is None else report.consistency,
+        evidence=None if report is None else report.evidence,
         num_points=None if report is None else report.num_points,
+        num_pixels=None if report is None else report.depth.num_pixels,
+        num_measured=None if report is None else report.depth.num_pixels - report.depth.num_invalid,
         removed=_removed(report),
+        num_updated=None if report is None else report.num_updated,
+        num_inserted=None if report is None else report.num_inserted,
         loop_frame=loop_frame,
     )

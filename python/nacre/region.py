@@ -13,6 +13,7 @@ from nacre import _core
 from nacre.arrays import as_depth, as_mask
 from nacre.noise import Noise, as_noise
 from nacre.parameters import to_core, updated
+from nacre.values import Value
 
 Mask = npt.NDArray[np.bool_]
 
@@ -39,8 +40,8 @@ class RegionParameters:
     keep_fraction: float = 0.25
 
 
-@dataclass(frozen=True)
-class RegionReport:
+@dataclass(frozen=True, eq=False, repr=False)
+class RegionReport(Value):
     """
     What was left out of a frame.
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from nacre import _core
 from nacre.arrays import FloatArray, as_matching_points, as_points, as_pose, localize
 from nacre.parameters import to_core
+from nacre.values import Value
 
 Method = Literal["point_to_point", "point_to_plane", "symmetric"]
 
@@ -40,8 +41,8 @@ class RegistrationParameters:
     num_threads: int = 0
 
 
-@dataclass(frozen=True)
-class AlignResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class AlignResult(Value):
     """
     The outcome of :func:`align`.
 

@@ -348,7 +348,7 @@ def test_defaults_equal_the_cores():
             if hasattr(core, name):
                 default = getattr(core, name)
                 assert parameter.default == getattr(default, "name", default), name
-    named = set(inspect.signature(nacre.consolidate).parameters) - {"points", "attributes"}
+    named = set(inspect.signature(nacre.consolidate).parameters) - {"points", "attributes", "progress"}
     assert named == {name for name in dir(core) if not name.startswith("_")} - {"check"}
 
 

@@ -510,12 +510,14 @@ def test_a_folder_too_high(tmp_path):
 
 
 def test_a_file_that_is_no_recording(tmp_path):
-    (tmp_path / "a.mkv").write_bytes(b"video")
+    (tmp_path / "a.avi").write_bytes(b"video")
     with pytest.raises(FileFormatError, match="a recording is a folder"):
-        open_sequence(tmp_path / "a.mkv")
+        open_sequence(tmp_path / "a.avi")
 
 
-NAMES = "tum redwood 7-scenes 7_Scenes icl-nuim stray-scanner rosbag plain stanford images"
+NAMES = (
+    "tum redwood 7-scenes 7_Scenes icl-nuim stray-scanner rosbag record3d azure-kinect plain stanford images"
+)
 
 
 @pytest.mark.parametrize("name", NAMES.split())
@@ -533,7 +535,7 @@ def test_a_named_format_is_taken(tmp_path):
 
 
 def test_unknown_format_lists_the_known_ones(tmp_path):
-    with pytest.raises(ValueError, match=r"format must be one of 'rosbag', 'icl-nuim', .* got 'kitti'"):
+    with pytest.raises(ValueError, match=r"format must be one of 'rosbag', 'record3d', .* got 'kitti'"):
         open_sequence(tmp_path, format="kitti")
 
 

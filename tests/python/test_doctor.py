@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
 import os
 import subprocess
@@ -43,7 +44,7 @@ def test_a_wrong_library_fails_the_self_test(monkeypatch: pytest.MonkeyPatch) ->
 
 def test_a_missing_extra_comes_with_the_command_that_installs_it(monkeypatch: pytest.MonkeyPatch) -> None:
     requirements = ['typer>=0.15; extra == "cli"', 'no-such-thing>=1; extra == "view"', "numpy>=1.22"]
-    monkeypatch.setattr(module.importlib.metadata, "requires", lambda name: requirements)
+    monkeypatch.setattr(importlib.metadata, "requires", lambda name: requirements)
     found = module.extras()
     assert found["view"] == {"no-such-thing": None}
     assert found["cli"]["typer"]
@@ -53,9 +54,9 @@ def test_a_missing_extra_comes_with_the_command_that_installs_it(monkeypatch: py
 
 def test_an_uninstalled_copy_has_no_extras(monkeypatch: pytest.MonkeyPatch) -> None:
     def missing(name: str) -> list[str]:
-        raise module.importlib.metadata.PackageNotFoundError(name)
+        raise importlib.metadata.PackageNotFoundError(name)
 
-    monkeypatch.setattr(module.importlib.metadata, "requires", missing)
+    monkeypatch.setattr(importlib.metadata, "requires", missing)
     assert module.extras() == {}
 
 

@@ -69,6 +69,25 @@ def test_notebooks_get_a_picture(model: nacre.Model) -> None:
     assert nacre.Model(model.camera)._repr_png_() is None
 
 
+def test_notebooks_get_pictures_of_clouds_and_frames(model: nacre.Model) -> None:
+    opened = pytest.importorskip("PIL.Image").open
+    thin = nacre.consolidate(model.points, num_points=200, attributes={"normals": model.normals})
+    for cloud in (nacre.Cloud(model.points), nacre.Cloud(model.points[:2]), thin):
+        image = opened(io.BytesIO(cloud._repr_png_() or b""))
+        assert image.size == (480, 400)
+        assert np.asarray(image.convert("RGBA"))[..., 3].any()
+    assert nacre.Cloud(np.full((3, 3), np.nan))._repr_png_() is None
+
+    depth = np.full((600, 1000), np.nan, np.float32)
+    depth[:, 500:] = np.linspace(0.5, 1, 500)
+    frame = nacre.SequenceFrame(0, depth, model.camera, None, None, None)
+    shown = np.asarray(opened(io.BytesIO(frame._repr_png_() or b"")).convert("RGBA"))
+    assert shown.shape == (200, 334, 4)
+    assert (shown[:, :160, 3] == 0).all()
+    assert (shown[:, 170:, 3] == 255).all()
+    assert shown[0, 170, 0] > 200 > shown[0, -1, 0]  # near is yellow, far is violet
+
+
 def test_parameters_and_results_can_be_pickled(model: nacre.Model) -> None:
     report = pickle.loads(pickle.dumps(model.frames[1]))
     assert np.array_equal(report.world_from_camera, model.frames[1].world_from_camera)

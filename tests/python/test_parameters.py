@@ -217,7 +217,10 @@ def test_unknown_name_lists_the_names(name: str) -> None:
 
 
 def test_unknown_name_in_a_nested_mapping() -> None:
-    with pytest.raises(ValueError, match=r"'decay' in RegistrationParameters; it has method, .*gate_decay"):
+    with pytest.raises(
+        ValueError,
+        match=r"'decay' in RegistrationParameters \(did you mean 'gate_decay'\?\); it has .*gate_decay",
+    ):
         updated(nacre.ModelParameters(), {"registration": {"decay": 1.0}})
 
 

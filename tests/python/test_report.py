@@ -27,8 +27,10 @@ from nacre.report import (
 )
 from nacre.report.charts import MAX_VALUES, Mark, Series, grouped, line_chart, map_chart, stacked_chart, ticks
 from nacre.report.colormap import viridis
-from nacre.report.pictures import draw_depth, draw_model
-from nacre.report.text import flatten, label, quantity
+from nacre.report.depth_pictures import draw_depth
+from nacre.report.palette import encode_small_png, quantize
+from nacre.report.pictures import draw_model
+from nacre.report.text import flatten, label, quantity, ranges
 
 SPACE = "\N{NARROW NO-BREAK SPACE}"
 
@@ -152,6 +154,11 @@ class TestText:
     def test_quantities(self, value: Any, unit: str, expected: str) -> None:
         assert quantity(value, unit) == expected
 
+    def test_ranges_of_frames(self) -> None:
+        assert ranges([3]) == "frame 3"
+        assert ranges([5, 4, 9]) == "frames 4 to 5, 9"
+        assert ranges([*range(10, 20), 30, 32, 34, 36, 38]) == "frames 10 to 19, 30, 32, 34 and 2 more"
+
     def test_names(self) -> None:
         assert label("num_points") == "Points"
         assert label("rotation_rmse") == "Rotation RMSE"
@@ -238,7 +245,7 @@ def example_data(**changes: Any) -> ReportData:
         "source": 'a "made-up" recording',
         "frames": entries(12, lost=(7,)),
         "model": ModelCloud(points, points, np.full((3000, 3), 120, np.uint8), np.arange(3000.0)),
-        "depth": DepthExample(depth, after, np.isnan(after).astype(int), ("edge",), 3),
+        "depth": [DepthExample(depth, after, np.isnan(after).astype(int), ("edge",), 3)],
         "evaluation": {
             "Surface": SurfaceAccuracy(1.2e-4, 1e-4, 1e-4, 3e-4, 5e-4, -1e-5, 3000, np.zeros(3000)),
             "Cover": Completeness((0.001, 0.002, 0.005), (0.5, 0.75, 1.0), 1e-3, 2e-3, 3e-3, 1000),
@@ -265,9 +272,27 @@ def page() -> str:
 class TestPage:
     def test_it_stands_alone(self, page: str) -> None:
         check = PageCheck(page)
-        assert all(link.startswith("data:image/png;base64,") for link in check.links)
+        assert all(link.startswith(("data:image/png;base64,", "#")) for link in check.links)
         assert not {"script", "link", "iframe", "object"} & set(check.tags)
         assert not re.search(r"https?://|url\(|@import", page)
+
+    def test_links_lead_to_sections(self, page: str) -> None:
+        names = re.findall(r'href="#([\w-]+)"', page)
+        assert {"model", "depth", "trajectory", "frames", "time", "figures"} <= set(names)
+        assert all(f'id="{name}"' in page for name in names)
+
+    def test_those_who_do_not_see_it_are_told(self, page: str) -> None:
+        assert all(len(alt) > 10 for alt in re.findall(r'<img [^>]*alt="([^"]*)"', page))
+        assert 'aria-label="State of every frame: 11 TRACKED, 1 LOST; lost: frame 7"' in page
+        assert re.search(r'aria-label="position \[mm\] of every frame; [^"]*greatest', page)
+
+    def test_it_prints_light_and_without_what_only_a_screen_can_use(self, page: str) -> None:
+        style = page[page.index("<style>") : page.index("</style>")]
+        screen, printed = style.split("@media print")
+        assert "@media screen and (prefers-color-scheme: dark)" in screen
+        assert "size: A4" in printed
+        assert re.search(r"nav, details\.screen[^}]*display: none", printed)
+        assert "print-color-adjust: exact" in printed
 
     def test_text_is_escaped(self, page: str) -> None:
         check = PageCheck(page)
@@ -286,7 +311,8 @@ class TestPage:
         assert f"3{SPACE}000 points" in verdict
         assert "0.120 mm (RMS) from the reference" in verdict
         assert "off by 3.0" in verdict or "off by 2.9" in verdict
-        assert "A frame takes 13.0 ms" in verdict
+        assert "Good in parts; look at frame 7" in verdict
+        assert "13.0 ms" in text
         assert "75.0 %" in text
         assert "max_depth" in text
 
@@ -302,7 +328,7 @@ class TestPage:
 
     def test_lost_frames_are_marked(self, page: str) -> None:
         assert '<rect class="lost"' in page
-        assert 'class="verdict lost"' in page
+        assert 'class="verdict weak"' in page
         assert 'class="status-LOST"' in page
         tracked = render_page(ReportData("x", frames=entries(12)))
         assert '<rect class="lost"' not in tracked
@@ -325,7 +351,7 @@ class TestPage:
         short = render_page(ReportData("x", frames=entries(12)))
         long = render_page(ReportData("x", frames=entries(2000, lost=tuple(range(0, 2000, 7)))))
         PageCheck(long)
-        assert len(long) < 600_000
+        assert len(long) < 700_000
         assert len(short) < 100_000
         assert "means over 5 frames" in long
 
@@ -341,7 +367,7 @@ class TestPage:
             ),
             ReportData("x", model=ModelCloud(np.zeros((0, 3)))),
             ReportData("x", model=ModelCloud(np.full((4, 3), np.nan), np.zeros((4, 3)))),
-            ReportData("x", depth=DepthExample(np.zeros((4, 5)), np.full((4, 5), np.nan))),
+            ReportData("x", depth=[DepthExample(np.zeros((4, 5)), np.full((4, 5), np.nan))]),
             ReportData("x", parameters={"a": {}}, figures={"b": math.nan}),
         ],
     )
@@ -372,6 +398,24 @@ class TestPictures:
             draw_depth(DepthExample(np.ones((2, 2)), np.ones((2, 3))))
         with pytest.raises(ValueError, match=r"depth\.reasons"):
             draw_depth(DepthExample(np.ones((2, 2)), np.full((2, 2), np.nan), np.full((2, 2), 2), ("edge",)))
+
+    def test_few_colours_are_kept_as_they_are(self) -> None:
+        image = np.random.default_rng(0).integers(0, 4, (20, 30, 3), dtype=np.uint8) * 80
+        palette, indices = quantize(image)
+        np.testing.assert_array_equal(palette[indices], image)
+
+    def test_many_colours_become_close_ones(self) -> None:
+        u, v = np.meshgrid(np.arange(200), np.arange(150))
+        image = np.stack([u, v, (u + v) // 2], axis=2).astype(np.uint8)
+        palette, indices = quantize(image)
+        assert len(palette) == 256
+        assert np.abs(palette[indices].astype(int) - image).mean() < 4
+
+    def test_a_picture_is_no_larger_than_it_may_be(self) -> None:
+        noise = np.random.default_rng(0).integers(0, 256, (240, 320, 4), dtype=np.uint8)
+        assert len(encode_small_png(noise)) > 40_000
+        assert len(encode_small_png(noise, 40_000)) <= 40_000
+        assert sum(pictures._MAX_BYTES.values()) < 500_000
 
     def test_a_room_is_also_shown_from_its_cameras(self) -> None:
         ball = ModelCloud(sphere(3000), sphere(3000))

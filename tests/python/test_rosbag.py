@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -47,24 +48,26 @@ class Recorder:
     def close(self) -> None:
         self.writer.close()
 
-    def write(self, topic: str, kind: str, time: float, **fields: Any) -> None:
+    def write(self, topic: str, kind: str, time: float, tail: bytes = b"", **fields: Any) -> None:
         if topic not in self.connections:
             self.connections[topic] = self.writer.add_connection(topic, kind, typestore=self.types)
         message = self.types.types[kind](**fields)
         serialize = self.types.serialize_ros1 if self.version == 1 else self.types.serialize_cdr
-        self.writer.write(self.connections[topic], int(time * SECOND), serialize(message, kind))
+        self.writer.write(self.connections[topic], int(time * SECOND), bytes(serialize(message, kind)) + tail)
 
     def header(self, time: float) -> Any:
         stamp = self.types.types["builtin_interfaces/msg/Time"](int(time), int(time % 1 * SECOND))
         extra = {"seq": 0} if self.version == 1 else {}
         return self.types.types["std_msgs/msg/Header"](stamp=stamp, frame_id="camera", **extra)
 
-    def image(self, topic: str, time: float, pixels: np.ndarray, encoding: str, step: int = 0) -> None:
+    def image(
+        self, topic: str, time: float, pixels: np.ndarray, encoding: str, step: int = 0, tail: bytes = b""
+    ) -> None:
         row = pixels.reshape(len(pixels), -1).view(np.uint8)
         self.write(
             topic, "sensor_msgs/msg/Image", time, header=self.header(time), height=pixels.shape[0],
             width=pixels.shape[1], encoding=encoding, is_bigendian=0, step=step or row.shape[1],
-            data=row.reshape(-1),
+            data=row.reshape(-1), tail=tail,
         )  # fmt: skip
 
     def compressed(self, topic: str, time: float, data: bytes, format: str) -> None:
@@ -131,7 +134,8 @@ def test_the_units_of_a_realsense_recording(tmp_path: Path) -> None:
     recorder = Recorder(tmp_path / "d435.bag", 1)
     recorder.info("/device_0/sensor_0/Depth_0/info/camera_info")
     recorder.write("/device_0/sensor_0/option/Depth_Units/value", "std_msgs/msg/Float32", 1.0, data=0.0001)
-    recorder.image("/device_0/sensor_0/Depth_0/image/data", 1.0, depth_image(0) * 10, "mono16")
+    tail = struct.pack("<f", 0.0001)  # the recorder's, up to version 2.56 of the SDK
+    recorder.image("/device_0/sensor_0/Depth_0/image/data", 1.0, depth_image(0) * 10, "mono16", tail=tail)
     recorder.close()
     sequence = nacre.open_sequence(tmp_path / "d435.bag")
     assert sequence.depth_scale == pytest.approx(10000)
@@ -176,6 +180,35 @@ def test_rows_may_be_padded_and_channels_swapped(tmp_path: Path) -> None:
     assert frame.depth[-1, -1] == pytest.approx(0.7)
     assert frame.color is not None
     assert frame.color[0, 0].tolist() == [200, 0, 3]
+
+
+def test_pixels_of_no_confidence_are_masked(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "l515.bag", 1)
+    recorder.info("/device_0/sensor_0/Depth_0/info/camera_info")
+    recorder.image("/device_0/sensor_0/Depth_0/image/data", 1.0, depth_image(0), "mono16")
+    confidence = np.full((HEIGHT, WIDTH), 240, np.uint8)
+    confidence[:, :10] = 0
+    recorder.image("/device_0/sensor_0/Confidence_0/image/data", 1.001, confidence, "8UC1")
+    recorder.close()
+    frame = nacre.open_sequence(tmp_path / "l515.bag")[0]
+    assert frame.color is None
+    assert frame.mask is not None
+    assert not frame.mask[:, :10].any()
+    assert frame.mask[:, 10:].all()
+
+
+@pytest.mark.parametrize(("fx", "are_used"), [(60.2, True), (90.0, False)])
+def test_colours_of_another_camera_do_not_lie_over_depth(
+    fx: float, are_used: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    recorder = Recorder(tmp_path / "d435.bag", 1)
+    recorder.info("/device_0/sensor_0/Depth_0/info/camera_info", 60.0)
+    recorder.info("/device_0/sensor_1/Color_0/info/camera_info", fx)
+    recorder.image("/device_0/sensor_0/Depth_0/image/data", 1.0, depth_image(0), "mono16")
+    recorder.image("/device_0/sensor_1/Color_0/image/data", 1.0, color_image(0), "rgb8")
+    recorder.close()
+    assert nacre.open_sequence(tmp_path / "d435.bag").has_color == are_used
+    assert ("its camera is not that of" in caplog.text) != are_used
 
 
 class TestBroken:

@@ -93,3 +93,13 @@ def test_without_depth_images(tmp_path: Path) -> None:
         path.unlink()
     with pytest.raises(nacre.FileFormatError, match="needs depth images in depth/"):
         nacre.open_sequence(folder)
+
+
+@pytest.mark.parametrize("lacking", ["camera_matrix.csv", "depth"])
+def test_a_folder_that_is_almost_one(lacking: str, tmp_path: Path) -> None:
+    folder = write(tmp_path / "r")
+    (folder / lacking).rename(tmp_path / "elsewhere")
+    with pytest.raises(
+        nacre.FileFormatError, match=f"almost a Stray Scanner recording: {lacking}/? is missing"
+    ):
+        nacre.open_sequence(folder)

@@ -60,6 +60,17 @@ class TestStory:
         assert story.snapshot_at(0) is story.snapshots[0][1]
         assert story.snapshot_at(99) is story.snapshots[-1][1]
 
+    def test_older_states_keep_fewer_points(self) -> None:
+        story = viewer.Story("x", None, max_points=20)
+        for i in range(3):
+            story.add(viewer.Moment(i, "TRACKED"))
+            story.set_snapshot(snapshot(50))
+        assert [len(cloud.points) for _, cloud in story.snapshots] == [17, 17, 50]
+        thin = story.snapshots[0][1]
+        assert thin.confidence is not None
+        assert len(thin.normals) == len(thin.confidence) == 17
+        assert thin.spacing == pytest.approx(0.1 * 3**0.5)
+
     def test_a_lost_frame_is_drawn_where_the_camera_was_last_known(self) -> None:
         story = viewer.Story("x", None)
         pose = np.eye(4)
@@ -100,6 +111,27 @@ class TestColors:
 
         colors = point_colors(snapshot(), "confidence").astype(int).sum(axis=1)
         assert colors[-1] > colors[0]
+
+    def test_the_ends_of_the_colours_are_told(self) -> None:
+        from nacre.viewer.page import color_bar
+
+        assert "2.0" in color_bar(snapshot(), "confidence")
+        assert "49 observations" in color_bar(snapshot(), "confidence")
+        assert "green: up" in color_bar(snapshot(), "normal")
+
+    def test_the_view_begins_at_what_is_best_known(self) -> None:
+        from nacre.viewer.scene import core, extent
+
+        far = snapshot(400)
+        near = 0.1 * far.points[:100]
+        cloud = viewer.Snapshot(
+            np.concatenate([near, far.points[100:]]),
+            far.normals,
+            0.1,
+            confidence=np.r_[np.full(100, 9.0), np.ones(300)],
+        )
+        np.testing.assert_array_equal(core(cloud), near)
+        assert extent(cloud) < 0.2 * extent(far)
 
     def test_removed_pixels_are_marked(self) -> None:
         from nacre.viewer.depth_picture import depth_picture

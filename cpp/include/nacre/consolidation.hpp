@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "nacre/types.hpp"
@@ -32,6 +33,8 @@ struct ConsolidateOptions {
   Theta theta = Theta::huang;
   std::uint64_t seed = 0;  ///< of the choice of the first samples
   int num_threads = 0;     ///< 0: all
+  /// Told how many of the iterations are done; false ends it there.
+  std::function<bool(int done, int total)> progress;
 
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };
@@ -42,6 +45,7 @@ struct BasicConsolidated {
   PointMatrix points;
   Attributes attributes;              ///< one row a point: means of the input's, with the last attraction's weights
   std::vector<std::int64_t> sources;  ///< the input point that each point started from
+  int iterations = 0;                 ///< that were done; where progress ended it, attributes are the sources' own
 };
 
 /// Of float coordinates.

@@ -79,7 +79,7 @@ NACRE_INLINE void find_steps(const float* centre, ptrdiff_t stride, float* small
                              step_between(p[2 * stride], p[3 * stride]));
     const Steps along = join({along_flat[i], along_smallest[i]}, {along_flat[i + 3], along_smallest[i + 3]});
     const Steps all = join(along, join(above, below));
-    smallest[i] = (all.num_flat >= 2.0F * fit_radius) & (all.smallest < INFINITY) ? all.smallest : 0.0F;
+    smallest[i] = ((all.num_flat >= 2.0F * fit_radius) & (all.smallest < INFINITY)) ? all.smallest : 0.0F;
   }
 }
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import logging
 import os
+import re
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated
 
 import typer
@@ -22,15 +23,7 @@ from nacre.cli.reconstruct import reconstruct
 from nacre.cli.simulate import simulate
 from nacre.cli.terminal import CommandError, set_verbosity
 from nacre.cli.view import view
-from nacre.errors import FileFormatError
-
-app = typer.Typer(
-    name="nacre",
-    no_args_is_help=True,
-    rich_markup_mode="rich",
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
+from nacre.errors import CameraError, FileFormatError, meant
 
 
 def _version(wanted: bool) -> None:
@@ -41,9 +34,6 @@ def _version(wanted: bool) -> None:
         raise typer.Exit
 
 
-@app.callback(
-    epilog="New here? Run [bold]nacre demo[/bold]. Every command explains itself: nacre COMMAND --help."
-)
 def _nacre(
     version: Annotated[
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
@@ -52,34 +42,60 @@ def _nacre(
     """Grow a 3D model of an object or a scene from depth-camera images."""
 
 
-for command, example in (
-    (demo, "nacre demo -o nacre-demo"),
-    (reconstruct, "nacre reconstruct rgbd_dataset_freiburg3_teddy -o teddy"),
-    (view, "nacre view teddy"),
-    (mesh, "nacre mesh teddy -o teddy-mesh.ply"),
-    (
-        simulate,
-        "nacre simulate bunny.ply -o bunny-recording --views 12 --step 30 --noise 0.0005 --orthographic",
+EXAMPLES: dict[Callable[..., None], str] = {
+    demo: "nacre demo -o nacre-demo",
+    reconstruct: "nacre reconstruct rgbd_dataset_freiburg3_teddy -o teddy",
+    view: "nacre view teddy",
+    mesh: "nacre mesh teddy -o teddy-mesh.ply",
+    simulate: (
+        "nacre simulate bunny.ply -o bunny-recording --views 12 --step 30 --noise 0.0005 --orthographic"
     ),
-    (evaluate, "nacre evaluate out/model.ply bunny.ply"),
-    (align, "nacre align scan2.ply scan1.ply -o moved.ply"),
-    (consolidate, "nacre consolidate noisy.ply thin.ply --radius 0.008 --num-points 2000"),
-    (info, "nacre info rgbd_dataset_freiburg3_teddy"),
-    (doctor, "nacre doctor --json"),
-):
-    paragraphs = (" ".join(text.split()) for text in (command.__doc__ or "").split("\n\n"))
-    app.command(
-        help="\n\n".join(paragraphs),
-        epilog=f"Example: [bold]{example}[/bold]",
-        no_args_is_help=command not in (demo, doctor),
-    )(command)
+    evaluate: "nacre evaluate out/model.ply bunny.ply",
+    align: "nacre align scan2.ply scan1.ply -o moved.ply",
+    consolidate: "nacre consolidate noisy.ply thin.ply --radius 0.008 --num-points 2000",
+    info: "nacre info rgbd_dataset_freiburg3_teddy",
+    doctor: "nacre doctor --json",
+}
+
+
+def make_app(only: str | None = None) -> typer.Typer:
+    """Return the command line; with ``only`` the other commands are there by name and summary alone."""
+    app = typer.Typer(
+        name="nacre",
+        no_args_is_help=True,
+        rich_markup_mode="rich",
+        pretty_exceptions_enable=False,
+        context_settings={"help_option_names": ["-h", "--help"]},
+    )
+    app.callback(
+        epilog="New here? Run [bold]nacre demo[/bold]. Every command explains itself: nacre COMMAND --help."
+    )(_nacre)
+    for command, example in EXAMPLES.items():
+        paragraphs = (" ".join(text.split()) for text in (command.__doc__ or "").split("\n\n"))
+        app.command(
+            command.__name__,
+            help="\n\n".join(paragraphs),
+            epilog=f"Example: [bold]{example}[/bold]",
+            no_args_is_help=command not in (demo, doctor),
+        )(command if only in (None, command.__name__) else _not_asked_for)
+    return app
+
+
+def _not_asked_for() -> None:
+    """Stand for a command in the list of commands: typer takes ten milliseconds to build a real one."""
+
+
+app = make_app()
 
 
 def run(arguments: Sequence[str] | None = None) -> int:
     """Run a command and return its exit code; whatever goes wrong is told in one line."""
     set_verbosity(0)
+    words = sys.argv[1:] if arguments is None else arguments
+    command = next((word for word in words if not word.startswith("-")), "")
     try:
-        return app(arguments, prog_name="nacre", standalone_mode=False) or 0
+        wanted = app if "_NACRE_COMPLETE" in os.environ else make_app(only=command)
+        return wanted(arguments, prog_name="nacre", standalone_mode=False) or 0
     except Exception as error:
         message, code = explain(error)
         if message:
@@ -95,15 +111,17 @@ def explain(error: Exception) -> tuple[str, int]:
     """Return what to say about an error, and the exit code."""
     if hasattr(error, "format_message"):  # the parser's: wrong usage, or help where arguments are missing
         context = getattr(error, "ctx", None)
-        message = error.format_message()
+        message = error.format_message().replace("Value error, ", "")
         if type(error).__name__ == "NoArgsIsHelpError":
             print(message)
             return "", 0 if context is not None and context.parent is None else 2
         hint = f" (see {context.command_path} --help)" if context is not None else ""
-        return message.rstrip(".") + hint, 2
+        choice = re.search(r"(\S+) is not one of (.+)", message)
+        near = meant(choice[1].strip("'"), re.findall(r"'([^']+)'", choice[2])) if choice else ""
+        return message.rstrip(".") + near + hint, 2
     if isinstance(error, CommandError):
         return str(error), error.code
-    if isinstance(error, FileFormatError):
+    if isinstance(error, (CameraError, FileFormatError)):
         return str(error), 1
     if isinstance(error, OSError):
         name = f": {os.fspath(error.filename)}" if error.filename is not None else ""

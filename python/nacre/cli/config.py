@@ -41,10 +41,23 @@ ConfigOption = Annotated[
         help="Parameters from a TOML file with tables such as \\[registration], \\[depth], \\[fusion].",
     ),
 ]
+
+
+def complete_parameter(incomplete: str) -> list[str]:
+    """Return the parameters that begin so, for the shell."""
+    from nacre.model import ModelParameters
+
+    names = (name for name, _ in _leaves(dataclasses.asdict(ModelParameters())))
+    return [f"{name}=" for name in names if name.startswith(incomplete)]
+
+
 SetOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--set", metavar="KEY=VALUE", help="One parameter, e.g. registration.max_angle=0.5. May be repeated."
+        "--set",
+        metavar="KEY=VALUE",
+        help="One parameter, e.g. registration.max_angle=0.5. May be repeated.",
+        autocompletion=complete_parameter,
     ),
 ]
 

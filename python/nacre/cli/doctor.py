@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.metadata
 import os
 import platform
 import re
@@ -46,10 +45,12 @@ _NESTED = ("environment", "extras", "self_test")
 
 def extras() -> dict[str, dict[str, str | None]]:
     """Return, for each extra for users, its packages and their versions; None where one is missing."""
+    from importlib import metadata
+
     found: dict[str, dict[str, str | None]] = {}
     try:
-        requirements = importlib.metadata.requires("nacre") or []
-    except importlib.metadata.PackageNotFoundError:
+        requirements = metadata.requires("nacre") or []
+    except metadata.PackageNotFoundError:
         return found
     for requirement in requirements:
         match = re.match(r"([\w.-]+).*extra\s*==\s*['\"](\w+)['\"]", requirement)
@@ -58,8 +59,8 @@ def extras() -> dict[str, dict[str, str | None]]:
         if "python_version" in requirement and sys.version_info >= (3, 11):
             continue
         try:
-            version: str | None = importlib.metadata.version(match[1])
-        except importlib.metadata.PackageNotFoundError:
+            version: str | None = metadata.version(match[1])
+        except metadata.PackageNotFoundError:
             version = None
         found.setdefault(match[2], {})[match[1]] = version
     return found

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from nacre.cli.feed import is_camera, open_camera
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
 from nacre.cli.surfaces import MESH_SUFFIXES, POINT_SUFFIXES, has_faces
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
@@ -17,7 +18,9 @@ Rows = list[tuple[str, str]]
 def info(
     source: Annotated[
         Path,
-        typer.Argument(metavar="SOURCE", help="A recording, a point file or a mesh.", show_default=False),
+        typer.Argument(
+            metavar="SOURCE", help="A recording, a point file, a mesh, or realsense.", show_default=False
+        ),
     ],
     format: FormatOption = None,
     camera: CameraOption = None,
@@ -26,11 +29,16 @@ def info(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Tell what is in a recording, a point file or a mesh."""
+    """Tell what is in a recording, a point file or a mesh, or what a camera is (realsense)."""
     terminal = Terminal(json, quiet, verbose)
+    if is_camera(source):
+        terminal.answer(*_camera(source))
+        return
     if not source.exists():
         raise CommandError(f"no such file or folder: {source}", 2)
-    if source.is_dir() or source.suffix.lower() == ".bag" or format is not None:
+    from nacre.datasets.detect import FILE_SUFFIXES
+
+    if source.is_dir() or source.suffix.lower() in FILE_SUFFIXES or format is not None:
         figures, rows = _recording(open_source(source, format, camera, depth_scale))
     elif source.suffix.lower() in POINT_SUFFIXES and not (
         source.suffix.lower() == ".ply" and has_faces(source)
@@ -45,10 +53,30 @@ def info(
         figures, rows = _mesh(source)
     else:
         known = ", ".join(dict.fromkeys(POINT_SUFFIXES + MESH_SUFFIXES))
+        recordings = ", ".join(FILE_SUFFIXES)
         raise CommandError(
-            f"{source}: neither a recording (a folder) nor a file of points or triangles ({known})", 2
+            f"{source}: neither a recording (a folder, {recordings}) nor points or triangles ({known})", 2
         )
     terminal.answer(figures, rows)
+
+
+def _camera(source: Path) -> tuple[dict[str, Any], Rows]:
+    camera = open_camera(source)
+    try:
+        frame = next(iter(camera))
+    finally:
+        camera.close()
+    figures = {
+        "kind": "camera", "name": camera.name, "serial": camera.serial, "depth_scale": camera.depth_scale,
+        "color": frame.color is not None, "confidence": frame.mask is not None,
+    }  # fmt: skip
+    return figures, [
+        ("camera", f"{camera.name}, serial number {camera.serial}"),
+        ("depth", describe_camera(camera.camera)),
+        ("depth scale", f"{camera.depth_scale:g} stored units per metre"),
+        ("colour", "yes" if frame.color is not None else "no"),
+        ("confidence", "yes" if frame.mask is not None else "no"),
+    ]
 
 
 def _recording(sequence: Any) -> tuple[dict[str, Any], Rows]:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_file
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_file, written_file
 
 
 def mesh(
@@ -40,7 +40,7 @@ def mesh(
     from nacre import read_points, write_mesh
     from nacre.meshing import mesh_points
 
-    path = source / "model.ply" if source.is_dir() else source
+    path = written_file(source, "model.ply") if source.is_dir() else source
     target = writable_file(out or path.with_name("mesh.ply"))
     if target.suffix.lower() != ".ply":
         raise CommandError(f"meshes are written to .ply files, got {target}", 2)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,6 +11,7 @@ import typer
 
 from nacre.cli.calibrating import run_calibrated
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
+from nacre.cli.feed import LiveFeed, camera_feed, is_camera, real_time_feed
 from nacre.cli.results import file_rows, trajectory_rows, write_results
 from nacre.cli.running import retry_lost, run_frames
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
@@ -22,7 +24,12 @@ if TYPE_CHECKING:
 
 def reconstruct(
     source: Annotated[
-        Path, typer.Argument(metavar="SOURCE", help="The recording: a folder or a .bag.", show_default=False)
+        Path,
+        typer.Argument(
+            metavar="SOURCE",
+            help="The recording: a folder or a file; or a camera: realsense, realsense:SERIAL.",
+            show_default=False,
+        ),
     ],
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.", show_default=False)
@@ -63,6 +70,12 @@ def reconstruct(
     last: Annotated[
         int | None, typer.Option(min=0, metavar="INDEX", help="The last frame.", show_default="all")
     ] = None,
+    realtime: Annotated[
+        bool,
+        typer.Option(
+            "--realtime", help="Play the recording as a camera would; frames that come too fast are dropped."
+        ),
+    ] = False,
     color: Annotated[bool, typer.Option("--color/--no-color", help="Give the model colours.")] = True,
     retry: Annotated[
         bool,
@@ -104,9 +117,12 @@ def reconstruct(
     """
     Make a model from a recording of a depth camera.
 
-    The recording may be TUM RGB-D, Redwood/Open3D, 7-Scenes, ICL-NUIM, ROS 1 or 2 (RealSense too), Stray
-    Scanner, Stanford range scans, a plain recording (camera.json and depth/), or a folder of depth images
-    with --camera and --depth-scale; its format is recognised.
+    The recording may be TUM RGB-D, Redwood/Open3D, 7-Scenes, ICL-NUIM, ROS 1 or 2 (MCAP and RealSense too),
+    Record3D, Stray Scanner, images of an Azure Kinect, Stanford range scans, a plain recording (camera.json
+    and depth/), or a folder of depth images with --camera and --depth-scale; its format is recognised.
+
+    SOURCE realsense is a camera: it runs until Ctrl-C or --last, and OUT/recording keeps what was used.
+    Where frames come faster than they can be registered, the oldest are dropped and counted.
 
     OUT gets model.ply (points with normals, in the first camera's frame), trajectory.txt, report.json and
     report.html. A frame that cannot be read or registered is LOST and changes nothing.
@@ -122,26 +138,38 @@ def reconstruct(
     more |= {f"region.{side}": value for side, value in zip(sides, box or (), strict=box is not None)}
     more["region.object"] = object or None
     parameters, preset_name = model_parameters(preset, config, settings, **more)
-    sequence = open_source(source, format, camera, depth_scale)
-    if masks is not None:
-        sequence = sequence.with_masks(masks)
-    for text in attribute or ():
-        name, equals, folder = text.partition("=")
-        if not (name and equals and folder):
-            raise CommandError(f"--attribute needs NAME=FOLDER, got {text!r}", 2)
-        sequence = sequence.with_attribute(name, folder)
-    if not color:
-        sequence = sequence.without_color()
-    indices = range(len(sequence))[first : None if last is None else last + 1 : every]
-    if not indices:
-        raise CommandError(f"no frames are left of {len(sequence)} (0 to {len(sequence) - 1})", 2)
+    feed: LiveFeed | None = None
+    pick = (first, None if last is None else last + 1, every)
+    if is_camera(source):
+        given = {"--format": format, "--camera": camera, "--depth-scale": depth_scale, "--masks": masks}
+        for option, value in (given | {"--attribute": attribute, "--realtime": realtime or None}).items():
+            if value is not None:
+                raise CommandError(f"{option} is for recordings, and {source} is a camera", 2)
+        feed = camera_feed(source, writable_folder(out), color, pick)
+        sequence, words = feed.sequence, f"live, {describe_camera(feed.sequence.camera)}"
+    else:
+        sequence = open_source(source, format, camera, depth_scale)
+        if masks is not None:
+            sequence = sequence.with_masks(masks)
+        for text in attribute or ():
+            name, equals, folder = text.partition("=")
+            if not (name and equals and folder):
+                raise CommandError(f"--attribute needs NAME=FOLDER, got {text!r}", 2)
+            sequence = sequence.with_attribute(name, folder)
+        if not color:
+            sequence = sequence.without_color()
+        indices = range(len(sequence))[slice(*pick)]
+        if not indices:
+            raise CommandError(f"no frames are left of {len(sequence)} (0 to {len(sequence) - 1})", 2)
+        words = describe(sequence, indices)
+        if realtime:
+            feed = real_time_feed(sequence, indices)
     import nacre
     from nacre.depth_calibration import can_calibrate
     from nacre.reconstruction import Reconstruction
 
     done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
     writable_folder(out)
-    words = describe(sequence, indices)
     terminal.say(f"{sequence.name}: {words}")
     live = None
     if view:
@@ -152,7 +180,12 @@ def reconstruct(
     # What turns before a camera that stands still is not one scene with what is around it.
     whole = masks is None and parameters.region == nacre.RegionParameters()
     calibration = None
-    if calibrate and whole and preset_name != "paper" and can_calibrate(sequence.camera):
+    if feed is not None:
+        with closing(feed):
+            interrupted = run_frames(terminal, done, feed, watch=live.add if live else None)
+        # Who stops a camera is content with what it saw.
+        interrupted = interrupted and not feed.is_camera
+    elif calibrate and whole and preset_name != "paper" and can_calibrate(sequence.camera):
         done, calibration, interrupted = run_calibrated(terminal, done, sequence, indices, live)
     else:
         interrupted = run_frames(terminal, done, indices, watch=live.add if live else None)
@@ -163,18 +196,21 @@ def reconstruct(
         out,
         done,
         title=sequence.name,
-        source=words,
+        source=words if feed is None else f"{words}; {feed.summary}",
         document={
             "recording": recording(sequence),
             "preset": preset_name,
             "interrupted": interrupted,
             "depth_calibration": calibration
             and dataclasses.asdict(calibration) | {"used": calibration.is_significant},
+            "live": None if feed is None else feed.figures,
         },
+        figures=None if feed is None else dict(feed.rows),
     )
     if json:
         print(to_json(report))
-    terminal.say(table([*trajectory_rows(done), *file_rows(out)]))
+    rows = [] if feed is None else feed.rows
+    terminal.say(table([*trajectory_rows(done), *rows, *file_rows(out)]))
     if live is not None:
         live.finish()
         if not interrupted:
@@ -186,10 +222,14 @@ def reconstruct(
             f"interrupted after {len(done.frames)} of {len(indices)} frames; what there is was written"
         )
         raise typer.Exit(130)
+    if feed is not None and feed.error is not None:
+        raise CommandError(f"{feed.error}; what there is was written")
     if done.num_tracked == 0:
         reasons = list(dict.fromkeys(frame.reason for frame in done.frames))
         others = " (and other reasons)" * (len(reasons) > 1)
-        raise CommandError(f"every frame was lost: {reasons[0]}{others}")
+        raise CommandError(
+            f"every frame was lost: {reasons[0]}{others}; nacre info {source} looks at its depth"
+        )
 
 
 def describe(sequence: Sequence, indices: range) -> str:

@@ -46,7 +46,9 @@ def write_results(
     )
     trajectory = done.trajectory
     nacre.write_trajectory(folder / "trajectory.txt", trajectory.timestamps, trajectory.poses)
-    page = render_page(done.report_data(title, source, figures))
+    page = render_page(
+        done.report_data(title, source, figures, interrupted=bool(document.get("interrupted")))
+    )
     _write(folder / "report.html", page.encode())
     if pictures:
         _write_pictures(folder / "pictures", page)
@@ -63,10 +65,10 @@ def _write(path: Path, data: bytes) -> None:
 
 
 def _write_pictures(folder: Path, page: str) -> None:
-    """Write the pictures that a page holds as PNG files, named by their captions."""
+    """Write the pictures that a page holds as PNG files, as they are named there."""
     folder.mkdir(exist_ok=True)
-    for data, caption in re.findall(r'<img src="data:image/png;base64,([^"]+)" alt="([^"]+)"', page):
-        name = re.sub(r"\W+", "-", caption.lower()).strip("-")
+    pattern = r'<img src="data:image/png;base64,([^"]+)"[^>]* data-name="([^"]+)"'
+    for data, name in reversed(re.findall(pattern, page)):  # of pictures of one name the first stays
         _write(folder / f"{_PICTURE_NAMES.get(name, name)}.png", base64.b64decode(data))
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import logging
+import re
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sized
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
@@ -13,8 +13,6 @@ from nacre.cli.terminal import CommandError, Terminal
 
 if TYPE_CHECKING:
     from nacre.reconstruction import FrameRecord, Reconstruction
-
-_log = logging.getLogger(__name__)
 
 
 class Interruption:
@@ -47,19 +45,18 @@ def interruptible() -> Iterator[Interruption]:
 def run_frames(
     terminal: Terminal,
     done: Reconstruction,
-    indices: Sequence[int],
+    indices: Iterable[int],
     until: Callable[[FrameRecord], bool] | None = None,
     watch: Callable[[FrameRecord], None] | None = None,
 ) -> bool:
     """Run frames, show each to who watches, at most until one says so; return whether Ctrl-C stopped it."""
     accepted = any(frame.report is not None for frame in done.frames)
-    with interruptible() as interruption, terminal.progress("frames", len(indices)) as advance:
+    total = len(indices) if isinstance(indices, Sized) else None
+    with interruptible() as interruption, terminal.progress("frames", total) as advance:
         for frame in done.run(indices):
             if frame.refused and not accepted:
-                raise CommandError(f"frame {frame.index}: {advice(frame.reason)}")
+                raise CommandError(f"frame {frame.index}: {advice(frame.reason, done.sequence)}")
             accepted |= frame.report is not None
-            if frame.status in ("LOST", "WEAK"):
-                _log.info("frame %d: %s: %s", frame.index, frame.status, frame.reason)
             if watch is not None:
                 watch(frame)
             lost = done.counts["LOST"]
@@ -75,15 +72,23 @@ def retry_lost(terminal: Terminal, done: Reconstruction) -> bool:
     if not num_lost:
         return False
     with interruptible() as interruption, terminal.progress("lost frames", num_lost) as advance:
-        for frame in done.retry_lost():
-            if frame.world_from_camera is not None:
-                _log.info("frame %d: found after all", frame.index)
+        for _ in done.retry_lost():
             advance(f"{num_lost - done.counts['LOST']} found")
             if interruption.wanted:
                 break
     return interruption.wanted
 
 
-def advice(reason: str) -> str:
-    """Return a message of the library in the words of the command line."""
-    return reason.replace("check depth_scale,", "give --depth-scale,").replace("depth_scale", "--depth-scale")
+def advice(reason: str, recording: object = None) -> str:
+    """Return a message of the library in the words of the command line, with a depth scale that fits."""
+    words = reason.replace("check depth_scale,", "give --depth-scale,").replace(
+        "depth_scale", "--depth-scale"
+    )
+    found = re.search(r"got a median of ([\d.e+-]+) m", reason)
+    scale = getattr(recording, "depth_scale", None)
+    if found is None or scale is None:
+        return words
+    stored = float(found[1]) * scale
+    fitting = [f"{s:g} ({stored / s:.2g} m)" for s in (1, 1000, 5000, 10000, 1e6) if 0.2 < stored / s < 10]
+    tried = f"; it was read with {scale:g}"
+    return words + tried + (f", and would make sense with {' or '.join(fitting)}" if fitting else "")

@@ -14,10 +14,21 @@ if TYPE_CHECKING:
     from nacre import Camera
     from nacre.datasets import Sequence
 
+
+def complete_format(incomplete: str) -> list[str]:
+    """Return the formats that begin so, for the shell."""
+    from nacre.datasets.detect import READERS
+
+    return [name for name in READERS if name.startswith(incomplete)]
+
+
 FormatOption = Annotated[
     str | None,
     typer.Option(
-        help="tum, redwood, 7-scenes, icl-nuim, plain, stanford or images.", show_default="recognised"
+        autocompletion=complete_format,
+        help="tum, redwood, 7-scenes, icl-nuim, rosbag, record3d, stray-scanner, azure-kinect, plain, "
+        "stanford or images.",
+        show_default="recognised",
     ),
 ]
 CameraOption = Annotated[

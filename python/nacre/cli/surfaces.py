@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import numpy.typing as npt
-
 from nacre.cli.terminal import CommandError
 
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
     from nacre import Mesh
     from nacre.evaluation import SurfaceSamples
     from nacre.evaluation.result import Result
 
-Array = npt.NDArray[Any]
+    Array = npt.NDArray[Any]
 
 MESH_SUFFIXES = (".ply", ".obj", ".off", ".stl")
 POINT_SUFFIXES = (".ply", ".pcd")

@@ -69,8 +69,8 @@ class Terminal:
             print(table(rows))
 
     @contextmanager
-    def progress(self, description: str, total: int) -> Iterator[Callable[[str], None]]:
-        """Show a bar on stderr, where that is a terminal; yields what advances it."""
+    def progress(self, description: str, total: int | None) -> Iterator[Callable[[str], None]]:
+        """Show a bar on stderr, where that is a terminal; yields what advances it. None: nobody knows."""
         if self.quiet or not sys.stderr.isatty():
             yield lambda note: None
             return
@@ -102,6 +102,15 @@ def table(rows: Sequence[tuple[str, str]]) -> str:
     """Return names and values in two columns."""
     width = max((len(name) for name, _ in rows), default=0)
     return "\n".join(f"{name:<{width}}  {value}".rstrip() for name, value in rows)
+
+
+def written_file(folder: Path, name: str) -> Path:
+    """Return a file that ``nacre reconstruct`` writes, or say that this is not one of its folders."""
+    path = folder / name
+    if not path.is_file():
+        what = f"{folder} has no {name}" if folder.is_dir() else f"there is no folder {folder}"
+        raise CommandError(f"{what}; give the folder that nacre reconstruct wrote to (its -o)", 2)
+    return path
 
 
 def writable_folder(path: Path) -> Path:

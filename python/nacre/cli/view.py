@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from nacre.cli.terminal import Quiet, Terminal, Verbose, table
+from nacre.cli.terminal import Quiet, Terminal, Verbose, table, written_file
 
 PortOption = Annotated[
     int, typer.Option(min=0, max=65535, metavar="PORT", help="Where the viewer listens; the next free one.")
@@ -24,6 +24,10 @@ def view(
             metavar="FILE", help="Write a page that opens without a server instead.", show_default=False
         ),
     ] = None,
+    rrd: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write a file for the Rerun viewer instead.", show_default=False),
+    ] = None,
     port: PortOption = 8080,
     quiet: Quiet = False,
     verbose: Verbose = 0,
@@ -32,15 +36,21 @@ def view(
     Look at a reconstruction in the browser.
 
     The page shows the model, coloured by shading, normal, confidence or age, the camera's path, and for
-    each frame its depth image with removed pixels marked, and its figures. It needs the extra "view".
+    each frame its depth image with removed pixels marked, and its figures. It needs the extra "view",
+    and --rrd the extra "rerun".
     """
     terminal = Terminal(False, quiet, verbose)
-    from nacre.viewer import Viewer, export_html, written_story
+    from nacre.viewer import Viewer, export_html, export_rrd, written_story
 
+    written_file(folder, "report.json")
     story = written_story(folder)
     if html is not None:
         export_html(story, html)
         terminal.say(table([("page", str(html))]))
+    if rrd is not None:
+        export_rrd(story, rrd)
+        terminal.say(table([("Rerun", str(rrd))]))
+    if html is not None or rrd is not None:
         return
     viewer = Viewer(story, port=port)
     terminal.say(f"the model is at {viewer.url}; Ctrl-C ends it")

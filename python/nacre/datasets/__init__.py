@@ -1,7 +1,39 @@
-"""Recordings of depth cameras: one reader for each format behind :func:`open_sequence`."""
+"""Recordings of depth cameras: one reader for each format behind :func:`open_sequence`; and live cameras."""
+
+import importlib
+from typing import TYPE_CHECKING, Any
 
 from nacre.datasets.detect import open_sequence
 from nacre.datasets.plain import write_recording
 from nacre.datasets.sequence import Sequence, SequenceFrame
 
-__all__ = ["Sequence", "SequenceFrame", "open_sequence", "write_recording"]
+if TYPE_CHECKING:
+    from nacre.datasets.growing import GrowingRecording
+    from nacre.datasets.live import LiveQueue
+    from nacre.datasets.real_time import in_real_time
+    from nacre.datasets.realsense import RealSense
+
+__all__ = [
+    "GrowingRecording",
+    "LiveQueue",
+    "RealSense",
+    "Sequence",
+    "SequenceFrame",
+    "in_real_time",
+    "open_sequence",
+    "write_recording",
+]
+
+_LIVE = {
+    "GrowingRecording": "growing",
+    "LiveQueue": "live",
+    "RealSense": "realsense",
+    "in_real_time": "real_time",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Import what live cameras need only when it is asked for."""
+    if name in _LIVE:
+        return getattr(importlib.import_module(f"nacre.datasets.{_LIVE[name]}"), name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -10,9 +10,11 @@ from typing import NamedTuple
 
 from nacre._core import Camera
 from nacre.datasets import (
+    azure_kinect,
     icl_nuim,
     images,
     plain,
+    record3d,
     redwood,
     rosbag,
     seven_scenes,
@@ -23,9 +25,9 @@ from nacre.datasets import (
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files
 from nacre.datasets.sequence import Sequence, check_first_view
-from nacre.errors import FileFormatError
+from nacre.errors import FileFormatError, meant
 from nacre.io.cameras import read_camera
-from nacre.io.images import DEPTH_SUFFIXES
+from nacre.io.images import COLOR_SUFFIXES, DEPTH_SUFFIXES
 
 
 class Reader(NamedTuple):
@@ -39,8 +41,13 @@ class Reader(NamedTuple):
 # The first that recognises a folder opens it.
 READERS = {
     module.FORMAT: Reader(module.LAYOUT, module.recognise, module.read)
-    for module in (rosbag, icl_nuim, tum, stray_scanner, plain, seven_scenes, stanford, redwood, images)
-}
+    for module in (
+        rosbag, record3d, azure_kinect, icl_nuim, tum, stray_scanner, plain, seven_scenes, stanford, redwood,
+        images,
+    )
+}  # fmt: skip
+# Recordings that are one file; .ply may be a range scan or a point file.
+FILE_SUFFIXES = (*rosbag.SUFFIXES, *record3d.SUFFIXES, *azure_kinect.SUFFIXES)
 
 
 def open_sequence(
@@ -57,11 +64,12 @@ def open_sequence(
     Parameters
     ----------
     path : path-like
-        The folder of the recording, a ``.bag`` file, or a single range scan.
+        The folder of the recording, a file (``.bag``, ``.mcap``, ``.db3``, ``.r3d``), or a single range scan.
     format : str, optional
         ``"tum"``, ``"redwood"`` (also Open3D), ``"7-scenes"``, ``"icl-nuim"``, ``"stray-scanner"``,
-        ``"rosbag"`` (ROS 1 and 2, RealSense), ``"plain"`` (camera.json and depth/), ``"stanford"`` (range
-        scans), or ``"images"`` (a folder of depth images). None recognises it.
+        ``"rosbag"`` (ROS 1 and 2, MCAP, RealSense), ``"record3d"``, ``"azure-kinect"`` (images of an
+        ``.mkv``), ``"plain"`` (camera.json and depth/), ``"stanford"`` (range scans), or ``"images"`` (a
+        folder of depth images). None recognises it.
     camera : Camera or path-like, optional
         The depth camera, or a camera file, in place of what the recording or its format says.
     depth_scale : float, optional
@@ -92,7 +100,8 @@ def open_sequence(
     """
     folder = Path(path)
     if not folder.exists():
-        raise FileNotFoundError(f"no such recording: {folder}")
+        beside = [p.name for p in folder.parent.iterdir()] if folder.parent.is_dir() else []
+        raise FileNotFoundError(f"no such recording: {folder}{meant(folder.name, beside)}")
     if depth_scale is not None and not (math.isfinite(depth_scale) and depth_scale > 0):
         raise ValueError(
             f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}"
@@ -110,17 +119,20 @@ def open_sequence(
 def _named(format: str) -> Reader:
     key = format.lower().replace("_", "-")
     if key not in READERS:
-        raise ValueError(f"format must be one of {', '.join(map(repr, READERS))}, got {format!r}")
+        known = ", ".join(map(repr, READERS))
+        raise ValueError(f"format must be one of {known}, got {format!r}{meant(key, READERS)}")
     return READERS[key]
 
 
 def _recognised(path: Path, given: Given) -> Reader:
     if not path.is_dir():
-        for module in (stanford, rosbag):
+        for module in (stanford, rosbag, record3d, azure_kinect):
             if module.recognise(path):
                 return READERS[module.FORMAT]
         raise FileFormatError(
-            path, "not a recording: a recording is a folder, a .bag, or a range scan (.ply with a range_grid)"
+            path,
+            "not a recording: a recording is a folder, a .bag, .mcap, .db3 or .r3d, or a range scan (.ply "
+            "with a range_grid)",
         )
     for name, reader in READERS.items():
         if reader.recognise(path) and not (name == images.FORMAT and _needs_more(path, given)):
@@ -134,7 +146,7 @@ def _needs_more(folder: Path, given: Given) -> bool:
 
 def _explanation(folder: Path) -> str:
     if not any(folder.iterdir()):
-        return "the folder is empty"
+        return "the folder is empty: give the one that holds the depth images, or copy them there"
     known = "".join(f"\n  {name}: {reader.layout}" for name, reader in READERS.items())
     hint = _hint(folder)
     return (
@@ -155,9 +167,32 @@ def _hint(folder: Path) -> str | None:
         return (
             "This is almost a TUM recording: depth.txt is missing, the list with a line 'timestamp file' for "
             "each depth image. (A plain recording needs camera.json instead.)"
+            + _listing_command(folder, depth)
         )
+    colors = [f"{name}/" for name in ("rgb", "color", "image", ".") if files(folder / name, COLOR_SUFFIXES)]
+    if colors and not images.recognise(folder):
+        return (
+            f"There are colour images (in {colors[0].replace('./', 'the folder itself')}), but nothing that "
+            "looks like depth: nacre needs depth images, in depth/ or with 'depth' in their names."
+        )
+    bags = files(folder, rosbag.SUFFIXES)
+    if bags:
+        return f"A ROS 2 recording has metadata.yaml, which is missing; give a file alone: {bags[0].name}."
+    for module in (record3d, azure_kinect, stray_scanner):
+        lacking: str | None = module.missing(folder)
+        if lacking is not None:
+            return lacking
     inside = [p for p in sorted(folder.iterdir()) if p.is_dir() and not p.name.startswith(".")]
     names = [p.name for p in inside if any(r.recognise(p) for n, r in READERS.items() if n != images.FORMAT)]
     if names:
         return f"Give one of the folders in it: {', '.join(names[:8])}."
     return None
+
+
+def _listing_command(folder: Path, depth: list[Path]) -> str:
+    """Say how to make depth.txt, where the images are named by their times."""
+    if not redwood.has_time_names(depth):
+        return ""
+    suffix = depth[0].suffix
+    command = f'for f in depth/*{suffix}; do echo "$(basename "$f" {suffix}) $f"; done > depth.txt'
+    return f" Its images are named by their times: (cd '{folder}' && {command}) makes it."

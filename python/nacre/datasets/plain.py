@@ -137,8 +137,7 @@ def write_recording(
         raise ValueError(
             f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}"
         )
-    if (folder / "camera.json").exists() or any(folder.glob("depth/*")):
-        raise FileExistsError(f"{folder} holds a recording already; give another folder or remove it first")
+    require_no_recording(folder)
     (folder / "depth").mkdir(parents=True, exist_ok=True)
     if colors is not None:
         (folder / "color").mkdir(exist_ok=True)
@@ -171,6 +170,12 @@ def write_recording(
             stream.write("".join(f"{time!r}\n" for time in times).encode())
     write_camera(folder / "camera.json", camera, depth_scale)
     return index
+
+
+def require_no_recording(folder: Path) -> None:
+    """Raise where a folder holds a recording already."""
+    if (folder / "camera.json").exists() or any(folder.glob("depth/*")):
+        raise FileExistsError(f"{folder} holds a recording already; give another folder or remove it first")
 
 
 def _next_view(iterators: dict[str, Any], index: int) -> dict[str, Any]:

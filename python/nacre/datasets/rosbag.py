@@ -1,10 +1,12 @@
-"""ROS 1 and 2 recordings (.bag, folders with metadata.yaml), RealSense's among them; read by rosbags."""
+"""ROS 1 and 2 recordings (.bag, .mcap, .db3, folders of them), RealSense's among them; read by rosbags."""
 
 from __future__ import annotations
 
 import io
+import logging
 import re
 import weakref
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -15,23 +17,37 @@ import numpy.typing as npt
 from nacre._core import Camera
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe
+from nacre.datasets.ros_messages import (
+    CHANNELS,
+    METRES,
+    MILLIMETRES,
+    compressed_depth,
+    intrinsics,
+    pixels,
+    without_tail,
+)
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
+from nacre.io.images import decode_color
+
+_log = logging.getLogger(__name__)
 
 FORMAT = "rosbag"
-LAYOUT = "a .bag file (ROS 1, RealSense) or a ROS 2 folder (metadata.yaml), with depth images and camera_info"
+LAYOUT = (
+    "a .bag (ROS 1, RealSense), .mcap or .db3 (ROS 2, RealSense) or a ROS 2 folder (metadata.yaml), "
+    "with depth images and camera_info"
+)
+SUFFIXES = (".bag", ".mcap", ".db3")
 
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO = "sensor_msgs/msg/CameraInfo"
 _MISSING = 'ROS recordings need rosbags: pip install "nacre[ros]"'
-_MILLIMETRES, _METRES = ("16UC1", "mono16", "Z16"), ("32FC1",)
-_CHANNELS = {"rgb8": (0, 1, 2), "bgr8": (2, 1, 0), "rgba8": (0, 1, 2), "bgra8": (2, 1, 0), "mono8": (0, 0, 0)}
 
 
 def recognise(path: Path) -> bool:
-    """Say whether this is a ROS recording: a .bag file, or a folder with metadata.yaml and bags."""
+    """Say whether this is a ROS recording: a file of one, or a folder with metadata.yaml and bags."""
     if path.is_file():
-        return path.suffix == ".bag"
+        return path.suffix in SUFFIXES
     return (path / "metadata.yaml").is_file() and any(path.glob(pattern) for pattern in ("*.db3*", "*.mcap"))
 
 
@@ -40,25 +56,29 @@ def read(path: Path, given: Given) -> Sequence:
     Open a ROS recording.
 
     The depth topic is the one that is aligned to the colours, if there is one. Images of 16 bits are
-    millimetres unless a RealSense recording tells its depth units, or the caller does.
+    millimetres unless a RealSense recording tells its depth units, or the caller does. Where there is a topic
+    of confidence, pixels whose confidence is 0 are not used. Colours of a camera with other intrinsics do not
+    lie over the depth images, and are left out.
     """
     if not recognise(path):
         holds = f"; the folder holds {describe(path)}" if path.is_dir() else ""
         raise FileFormatError(path, f"a ROS recording is {LAYOUT}{holds}")
     bag = _Bag(path, given.depth_scale)
     camera = given.camera or bag.camera()
-    colors = bag.colors(given.max_difference)
+    colors = bag.nearest(bag.color_topics, given.max_difference)
+    confidence = bag.nearest(bag.confidence_topics, given.max_difference)
     return Sequence(
         path,
         format=FORMAT,
         camera=camera,
         depth_scale=bag.depth_scale,
         sources=[
-            FrameSource(i, bag.place(bag.depth_topic, time), color, 1e-9 * time)
-            for i, (time, color) in enumerate(zip(bag.times, colors, strict=True))
+            FrameSource(i, bag.place(bag.depth_topic, time), color, 1e-9 * time, mask=mask)
+            for i, (time, color, mask) in enumerate(zip(bag.times, colors, confidence, strict=True))
         ],
         load_depth=bag.depth,
         load_color=bag.color,
+        load_mask=bag.is_sure,
     )
 
 
@@ -75,18 +95,31 @@ class _Bag:
         try:
             self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
             self._reader.open()
+            if not all(
+                isinstance(name, str) for c in self._reader.connections for name in (c.topic, c.msgtype)
+            ):
+                raise ValueError("a topic has no name")
         except Exception as error:  # rosbags has several, and lets through what damaged files cause
-            raise FileFormatError(path, f"not a whole ROS recording: {error}") from error
+            hint = ""
+            if path.suffix == ".mcap" and path.stat().st_size:
+                hint = f" (ROS 2 is read; what was cut short: mcap recover {path.name} -o whole.mcap)"
+            raise FileFormatError(path, f"not a whole ROS recording: {error}{hint}") from error
         weakref.finalize(self, self._reader.close)
         topics = [c.topic for c in self._reader.connections if c.msgtype in _IMAGES]
-        depth = [topic for topic in topics if re.search("depth", topic, re.IGNORECASE)]
+        sure = [topic for topic in topics if re.search("confidence", topic, re.IGNORECASE)]
+        depth = [t for t in topics if re.search("depth", t, re.IGNORECASE) and t not in sure]
         if not depth:
             raise FileFormatError(
                 path, f"no topic of depth images; there are {', '.join(sorted(topics)) or 'no images'}"
             )
         self.depth_topic = min(depth, key=_preference)
-        self._color_topics = [
-            t for t in topics if re.search("colou?r|rgb", t, re.IGNORECASE) and t not in depth
+        self.confidence_topics = [topic for topic in sure if self._has_camera_of_depth(topic)]
+        self.color_topics = [
+            topic
+            for topic in topics
+            if re.search("colou?r|rgb", topic, re.IGNORECASE)
+            and topic not in depth
+            and self._has_camera_of_depth(topic)
         ]
         self.times = [time for _, time, _ in self._messages(self.depth_topic)]
         self.depth_scale = depth_scale if depth_scale is not None else self._depth_scale()
@@ -97,26 +130,54 @@ class _Bag:
         if not near:
             raise FileFormatError(self.path, "no camera_info; give the camera")
         chosen = max(near, key=lambda c: _common(c.topic, self.depth_topic))
-        for connection, _, data in self._reader.messages([chosen]):
-            info: Any = self._reader.deserialize(data, connection.msgtype)
-            matrix, coefficients = (
-                np.asarray(getattr(info, name if hasattr(info, name) else name.upper()), np.float64)
-                for name in ("k", "d")  # capitals in ROS 1
-            )
-            matrix = matrix.reshape(3, 3)
-            distortion = coefficients if len(coefficients) in (4, 5) else np.zeros(5)
-            try:
-                return Camera(
-                    info.width, info.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2],
-                    distortion=list(distortion),
-                )  # fmt: skip
-            except ValueError as error:
-                raise FileFormatError(self.path, f"{chosen.topic}: {error}") from error
-        raise FileFormatError(self.path, f"{chosen.topic} is empty; give the camera")
+        info = self._first(chosen)
+        if info is None:
+            raise FileFormatError(self.path, f"{chosen.topic} is empty; give the camera")
+        matrix, coefficients = intrinsics(info)
+        distortion = coefficients if len(coefficients) in (4, 5) else np.zeros(5)
+        try:
+            return Camera(
+                info.width, info.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2],
+                distortion=list(distortion),
+            )  # fmt: skip
+        except ValueError as error:
+            raise FileFormatError(self.path, f"{chosen.topic}: {error}") from error
 
-    def colors(self, max_difference: float) -> list[Path | None]:
-        """Return for each depth image the colour image that is nearest in time."""
-        for topic in sorted(self._color_topics, key=_preference):
+    def _has_camera_of_depth(self, topic: str) -> bool:
+        """Say whether an image's own camera is the depth images', as far as they tell their cameras."""
+        matrices = []
+        for image in (topic, self.depth_topic):
+            own = [
+                c
+                for c in self._reader.connections
+                if c.msgtype == _INFO
+                and image.startswith(c.topic.rpartition("/")[0].removesuffix("/info") + "/")
+            ]
+            info = self._first(max(own, key=lambda c: len(c.topic))) if own else None
+            if info is None:
+                return True
+            matrices.append(intrinsics(info)[0])
+        if np.allclose(matrices[0], matrices[1], rtol=0.01, atol=0.01 * matrices[0][0, 0]):
+            return True
+        hint = (
+            f"; nacre reconstruct realsense:{self.path} lays colours over depth"
+            if "/device_" in topic
+            else ""
+        )
+        _log.warning(
+            "%s: %s is left out: its camera is not that of %s%s", self.path, topic, self.depth_topic, hint
+        )
+        return False
+
+    def _first(self, connection: Any) -> Any:
+        """Return the first message of a connection, or None."""
+        for _, _, data in self._read([connection]):
+            return self._decoded(connection, data, self.path / connection.topic.strip("/"))
+        return None
+
+    def nearest(self, topics: list[str], max_difference: float) -> list[Path | None]:
+        """Return for each depth image the image of the best topic that is nearest in time."""
+        for topic in sorted(topics, key=_preference):
             times = np.array([time for _, time, _ in self._messages(topic)])
             if not len(times):
                 continue
@@ -137,11 +198,11 @@ class _Bag:
         message = self._message(place)
         is_raw = hasattr(message, "encoding")
         encoding = message.encoding if is_raw else message.format.split(";")[0].strip()
-        if encoding not in _MILLIMETRES + _METRES:
-            known = ", ".join(_MILLIMETRES + _METRES)
+        if encoding not in MILLIMETRES + METRES:
+            known = ", ".join(MILLIMETRES + METRES)
             raise FileFormatError(place, f"depth images are {known}, this one is {encoding}")
-        image = _pixels(message, place) if is_raw else _compressed_depth(message, place)
-        metres = np.array(image if encoding in _METRES else image / self.depth_scale, np.float32)
+        image = pixels(message, place) if is_raw else compressed_depth(message, place)
+        metres = np.array(image if encoding in METRES else image / self.depth_scale, np.float32)
         metres[~(metres > 0) | ~np.isfinite(metres) | (image == 65535)] = np.nan
         return metres
 
@@ -149,33 +210,54 @@ class _Bag:
         """Read a colour image."""
         message = self._message(place)
         if not hasattr(message, "encoding"):
-            return _decoded(message, place)
-        if message.encoding not in _CHANNELS:
+            return decode_color(io.BytesIO(bytes(message.data)), place)
+        if message.encoding not in CHANNELS:
             raise FileFormatError(
-                place, f"colour images are {', '.join(_CHANNELS)}, this is {message.encoding}"
+                place, f"colour images are {', '.join(CHANNELS)}, this is {message.encoding}"
             )
-        pixels = _pixels(message, place)
-        pixels = pixels if pixels.ndim == 3 else pixels[..., None]
-        return np.ascontiguousarray(pixels[..., _CHANNELS[message.encoding]])
+        image = pixels(message, place)
+        image = image if image.ndim == 3 else image[..., None]
+        return np.ascontiguousarray(image[..., CHANNELS[message.encoding]])
+
+    def is_sure(self, place: Path) -> npt.NDArray[np.bool_]:
+        """Read where an image of confidence is not 0."""
+        message = self._message(place)
+        if not hasattr(message, "encoding"):
+            return np.asarray(decode_color(io.BytesIO(bytes(message.data)), place).any(axis=2), np.bool_)
+        return np.asarray(pixels(message, place) > 0, np.bool_)
 
     def _depth_scale(self) -> float:
-        units = [c for c in self._reader.connections if c.topic.endswith("option/Depth_Units/value")]
-        for connection, _, data in self._reader.messages(units) if units else ():
-            message: Any = self._reader.deserialize(data, connection.msgtype)
-            if message.data > 0:
-                return float(round(1 / message.data, 3))
+        for connection in self._reader.connections:
+            if connection.topic.endswith("option/Depth_Units/value"):
+                message = self._first(connection)
+                with suppress(ValueError, TypeError, AttributeError):  # a text in the SDK's .db3
+                    if float(message.data) > 0:
+                        return round(1 / float(message.data), 3)
         return 1000.0
 
-    def _messages(self, topic: str, time: int | None = None) -> Any:
+    def _messages(self, topic: str, time: int | None = None) -> Iterator[tuple[Any, int, bytes]]:
         connections = [c for c in self._reader.connections if c.topic == topic]
-        return self._reader.messages(connections, time, None if time is None else time + 1)
+        return self._read(connections, time, None if time is None else time + 1)
+
+    def _read(self, connections: list[Any], *times: int | None) -> Iterator[tuple[Any, int, bytes]]:
+        try:
+            yield from self._reader.messages(connections, *times)
+        except Exception as error:  # rosbags', and those of its decompressors
+            raise FileFormatError(self.path, f"damaged in {connections[0].topic}: {error}") from error
 
     def _message(self, place: Path) -> Any:
         topic, time = "/" + place.parent.relative_to(self.path).as_posix(), int(place.name)
         for connection, _, data in self._messages(topic, time):
-            with suppress(AssertionError):
-                return self._reader.deserialize(data, connection.msgtype)
-        raise FileFormatError(place, "the message is missing or damaged")
+            return self._decoded(connection, data, place)
+        raise FileFormatError(place, "the message is missing")
+
+    def _decoded(self, connection: Any, data: bytes, place: Path) -> Any:
+        if connection.msgtype == _IMAGES[0] and not self._reader.is2:
+            data = without_tail(data)
+        try:
+            return self._reader.deserialize(data, connection.msgtype)
+        except Exception as error:  # rosbags' own, and whatever damaged lengths cause
+            raise FileFormatError(place, f"the message is damaged: {error!r}") from error
 
 
 def _preference(topic: str) -> tuple[bool, bool, str]:
@@ -191,45 +273,3 @@ def _common(a: str, b: str) -> int:
     """Return how many parts of two topics are the same from the start."""
     parts = zip(a.split("/"), b.split("/"), strict=False)
     return next((i for i, (x, y) in enumerate(parts) if x != y), min(a.count("/"), b.count("/")) + 1)
-
-
-def _pixels(message: Any, place: Path) -> npt.NDArray[Any]:
-    """Return the pixels of an uncompressed image, (H, W) or (H, W, C)."""
-    encoding = message.encoding
-    if encoding in _CHANNELS:
-        dtype, channels = np.dtype("u1"), 1 if encoding == "mono8" else len(encoding) - 1
-    else:
-        dtype, channels = np.dtype("f4" if encoding in _METRES else "u2"), 1
-    dtype = dtype.newbyteorder(">" if message.is_bigendian else "<")
-    row = message.width * channels * dtype.itemsize
-    data = np.asarray(message.data, np.uint8).reshape(-1)
-    if message.step < row or len(data) < message.height * message.step:
-        raise FileFormatError(place, f"the image of {message.width} x {message.height} is cut short")
-    rows = data[: message.height * message.step].reshape(message.height, message.step)[:, :row]
-    image = np.ascontiguousarray(rows).view(dtype).reshape(message.height, message.width, channels)
-    return image[..., 0] if channels == 1 else image
-
-
-def _compressed_depth(message: Any, place: Path) -> npt.NDArray[Any]:
-    """Return the pixels of a compressedDepth image: a header of 12 bytes, then a PNG of 16 bits."""
-    from PIL import Image, UnidentifiedImageError
-
-    data = bytes(message.data)
-    start = data.find(b"\x89PNG")
-    if start < 0 or "32FC1" in message.format:
-        raise FileFormatError(place, f"compressed depth must be a PNG of 16 bits, this is {message.format!r}")
-    try:
-        return np.asarray(Image.open(io.BytesIO(data[start:])), dtype=np.uint16)
-    except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise FileFormatError(place, f"the PNG is damaged: {error}") from error
-
-
-def _decoded(message: Any, place: Path) -> npt.NDArray[np.uint8]:
-    """Return the pixels of a compressed colour image."""
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        with Image.open(io.BytesIO(bytes(message.data))) as image:
-            return np.array(image.convert("RGB"), dtype=np.uint8)
-    except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise FileFormatError(place, f"the image is damaged: {error}") from error

@@ -17,20 +17,28 @@ import numpy.typing as npt
 
 from nacre import arrays
 from nacre._core import Camera
+from nacre.datasets.doubt import doubt_about
 from nacre.datasets.listing import files, pair
 from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
 from nacre.io.images import ATTRIBUTE_SUFFIXES, COLOR_SUFFIXES, read_attribute, read_color, read_depth
 from nacre.io.trajectories import Trajectory
+from nacre.values import Value
 
 _log = logging.getLogger(__name__)
 
 DepthLoader = Callable[[Path], npt.NDArray[np.float32]]
 ColorLoader = Callable[[Path], npt.NDArray[np.uint8]]
+MaskLoader = Callable[[Path], npt.NDArray[np.bool_]]
 
 
-@dataclass(frozen=True, eq=False)
-class SequenceFrame:
+def load_mask(path: Path) -> npt.NDArray[np.bool_]:
+    """Read an image as a mask: pixels that are not black are of interest."""
+    return np.asarray(read_color(path).any(axis=2), np.bool_)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SequenceFrame(Value):
     """
     One view of a recording.
 
@@ -71,6 +79,11 @@ class SequenceFrame:
         parts += [name for name in ("color", "truth", "mask") if getattr(self, name) is not None]
         parts += self.attributes
         return f"SequenceFrame({', '.join(parts)})"
+
+    def _repr_png_(self) -> bytes | None:
+        from nacre.inline_pictures import picture_of_depth
+
+        return picture_of_depth(self.depth)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +136,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         estimate: Trajectory | None = None,
         load_depth: DepthLoader | None = None,
         load_color: ColorLoader = read_color,
+        load_mask: MaskLoader = load_mask,
         name: str | None = None,
     ) -> None:
         self.path = path
@@ -132,9 +146,10 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         self.depth_scale = depth_scale
         self.truth = truth
         self.estimate = estimate
-        self._sources = tuple(sources)
+        self._sources: collections.abc.Sequence[FrameSource] = tuple(sources)
         self._load_depth = load_depth or partial(load_depth_metres, depth_scale=depth_scale)
         self._load_color = load_color
+        self._load_mask = load_mask
 
     def __len__(self) -> int:
         return len(self._sources)
@@ -177,6 +192,10 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         """Return the depth file of a view."""
         return self._sources[index].depth
 
+    def timestamp(self, index: int) -> float | None:
+        """Return when a view was taken [s]; None where that is not known."""
+        return self._sources[index].timestamp
+
     def without_color(self) -> Sequence:
         """Return the same recording with ``color`` None in every view."""
         return self._with_sources([dataclasses.replace(source, color=None) for source in self._sources])
@@ -197,7 +216,8 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         if not any(masks):
             raise FileFormatError(Path(folder), "no image here is named as a depth image of the recording is")
         return self._with_sources(
-            [dataclasses.replace(s, mask=mask) for s, mask in zip(self._sources, masks, strict=True)]
+            [dataclasses.replace(s, mask=mask) for s, mask in zip(self._sources, masks, strict=True)],
+            load_mask=load_mask,
         )
 
     def with_attribute(self, name: str, folder: str | os.PathLike[str]) -> Sequence:
@@ -206,6 +226,17 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
 
         An image (PNG, TIFF, JPEG or ``.npy``, with the values that are stored) belongs to the depth image of
         the same stem, or else of the same first number.
+
+        Parameters
+        ----------
+        name : str
+            Of the attribute.
+        folder : path-like
+            Of the images.
+
+        Returns
+        -------
+        Sequence
 
         Raises
         ------
@@ -233,7 +264,10 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         return self._with_sources(self._sources, load)
 
     def _with_sources(
-        self, sources: collections.abc.Sequence[FrameSource], load_depth: DepthLoader | None = None
+        self,
+        sources: collections.abc.Sequence[FrameSource],
+        load_depth: DepthLoader | None = None,
+        load_mask: MaskLoader | None = None,
     ) -> Sequence:
         return Sequence(
             self.path,
@@ -245,6 +279,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
             estimate=self.estimate,
             load_depth=load_depth or self._load_depth,
             load_color=self._load_color,
+            load_mask=load_mask or self._load_mask,
             name=self.name,
         )
 
@@ -257,7 +292,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
             check_size(source.color, color, self.camera)
         mask = None
         if source.mask is not None:
-            mask = _named(read_color, source.mask).any(axis=2)
+            mask = _named(self._load_mask, source.mask)
             check_size(source.mask, mask, self.camera)
         attributes = {name: _named(read_attribute, path) for name, path in source.attributes.items()}
         for name, path in source.attributes.items():
@@ -306,12 +341,17 @@ def check_first_view(sequence: Sequence) -> Sequence:
 
     Colour images of another size cannot be used pixel by pixel: the sequence then comes back without colour.
     """
+    first_error: FileFormatError | None = None
     for source in sequence._sources:
         try:
             depth = _named(sequence._load_depth, source.depth)
-        except FileFormatError:
+        except FileFormatError as error:
+            first_error = first_error or error
             continue
         check_size(source.depth, depth, sequence.camera)
+        doubt = doubt_about(depth)
+        if doubt is not None:
+            _log.warning("%s: %s", source.depth, doubt)
         if source.color is None:
             break
         try:
@@ -320,6 +360,12 @@ def check_first_view(sequence: Sequence) -> Sequence:
             _log.warning("colour is left out: %s", error)
             return sequence.without_color()
         break
+    else:
+        if first_error is not None:
+            raise FileFormatError(
+                sequence.path,
+                f"none of its {len(sequence)} depth images can be read; the first: {first_error}",
+            )
     return sequence
 
 

@@ -28,6 +28,16 @@ def recognise(folder: Path) -> bool:
     return (folder / "camera_matrix.csv").is_file() and (folder / "depth").is_dir()
 
 
+def missing(folder: Path) -> str | None:
+    """Say what a folder lacks that is almost such a recording."""
+    if (folder / "odometry.csv").is_file() or (
+        (folder / "confidence").is_dir() and (folder / "depth").is_dir()
+    ):
+        lacking = "depth/" if (folder / "camera_matrix.csv").is_file() else "camera_matrix.csv"
+        return f"This is almost a Stray Scanner recording: {lacking} is missing."
+    return None
+
+
 def read(folder: Path, given: Given) -> Sequence:
     """
     Open a folder of this format.

@@ -46,6 +46,12 @@ def read(folder: Path, given: Given) -> Sequence:
     if (folder / "camera.json").is_file():
         given = given.filled_from(folder / "camera.json")
     depth = read_list(folder / "depth.txt")
+    if not any((folder / name).is_file() for _, name in depth):
+        raise FileFormatError(
+            folder / "depth.txt",
+            f"none of the {len(depth)} files that it lists is there, {depth[0][1]!r} the first; "
+            f"the folder holds {describe(folder)}",
+        )
     times = np.array([time for time, _ in depth])
     colors: dict[int, Path] = {}
     if (folder / "rgb.txt").is_file():

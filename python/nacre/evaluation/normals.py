@@ -11,7 +11,7 @@ from nacre.arrays import as_matching_points, as_points
 from nacre.evaluation.result import Count, Fraction, Radians, Result
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class NormalError(Result):
     """Angles between normals and their references; made by :func:`normal_error`."""
 

@@ -13,7 +13,7 @@ from nacre.evaluation.result import Array, Count, Metres, Radians, Result
 from nacre.evaluation.trajectory import absolute_trajectory_error
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PoseError(Result):
     """
     Errors of poses at a point of the world; made by :func:`pose_error`.

@@ -9,6 +9,8 @@ from typing import Annotated, Any, TypeAlias, get_type_hints
 import numpy as np
 import numpy.typing as npt
 
+from nacre.values import Value, told
+
 Array: TypeAlias = npt.NDArray[np.float64]
 
 Metres = Annotated[float, "m"]
@@ -32,8 +34,17 @@ def plain(value: Any) -> Any:
     return value
 
 
-class Result:
+_UNITS = {"m": " m", "rad": " rad"}
+
+
+class Result(Value):
     """Base of the evaluation results, which are frozen dataclasses."""
+
+    def __repr__(self) -> str:
+        units = self.units()
+        shown = (f.name for f in dataclasses.fields(self) if f.repr)  # type: ignore[arg-type]
+        words = (f"{name}={told(getattr(self, name))}" + _UNITS.get(units[name], "") for name in shown)
+        return f"{type(self).__name__}({', '.join(words)})"
 
     def as_dict(self) -> dict[str, Any]:
         """Return every field under its name, as plain Python values that JSON can hold (NaN becomes None)."""

@@ -22,7 +22,7 @@ class SurfaceSamples(NamedTuple):
     triangles: npt.NDArray[np.intp]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SurfaceAccuracy(Result):
     """Distances from model points to the reference surface; made by :func:`surface_accuracy`."""
 
@@ -36,7 +36,7 @@ class SurfaceAccuracy(Result):
     distances: Array = field(repr=False)  #: one per point [m], NaN where the point is not finite
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Completeness(Result):
     """How much of the reference surface the model covers; made by :func:`completeness`."""
 
@@ -48,7 +48,7 @@ class Completeness(Result):
     num_samples: Count  #: surface samples that were asked for and seen
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class FScore(Result):
     """Precision, recall and their harmonic mean for each threshold; made by :func:`f_score`."""
 
@@ -238,8 +238,14 @@ def f_score(
     Measure precision, recall and F-score of a model (Knapitsch et al., Tanks and Temples, 2017).
 
     Precision is the part of the model within ``tau`` of the reference, recall the part of the reference
-    within ``tau`` of the model (:func:`completeness`), F their harmonic mean. Parameters are those of
-    :func:`surface_accuracy` and :func:`completeness`.
+    within ``tau`` of the model (:func:`completeness`), F their harmonic mean.
+
+    Parameters
+    ----------
+    points, reference, reference_normals
+        As in :func:`surface_accuracy`.
+    tau, seen, num_samples, seed
+        As in :func:`completeness`.
 
     Returns
     -------

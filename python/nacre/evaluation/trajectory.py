@@ -13,7 +13,7 @@ from nacre.evaluation.result import Array, Count, Fraction, Metres, Radians, Res
 from nacre.io.trajectories import associate
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AbsoluteTrajectoryError(Result):
     """
     How far each estimated pose is from its true pose; made by :func:`absolute_trajectory_error`.
@@ -38,7 +38,7 @@ class AbsoluteTrajectoryError(Result):
     rotation_errors: Array = field(repr=False)  #: likewise
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class RelativePoseError(Result):
     """How far the motion over a fixed interval is from the true motion; see :func:`relative_pose_error`."""
 
@@ -160,7 +160,7 @@ def relative_pose_error(
     Measure the drift: the error of the motion over a fixed interval (RPE, Sturm et al. 2012).
 
     Every pair of poses that lie ``delta`` apart counts. The result does not depend on the frames of reference
-    of the two trajectories. Arguments that are not listed are those of :func:`absolute_trajectory_error`.
+    of the two trajectories.
 
     Parameters
     ----------
@@ -171,6 +171,8 @@ def relative_pose_error(
     unit : {"frames", "seconds"}, optional
         "frames" counts rows of ``estimated``; "seconds" needs ``timestamps`` and takes the pose nearest to
         the end of the interval.
+    valid, timestamps, truth_timestamps, max_time_difference
+        As in :func:`absolute_trajectory_error`.
 
     Returns
     -------

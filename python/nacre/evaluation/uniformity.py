@@ -11,7 +11,7 @@ from nacre.arrays import as_points
 from nacre.evaluation.result import Count, Fraction, Metres, Result
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Uniformity(Result):
     """Statistics of each point's distance to its nearest other point; made by :func:`uniformity`."""
 

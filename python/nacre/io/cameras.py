@@ -125,7 +125,8 @@ class _Fields:
 
     def get(self, key: str) -> Any:
         if key not in self.document:
-            raise FileFormatError(self.path, f"the key {key!r} is missing")
+            hint = "a pinhole camera has model, width, height, fx, fy, cx and cy"
+            raise FileFormatError(self.path, f"the key {key!r} is missing; {hint}")
         return self.document[key]
 
     def number(self, key: str) -> float:

@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import arrays
+from nacre.values import Value
 
 Columns = dict[str, npt.NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cloud:
+class Cloud(Value):
     """
     The points of a file with everything that the file holds for each of them.
 
@@ -58,6 +59,11 @@ class Cloud:
         if self.path is not None:
             parts.append(f"path={str(self.path)!r}")
         return f"Cloud({', '.join(parts)})"
+
+    def _repr_png_(self) -> bytes | None:
+        from nacre.inline_pictures import picture_of_points
+
+        return picture_of_points(self.points, self.normals, self.colors)
 
 
 def gather_columns(columns: Columns, names: tuple[str, ...]) -> npt.NDArray[Any]:

@@ -11,12 +11,13 @@ import numpy.typing as npt
 
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
+from nacre.values import Value
 
 Float64 = npt.NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Value):
     """
     Poses over time.
 

@@ -44,6 +44,7 @@ def line_chart(
     indices: Sequence[int] | None = None,
     marks: Sequence[Mark] = (),
     y_max: float | None = None,
+    level: float | None = None,
     width: int = 560,
     height: int = 200,
 ) -> str:
@@ -51,7 +52,7 @@ def line_chart(
     Draw one value per frame, from 0 upwards.
 
     Long series are drawn as a band between the least and the greatest value of each group of frames, so that
-    no peak is lost, with the mean as its line.
+    no peak is lost, with the mean as its line. A dashed line stands at ``level``.
     """
     top = y_max or _largest(series)
     frame = _Frame(_num_values(series), indices, top, width, height)
@@ -73,8 +74,11 @@ def line_chart(
                 for a, b in zip(x, frame.y(mean), strict=True)
                 if math.isfinite(b)
             ]
+    if level is not None and 0 < level <= frame.top:
+        at = float(frame.y(level))
+        parts.append(f'<path class="level" d="M{_LEFT} {at:.1f}H{width - _RIGHT}"/>')
     parts.append(frame.hover(series, y_label))
-    return frame.svg(parts, x_label, y_label)
+    return frame.svg(parts, x_label, _described(series, y_label), y_label)
 
 
 def stacked_chart(
@@ -106,7 +110,7 @@ def stacked_chart(
         parts.append(f'<path class="f{one.color}" d="{path}"/>')
         base = base + layer
     parts.append(frame.hover(series, y_label))
-    return frame.svg(parts, x_label, y_label)
+    return frame.svg(parts, x_label, _described(series, y_label), y_label)
 
 
 def map_chart(
@@ -151,12 +155,10 @@ def map_chart(
             if axis == 0:
                 parts.append(f'<path class="grid" d="M{at:.1f} {_TOP}v{inner[1]:g}"/>')
                 y = _TOP + inner[1] + 15
-                parts.append(f'<text class="tick mid" x="{at:.1f}" y="{y:.1f}">{_number(tick)}</text>')
+                parts.append(f'<text class="tick mid" x="{at:.1f}" y="{y:.1f}">{number(tick)}</text>')
             else:
                 parts.append(f'<path class="grid" d="M{_LEFT} {at:.1f}h{inner[0]:g}"/>')
-                parts.append(
-                    f'<text class="tick end" x="{_LEFT - 6}" y="{at + 4:.1f}">{_number(tick)}</text>'
-                )
+                parts.append(f'<text class="tick end" x="{_LEFT - 6}" y="{at + 4:.1f}">{number(tick)}</text>')
     for name, xy, color in tracks:
         thinned = xy[:: max(len(xy) // 1500, 1)]
         style = " wide" if name == "truth" else ""
@@ -171,6 +173,24 @@ def map_chart(
         )
     parts.append(_axis_labels(f"{x_label} [{unit}]", f"{y_label} [{unit}]", width, height))
     return _svg(parts, width, height, f"{y_label} over {x_label}")
+
+
+def status_strip(states: Sequence[str], description: str, width: int = 1000, height: int = 16) -> str:
+    """Draw the states of all frames as a bar; what is rare stays visible."""
+    step = width / max(len(states), 1)
+    parts = [f'<rect class="st-tracked" width="{width}" height="{height}"/>']
+    for kind in ("RELOCALISED", "WEAK", "LOST"):
+        bars = [
+            f"M{first * step:.1f} 0h{max((end - first) * step, 2):.1f}v{height}H{first * step:.1f}Z"
+            for first, end in runs(np.array([state == kind for state in states], dtype=bool))
+        ]
+        if bars:
+            parts.append(f'<path class="st-{kind.lower()}" d="{"".join(bars)}"/>')
+    aspect = ' preserveAspectRatio="none"'
+    return (
+        f'<svg viewBox="0 0 {width} {height}"{aspect} role="img" '
+        f'aria-label="{escape(description, quote=True)}">{"".join(parts)}</svg>'
+    )
 
 
 def grouped(values: Array) -> tuple[Array, Array, Array]:
@@ -268,13 +288,13 @@ class _Frame:
             )
         return "".join(parts)
 
-    def svg(self, parts: Sequence[str], x_label: str, y_label: str) -> str:
+    def svg(self, parts: Sequence[str], x_label: str, description: str, y_label: str) -> str:
         axes = []
         for tick in ticks(0, self.top, 4):
             at = float(self.y(tick))
             kind = "grid" if tick else "axis"
             axes.append(f'<path class="{kind}" d="M{_LEFT} {at:.1f}H{self.width - _RIGHT}"/>')
-            axes.append(f'<text class="tick end" x="{_LEFT - 6}" y="{at + 4:.1f}">{_number(tick)}</text>')
+            axes.append(f'<text class="tick end" x="{_LEFT - 6}" y="{at + 4:.1f}">{number(tick)}</text>')
         last = max(self.num_frames - 1, 0)
         for tick in ticks(0, last, 8) if last else [0.0]:
             if tick == int(tick) and int(tick) < len(self.indices):
@@ -285,7 +305,7 @@ class _Frame:
                     f'<text class="tick mid" x="{at:.1f}" y="{y + 16}">{self.indices[int(tick)]}</text>'
                 )
         axes.append(_axis_labels(x_label, y_label, self.width, self.height))
-        return _svg([*axes, *parts], self.width, self.height, f"{y_label} over {x_label}")
+        return _svg([*axes, *parts], self.width, self.height, description)
 
 
 def _axis_labels(x_label: str, y_label: str, width: int, height: int) -> str:
@@ -297,10 +317,20 @@ def _axis_labels(x_label: str, y_label: str, width: int, height: int) -> str:
 
 
 def _svg(parts: Sequence[str], width: int, height: int, description: str) -> str:
-    return (
-        f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{escape(description, quote=True)}">'
-        f"{''.join(parts)}</svg>"
-    )
+    kind = ' class="broad"' if width > 800 else ""
+    alt = escape(description, quote=True)
+    return f'<svg{kind} viewBox="0 0 {width} {height}" role="img" aria-label="{alt}">{"".join(parts)}</svg>'
+
+
+def _described(series: Sequence[Series], y_label: str) -> str:
+    """Return a chart in words, for those who do not see it."""
+    told = []
+    for one in series:
+        known = one.values[np.isfinite(one.values)]
+        if len(known):
+            low, middle, high = (f"{value:.4g}" for value in (known.min(), np.median(known), known.max()))
+            told.append(f"{one.name or y_label}: least {low}, median {middle}, greatest {high}")
+    return f"{y_label} of every frame; " + "; ".join(told)
 
 
 def _path(xy: Array) -> str:
@@ -324,6 +354,7 @@ def _largest(series: Sequence[Series]) -> float:
     return max((float(values.max()) for values in known if len(values)), default=0.0)
 
 
-def _number(value: float) -> str:
+def number(value: float) -> str:
+    """Return the number at a tick."""
     text = f"{value:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}") if abs(value) >= 1e4 else f"{value:.6g}"
     return text.replace("-", "\N{MINUS SIGN}")

@@ -26,9 +26,13 @@ class FrameEntry:
     translation_error: float | None = None  #: [m]; worked out from the poses where no frame has it
     rotation_error: float | None = None  #: [rad]; likewise
     num_points: int | None = None  #: of the model, after the frame
-    removed: Mapping[str, int] = field(
-        default_factory=dict
-    )  #: pixels removed from the depth image, by reason
+    consistency: float | None = None  #: of what is in view, the part that nothing was seen through
+    evidence: float | None = None  #: that the registration is right
+    num_pixels: int | None = None  #: of the depth image
+    num_measured: int | None = None  #: pixels with a depth
+    removed: Mapping[str, int] = field(default_factory=dict)  #: measured pixels that were not used, by reason
+    num_updated: int | None = None  #: points of the model that the frame moved
+    num_inserted: int | None = None  #: and that it added
     loop_frame: int | None = None  #: the earlier frame that this one closed a loop with
 
 
@@ -39,7 +43,7 @@ class ModelCloud:
     points: npt.NDArray[np.floating[Any]]  #: (N, 3) [m]
     normals: npt.NDArray[np.floating[Any]] | None = None
     colors: npt.NDArray[np.uint8] | None = None
-    confidence: npt.NDArray[Any] | None = None  #: (N,)
+    confidence: npt.NDArray[Any] | None = None  #: (N,), in frontal observations
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +57,7 @@ class DepthExample:
     )
     reason_names: Sequence[str] = ()
     index: int = 0  #: of the frame
+    note: str = ""  #: why this one is shown
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +68,8 @@ class ReportData:
     source: str = ""  #: where the frames come from, in words
     frames: Sequence[FrameEntry] = ()
     model: ModelCloud | None = None
-    depth: DepthExample | None = None
+    depth: Sequence[DepthExample] = ()
     evaluation: Mapping[str, Any] = field(default_factory=dict)  #: heading -> a result of nacre.evaluation
     figures: Mapping[str, Any] = field(default_factory=dict)  #: further figures, name -> number or text
     parameters: Mapping[str, Any] = field(default_factory=dict)  #: name -> value, or a group of them
+    interrupted: bool = False  #: whether it was stopped before the last frame

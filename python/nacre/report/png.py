@@ -31,10 +31,40 @@ def encode_png(image: npt.NDArray[np.uint8]) -> bytes:
     if pixels.ndim != 3 or pixels.shape[2] not in _COLOR_TYPES or not pixels.size:
         raise ValueError(f"image must have shape (H, W), (H, W, 3) or (H, W, 4), got {np.shape(image)}")
     height, width, channels = pixels.shape
-    rows = pixels.reshape(height, width * channels)
-    filtered = _filter_rows(rows, channels)
+    filtered = _filter_rows(pixels.reshape(height, width * channels), channels)
     header = struct.pack(">IIBBBBB", width, height, 8, _COLOR_TYPES[channels], 0, 0, 0)
-    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(filtered, 6)), (b"IEND", b""))
+    return _file((b"IHDR", header), (b"IDAT", zlib.compress(filtered, 6)), (b"IEND", b""))
+
+
+def encode_indexed_png(indices: npt.NDArray[np.uint8], palette: npt.NDArray[np.uint8]) -> bytes:
+    """
+    Return an image of palette colours as the bytes of a PNG file.
+
+    Parameters
+    ----------
+    indices : numpy.ndarray of uint8, shape (H, W)
+        Rows of the palette.
+    palette : numpy.ndarray of uint8, shape (C, 3) or (C, 4)
+        RGB or RGBA, C at most 256.
+
+    Returns
+    -------
+    bytes
+    """
+    height, width = indices.shape
+    plain = np.concatenate([np.zeros((height, 1), np.uint8), indices], axis=1).tobytes()
+    chunks = [
+        (b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 3, 0, 0, 0)),
+        (b"PLTE", palette[:, :3].tobytes()),
+        (b"IDAT", zlib.compress(plain, 7)),
+        (b"IEND", b""),
+    ]
+    if palette.shape[1] == 4:
+        chunks.insert(2, (b"tRNS", palette[:, 3].tobytes()))
+    return _file(*chunks)
+
+
+def _file(*chunks: tuple[bytes, bytes]) -> bytes:
     return b"\x89PNG\r\n\x1a\n" + b"".join(
         struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
         for kind, data in chunks

@@ -133,12 +133,12 @@ def _reverse_parts(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) ->
     return float(reverse[order[nearest]].mean()), float(reverse.mean())
 
 
-def measure_spacing(points: npt.ArrayLike) -> Array:
+def measure_spacing(points: npt.ArrayLike, most: float = 2.0) -> Array:
     """
     Return how far each point's disk must reach to meet the disks around it.
 
     That is the distance to the fourth neighbour: on a regular lattice all of the ring, at a border still the
-    half of it. Outliers get two medians.
+    half of it. None gets more than ``most`` medians: outliers stay small, or far walls become closed.
     """
     from nacre import KdTree
 
@@ -150,8 +150,18 @@ def measure_spacing(points: npt.ArrayLike) -> Array:
         distance = np.asarray(KdTree(usable).query(usable, k=min(5, len(usable)))[0], dtype=np.float64)[:, -1]
         typical = float(np.median(distance))
         if typical > 0:
-            spacing[finite] = np.clip(distance, 0.05 * typical, 2 * typical)
+            spacing[finite] = np.clip(distance, 0.05 * typical, most * typical)
     return spacing
+
+
+def nearest_distances(points: npt.ArrayLike) -> Array:
+    """Return how far each point is from the nearest other one; 0 for a lone point."""
+    from nacre import KdTree
+
+    cloud = as_points("points", points)
+    if len(cloud) < 2:
+        return np.zeros(len(cloud))
+    return np.asarray(KdTree(cloud).query(cloud, k=2)[0], dtype=np.float64)[:, 1]
 
 
 def _normals_towards(view: View, cloud: npt.NDArray[np.floating]) -> npt.NDArray[np.floating]:

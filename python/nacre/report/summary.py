@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -18,6 +17,7 @@ from nacre.evaluation import (
 )
 from nacre.report.data import FrameEntry, ReportData
 from nacre.report.text import count, quantity
+from nacre.report.verdict import Verdict, judge
 
 ResultType = TypeVar("ResultType")
 
@@ -35,7 +35,7 @@ class Tile:
 class Summary:
     """The main figures of a reconstruction."""
 
-    level: str  #: "ok", "weak" or "lost"
+    verdict: Verdict | None
     sentence: str
     tiles: tuple[Tile, ...]
     trajectory: AbsoluteTrajectoryError | None  #: given, or worked out from the poses
@@ -60,24 +60,18 @@ def find(data: ReportData, kind: type[ResultType]) -> ResultType | None:
 
 def summarize(data: ReportData) -> Summary:
     """Work out what to say first."""
-    statuses = Counter(frame.status.upper() for frame in data.frames)
-    num_frames, num_lost, num_weak = len(data.frames), statuses["LOST"], statuses["WEAK"]
-    level = "lost" if num_lost else "weak" if num_weak else "ok"
+    trajectory = find(data, AbsoluteTrajectoryError) or _trajectory_error(data.frames)
+    verdict = judge(data, trajectory)
     sentences, tiles = [], []
-    if num_frames:
-        told = "All" if not num_lost else f"{count(num_frames - num_lost)} of"
-        sentence = (
-            f"{told} {count(num_frames)} frames were tracked" if num_frames > 1 or num_lost else "One frame"
-        )
-        extra = [
-            f"{count(num_lost)} lost" * bool(num_lost),
-            f"{count(num_weak)} with weak geometry" * bool(num_weak),
-        ]
-        extra = [text for text in extra if text]
-        sentences.append(sentence + (f" ({', '.join(extra)})" if extra else ""))
-        tiles.append(
-            Tile("Frames tracked", f"{count(num_frames - num_lost)} / {count(num_frames)}", ", ".join(extra))
-        )
+    if verdict is not None:
+        sentences.append(verdict.why)
+        num_frames, num_tracked = len(data.frames), sum(is_tracked(frame) for frame in data.frames)
+        part = quantity(num_tracked / num_frames, "fraction")
+        tiles.append(Tile("Frames tracked", f"{count(num_tracked)} / {count(num_frames)}", part))
+    matching = [f.overlap for f in data.frames if is_tracked(f) and f.num_inliers and f.overlap is not None]
+    if matching:
+        typical = 100 * float(np.median(matching))
+        sentences.append(f"Typically {typical:.0f} % of a frame matches the model")
     if data.model is not None:
         num_points = int(np.isfinite(np.asarray(data.model.points)).all(axis=1).sum())
         sentences.append(f"The model has {count(num_points)} points")
@@ -93,10 +87,9 @@ def summarize(data: ReportData) -> Summary:
         part = quantity(covered.fraction[middle], "fraction")
         tiles.append(Tile("Surface covered", part, f"within {quantity(covered.tau[middle], 'm')}"))
 
-    trajectory = find(data, AbsoluteTrajectoryError) or _trajectory_error(data.frames)
     if trajectory is not None and trajectory.num_compared:
         rmse = quantity(trajectory.rmse, "m")
-        sentences.append(f"The camera positions are off by {rmse} (RMS)")
+        sentences.append(f"The camera positions are off by {rmse} (RMS){_path_length(data.frames)}")
         tiles.append(
             Tile(
                 "Trajectory error", rmse, f"ATE RMSE; {quantity(trajectory.rotation_rmse, 'rad')} in rotation"
@@ -107,7 +100,6 @@ def summarize(data: ReportData) -> Summary:
     times = times[np.isfinite(times)]
     if len(times):
         median = quantity(float(np.median(times)), "ms")
-        sentences.append(f"A frame takes {median}")
         tiles.append(
             Tile(
                 "Time per frame",
@@ -115,7 +107,13 @@ def summarize(data: ReportData) -> Summary:
                 f"median; 99 % within {quantity(float(np.percentile(times, 99)), 'ms')}",
             )
         )
-    return Summary(level, ". ".join(sentences) + "." * bool(sentences), tuple(tiles), trajectory)
+    return Summary(verdict, ". ".join(sentences) + "." * bool(sentences), tuple(tiles), trajectory)
+
+
+def _path_length(frames: Sequence[FrameEntry]) -> str:
+    places = [np.asarray(frame.truth, dtype=np.float64)[:3, 3] for frame in frames if frame.truth is not None]
+    length = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum()) if len(places) > 1 else 0.0
+    return f" on a path of {quantity(length, 'm')}" if length > 0 else ""
 
 
 def _trajectory_error(frames: Sequence[FrameEntry]) -> AbsoluteTrajectoryError | None:

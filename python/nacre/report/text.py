@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -58,6 +58,21 @@ def quantity(value: Any, unit: str = "") -> str:
 def count(value: int) -> str:
     """Return a whole number with its digits in groups of three."""
     return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+
+
+def ranges(indices: Sequence[int], most: int = 4) -> str:
+    """Return frames in words: "frame 3", "frames 10 to 19, 30 and 2 more"."""
+    runs: list[list[int]] = []
+    for index in sorted(indices):
+        if runs and index == runs[-1][1] + 1:
+            runs[-1][1] = index
+        else:
+            runs.append([index, index])
+    shown = sorted(sorted(runs, key=lambda run: run[0] - run[1])[:most])
+    rest = len(indices) - sum(last - first + 1 for first, last in shown)
+    named = [str(first) if first == last else f"{first} to {last}" for first, last in shown]
+    told = ", ".join(named) + (f" and {count(rest)} more" if rest else "")
+    return f"frame{'s' * (len(indices) > 1)} {told}"
 
 
 def label(name: str) -> str:

@@ -6,7 +6,8 @@ The model in the browser while it grows, and afterwards; needs ``pip install "na
 
 from nacre.viewer.live import LiveView
 from nacre.viewer.page import Viewer, export_html
+from nacre.viewer.rerun_file import export_rrd
 from nacre.viewer.story import Moment, Snapshot, Story
 from nacre.viewer.written import written_story
 
-__all__ = ["LiveView", "Moment", "Snapshot", "Story", "Viewer", "export_html", "written_story"]
+__all__ = ["LiveView", "Moment", "Snapshot", "Story", "Viewer", "export_html", "export_rrd", "written_story"]

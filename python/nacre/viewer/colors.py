@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.report.colormap import viridis
+from nacre.report.text import count, quantity
 from nacre.viewer.story import Snapshot
 
 STATUS_COLORS = {
@@ -54,6 +55,17 @@ def point_colors(cloud: Snapshot, kind: str) -> npt.NDArray[np.uint8]:
     light = np.array([0.3, -0.5, -0.8]) / np.linalg.norm([0.3, -0.5, -0.8])
     shade = 0.35 + 0.65 * np.abs(cloud.normals @ light)
     return np.asarray(shade[:, None] * (205, 210, 215)).astype(np.uint8)
+
+
+def color_range(cloud: Snapshot, kind: str) -> tuple[str, str]:
+    """Return in words what the darkest and the lightest colour mean, where colours stand for a quantity."""
+    if kind == "confidence" and cloud.confidence is not None and len(cloud.points):
+        low, high = np.percentile(cloud.confidence, (2, 98))
+        return quantity(float(f"{low:.2g}"), "number"), f"{count(round(high))} observations"
+    if kind == "age" and cloud.last_seen is not None and len(cloud.points):
+        low, high = np.percentile(cloud.last_seen, (2, 98))
+        return f"last seen in frame {low:.0f}", f"{high:.0f}"
+    return "", ""
 
 
 def _spread(values: npt.NDArray[Any]) -> npt.NDArray[np.float64]:

@@ -7,8 +7,8 @@ import numpy.typing as npt
 
 from nacre import Camera
 from nacre.depth import PIXEL_LABELS, DepthParameters, label_pixels
-from nacre.report.colormap import category_rgb, viridis
-from nacre.report.pictures import reason_color
+from nacre.report.colormap import CATEGORIES, category_rgb, viridis
+from nacre.report.depth_pictures import reason_color
 
 
 def depth_picture(
@@ -42,10 +42,23 @@ def depth_picture(
     picture = np.full((*depth.shape, 3), 24, dtype=np.uint8)
     if kept.any():
         low, high = np.percentile(depth[kept], (1, 99))
-        position = (high - np.clip(depth[kept], low, high)) / max(high - low, 1e-9)
-        picture[kept] = viridis(position)
+        inverse = 1 / np.clip(depth[kept], low, high)  # near things get most of the colours, as in the report
+        picture[kept] = viridis((inverse - 1 / high) / max(1 / low - 1 / high, 1e-9))
     for label, name in enumerate(PIXEL_LABELS):
         if label:
             picture[measured & (labels == label)] = category_rgb(reason_color(name, label))
     step = max(-(-depth.shape[1] // max_width), 1)
     return picture[::step, ::step]
+
+
+def depth_legend() -> str:
+    """Return what the colours of removed pixels mean, as HTML."""
+    box = "display:inline-block;width:9px;height:9px;border-radius:2px;margin-right:4px;background:"
+    keys = "".join(
+        f'<span style="white-space:nowrap"><span style="{box}{CATEGORIES[reason_color(name, label)]}"></span>'
+        f"{name.replace('_', ' ')}</span>"
+        for label, name in enumerate(PIXEL_LABELS)
+        if label > 1
+    )
+    style = "display:flex;flex-wrap:wrap;gap:2px 10px;font-size:12px;padding:0 14px 6px"
+    return f'<div style="{style}">removed: {keys}</div>'

@@ -17,9 +17,9 @@ from nacre import back_project, preprocess_depth
 from nacre.depth import DepthParameters
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
-from nacre.viewer.colors import STATUS_COLORS, color_kinds
-from nacre.viewer.depth_picture import depth_picture
-from nacre.viewer.scene import Scene, extent
+from nacre.viewer.colors import STATUS_COLORS, color_kinds, color_range
+from nacre.viewer.depth_picture import depth_legend, depth_picture
+from nacre.viewer.scene import Scene, core, extent
 from nacre.viewer.story import Moment, Snapshot, Story
 
 _MISSING = 'the viewer needs viser: pip install "nacre[view]"'
@@ -103,13 +103,15 @@ class Viewer:
         self._title = gui.add_markdown(f"## {self.story.title}")
         self._summary = gui.add_markdown("")
         self._picture = gui.add_image(np.full((3, 4, 3), 24, np.uint8), label="Depth", format="png")
+        gui.add_html(depth_legend())
         self._time = gui.add_slider("frame", min=0, max=1, step=1, initial_value=0)
         self._strip = gui.add_html("")
         self._follow = gui.add_checkbox("follow the newest", True)
         self._figures = gui.add_markdown("")
         with gui.add_folder("Look"):
             self._kind = gui.add_dropdown("colour by", ("shading",), initial_value="shading")
-            self._point_size = gui.add_slider("point size", min=0.2, max=3.0, step=0.1, initial_value=1.0)
+            self._legend = gui.add_html("")
+            self._point_size = gui.add_slider("point size", min=0.2, max=4.0, step=0.1, initial_value=1.4)
             self._own_points = gui.add_checkbox("points of this frame", False)
         self._time.on_update(self._on_time)
         for control in (self._kind, self._point_size, self._own_points, self._follow):
@@ -147,6 +149,7 @@ class Viewer:
         if self._shown != wanted:
             self._shown = wanted
             self._scene.show_cloud(*wanted)
+            self._legend.content = color_bar(cloud, self._kind.value)
         if not self._size:
             self._size = extent(cloud)
             look_at(self._server.initial_camera, cloud, self._size)
@@ -177,7 +180,7 @@ class Viewer:
 
 def look_at(camera: Any, cloud: Snapshot, size: float) -> None:
     """Put the browser's camera above and beside the first depth camera, so that it sees the whole model."""
-    middle = np.median(cloud.points, axis=0).astype(np.float64)
+    middle = np.median(core(cloud), axis=0).astype(np.float64)
     camera.look_at = middle
     camera.position = middle + size * np.array([-0.45, -0.45, -1.0])
     camera.up = (0.0, -1.0, 0.0)
@@ -188,6 +191,23 @@ def summary(story: Story) -> str:
     counts = {status: sum(moment.status == status for moment in story.moments) for status in STATUS_COLORS}
     parts = [f"{number} {status}" for status, number in counts.items() if number]
     return f"{len(story.moments)} frames: {', '.join(parts)}"
+
+
+def color_bar(cloud: Snapshot, kind: str) -> str:
+    """Return what the colours of the points mean: their range, or how they come about."""
+    words = {
+        "colour": "as the camera saw it",
+        "shading": "lit from the first camera",
+        "normal": "red: to the right, green: up, blue: towards the first camera",
+    }
+    low, high = color_range(cloud, kind)
+    bar = "linear-gradient(90deg,#440154,#3b518b,#21908d,#5cc863,#fde725)"
+    told = words.get(kind) or (
+        f'<span>{low}</span><span style="flex:1;height:9px;background:{bar}"></span><span>{high}</span>'
+    )
+    return (
+        f'<div style="display:flex;gap:8px;align-items:center;font-size:12px;padding:2px 14px">{told}</div>'
+    )
 
 
 def figures_table(moment: Moment) -> str:
@@ -214,7 +234,7 @@ def status_strip(moments: list[Moment], width: int = 1000) -> str:
             start = end
     return (
         f'<svg viewBox="0 0 {width} 20" preserveAspectRatio="none" '
-        f'style="width:100%;height:8px;display:block">{"".join(bars)}</svg>'
+        f'style="width:calc(100% - 28px);height:8px;margin:2px 14px;display:block">{"".join(bars)}</svg>'
     )
 
 

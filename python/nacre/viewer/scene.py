@@ -15,7 +15,7 @@ from nacre.viewer.story import Moment, Snapshot, Story
 Array = npt.NDArray[np.float64]
 
 _MAX_POINTS = 400_000
-_MAX_FRUSTUMS = 60
+_MAX_FRUSTUMS = 24
 
 
 class Scene:
@@ -38,11 +38,11 @@ class Scene:
 
     def show_cloud(self, cloud: Snapshot, kind: str, point_size: float = 1.0) -> None:
         """Draw the model; the size of points is in spacings."""
-        step = max(-(-len(cloud.points) // _MAX_POINTS), 1)
+        cloud = cloud.thinned(_MAX_POINTS)
         self._scene.add_point_cloud(
             "/model",
-            cloud.points[::step],
-            point_colors(cloud, kind)[::step],
+            cloud.points,
+            point_colors(cloud, kind),
             point_size=point_size * cloud.spacing,
             point_shape="circle",
             point_shading="flat",
@@ -119,8 +119,16 @@ def frustum_corners(camera: Camera | None) -> Array:
 
 def extent(cloud: Snapshot) -> float:
     """Return a length that stands for the size of a model [m]."""
-    low, high = np.percentile(cloud.points, (2, 98), axis=0)
+    low, high = np.percentile(core(cloud), (2, 98), axis=0)
     return float(np.linalg.norm(high - low))
+
+
+def core(cloud: Snapshot) -> npt.NDArray[np.float32]:
+    """Return the best known quarter of a model's points: of a room, what was looked at, not its far walls."""
+    if cloud.confidence is None or len(cloud.points) < 4:
+        return cloud.points
+    known: npt.NDArray[np.float32] = cloud.points[cloud.confidence >= np.percentile(cloud.confidence, 75)]
+    return known
 
 
 def _chain(positions: Array) -> Array:

@@ -49,6 +49,18 @@ class Snapshot:
             model.points, model.normals, model.spacing, model.colors, model.confidence, model.last_seen
         )
 
+    def thinned(self, max_points: int) -> Snapshot:
+        """Return the same with every second, third, ... point, ``max_points`` at most."""
+        step = max(-(-len(self.points) // max_points), 1)
+        if step == 1:
+            return self
+        rest = (
+            None if rows is None else rows[::step].copy()
+            for rows in (self.colors, self.confidence, self.last_seen)
+        )
+        points, normals = self.points[::step].copy(), self.normals[::step].copy()
+        return Snapshot(points, normals, self.spacing * step**0.5, *rest)
+
 
 @dataclass(frozen=True, eq=False)
 class Moment:
@@ -128,6 +140,8 @@ class Story:
         ``depth_of(index)`` reads the depth image of a frame again: (H, W) float32 [m].
     max_snapshots : int
         So many states of the model are kept, evenly spread over the frames.
+    max_points : int
+        States but the newest keep so many points at most, so that a long run stays within memory.
 
     Attributes
     ----------
@@ -142,6 +156,7 @@ class Story:
         *,
         depth_of: Callable[[int], npt.NDArray[np.float32]] | None = None,
         max_snapshots: int = 40,
+        max_points: int = 100_000,
     ) -> None:
         if max_snapshots < 2:
             raise ValueError(f"max_snapshots must be at least 2, got {max_snapshots}")
@@ -151,6 +166,7 @@ class Story:
         self.moments: list[Moment] = []
         self._snapshots: list[tuple[int, Snapshot]] = []
         self._max_snapshots = max_snapshots
+        self._max_points = max_points
 
     def add(self, moment: Moment) -> None:
         """Append a frame."""
@@ -168,6 +184,9 @@ class Story:
             self._snapshots.pop()
         if len(self._snapshots) >= self._max_snapshots:
             self._snapshots = self._snapshots[::2]
+        if self._snapshots:
+            before, last = self._snapshots[-1]
+            self._snapshots[-1] = (before, last.thinned(self._max_points))
         self._snapshots.append((place, cloud))
 
     @property

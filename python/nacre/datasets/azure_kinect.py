@@ -1,0 +1,140 @@
+"""Azure Kinect and Orbbec Femto recordings (.mkv), by way of their images: calibration.json and depth/."""
+
+from __future__ import annotations
+
+import json
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre._core import Camera
+from nacre.datasets.given import Given
+from nacre.datasets.listing import describe, files
+from nacre.datasets.sequence import FrameSource, Sequence
+from nacre.errors import FileFormatError
+from nacre.io.images import DEPTH_SUFFIXES, read_depth
+
+FORMAT = "azure-kinect"
+LAYOUT = "calibration.json and the depth images, in depth/ or beside it, as ffmpeg takes them out of the .mkv"
+SUFFIXES = (".mkv",)
+DEPTH_SCALE = 1000.0
+
+_log = logging.getLogger(__name__)
+# Size of the depth images: the side of the sensor in their pixels, and where on it they begin.
+_MODES = {
+    (640, 576): (1024, 192, 180),
+    (320, 288): (512, 96, 90),
+    (1024, 1024): (1024, 0, 0),
+    (512, 512): (512, 0, 0),
+}
+_MODEL = "CALIBRATION_LensDistortionModelBrownConrady"
+_PURPOSE = "CALIBRATION_CameraPurposeDepth"
+
+
+def recognise(path: Path) -> bool:
+    """Say whether this is a recording of these cameras, or the folder of its images."""
+    if path.is_file():
+        return path.suffix.lower() in SUFFIXES
+    return (path / "calibration.json").is_file() and bool(_images(path))
+
+
+def missing(folder: Path) -> str | None:
+    """Say what a folder lacks that is almost such a recording."""
+    videos = files(folder, SUFFIXES)
+    if (folder / "calibration.json").is_file() or videos:
+        return (
+            f"This is almost an Azure Kinect recording: {_advice(videos[0].name if videos else 'REC.mkv')}."
+        )
+    return None
+
+
+def read(path: Path, given: Given) -> Sequence:
+    """
+    Open the folder of a recording's images.
+
+    The intrinsics are those of calibration.json, which every recording carries, for the mode that the images'
+    size tells. Colours are those of another camera, and are not read.
+    """
+    if path.is_file():
+        raise FileFormatError(path, f"an .mkv is read by way of its images: {_advice(path.name)}")
+    depth = _images(path)
+    if not depth:
+        raise FileFormatError(
+            path, f"no depth images, the folder holds {describe(path)}: {_advice('REC.mkv')}"
+        )
+    height, width = read_depth(depth[0]).shape
+    return Sequence(
+        path,
+        format=FORMAT,
+        camera=given.camera or _camera(path / "calibration.json", width, height),
+        depth_scale=given.scale_or(DEPTH_SCALE),
+        sources=[FrameSource(i, image) for i, image in enumerate(depth)],
+    )
+
+
+def _images(folder: Path) -> list[Path]:
+    return files(folder / "depth", DEPTH_SUFFIXES) or files(folder, DEPTH_SUFFIXES)
+
+
+def _advice(name: str) -> str:
+    return (
+        f"mkdir -p images/depth && ffmpeg -dump_attachment:t:0 images/calibration.json -i {name} -map 0:1 "
+        "-fps_mode passthrough images/depth/%05d.png, then give images (0:1 is the depth track, 0:0 where "
+        "there is no colour; for colours, give the folder that Open3D's azure_kinect_mkv_reader.py writes)"
+    )
+
+
+def _camera(path: Path, width: int, height: int) -> Camera:
+    """Return the depth camera in the mode that has images of a size."""
+    if (width, height) not in _MODES:
+        known = ", ".join(f"{w} x {h}" for w, h in _MODES)
+        raise FileFormatError(
+            path, f"depth images are {known}, these are {width} x {height}; give the camera"
+        )
+    side, left, top = _MODES[width, height]
+    cx, cy, fx, fy, *lens = _parameters(path)
+    (k1, k2, k3), error = _polynomial(np.array(lens[:6]), np.hypot(width, height) / (2 * side * fx))
+    if error * side * fx > 1:
+        _log.warning("the lens is known to %.1f pixels at the edges of the images", error * side * fx)
+    # The file measures from the corner of the sensor in its sides; pixel centres are integers.
+    try:
+        return Camera(
+            width, height, side * fx, side * fy, side * cx - left - 0.5, side * cy - top - 0.5,
+            distortion=[k1, k2, lens[9], lens[8], k3],
+        )  # fmt: skip
+    except ValueError as error:
+        raise FileFormatError(path, str(error)) from error
+
+
+def _parameters(path: Path) -> npt.NDArray[np.float64]:
+    """Return cx cy fx fy k1 ... k6, the centre of distortion, p2 and p1 of the depth camera."""
+    try:
+        cameras: Any = json.loads(path.read_text(encoding="utf-8").rstrip("\0"))
+        cameras = cameras["CalibrationInformation"]["Cameras"]
+        (lens,) = (camera["Intrinsics"] for camera in cameras if camera["Purpose"] == _PURPOSE)
+        model, values = lens["ModelType"], np.array(lens["ModelParameters"], np.float64)
+    except (ValueError, KeyError, TypeError, OSError) as error:
+        raise FileFormatError(path, f"not the calibration of an Azure Kinect: {error!r}") from error
+    if model != _MODEL or len(values) < 14 or not np.isfinite(values).all() or not (values[2:4] > 0).all():
+        raise FileFormatError(
+            path, f"14 finite parameters of {_MODEL} were expected, got {len(values)} of {model}"
+        )
+    return values[:14]
+
+
+def _polynomial(k: npt.NDArray[np.float64], radius: float) -> tuple[npt.NDArray[np.float64], float]:
+    """
+    Bring the rational lens (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) into Brown's form.
+
+    Least squares in the image, up to a radius there; returns k1 k2 k3 and the largest error [focal lengths].
+    """
+    r = np.linspace(0, 2, 2001)[1:]
+    powers = np.stack([r**2, r**4, r**6], axis=1)
+    seen = r * (1 + powers @ k[:3]) / (1 + powers @ k[3:])
+    inside = (seen <= radius) & (np.gradient(seen) > 0)
+    terms = (powers * r[:, None])[inside]
+    fitted = np.asarray(np.linalg.lstsq(terms, (seen - r)[inside], rcond=None)[0], np.float64)
+    return fitted, float(np.abs(terms @ fitted - (seen - r)[inside]).max(initial=0))

@@ -1,0 +1,67 @@
+"""Images and cameras in messages of ROS."""
+
+from __future__ import annotations
+
+import io
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre.errors import FileFormatError
+
+MILLIMETRES, METRES = ("16UC1", "mono16", "Z16"), ("32FC1",)
+CHANNELS = {"rgb8": (0, 1, 2), "bgr8": (2, 1, 0), "rgba8": (0, 1, 2), "bgra8": (2, 1, 0), "mono8": (0, 0, 0)}
+
+
+def pixels(message: Any, place: Path) -> npt.NDArray[Any]:
+    """Return the pixels of an uncompressed image, (H, W) or (H, W, C)."""
+    encoding = message.encoding
+    if encoding in CHANNELS or encoding == "8UC1":
+        dtype, channels = np.dtype("u1"), 1 if encoding in ("mono8", "8UC1") else len(encoding) - 1
+    else:
+        dtype, channels = np.dtype("f4" if encoding in METRES else "u2"), 1
+    dtype = dtype.newbyteorder(">" if message.is_bigendian else "<")
+    row = message.width * channels * dtype.itemsize
+    data = np.asarray(message.data, np.uint8).reshape(-1)
+    if message.step < row or len(data) < message.height * message.step:
+        raise FileFormatError(place, f"the image of {message.width} x {message.height} is cut short")
+    rows = data[: message.height * message.step].reshape(message.height, message.step)[:, :row]
+    image = np.ascontiguousarray(rows).view(dtype).reshape(message.height, message.width, channels)
+    return image[..., 0] if channels == 1 else image
+
+
+def compressed_depth(message: Any, place: Path) -> npt.NDArray[Any]:
+    """Return the pixels of a compressedDepth image: a header of 12 bytes, then a PNG of 16 bits."""
+    from PIL import Image, UnidentifiedImageError
+
+    data = bytes(message.data)
+    start = data.find(b"\x89PNG")
+    if start < 0 or "32FC1" in message.format:
+        raise FileFormatError(place, f"compressed depth must be a PNG of 16 bits, this is {message.format!r}")
+    try:
+        return np.asarray(Image.open(io.BytesIO(data[start:])), dtype=np.uint16)
+    except (UnidentifiedImageError, OSError, SyntaxError) as error:
+        raise FileFormatError(place, f"the PNG is damaged: {error}") from error
+
+
+def without_tail(data: bytes) -> bytes:
+    """Return an image of ROS 1 without the depth units that RealSense's recorder writes behind its end."""
+    at = 12  # sequence number and time stamp
+    try:
+        for fixed in (8, 5):  # after frame_id: height, width; after the encoding: endianness and step
+            at += 4 + struct.unpack_from("<I", data, at)[0] + fixed
+        return data[: at + 4 + struct.unpack_from("<I", data, at)[0]]
+    except struct.error:
+        return data
+
+
+def intrinsics(info: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return the matrix and the distortion of a camera_info; capitals in ROS 1."""
+    matrix, distortion = (
+        np.asarray(getattr(info, name if hasattr(info, name) else name.upper()), np.float64)
+        for name in ("k", "d")
+    )
+    return matrix.reshape(3, 3), distortion

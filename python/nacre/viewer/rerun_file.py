@@ -1,0 +1,95 @@
+"""A recording for the Rerun viewer (.rrd): model, cameras, depth images and figures on one time line."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from nacre.errors import FileFormatError
+from nacre.viewer.colors import STATUS_COLORS, color_kinds, point_colors
+from nacre.viewer.story import Moment, Story
+
+_MISSING = 'files for Rerun need rerun-sdk: pip install "nacre[rerun]"'
+_MOST_DEPTH_IMAGES = 100
+
+
+def export_rrd(story: Story, path: str | os.PathLike[str]) -> None:
+    """
+    Write what a story tells for the Rerun viewer: ``rerun FILE`` opens it.
+
+    The world is nacre's: metres, x right, y down, z forward. Depth images, of at most 100 frames, are stored
+    in millimetres.
+
+    Parameters
+    ----------
+    story : Story
+        What is told.
+    path : path-like
+        The file, usually ``view.rrd``.
+
+    Raises
+    ------
+    ImportError
+        When rerun-sdk is missing, with the command that installs it.
+    OSError
+        When the file cannot be written.
+    """
+    try:
+        import rerun
+    except ImportError as error:
+        raise ImportError(_MISSING) from error
+    rr: Any = rerun
+    target = Path(path)
+    with target.open("wb"):  # a folder that is missing is told by Python's own error
+        pass
+    recording = rr.RecordingStream("nacre")
+    recording.save(str(target))
+    recording.send_recording_name(story.title)
+    recording.log("world", rr.ViewCoordinates.RDF, static=True)
+    for place, cloud in story.snapshots:
+        if len(story.snapshots) > 1:
+            recording.set_time("frame", sequence=story.moments[place].index)
+        colors = point_colors(cloud, color_kinds(cloud)[0])
+        points = rr.Points3D(cloud.points, colors=colors, radii=0.6 * cloud.spacing)
+        recording.log("world/model", points, static=len(story.snapshots) == 1)
+    step = -(-len(story.moments) // _MOST_DEPTH_IMAGES)
+    for place, moment in enumerate(story.moments):
+        recording.set_time("frame", sequence=moment.index)
+        _log_frame(rr, recording, story, moment, place % step == 0)
+    path_points = [m.world_from_camera[:3, 3] for m in story.moments if m.world_from_camera is not None]
+    if len(path_points) > 1:
+        recording.log("world/path", rr.LineStrips3D([np.array(path_points)]), static=True)
+    recording.flush()
+    recording.disconnect()
+
+
+def _log_frame(rr: Any, recording: Any, story: Story, moment: Moment, with_depth: bool) -> None:
+    """Log the camera of a frame, its depth image, its status and its figures."""
+    level = rr.TextLogLevel.WARN if moment.status in ("LOST", "WEAK") else rr.TextLogLevel.INFO
+    told = ", ".join(f"{name} {value}" for name, value in moment.figures.items())
+    reason = f": {moment.reason}" if moment.reason else ""
+    text = f"frame {moment.index} {moment.status}{reason}; {told}"
+    recording.log("frames", rr.TextLog(text, level=level, color=STATUS_COLORS[moment.status]))
+    for name, pose in (("camera", moment.world_from_camera), ("truth", moment.truth)):
+        if pose is None:
+            recording.log(f"world/{name}", rr.Clear(recursive=True))
+            continue
+        recording.log(f"world/{name}", rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
+        camera = story.camera
+        if camera is not None and camera.model == "pinhole":
+            matrix = [[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]]
+            pinhole = rr.Pinhole(
+                image_from_camera=matrix, resolution=[camera.width, camera.height],
+                camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=0.1,
+            )  # fmt: skip
+            recording.log(f"world/{name}", pinhole)
+    if with_depth and story.depth_of is not None and moment.world_from_camera is not None:
+        try:
+            depth = story.depth_of(moment.index)
+        except (FileFormatError, OSError):
+            return
+        stored = np.rint(np.clip(np.nan_to_num(1000 * depth), 0, 65535)).astype(np.uint16)
+        recording.log("world/camera/depth", rr.DepthImage(stored, meter=1000.0))

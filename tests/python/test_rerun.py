@@ -1,0 +1,70 @@
+"""Files for the Rerun viewer, read by Rerun's own tools."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nacre
+import nacre.viewer
+from nacre.cli.app import run
+from nacre.viewer import Moment, Snapshot, Story, export_rrd
+
+
+def story() -> Story:
+    """Tell of three frames, the second of them lost."""
+    camera = nacre.Camera(96, 72, 90, 90, 47.5, 35.5)
+    y, x = np.mgrid[0:72, 0:96]
+    depth = (0.7 + 0.03 * np.sin(x / 6) * np.cos(y / 7)).astype(np.float32)
+    told = Story("wave", camera, depth_of=lambda index: depth)
+    points = nacre.back_project(depth, camera).reshape(-1, 3)
+    for i in range(3):
+        pose = np.eye(4)
+        pose[0, 3] = 0.01 * i
+        lost = i == 1
+        told.add(
+            Moment(i, "LOST", "too few pairs")
+            if lost
+            else Moment(i, "TRACKED", "", pose, None, {"overlap": "98 %"})
+        )
+        told.set_snapshot(Snapshot(points, np.zeros_like(points) - (0, 0, 1), 0.005))
+    return told
+
+
+def rerun(*arguments: str | Path) -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", "rerun", *map(str, arguments)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
+
+
+def test_rerun_reads_what_was_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("rerun")
+    monkeypatch.setattr(nacre.viewer, "written_story", lambda folder: story())
+    file = tmp_path / "view.rrd"
+    assert run(["view", str(tmp_path), "--rrd", str(file)]) == 0
+    assert str(file) in capsys.readouterr().out
+    assert "verified without error" in rerun("rrd", "verify", file)
+    told = rerun("rrd", "print", "-vvv", file)
+    for entity in ("/world/model", "/world/path", "/world/camera", "/world/camera/depth", "/frames"):
+        assert entity in told
+    assert "LOST" in told
+
+
+def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rerun", None)
+    with pytest.raises(ImportError, match=r'pip install "nacre\[rerun\]"'):
+        export_rrd(story(), tmp_path / "view.rrd")
+
+
+def test_a_folder_that_is_missing(tmp_path: Path) -> None:
+    pytest.importorskip("rerun")
+    with pytest.raises(FileNotFoundError):
+        export_rrd(story(), tmp_path / "none" / "view.rrd")
