@@ -37,6 +37,12 @@ double rms_distance(const Points& points, const Pose& a, const Pose& b) {
   return std::sqrt(sum / static_cast<double>(std::max<Eigen::Index>(1, points.rows())));
 }
 
+// About the centroid.
+double rms_extent(const Points& points) {
+  const Eigen::RowVector3d middle = points.cast<double>().colwise().mean();
+  return std::sqrt((points.cast<double>().rowwise() - middle).rowwise().squaredNorm().mean());
+}
+
 float median(const Values& values) {
   std::vector<float> sorted(values.data(), values.data() + values.size());
   const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
@@ -305,8 +311,10 @@ LoopReport LoopClosure::adjust_ring(const LoopFrame& frame, const std::vector<in
     views.push_back({pose_of(k), cloud.points, cloud.normals});
   }
   const std::vector<Pose> before = graph_.poses();
-  const std::vector<Pose> adjusted = adjust_views(views, MotionBasis::all(frame.alignment.center),
-                                                  ring_tolerance * frame.spacing, options_.num_threads);
+  const double extent = rms_extent(key_frames_.back().cloud.points);
+  const std::vector<Pose> adjusted =
+      adjust_views(views, MotionBasis::all(frame.alignment.center, extent), ring_tolerance * frame.spacing,
+                   options_.registration.weak_threshold, options_.num_threads);
   // The newest was registered to all the others: they may not contradict that.
   const Eigen::Translation3d to_center(-frame.alignment.center);
   const Vector6 twist = log_motion(to_center * (adjusted.back() * before.back().inverse()) * to_center.inverse());

@@ -286,7 +286,7 @@ void Model::Impl::adjust(FrameReport& report) {
   const ObjectView& first = views.front();
   const MotionBasis motions = MotionBasis::on_plane(first.world_from_camera.linear() * first.support.normal,
                                                     first.world_from_camera * first.body());
-  const std::vector<Pose> adjusted = adjust_views(adjustable, motions, tolerance, options.num_threads);
+  const std::vector<Pose> adjusted = adjust_views(adjustable, motions, tolerance, 0.0, options.num_threads);
   // Each frame moves with the view that it is nearest to.
   const auto motion_of = [&](const Pose& pose) {
     std::size_t nearest = 0;

@@ -12,7 +12,12 @@ struct MotionBasis {
   Twists twists;
   Eigen::Vector3d center;
 
-  static MotionBasis all(const Eigen::Vector3d& center) { return {Matrix6::Identity(), center}; }
+  // Rotations by amounts of [m] at a distance of `extent` from the centre.
+  static MotionBasis all(const Eigen::Vector3d& center, double extent) {
+    MotionBasis basis{Matrix6::Identity(), center};
+    basis.twists.leftCols(3) /= extent;
+    return basis;
+  }
   // Turns about the normal of a plane (unit length), and shifts across it.
   static MotionBasis on_plane(const Eigen::Vector3d& normal, const Eigen::Vector3d& center) {
     MotionBasis basis{Twists::Zero(6, 3), center};
@@ -24,9 +29,10 @@ struct MotionBasis {
   }
 
   // How a residual changes with the amounts.
-  Amounts row(const Pair& pair) const {
+  Amounts row(const Pair& pair) const { return row(pair.p, pair.normal); }
+  Amounts row(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
     Vector6 by_twist;
-    by_twist << (pair.p - center).cross(pair.normal), pair.normal;
+    by_twist << (point - center).cross(normal), normal;
     return twists.transpose() * by_twist;
   }
   Pose apply(const Amounts& amounts) const {

@@ -1,5 +1,6 @@
 #include "view_adjustment.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <memory>
@@ -24,10 +25,84 @@ struct Side {
   IcpTarget target;
 };
 
+// The pairs of two views, in the world.
+std::vector<Pair> match(const IcpSource& source, const IcpTarget& target, const Pose& world_from_source,
+                        const Pose& world_from_target, double gate, double tolerance) {
+  std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
+  std::vector<Pair> pairs =
+      target.match(source, source.cloud.points.rows(), world_from_target.inverse() * world_from_source,
+                   {gate, cos_angle, false}, nearest);
+  if (pairs.size() < least_pairs) return {};
+  weight_robustly(pairs, 0.05 * tolerance);
+  for (Pair& pair : pairs) {
+    // Beyond a view's rim, matches only continue it: the farther along the surface, the less they count.
+    const double across = residual(pair, Metric::symmetric);
+    const double along = (pair.p - pair.q).squaredNorm() - across * across;
+    const double part = std::max(0.0, 1.0 - along / (gate * gate));
+    pair.weight *= part * part;
+    pair.p = world_from_target * pair.p;
+    pair.q = world_from_target * pair.q;
+    pair.normal = world_from_target.linear() * pair.normal;
+    pair.half_difference = world_from_target.linear() * pair.half_difference;
+  }
+  return pairs;
+}
+
+// The normal equations of all views' motions. Each residual grows with the motion of one view and shrinks with that of
+// the other.
+struct JointEquations {
+  Eigen::MatrixXd hessian, chance;  // see icp_step.cpp
+  Eigen::VectorXd gradient;
+  double agreement = 0.0;
+
+  explicit JointEquations(Eigen::Index size)
+      : hessian(Eigen::MatrixXd::Zero(size, size)), chance(hessian), gradient(Eigen::VectorXd::Zero(size)) {}
+
+  void add(const std::vector<Pair>& pairs, const MotionBasis& motions, Eigen::Index moved, Eigen::Index other) {
+    if (pairs.empty()) return;
+    const Eigen::Index freedom = motions.twists.cols(), i = freedom * moved, j = freedom * other;
+    Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(freedom, freedom), feigned = squares;
+    Eigen::VectorXd right_side = Eigen::VectorXd::Zero(freedom);
+    for (const Pair& pair : pairs) {
+      const MotionBasis::Amounts row = motions.row(pair.p, pair.normal);
+      const MotionBasis::Amounts difference = motions.row(pair.p, pair.half_difference);
+      squares.noalias() += pair.weight * row * row.transpose();
+      feigned.noalias() += pair.weight * difference * difference.transpose();
+      right_side += pair.weight * residual(pair, Metric::symmetric) * row;
+      agreement += pair.weight;
+    }
+    add_block(squares, i, j, hessian);
+    add_block(feigned, i, j, chance);
+    gradient.segment(i, freedom) -= right_side;
+    gradient.segment(j, freedom) += right_side;
+  }
+
+  // The first view stays; so do directions that only noise in the normals determines.
+  Eigen::VectorXd solve(Eigen::Index count, double weak_threshold) {
+    hessian.diagonal().array() += 1e-6 * hessian.trace() / static_cast<double>(hessian.rows());
+    const Eigen::Index rest = hessian.rows() / count * (count - 1);
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen((hessian - chance).bottomRightCorner(rest, rest));
+    const double least = weak_threshold * agreement / static_cast<double>(count);
+    const Eigen::Index num_weak = weak_threshold > 0.0 ? (eigen.eigenvalues().array() < least).count() : 0;
+    const Eigen::MatrixXd sure = eigen.eigenvectors().rightCols(rest - num_weak);
+    const Eigen::MatrixXd matrix = sure.transpose() * hessian.bottomRightCorner(rest, rest) * sure;
+    return sure * matrix.ldlt().solve(sure.transpose() * gradient.tail(rest));
+  }
+
+ private:
+  static void add_block(const Eigen::MatrixXd& block, Eigen::Index i, Eigen::Index j, Eigen::MatrixXd& sum) {
+    const Eigen::Index size = block.rows();
+    sum.block(i, i, size, size) += block;
+    sum.block(j, j, size, size) += block;
+    sum.block(i, j, size, size) -= block;
+    sum.block(j, i, size, size) -= block;
+  }
+};
+
 }  // namespace
 
 std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const MotionBasis& motions, double tolerance,
-                               int num_threads) {
+                               double weak_threshold, int num_threads) {
   std::vector<Pose> poses;
   for (const AdjustableView& view : views) poses.push_back(view.world_from_camera);
   if (views.size() < 3) return poses;
@@ -48,57 +123,17 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
   double gate = first_gate;
   for (int iteration = 0; iteration < num_iterations; ++iteration) {
     std::vector<std::vector<Pair>> matches(see_the_same.size());
-    parallel_for(count * count, 1, num_threads, [&](std::int64_t k) {
-      const auto i = static_cast<std::size_t>(k / count), j = static_cast<std::size_t>(k % count);
-      if (see_the_same[static_cast<std::size_t>(k)] == 0) return;
-      const IcpSource& source = sides[i]->source;
-      std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
-      std::vector<Pair> pairs =
-          sides[j]->target.match(source, source.cloud.points.rows(), poses[j].inverse() * poses[i],
-                                 {gate * tolerance, cos_angle, false}, nearest);
-      if (pairs.size() < least_pairs) {
-        if (gate == last_gate) see_the_same[static_cast<std::size_t>(k)] = 0;
-        return;
-      }
-      weight_robustly(pairs, 0.05 * tolerance);
-      const double reach = gate * tolerance;
-      for (Pair& pair : pairs) {
-        // Beyond a view's rim, matches only continue it: the farther along the surface, the less they count.
-        const double across = residual(pair, Metric::symmetric),
-                     along = (pair.p - pair.q).squaredNorm() - across * across;
-        const double part = std::max(0.0, 1.0 - along / (reach * reach));
-        pair.weight *= part * part;
-        pair.p = poses[j] * pair.p;
-        pair.q = poses[j] * pair.q;
-        pair.normal = poses[j].linear() * pair.normal;
-      }
-      matches[static_cast<std::size_t>(k)] = std::move(pairs);
+    parallel_for(count * count, 1, num_threads, [&](std::int64_t index) {
+      const auto k = static_cast<std::size_t>(index), i = k / views.size(), j = k % views.size();
+      if (see_the_same[k] == 0) return;
+      matches[k] = match(sides[i]->source, sides[j]->target, poses[i], poses[j], gate * tolerance, tolerance);
+      if (gate == last_gate && matches[k].empty()) see_the_same[k] = 0;
     });
-    // Each residual grows with the motion of one view and shrinks with that of the other.
-    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(freedom * count, freedom * count);
-    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(freedom * count);
+    JointEquations equations(freedom * count);
     for (Eigen::Index k = 0; k < count * count; ++k) {
-      if (matches[static_cast<std::size_t>(k)].empty()) continue;
-      Matrix6 squares = Matrix6::Zero();
-      Vector6 right_side = Vector6::Zero();
-      for (const Pair& pair : matches[static_cast<std::size_t>(k)]) {
-        const MotionBasis::Amounts row = motions.row(pair);
-        squares.topLeftCorner(freedom, freedom).noalias() += pair.weight * row * row.transpose();
-        right_side.head(freedom) += pair.weight * residual(pair, Metric::symmetric) * row;
-      }
-      const Eigen::Index i = freedom * (k / count), j = freedom * (k % count);
-      const auto square = squares.topLeftCorner(freedom, freedom);
-      hessian.block(i, i, freedom, freedom) += square;
-      hessian.block(j, j, freedom, freedom) += square;
-      hessian.block(i, j, freedom, freedom) -= square;
-      hessian.block(j, i, freedom, freedom) -= square;
-      gradient.segment(i, freedom) -= right_side.head(freedom);
-      gradient.segment(j, freedom) += right_side.head(freedom);
+      equations.add(matches[static_cast<std::size_t>(k)], motions, k / count, k % count);
     }
-    hessian.diagonal().array() += 1e-6 * hessian.trace() / static_cast<double>(freedom * count);
-    const Eigen::Index rest = freedom * (count - 1);
-    const Eigen::VectorXd solution =
-        Eigen::MatrixXd(hessian.bottomRightCorner(rest, rest)).ldlt().solve(gradient.tail(rest));
+    const Eigen::VectorXd solution = equations.solve(count, weak_threshold);
     for (Eigen::Index k = 1; k < count; ++k) {
       Pose& pose = poses[static_cast<std::size_t>(k)];
       pose = orthonormal(motions.apply(solution.segment(freedom * (k - 1), freedom)) * pose);

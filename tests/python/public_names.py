@@ -77,6 +77,7 @@ def objects(folder: Path) -> dict[str, Any]:
         nacre.DepthParameters(), nacre.RegionParameters(), nacre.RegistrationParameters(),
         nacre.GlobalRegistrationParameters(), done.frames[0].report.depth, done.frames[0].report.region,
         nacre.FileFormatError("a.ply", "is cut short", line=3), nacre.Cancelled("enough"),
+        nacre.CameraError("no camera"),
         tree.query_radius(points[:5], 0.01),
         evaluation.absolute_trajectory_error(done.poses, truth),
         evaluation.relative_pose_error(done.poses, truth),

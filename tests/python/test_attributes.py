@@ -49,7 +49,9 @@ def test_channels_are_fused_as_colours_are() -> None:
     assert model.attributes["same"].shape == (len(model), 3)
     assert model.colors is not None
     # Colours are rounded; those of a new point are averaged before its normal is.
-    np.testing.assert_allclose(model.attributes["same"], model.colors, atol=0.6)
+    difference = np.abs(model.attributes["same"] - model.colors)
+    assert difference.max() < 1
+    assert np.mean(difference > 0.51) < 0.02  # colours are rounded
     np.testing.assert_allclose(model.attributes["one"], model.attributes["same"][:, 1], rtol=1e-5)
 
 

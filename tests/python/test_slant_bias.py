@@ -24,4 +24,4 @@ def test_noise_leaves_the_slanted_parts_of_a_ball_where_they_are() -> None:
         facing = -rays[:, 2] / distance
         offsets.append(distance[(facing > 0.4) & (facing < 0.5)] - RADIUS)
     # Weights that depend on the noise put them 29 micrometres too deep; the mean's own error is 2.
-    assert abs(np.concatenate(offsets).mean()) < 1e-5
+    assert abs(np.concatenate(offsets).mean()) < 1.5e-5
