@@ -1,6 +1,7 @@
 """A stranger's C++ project finds, builds and runs nacre in each of the three ways, static and shared."""
 
 import os
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -92,5 +93,6 @@ def test_shared_library_shows_its_own_names_only(shared_build: Path, run: Callab
     (library,) = (shared_build / "cpp").glob("libnacre.so.*.*.*")
     symbols = run("nm", "-DC", "--defined-only", library).splitlines()
     names = [line.split(" ", 2)[2] for line in symbols]
+    names = [re.sub("^(typeinfo|typeinfo name|vtable) for ", "", name) for name in names]  # of what is thrown
     assert names
     assert [name for name in names if not name.startswith("nacre::")] == []
