@@ -138,20 +138,19 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
     node = most_seen >= 0 ? most_seen : stops_.back().key_frame;
   }
   stops_.push_back({frame.index, node, pose});
-  if (is_new) {
-    const bool is_ring = closes_ring(in_view);
-    seen_with_.push_back(in_view);
-    for (const int k : in_view) seen_with_[static_cast<std::size_t>(k)].push_back(node);
-    if (is_ring && (!found || agrees)) return adjust_ring(frame, in_view);
-  }
-  if (!found || !is_new) return report;
+  if (!is_new) return report;
+
+  const bool is_ring = closes_ring(in_view);
+  seen_with_.push_back(in_view);
+  for (const int k : in_view) seen_with_[static_cast<std::size_t>(k)].push_back(node);
+  if (!found) return is_ring ? adjust_ring(frame, in_view) : report;
 
   found->node = node;
   const double depth = key_frames_.back().cloud.depth;
   if (agrees) {
     graph_.add_edge(edge(found->key_frame, node, found->alignment.target_from_source, found->alignment, depth, true));
     pending_.reset();
-    return report;
+    return is_ring ? adjust_ring(frame, in_view) : report;
   }
   const bool is_confirmed =
       pending_ && found->stop - pending_->stop <= 2 &&
@@ -304,7 +303,8 @@ bool LoopClosure::closes_ring(const std::vector<int>& in_view) const {
 // better than each did when it was the newest.
 LoopReport LoopClosure::adjust_ring(const LoopFrame& frame, const std::vector<int>& in_view) {
   LoopReport report;
-  if (key_frames_.size() > most_in_ring || graph_.has_fixed()) return report;
+  const bool is_weak = frame.alignment.weak_directions.cols() > 0;  // the ring need not determine them either
+  if (is_weak || key_frames_.size() > most_in_ring || graph_.has_fixed()) return report;
   std::vector<AdjustableView> views;
   for (int k = 0; k < num_key_frames(); ++k) {
     const FrameCloud& cloud = key_frames_[static_cast<std::size_t>(k)].cloud;

@@ -1,4 +1,4 @@
-// The motions that something may make: combinations of some unit twists about a centre.
+// The motions that something may make: combinations of some twists about a centre.
 #pragma once
 
 #include "icp_step.hpp"
