@@ -7,6 +7,7 @@
 #include "depth_images.hpp"
 #include "doctest/doctest.h"
 #include "key_frames.hpp"
+#include "loop_closure.hpp"
 #include "meshes.hpp"
 #include "model_correction.hpp"
 #include "nacre/model.hpp"
@@ -335,6 +336,30 @@ TEST_CASE("a ring of views closes with the same bits for any number of threads")
   const Model one = Turntable::scanned(1, true, false, 1), three = Turntable::scanned(1, true, false, 3);
   CHECK(num_loops(one) == 1);
   CHECK(same_bits(one.cloud().points, three.cloud().points));
+}
+
+TEST_CASE("a ring is not closed by a view that leaves directions open") {
+  const Camera camera = Camera::orthographic(130, 160, 0.0015);
+  ModelOptions options;
+  for (const bool is_weak : {false, true}) {
+    CAPTURE(is_weak);
+    LoopClosure loops(camera, options);
+    int num_closed = 0;
+    for (int k = 0; k < Turntable::num_views; ++k) {
+      const Frame frame = make_frame(Turntable::clean(camera)[static_cast<std::size_t>(k)], camera);
+      SurfaceObserver observer(camera, options.fusion);
+      observer.look_at(frame, ColorsRef(Colors()), 0);
+      AlignResult alignment;
+      alignment.target_from_source = Turntable::pose(k);
+      alignment.center = Turntable::middle();
+      alignment.information = 1e6 * Matrix6::Identity();
+      if (is_weak) alignment.weak_directions = Vector6::Unit(4);
+      const LoopReport report = loops.add_frame({k, frame, observer, alignment, 0.003, false, false});
+      num_closed += report.frame.has_value() ? 1 : 0;
+      CHECK(report.frame.has_value() == !report.corrections.empty());
+    }
+    CHECK(num_closed == (is_weak ? 0 : 1));
+  }
 }
 
 TEST_CASE("a ring of given poses stays as it is") {
