@@ -21,22 +21,20 @@ from nacre.datasets.sequence import SequenceFrame
 from nacre.depth import PIXEL_LABELS, label_pixels
 from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
-from nacre.evaluation.result import Result, plain
+from nacre.evaluation.result import Result, plain, result_dict
+from nacre.frame_figures import frame_dict, frame_entry
 from nacre.io.trajectories import Trajectory
 from nacre.model import FrameReport, Model
 from nacre.progress import as_progress
 from nacre.values import Value
 
 if TYPE_CHECKING:
-    from nacre.report import DepthExample, FrameEntry, ReportData
+    from nacre.report import DepthExample, ReportData
 
 _log = logging.getLogger(__name__)
 
 STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
 _RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
-
-# Fields of evaluation results that hold one value per frame or point; the frames have them already.
-_LONG = {"errors", "translation_errors", "rotation_errors", "distances"}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -288,7 +286,7 @@ class Reconstruction:
         counts = self.counts
         times = self.milliseconds
         errors = self._frame_errors()
-        figures: dict[str, Any] = plain_tree(
+        figures: dict[str, Any] = plain(
             {
                 "nacre": __version__,
                 "versions": {
@@ -313,7 +311,7 @@ class Reconstruction:
                 **{name: result_dict(result) for name, result in self.evaluation.items()},
                 "parameters": self.parameters,
                 "frames": [
-                    _frame_dict(frame, *errors[i], self._loop_frame(frame))
+                    frame_dict(frame, *errors[i], self._loop_frame(frame))
                     for i, frame in enumerate(self.frames)
                 ],
             }
@@ -357,7 +355,7 @@ class Reconstruction:
             title=title,
             source=source,
             frames=[
-                _entry(frame, *errors[i], self._loop_frame(frame)) for i, frame in enumerate(self.frames)
+                frame_entry(frame, *errors[i], self._loop_frame(frame)) for i, frame in enumerate(self.frames)
             ],
             model=model,
             depth=self._depth_examples(),
@@ -408,94 +406,6 @@ class Reconstruction:
         ]
 
 
-def plain_tree(value: Any) -> Any:
-    """Return nested mappings, arrays and numbers as what JSON knows: what is not finite is None."""
-    if isinstance(value, Mapping):
-        return {str(name): plain_tree(item) for name, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain_tree(item) for item in value]
-    return plain(value)
-
-
-def result_dict(result: Result) -> dict[str, Any]:
-    """Return the figures of an evaluation result, without those for each frame or point."""
-    return {name: value for name, value in result.as_dict().items() if name not in _LONG}
-
-
 def _stacked(poses: collections.abc.Sequence[npt.NDArray[np.float64] | None]) -> npt.NDArray[np.float64]:
     missing = np.full((4, 4), np.nan)
     return np.array([missing if pose is None else pose for pose in poses]).reshape(-1, 4, 4)
-
-
-def _removed(report: FrameReport | None) -> dict[str, int]:
-    if report is None:
-        return {}
-    depth = dataclasses.asdict(report.depth)
-    removed = {
-        name.removeprefix("num_"): count
-        for name, count in depth.items()
-        if name not in ("num_pixels", "num_invalid", "num_kept")
-    }
-    return {**removed, "outside": report.region.num_outside}
-
-
-def _frame_dict(
-    frame: FrameRecord,
-    translation_error: float | None,
-    rotation_error: float | None,
-    loop_frame: int | None,
-) -> dict[str, Any]:
-    report = frame.report
-    figures: dict[str, Any] = {
-        "index": frame.index,
-        "status": frame.status,
-        "reason": frame.reason,
-        "timestamp": frame.timestamp,
-        "world_from_camera": frame.world_from_camera,
-        "truth": frame.truth,
-        "translation_error": translation_error,
-        "rotation_error": rotation_error,
-    }
-    for name in (
-        "num_inliers", "overlap", "consistency", "evidence", "rmse", "weak_directions", "loop_distance",
-        "num_updated", "num_inserted", "num_removed", "num_points", "spacing", "milliseconds",
-    ):  # fmt: skip
-        figures[name] = None if report is None else getattr(report, name)
-    figures["loop_frame"] = loop_frame
-    figures["depth"] = None if report is None else dataclasses.asdict(report.depth)
-    figures["region"] = None if report is None else dataclasses.asdict(report.region)
-    figures["removed"] = _removed(report)
-    return figures
-
-
-def _entry(
-    frame: FrameRecord,
-    translation_error: float | None,
-    rotation_error: float | None,
-    loop_frame: int | None,
-) -> FrameEntry:
-    from nacre.report import FrameEntry
-
-    report = frame.report
-    return FrameEntry(
-        index=frame.index,
-        status=frame.status,
-        reason=frame.reason,
-        milliseconds={} if report is None else report.milliseconds,
-        num_inliers=None if report is None else report.num_inliers,
-        overlap=None if report is None else report.overlap,
-        rmse=None if report is None or not np.isfinite(report.rmse) else report.rmse,
-        world_from_camera=frame.world_from_camera,
-        truth=frame.truth,
-        translation_error=translation_error,
-        rotation_error=rotation_error,
-        consistency=None if report is None else report.consistency,
-        evidence=None if report is None else report.evidence,
-        num_points=None if report is None else report.num_points,
-        num_pixels=None if report is None else report.depth.num_pixels,
-        num_measured=None if report is None else report.depth.num_pixels - report.depth.num_invalid,
-        removed=_removed(report),
-        num_updated=None if report is None else report.num_updated,
-        num_inserted=None if report is None else report.num_inserted,
-        loop_frame=loop_frame,
-    )

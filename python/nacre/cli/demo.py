@@ -109,7 +109,7 @@ def demo(
 def _pose_error(done: Any, center: Any) -> dict[str, Any] | None:
     """Return the errors of the poses at the object's centre, with the first camera in its place."""
     from nacre.evaluation import pose_error
-    from nacre.reconstruction import result_dict
+    from nacre.evaluation.result import result_dict
 
     truths = done.truths
     if truths is None or not done.num_tracked:

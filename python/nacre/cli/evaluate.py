@@ -167,7 +167,7 @@ def _surface(
 
 def _add(figures: Figures, rows: Rows, results: Mapping[str, Result], written: Written | None = None) -> None:
     """Add results, and what became of the frames, to the figures and as rows for people."""
-    from nacre.reconstruction import result_dict
+    from nacre.evaluation.result import result_dict
     from nacre.report.text import label, quantity
 
     if written:

@@ -91,9 +91,9 @@ class Terminal:
 
 def to_json(figures: Mapping[str, Any]) -> str:
     """Return a JSON object; numbers that are not finite are null."""
-    from nacre.reconstruction import plain_tree
+    from nacre.evaluation.result import plain
 
-    text = json.dumps(plain_tree(figures), indent=2, allow_nan=False, default=str)
+    text = json.dumps(plain(figures), indent=2, allow_nan=False, default=str)
     # Lists of numbers on one line; a line break is never part of a string.
     return re.sub(r"\[\n\s+([^\[\]{}]*?)\n\s+\]", lambda m: "[" + re.sub(r"\n\s+", " ", m[1]) + "]", text)
 

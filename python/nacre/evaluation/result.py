@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, TypeAlias, get_type_hints
 
 import numpy as np
@@ -22,7 +23,9 @@ ManyFractions = Annotated[tuple[float, ...], "fraction"]
 
 
 def plain(value: Any) -> Any:
-    """Turn arrays, numpy scalars and tuples into what JSON knows; numbers that are not finite become None."""
+    """Return mappings, arrays and numbers, nested or not, as what JSON knows: what is not finite is None."""
+    if isinstance(value, Mapping):
+        return {str(name): plain(item) for name, item in value.items()}
     if isinstance(value, np.ndarray):
         return plain(value.tolist())
     if isinstance(value, (list, tuple)):
@@ -35,6 +38,9 @@ def plain(value: Any) -> Any:
 
 
 _UNITS = {"m": " m", "rad": " rad"}
+
+# Fields that hold one value per frame or point.
+_LONG = {"errors", "translation_errors", "rotation_errors", "distances"}
 
 
 class Result(Value):
@@ -56,3 +62,8 @@ class Result(Value):
         hints = get_type_hints(cls, include_extras=True)
         fields = dataclasses.fields(cls)  # type: ignore[arg-type]
         return {field.name: getattr(hints[field.name], "__metadata__", ("",))[0] for field in fields}
+
+
+def result_dict(result: Result) -> dict[str, Any]:
+    """Return the figures of an evaluation result, without those for each frame or point."""
+    return {name: value for name, value in result.as_dict().items() if name not in _LONG}
