@@ -389,9 +389,9 @@ class Model(ExchangeablePoints):
         """
         Write all that the model knows to a file, so that :meth:`load` can go on with it.
 
-        A model that was saved and loaded goes on to the same bits as one that was not. The file is complete or
-        not there at all. It is for going on, on any machine, with any nacre of the same checkpoint format (its
-        changes are in the change log); what is to be kept for years is written with
+        A model that was saved and loaded goes on to the same bits as one that was not. The file is complete
+        or not there at all. It is for going on, on any machine, with any nacre of the same checkpoint format
+        (its changes are in the change log); what is to be kept for years is written with
         :func:`nacre.write_points`.
 
         Parameters
