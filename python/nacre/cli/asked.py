@@ -79,7 +79,7 @@ class Asked:
             "nacre": nacre.__version__,
             "folder": str(Path.cwd()),
             "options": dataclasses.asdict(self),
-            "recording": None if self.is_camera else sequence.fingerprint(),
+            "recording": None if self.is_camera else sequence.digests(),
         }
 
 
@@ -101,7 +101,7 @@ def check_recording(document: Mapping[str, Any], sequence: Sequence) -> None:
         _log.warning(
             "the run began with nacre %s; this is nacre %s", document.get("nacre"), nacre.__version__
         )
-    before, now = document.get("recording"), sequence.fingerprint()
+    before, now = document.get("recording"), sequence.digests()
     if before is None or before == now:
         return
     if before.get("files") != now["files"]:

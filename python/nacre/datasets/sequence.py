@@ -197,7 +197,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         """Return when a view was taken [s]; None where that is not known."""
         return self._sources[index].timestamp
 
-    def fingerprint(self) -> dict[str, str]:
+    def digests(self) -> dict[str, str]:
         """
         Return digests by which a recording that has changed is known again.
 
