@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import os
+from array import array
 from dataclasses import dataclass
-from pathlib import Path
+from io import BytesIO
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
+from nacre.io.raw import excerpt, number_of, read_file, text_of
 from nacre.values import Value
 
 Float64 = npt.NDArray[np.float64]
+Rows = list[tuple[int, "array[float]"]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -211,24 +215,7 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     FileFormatError
         Names the file and the line.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise FileFormatError(path, "not a trajectory: it is not text") from error
-    rows: list[tuple[int, list[float]]] = []
-    for line, content in enumerate(text.splitlines(), start=1):
-        words = content.split("#", 1)[0].split()
-        if not words:
-            continue
-        try:
-            numbers = [float(word) for word in words]
-        except ValueError as error:
-            raise FileFormatError(
-                path, f"expected numbers, got {content.strip()[:60]!r}", line=line
-            ) from error
-        if not np.isfinite(numbers).all():
-            raise FileFormatError(path, f"expected finite numbers, got {content.strip()[:60]!r}", line=line)
-        rows.append((line, numbers))
+    rows = _read_rows(path)
     if not rows:
         raise FileFormatError(path, "the trajectory is empty")
 
@@ -276,11 +263,31 @@ def write_trajectory(path: str | os.PathLike[str], timestamps: npt.ArrayLike, po
             stream.write((" ".join(_shortest(value) for value in row) + "\n").encode())
 
 
+def _read_rows(path: str | os.PathLike[str]) -> Rows:
+    """Return the lines that hold numbers, each with its number."""
+    rows: Rows = []
+    for line, content in enumerate(BytesIO(read_file(path)), start=1):
+        words = content.partition(b"#")[0].split()
+        if not words:
+            continue
+        try:
+            numbers = array("d", (number_of(word.decode("ascii")) for word in words))
+        except ValueError:
+            text_of(path, content)
+            reason = f"expected numbers, got {excerpt(content.strip())}"
+            raise FileFormatError(path, reason, line=line) from None
+        if not all(map(math.isfinite, numbers)):
+            reason = f"expected finite numbers, got {excerpt(content.strip())}"
+            raise FileFormatError(path, reason, line=line)
+        rows.append((line, numbers))
+    return rows
+
+
 def _shortest(value: float) -> str:
     return repr(float(value)).removesuffix(".0")
 
 
-def _parse_tum(path: str | os.PathLike[str], rows: list[tuple[int, list[float]]]) -> Trajectory:
+def _parse_tum(path: str | os.PathLike[str], rows: Rows) -> Trajectory:
     for line, numbers in rows:
         if len(numbers) != 8:
             raise FileFormatError(
@@ -295,24 +302,29 @@ def _parse_tum(path: str | os.PathLike[str], rows: list[tuple[int, list[float]]]
     return Trajectory(table[:, 0], poses)
 
 
-def _parse_log(path: str | os.PathLike[str], rows: list[tuple[int, list[float]]]) -> Trajectory:
+def _parse_log(path: str | os.PathLike[str], rows: Rows) -> Trajectory:
     timestamps, poses = [], []
     for start in range(0, len(rows), 5):
         line, numbers = rows[start]
         if len(numbers) != 3:
             raise FileFormatError(path, f"expected 3 numbers before a matrix, got {len(numbers)}", line=line)
+        if not numbers[0].is_integer():
+            reason = f"expected three whole numbers before a matrix, got {numbers[0]:g} first"
+            raise FileFormatError(path, reason, line=line)
         timestamps.append(numbers[0])
         poses.append(_parse_matrix(path, rows[start + 1 : start + 5]))
     return Trajectory(np.array(timestamps), np.array(poses))
 
 
-def _parse_matrix(path: str | os.PathLike[str], rows: list[tuple[int, list[float]]]) -> Float64:
+def _parse_matrix(path: str | os.PathLike[str], rows: Rows) -> Float64:
     for line, numbers in rows:
         if len(numbers) != 4:
             raise FileFormatError(path, f"expected 4 numbers of a 4x4 matrix, got {len(numbers)}", line=line)
     if len(rows) != 4:
         raise FileFormatError(path, "the last 4x4 matrix is cut off")
     pose = np.array([numbers for _, numbers in rows])
+    if np.abs(pose[:3, :3]).max() > 2:  # also what has no finite singular values
+        raise FileFormatError(path, "the 4x4 matrix is not a rotation and a translation", line=rows[0][0])
     u, stretch, vt = np.linalg.svd(pose[:3, :3])
     if (
         np.abs(stretch - 1).max() > 0.01
