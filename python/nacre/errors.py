@@ -45,6 +45,10 @@ class FileFormatError(ValueError):
         return f"{self.path}{place}: {self.reason}"
 
 
+class UnknownRecordingError(FileFormatError):
+    """What was given is no recording, or not one without more options: not the files are wrong."""
+
+
 _repr = reprlib.Repr()
 _repr.maxlist = _repr.maxdict = 10
 _repr.maxstring = _repr.maxother = 60

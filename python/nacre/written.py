@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.errors import FileFormatError, shown
+from nacre.io.cameras import camera_of
 from nacre.io.json_files import read_json
 
 if TYPE_CHECKING:
@@ -27,6 +28,11 @@ class Written:
     ----------
     folder : Path
         It holds ``report.json``.
+
+    Attributes
+    ----------
+    camera : Camera or None
+        The recording's camera, where the report names it.
 
     Raises
     ------
@@ -49,6 +55,8 @@ class Written:
         wrong = _wrong_in_report(report)
         if wrong:
             raise FileFormatError(path, f"not a report of nacre reconstruct: {wrong}")
+        document = (report.get("recording") or {}).get("camera")
+        self.camera: Camera | None = None if document is None else camera_of(path, document).camera
 
     @property
     def poses(self) -> Matrix:
@@ -60,17 +68,6 @@ class Written:
         """(F, 4, 4) true poses, NaN where they are not known; None where none is."""
         poses = self._stacked("truth")
         return poses if np.isfinite(poses).any() else None
-
-    @property
-    def camera(self) -> Camera | None:
-        """The recording's camera, where the report names it."""
-        from nacre.io.cameras import camera_of
-
-        document = (self.report.get("recording") or {}).get("camera")
-        path = self.folder / "report.json"
-        if document is not None and not isinstance(document, dict):
-            raise FileFormatError(path, f"recording.camera must be an object, got {shown(document)}")
-        return None if document is None else camera_of(path, document).camera
 
     @property
     def truth_from_world(self) -> Matrix | None:

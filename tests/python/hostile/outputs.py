@@ -48,7 +48,7 @@ REPORTS = {
     "pose of zeros": (frames({"world_from_camera": [[0] * 4] * 4}), r"frames\[0\].*world_from_camera"),
     "pose of second frame ragged": (frames({}, {"world_from_camera": [[1], [2, 3]]}), r"frames\[1\].*world_from"),
     "truth of zeros": (frames({"truth": [[0] * 4] * 4}), r"frames\[0\].*truth"),
-    "camera a list": (report(recording={"camera": [1]}), r"report\.json: .*camera"),
+    "camera a list": (report(recording={"camera": [1]}), r"report\.json: a camera file must hold"),
     "camera of width 0": (report(recording={"camera": {**PINHOLE, "width": 0}}), r"report\.json: .*width"),
     "recording a text": (report(recording="here"), r"report\.json: .*recording"),
     "recording path a number": (report(recording={"path": 5}), r"report\.json: .*recording"),
