@@ -114,7 +114,7 @@ def _wrong_in_frame(frame: Any) -> str | None:
     index, status = frame.get("index"), frame.get("status")
     if type(index) is not int or index < 0:
         return f".index must be a whole number, got {shown(index)}"
-    if status is not None and status not in STATUSES:
+    if status not in STATUSES:
         return f".status must be one of {', '.join(STATUSES)}, got {shown(status)}"
     for name in ("world_from_camera", "truth"):
         pose = frame.get(name)

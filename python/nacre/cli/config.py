@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 
 _MOST_BYTES = 1 << 16
+_DEEP_KEY = re.compile(r"(?:[^\s.,=\[\]{}]+[ \t]*\.[ \t]*){16}")
 
 
 class Preset(str, Enum):
@@ -116,6 +117,10 @@ def _toml() -> Any:
 def _read_toml(path: Path) -> Mapping[str, Any]:
     toml = _toml()
     text = read_text(path, _MOST_BYTES)
+    deep = _DEEP_KEY.search(text)
+    if deep is not None:  # Python's parser takes the square of its length
+        line = 1 + text.count("\n", 0, deep.start())
+        raise FileFormatError(path, "not TOML that can be read: a key is nested too deep", line=line)
     try:
         document: Mapping[str, Any] = toml.loads(text)
     except RecursionError:

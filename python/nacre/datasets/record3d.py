@@ -179,7 +179,8 @@ class _Archive(_Files):
             reason = f"refused: {info.file_size} bytes from {info.compress_size}"
             raise FileFormatError(self.path / name, reason)
         try:
-            return self._zip.read(info)
+            with self._zip.open(info) as stream:
+                return stream.read(info.file_size)  # no more, whatever there is
         except Exception as error:  # zipfile's, and those of its decompressors
             raise FileFormatError(self.path / name, f"damaged in the archive: {error}") from error
 

@@ -13,15 +13,22 @@ MAX_PIXELS = 1 << 26
 
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
+# At most: bitmaps, runs of 255 in two bytes, blocks of 64 in half a bit, rows of a fax in one bit.
+_PIXELS_PER_BYTE: dict[str | None, int] = {"PPM": 8, "BMP": 256, "JPEG": 1024, "TIFF": 1 << 14}
 _DEFLATE_RATIO = 1032  # 258 bytes of two bits
 _LZFSE_HEADER = 772  # of a block of version 1
 _EXR_MAGIC = b"\x76\x2f\x31\x01"
 
 
-def check_pixels(path: str | os.PathLike[str], width: int, height: int) -> None:
-    """Refuse an image of more pixels than a camera has."""
+def check_pixels(
+    path: str | os.PathLike[str], width: int, height: int, *, file_size: int = 0, format: str | None = None
+) -> None:
+    """Refuse an image of more pixels than a camera has, or than its file can hold."""
     if width * height > MAX_PIXELS:
         reason = f"refused: {width} x {height} pixels are more than {MAX_PIXELS}"
+        raise FileFormatError(path, reason)
+    if width * height > _PIXELS_PER_BYTE.get(format, MAX_PIXELS) * file_size > 0:
+        reason = f"refused: {width} x {height} pixels in {file_size} bytes, which cannot hold them"
         raise FileFormatError(path, reason)
 
 

@@ -29,7 +29,8 @@ COLOR_SUFFIXES = (".png", ".jpg", ".jpeg", ".ppm", ".bmp", ".webp")
 _COLOR_FORMATS = ("PNG", "JPEG", "PPM", "BMP", "WEBP")
 _ATTRIBUTE_FORMATS = ("PNG", "TIFF", "JPEG")
 _EXR_DEPTH_CHANNELS = ("Z", "depth", "Depth", "Y", "R")
-_PGM_GAP = rb"\s+(?:#[^\n]*\n\s*)*"
+_MOST_NPY_HEADER = 1000
+_PGM_GAP = rb"(?:\s|#[^\n]*\n){1,1000}"
 _PGM_HEADER = re.compile(_PGM_GAP.join((rb"P5", *3 * (rb"(\d{1,20})",))) + rb"\s")
 
 
@@ -172,9 +173,9 @@ def decoded(data: bytes, path: str | os.PathLike[str], formats: Sequence[str]) -
     check_png(path, data)
     try:
         image = pillow.open(BytesIO(data), formats=formats)
-        check_pixels(path, *image.size)
+        check_pixels(path, *image.size, file_size=len(data), format=image.format)
         image.load()
-    except FileFormatError:
+    except (FileFormatError, MemoryError):
         raise
     except pillow.DecompressionBombError as error:
         raise FileFormatError(path, f"refused: {error}") from error
@@ -227,9 +228,10 @@ def _read_npy(path: Path) -> npt.NDArray[Any]:
             (1, 0): np.lib.format.read_array_header_1_0,
             (2, 0): np.lib.format.read_array_header_2_0,
         }[version]
-        shape, by_columns, dtype = read_header(stream)
+        shape, by_columns, dtype = read_header(stream, _MOST_NPY_HEADER)
     except Exception as error:  # of numpy's own, and of Python's, with which it reads the header
-        raise FileFormatError(path, f"not a readable .npy array: {error}", offset=0) from error
+        reason = str(error).partition(": <")[0]
+        raise FileFormatError(path, f"not a readable .npy array: {reason}", offset=0) from error
     start = stream.tell()
     if dtype.kind not in "buif" or len(shape) not in (2, 3) or min(shape) < 1:
         raise FileFormatError(path, f"an image must be (H, W) numbers, this is {shown(shape)} of {shown(dtype)}")
@@ -251,6 +253,8 @@ def _read_exr(path: Path) -> npt.NDArray[Any]:
     try:
         with OpenEXR.File(str(path), separate_channels=True) as image:
             channels = {name: np.array(channel.pixels) for name, channel in image.channels().items()}
+    except MemoryError:
+        raise
     except Exception as error:
         raise FileFormatError(path, f"the image is damaged or truncated: {error}") from error
     names = [name for name in _EXR_DEPTH_CHANNELS if name in channels] or list(channels)

@@ -29,6 +29,7 @@ TYPES = {
 }
 BYTE_ORDERS: dict[str, Literal["<", ">"]] = {"binary_little_endian": "<", "binary_big_endian": ">"}
 _FORMATS = ("ascii", *BYTE_ORDERS)
+_MAX_ELEMENTS = 1_000
 _MAX_ENTRIES = 10_000
 
 
@@ -136,6 +137,8 @@ class _Parser:
         elif keyword == "element":
             if len(words) != 2 or not (words[1].isascii() and words[1].isdigit() and len(words[1]) < 20):
                 raise ValueError(f"expected 'element', a name and a number of rows, got {excerpt(line)}")
+            if len(self._elements) == _MAX_ELEMENTS:
+                raise ValueError(f"more than {_MAX_ELEMENTS} elements")
             if words[0] in self._elements:
                 raise ValueError(f"a second element {excerpt(words[0].encode())}")
             self._properties = {}

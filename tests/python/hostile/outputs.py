@@ -39,6 +39,7 @@ REPORTS = {
     "frame without index": (report(frames=[{"status": "TRACKED"}]), r"frames\[0\]"),
     "frame index a text": (frames({"index": "0"}), r"frames\[0\].*index"),
     "frame index negative": (frames({"index": -1}), r"frames\[0\].*index"),
+    "frame without status": (frames({"status": None}), r"frames\[0\].*status"),
     "frame status unknown": (frames({"status": "SEEN"}), r"frames\[0\].*status"),
     "pose of three rows": (frames({"world_from_camera": _POSE[:3]}), r"frames\[0\].*world_from_camera"),
     "pose of words": (frames({"world_from_camera": "eye"}), r"frames\[0\].*world_from_camera"),

@@ -51,7 +51,7 @@ POINTS = {
     "header of blank lines": (b"ply\n" + b"\n" * 100_000, "line 2: unknown keyword"),
     "header of a million comments": (b"ply\n" + b"comment\n" * 60_000, "before end_header"),
     "header of many elements": (
-        ply(b"", "\n".join(f"element e{i} 0" for i in range(12_000))), "line 10002: more than 10000 lines",
+        ply(b"", "\n".join(f"element e{i} 0" for i in range(12_000))), "line 1003: more than 1000 elements",
     ),
     "header of many properties": (
         ply(b"", "element vertex 1\n" + "\n".join(f"property float p{i}" for i in range(12_000))),
