@@ -46,6 +46,7 @@ class Findings:
     def __init__(self, kind: str, folder: Path, keep: Path) -> None:
         self.kind = kind
         self.keep = keep
+        self._known: set[str] = set()
         self.num_runs = self.num_refused = self.num_found = 0
         cases = [case for case in (*CASES.values(), *VALID.values()) if case.reader == kind]
         # Of each suffix the cases' main files are the seeds; what lies beside them stays as in the first case.
@@ -82,6 +83,9 @@ class Findings:
             self._found(key, data, f"{time.process_time() - start:.1f} s")
 
     def _found(self, key: str, data: bytes, what: str) -> None:
+        if what[:40] in self._known:  # one file of each kind is enough
+            return
+        self._known.add(what[:40])
         self.num_found += 1
         self.keep.mkdir(exist_ok=True)
         path = self.keep / f"{self.kind}-{self.num_found}-{Path(key).name}".replace(" ", "-")

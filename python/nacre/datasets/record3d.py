@@ -160,7 +160,7 @@ class _Archive(_Files):
         require_regular(path)
         try:
             self._zip = zipfile.ZipFile(path)
-        except (zipfile.BadZipFile, OSError) as error:
+        except Exception as error:  # zipfile has several, and lets through what damaged names and sizes cause
             raise FileFormatError(path, f"not a whole .r3d archive: {error}") from error
         self.names = [info.filename for info in self._zip.infolist() if not info.is_dir()]
         for name in self.names:

@@ -118,11 +118,12 @@ class _Parser:
 
     def take(self, line: bytes, number: int) -> None:
         """Take in the line of this number, or raise a ValueError that says what is wrong with it."""
-        keyword, *words = decode(line).split(maxsplit=1) or [""]
+        first, *rest = line.split(maxsplit=1) or [b""]
+        keyword = decode(first)
         if keyword in self._notes:
-            self._notes[keyword].append(words[0].strip() if words else "")
+            self._notes[keyword].append(decode(rest[0]).strip() if rest else "")
             return
-        words = words[0].split() if words else []
+        words = [decode(word) for word in rest[0].split()] if rest else []
         self._num_entries += 1
         if self._num_entries > _MAX_ENTRIES:
             raise ValueError(f"more than {_MAX_ENTRIES} lines of elements and properties")

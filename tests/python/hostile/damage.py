@@ -11,6 +11,17 @@ WORDS = (
 )  # fmt: skip
 
 
+def scratched(seeds: Sequence[bytes], chance: random.Random) -> bytes:
+    """Return one of the seeds with one digit or one bit changed: the damage that is hardest to see."""
+    data = bytearray(chance.choice(seeds))
+    digits = [at for at, value in enumerate(data) if 48 <= value < 58]
+    if digits and chance.random() < 0.5:
+        data[chance.choice(digits)] = 48 + chance.randrange(10)
+    elif data:
+        data[chance.randrange(len(data))] ^= 1 << chance.randrange(8)
+    return bytes(data)
+
+
 def damaged(seeds: Sequence[bytes], chance: random.Random) -> bytes:
     """Return one of the seeds with one to four pieces flipped, cut, doubled, replaced, or from another seed."""
     data = chance.choice(seeds)

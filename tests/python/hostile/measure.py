@@ -75,6 +75,8 @@ def main() -> None:
         for case in (*VALID.values(), *CASES.values()):  # whatever is imported or kept is so by then
             if find_spec(case.needs) is not None:
                 outcome(lambda path, case=case: opened(case, path), write(case, Path(folder) / "warm"))
+        gc.collect()
+        gc.freeze()  # so that collecting again is quick
         for name, case in CASES.items():
             if find_spec(case.needs) is None:
                 continue

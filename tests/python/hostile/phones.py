@@ -51,6 +51,12 @@ def depth(data: bytes, compression: int = zipfile.ZIP_STORED) -> bytes:
     return archive({"metadata": json.dumps(TOLD).encode(), "rgbd/0.depth": data}, compression)
 
 
+def _nameless(data: bytes) -> bytes:
+    """Return an archive whose last file has a name of no letters in the archive's list."""
+    at = data.rfind(b"PK\x01\x02")
+    return data[: at + 28] + bytes(2) + data[at + 30 :]
+
+
 _good = r3d()
 _bz2_bomb = archive({"metadata": bytes(1 << 22), "rgbd/0.depth": PLANE}, zipfile.ZIP_BZIP2)
 _lies = bytearray(archive({"metadata": json.dumps(TOLD).encode() + b" " * (1 << 22)}, zipfile.ZIP_DEFLATED))
@@ -61,6 +67,8 @@ R3D = {
     "garbage": (b"PK\x03\x04" + bytes(range(256)) * 4, "not a whole .r3d archive"),
     "cut in the middle": (_good[: len(_good) // 2], "not a whole .r3d archive"),
     "of no files": (archive({}), "metadata"),
+    "of version 9.7": (_good.replace(b"PK\x01\x02\x14\x03\x14", b"PK\x01\x02\x14\x03\x61"), "not a whole .r3d"),
+    "of a nameless file": (_nameless(_good), "not a whole .r3d archive|damaged in the archive|missing"),
     "name leads up": (archive({"../rgbd/0.depth": PLANE, "metadata": b"{}"}), "refused: the name .*leads out"),
     "name absolute": (archive({"/rgbd/0.depth": PLANE, "metadata": b"{}"}), "refused: the name .*leads out"),
     "name of another drive": (archive({"C:/0.depth": PLANE, "metadata": b"{}"}), "refused: the name .*leads out"),
