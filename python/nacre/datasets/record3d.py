@@ -160,9 +160,9 @@ class _Archive(_Files):
         require_regular(path)
         try:
             self._zip = zipfile.ZipFile(path)
+            self.names = [info.filename for info in self._zip.infolist() if not info.is_dir()]
         except Exception as error:  # zipfile has several, and lets through what damaged names and sizes cause
             raise FileFormatError(path, f"not a whole .r3d archive: {error}") from error
-        self.names = [info.filename for info in self._zip.infolist() if not info.is_dir()]
         for name in self.names:
             parts = PurePosixPath(name.replace("\\", "/")).parts
             if ".." in parts or parts[:1] == ("/",) or re.match(r"[A-Za-z]:", name):
