@@ -15,15 +15,19 @@ from hostile.measure import allowed
 NOT_UNDER_A_LIMIT = ("recording/bag_",)
 
 
-@pytest.fixture(scope="module")
-def rows():
+def measured(*options):
     if not Path("/proc/self/clear_refs").exists():
         pytest.skip("the peak of memory can be read on Linux only")
     done = subprocess.run(
-        [sys.executable, HERE / "hostile" / "measure.py"], capture_output=True, text=True, check=False
+        [sys.executable, HERE / "hostile" / "measure.py", *options], capture_output=True, text=True, check=False
     )
-    found = [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
     assert done.returncode == 0, done.stderr
+    return [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+
+
+@pytest.fixture(scope="module")
+def rows():
+    found = measured()
     assert len(found) > 400
     return found
 
@@ -39,3 +43,11 @@ def test_error_is_the_same_where_no_more_memory_can_be_had(rows):
 
 def test_no_file_takes_long(rows):
     assert [(row["name"], row["seconds"]) for row in rows if row["seconds"] > 2] == []
+
+
+def test_large_files_take_four_times_what_they_hold():
+    rows = measured("--large")
+    assert len(rows) == 10
+    assert [row for row in rows if row["peak"] > allowed(max(row["size"], row["held"]))] == []
+    real = [row for row in rows if row["name"].startswith(("binary", "text"))]
+    assert [row for row in real if row["peak"] > 3 * row["size"]] == []

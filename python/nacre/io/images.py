@@ -194,7 +194,7 @@ def _read_png(path: Path) -> npt.NDArray[Any]:
                 f"a depth image must have 16 bits and one channel, this is 8-bit with mode {image.mode}; "
                 "save the depth itself, in millimetres say, not a picture of it",
             )
-        return np.array(image).astype(np.uint16, copy=False)
+        return np.asarray(image).astype(np.uint16, copy=False)
 
 
 def _read_pgm(path: Path) -> npt.NDArray[Any]:
