@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_matching_points, as_points, as_vector, localize
+from nacre.arrays import FloatArray, as_matching_points, as_points, as_rows, as_vector, localize
 from nacre.parameters import to_core
 from nacre.values import Value
 
@@ -95,9 +95,7 @@ def _cloud(
     points = as_points(name, points)
     rows = np.zeros((0, 3), np.float32)
     if normals is not None:
-        rows = as_matching_points(f"{name}_normals", normals, name, len(points)).astype(
-            np.float32, copy=False
-        )
+        rows = as_rows(as_matching_points(f"{name}_normals", normals, name, len(points)), np.float32)
     place = None if viewpoint is None else as_vector(f"{name}_viewpoint", viewpoint, 3)
     return points, rows, place
 

@@ -6,6 +6,8 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
+import numpy as np
+
 from nacre.errors import meant
 
 Core = TypeVar("Core")
@@ -32,6 +34,8 @@ def to_core(parameters: Any, core: Core) -> Core:
                 raise ValueError(f"{field.name} must be one of {names}, got {value!r}{hint}")
             value = members[value.replace("+", "_plus")]
         try:
+            if isinstance(current, bool) and not isinstance(value, bool | np.bool_):
+                raise TypeError
             setattr(core, field.name, value)
         except TypeError:
             expected = type(current).__name__

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_matching_points, as_points, as_pose, localize
+from nacre.arrays import FloatArray, as_matching_points, as_points, as_pose, as_real, as_rows, localize
 from nacre.parameters import to_core
 from nacre.values import Value
 
@@ -101,15 +101,10 @@ def _cloud(
     points = as_points(name, points)
     rows = np.zeros((0, 3), np.float32)
     if normals is not None:
-        rows = as_matching_points(f"{name}_normals", normals, name, len(points)).astype(
-            np.float32, copy=False
-        )
+        rows = as_rows(as_matching_points(f"{name}_normals", normals, name, len(points)), np.float32)
     values = np.zeros(0, np.float32)
     if sigma is not None:
-        given = np.asarray(sigma)
-        if given.dtype.kind not in "buif":
-            raise TypeError(f"{name}_sigma must be an array of real numbers, got dtype {given.dtype}")
-        values = np.ascontiguousarray(given, dtype=np.float32)
+        values = as_rows(as_real(f"{name}_sigma", sigma), np.float32)
         if values.shape != (len(points),):
             raise ValueError(
                 f"{name}_sigma must have one value per point of {name} ({len(points)}), got {values.shape}"
@@ -123,13 +118,11 @@ def _brightness(name: str, colors: npt.ArrayLike | None, num_points: int) -> npt
     """Return one value a point (luma of ITU-R BT.601 for three), or none."""
     if colors is None:
         return np.zeros(0, np.float32)
-    given = np.asarray(colors)
-    if given.dtype.kind not in "buif":
-        raise TypeError(f"{name} must be an array of real numbers, got dtype {given.dtype}")
+    given = as_real(name, colors)
     if given.shape not in ((num_points,), (num_points, 3)):
         raise ValueError(f"{name} must have shape ({num_points},) or ({num_points}, 3), got {given.shape}")
     luma = given @ np.array([0.299, 0.587, 0.114]) if given.ndim == 2 else given
-    return np.ascontiguousarray(luma, dtype=np.float32)
+    return as_rows(luma, np.float32)
 
 
 def _shifted(

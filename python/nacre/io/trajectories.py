@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from nacre.arrays import as_length, as_real, as_times
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 from nacre.values import Value
@@ -33,10 +34,8 @@ class Trajectory(Value):
     poses: Float64
 
     def __post_init__(self) -> None:
-        timestamps = np.array(self.timestamps, dtype=np.float64)
-        poses = np.array(self.poses, dtype=np.float64)
-        if timestamps.ndim != 1 or not np.isfinite(timestamps).all():
-            raise ValueError(f"timestamps must be (N,) finite numbers, got shape {timestamps.shape}")
+        timestamps = as_times("timestamps", self.timestamps).copy()
+        poses = np.array(as_real("poses", self.poses), dtype=np.float64, order="C")
         if poses.shape != (len(timestamps), 4, 4):
             raise ValueError(f"poses must have shape ({len(timestamps)}, 4, 4), got {poses.shape}")
         timestamps.flags.writeable = False
@@ -70,7 +69,7 @@ class Trajectory(Value):
         (M, 4, 4) float64
             ``world_from_camera``; NaN where no pose is near enough.
         """
-        wanted = np.asarray(timestamps, dtype=np.float64)
+        wanted, max_difference = as_times("timestamps", timestamps), as_length("max_difference", max_difference)
         result = np.full((len(wanted), 4, 4), np.nan)
         if not len(self):
             return result
@@ -164,10 +163,8 @@ def associate(
     indices_a, indices_b : (K,) arrays
         The pairs, ordered by ``indices_a``.
     """
-    a = np.asarray(timestamps_a, dtype=np.float64)
-    b = np.asarray(timestamps_b, dtype=np.float64)
-    if a.ndim != 1 or b.ndim != 1:
-        raise ValueError(f"timestamps must be one-dimensional, got shapes {a.shape} and {b.shape}")
+    a, b = as_times("timestamps_a", timestamps_a), as_times("timestamps_b", timestamps_b)
+    max_difference = as_length("max_difference", max_difference)
     order = np.argsort(b, kind="stable")
     sorted_b = b[order]
     first = np.searchsorted(sorted_b, a - max_difference, side="left")
@@ -262,7 +259,7 @@ def write_trajectory(path: str | os.PathLike[str], timestamps: npt.ArrayLike, po
     """
     trajectory = Trajectory(np.asarray(timestamps), np.asarray(poses))
     if not np.isfinite(trajectory.poses).all():
-        raise ValueError("poses must be finite")
+        raise ValueError("poses must be finite, got NaN or infinity")
     rows = np.column_stack(
         [
             trajectory.timestamps,
