@@ -53,15 +53,15 @@ def random_size(rng: np.random.Generator, largest: int) -> tuple[int, int]:
     if rng.random() < 0.08:
         sizes = [(1, 1), (1, 50), (50, 1), (2, 2), (3, 3), (5, 4), (7, 200), (16, 16), (17, 15)]
         return sizes[rng.integers(len(sizes))]
-    width = int(math.exp(rng.uniform(math.log(8), math.log(largest))))
+    width = int(math.exp(rng.uniform(math.log(16), math.log(largest))))
     return width, max(1, min(largest, int(width * math.exp(rng.normal(-0.3, 0.3)))))
 
 
 def random_camera(rng: np.random.Generator, width: int, height: int) -> nacre.Camera:
     """Return a camera of either model; the object is some 0.15 m long."""
     if rng.random() < 0.3:
-        return nacre.Camera.orthographic(width, height, 0.2 / width * math.exp(rng.normal(0, 0.5)))
-    focal = width * math.exp(rng.normal(0.1, 0.4))
+        return nacre.Camera.orthographic(width, height, 0.15 / width * math.exp(rng.normal(0, 0.4)))
+    focal = width * math.exp(rng.normal(0.7, 0.4))
     cx, cy = (width - 1) / 2 + rng.normal(0, 2), (height - 1) / 2 + rng.normal(0, 2)
     distortion = rng.normal(0, [0.2, 0.2, 0.01, 0.01, 0.1]) if rng.random() < 0.3 else np.zeros(5)
     if rng.random() < 0.05:
@@ -165,7 +165,7 @@ class Scene:
     def __init__(self, rng: np.random.Generator, camera: nacre.Camera) -> None:
         self.rng, self.camera = rng, camera
         self.shape = (camera.height, camera.width)
-        self.angle, self.step = 0.0, rng.choice([0.0, 0.02, 0.1, 0.5])
+        self.angle, self.step = 0.0, rng.choice([0.0, 0.02, 0.05, 0.1, 0.5])
         self.distance = 0.35 * math.exp(rng.normal(0, 0.3))
         self.wild = rng.random()  # how often a frame is none of the object
 
@@ -176,8 +176,8 @@ class Scene:
 
     def next(self) -> tuple[str, Array]:
         """Return the kind of frame and its depth [m]."""
-        if self.rng.random() > 0.7 * self.wild:
-            kind = self.rng.choice(["object", "object", "object", "noisy", "spoilt", "plane", "waves"])
+        if self.rng.random() > 0.5 * self.wild:
+            kind = self.rng.choice(["object", "object", "noisy", "spoilt", "waves", "waves", "waves", "plane"])
         else:
             kind = self.rng.choice(
                 ["zeros", "largest", "nan", "inf", "negative", "pixel", "blocks", "noise", "wide", "bits", "spikes"]
@@ -195,7 +195,7 @@ class Scene:
         )  # fmt: skip
 
     def _spoilt(self) -> Array:
-        depth = self._object()
+        depth = (self._object() if self.rng.random() < 0.5 else self._waves()).astype(np.float32)
         for value in self.rng.choice([np.nan, np.inf, 0.0, -1.0, 1e-30, 1e-42, 1e30, 3e38, 0.3], 3):
             v, u = self.rng.integers(0, self.shape[0]), self.rng.integers(0, self.shape[1])
             depth[v : v + int(self.rng.integers(1, 9)), u : u + int(self.rng.integers(1, 9))] = value
@@ -208,7 +208,9 @@ class Scene:
 
     def _waves(self) -> Array:
         v, u = np.indices(self.shape) / max(self.shape)
-        return 0.5 + 0.05 * np.sin(20 * u + self.step) * np.cos(15 * v) + 0.1 * u
+        self.angle += self.step
+        x = u + self.angle / 10
+        return 0.5 + 0.02 * np.sin(9 * x) * np.cos(7 * v) + 0.01 * np.sin(15 * v + 4 * x) + 0.1 * v
 
     def _zeros(self) -> Array:
         return np.zeros(self.shape, np.float32)

@@ -68,6 +68,22 @@ def as_matching_points(name: str, value: npt.ArrayLike, like_name: str, num_poin
     return array
 
 
+def as_unit_rows(name: str, value: npt.ArrayLike, like_name: str, num_points: int) -> npt.NDArray[np.float32]:
+    """Return normals as float32 rows of unit length; NaN where a row is 0 or not finite."""
+    given = as_matching_points(name, value, like_name, num_points)
+    rows = as_rows(given, np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):
+        is_other = np.abs(np.einsum("ij,ij->i", rows, rows) - 1.0) > 0.002
+    if is_other.any():
+        other = given[is_other].astype(np.float64)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            other /= np.abs(other).max(axis=1, keepdims=True)
+            other /= np.linalg.norm(other, axis=1, keepdims=True)
+        rows = rows.copy()
+        rows[is_other] = np.where(np.isfinite(other).all(axis=1, keepdims=True), other, np.nan)
+    return rows
+
+
 def as_values(name: str, value: npt.ArrayLike, size: int, of: str) -> npt.NDArray[Any]:
     """Return ``value`` as one real number for each of the ``size`` things it belongs to, in its dtype."""
     array = as_real(name, value)

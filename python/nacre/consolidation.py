@@ -259,12 +259,13 @@ class _Cargo:
             if name == "normals" and (array.dtype.kind != "f" or array.shape[1:] != (3,)):
                 expected = f"floating-point of shape ({num_points}, 3)"
                 raise ValueError(f"{label} must be {expected}, got {array.dtype} {array.shape}")
-            rows = array.reshape(num_points, math.prod(array.shape[1:])).astype(np.float64)
+            rows = array.reshape(num_points, math.prod(array.shape[1:])).astype(np.float64, order="C")
             finite = np.isfinite(rows)
             mean = np.where(finite, rows, 0.0).sum(axis=0) / np.maximum(finite.sum(axis=0), 1)
             self._arrays[name] = array
             self._means[name] = mean
-            blocks.append((rows - mean).astype(np.float32))
+            with np.errstate(over="ignore"):
+                blocks.append((rows - mean).astype(np.float32))
         self.columns = np.ascontiguousarray(np.hstack(blocks))
 
     def unpack(

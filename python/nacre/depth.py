@@ -30,6 +30,8 @@ __all__ = [
 PIXEL_LABELS = ("kept", "invalid", "out_of_range", "masked", "edge", "slanted", "isolated")
 """What the values of :func:`label_pixels` mean."""
 
+_FARTHEST = 1e15  # [m]: beyond it single precision cannot tell a normal
+
 DepthArray = npt.NDArray[np.float32]
 EdgeTest = Literal["inverse_depth", "gradient", "none"]
 
@@ -340,7 +342,7 @@ def depth_normals(
     Returns
     -------
     normals : (H, W, 3) float32
-        Unit length, towards the camera; NaN where the depth is missing or no plane fits.
+        Unit length, towards the camera; NaN where the depth is missing (or beyond 1e15 m) or no plane fits.
 
     Raises
     ------
@@ -351,5 +353,8 @@ def depth_normals(
     model = as_noise("noise", noise, as_camera("camera", camera))
     core_model = None if model is None else model.to_core()
     threads = as_count("num_threads", num_threads)
+    too_far = image > _FARTHEST
+    if too_far.any():
+        image = np.where(too_far, np.float32(np.nan), image)
     normals: npt.NDArray[np.float32] = _core.depth_normals(image, camera, core_model, threads)
     return normals.reshape(*image.shape, 3)

@@ -13,6 +13,8 @@ from nacre.noise import NoiseModel, NoiseName, as_noise
 from nacre.parameters import to_core
 from nacre.values import Value
 
+_FARTHEST = 1e150  # [m]: beyond it squared distances overflow
+
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class RayHits(Value):
@@ -36,7 +38,7 @@ class ClosestPoints(Value):
     """
     The points of a mesh that are nearest to given points, one row per point.
 
-    Rows of points that are not finite are NaN, with triangle -1.
+    Rows of points that are not finite, or beyond 1e150 m, are NaN, with triangle -1.
 
     Attributes
     ----------
@@ -120,6 +122,7 @@ class Mesh:
         ClosestPoints
         """
         queries = arrays.as_points("points", points).astype(np.float64) - self._origin
+        queries[np.abs(queries).max(axis=1) > _FARTHEST] = np.nan
         nearest, normals, distances, triangles = self._tree.closest(
             queries, arrays.as_count("num_threads", num_threads)
         )

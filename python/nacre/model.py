@@ -152,6 +152,8 @@ class ModelParameters:
     @classmethod
     def preset(cls, name: Preset) -> ModelParameters:
         """Return "default" (what measures best) or "paper" (every number of the 2010 paper)."""
+        if not isinstance(name, str):
+            raise TypeError(f"preset must be 'default' or 'paper', got {name!r}")
         return from_core(cls, _core.ModelOptions.preset(name))
 
 
@@ -292,8 +294,6 @@ class Model(ExchangeablePoints):
     ) -> None:
         camera = as_camera("camera", camera)
         if parameters is None:
-            if not isinstance(preset, str):
-                raise TypeError(f"preset must be 'default' or 'paper', got {preset!r}")
             parameters = ModelParameters.preset(preset)
         elif not isinstance(parameters, ModelParameters):
             raise TypeError(f"parameters must be nacre.ModelParameters, got {type(parameters).__name__}")

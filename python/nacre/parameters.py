@@ -8,6 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from nacre.arrays import as_number
 from nacre.errors import meant
 
 Core = TypeVar("Core")
@@ -84,7 +85,7 @@ def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
         elif isinstance(value, Mapping) and dataclasses.is_dataclass(current):
             value = updated(current, value)
         elif isinstance(current, float) and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
+            value = as_number(name, value)
         parameters = dataclasses.replace(parameters, **{head: value})  # type: ignore[type-var]
     return parameters
 

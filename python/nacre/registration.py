@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_matching_points, as_points, as_pose, as_real, as_rows, localize
+from nacre.arrays import FloatArray, as_points, as_pose, as_real, as_rows, as_unit_rows, localize
 from nacre.parameters import to_core
 from nacre.values import Value
 
@@ -101,7 +101,7 @@ def _cloud(
     points = as_points(name, points)
     rows = np.zeros((0, 3), np.float32)
     if normals is not None:
-        rows = as_rows(as_matching_points(f"{name}_normals", normals, name, len(points)), np.float32)
+        rows = as_unit_rows(f"{name}_normals", normals, name, len(points))
     values = np.zeros(0, np.float32)
     if sigma is not None:
         values = as_rows(as_real(f"{name}_sigma", sigma), np.float32)
@@ -174,7 +174,7 @@ def align(
         Points [m]. Rows that are not finite are ignored. float32 and float64 arrays that are C-contiguous are
         not copied, but float64 is converted to float32 about its centre.
     source_normals, target_normals : (N, 3), (M, 3) real, optional
-        Unit normals. Estimated from the 16 nearest neighbours where the method needs them and they are not
+        Normals; a point whose normal is 0 or not finite is left out. Estimated from the 16 nearest neighbours where the method needs them and they are not
         given; then their sides are ignored.
     source_sigma, target_sigma : (N,), (M,) real, optional
         Standard deviation of each point along its normal [m]; pairs count by 1 / (sum of squares).

@@ -182,11 +182,11 @@ def default_camera(
     -------
     nacre.Camera
     """
+    lower, upper = _bounds(mesh)
     if model == "pinhole":
         return Camera(width=640, height=480, fx=525, fy=525, cx=319.5, cy=239.5)
     if model != "orthographic":
         raise ValueError(f"model must be 'orthographic' or 'pinhole', got {model!r}")
-    lower, upper = _bounds(mesh)
     extent = float((upper - lower).max())
     if extent == 0:
         raise ValueError("mesh must have an extent, got a single point")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -104,12 +105,18 @@ def forms(folder: Path) -> dict[str, Callable[[Array], Any]]:
         "byte-swapped": lambda a: a.astype(a.dtype.newbyteorder()),
         "read-only": _read_only,
         "a list": lambda a: a.tolist(),
-        "a matrix": lambda a: np.asmatrix(a) if a.ndim == 2 else a,
+        "a matrix": _matrix,
         "nothing masked": lambda a: np.ma.masked_array(a, mask=False),
         "an object with an array": Arrayed,
         "a memory map": _mapped(folder),
         "unaligned": _unaligned,
     }
+
+
+def _matrix(array: Array) -> Any:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", PendingDeprecationWarning)
+        return np.asmatrix(array) if array.ndim == 2 else array
 
 
 def _read_only(array: Array) -> Array:

@@ -27,6 +27,12 @@ class Recipe:
     arguments: Mapping[str, Any]
     holds: Callable[..., None] = lambda result, **arguments: None
     grows: tuple[str, ...] = ()  # arguments that say how much to compute: a large one takes its time
+    lists: tuple[str, ...] = ()  # arrays whose dtype matters: a list is another
+
+
+def arrays_of(recipe: Recipe) -> list[str]:
+    """Return the names of the arguments that are arrays."""
+    return [name for name, value in recipe.arguments.items() if isinstance(value, np.ndarray)]
 
 
 def bumpy(count: int = 60, dtype: Any = np.float64) -> Array:
@@ -111,7 +117,8 @@ def _neighbors(result: Any, **arguments: Any) -> None:
     distances, indices = result
     assert ((indices >= 0) & (indices <= 60)).all()
     assert (np.isinf(distances) == (indices == 60)).all()
-    assert (np.diff(np.atleast_2d(distances), axis=-1)[np.isfinite(np.diff(np.atleast_2d(distances)))] >= 0).all()
+    rows = distances.reshape(-1, distances.shape[-1])
+    assert (rows[:, 1:] >= rows[:, :-1]).all()
 
 
 def _neighbors_within(result: nacre.RadiusNeighbors, **arguments: Any) -> None:
@@ -143,7 +150,7 @@ def _poses(result: Array, **arguments: Any) -> None:
 
 
 def _closest(result: nacre.ClosestPoints, points: Any, **arguments: Any) -> None:
-    known = np.isfinite(np.asarray(points, np.float64)).all(axis=1)
+    known = (np.abs(np.asarray(points, np.float64)) < 1e150).all(axis=1)
     assert ((result.triangles >= 0) == known).all()
     assert (result.distances[known] >= 0).all()
 
@@ -171,7 +178,7 @@ RECIPES: dict[str, Recipe] = {
     "nacre._core.Camera": Recipe(
         nacre.Camera,
         {"width": 24, "height": 18, "fx": 20.0, "fy": 20.0, "cx": 11.5, "cy": 8.5,
-         "distortion": np.array([0.1, 0.0, 0.0, 0.0, 0.0]), "depth": "z"},
+         "distortion": (0.1, 0.0, 0.0, 0.0, 0.0), "depth": "z"},
         grows=("width", "height"),
     ),
     "nacre._core.Camera.orthographic": Recipe(
@@ -280,6 +287,7 @@ RECIPES: dict[str, Recipe] = {
         ),
         {"camera": CAMERA, "depth_scale": 1000.0, "depth_images": DEPTH, "colors": COLOR, "poses": POSE,
          "timestamps": 1.0},
+        lists=("colors",),
     ),
     "nacre.io.trajectories.associate": Recipe(
         nacre.associate, {"timestamps_a": np.arange(5.0), "timestamps_b": np.arange(4.0), "max_difference": 0.1}
@@ -300,9 +308,12 @@ RECIPES: dict[str, Recipe] = {
         add_frame,
         {"depth": DEPTH, "color": COLOR, "mask": MASK, "timestamp": 1.0, "guess": POSE, "keep_guess": False},
         _report,
+        lists=("color",),
     ),
     "nacre.model.Model.in_camera": Recipe(lambda: nacre.Model(CAMERA).in_camera(), {}),
-    "nacre.model.ModelParameters.preset": Recipe(nacre.ModelParameters.preset, {"name": "paper"}),
+    "nacre.model.ModelParameters.preset": Recipe(
+        lambda preset: nacre.ModelParameters.preset(preset), {"preset": "paper"}
+    ),
     "nacre.neighbors.KdTree": Recipe(nacre.KdTree, {"points": bumpy(), "num_threads": 1}),
     "nacre.neighbors.KdTree.query": Recipe(
         tree().query, {"queries": bumpy(10), "k": 3, "max_distance": 0.1, "num_threads": 1}, _neighbors

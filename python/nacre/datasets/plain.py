@@ -151,9 +151,10 @@ def write_recording(
         )
         if "colors" in view:
             color = arrays.as_real(f"colors[{index}]", view["colors"])
-            if color.shape != (camera.height, camera.width, 3):
+            if color.shape != (camera.height, camera.width, 3) or color.dtype != np.uint8:
                 raise ValueError(
-                    f"colors[{index}] must have shape ({camera.height}, {camera.width}, 3), got {color.shape}"
+                    f"colors[{index}] must be uint8 of shape ({camera.height}, {camera.width}, 3), "
+                    f"got {color.dtype} {color.shape}"
                 )
             write_color_png(folder / "color" / f"{index:06d}.png", color)
         times.append(arrays.as_number(f"timestamps[{index}]", view.get("timestamps", index)))

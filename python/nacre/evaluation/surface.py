@@ -275,8 +275,9 @@ def _harmonic_mean(a: float, b: float) -> float:
 
 
 def _thresholds(tau: float | Sequence[float]) -> tuple[float, ...]:
-    thresholds = tuple(float(t) for t in np.atleast_1d(as_real("tau", tau)))  # type: ignore[arg-type]
-    if not thresholds or not all(np.isfinite(t) and t > 0 for t in thresholds):
+    given = np.atleast_1d(as_real("tau", tau))
+    thresholds = tuple(float(t) for t in given.reshape(-1))
+    if given.ndim > 1 or not thresholds or not all(np.isfinite(t) and t > 0 for t in thresholds):
         raise ValueError(f"tau must be one or more positive distances, got {tau!r}")
     return thresholds
 

@@ -257,9 +257,12 @@ def write_trajectory(path: str | os.PathLike[str], timestamps: npt.ArrayLike, po
     poses : (N, 4, 4) array
         ``world_from_camera``.
     """
-    trajectory = Trajectory(np.asarray(timestamps), np.asarray(poses))
+    trajectory = Trajectory(timestamps, poses)  # type: ignore[arg-type]
     if not np.isfinite(trajectory.poses).all():
         raise ValueError("poses must be finite, got NaN or infinity")
+    largest = np.abs(trajectory.poses[:, :3, :3]).max(initial=0.0)
+    if largest > 2:
+        raise ValueError(f"poses must be rigid, got a rotation matrix with an entry of {largest:g}")
     rows = np.column_stack(
         [
             trajectory.timestamps,
