@@ -91,7 +91,7 @@ def recording(name: str, frames: int, path: str | None) -> Sequence[SequenceFram
         thing = nacre.built_in_object()
         camera, poses = nacre.default_camera(thing), nacre.turntable_poses(thing, 8, np.radians(15))
         views = [thing.simulate_depth(camera, pose, noise=0.0005, seed=i) for i, pose in enumerate(poses)]
-        return [SequenceFrame(i, view, camera, timestamp=None) for i, view in enumerate(views)]
+        return [SequenceFrame(i, view, camera, None, None, None) for i, view in enumerate(views)]
     scene = Scene("object" if name == "object" else "turning", 160, views=max(36, frames - 4), sigma=0.001)
     camera = scene.camera
     if name == "room":
