@@ -59,6 +59,7 @@ def start(log: Path, *arguments: str | Path) -> subprocess.Popen[bytes]:
 
 
 def digest(path: Path) -> str:
+    """Return the SHA-256 of a file."""
     return hashlib.sha256(path.read_bytes()).hexdigest()
 
 
@@ -70,6 +71,7 @@ def without_times(figures: Any) -> Any:
 
 
 def results(out: Path) -> tuple[str, str, Any]:
+    """Return the digests of model and trajectory, and the figures."""
     report = without_times(json.loads((out / "report.json").read_text()))
     return digest(out / "model.ply"), digest(out / "trajectory.txt"), report
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -185,7 +186,8 @@ def reconstruct(
                 is_camera=is_camera(source),
             )
             run = _begun(terminal, asked, out, parameters, checkpoint_every)
-        carry_out(terminal, run, stop, port if view else None)
+        with closing(run.unfinished):
+            carry_out(terminal, run, stop, port if view else None)
 
 
 def _text(path: Path | None) -> str | None:
