@@ -186,24 +186,29 @@ std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
   return {predicted, last};
 }
 
-// Some of the newest poses from which the camera looked in different directions; and everywhere, but not at every frame
-// where that has been to no avail.
-WhereElse Model::Impl::elsewhere(const RegionReport& region_report) const {
+// Some of the newest poses from which the camera looked in different directions.
+static std::vector<Pose> key_poses(const std::vector<Pose>& poses) {
   constexpr std::size_t most = 8;
   constexpr double least_angle = 0.35;
-  constexpr std::int64_t patience = 8;
-  WhereElse where;
-  if (!options.relocalise) return where;
-  where.views = &views;
-  where.view_of_frame = [&] { return view_of_object(region_report); };
-  where.everywhere = num_lost < patience || num_lost % patience == 0;
-  std::vector<Pose>& chosen = where.key_poses;
+  std::vector<Pose> chosen;
   for (auto pose = poses.rbegin(); pose != poses.rend() && chosen.size() < most; ++pose) {
     const bool is_new = std::all_of(chosen.begin(), chosen.end(), [&](const Pose& other) {
       return Eigen::AngleAxisd(other.linear().transpose() * pose->linear()).angle() > least_angle;
     });
     if (is_new) chosen.push_back(*pose);
   }
+  return chosen;
+}
+
+// Around some poses; and everywhere, but not at every frame where that has been to no avail.
+WhereElse Model::Impl::elsewhere(const RegionReport& region_report) const {
+  constexpr std::int64_t patience = 8;
+  WhereElse where;
+  if (!options.relocalise) return where;
+  where.views = &views;
+  where.view_of_frame = [&] { return view_of_object(region_report); };
+  where.key_poses = [this] { return key_poses(poses); };
+  where.everywhere = num_lost < patience || num_lost % patience == 0;
   return where;
 }
 

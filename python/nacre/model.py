@@ -15,7 +15,18 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._core import Camera
-from nacre.arrays import as_attributes, as_depth, as_mask, as_pose
+from nacre.arrays import (
+    as_array,
+    as_attributes,
+    as_camera,
+    as_depth,
+    as_flag,
+    as_mask,
+    as_number,
+    as_pose,
+    as_rows,
+    as_scale,
+)
 from nacre.depth import DepthParameters, DepthReport
 from nacre.errors import FileFormatError
 from nacre.exchange import ExchangeablePoints
@@ -146,6 +157,8 @@ class ModelParameters:
     @classmethod
     def preset(cls, name: Preset) -> ModelParameters:
         """Return "default" (what measures best) or "paper" (every number of the 2010 paper)."""
+        if not isinstance(name, str):
+            raise TypeError(f"preset must be 'default' or 'paper', got {name!r}")
         return from_core(cls, _core.ModelOptions.preset(name))
 
 
@@ -294,19 +307,14 @@ class Model(ExchangeablePoints):
         depth_scale: float = 1.0,
         **changes: Any,
     ) -> None:
-        if not isinstance(camera, Camera):
-            raise TypeError(f"camera must be a nacre.Camera, got {type(camera).__name__}")
+        camera = as_camera("camera", camera)
         if parameters is None:
-            if not isinstance(preset, str):
-                raise TypeError(f"preset must be 'default' or 'paper', got {preset!r}")
             parameters = ModelParameters.preset(preset)
         elif not isinstance(parameters, ModelParameters):
             raise TypeError(f"parameters must be nacre.ModelParameters, got {type(parameters).__name__}")
-        if not (np.isfinite(depth_scale) and depth_scale > 0):
-            raise ValueError(f"depth_scale must be positive (stored units per metre), got {depth_scale!r}")
         parameters = updated(parameters, changes)
         self.parameters = replace(parameters, depth=parameters.depth.for_camera(camera))
-        self._depth_scale = depth_scale
+        self._depth_scale = as_scale("depth_scale", depth_scale)
         self._core = _core.Model(camera, to_core(self.parameters, _core.ModelOptions()))
         self._lock = threading.Lock()
         self._frames: list[FrameReport] = []
@@ -361,18 +369,20 @@ class Model(ExchangeablePoints):
         pixels = as_mask("mask", mask, image.shape)
         colors = np.zeros((0, 3), np.uint8)
         if color is not None:
-            array = np.asarray(color)
+            array = as_array("color", color)
             if array.shape != (*image.shape, 3) or array.dtype != np.uint8:
                 raise ValueError(
                     f"color must be uint8 of shape {(*image.shape, 3)}, got {array.dtype} {array.shape}"
                 )
-            colors = np.ascontiguousarray(array).reshape(-1, 3)
+            colors = as_rows(array.reshape(-1, 3), np.uint8)
         more = as_attributes("attributes", attributes, (image.shape[0], image.shape[1]))
         pose = None if guess is None else as_pose("guess", guess)
         if timestamp is not None and not isinstance(timestamp, numbers.Real):
             raise TypeError(f"timestamp must be a number of seconds or None, got {timestamp!r}")
+        time = None if timestamp is None else as_number("timestamp", timestamp)
+        keeps = as_flag("keep_guess", keep_guess)
         with self._lock:
-            self._core.add_frame(image, pixels, colors, more, timestamp, pose, keep_guess)
+            self._core.add_frame(image, pixels, colors, more, time, pose, keeps)
             return self._reports()[-1]
 
     def _reports(self) -> list[FrameReport]:

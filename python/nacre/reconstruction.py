@@ -463,8 +463,9 @@ class Reconstruction:
         """Return the place in the recording of the frame that another closed a loop with."""
         if frame.report is None or frame.report.loop_frame is None:
             return None
-        given = (other.index for other in self.frames if other.report is not None)
-        return next(itertools.islice(given, frame.report.loop_frame, None))
+        number = frame.report.loop_frame  # of the model, which counts frames that were tried again once more
+        found = (f.index for f in self.frames if f.report is not None and f.report.index == number)
+        return next(found, None)
 
     def _depth_examples(self) -> list[DepthExample]:
         """Return the depth image of the first frame that was tracked and of the first one that was not."""
