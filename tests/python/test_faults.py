@@ -133,8 +133,9 @@ def test_every_step_may_fail(name: str, tmp_path: Path) -> None:
             write(path)
         assert caught.value.filename == str(path), f"step {count} of {num_steps}"
         assert caught.value.errno == code
-        # The last step brings the new name to disk: then the new file is there, whole.
-        assert path.read_bytes() == (whole if count == num_steps else b"before")
+        # The last step, not of images, brings the new name to disk: then the new file is there, whole.
+        is_named = count == num_steps and "image" not in name
+        assert path.read_bytes() == (whole if is_named else b"before")
         assert [other.name for other in tmp_path.iterdir()] == [file]
         path.write_bytes(b"before")
 

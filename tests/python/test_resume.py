@@ -114,6 +114,7 @@ class TestKilled:
             assert results(out) == undisturbed
             assert not (out / "unfinished").exists()
 
+    @pytest.mark.slow
     def test_while_depth_is_calibrated_and_after(self, tmp_path: Path) -> None:
         depths, poses = tilted.room.__wrapped__()  # type: ignore[attr-defined]
         wrong = [depth / (1.0 + 0.01 * tilted.SIDE * depth) for depth in depths]

@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 
 @contextmanager
-def atomic_writer(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+def atomic_writer(path: str | os.PathLike[str], *, named: bool = True) -> Iterator[BinaryIO]:
     """
     Open a file for writing that takes its name only when everything is written and on disk.
 
@@ -23,6 +23,8 @@ def atomic_writer(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     ----------
     path : path-like
         The file to write; its folder must exist.
+    named : bool
+        Whether its name must be on disk, too, when this ends; for many small files that takes long.
 
     Yields
     ------
@@ -34,12 +36,12 @@ def atomic_writer(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     OSError
         The file cannot be written; it names ``path``.
     """
-    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+    with atomic_path(path, named=named) as temporary, temporary.open("wb") as stream:
         yield stream
 
 
 @contextmanager
-def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
+def atomic_path(path: str | os.PathLike[str], *, named: bool = True) -> Iterator[Path]:
     """Do as :func:`atomic_writer` does for who needs a name to write to: yield that of an empty file."""
     target = Path(path)
     temporary: Path | None = None
@@ -54,7 +56,8 @@ def atomic_path(path: str | os.PathLike[str]) -> Iterator[Path]:
         os.umask(umask)
         temporary.chmod(0o666 & ~umask)
         temporary.replace(target)
-        _sync_folder(target.parent)
+        if named:
+            _sync_folder(target.parent)
     except BaseException as error:
         if temporary is not None:
             with suppress(OSError):
