@@ -312,7 +312,7 @@ def test_a_camera_that_was_killed_leaves_a_whole_recording(tmp_path: Path) -> No
 def test_killed_at_random_moments() -> None:
     script = Path(__file__).resolve().parents[2] / "benchmarks" / "kills.py"
     done = subprocess.run(
-        [sys.executable, str(script), "--kills", "5", "--views", "12"],
+        [sys.executable, str(script), "--kills", "5", "--views", "12", "--plain-page"],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
