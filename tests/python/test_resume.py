@@ -154,6 +154,7 @@ class TestKilled:
         assert "3" in command("info", tmp_path / "o")[1]
         assert command("reconstruct", "--resume", tmp_path / "o")[0] == 0
         assert results(tmp_path / "o") == undisturbed
+        assert not list((tmp_path / "o").glob(".*"))
 
     def test_a_run_that_is_begun_again_says_so(
         self, recording: Path, undisturbed: Any, tmp_path: Path

@@ -263,5 +263,9 @@ def _resumed(context: typer.Context, out: Path, checkpoint_every: int | None) ->
         words = describe(sequence, indices)
         if asked.realtime:  # what it had seen; which frames come, is the clock's doing
             indices = unfinished.journaled_indices()
+    from nacre.io.atomic import remove_leftovers
+
+    for place in (out, unfinished.folder):
+        remove_leftovers(place)
     done = unfinished.resume(sequence, compare=not asked.is_camera)  # its colours were kept as JPEG
     return Run(asked, out, done, sequence, unfinished, words, indices, None)
