@@ -175,7 +175,7 @@ def main() -> None:
             num_runs += 1
             print(f"{num_kills} kills, {num_runs} runs finished, all with the same bytes", flush=True)
         print(
-            f"{num_kills} kills ({num_in_results} of them while results were written), {num_runs} runs: "
+            f"{num_kills} kills ({num_in_results} of them with results there), {num_runs} runs: "
             f"no frame lost but those in flight, {num_redone / num_kills:.1f} frames a kill done again, "
             f"every file whole, model {expected[0][:16]} and trajectory {expected[1][:16]} the same in all"
         )
