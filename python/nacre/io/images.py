@@ -158,7 +158,7 @@ def _pillow() -> Any:
 
 def _write_image(path: str | os.PathLike[str], array: npt.NDArray[Any], format: str, **options: Any) -> None:
     image = _pillow().fromarray(array)
-    with atomic_writer(path) as stream:
+    with atomic_writer(path, named=False) as stream:
         image.save(stream, format=format, **options)
 
 
