@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 _MOST_BYTES = 1 << 16
-_DEEP_KEY = re.compile(r"(?:[^\s.,=\[\]{}]+[ \t]*\.[ \t]*){16}")
+_DEEP_KEY = re.compile(r"(?<![^\s.,=\[\]{}])(?:[^\s.,=\[\]{}]+[ \t]*\.[ \t]*){16}")
 
 
 class Preset(str, Enum):

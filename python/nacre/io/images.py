@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
-from nacre.io.image_limits import check_exr, check_pixels, check_png
+from nacre.io.image_limits import check_exr, check_pixels, checked_png
 from nacre.io.raw import check_padding, read_file
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ def decoded(data: bytes, path: str | os.PathLike[str], formats: Sequence[str]) -
     Other formats are not tried, some of which start programs (Ghostscript).
     """
     pillow = _pillow()
-    check_png(path, data)
+    data = checked_png(path, data)
     try:
         image = pillow.open(BytesIO(data), formats=formats)
         check_pixels(path, *image.size, file_size=len(data), format=image.format)

@@ -18,6 +18,7 @@ from nacre.values import Value
 
 Float64 = npt.NDArray[np.float64]
 
+_LONGEST_LINE = 4096
 _ROWS_PER_BLOCK = 1024
 
 
@@ -303,7 +304,10 @@ def _read_rows(path: str | os.PathLike[str]) -> Rows:
     """Return the lines that hold numbers."""
     lines, ends, numbers = array("q"), array("q"), array("d")
     for line, content in enumerate(BytesIO(read_file(path)), start=1):
-        words = content.partition(b"#")[0].split()
+        told = content.partition(b"#")[0]
+        if len(told) > _LONGEST_LINE:
+            raise FileFormatError(path, f"not a trajectory: a line of {len(told)} bytes", line=line)
+        words = told.split()
         if not words:
             continue
         try:

@@ -73,7 +73,7 @@ def exr(
     return head + body
 
 
-_bomb = zlib.compress(bytes(1 << 24), 9)
+BOMB = zlib.compress(bytes(1 << 24), 9)
 _lying = {"descr": "'<u2'", "fortran_order": "False", "shape": "(100000, 100000)"}
 PNG = {
     "png empty": (b"", "damaged or truncated"),
@@ -87,10 +87,6 @@ PNG = {
     "png larger than it can hold": (png(4000, 4000), "refused: .*4000 x 4000 .* cannot hold"),
     "png of no width": (png(0, 3), "damaged or truncated|refused"),
     "png of width 2 to the 32 - 1": (png(2**32 - 1, 1), "refused|damaged"),
-    "png bomb of a comment": (
-        png(extra=chunk(b"zTXt", b"a\0\0" + _bomb)), "damaged or truncated|refused",
-    ),
-    "png bomb of a colour profile": (png(extra=chunk(b"iCCP", b"a\0\0" + _bomb)), "refused|damaged"),
     "png of bad crc": (png(crc=1), "damaged or truncated"),
     "png of bad zlib": (png(data=b"\x78\x9c" + _random.bytes(40)), "damaged or truncated"),
     "png of bad adler": (png(data=zlib.compress(bytes(27))[:-4] + b"\1\2\3\4"), "damaged or truncated"),
@@ -182,7 +178,7 @@ EXR = {
     "exr of unknown compression": (exr(compression=77), "damaged or truncated|refused"),
     "exr of colours": (exr(channels=("x", "y")), "no channel Z"),
     "exr of thousand channels": (
-        exr(channels=tuple(f"c{i:04}" for i in range(1000)), body=b""), "no channel Z|damaged|refused",
+        exr(channels=tuple(f"c{i:04}" for i in range(1000)), body=b""), "refused: .*channels",
     ),
     "exr of sampling 0": (exr(sampling=0), "damaged or truncated|refused"),
 }

@@ -55,7 +55,7 @@ POINTS = {
     ),
     "header of many properties": (
         ply(b"", "element vertex 1\n" + "\n".join(f"property float p{i}" for i in range(12_000))),
-        "line 10002: more than 10000 lines",
+        "line 5002: more than 5000 lines",
     ),
     "nul in a name": (ply(TWO, vertices(2).replace("float x", "float x\0")), "no single value x"),
     "no format": (ply(TWO).replace(b"format binary_little_endian 1.0\n", b""), "no line 'format'"),
