@@ -90,4 +90,6 @@ def test_what_is_read_is_what_is_there(tmp_path, suffix):
             pass
         except Exception as error:
             raise AssertionError(f"{error!r} with {data!r}") from error
-    assert num_read >= (1 if suffix == ".png" else 50), num_read  # else nothing was compared; PNG has check sums
+    assert num_read >= (1 if suffix == ".png" else 50), (
+        num_read
+    )  # else nothing was compared; PNG has check sums

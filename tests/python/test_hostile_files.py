@@ -1,7 +1,6 @@
 """Files from strangers: each of the corpus gives nacre's own error, with file, place and reason, in time."""
 
 import importlib.util
-import re
 import sys
 import time
 from pathlib import Path

@@ -98,7 +98,9 @@ def _told_by_file(path: Path, document: Mapping[str, Any], parameters: ModelPara
 
     try:
         changes = dict(_leaves(document))
-        changed = updated(parameters, {key: _checked(parameters, key, value) for key, value in changes.items()})
+        changed = updated(
+            parameters, {key: _checked(parameters, key, value) for key, value in changes.items()}
+        )
         Model(Camera(width=8, height=8, fx=8, fy=8, cx=4, cy=4), parameters=changed)
     except RecursionError:
         raise FileFormatError(path, "its tables are nested too deep") from None
@@ -170,8 +172,8 @@ def _checked(parameters: Any, key: str, value: Any) -> Any:
         try:
             return NoiseModel(**value) if isinstance(value, Mapping) else as_noise_choice(key, value)
         except TypeError as error:
-            names = ", ".join(field.name for field in dataclasses.fields(NoiseModel))
-            raise CommandError(f"{key} must have numbers for {names}, got {shown(value)}", 2) from error
+            parts = ", ".join(field.name for field in dataclasses.fields(NoiseModel))
+            raise CommandError(f"{key} must have numbers for {parts}, got {shown(value)}", 2) from error
     if dataclasses.is_dataclass(current):
         raise CommandError(
             f"{key} is a group; set one of {', '.join(f.name for f in dataclasses.fields(current))}", 2

@@ -1,4 +1,4 @@
-"""What an image says of its size, believed only as far as its file can hold it: before a decoder sets memory aside."""
+"""What an image says of its size, believed only as far as its file can hold it, before it is decoded."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ def check_pixels(
 
 def checked_png(path: str | os.PathLike[str], data: bytes) -> bytes:
     """
-    Check what a PNG file is made of, its check sums included, and that it can hold as many pixels as it says.
+    Check what a PNG file is made of, its check sums included, and that it can hold its pixels.
 
     Returns the file without compressed texts and profiles, which could be of any size and have no use here.
 
-    Decoders pass over damaged parts that they have no use for, and give zeros for what is missing. What is no PNG
-    at all is left to them.
+    Decoders pass over damaged parts that they have no use for, and give zeros for what is missing. What is no
+    PNG at all is left to them.
     """
     if not data.startswith(_PNG_SIGNATURE):
         return data
@@ -123,7 +123,9 @@ def check_lzfse(path: str | os.PathLike[str], data: bytes, most: int) -> None:
     except FileFormatError:
         raise
     except (ValueError, struct.error):
-        raise FileFormatError(path, "the LZFSE data is damaged: a block is cut short", offset=position) from None
+        raise FileFormatError(
+            path, "the LZFSE data is damaged: a block is cut short", offset=position
+        ) from None
 
 
 def _word(data: bytes, position: int) -> tuple[bytes, int]:

@@ -24,7 +24,7 @@ _IS_SPACE[list(b" \t\n\r\v\f")] = True
 
 
 def read_file(path: str | os.PathLike[str], most: int | None = None) -> bytes:
-    """Return the bytes of a regular file, ``most`` at most; what would never end (a pipe, a device) is refused."""
+    """Return the bytes of a regular file, ``most`` at most; a pipe or a device is refused."""
     size = require_regular(path).stat().st_size
     if most is not None and size > most:
         raise FileFormatError(path, f"larger than what it can hold: {size} bytes, more than {most}")

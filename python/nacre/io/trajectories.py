@@ -125,9 +125,9 @@ class Trajectory(Value):
 
 def _frozen(values: npt.ArrayLike) -> Float64:
     """Return values that nobody can change: themselves where they are so already, else a copy."""
-    if isinstance(values, np.ndarray) and values.dtype == np.float64:
-        if values.base is None and not values.flags.writeable:
-            return values
+    is_array = isinstance(values, np.ndarray) and values.dtype == np.float64
+    if is_array and values.base is None and not values.flags.writeable:  # type: ignore[union-attr]
+        return values  # type: ignore[return-value]
     copy = np.array(values, dtype=np.float64)
     copy.flags.writeable = False
     return copy

@@ -51,10 +51,14 @@ class Case:
     needs: str = "numpy"
 
 
-def single(kind: str, reader: str, suffix: str, table: Mapping[str, tuple[bytes, str]], **more: str) -> list[Case]:
+def single(
+    kind: str, reader: str, suffix: str, table: Mapping[str, tuple[bytes, str]], **more: str
+) -> list[Case]:
     """Return a case for each file of a table: name to content and message."""
     return [
-        Case(f"{kind}/{name.replace(' ', '_')}", reader, {f"a{suffix}": content}, message, f"a{suffix}", **more)
+        Case(
+            f"{kind}/{name.replace(' ', '_')}", reader, {f"a{suffix}": content}, message, f"a{suffix}", **more
+        )
         for name, (content, message) in table.items()
     ]
 
