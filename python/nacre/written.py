@@ -81,7 +81,7 @@ class Written:
     @property
     def counts(self) -> dict[str, int]:
         """How many frames there are, and how many of each status."""
-        from nacre.reconstruction import STATUSES
+        from nacre.run_state import STATUSES
 
         found = [frame.get("status") for frame in self.frames]
         return {"num_frames": len(found), **{f"num_{s.lower()}": found.count(s) for s in STATUSES}}

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from nacre._core import Camera
+from nacre.arrays import as_camera, as_scale
 from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
 from nacre.io.image_limits import MAX_PIXELS
@@ -111,6 +112,7 @@ def write_camera(path: str | os.PathLike[str], camera: Camera, depth_scale: floa
     depth_scale : float, optional
         Stored depth units per metre.
     """
+    as_camera("camera", camera)
     document: dict[str, Any] = {"model": camera.model, "width": camera.width, "height": camera.height}
     if camera.model == "orthographic":
         document["pixel_size"] = camera.pixel_size
@@ -118,11 +120,7 @@ def write_camera(path: str | os.PathLike[str], camera: Camera, depth_scale: floa
         document.update(fx=camera.fx, fy=camera.fy, cx=camera.cx, cy=camera.cy)
         document.update(distortion=list(camera.distortion), depth=camera.depth)
     if depth_scale is not None:
-        if not (math.isfinite(depth_scale) and depth_scale > 0):
-            raise ValueError(
-                f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}"
-            )
-        document["depth_scale"] = depth_scale
+        document["depth_scale"] = as_scale("depth_scale", depth_scale)
     with atomic_writer(path) as stream:
         stream.write((json.dumps(document, indent=2) + "\n").encode())
 

@@ -11,6 +11,7 @@ from io import BytesIO
 import numpy as np
 import numpy.typing as npt
 
+from nacre.arrays import as_length, as_real, as_times
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 from nacre.io.raw import excerpt, number_of, read_file, text_of
@@ -67,10 +68,8 @@ class Trajectory(Value):
     poses: Float64
 
     def __post_init__(self) -> None:
-        timestamps = _frozen(self.timestamps)
-        poses = _frozen(self.poses)
-        if timestamps.ndim != 1 or not np.isfinite(timestamps).all():
-            raise ValueError(f"timestamps must be (N,) finite numbers, got shape {timestamps.shape}")
+        timestamps = _frozen(as_times("timestamps", self.timestamps))
+        poses = _frozen(as_real("poses", self.poses))
         if poses.shape != (len(timestamps), 4, 4):
             raise ValueError(f"poses must have shape ({len(timestamps)}, 4, 4), got {poses.shape}")
         object.__setattr__(self, "timestamps", timestamps)
@@ -102,7 +101,7 @@ class Trajectory(Value):
         (M, 4, 4) float64
             ``world_from_camera``; NaN where no pose is near enough.
         """
-        wanted = np.asarray(timestamps, dtype=np.float64)
+        wanted, max_difference = as_times("timestamps", timestamps), as_length("max_difference", max_difference)
         result = np.full((len(wanted), 4, 4), np.nan)
         if not len(self):
             return result
@@ -206,10 +205,8 @@ def associate(
     indices_a, indices_b : (K,) arrays
         The pairs, ordered by ``indices_a``.
     """
-    a = np.asarray(timestamps_a, dtype=np.float64)
-    b = np.asarray(timestamps_b, dtype=np.float64)
-    if a.ndim != 1 or b.ndim != 1:
-        raise ValueError(f"timestamps must be one-dimensional, got shapes {a.shape} and {b.shape}")
+    a, b = as_times("timestamps_a", timestamps_a), as_times("timestamps_b", timestamps_b)
+    max_difference = as_length("max_difference", max_difference)
     order = np.argsort(b, kind="stable")
     sorted_b = b[order]
     first = np.searchsorted(sorted_b, a - max_difference, side="left")
@@ -284,9 +281,12 @@ def write_trajectory(path: str | os.PathLike[str], timestamps: npt.ArrayLike, po
     poses : (N, 4, 4) array
         ``world_from_camera``.
     """
-    trajectory = Trajectory(np.asarray(timestamps), np.asarray(poses))
+    trajectory = Trajectory(timestamps, poses)  # type: ignore[arg-type]
     if not np.isfinite(trajectory.poses).all():
-        raise ValueError("poses must be finite")
+        raise ValueError("poses must be finite, got NaN or infinity")
+    largest = np.abs(trajectory.poses[:, :3, :3]).max(initial=0.0)
+    if largest > 2:
+        raise ValueError(f"poses must be rigid, got a rotation matrix with an entry of {largest:g}")
     rows = np.column_stack(
         [
             trajectory.timestamps,
