@@ -3,8 +3,8 @@ Hostile point files in nacre and in other libraries: who tells, who is silent, w
 
     python benchmarks/hostile_files.py [--python PATH]
 
-reads the PLY and PCD files of ``tests/python/hostile`` with nacre and with what is there of Open3D, OpenCV,
-meshio and trimesh, each in a process of its own that is started again where it dies. ``--python`` is another
+reads the PLY and PCD files of ``tests/python/hostile_files`` with nacre and with what is there of Open3D,
+OpenCV, meshio and trimesh, each in a process of its own that is started again where it dies. ``--python`` is another
 interpreter, in whose environment the others are. ``--data FOLDER`` adds files: all those in it but ok.ply and
 nan.ply are broken.
 """
@@ -28,7 +28,7 @@ READ = {
     "OpenCV": "import cv2\ndef read(p):\n  v = cv2.loadPointCloud(p)[0]\n"
     "  return 0 if v is None else v.size // 3",
     "meshio": "import meshio\ndef read(p): return len(meshio.read(p).points)",
-    "trimesh": "import trimesh\ndef read(p):\n  v = trimesh.load(p)\n  return len(getattr(v, 'vertices', ()))",
+    "trimesh": "import trimesh\ndef read(p): return len(getattr(trimesh.load(p), 'vertices', ()))",
 }
 ENDINGS = {"nacre": (".ply", ".pcd"), "Open3D": (".ply", ".pcd"), "Open3D (tensor)": (".ply", ".pcd")}
 WORKER = """
@@ -98,7 +98,7 @@ class Reader:
 def broken_files(folder: Path, data: Path | None) -> list[Path]:
     """Write the hostile point files, and return them and those of a folder of others."""
     sys.path.insert(0, str(TESTS))
-    from hostile import CASES, write
+    from hostile_files import CASES, write
 
     cases = [case for case in CASES.values() if case.reader == "points"]
     found = [write(case, folder) for case in cases]

@@ -109,7 +109,7 @@ def _wrong_in_report(report: dict[str, Any]) -> str | None:
 
 def _wrong_in_frame(frame: Any) -> str | None:
     """Say what is not as nacre reconstruct writes a frame."""
-    from nacre.reconstruction import STATUSES
+    from nacre.run_state import STATUSES
 
     if not isinstance(frame, dict):
         return f" must be an object, got {shown(frame)}"

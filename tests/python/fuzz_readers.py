@@ -1,11 +1,11 @@
 """
-Fuzz nacre's readers, the hostile files of ``hostile`` and valid ones being the seeds.
+Fuzz nacre's readers, the hostile files of ``hostile_files`` and valid ones being the seeds.
 
     python tests/python/fuzz_readers.py KIND [--seconds 60] [--seed 0]
 
 damages files at random; with atheris (``pip install atheris``, Python 3.11 to 3.13) what it tries follows
-the branches that it has seen. KIND is one of those of ``hostile.READERS``. Whatever is neither a result nor an
-error of nacre's is written to ``fuzz-findings/`` and ends the run with 1.
+the branches that it has seen. KIND is one of those of ``hostile_files.READERS``. Whatever is neither a result
+nor an error of nacre's is written to ``fuzz-findings/`` and ends the run with 1.
 """
 
 import argparse
@@ -32,9 +32,9 @@ if atheris is not None and __name__ == "__main__":
         import nacre.viewer.written
 else:
     import nacre
-from hostile import CASES, READERS, Case, write
-from hostile.damage import damaged
-from hostile.valid import VALID
+from hostile_files import CASES, READERS, Case, write
+from hostile_files.damage import damaged
+from hostile_files.valid import VALID
 
 MOST_BYTES = 1 << 16
 MOST_SECONDS = 2.0

@@ -11,11 +11,11 @@ import pytest
 
 pytest.importorskip("typer")
 sys.path.insert(0, str(Path(__file__).parent))
-from hostile import CASES, write
-from hostile.meshes import TRIANGLE
-from hostile.ply import text, vertices
-from hostile.recordings import plain
-from hostile.trajectories import GOOD
+from hostile_files import CASES, write
+from hostile_files.meshes import TRIANGLE
+from hostile_files.ply import text, vertices
+from hostile_files.recordings import plain
+from hostile_files.trajectories import GOOD
 
 from nacre.cli.app import run
 
@@ -42,6 +42,7 @@ COMMANDS = {
     "matrix": ("evaluate {good}/points.ply {good}/mesh.obj --world-from-model {bad}",),
     "config": ("reconstruct {good}/recording --config {bad} -o {out}",),
     "recording": ("reconstruct {bad} -o {out}",),
+    "run": ("info {bad}", "reconstruct --resume {bad}"),
     "output": ("view {bad} --html {out}.html", "evaluate {bad} {good}/mesh.obj"),
 }
 # Told as wrong usage: the folder or file is not what the command takes.

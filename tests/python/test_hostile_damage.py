@@ -13,9 +13,9 @@ from nacre.io.cameras import read_camera
 from nacre.io.images import read_depth
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hostile import CASES, oracle
-from hostile.damage import damaged, scratched
-from hostile.valid import VALID
+from hostile_files import CASES, oracle
+from hostile_files.damage import damaged, scratched
+from hostile_files.valid import VALID
 
 NUM_FILES = 1000
 

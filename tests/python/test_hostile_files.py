@@ -10,7 +10,7 @@ import pytest
 import nacre
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hostile import CASES, opened, write
+from hostile_files import CASES, opened, write
 
 MOST_SECONDS = 2.0
 RUNNABLE = [name for name, case in CASES.items() if importlib.util.find_spec(case.needs) is not None]

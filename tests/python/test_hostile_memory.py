@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hostile.measure import allowed
+from hostile_files.measure import allowed
 
 HERE = Path(__file__).parent
 # rosbags asks for as many bytes as a record of a .bag says, before it finds that they are not there.
@@ -19,7 +19,7 @@ def measured(*options):
     if not Path("/proc/self/clear_refs").exists():
         pytest.skip("the peak of memory can be read on Linux only")
     done = subprocess.run(
-        [sys.executable, HERE / "hostile" / "measure.py", *options],
+        [sys.executable, HERE / "hostile_files" / "measure.py", *options],
         capture_output=True,
         text=True,
         check=False,

@@ -4,7 +4,7 @@ import struct
 
 import numpy as np
 
-from hostile.case import single
+from hostile_files.case import single
 
 XYZ = "property float x\nproperty float y\nproperty float z"
 TWO = struct.pack("<6f", 0, 1, 2, 3, 4, 5)

@@ -70,8 +70,8 @@ def large() -> None:
     import numpy as np
 
     import nacre
-    from hostile.case import READERS
-    from hostile.ply import ply, text, vertices
+    from hostile_files.case import READERS
+    from hostile_files.ply import ply, text, vertices
 
     n, normal = 100_000, np.random.default_rng(0).normal
     points = normal(size=(n, 3)).astype(np.float32)
@@ -113,8 +113,8 @@ def main() -> None:
     """Measure every hostile file in this process; print a line of JSON for each."""
     from importlib.util import find_spec
 
-    from hostile import CASES, opened, write
-    from hostile.valid import VALID
+    from hostile_files import CASES, opened, write
+    from hostile_files.valid import VALID
 
     warnings.simplefilter("ignore")
     logging.disable(logging.WARNING)

@@ -7,8 +7,8 @@ import zipfile
 import zlib
 from io import BytesIO
 
-from hostile.case import Case
-from hostile.depth_images import pgm
+from hostile_files.case import Case
+from hostile_files.depth_images import pgm
 
 SIZE = 4 * 3 * 4
 TOLD = {

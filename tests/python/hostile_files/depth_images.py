@@ -6,7 +6,7 @@ from io import BytesIO
 
 import numpy as np
 
-from hostile.case import Case, single
+from hostile_files.case import Case, single
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _random = np.random.default_rng(3)

@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 
-from hostile.cameras import PINHOLE, changed
-from hostile.case import Case
-from hostile.depth_images import pgm, png
-from hostile.ply import GRID, TEXT, text
-from hostile.trajectories import EYE, GOOD
+from hostile_files.cameras import PINHOLE, changed
+from hostile_files.case import Case
+from hostile_files.depth_images import pgm, png
+from hostile_files.ply import GRID, TEXT, text
+from hostile_files.trajectories import EYE, GOOD
 
 DEPTH = pgm(65535, bytes((3, 232)) * 12)
 CAMERA = json.dumps(PINHOLE).encode()

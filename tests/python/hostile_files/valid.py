@@ -6,18 +6,18 @@ import zlib
 
 import numpy as np
 
-from hostile.cameras import OPEN3D, PINHOLE
-from hostile.case import Case
-from hostile.configs import TEXTS  # noqa: F401
-from hostile.depth_images import exr, npy, pgm, png
-from hostile.meshes import OFF, TRIANGLE, stl
-from hostile.outputs import FRAME, MODEL, report
-from hostile.pcd import TWO as PCD_TWO
-from hostile.pcd import packed, pcd
-from hostile.phones import HEAD, TOLD, r3d, stray
-from hostile.ply import FACES, GRID, TEXT, TWO, ply, text, vertices
-from hostile.recordings import plain, tum
-from hostile.trajectories import EYE, GOOD
+from hostile_files.cameras import OPEN3D, PINHOLE
+from hostile_files.case import Case
+from hostile_files.configs import TEXTS  # noqa: F401
+from hostile_files.depth_images import exr, npy, pgm, png
+from hostile_files.meshes import OFF, TRIANGLE, stl
+from hostile_files.outputs import FRAME, MODEL, report
+from hostile_files.pcd import TWO as PCD_TWO
+from hostile_files.pcd import packed, pcd
+from hostile_files.phones import HEAD, TOLD, r3d, stray
+from hostile_files.ply import FACES, GRID, TEXT, TWO, ply, text, vertices
+from hostile_files.recordings import plain, tum
+from hostile_files.trajectories import EYE, GOOD
 
 PIXELS = np.arange(12, dtype=">u2").reshape(3, 4) + 500
 ROWS = b"".join(b"\0" + row.tobytes() for row in PIXELS)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from hostile.case import single
+from hostile_files.case import single
 
 GOOD = "0 0 0 0 0 0 0 1\n"
 EYE = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"

@@ -2,7 +2,7 @@
 
 import json
 
-from hostile.case import single
+from hostile_files.case import single
 
 PINHOLE = {
     "model": "pinhole",

@@ -2,8 +2,8 @@
 
 import struct
 
-from hostile.case import single
-from hostile.ply import FACES, TEXT, text, vertices
+from hostile_files.case import single
+from hostile_files.ply import FACES, TEXT, text, vertices
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 OFF = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n"

@@ -89,6 +89,13 @@ def read_output(path: Path) -> Any:
     return written_story(path)
 
 
+def read_run(path: Path) -> Any:
+    """Read what an unfinished run left, as ``nacre info`` does."""
+    from nacre.cli.unfinished import describe_unfinished
+
+    return describe_unfinished(path)
+
+
 READERS: dict[str, Callable[[Path], Any]] = {
     "points": nacre.read_points,
     "mesh": nacre.read_mesh,
@@ -102,6 +109,8 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "recording": read_recording,
     "config": lambda path: model_parameters(None, path, None),
     "output": read_output,
+    "checkpoint": nacre.Model.load,
+    "run": read_run,
 }
 
 

@@ -2,9 +2,9 @@
 
 import json
 
-from hostile.cameras import PINHOLE
-from hostile.case import Case
-from hostile.ply import TEXT, text, vertices
+from hostile_files.cameras import PINHOLE
+from hostile_files.case import Case
+from hostile_files.ply import TEXT, text, vertices
 
 _POSE = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
 FRAME = {"index": 0, "status": "TRACKED", "world_from_camera": _POSE, "truth": None}
