@@ -14,7 +14,6 @@ import typer
 
 from nacre.cli.terminal import CommandError
 from nacre.errors import FileFormatError, shown
-from nacre.io.raw import read_text
 
 if TYPE_CHECKING:
     from nacre.model import ModelParameters
@@ -92,7 +91,7 @@ def model_parameters(
 
 def _told_by_file(path: Path, document: Mapping[str, Any], parameters: ModelParameters) -> ModelParameters:
     """Return the parameters with the changes of a file, which must make a model."""
-    from nacre._core import Camera
+    from nacre import Camera
     from nacre.model import Model
     from nacre.parameters import updated
 
@@ -117,6 +116,8 @@ def _toml() -> Any:
 
 
 def _read_toml(path: Path) -> Mapping[str, Any]:
+    from nacre.io.raw import read_text
+
     toml = _toml()
     text = read_text(path, _MOST_BYTES)
     deep = _DEEP_KEY.search(text)

@@ -182,7 +182,7 @@ ROS_FOLDERS = {
     "ros folder leads up": {"metadata.yaml": YAML.format(path="../../../etc/passwd").encode(), "a.db3": b""},
     "ros folder absolute": {"metadata.yaml": YAML.format(path="/etc/passwd").encode(), "a.db3": b""},
     "ros folder runs python": {
-        "metadata.yaml": b"!!python/object/apply:os.system ['touch /tmp/nacre-was-here']\n",
+        "metadata.yaml": b"!!python/object/apply:os.system ['exit']\n",
         "a.db3": b"",
     },
     "ros folder of a billion laughs": {"metadata.yaml": LAUGHS.encode(), "a.db3": b""},
