@@ -102,7 +102,9 @@ def _wrong_in_report(report: dict[str, Any]) -> str | None:
         if value is not None and not (isinstance(value, str) and "\0" not in value):
             return f"recording.{name} must be a text, got {shown(value)}"
     spacing = report.get("spacing")
-    return None if spacing is None or _is_number(spacing) else f"spacing must be a number, got {shown(spacing)}"
+    return (
+        None if spacing is None or _is_number(spacing) else f"spacing must be a number, got {shown(spacing)}"
+    )
 
 
 def _wrong_in_frame(frame: Any) -> str | None:

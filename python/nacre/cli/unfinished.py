@@ -186,6 +186,8 @@ def read_asked(out: Path) -> dict[str, Any]:
         raise FileFormatError(
             path, "it was written by another version of nacre; run it again without --resume"
         )
+    if not isinstance(asked.get("options"), dict):
+        raise FileFormatError(path, "options must be an object: it is no run of nacre reconstruct")
     return asked
 
 
