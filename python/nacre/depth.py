@@ -272,7 +272,11 @@ def label_pixels(
         raise TypeError(f"parameters must be nacre.DepthParameters, got {type(parameters).__name__}")
     options = to_core((parameters or DepthParameters()).for_camera(camera), _core.DepthOptions())
     labels: npt.NDArray[np.uint8] = _core.label_pixels(
-        image, camera, options, as_mask("mask", mask, (image.shape[0], image.shape[1])), as_count("num_threads", num_threads)
+        image,
+        camera,
+        options,
+        as_mask("mask", mask, (image.shape[0], image.shape[1])),
+        as_count("num_threads", num_threads),
     )
     return labels
 
@@ -305,7 +309,9 @@ def back_project(
         Depth and camera differ in size.
     """
     points: npt.NDArray[np.float32] = _core.back_project(
-        as_depth("depth", depth, depth_scale), as_camera("camera", camera), as_count("num_threads", num_threads)
+        as_depth("depth", depth, depth_scale),
+        as_camera("camera", camera),
+        as_count("num_threads", num_threads),
     )
     return points
 

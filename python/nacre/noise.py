@@ -170,7 +170,9 @@ def estimate_noise(
     """
     return NoiseModel._from_core(
         _core.estimate_noise(
-            as_depth("depth", depth, depth_scale), as_camera("camera", camera), as_count("num_threads", num_threads)
+            as_depth("depth", depth, depth_scale),
+            as_camera("camera", camera),
+            as_count("num_threads", num_threads),
         )
     )
 

@@ -123,11 +123,11 @@ def fields_of(parameters: Any, prefix: str = "") -> Iterator[tuple[str, Any]]:
             yield f"{prefix}{name}", value
 
 
-@pytest.mark.parametrize("name, default", list(fields_of(nacre.ModelParameters())))
+@pytest.mark.parametrize(("name", "default"), list(fields_of(nacre.ModelParameters())))
 def test_any_parameter(name: str, default: Any) -> None:
     complaints = []
     for condition, value, refused in hostile.values_for(default):
-        recipe = recipes.Recipe(lambda **changed: nacre.Model(recipes.CAMERA, **{name: changed[name]}), {})  # noqa: B023
+        recipe = recipes.Recipe(lambda **changed: nacre.Model(recipes.CAMERA, **{name: changed[name]}), {})
         last = name.rpartition(".")[2]
         wrong = complaint(dataclasses.replace(recipe, arguments={last: default}), name, value, refused)
         if wrong and not re.search(rf"\b{last} must be .* got ", wrong):
@@ -137,19 +137,23 @@ def test_any_parameter(name: str, default: Any) -> None:
 
 # What the table does not call: results, which hold what nacre found, and what reads files.
 RESULTS = {
-    "AbsoluteTrajectoryError", "AlignResult", "CameraFile", "ClosestPoints", "Cloud", "Completeness", "Consolidated",
+    "AbsoluteTrajectoryError", "AlignResult", "CameraFile", "ClosestPoints", "Cloud", "Completeness",
+    "Consolidated",
     "DepthReport", "FScore", "FrameRecord", "FrameReport", "GlobalAlignResult", "NormalError", "PoseError",
-    "RadiusNeighbors", "RayHits", "Reconstruction", "RegionReport", "RelativePoseError", "Sequence", "SequenceFrame",
+    "RadiusNeighbors", "RayHits", "Reconstruction", "RegionReport", "RelativePoseError", "Sequence",
+    "SequenceFrame",
     "SurfaceAccuracy", "SurfaceSamples", "Uniformity", "DepthCalibration",
 }  # fmt: skip
 PARAMETERS = {  # checked by what they are given to
-    "DepthParameters", "ModelParameters", "RegionParameters", "RegistrationParameters", "GlobalRegistrationParameters",
+    "DepthParameters", "ModelParameters", "RegionParameters", "RegistrationParameters",
+    "GlobalRegistrationParameters",
     "NoiseModel",
 }  # fmt: skip
 ERRORS = {"CameraError", "Cancelled", "FileFormatError"}
 FILES = {
     "nacre.datasets.detect.open_sequence", "nacre.io.cameras.read_camera", "nacre.io.meshes.read_mesh",
-    "nacre.io.points.read_points", "nacre.io.trajectories.read_trajectory", "nacre.reconstructing.reconstruct",
+    "nacre.io.points.read_points", "nacre.io.trajectories.read_trajectory",
+    "nacre.reconstructing.reconstruct",
 }  # fmt: skip
 NOT_OF_ARRAYS = re.compile(r"\.(Sequence|Reconstruction)\.\w+$|\.NoiseModel\.to_core$")
 

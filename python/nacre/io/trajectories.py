@@ -69,7 +69,10 @@ class Trajectory(Value):
         (M, 4, 4) float64
             ``world_from_camera``; NaN where no pose is near enough.
         """
-        wanted, max_difference = as_times("timestamps", timestamps), as_length("max_difference", max_difference)
+        wanted, max_difference = (
+            as_times("timestamps", timestamps),
+            as_length("max_difference", max_difference),
+        )
         result = np.full((len(wanted), 4, 4), np.nan)
         if not len(self):
             return result
