@@ -20,6 +20,7 @@ import math
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -92,12 +93,15 @@ def turned(axis: Array, angle: float) -> Array:
     """Return the rotation by an angle about an axis."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    rotation: Array = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    return rotation
 
 
 def look(mesh: nacre.Mesh, angle: float, *, distance: float = 0.3, elevation: float = 0.3) -> Array:
     """Return the pose of a camera that looks at an object from a direction."""
-    return nacre.turntable_poses(mesh, 2, angle, camera=CAMERA, distance=distance, elevation=elevation)[1]
+    poses = nacre.turntable_poses(mesh, 2, angle, camera=CAMERA, distance=distance, elevation=elevation)
+    pose: Array = poses[1]
+    return pose
 
 
 def view(mesh: nacre.Mesh, pose: Array, seed: int) -> Array:
@@ -192,7 +196,7 @@ def rubbish(rng: np.random.Generator) -> Array:
     """Return a frame that shows nothing of the scene."""
     shape = (CAMERA.height, CAMERA.width)
     v, u = np.indices(shape)
-    kinds = [
+    kinds: list[Callable[[], Array]] = [
         lambda: rng.uniform(0.1, 1.0, shape),
         lambda: np.kron(rng.uniform(0.2, 0.4, (12, 16)), np.ones((10, 10))),
         lambda: rng.uniform(0.2, 0.5) + rng.normal(0, 3e-4) * u + rng.normal(0, 3e-4) * v,

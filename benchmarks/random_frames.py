@@ -180,7 +180,8 @@ class Scene:
     def pose(self) -> Array:
         """Return the next pose around the object."""
         self.angle += self.step
-        return nacre.turntable_poses(thing(), 2, self.angle, distance=self.distance)[1]
+        pose: Array = nacre.turntable_poses(thing(), 2, self.angle, distance=self.distance)[1]
+        return pose
 
     def next(self) -> tuple[str, Array]:
         """Return the kind of frame and its depth [m]."""
@@ -226,13 +227,15 @@ class Scene:
     def _plane(self) -> Array:
         v, u = np.indices(self.shape)
         a, b = self.rng.normal(0, 0.2, 2)
-        return np.float32(1.0) + a * u / self.shape[1] + b * v / self.shape[0]
+        plane: Array = 1.0 + a * u / self.shape[1] + b * v / self.shape[0]
+        return plane
 
     def _waves(self) -> Array:
         v, u = np.indices(self.shape) / max(self.shape)
         self.angle += self.step
         x = u + self.angle / 10
-        return 0.5 + 0.02 * np.sin(9 * x) * np.cos(7 * v) + 0.01 * np.sin(15 * v + 4 * x) + 0.1 * v
+        waves: Array = 0.5 + 0.02 * np.sin(9 * x) * np.cos(7 * v) + 0.01 * np.sin(15 * v + 4 * x) + 0.1 * v
+        return waves
 
     def _zeros(self) -> Array:
         return np.zeros(self.shape, np.float32)
