@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import numbers
+import os
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -26,7 +28,10 @@ from nacre.arrays import (
     as_scale,
 )
 from nacre.depth import DepthParameters, DepthReport
+from nacre.errors import FileFormatError
 from nacre.exchange import ExchangeablePoints
+from nacre.io.atomic import atomic_writer
+from nacre.io.raw import read_file
 from nacre.noise import NoiseModel
 from nacre.parameters import from_core, to_core, updated
 from nacre.region import RegionParameters, RegionReport
@@ -252,6 +257,16 @@ class FrameReport(Value):
         )
 
 
+def _corrected(report: FrameReport, now: Any) -> FrameReport:
+    """Return a report with what a later frame has changed."""
+    return replace(
+        report,
+        world_from_camera=now.world_from_camera,
+        information=now.information,
+        weak_directions=now.weak_directions,
+    )
+
+
 class Model(ExchangeablePoints):
     """
     A 3D model that grows with every depth frame.
@@ -376,9 +391,80 @@ class Model(ExchangeablePoints):
         new = [FrameReport._from_core(self._core.report(i)) for i in range(num_known, self._core.num_frames)]
         known = self._frames
         if any(report.corrects_earlier for report in new):
-            known = [replace(report, world_from_camera=self._core.pose(report.index)) for report in known]
+            known = [_corrected(report, self._core.report(report.index)) for report in known]
         self._frames = known + new if new else known
         return self._frames
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """
+        Write all that the model knows to a file, so that :meth:`load` can go on with it.
+
+        A model that was saved and loaded goes on to the same bits as one that was not. The file is complete
+        or not there at all. It is for going on, on any machine, with any nacre of the same checkpoint format
+        (its changes are in the change log); what is to be kept for years is written with
+        :func:`nacre.write_points`.
+
+        Parameters
+        ----------
+        path : path-like
+            The file; its folder must exist.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written; what was there before is left as it was.
+        """
+        data = self._saved()
+        with atomic_writer(path) as stream:
+            stream.write(data)
+
+    def _saved(self, more: Mapping[str, Any] | None = None) -> bytes:
+        note = json.dumps({"depth_scale": self._depth_scale, **(more or {})})
+        with self._lock:
+            return self._core.save(note)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Model:
+        """
+        Read a model that :meth:`save` wrote.
+
+        Parameters
+        ----------
+        path : path-like
+            The file. It may come from anybody: nothing in it is run, and no more memory is taken than it
+            fills.
+
+        Returns
+        -------
+        Model
+
+        Raises
+        ------
+        FileFormatError
+            It is no saved model, it is damaged or not all there, or another version's; with the place.
+        OSError
+            It cannot be read.
+        """
+        return cls._loaded(path)[0]
+
+    @classmethod
+    def _loaded(cls, path: str | os.PathLike[str]) -> tuple[Model, dict[str, Any]]:
+        data = read_file(path)
+        try:
+            core, note = _core.Model.load(data)
+        except _core.CheckpointError as error:
+            reason, offset = error.args
+            raise FileFormatError(path, reason, offset=offset) from None
+        try:
+            more = json.loads(note)
+            scale = float(more.pop("depth_scale"))
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            raise FileFormatError(path, "it was saved by C++: it does not say the depth_scale") from None
+        if not (np.isfinite(scale) and scale > 0):
+            raise FileFormatError(path, f"its depth_scale must be positive, got {scale!r}")
+        model = cls(core.camera, parameters=from_core(ModelParameters, core.given_options), depth_scale=scale)
+        model._core = core
+        return model, more
 
     def __len__(self) -> int:
         """Return the number of points."""
@@ -387,8 +473,8 @@ class Model(ExchangeablePoints):
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         raise TypeError(
-            "a Model cannot be pickled or copied: pickle what it holds (model.points, model.normals, "
-            "model.poses, model.frames, model.parameters), or write it with nacre.write_points"
+            "a Model cannot be pickled or copied: write it with model.save and read it with Model.load, or "
+            "pickle what it holds (model.points, model.normals, model.poses, model.frames, model.parameters)"
         )
 
     def __repr__(self) -> str:

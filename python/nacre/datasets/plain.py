@@ -20,9 +20,9 @@ import numpy.typing as npt
 from nacre import arrays
 from nacre._core import Camera
 from nacre.datasets.given import Given
-from nacre.datasets.listing import describe, files
+from nacre.datasets.listing import describe, files, require_order
 from nacre.datasets.sequence import FrameSource, Sequence
-from nacre.datasets.tum import read_truth
+from nacre.datasets.tum import lines_of, read_truth, time_of
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 from nacre.io.cameras import write_camera
@@ -33,6 +33,7 @@ from nacre.io.images import (
     write_color_png,
     write_depth_png,
 )
+from nacre.io.raw import excerpt
 from nacre.io.trajectories import write_trajectory
 
 FORMAT = "plain"
@@ -216,18 +217,15 @@ def _stored(depth: Any, camera: Camera, depth_scale: float, index: int) -> npt.N
 def _read_timestamps(path: Path, count: int) -> npt.NDArray[np.float64] | None:
     if not path.is_file():
         return None
-    lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]
-    times = []
-    for number, line in enumerate(lines, start=1):
-        if not line or line.startswith("#"):
-            continue
-        try:
-            times.append(float(line))
-        except ValueError as error:
-            raise FileFormatError(
-                path, f"expected a time in seconds, got {line[:60]!r}", line=number
-            ) from error
-    if len(times) != count or not np.isfinite(times).all():
+    times: list[float] = []
+    for number, line in lines_of(path):
+        time = time_of(line)
+        if not np.isfinite(time):
+            reason = f"expected a time in seconds, a finite number, got {excerpt(line.encode())}"
+            raise FileFormatError(path, reason, line=number)
+        require_order(path, number, time, times[-1] if times else None)
+        times.append(time)
+    if len(times) != count:
         raise FileFormatError(
             path, f"expected {count} finite times, one for each depth image, got {len(times)}"
         )
