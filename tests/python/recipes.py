@@ -75,7 +75,7 @@ def tree() -> nacre.KdTree:
 
 def add_frame(**arguments: Any) -> nacre.FrameReport:
     """Add a frame to a model that has two."""
-    model = nacre.Model(CAMERA, num_threads=1)
+    model = nacre.Model(CAMERA, num_threads=1, relocalise=False)
     model.add_frame(DEPTH)
     model.add_frame(DEPTH)
     return model.add_frame(**arguments)

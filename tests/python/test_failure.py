@@ -193,6 +193,26 @@ def test_one_garbage_frame_among_many() -> None:
     assert told["outliers_with"] < told["outliers_without"] + 0.001
 
 
+@pytest.mark.parametrize("fold_in", ["fuse", "wlop", "wlop+"])
+@pytest.mark.parametrize("value", [1e-30, 3e38])
+def test_absurd_depths_leave_no_points_without_a_normal(fold_in: str, value: float) -> None:
+    depth = view(0).copy()
+    depth[50:60, 70:80] = value
+    model = nacre.Model(CAMERA, fold_in=fold_in)
+    assert model.add_frame(depth).status == "TRACKED"
+    assert np.allclose(np.linalg.norm(model.normals, axis=1), 1, atol=1e-3)
+    assert np.isfinite(model.points).all()
+
+
+@pytest.mark.parametrize("sigma", [1e-30, 1e-12, 1e9, 1e300])
+def test_an_absurd_reference_leaves_unit_normals(sigma: float) -> None:
+    model = nacre.Model(CAMERA, fusion={"reference_sigma": sigma})
+    model.add_frame(view(0))
+    model.add_frame(view(1))
+    assert len(model) > 100
+    assert np.allclose(np.linalg.norm(model.normals, axis=1), 1, atol=1e-3)
+
+
 @pytest.mark.slow
 def test_the_measured_experiments() -> None:
     import failures
