@@ -199,9 +199,9 @@ def preprocess_depth(
 
     Raises
     ------
-    ValueError
-        Depth, camera or mask differ in size; the median depth lies outside 0.05-50 m (a wrong
-        ``depth_scale``); an option is out of its range.
+    TypeError, ValueError
+        An argument of the wrong type, shape or range; depth, camera or mask differ in size; the median
+        depth lies outside 0.05-50 m (a wrong ``depth_scale``); an option is out of its range.
     """
     image = as_depth("depth", depth, depth_scale)
     camera, wants_report = as_camera("camera", camera), as_flag("return_report", return_report)
@@ -263,8 +263,8 @@ def label_pixels(
 
     Raises
     ------
-    ValueError
-        As :func:`preprocess_depth`.
+    TypeError, ValueError
+        An argument of the wrong type, shape or range, as for :func:`preprocess_depth`.
     """
     image = as_depth("depth", depth, depth_scale)
     camera = as_camera("camera", camera)
@@ -305,8 +305,8 @@ def back_project(
 
     Raises
     ------
-    ValueError
-        Depth and camera differ in size.
+    TypeError, ValueError
+        An argument of the wrong type, shape or range; depth and camera differ in size.
     """
     points: npt.NDArray[np.float32] = _core.back_project(
         as_depth("depth", depth, depth_scale),
@@ -352,8 +352,8 @@ def depth_normals(
 
     Raises
     ------
-    ValueError
-        Depth and camera differ in size.
+    TypeError, ValueError
+        An argument of the wrong type, shape or range; depth and camera differ in size.
     """
     image = as_depth("depth", depth, depth_scale)
     model = as_noise("noise", noise, as_camera("camera", camera))
