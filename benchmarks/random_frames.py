@@ -2,10 +2,10 @@
 """
 Send random frames through models with random cameras and parameters, and check what comes of each.
 
-Depth is all 0, the largest value, NaN, inf, one pixel, blocks, noise, any bits, planes, views of an object, whole
-or spoilt; sizes from 1x1 up, both camera models, distortion, colours, masks, attributes, guesses, and every way to
-fold in. Each frame must get a status, or a ValueError that is documented, after which nothing has changed; the model
-stays finite, with unit normals, and within its bound.
+Depth is all 0, the largest value, NaN, inf, one pixel, blocks, noise, any bits, planes, views of an object,
+whole or spoilt; sizes from 1x1 up, both camera models, distortion, colours, masks, attributes, guesses, and
+every way to fold in. Each frame must get a status, or a ValueError that is documented, after which nothing
+has changed; the model stays finite, with unit normals, and within its bound.
 """
 
 from __future__ import annotations
@@ -32,14 +32,14 @@ REFUSALS = ("depth must be in metres with a median",)
 SLOWEST = 120.0  # seconds a model may take before the run is ended with a traceback
 
 
-class Broken(AssertionError):
+class BrokenPromiseError(AssertionError):
     """A frame after which something is not as promised."""
 
 
 def expect(condition: Any, what: str) -> None:
     """Raise where a promise does not hold."""
     if not condition:
-        raise Broken(what)
+        raise BrokenPromiseError(what)
 
 
 @functools.cache
@@ -53,7 +53,7 @@ def random_size(rng: np.random.Generator, largest: int) -> tuple[int, int]:
     if rng.random() < 0.08:
         sizes = [(1, 1), (1, 50), (50, 1), (2, 2), (3, 3), (5, 4), (7, 200), (16, 16), (17, 15)]
         return sizes[rng.integers(len(sizes))]
-    width = int(math.exp(rng.uniform(math.log(16), math.log(largest))))
+    width = int(math.exp(rng.uniform(math.log(12), math.log(largest))))
     return width, max(1, min(largest, int(width * math.exp(rng.normal(-0.3, 0.3)))))
 
 
@@ -65,7 +65,11 @@ def random_camera(rng: np.random.Generator, width: int, height: int) -> nacre.Ca
     cx, cy = (width - 1) / 2 + rng.normal(0, 2), (height - 1) / 2 + rng.normal(0, 2)
     distortion = rng.normal(0, [0.2, 0.2, 0.01, 0.01, 0.1]) if rng.random() < 0.3 else np.zeros(5)
     if rng.random() < 0.05:
-        focal, cx, distortion = focal * 10 ** rng.uniform(-3, 3), cx * 10 ** rng.uniform(0, 4), distortion * 30
+        focal, cx, distortion = (
+            focal * 10 ** rng.uniform(-3, 3),
+            cx * 10 ** rng.uniform(0, 4),
+            distortion * 30,
+        )
     depth = "radial" if rng.random() < 0.2 else "z"
     sign = -1 if rng.random() < 0.03 else 1
     return nacre.Camera(width, height, focal, sign * focal, cx, cy, distortion=list(distortion), depth=depth)
@@ -112,7 +116,9 @@ PARAMETERS: dict[str, Any] = {
     "depth.max_slant": _between(0.01, 1.57),
     "depth.max_missing": _one_of(0.0, 0.3, 0.6, 1.0),
     "depth.min_component": _one_of(0, 1, 20, 1000, 2**31 - 1),
-    "depth.noise": _one_of(None, "kinect", "tof", nacre.NoiseModel(0.001, shared=0.5), nacre.NoiseModel(), nacre.NoiseModel(10.0)),
+    "depth.noise": _one_of(
+        None, "kinect", "tof", nacre.NoiseModel(0.001, shared=0.5), nacre.NoiseModel(), nacre.NoiseModel(10.0)
+    ),
     "region.object": _one_of(True, False),
     "region.min_x": _one_of(-math.inf, -0.05, -1e30),
     "region.max_z": _one_of(math.inf, 0.5, 2.0),
@@ -153,10 +159,12 @@ PARAMETERS: dict[str, Any] = {
 def random_changes(rng: np.random.Generator) -> dict[str, Any]:
     """Return parameters to change."""
     if rng.random() < 0.5:
-        return {"num_threads": 1, "fold_in": PARAMETERS["fold_in"](rng)} if rng.random() < 0.4 else {"num_threads": 1}
-    return {"num_threads": 1} | {
-        name: draw(rng) for name, draw in PARAMETERS.items() if rng.random() < 0.2
-    }
+        return (
+            {"num_threads": 1, "fold_in": PARAMETERS["fold_in"](rng)}
+            if rng.random() < 0.4
+            else {"num_threads": 1}
+        )
+    return {"num_threads": 1} | {name: draw(rng) for name, draw in PARAMETERS.items() if rng.random() < 0.2}
 
 
 class Scene:
@@ -172,15 +180,30 @@ class Scene:
     def pose(self) -> Array:
         """Return the next pose around the object."""
         self.angle += self.step
-        return nacre.turntable_poses(thing(), 2, self.angle, distance=self.distance)[1]
+        pose: Array = nacre.turntable_poses(thing(), 2, self.angle, distance=self.distance)[1]
+        return pose
 
     def next(self) -> tuple[str, Array]:
         """Return the kind of frame and its depth [m]."""
         if self.rng.random() > 0.5 * self.wild:
-            kind = self.rng.choice(["object", "object", "noisy", "spoilt", "waves", "waves", "waves", "plane"])
+            kind = self.rng.choice(
+                ["object", "object", "noisy", "spoilt", "waves", "waves", "waves", "plane"]
+            )
         else:
             kind = self.rng.choice(
-                ["zeros", "largest", "nan", "inf", "negative", "pixel", "blocks", "noise", "wide", "bits", "spikes"]
+                [
+                    "zeros",
+                    "largest",
+                    "nan",
+                    "inf",
+                    "negative",
+                    "pixel",
+                    "blocks",
+                    "noise",
+                    "wide",
+                    "bits",
+                    "spikes",
+                ]
             )
         return str(kind), getattr(self, "_" + str(kind))()
 
@@ -204,13 +227,15 @@ class Scene:
     def _plane(self) -> Array:
         v, u = np.indices(self.shape)
         a, b = self.rng.normal(0, 0.2, 2)
-        return np.float32(1.0) + a * u / self.shape[1] + b * v / self.shape[0]
+        plane: Array = 1.0 + a * u / self.shape[1] + b * v / self.shape[0]
+        return plane
 
     def _waves(self) -> Array:
         v, u = np.indices(self.shape) / max(self.shape)
         self.angle += self.step
         x = u + self.angle / 10
-        return 0.5 + 0.02 * np.sin(9 * x) * np.cos(7 * v) + 0.01 * np.sin(15 * v + 4 * x) + 0.1 * v
+        waves: Array = 0.5 + 0.02 * np.sin(9 * x) * np.cos(7 * v) + 0.01 * np.sin(15 * v + 4 * x) + 0.1 * v
+        return waves
 
     def _zeros(self) -> Array:
         return np.zeros(self.shape, np.float32)
@@ -293,7 +318,13 @@ def fingerprint(model: nacre.Model) -> str:
     """Return the SHA-256 of everything that a model's points are."""
     digest = hashlib.sha256()
     colors = model.colors
-    for values in (model.points, model.normals, model.confidence, model.last_seen, *model.attributes.values()):
+    for values in (
+        model.points,
+        model.normals,
+        model.confidence,
+        model.last_seen,
+        *model.attributes.values(),
+    ):
         digest.update(values.tobytes())
     digest.update(b"" if colors is None else colors.tobytes())
     return digest.hexdigest()
@@ -305,7 +336,13 @@ def check(model: nacre.Model, report: nacre.FrameReport, before: str) -> None:
     expect(report.index == len(model.frames) - 1, "index")
     expect(bool(report.reason) == (report.status in ("LOST", "WEAK")), f"reason {report.reason!r}")
     counts = report.depth
-    removed = (counts.num_invalid, counts.num_out_of_range, counts.num_masked, counts.num_edge, counts.num_slanted)
+    removed = (
+        counts.num_invalid,
+        counts.num_out_of_range,
+        counts.num_masked,
+        counts.num_edge,
+        counts.num_slanted,
+    )
     total = sum(removed) + counts.num_isolated + counts.num_kept
     expect(min(removed) >= 0 and counts.num_isolated >= 0 and total == counts.num_pixels, f"counts {counts}")
     pose = report.world_from_camera
@@ -344,13 +381,16 @@ def run_model(seed: int, trial: int, largest: int, most_frames: int, told: colle
             report = model.add_frame(image, **more)
         except ValueError as error:
             expect(str(error).startswith(REFUSALS), f"{kind}: {error}")
-            expect(fingerprint(model) == before and len(model.frames) == num_frames, "a refusal changed the model")
+            expect(
+                fingerprint(model) == before and len(model.frames) == num_frames,
+                "a refusal changed the model",
+            )
             told["refused"] += 1
         else:
             try:
                 check(model, report, before)
-            except Broken as broken:
-                raise Broken(f"{broken} ({kind}, {report}, {camera})") from None
+            except BrokenPromiseError as broken:
+                raise BrokenPromiseError(f"{broken} ({kind}, {report}, {camera})") from None
             told[report.status] += 1
         slowest = max(slowest, time.process_time() - start)
         told["frames"] += 1
@@ -359,7 +399,9 @@ def run_model(seed: int, trial: int, largest: int, most_frames: int, told: colle
 
 def main() -> int:
     """Send frames until there were as many as wanted."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     add = parser.add_argument
     add("--frames", type=int, default=300, help="how many to send")
     add("--seed", type=int, default=0, help="another seed, other frames")
@@ -374,7 +416,9 @@ def main() -> int:
     while told["frames"] < options.frames:
         faulthandler.dump_traceback_later(SLOWEST, exit=True)
         try:
-            slowest = max(slowest, (run_model(options.seed, trial, options.largest, options.most, told), trial))
+            slowest = max(
+                slowest, (run_model(options.seed, trial, options.largest, options.most, told), trial)
+            )
         except Exception as error:
             print(f"model {trial}: {type(error).__name__}: {error}", flush=True)
             told["broken"] += 1

@@ -20,6 +20,8 @@ PointModel to_world(const Frame& frame, const Pose& world_from_camera, std::int3
   const Eigen::Isometry3f transform(world_from_camera.cast<float>());
   PointModel result;
   for (const std::int32_t row : frame.valid) {
+    // Single precision cannot tell the normal of what is extremely near or far.
+    if (!(std::abs(frame.normals.row(row).squaredNorm() - 1.0F) < 0.01F)) continue;
     result.points.emplace_back(transform * Eigen::Vector3f(frame.points.row(row).transpose()));
     result.normals.emplace_back(transform.linear() * frame.normals.row(row).transpose());
   }

@@ -82,9 +82,8 @@ class SurfaceObserver {
 
   // The same of a frontal measurement of some noise; sigma 0 stands for the reference.
   float frontal_weight(float sigma) const {
-    const float ratio = sigma > 0.0F ? std::clamp(reference_sigma_ / sigma, simd::least_sigma_ratio,
-                                                  simd::largest_sigma_ratio)
-                                     : 1.0F;
+    const float ratio =
+        sigma > 0.0F ? std::clamp(reference_sigma_ / sigma, simd::least_sigma_ratio, simd::largest_sigma_ratio) : 1.0F;
     return ratio * ratio;
   }
 

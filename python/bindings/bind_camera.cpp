@@ -37,8 +37,7 @@ struct py::detail::handle_type_name<Real> {
 };
 template <>
 struct py::detail::handle_type_name<Coefficients> {
-  static constexpr auto name =
-      const_name("collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]");
+  static constexpr auto name = const_name("collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]");
 };
 template <>
 struct py::detail::handle_type_name<PointArray> {
@@ -189,7 +188,7 @@ ValueError
                                         as_number("pixel_size", pixel_size));
           },
           py::arg("width"), py::arg("height"), py::arg("pixel_size"),
-                  "A camera with parallel rays: x = (u - (width - 1) / 2) pixel_size [m].")
+          "A camera with parallel rays: x = (u - (width - 1) / 2) pixel_size [m].")
       .def_property_readonly("model", &model_name, "'pinhole' or 'orthographic'")
       .def_property_readonly("width", &Camera::width, "[pixels]")
       .def_property_readonly("height", &Camera::height, "[pixels]")

@@ -127,7 +127,7 @@ def as_pose(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
 
 
 def as_poses(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Return ``value`` as (N, 4, 4) rigid float64 matrices; one that is not finite is missing, and all NaN."""
+    """Return ``value`` as (N, 4, 4) rigid float64 matrices; one that is not finite is missing: all NaN."""
     array = as_rows(as_real(name, value), np.float64)
     if array.ndim != 3 or array.shape[1:] != (4, 4):
         raise ValueError(f"{name} must have shape (N, 4, 4), got {array.shape}")
@@ -256,7 +256,8 @@ def as_count(name: str, value: Any, *, minimum: int = 0) -> int:
     except TypeError:
         raise TypeError(f"{name} must be an integer, got {value!r}") from None
     if not minimum <= count < 2**31:
-        raise ValueError(f"{name} must be an integer of at least {minimum} and below 2^31, got {count}")
+        expected = f"of at least {minimum}" if count < minimum else "below 2^31"
+        raise ValueError(f"{name} must be an integer {expected}, got {count}")
     return count
 
 

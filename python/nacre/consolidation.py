@@ -204,7 +204,9 @@ def project_samples(
     options = _options(radius, iterations, mu, method, theta, num_threads)
     hints = _core.ProjectionHints()
     if point_weights is not None:
-        hints.point_weights = as_rows(_as_column("point_weights", point_weights, len(point_array)), np.float32)
+        hints.point_weights = as_rows(
+            _as_column("point_weights", point_weights, len(point_array)), np.float32
+        )
     if sample_normals is not None:
         normals = as_matching_points("sample_normals", sample_normals, "samples", len(sample_array))
         hints.sample_normals = as_rows(normals, np.float32)

@@ -199,9 +199,9 @@ def preprocess_depth(
 
     Raises
     ------
-    ValueError
-        Depth, camera or mask differ in size; the median depth lies outside 0.05-50 m (a wrong
-        ``depth_scale``); an option is out of its range.
+    TypeError, ValueError
+        An argument of the wrong type, shape or range; depth, camera or mask differ in size; the median
+        depth lies outside 0.05-50 m (a wrong ``depth_scale``); an option is out of its range.
     """
     image = as_depth("depth", depth, depth_scale)
     camera, wants_report = as_camera("camera", camera), as_flag("return_report", return_report)
@@ -263,8 +263,8 @@ def label_pixels(
 
     Raises
     ------
-    ValueError
-        As :func:`preprocess_depth`.
+    TypeError, ValueError
+        An argument of the wrong type, shape or range, as for :func:`preprocess_depth`.
     """
     image = as_depth("depth", depth, depth_scale)
     camera = as_camera("camera", camera)
@@ -272,7 +272,11 @@ def label_pixels(
         raise TypeError(f"parameters must be nacre.DepthParameters, got {type(parameters).__name__}")
     options = to_core((parameters or DepthParameters()).for_camera(camera), _core.DepthOptions())
     labels: npt.NDArray[np.uint8] = _core.label_pixels(
-        image, camera, options, as_mask("mask", mask, (image.shape[0], image.shape[1])), as_count("num_threads", num_threads)
+        image,
+        camera,
+        options,
+        as_mask("mask", mask, (image.shape[0], image.shape[1])),
+        as_count("num_threads", num_threads),
     )
     return labels
 
@@ -301,11 +305,13 @@ def back_project(
 
     Raises
     ------
-    ValueError
-        Depth and camera differ in size.
+    TypeError, ValueError
+        An argument of the wrong type, shape or range; depth and camera differ in size.
     """
     points: npt.NDArray[np.float32] = _core.back_project(
-        as_depth("depth", depth, depth_scale), as_camera("camera", camera), as_count("num_threads", num_threads)
+        as_depth("depth", depth, depth_scale),
+        as_camera("camera", camera),
+        as_count("num_threads", num_threads),
     )
     return points
 
@@ -346,8 +352,8 @@ def depth_normals(
 
     Raises
     ------
-    ValueError
-        Depth and camera differ in size.
+    TypeError, ValueError
+        An argument of the wrong type, shape or range; depth and camera differ in size.
     """
     image = as_depth("depth", depth, depth_scale)
     model = as_noise("noise", noise, as_camera("camera", camera))

@@ -117,8 +117,9 @@ def calibrate_depth(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera
 
     Raises
     ------
-    ValueError
-        If the camera is not a pinhole camera, or an image or a pose does not fit.
+    TypeError, ValueError
+        An argument of the wrong type, shape or range; not a pinhole camera, or an image or a pose does
+        not fit.
     """
     _check_camera(camera)
     chosen = _choose(views, camera)

@@ -138,9 +138,8 @@ def align_global(
     source, target : (N, 3), (M, 3) real
         Points [m]. Rows that are not finite are ignored.
     source_normals, target_normals : (N, 3), (M, 3) real, optional
-        Normals, on the side that the surface is seen from; a point whose normal is 0 or not finite is left out.
-        Estimated where they are not given; without a
-        viewpoint their sides are then ignored.
+        Normals, on the side that the surface is seen from; a point whose normal is 0 or not finite is left
+        out. Estimated where they are not given; without a viewpoint their sides are then ignored.
     source_viewpoint, target_viewpoint : (3,), optional
         From where each cloud was seen [m], in its own frame. Nothing is between it and the points.
     num_rotations, num_candidates : int

@@ -165,12 +165,14 @@ def estimate_noise(
 
     Raises
     ------
-    ValueError
-        Depth and camera differ in size.
+    TypeError, ValueError
+        An argument of the wrong type, shape or range; depth and camera differ in size.
     """
     return NoiseModel._from_core(
         _core.estimate_noise(
-            as_depth("depth", depth, depth_scale), as_camera("camera", camera), as_count("num_threads", num_threads)
+            as_depth("depth", depth, depth_scale),
+            as_camera("camera", camera),
+            as_count("num_threads", num_threads),
         )
     )
 
@@ -207,8 +209,8 @@ def calibrate_noise(
 
     Raises
     ------
-    ValueError
-        A depth image and the camera differ in size.
+    TypeError, ValueError
+        An argument of the wrong type, shape or range; a depth image and the camera differ in size.
     """
     calibration = _core.NoiseCalibration(as_camera("camera", camera))
     threads = as_count("num_threads", num_threads)

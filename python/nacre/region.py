@@ -158,8 +158,9 @@ def select_region(
 
     Raises
     ------
-    ValueError
-        Depth, camera or ``previous`` differ in size; an option is out of its range or does not exist.
+    TypeError, ValueError
+        An argument of the wrong type, shape or range; depth, camera or ``previous`` differ in size; an
+        option is out of its range or does not exist.
     """
     image = as_depth("depth", depth, depth_scale)
     wants_report = as_flag("return_report", return_report)

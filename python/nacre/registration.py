@@ -174,8 +174,8 @@ def align(
         Points [m]. Rows that are not finite are ignored. float32 and float64 arrays that are C-contiguous are
         not copied, but float64 is converted to float32 about its centre.
     source_normals, target_normals : (N, 3), (M, 3) real, optional
-        Normals; a point whose normal is 0 or not finite is left out. Estimated from the 16 nearest neighbours where the method needs them and they are not
-        given; then their sides are ignored.
+        Normals; a point whose normal is 0 or not finite is left out. Estimated from the 16 nearest neighbours
+        where the method needs them and they are not given; then their sides are ignored.
     source_sigma, target_sigma : (N,), (M,) real, optional
         Standard deviation of each point along its normal [m]; pairs count by 1 / (sum of squares).
     source_colors, target_colors : (N,) or (N, 3), (M,) or (M, 3) real, optional

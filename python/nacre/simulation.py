@@ -200,7 +200,9 @@ def _bounds(mesh: Mesh | npt.ArrayLike) -> npt.NDArray[np.float64]:
         return mesh.bounds
     vertices = arrays.as_points("mesh", mesh).astype(np.float64)
     if len(vertices) == 0 or not np.isfinite(vertices).all():
-        raise ValueError(f"mesh must be a Mesh or at least one vertex, all finite, got {len(vertices)} vertices")
+        raise ValueError(
+            f"mesh must be a Mesh or at least one vertex, all finite, got {len(vertices)} vertices"
+        )
     return np.stack([vertices.min(axis=0), vertices.max(axis=0)])
 
 

@@ -75,7 +75,7 @@ def tree() -> nacre.KdTree:
 
 def add_frame(**arguments: Any) -> nacre.FrameReport:
     """Add a frame to a model that has two."""
-    model = nacre.Model(CAMERA, num_threads=1)
+    model = nacre.Model(CAMERA, num_threads=1, relocalise=False)
     model.add_frame(DEPTH)
     model.add_frame(DEPTH)
     return model.add_frame(**arguments)
@@ -169,10 +169,18 @@ _GLOBAL = dataclasses.asdict(nacre.GlobalRegistrationParameters()) | {
     "num_threads": 1, "num_rotations": 8, "num_candidates": 2, "max_samples": 50,
 }  # fmt: skip
 _SIMULATION = {
-    "camera": CAMERA, "world_from_camera": POSES[0], "noise": 0.001, "edge_mixing": 0.5, "background_depth": 5.0,
+    "camera": CAMERA, "world_from_camera": POSES[0], "noise": 0.001, "edge_mixing": 0.5,
+    "background_depth": 5.0,
     "quantization": 0.001, "dropout": 0.1, "seed": 3, "num_threads": 1,
 }  # fmt: skip
-_CONSOLIDATION = {"radius": 0.05, "iterations": 3, "mu": 0.4, "method": "wlop+", "theta": "huang", "num_threads": 1}
+_CONSOLIDATION = {
+    "radius": 0.05,
+    "iterations": 3,
+    "mu": 0.4,
+    "method": "wlop+",
+    "theta": "huang",
+    "num_threads": 1,
+}
 
 RECIPES: dict[str, Recipe] = {
     "nacre._core.Camera": Recipe(
@@ -227,12 +235,14 @@ RECIPES: dict[str, Recipe] = {
     ),
     "nacre.evaluation.surface.completeness": Recipe(
         _EVALUATION.completeness,
-        {"points": bumpy(), "reference": mesh(), "tau": np.array([0.01, 0.02]), "seen": np.ones(50, bool), "num_samples": 50, "seed": 1},
+        {"points": bumpy(), "reference": mesh(), "tau": np.array([0.01, 0.02]), "seen": np.ones(50, bool),
+         "num_samples": 50, "seed": 1},
         grows=("num_samples",),
     ),
     "nacre.evaluation.surface.f_score": Recipe(
         _EVALUATION.f_score,
-        {"points": bumpy(), "reference": bumpy(50), "tau": np.array([0.01, 0.02]), "reference_normals": unit(50),
+        {"points": bumpy(), "reference": bumpy(50), "tau": np.array([0.01, 0.02]),
+         "reference_normals": unit(50),
          "seen": np.ones(50, bool)},
     ),
     "nacre.evaluation.surface.sample_surface": Recipe(
@@ -241,11 +251,13 @@ RECIPES: dict[str, Recipe] = {
         grows=("num_samples",),
     ),
     "nacre.evaluation.surface.surface_accuracy": Recipe(
-        _EVALUATION.surface_accuracy, {"points": bumpy(), "reference": bumpy(50), "reference_normals": unit(50)}
+        _EVALUATION.surface_accuracy, {"points": bumpy(), "reference": bumpy(50),
+        "reference_normals": unit(50)}
     ),
     "nacre.evaluation.trajectory.absolute_trajectory_error": Recipe(
         _EVALUATION.absolute_trajectory_error,
-        {"estimated": POSES, "truth": POSES, "align": True, "valid": np.ones(3, bool), "timestamps": np.arange(3.0),
+        {"estimated": POSES, "truth": POSES, "align": True, "valid": np.ones(3, bool),
+         "timestamps": np.arange(3.0),
          "truth_timestamps": np.arange(3.0), "max_time_difference": 0.02, "num_frames": 3},
     ),
     "nacre.evaluation.trajectory.relative_pose_error": Recipe(
@@ -268,17 +280,20 @@ RECIPES: dict[str, Recipe] = {
         grows=("num_rotations", "num_candidates"),
     ),
     "nacre.io.cameras.write_camera": Recipe(
-        functools.partial(nacre.write_camera, FOLDER / "camera.json"), {"camera": CAMERA, "depth_scale": 1000.0}
+        functools.partial(nacre.write_camera, FOLDER / "camera.json"), {"camera": CAMERA,
+        "depth_scale": 1000.0}
     ),
     "nacre.io.meshes.write_mesh": Recipe(
-        functools.partial(nacre.write_mesh, FOLDER / "mesh.ply"), {"vertices": VERTICES, "triangles": TRIANGLES}
+        functools.partial(nacre.write_mesh, FOLDER / "mesh.ply"), {"vertices": VERTICES,
+        "triangles": TRIANGLES}
     ),
     "nacre.io.points.write_points": Recipe(
         functools.partial(nacre.write_points, FOLDER / "points.ply"),
         {"points": bumpy(), "normals": unit(), "colors": np.full((60, 3), 7, np.uint8), "binary": True},
     ),
     "nacre.io.trajectories.write_trajectory": Recipe(
-        functools.partial(nacre.write_trajectory, FOLDER / "poses.txt"), {"timestamps": np.arange(3.0), "poses": POSES}
+        functools.partial(nacre.write_trajectory, FOLDER / "poses.txt"), {"timestamps": np.arange(3.0),
+        "poses": POSES}
     ),
     "nacre.datasets.plain.write_recording": Recipe(
         lambda depth_images, colors, poses, timestamps, **more: nacre.write_recording(
@@ -290,7 +305,8 @@ RECIPES: dict[str, Recipe] = {
         lists=("colors",),
     ),
     "nacre.io.trajectories.associate": Recipe(
-        nacre.associate, {"timestamps_a": np.arange(5.0), "timestamps_b": np.arange(4.0), "max_difference": 0.1}
+        nacre.associate, {"timestamps_a": np.arange(5.0), "timestamps_b": np.arange(4.0),
+        "max_difference": 0.1}
     ),
     "nacre.io.trajectories.Trajectory.at": Recipe(
         nacre.Trajectory(np.arange(3.0), POSES).at, {"timestamps": np.arange(4.0), "max_difference": 0.1}
@@ -350,7 +366,8 @@ RECIPES: dict[str, Recipe] = {
     "nacre.registration.align": Recipe(
         nacre.align,
         {"source": bumpy(), "target": bumpy(50), "source_normals": unit(60), "target_normals": unit(50),
-         "source_sigma": np.full(60, 0.01), "target_sigma": np.full(50, 0.01), "source_colors": RNG.uniform(0, 255, 60),
+         "source_sigma": np.full(60, 0.01), "target_sigma": np.full(50, 0.01),
+         "source_colors": RNG.uniform(0, 255, 60),
          "target_colors": RNG.uniform(0, 255, 50), "initial": POSE, **_ALIGN},
         _aligned,
     ),

@@ -63,7 +63,7 @@ class TestPoseError:
 
     def test_illegal_input_is_named(self):
         truth = self.poses()
-        with pytest.raises(ValueError, match="center must be three finite numbers"):
+        with pytest.raises(ValueError, match="center must be 3 finite numbers"):
             pose_error(truth, truth, center=(0, 0))
         with pytest.raises(ValueError, match="truth must have one pose per pose of estimated"):
             pose_error(truth, truth[:2])

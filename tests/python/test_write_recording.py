@@ -72,7 +72,8 @@ def test_a_recording_is_not_overwritten(tmp_path):
 
 def test_a_depth_too_far_names_the_scale(tmp_path):
     with pytest.raises(
-        ValueError, match=r"depth_images\[0\] reaches 66 m.*depth_scale=1000 \(at most 65\.534 m\)"
+        ValueError,
+        match=r"depth_images\[0\] must fit 16 bits at depth_scale=1000 \(at most 65\.534 m\), got 66 m",
     ):
         write_recording(tmp_path / "p", SMALL, [np.full((6, 8), 66.0)], depth_scale=1000)
     assert write_recording(tmp_path / "p", SMALL, [np.full((6, 8), 66.0)], depth_scale=500) == 1

@@ -154,8 +154,8 @@ def write_recording(
             color = arrays.as_real(f"colors[{index}]", view["colors"])
             if color.shape != (camera.height, camera.width, 3) or color.dtype != np.uint8:
                 raise ValueError(
-                    f"colors[{index}] must be uint8 of shape ({camera.height}, {camera.width}, 3), "
-                    f"got {color.dtype} {color.shape}"
+                    f"colors[{index}] must have shape ({camera.height}, {camera.width}, 3) and dtype uint8, "
+                    f"got {color.shape} and {color.dtype}"
                 )
             write_color_png(folder / "color" / f"{index:06d}.png", color)
         times.append(arrays.as_number(f"timestamps[{index}]", view.get("timestamps", index)))
@@ -202,8 +202,9 @@ def _stored(depth: Any, camera: Camera, depth_scale: float, index: int) -> npt.N
         units = np.rint(np.where(valid, metres, 0.0) * depth_scale)
     if units.max() > _LARGEST_STORED:
         raise ValueError(
-            f"{name} must fit 16 bits at depth_scale={depth_scale:g} (at most {_LARGEST_STORED / depth_scale:g} "
-            f"m), got {metres[valid].max():g} m; give a smaller scale"
+            f"{name} must fit 16 bits at depth_scale={depth_scale:g} "
+            f"(at most {_LARGEST_STORED / depth_scale:g} m), got {metres[valid].max():g} m; "
+            f"give a smaller scale"
         )
     if (units[valid] == 0).any():
         raise ValueError(

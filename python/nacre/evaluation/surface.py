@@ -92,7 +92,8 @@ def sample_surface(
         raise ValueError(f"triangles must be whole numbers of shape (T, 3), got {faces.dtype} {faces.shape}")
     if len(faces) and not (faces.min() >= 0 and faces.max() < len(corners)):
         raise ValueError(
-            f"triangles must name rows of vertices (0 to {len(corners) - 1}), got {faces.min()} to {faces.max()}"
+            f"triangles must name rows of vertices (0 to {len(corners) - 1}), "
+            f"got {faces.min()} to {faces.max()}"
         )
     num_samples, seed = as_count("num_samples", num_samples, minimum=1), as_count("seed", seed)
     a, b, c = (corners[faces[:, i]] for i in range(3))
@@ -291,8 +292,10 @@ def _as_reference(reference: Any, reference_normals: npt.ArrayLike | None) -> tu
         usable &= np.isfinite(given).all(axis=1)
         normals = given[usable].astype(np.float64)
     if not usable.any():
-        given = "" if reference_normals is None else " with a finite row of reference_normals"
-        raise ValueError(f"reference must have at least one finite point{given}, got {len(cloud)} that are not")
+        rows = "" if reference_normals is None else " with a finite row of reference_normals"
+        raise ValueError(
+            f"reference must have at least one finite point{rows}, got {len(cloud)} that are not"
+        )
     return cloud[usable], normals
 
 

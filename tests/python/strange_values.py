@@ -138,7 +138,8 @@ FLOATS: dict[str, Any] = {
     "int": 1, "int64": np.int64(1), "bool": True, "array of none": np.array(0.5),
 }  # fmt: skip
 INTEGERS: dict[str, Any] = {
-    "0": 0, "negative": -1, "1": 1, "2": 2, "most": 2**31 - 1, "int32": 2**31, "int64": 2**63, "beyond": 2**70,
+    "0": 0, "negative": -1, "1": 1, "2": 2, "most": 2**31 - 1, "int32": 2**31, "int64": 2**63,
+    "beyond": 2**70,
     "numpy": np.int64(3), "uint8": np.uint8(3), "bool": True,
 }  # fmt: skip
 NO_NUMBERS: dict[str, Any] = {
