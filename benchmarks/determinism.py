@@ -20,7 +20,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +41,7 @@ MODELS: dict[str, dict[str, Any]] = {
     "wlop+": {"fold_in": "wlop+", "max_points": 1000},
     "recording": {},
 }
-ALONE = {"MALLOC_PERTURB_": "0"}
-"""Environments of other processes, by name; "processors" is how many of them the process may use."""
+# Environments of other processes; "processors" is how many the process may use.
 ELSEWHERE: dict[str, dict[str, str]] = {
     "another process": {"PYTHONHASHSEED": "1"},
     "another hash seed, dirty memory": {"PYTHONHASHSEED": "271828", "MALLOC_PERTURB_": "170"},
@@ -55,13 +54,13 @@ ELSEWHERE: dict[str, dict[str, str]] = {
 FREE = {"wlop", "wlop+"}  # may differ between instruction sets
 
 
-@dataclass
+@dataclass(eq=False)
 class Result:
     """What a run left: its arrays, and the figures of its report that are no times."""
 
     arrays: dict[str, Array]
     figures: str
-    about: str = field(default="", compare=False)
+    about: str = ""
 
     @property
     def sha256(self) -> str:
@@ -181,9 +180,11 @@ def compare(name: str, options: argparse.Namespace) -> bool:
     print(f"  {'SHA-256':36} {first.sha256}")
     for threads in options.threads[1:]:
         tell(f"{threads} threads", reconstruct(name, sequence, threads))
-    repeats = [reconstruct(name, sequence, 0) for _ in range(options.repeats)]
-    others = [result for result in repeats if result != first and result.sha256 != first.sha256]
-    tell(f"{options.repeats} times, all threads", (others or repeats or [first])[0])
+    repeats = {first.sha256: first}
+    for _ in range(options.repeats):
+        repeated = reconstruct(name, sequence, 0)
+        repeats[repeated.sha256] = repeated
+    tell(f"{options.repeats} times, all threads", list(repeats.values())[-1])
     words = ["--frames", str(options.frames), *(["--recording", options.recording] if options.recording else [])]
     for way, environment in ELSEWHERE.items():
         free = "NACRE_SIMD" in environment and name in FREE
