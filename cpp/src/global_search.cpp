@@ -95,7 +95,8 @@ std::vector<SearchCandidate> GlobalSearch::run() const {
   candidates = best_different(std::move(candidates), static_cast<std::size_t>(options_.num_candidates));
   parallel_for(static_cast<std::int64_t>(candidates.size()), 1, options_.num_threads,
                [&](std::int64_t i) { refine(candidates[static_cast<std::size_t>(i)]); });
-  return best_different(std::move(candidates), candidates.size());
+  const std::size_t num_refined = candidates.size();
+  return best_different(std::move(candidates), num_refined);
 }
 
 SearchCandidate GlobalSearch::start_from(int number) const {

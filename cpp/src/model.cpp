@@ -10,13 +10,11 @@
 #include "consolidation_fold.hpp"
 #include "depth_cleaning.hpp"
 #include "fusion_step.hpp"
-#include "loop_closure.hpp"
 #include "model_correction.hpp"
+#include "model_impl.hpp"
 #include "nacre/cancel.hpp"
-#include "object_view.hpp"
 #include "point_spacing.hpp"
 #include "rigid_motion.hpp"
-#include "tracking.hpp"
 #include "view_adjustment.hpp"
 
 namespace nacre {
@@ -72,47 +70,14 @@ const char* to_string(FrameStatus status) {
   }
 }
 
-struct Model::Impl {
-  Camera camera;
-  ModelOptions options;  // what the first frame decides is filled in
-  Frame frame;           // the newest; its memory and the observer's are used again for the next
-  SurfaceObserver observer{camera, options.fusion};
-  MaskImage region;  // of the newest frame; empty where nothing is left out
-  NoiseCalibration calibration{camera};
-  PointModel cloud;
-  LoopClosure loops{camera, options};
-  std::vector<FrameReport> reports;
-  Values measured;                // by the newest, before it was cleaned
-  Sight before;                   // of the newest frame that was folded in
-  PlaceHypothesis hypothesis;     // while the camera is lost
-  std::vector<Pose> poses;        // of the registered frames, oldest first
-  std::vector<ObjectView> views;  // of an object that stands on a plane, from different directions
-  double spacing = 0.0;
-  std::int64_t num_lost = 0;  // frames in a row, up to the newest
-
-  bool was_lost() const { return num_lost > 0; }
-  bool jumped() const;
-
-  Impl(const Camera& camera_in, const ModelOptions& options_in) : camera(camera_in), options(options_in) {
-    options.check();
-    options.registration.num_threads = options.num_threads;
-    options.consolidation.num_threads = options.num_threads;
-    options.normals.num_threads = options.num_threads;
-    spacing = options.spacing;
-  }
-
-  FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
-  NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
-  void keep_region(FrameReport& report);
-  TrackingResult locate(const FrameExtras& extras, const RegionReport& region);
-  std::vector<Pose> guesses(const FrameExtras& extras) const;
-  WhereElse elsewhere(const RegionReport& region) const;
-  std::optional<ObjectView> view_of_object(const RegionReport& region) const;
-  void keep_view(const FrameReport& report);
-  void adjust(FrameReport& report);
-  void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
-  void fold_in(const FrameExtras& extras, FrameReport& report);
-};
+Model::Impl::Impl(const Camera& camera_in, const ModelOptions& options_in)
+    : camera(camera_in), given(options_in), options(options_in) {
+  options.check();
+  options.registration.num_threads = options.num_threads;
+  options.consolidation.num_threads = options.num_threads;
+  options.normals.num_threads = options.num_threads;
+  spacing = options.spacing;
+}
 
 // The loop: clean the image, make points of it, keep those of interest, register them to the model, correct the model
 // where a loop closes, fold the points in, renew the normals.
@@ -370,6 +335,7 @@ void Model::Impl::fold_in(const FrameExtras& extras, FrameReport& report) {
 
 Model::Model(const Camera& camera, const ModelOptions& options) : impl_(std::make_unique<Impl>(camera, options)) {}
 Model::~Model() = default;
+Model::Model(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Model::Model(Model&&) noexcept = default;
 Model& Model::operator=(Model&&) noexcept = default;
 
@@ -380,6 +346,7 @@ FrameReport Model::add_frame(const DepthRef& depth, const FrameExtras& extras) {
 
 const Camera& Model::camera() const { return impl_->camera; }
 const ModelOptions& Model::options() const { return impl_->options; }
+const ModelOptions& Model::given_options() const { return impl_->given; }
 const PointModel& Model::cloud() const { return impl_->cloud; }
 const std::vector<FrameReport>& Model::frames() const { return impl_->reports; }
 NoiseModel Model::noise() const { return impl_->noise(); }

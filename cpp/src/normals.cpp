@@ -1,5 +1,6 @@
 #include "nacre/normals.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <vector>
 
@@ -28,16 +29,19 @@ PointMatrix<T> estimate(const Eigen::Ref<const PointMatrix<T>>& points, const No
   require(viewpoint.allFinite(), "viewpoint", "finite", viewpoint.transpose());
 
   const BlockTree<T> tree(Rows<T>(points).data(), points.rows(), options.num_threads);
+  const auto k = static_cast<int>(std::min<std::int64_t>(options.k, std::max<std::int64_t>(3, tree.num_points())));
   PointMatrix<T> normals(points.rows(), 3);
   if (tree.num_points() < points.rows()) normals.setConstant(std::numeric_limits<T>::quiet_NaN());
+  // All points are as many neighbours as any larger number.
+  const int k = static_cast<int>(std::min<std::int64_t>(options.k, std::max<std::int64_t>(3, tree.num_points())));
   constexpr int points_per_task = 64 * block_points;
   parallel_blocks(
       tree.num_points(), points_per_task, options.num_threads, [&](auto, std::int64_t begin, std::int64_t end) {
-        std::vector<std::uint32_t> slots(static_cast<std::size_t>(block_points) * static_cast<std::size_t>(options.k));
+        std::vector<std::uint32_t> slots(static_cast<std::size_t>(block_points) * static_cast<std::size_t>(k));
         simd::Neighborhoods near;
         near.slots = slots.data();
-        near.stride = options.k;
-        const simd::NearestSlotsTask task = {options.k, squared_bound(options.max_radius), slots.data(), near.counts};
+        near.stride = k;
+        const simd::NearestSlotsTask task = {k, squared_bound(options.max_radius), slots.data(), near.counts};
         GroupQueries search(tree, task);
         for (std::int64_t first = begin; first < end; first += block_points) {
           const PointBlock<T>& block = tree.view().blocks[first / block_points];

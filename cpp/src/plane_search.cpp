@@ -51,7 +51,8 @@ class Search {
     std::vector<Candidate> candidates(num_angles);
     parallel_for(num_angles, 2, num_threads_, [&](std::int64_t i) {
       Pose turn = Pose::Identity();
-      turn.linear() = Eigen::AngleAxisd(static_cast<double>(i) * 2.0 * EIGEN_PI / num_angles, Eigen::Vector3d::UnitZ())
+      turn.linear() = Eigen::AngleAxisd(static_cast<double>(i) * 2.0 * static_cast<double>(EIGEN_PI) / num_angles,
+                                        Eigen::Vector3d::UnitZ())
                           .toRotationMatrix();
       const PlaneGates gates{first_gate * frame_.size, 3.0 * frame_.tolerance, 14, coarse_samples};
       candidates[static_cast<std::size_t>(i)] = align(plane_ * turn * foot_.inverse(), gates, coarse_samples);
@@ -62,7 +63,8 @@ class Search {
       const PlaneGates gates{4.0 * frame_.tolerance, 2.0 * frame_.tolerance, 30, frame_.points.rows()};
       candidate = climb(align(candidate.alignment.target_from_source, gates, frame_.points.rows()));
     });
-    return different(std::move(candidates), candidates.size());
+    const std::size_t num_refined = candidates.size();
+    return different(std::move(candidates), num_refined);
   }
 
   // The surfaces decide in the end, closer than the score asks for.

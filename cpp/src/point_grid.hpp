@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "nacre/types.hpp"
@@ -44,8 +45,21 @@ class PointGrid {
   }
 
  private:
+  // So far off that cells are finer than floats, each float has a cell of its own.
   Eigen::Vector3i cell_of(const Eigen::Vector3f& point) const {
-    return (point * inverse_size_).array().floor().cast<int>();
+    constexpr float most = 1073741824.0F;
+    Eigen::Vector3i cell;
+    for (int axis = 0; axis < 3; ++axis) {
+      const float place = std::floor(point[axis] * inverse_size_);
+      if (place >= -most && place <= most) {
+        cell[axis] = static_cast<int>(place);
+      } else {
+        std::int32_t bits;
+        std::memcpy(&bits, &point[axis], sizeof bits);
+        cell[axis] = bits & 0x3FFFFFFF;
+      }
+    }
+    return cell;
   }
   std::size_t bucket_of(const Eigen::Vector3i& cell) const {
     const std::uint64_t key = (static_cast<std::uint64_t>(static_cast<std::uint32_t>(cell.x())) * 73856093U) ^

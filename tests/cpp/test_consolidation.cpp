@@ -313,6 +313,21 @@ TEST_CASE("samples stay with their digits among strays") {
   CHECK((project_samples(samples, points, options) - moved).cwiseAbs().maxCoeff() < 1e-7F);
 }
 
+TEST_CASE("coordinates beyond what the radius can measure do no harm") {
+  for (const double size : {1e30, 3e38, 1e300}) {
+    PointsDouble points(40, 3);
+    for (int i = 0; i < 120; ++i) points.data()[i] = size * (random_uniform(7, static_cast<std::uint64_t>(i)) - 0.5);
+    for (const ConsolidationMethod method : all_methods) {
+      ConsolidateOptions options;
+      options.method = method;
+      options.radius = 1e-3;
+      options.num_points = 20;
+      CHECK(consolidate(points, options).points.rows() == 20);
+      if (size < 3e38) CHECK(consolidate(Points(points.cast<float>()), options).points.rows() == 20);
+    }
+  }
+}
+
 TEST_CASE("cgal: one neighbour alone does not repel, two do") {
   const Points points = noisy_plane(3000, 0.05, 0.0);
   ConsolidateOptions options;

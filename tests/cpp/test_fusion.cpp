@@ -343,6 +343,18 @@ TEST_CASE("thinning keeps the earlier points, at least the spacing apart") {
   CHECK(empty.size() == 0);
 }
 
+TEST_CASE("a spacing below the resolution of floats keeps all points, soon") {
+  PointModel model;
+  for (int i = 0; i < 30000; ++i) {
+    model.points.emplace_back(1.0F + 1e-5F * static_cast<float>(i), 0.0F, -1.0F);
+    model.normals.emplace_back(0.0F, 0.0F, 1.0F);
+  }
+  for (const double tiny : {1e-12, 1e-300}) {
+    thin(model, tiny);
+    CHECK(model.points.size() == 30000);
+  }
+}
+
 TEST_CASE("keep drops the points whose flag is 0, in order") {
   PointModel model;
   for (int i = 0; i < 5; ++i) {

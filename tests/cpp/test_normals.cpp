@@ -149,6 +149,15 @@ TEST_CASE("the same bits for any number of threads") {
   CHECK((a.array() == b.array() || (a.array() != a.array() && b.array() != b.array())).all());
 }
 
+TEST_CASE("more neighbours than there are points are all points") {
+  Points points(4, 3);
+  points << 0, 0, 1, 1, 0, 1, 0, 1, 1, 1, 1, 1;
+  NormalOptions options;
+  options.k = 2147483647;
+  CHECK(estimate_normals(points, options) ==
+        Points(Points::Constant(4, 3, 0.0F) - Points(Eigen::RowVector3f::UnitZ().replicate(4, 1))));
+}
+
 TEST_CASE("illegal arguments") {
   const Points points = Points::Random(10, 3);
   NormalOptions options;

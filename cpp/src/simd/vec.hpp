@@ -84,6 +84,7 @@ NACRE_INLINE I32 shift_right(I32 a) {
 
 NACRE_INLINE I32 as_int(F32 a) { return {_mm512_castps_si512(a.v)}; }
 NACRE_INLINE F32 as_float(I32 a) { return {_mm512_castsi512_ps(a.v)}; }
+// INT32_MIN where that does not fit, and of NaN.
 NACRE_INLINE I32 truncate(F32 a) { return {_mm512_cvttps_epi32(a.v)}; }
 NACRE_INLINE F32 to_float(I32 a) { return {_mm512_cvtepi32_ps(a.v)}; }
 
@@ -377,7 +378,10 @@ NACRE_INLINE F32 as_float(I32 a) {
   return r;
 }
 NACRE_INLINE I32 truncate(F32 a) {
-  return each_lane<I32>([=](int i) { return static_cast<int32_t>(a.v[i]); });
+  return each_lane<I32>([=](int i) {
+    const bool fits = a.v[i] >= -2147483648.0F && a.v[i] < 2147483648.0F;
+    return fits ? static_cast<int32_t>(a.v[i]) : INT32_MIN;
+  });
 }
 NACRE_INLINE F32 to_float(I32 a) {
   return each_lane<F32>([=](int i) { return static_cast<float>(a.v[i]); });

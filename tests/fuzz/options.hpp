@@ -1,0 +1,70 @@
+// Options of every kind from the fuzzer's bytes; numbers that are nothing but work stay small.
+#pragma once
+
+#include "bytes.hpp"
+#include "nacre/model.hpp"
+
+namespace nacre_fuzz {
+
+inline NoiseModel noise_model(Bytes& bytes) {
+  NoiseModel noise = NoiseModel::kinect();
+  bytes.change(noise.constant), bytes.change(noise.quadratic), bytes.change(noise.offset), bytes.change(noise.shared);
+  return noise;
+}
+
+inline DepthOptions depth_options(Bytes& bytes) {
+  DepthOptions options;
+  bytes.change_to(options.edge_test, 3);
+  bytes.change(options.min_depth), bytes.change(options.max_depth), bytes.change(options.gradient_threshold);
+  bytes.change(options.edge_dilation, -1, 100), bytes.change(options.edge_sigmas), bytes.change(options.edge_reprieve);
+  bytes.change(options.max_slant), bytes.change(options.max_missing), bytes.change(options.min_component, -1, 3000);
+  if (bytes.boolean()) options.noise = noise_model(bytes);
+  return options;
+}
+
+inline RegionOptions region_options(Bytes& bytes) {
+  RegionOptions options;
+  bytes.change(options.min_x), bytes.change(options.max_x), bytes.change(options.min_y), bytes.change(options.max_y);
+  bytes.change(options.min_z), bytes.change(options.max_z), bytes.change(options.object);
+  bytes.change(options.min_plane), bytes.change(options.min_object), bytes.change(options.plane_margin);
+  bytes.change(options.link_distance), bytes.change(options.keep_fraction);
+  return options;
+}
+
+inline AlignOptions align_options(Bytes& bytes) {
+  AlignOptions options;
+  options.max_iterations = 8;
+  bytes.change_to(options.method, 3);
+  bytes.change(options.max_iterations, -1, 30), bytes.change(options.max_distance),
+      bytes.change(options.final_distance);
+  bytes.change(options.gate_decay), bytes.change(options.max_angle), bytes.change(options.robust);
+  bytes.change(options.sample_fraction), bytes.change(options.max_points, -1, 300);
+  bytes.change(options.max_samples, -1, 300), bytes.change(options.coarse_samples, -1, 300);
+  bytes.change(options.keep_best), bytes.change(options.weak_threshold);
+  options.seed = bytes.byte();
+  options.num_threads = bytes.threads();
+  return options;
+}
+
+inline ConsolidateOptions consolidate_options(Bytes& bytes) {
+  ConsolidateOptions options;
+  options.iterations = 3;
+  options.radius = 0.3;
+  options.num_points = 40;
+  bytes.change_to(options.method, 3), bytes.change_to(options.theta, 2);
+  bytes.change(options.radius), bytes.change(options.num_points, -1, 300), bytes.change(options.iterations, -1, 8);
+  bytes.change(options.mu);
+  options.seed = bytes.byte();
+  options.num_threads = bytes.threads();
+  return options;
+}
+
+inline FusionOptions fusion_options(Bytes& bytes) {
+  FusionOptions options;
+  bytes.change(options.support), bytes.change(options.max_angle), bytes.change(options.max_confidence);
+  bytes.change(options.min_sightings, -1, 300), bytes.change(options.max_violations, -1, 300);
+  bytes.change(options.reference_sigma);
+  return options;
+}
+
+}  // namespace nacre_fuzz
