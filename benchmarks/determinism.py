@@ -1,13 +1,14 @@
 """
-Whole reconstructions, again and again: are model, trajectory and report the same bits?
+Whole reconstructions, again and again: model, trajectory and report have the same bits.
 
     python benchmarks/determinism.py                                  # simulated recordings
     python benchmarks/determinism.py --recording FOLDER --frames 40   # and a real one
     python benchmarks/determinism.py --threads 1,2 --repeats 2        # as the tests run it
 
-Each recording is run with each number of threads, some more times in one process, and in other processes: with each
-instruction set, hash seed, locale and time zone, on one processor, with dirty memory. Prints the SHA-256 of each
-result, and where one differs from the first, by how much. Ends with 1 where one does that may not.
+Each recording is run with each number of threads, some more times in one process, saved and loaded on the
+way, and in other processes: with each instruction set, hash seed, locale and time zone, on one processor, with
+dirty memory. Prints the SHA-256 of each result, and where one differs from the first, by how much. Ends with 1
+where one does that may not.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ from nacre.reconstruction import Reconstruction
 Array = npt.NDArray[Any]
 
 MODELS: dict[str, dict[str, Any]] = {
-    "room": {"max_points": 8000},  # a full turn with wrong focal length, so that a loop closes; lost frames; colours
+    "room": {
+        "max_points": 8000
+    },  # a full turn with wrong focal length, so that a loop closes; lost frames; colours
     "object": {"region": {"object": True}},
     "wlop": {"fold_in": "wlop", "max_points": 1000},
     "wlop+": {"fold_in": "wlop+", "max_points": 1000},
@@ -114,12 +117,22 @@ def without_times(value: Any) -> Any:
     return [without_times(entry) for entry in value] if isinstance(value, list) else value
 
 
-def reconstruct(name: str, sequence: Sequence[SequenceFrame], num_threads: int) -> Result:
-    """Run one case."""
+def reconstruct(
+    name: str, sequence: Sequence[SequenceFrame], num_threads: int, interrupted: int | None = None
+) -> Result:
+    """Run one case; save it after some frames, forget it, load it and go on, if asked to."""
     model = nacre.Model(sequence[0].camera, num_threads=num_threads, **MODELS[name])
-    done = Reconstruction(sequence, model).complete()
+    done = Reconstruction(sequence, model)
+    if interrupted is not None:
+        for _ in done.run(range(interrupted)):
+            pass
+        with tempfile.TemporaryDirectory() as folder:
+            done.save(Path(folder) / "checkpoint")
+            done = Reconstruction.load(Path(folder) / "checkpoint", sequence)
+    done.complete()
+    model = done.model
     figures = without_times(done.as_dict())
-    arrays = {
+    arrays: dict[str, Array] = {
         "points": model.points,
         "normals": model.normals,
         "confidence": model.confidence,
@@ -185,7 +198,14 @@ def compare(name: str, options: argparse.Namespace) -> bool:
         repeated = reconstruct(name, sequence, 0)
         repeats[repeated.sha256] = repeated
     tell(f"{options.repeats} times, all threads", list(repeats.values())[-1])
-    words = ["--frames", str(options.frames), *(["--recording", options.recording] if options.recording else [])]
+    for part in (0.25, 0.5, 0.9):
+        frames = int(part * len(sequence))
+        tell(f"saved and loaded after {frames} frames", reconstruct(name, sequence, 0, frames))
+    words = [
+        "--frames",
+        str(options.frames),
+        *(["--recording", options.recording] if options.recording else []),
+    ]
     for way, environment in ELSEWHERE.items():
         free = "NACRE_SIMD" in environment and name in FREE
         tell(way, in_another_process(name, words, environment), free)
@@ -194,21 +214,26 @@ def compare(name: str, options: argparse.Namespace) -> bool:
 
 def main() -> int:
     """Compare the cases that are asked for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     numbers = lambda text: [int(word) for word in text.split(",")]  # noqa: E731
     parser.add_argument("--threads", type=numbers, default=[1, 2, 3, 4, 7, 8, 16])
     parser.add_argument("--repeats", type=int, default=20)
     parser.add_argument("--frames", type=int, default=76, help="of each recording")
-    parser.add_argument("--recording", help="a folder or file of a recording, as `nacre reconstruct` takes it")
+    parser.add_argument(
+        "--recording", help="a folder or file of a recording, as `nacre reconstruct` takes it"
+    )
     parser.add_argument("--only", choices=MODELS, action="append", help="by default all")
     parser.add_argument("--save", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
     names = options.only or [name for name in MODELS if name != "recording" or options.recording]
     if options.save:
         result = reconstruct(names[0], recording(names[0], options.frames, options.recording), 2)
-        np.savez(options.save, figures=result.figures, **result.arrays)
+        np.savez(options.save, allow_pickle=False, figures=result.figures, **result.arrays)
         return 0
-    return 0 if all([compare(name, options) for name in names]) else 1
+    hold = [compare(name, options) for name in names]
+    return 0 if all(hold) else 1
 
 
 if __name__ == "__main__":

@@ -1,5 +1,5 @@
 """
-What a long-lived program sees of nacre: models that come and go, threads beside them, forks, other thread pools.
+What a long-lived program sees of nacre: models that come and go, threads, forks, other thread pools.
 
     python benchmarks/life.py                 # 1000 cycles, ten seconds of ticks
     python benchmarks/life.py --cycles 60 --seconds 2 --busy    # as the tests run it
@@ -17,6 +17,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from soak import memory
 import nacre
 
 MOST_GROWTH = 2e6  # [bytes]: what the allocator's arenas vary by
+FOLDERS = [str(Path(__file__).resolve().parent), str(Path(str(nacre.__file__)).parents[1])]
 MOST_LOST = 0.05  # of a thread's ticks
 
 
@@ -39,11 +41,13 @@ def grown(scene: Scene, frames: int = 3) -> nacre.Model:
 
 def bits(model: nacre.Model) -> str:
     """Return the SHA-256 of a model's points and poses."""
-    return hashlib.sha256(model.points.tobytes() + model.normals.tobytes() + model.poses.tobytes()).hexdigest()
+    return hashlib.sha256(
+        model.points.tobytes() + model.normals.tobytes() + model.poses.tobytes()
+    ).hexdigest()
 
 
 def growth_of_cycles(cycles: int) -> float:
-    """Return by how much memory grows from a tenth of the cycles on [bytes]; each makes a model and drops it."""
+    """Make models and drop them; return by how much memory grows from a tenth of the cycles on [bytes]."""
     scene = Scene("static", 96)
     begin = 0
     for cycle in range(cycles):
@@ -82,7 +86,7 @@ def lost_ticks(seconds: float) -> float:
     The other turns are as busy, but without Python's lock: a hash of a large array.
     """
     scene = Scene("static", 640)
-    large = np.zeros(2**24, np.uint8)
+    large = bytes(2**24)
     depths = [scene.depth(index) for index in range(8)]
     model = nacre.Model(scene.camera, num_threads=1)
     frames = iter(range(10**9))
@@ -111,19 +115,6 @@ def two_at_once() -> bool:
     return found == alone
 
 
-def goes_on_after_fork() -> bool:
-    """Return whether a child process gets the same bits out of a model that its parent has begun."""
-    scene = Scene("static", 96)
-    model = grown(scene)
-    child = os.fork()
-    model.add_frame(scene.depth(3))
-    if child == 0:
-        os.write(1, bits(model).encode())
-        os._exit(0)
-    os.waitpid(child, 0)
-    return True
-
-
 # In a fresh interpreter: before and after, in the same process, each has to work.
 BESIDE = """
 import sys
@@ -142,7 +133,7 @@ print(first)
 """
 POOLS = {
     "numpy.linalg": "np.random.default_rng(0).random((300, 300)) @ np.eye(300)",
-    "scipy.spatial": "scipy.spatial.cKDTree(np.random.default_rng(0).random((2000, 3))).query(np.eye(3), workers=2)",
+    "scipy.spatial": "scipy.spatial.cKDTree(np.random.rand(2000, 3)).query(np.eye(3), workers=2)",
     "torch": "torch.rand(300, 300) @ torch.rand(300, 300)",
     "open3d": "open3d.geometry.PointCloud(open3d.utility.Vector3dVector(np.eye(3))).estimate_normals()",
     "cv2": "cv2.GaussianBlur(np.zeros((400, 400), np.float32), (9, 9), 2)",
@@ -150,11 +141,10 @@ POOLS = {
 
 
 def beside(library: str) -> str:
-    """Say whether nacre and a library with threads of its own work in one process, imported in either order."""
-    path = [os.path.dirname(os.path.abspath(__file__)), os.path.dirname(os.path.dirname(nacre.__file__))]
+    """Say whether a library with threads of its own works beside nacre, imported before or after."""
     said = set()
     for first, second in ((library, "nacre"), ("nacre", library)):
-        program = BESIDE.format(path=path, first=first, second=second, work=POOLS[library])
+        program = BESIDE.format(path=FOLDERS, first=first, second=second, work=POOLS[library])
         done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
         if "ModuleNotFoundError" in done.stderr:
             return "not installed"
@@ -164,29 +154,47 @@ def beside(library: str) -> str:
     return "same bits in either order" if len(said) == 1 else "FAILED: other bits in the other order"
 
 
-def forked() -> bool:
-    """Return whether the child's bits are the parent's."""
-    program = (
-        "import sys, warnings; warnings.simplefilter('ignore'); sys.path[:0] = {0!r}; import life, os; "
-        "life.goes_on_after_fork(); s = life.Scene('static', 96); m = life.grown(s); m.add_frame(s.depth(3)); "
-        "print(' ' + life.bits(m))"
-    ).format([os.path.dirname(os.path.abspath(__file__)), os.path.dirname(os.path.dirname(nacre.__file__))])
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120, check=False)
+FORKED = """
+import os, sys, warnings
+sys.path[:0] = {path!r}
+warnings.simplefilter("ignore")  # newer Pythons warn of fork with threads
+from life import bits, grown
+from simulated import Scene
+scene = Scene("static", 96)
+model = grown(scene)
+child = os.fork()
+model.add_frame(scene.depth(3))
+if child == 0:
+    os.write(1, bits(model).encode() + b" ")
+    os._exit(0)
+os.waitpid(child, 0)
+print(bits(model))
+"""
+
+
+def goes_on_after_fork() -> bool:
+    """Return whether a child process gets the same bits out of a model that its parent has begun."""
+    command = [sys.executable, "-c", FORKED.format(path=FOLDERS)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
     child, parent = done.stdout.split()
     return child == parent
 
 
 def main(words: list[str] | None = None) -> int:
     """Measure all of it."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--cycles", type=int, default=1000)
     parser.add_argument("--seconds", type=float, default=10.0, help="of the ticking thread")
-    parser.add_argument("--busy", action="store_true", help="the machine is: print the ticks, and demand nothing")
+    parser.add_argument(
+        "--busy", action="store_true", help="the machine is: print the ticks, and demand nothing"
+    )
     options = parser.parse_args(words)
     holds = [two_at_once()]
     print(f"two models in two threads have the bits of each alone: {holds[-1]}")
     if hasattr(os, "fork"):
-        holds.append(forked())
+        holds.append(goes_on_after_fork())
         print(f"a child process gets its parent's bits: {holds[-1]}", flush=True)
     for library in POOLS:
         said = beside(library)

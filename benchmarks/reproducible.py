@@ -1,9 +1,10 @@
 """
-Two wheels of the same sources, built in different folders, one after the other: are they the same file?
+Two wheels of the same sources, built in different folders, one after the other, are the same file.
 
-    python benchmarks/reproducible.py      # some minutes: everything is compiled twice, without a compiler cache
+    python benchmarks/reproducible.py      # some minutes: everything is compiled twice, without a cache
 
-Needs the dependency group "build". Takes what git tracks; prints the SHA-256 of both and ends with 1 where they differ.
+Needs the dependency group "build". Takes what git tracks; prints the SHA-256 of both and ends with 1 where they
+differ.
 """
 
 from __future__ import annotations

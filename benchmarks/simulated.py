@@ -33,13 +33,14 @@ def merged(parts: list[tuple[Array, Array]]) -> nacre.Mesh:
 
 
 def furnished_room() -> nacre.Mesh:
-    """Return a room of 2 m x 1.4 m x 2 m with boxes along its walls: they are about a metre from its middle."""
+    """Return a room with boxes along its walls, which are about a metre from its middle."""
     random = np.random.default_rng(3)
     parts = [box(np.zeros(3), [2.2, 1.6, 2.2], 0.0)]
     for i in range(60):
         angle = 2 * math.pi * (i + random.random()) / 60
         way = np.array([math.sin(angle), 0, math.cos(angle)])
-        place = (1.1 / abs(way).max() - 0.15 * random.random()) * way + [0, random.uniform(-0.7, 0.7), 0]
+        place = (1.1 / abs(way).max() - 0.15 * random.random()) * way
+        place += np.array([0, random.uniform(-0.7, 0.7), 0])
         parts.append(box(place, random.uniform(0.1, [0.35, 0.4, 0.35]), random.uniform(0, math.pi)))
     return merged(parts)
 
@@ -69,8 +70,8 @@ class Scene:
     """
     Depth and colour images with new noise in every frame.
 
-    "static": a camera that stands in a furnished room; "turning": one that turns in it, again and again; "object":
-    a thing that turns on a table before a camera that stands. The images of a full turn are made once.
+    "static": a camera that stands in a furnished room; "turning": one that turns in it, again and again;
+    "object": a thing that turns on a table before a camera that stands. The images of a full turn are made once.
     """
 
     def __init__(self, name: str, width: int, *, views: int = 180, sigma: float = 0.002) -> None:

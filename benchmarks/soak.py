@@ -1,12 +1,12 @@
 """
-Ten thousand frames: does the memory grow, do frames become slower, does a camera that stands still drift away?
+Ten thousand frames: growth of memory and of frame times, and the drift of a camera that stands still.
 
     python benchmarks/soak.py                              # 10 000 frames of each scene
     python benchmarks/soak.py --scene static --frames 500
 
-Prints a line for each scene and ends with 1 where a limit is missed. Frame times are processor time on one thread, so
-that other programs on the machine hardly count. "Begin" is a tenth of the frames, a thousand at most, from the frame of
-that number on; "end" is as many frames, the last ones.
+Prints a line for each scene and ends with 1 where a limit is missed. Frame times are processor time on one
+thread, so that other programs on the machine hardly count. "Begin" is a tenth of the frames, a thousand at
+most, from the frame of that number on; "end" is as many frames, the last ones.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class Outcome:
     """
     What a run measured; growth and ratios are of the end to the beginning.
 
-    A model keeps the report of every frame: ``bytes_per_frame`` is by how much memory grew, ``report_bytes`` what
-    of that is the report, and ``memory_growth`` the rest, as a part of the memory at the beginning.
+    A model keeps the report of every frame: ``bytes_per_frame`` is by how much memory grew, ``report_bytes``
+    what of that is the report, and ``memory_growth`` the rest, as a part of the memory at the beginning.
     """
 
     scene: str
@@ -119,7 +119,11 @@ def soak(name: str, frames: int, width: int, cap: int, sigma: float) -> Outcome:
         if index + 1 == part:
             begin = memory()
         if (index + 1) % 1000 == 0:
-            print(f"  {name}: {index + 1} frames, {memory() / 1e6:.1f} MB, {report}", file=sys.stderr, flush=True)
+            print(
+                f"  {name}: {index + 1} frames, {memory() / 1e6:.1f} MB, {report}",
+                file=sys.stderr,
+                flush=True,
+            )
     end = memory()
     first, last = seconds[part : 2 * part] * 1000, seconds[-part:] * 1000
     drift = np.nanmax(errors, axis=0)
@@ -150,13 +154,19 @@ def soak(name: str, frames: int, width: int, cap: int, sigma: float) -> Outcome:
 
 def main(words: list[str] | None = None) -> int:
     """Run the scenes that are asked for, and say what was missed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--scene", choices=SCENES, action="append", help="by default each of them")
     parser.add_argument("--frames", type=int, default=10_000)
-    parser.add_argument("--width", type=int, default=160, help="of the images [pixels]; the height is 3/4 of it")
+    parser.add_argument(
+        "--width", type=int, default=160, help="of the images [pixels]; the height is 3/4 of it"
+    )
     parser.add_argument("--max-points", type=int, default=4000, help="the model's cap")
     parser.add_argument("--sigma", type=float, default=0.002, help="of the depth [m]")
-    parser.add_argument("--not", dest="left_out", choices=LIMITS, action="append", default=[], help="do not demand it")
+    parser.add_argument(
+        "--not", dest="left_out", choices=LIMITS, action="append", default=[], help="do not demand it"
+    )
     parser.add_argument("--json", type=Path, help="write the figures there")
     options = parser.parse_args(words)
     outcomes = []
