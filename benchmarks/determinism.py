@@ -7,8 +7,7 @@ Whole reconstructions, again and again: model, trajectory and report have the sa
 
 Each recording is run with each number of threads, some more times in one process, saved and loaded on the
 way, and in other processes: with each instruction set, hash seed, locale and time zone, on one processor, with
-dirty memory. Prints the SHA-256 of each result, and where one differs from the first, by how much. Ends with 1
-where one does that may not.
+dirty memory. Prints the SHA-256 of each result, and by how much it differs. Ends with 1 where it may not.
 """
 
 from __future__ import annotations

@@ -3,8 +3,8 @@ Two wheels of the same sources, built in different folders, one after the other,
 
     python benchmarks/reproducible.py      # some minutes: everything is compiled twice, without a cache
 
-Needs the dependency group "build". Takes what git tracks; prints the SHA-256 of both and ends with 1 where they
-differ.
+Needs the dependency group "build". Takes what git tracks; prints the SHA-256 of both.
+Ends with 1 where they differ.
 """
 
 from __future__ import annotations
