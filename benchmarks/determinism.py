@@ -6,8 +6,8 @@ Whole reconstructions, again and again: model, trajectory and report have the sa
     python benchmarks/determinism.py --threads 1,2 --repeats 2        # as the tests run it
 
 Each recording is run with each number of threads, some more times in one process, saved and loaded on the
-way, and in other processes: with each instruction set, hash seed, locale and time zone, on one processor, with
-dirty memory. Prints the SHA-256 of each result, and by how much it differs. Ends with 1 where it may not.
+way, and in other processes: with each instruction set, hash seed, locale and time zone, on one processor, and
+with dirty memory. Prints the SHA-256 of each, and by how much it differs; ends with 1 where it may not.
 """
 
 from __future__ import annotations

@@ -31,9 +31,10 @@ def run(program: str, *words: str) -> str:
 
 
 def test_whole_reconstructions_have_the_same_bits() -> None:
-    said = run("determinism.py", "--threads", "1,3", "--repeats", "1", "--frames", "40")
+    cases = ("--only", "room", "--only", "object", "--frames", "40")
+    said = run("determinism.py", "--threads", "1,3", "--repeats", "1", *cases)
     results = [line for line in said.splitlines() if line.startswith("  ") and "SHA-256" not in line]
-    assert len(results) == 4 * 12
+    assert len(results) == 2 * 12
     assert "1 loops" in said
     assert "LOST" in said
 
