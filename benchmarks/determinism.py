@@ -87,7 +87,8 @@ def recording(name: str, frames: int, path: str | None) -> Sequence[SequenceFram
     """Return the frames of a case."""
     if name == "recording":
         assert path is not None
-        return nacre.open_sequence(path)[:frames]
+        opened: Sequence[SequenceFrame] = nacre.open_sequence(path)[:frames]
+        return opened
     if name.startswith("wlop"):
         thing = nacre.built_in_object()
         camera, poses = nacre.default_camera(thing), nacre.turntable_poses(thing, 8, np.radians(15))
