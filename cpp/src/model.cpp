@@ -15,6 +15,7 @@
 #include "nacre/cancel.hpp"
 #include "object_view.hpp"
 #include "point_spacing.hpp"
+#include "pose_check.hpp"
 #include "rigid_motion.hpp"
 #include "tracking.hpp"
 #include "view_adjustment.hpp"
@@ -55,6 +56,7 @@ void check_extras(const Camera& camera, const FrameExtras& extras, const PointMo
           extras.colors.rows());
   check_attributes(extras.attributes, camera, model);
   require(!extras.keep_guess || extras.guess.has_value(), "keep_guess", "used with a guess", "no guess");
+  if (extras.guess) require_rigid(*extras.guess, "guess");
 }
 
 }  // namespace
