@@ -325,6 +325,7 @@ CellLattice cell_lattice(std::initializer_list<const Cloud*> clouds, double cell
     lattice.center = median(rows_of(**clouds.begin()));
     lattice.origin = lattice.center - half;
   }
+  lattice.reach = (whole.upper - lattice.center).max(lattice.center - whole.lower).maxCoeff() * lattice.cells_per_length;
   const double cells = (whole.upper - lattice.origin).maxCoeff() * lattice.cells_per_length;
   while (lattice.num_bits < most_bits && static_cast<double>(1 << lattice.num_bits) <= cells) ++lattice.num_bits;
   return lattice;

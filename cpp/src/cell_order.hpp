@@ -15,6 +15,7 @@ struct CellLattice {
   Eigen::Array3d center = Eigen::Array3d::Zero();  // of the clouds; the first one's median if they are huge
   double cells_per_length = 1.0;
   int num_bits = 1;
+  double reach = 0.0;  // of the clouds from the center, in cells
 };
 
 // Cells of the given edge around some clouds; if these are more than two million cells wide, around the middle of the

@@ -44,6 +44,7 @@ class LoopClosure {
   int num_key_frames() const { return static_cast<int>(key_frames_.size()); }
 
  private:
+  friend struct PrivateState;
   // The camera went on by a step of view_distance.
   struct Stop {
     std::int32_t frame;

@@ -10,14 +10,12 @@
 #include "consolidation_fold.hpp"
 #include "depth_cleaning.hpp"
 #include "fusion_step.hpp"
-#include "loop_closure.hpp"
 #include "model_correction.hpp"
+#include "model_impl.hpp"
 #include "nacre/cancel.hpp"
-#include "object_view.hpp"
 #include "point_spacing.hpp"
 #include "pose_check.hpp"
 #include "rigid_motion.hpp"
-#include "tracking.hpp"
 #include "view_adjustment.hpp"
 
 namespace nacre {
@@ -74,47 +72,14 @@ const char* to_string(FrameStatus status) {
   }
 }
 
-struct Model::Impl {
-  Camera camera;
-  ModelOptions options;  // what the first frame decides is filled in
-  Frame frame;           // the newest; its memory and the observer's are used again for the next
-  SurfaceObserver observer{camera, options.fusion};
-  MaskImage region;  // of the newest frame; empty where nothing is left out
-  NoiseCalibration calibration{camera};
-  PointModel cloud;
-  LoopClosure loops{camera, options};
-  std::vector<FrameReport> reports;
-  Values measured;                // by the newest, before it was cleaned
-  Sight before;                   // of the newest frame that was folded in
-  PlaceHypothesis hypothesis;     // while the camera is lost
-  std::vector<Pose> poses;        // of the registered frames, oldest first
-  std::vector<ObjectView> views;  // of an object that stands on a plane, from different directions
-  double spacing = 0.0;
-  std::int64_t num_lost = 0;  // frames in a row, up to the newest
-
-  bool was_lost() const { return num_lost > 0; }
-  bool jumped() const;
-
-  Impl(const Camera& camera_in, const ModelOptions& options_in) : camera(camera_in), options(options_in) {
-    options.check();
-    options.registration.num_threads = options.num_threads;
-    options.consolidation.num_threads = options.num_threads;
-    options.normals.num_threads = options.num_threads;
-    spacing = options.spacing;
-  }
-
-  FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
-  NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
-  void keep_region(FrameReport& report);
-  TrackingResult locate(const FrameExtras& extras, const RegionReport& region);
-  std::vector<Pose> guesses(const FrameExtras& extras) const;
-  WhereElse elsewhere(const RegionReport& region) const;
-  std::optional<ObjectView> view_of_object(const RegionReport& region) const;
-  void keep_view(const FrameReport& report);
-  void adjust(FrameReport& report);
-  void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
-  void fold_in(const FrameExtras& extras, FrameReport& report);
-};
+Model::Impl::Impl(const Camera& camera_in, const ModelOptions& options_in)
+    : camera(camera_in), given(options_in), options(options_in) {
+  options.check();
+  options.registration.num_threads = options.num_threads;
+  options.consolidation.num_threads = options.num_threads;
+  options.normals.num_threads = options.num_threads;
+  spacing = options.spacing;
+}
 
 // The loop: clean the image, make points of it, keep those of interest, register them to the model, correct the model
 // where a loop closes, fold the points in, renew the normals.
@@ -223,24 +188,29 @@ std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
   return {predicted, last};
 }
 
-// Some of the newest poses from which the camera looked in different directions; and everywhere, but not at every frame
-// where that has been to no avail.
-WhereElse Model::Impl::elsewhere(const RegionReport& region_report) const {
+// Some of the newest poses from which the camera looked in different directions.
+static std::vector<Pose> key_poses(const std::vector<Pose>& poses) {
   constexpr std::size_t most = 8;
   constexpr double least_angle = 0.35;
-  constexpr std::int64_t patience = 8;
-  WhereElse where;
-  if (!options.relocalise) return where;
-  where.views = &views;
-  where.view_of_frame = [&] { return view_of_object(region_report); };
-  where.everywhere = num_lost < patience || num_lost % patience == 0;
-  std::vector<Pose>& chosen = where.key_poses;
+  std::vector<Pose> chosen;
   for (auto pose = poses.rbegin(); pose != poses.rend() && chosen.size() < most; ++pose) {
     const bool is_new = std::all_of(chosen.begin(), chosen.end(), [&](const Pose& other) {
       return Eigen::AngleAxisd(other.linear().transpose() * pose->linear()).angle() > least_angle;
     });
     if (is_new) chosen.push_back(*pose);
   }
+  return chosen;
+}
+
+// Around some poses; and everywhere, but not at every frame where that has been to no avail.
+WhereElse Model::Impl::elsewhere(const RegionReport& region_report) const {
+  constexpr std::int64_t patience = 8;
+  WhereElse where;
+  if (!options.relocalise) return where;
+  where.views = &views;
+  where.view_of_frame = [&] { return view_of_object(region_report); };
+  where.key_poses = [this] { return key_poses(poses); };
+  where.everywhere = num_lost < patience || num_lost % patience == 0;
   return where;
 }
 
@@ -367,6 +337,7 @@ void Model::Impl::fold_in(const FrameExtras& extras, FrameReport& report) {
 
 Model::Model(const Camera& camera, const ModelOptions& options) : impl_(std::make_unique<Impl>(camera, options)) {}
 Model::~Model() = default;
+Model::Model(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Model::Model(Model&&) noexcept = default;
 Model& Model::operator=(Model&&) noexcept = default;
 
@@ -377,6 +348,7 @@ FrameReport Model::add_frame(const DepthRef& depth, const FrameExtras& extras) {
 
 const Camera& Model::camera() const { return impl_->camera; }
 const ModelOptions& Model::options() const { return impl_->options; }
+const ModelOptions& Model::given_options() const { return impl_->given; }
 const PointModel& Model::cloud() const { return impl_->cloud; }
 const std::vector<FrameReport>& Model::frames() const { return impl_->reports; }
 NoiseModel Model::noise() const { return impl_->noise(); }

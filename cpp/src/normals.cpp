@@ -29,6 +29,7 @@ PointMatrix<T> estimate(const Eigen::Ref<const PointMatrix<T>>& points, const No
   require(viewpoint.allFinite(), "viewpoint", "finite", viewpoint.transpose());
 
   const BlockTree<T> tree(Rows<T>(points).data(), points.rows(), options.num_threads);
+  const auto k = static_cast<int>(std::min<std::int64_t>(options.k, std::max<std::int64_t>(3, tree.num_points())));
   PointMatrix<T> normals(points.rows(), 3);
   if (tree.num_points() < points.rows()) normals.setConstant(std::numeric_limits<T>::quiet_NaN());
   // All points are as many neighbours as any larger number.

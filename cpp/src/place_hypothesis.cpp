@@ -30,7 +30,7 @@ double median_depth(const IcpSource& frame) {
 std::optional<Pose> PlaceHypothesis::predict(const IcpSource& frame, const AlignOptions& options) {
   depth_ = median_depth(frame);
   if (!place_ || !before_) return std::nullopt;
-  const IcpTarget target(AlignCloud(before_->cloud.points, before_->cloud.normals), options);
+  const IcpTarget target(AlignCloud(before_->points, before_->normals), options);
   const IcpResult moved = align_to(target, frame, motion_, options);
   if (!(moved.overlap >= least_overlap) || moved.weak_directions.cols() > 0) {
     forget();
@@ -58,7 +58,7 @@ bool PlaceHypothesis::weigh(const TrackingResult& best, const IcpSource& frame) 
     if (!is_determined || best.recognition <= chance) return false;
     place_ = Place{pose, pose, {}, 0.0};
   }
-  before_ = frame;
+  before_ = Surface{frame.cloud.points, frame.cloud.normals};
   depth_ = median_depth(frame);
   place_->pose = pose;
   double distance = 1.0;

@@ -26,19 +26,23 @@ class PlaceHypothesis {
   void forget() { *this = {}; }
 
  private:
+  friend struct PrivateState;
   struct Place {
     Pose pose;                // as registered to the model, world_from_camera
     Pose followed;            // as moved from frame to frame since the start
     std::vector<Pose> views;  // that have been counted
     double belief = 0.0;
   };
+  struct Surface {
+    Points points, normals;  // camera frame
+  };
 
   bool is_near(const TrackingResult& result) const;
 
   std::optional<Place> place_;
-  std::optional<IcpSource> before_;  // the lost frame before
-  Pose motion_ = Pose::Identity();   // the last: camera before from camera now
-  double depth_ = 1.0;               // of the newest frame, the median [m]
+  std::optional<Surface> before_;   // the lost frame before
+  Pose motion_ = Pose::Identity();  // the last: camera before from camera now
+  double depth_ = 1.0;              // of the newest frame, the median [m]
 };
 
 }  // namespace nacre

@@ -46,6 +46,7 @@ class PoseGraph {
   PoseGraphFit optimise(double outlier = 5.0);
 
  private:
+  friend struct PrivateState;
   double squared_error(std::size_t edge, const std::vector<Pose>& poses) const;
   double cost(const std::vector<Pose>& poses, const std::vector<double>& weights) const;
   PoseGraphFit fit(const std::vector<double>& weights);

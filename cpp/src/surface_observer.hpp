@@ -1,6 +1,7 @@
 // What a depth frame says about points of a surface: the symmetric implicit moving-least-squares residual.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "nacre/fusion.hpp"
@@ -81,7 +82,9 @@ class SurfaceObserver {
 
   // The same of a frontal measurement of some noise; sigma 0 stands for the reference.
   float frontal_weight(float sigma) const {
-    const float ratio = sigma > 0.0F ? reference_sigma_ / sigma : 1.0F;
+    const float ratio = sigma > 0.0F ? std::clamp(reference_sigma_ / sigma, simd::least_sigma_ratio,
+                                                  simd::largest_sigma_ratio)
+                                     : 1.0F;
     return ratio * ratio;
   }
 

@@ -254,8 +254,9 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
     if (fit) return on_plane(*fit);
   }
   const bool goes_on = predicted && hypothesis.is_confirmed_by(best);
-  if (!goes_on && !elsewhere.key_poses.empty()) {
-    TrackingResult found = search.relocalise(elsewhere.key_poses);
+  const std::vector<Pose> key_poses = goes_on || !elsewhere.key_poses ? std::vector<Pose>() : elsewhere.key_poses();
+  if (!key_poses.empty()) {
+    TrackingResult found = search.relocalise(key_poses);
     found.is_to_whole_model = true;
     if (found.status != FrameStatus::lost) return found;
     if (found.rank() > best.rank()) best = found;

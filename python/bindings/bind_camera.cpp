@@ -1,3 +1,5 @@
+#include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "bindings.hpp"
@@ -5,8 +7,71 @@
 
 namespace {
 
+// Arguments of any type, so that the error for a wrong one can name it; the signatures say what they should be.
+bool is_anything(PyObject* /*object*/) { return true; }
+class Whole : public py::object {
+  PYBIND11_OBJECT_DEFAULT(Whole, py::object, is_anything)
+};
+class Real : public py::object {
+  PYBIND11_OBJECT_DEFAULT(Real, py::object, is_anything)
+};
+class Coefficients : public py::object {
+  PYBIND11_OBJECT_DEFAULT(Coefficients, py::object, is_anything)
+};
+class PointArray : public py::object {
+  PYBIND11_OBJECT_DEFAULT(PointArray, py::object, is_anything)
+};
+class Depth : public py::object {
+  PYBIND11_OBJECT_DEFAULT(Depth, py::object, is_anything)
+};
+
+}  // namespace
+
+template <>
+struct py::detail::handle_type_name<Whole> {
+  static constexpr auto name = const_name("typing.SupportsInt | typing.SupportsIndex");
+};
+template <>
+struct py::detail::handle_type_name<Real> {
+  static constexpr auto name = const_name("typing.SupportsFloat | typing.SupportsIndex");
+};
+template <>
+struct py::detail::handle_type_name<Coefficients> {
+  static constexpr auto name =
+      const_name("collections.abc.Sequence[typing.SupportsFloat | typing.SupportsIndex]");
+};
+template <>
+struct py::detail::handle_type_name<PointArray> {
+  static constexpr auto name = const_name("typing.Annotated[numpy.typing.ArrayLike, numpy.float64]");
+};
+template <>
+struct py::detail::handle_type_name<Depth> {
+  static constexpr auto name = const_name("str");
+};
+
+namespace {
+
 using nacre::Camera;
 using nacre::DepthKind;
+
+[[noreturn]] void refuse(const char* name, const char* expected, const py::handle& value) {
+  throw py::type_error(std::string(name) + " must be " + expected + ", got " + py::repr(value).cast<std::string>());
+}
+
+int as_pixels(const char* name, const Whole& value) {
+  if (PyIndex_Check(value.ptr()) == 0) refuse(name, "an integer", value);
+  const Py_ssize_t number = PyNumber_AsSsize_t(value.ptr(), nullptr);  // the nearest that there is
+  return static_cast<int>(std::clamp<Py_ssize_t>(number, -1, std::numeric_limits<int>::max()));
+}
+
+double as_number(const char* name, const py::handle& value) {
+  const double number = PyFloat_AsDouble(value.ptr());
+  if (number == -1.0 && PyErr_Occurred() != nullptr) {
+    PyErr_Clear();
+    refuse(name, "a number that a float can hold", value);
+  }
+  return number;
+}
 
 DepthKind parse_depth_kind(const std::string& name) {
   if (name == "z") return DepthKind::z;
@@ -21,7 +86,12 @@ std::string model_name(const Camera& camera) {
 }
 
 // OpenCV's vector of 4 or 5 coefficients; none is no distortion.
-Camera::Distortion parse_distortion(const std::vector<double>& coefficients) {
+Camera::Distortion parse_distortion(const py::object& value) {
+  std::vector<double> coefficients;
+  if (py::isinstance<py::str>(value) || PySequence_Check(value.ptr()) == 0) {
+    refuse("distortion", "4 or 5 numbers", value);
+  }
+  for (const py::handle coefficient : py::iter(value)) coefficients.push_back(as_number("distortion", coefficient));
   if (!coefficients.empty() && coefficients.size() != 4 && coefficients.size() != 5) {
     throw std::invalid_argument("distortion must be the 4 or 5 coefficients k1 k2 p1 p2 (k3), got " +
                                 std::to_string(coefficients.size()));
@@ -48,8 +118,9 @@ std::string repr(const Camera& camera) {
   return text + ")";
 }
 
-py::array_t<double> project(const Camera& camera,
-                            const py::array_t<double, py::array::c_style | py::array::forcecast>& points) {
+py::array_t<double> project(const Camera& camera, const PointArray& given) {
+  const py::array_t<double, py::array::c_style | py::array::forcecast> points(
+      py::module_::import("nacre.arrays").attr("as_real")("points", given));
   if (points.ndim() != 2 || points.shape(1) != 3) {
     throw std::invalid_argument("points must have shape (N, 3), got " +
                                 py::repr(points.attr("shape")).cast<std::string>());
@@ -102,14 +173,22 @@ Raises
 ------
 ValueError
     Names the argument that is out of range.)")
-      .def(py::init([](int width, int height, double fx, double fy, double cx, double cy,
-                       const std::vector<double>& distortion, const std::string& depth) {
-             return Camera::pinhole(width, height, fx, fy, cx, cy, parse_distortion(distortion),
-                                    parse_depth_kind(depth));
+      .def(py::init([](const Whole& width, const Whole& height, const Real& fx, const Real& fy, const Real& cx,
+                       const Real& cy, const Coefficients& distortion, const Depth& depth) {
+             if (!py::isinstance<py::str>(depth)) refuse("depth", "'z' or 'radial'", depth);
+             return Camera::pinhole(as_pixels("width", width), as_pixels("height", height), as_number("fx", fx),
+                                    as_number("fy", fy), as_number("cx", cx), as_number("cy", cy),
+                                    parse_distortion(distortion), parse_depth_kind(depth.cast<std::string>()));
            }),
            py::arg("width"), py::arg("height"), py::arg("fx"), py::arg("fy"), py::arg("cx"), py::arg("cy"),
            py::kw_only(), py::arg("distortion") = std::vector<double>(5, 0.0), py::arg("depth") = "z")
-      .def_static("orthographic", &Camera::orthographic, py::arg("width"), py::arg("height"), py::arg("pixel_size"),
+      .def_static(
+          "orthographic",
+          [](const Whole& width, const Whole& height, const Real& pixel_size) {
+            return Camera::orthographic(as_pixels("width", width), as_pixels("height", height),
+                                        as_number("pixel_size", pixel_size));
+          },
+          py::arg("width"), py::arg("height"), py::arg("pixel_size"),
                   "A camera with parallel rays: x = (u - (width - 1) / 2) pixel_size [m].")
       .def_property_readonly("model", &model_name, "'pinhole' or 'orthographic'")
       .def_property_readonly("width", &Camera::width, "[pixels]")

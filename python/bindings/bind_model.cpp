@@ -135,15 +135,48 @@ void bind_model(py::module_& m) {
       .def_readonly("spacing", &FrameReport::spacing)
       .def_property_readonly("milliseconds", &milliseconds);
 
+  // Its arguments: the reason, and the place in the bytes.
+  static py::handle checkpoint_error =
+      py::exception<CheckpointError>(m, "CheckpointError", PyExc_ValueError).release();
+  py::register_local_exception_translator([](std::exception_ptr pointer) {
+    try {
+      if (pointer) std::rethrow_exception(pointer);
+    } catch (const CheckpointError& error) {
+      const py::tuple arguments = py::make_tuple(error.what(), error.offset());
+      PyErr_SetObject(checkpoint_error.ptr(), arguments.ptr());
+    }
+  });
+
   py::class_<Model>(m, "Model")
       .def(py::init<const Camera&, const ModelOptions&>())
       .def("add_frame", &add_frame, ReleaseGil())
+      .def(
+          "save",
+          [](const Model& model, const std::string& note) {
+            std::string bytes;
+            {
+              const py::gil_scoped_release unlocked;
+              bytes = model.save(note);
+            }
+            return py::bytes(bytes);
+          })
+      .def_static("load",
+                  [](const py::bytes& bytes) {
+                    std::string note;
+                    const auto data = static_cast<std::string_view>(bytes);
+                    std::optional<Model> model;
+                    {
+                      const py::gil_scoped_release unlocked;
+                      model.emplace(Model::load(data, &note));
+                    }
+                    return std::make_pair(std::move(*model), py::bytes(note));
+                  })
+      .def_property_readonly("given_options", &Model::given_options)
       .def_property_readonly("camera", &Model::camera)
       .def_property_readonly("cloud", &Model::cloud, py::return_value_policy::reference_internal)
       .def("cloud_in_camera", &Model::cloud_in_camera)
       .def_property_readonly("noise", &Model::noise)
       .def_property_readonly("num_frames", [](const Model& model) { return model.frames().size(); })
       .def("report", [](const Model& model, std::size_t i) { return model.frames().at(i); })
-      .def("pose", [](const Model& model, std::size_t i) { return to_matrix(model.frames().at(i).world_from_camera); })
       .def_property_readonly("spacing", &Model::spacing);
 }

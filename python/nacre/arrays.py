@@ -14,11 +14,34 @@ from nacre import _core
 FloatArray = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 
 
-def _real(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
-    array = np.asarray(value)
+def as_array(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
+    """Return ``value`` as NumPy makes an array of it, of any dtype; nothing of it may be masked."""
+    if np.ma.is_masked(value):
+        raise TypeError(f"{name} must have no masked values, got some: fill them first, with NaN or with 0")
+    try:
+        return np.asarray(value)
+    except (TypeError, ValueError) as error:  # rows of different lengths
+        raise ValueError(f"{name} must be an array, got {type(value).__name__}: {error}") from None
+
+
+def as_real(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
+    """Return ``value`` as an array of real numbers, in its dtype."""
+    array = as_array(name, value)
     if array.dtype.kind not in "buif":
         raise TypeError(f"{name} must be an array of real numbers, got dtype {array.dtype}")
     return array
+
+
+def as_rows(array: npt.NDArray[Any], dtype: npt.DTypeLike) -> npt.NDArray[Any]:
+    """
+    Return an array in C order, itself where it is so already.
+
+    NumPy lets a single row or column have any stride, a negative one too, which the C++ part does not take.
+    What is too large for the dtype becomes infinite.
+    """
+    with np.errstate(over="ignore"):
+        rows = np.ascontiguousarray(array, dtype=dtype)
+    return rows if min(rows.strides, default=0) >= 0 and rows.flags.aligned else rows.copy()
 
 
 def as_points(name: str, value: npt.ArrayLike) -> FloatArray:
@@ -28,11 +51,11 @@ def as_points(name: str, value: npt.ArrayLike) -> FloatArray:
     float32 and float64 arrays that are already C-contiguous are returned as they are; other real dtypes
     become float64.
     """
-    array = _real(name, value)
+    array = as_real(name, value)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} must have shape (N, 3), got {array.shape}")
     dtype = array.dtype if array.dtype in (np.float32, np.float64) else np.float64
-    return np.ascontiguousarray(array, dtype=dtype)
+    return as_rows(array, dtype)
 
 
 def as_matching_points(name: str, value: npt.ArrayLike, like_name: str, num_points: int) -> FloatArray:
@@ -45,9 +68,41 @@ def as_matching_points(name: str, value: npt.ArrayLike, like_name: str, num_poin
     return array
 
 
+def as_unit_rows(name: str, value: npt.ArrayLike, like_name: str, num_points: int) -> npt.NDArray[np.float32]:
+    """Return normals as float32 rows of unit length; NaN where a row is 0 or not finite."""
+    given = as_matching_points(name, value, like_name, num_points)
+    rows = as_rows(given, np.float32)
+    with np.errstate(over="ignore", invalid="ignore"):
+        is_other = np.abs(np.einsum("ij,ij->i", rows, rows) - 1.0) > 0.002
+    if is_other.any():
+        other = given[is_other].astype(np.float64)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            other /= np.abs(other).max(axis=1, keepdims=True)
+            other /= np.linalg.norm(other, axis=1, keepdims=True)
+        rows = rows.copy()
+        rows[is_other] = np.where(np.isfinite(other).all(axis=1, keepdims=True), other, np.nan)
+    return rows
+
+
+def as_values(name: str, value: npt.ArrayLike, size: int, of: str) -> npt.NDArray[Any]:
+    """Return ``value`` as one real number for each of the ``size`` things it belongs to, in its dtype."""
+    array = as_real(name, value)
+    if array.shape != (size,):
+        raise ValueError(f"{name} must have one entry per {of} ({size}), got shape {array.shape}")
+    return array
+
+
+def as_times(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Return ``value`` as a list of finite float64 times."""
+    times = as_rows(as_real(name, value), np.float64)
+    if times.ndim != 1 or times.shape != np.shape(value) or not np.isfinite(times).all():
+        raise ValueError(f"{name} must be a list of finite times, got shape {np.shape(value)}")
+    return times
+
+
 def as_vector(name: str, value: npt.ArrayLike, size: int) -> npt.NDArray[np.float64]:
     """Return ``value`` as ``size`` finite float64 numbers."""
-    array = np.ascontiguousarray(_real(name, value), dtype=np.float64)
+    array = as_rows(as_real(name, value), np.float64)
     if array.shape != (size,) or not np.isfinite(array).all():
         raise ValueError(f"{name} must be {size} finite numbers, got {value!r}")
     return array
@@ -55,12 +110,13 @@ def as_vector(name: str, value: npt.ArrayLike, size: int) -> npt.NDArray[np.floa
 
 def as_pose(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """Return ``value`` as a rigid 4x4 float64 matrix."""
-    array = np.ascontiguousarray(_real(name, value), dtype=np.float64)
+    array = as_rows(as_real(name, value), np.float64)
     if array.shape != (4, 4):
         raise ValueError(f"{name} must be a 4x4 matrix, got shape {array.shape}")
     rotation = array[:3, :3]
     is_rigid = (
         np.isfinite(array).all()
+        and np.abs(rotation).max() < 2
         and np.allclose(rotation @ rotation.T, np.eye(3), atol=1e-5)
         and np.linalg.det(rotation) > 0
         and np.allclose(array[3], (0, 0, 0, 1))
@@ -71,17 +127,21 @@ def as_pose(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
 
 
 def as_poses(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    """Return ``value`` as (N, 4, 4) rigid float64 matrices; a pose that is not finite is a missing one."""
-    array = np.ascontiguousarray(_real(name, value), dtype=np.float64)
+    """Return ``value`` as (N, 4, 4) rigid float64 matrices; one that is not finite is missing, and all NaN."""
+    array = as_rows(as_real(name, value), np.float64)
     if array.ndim != 3 or array.shape[1:] != (4, 4):
         raise ValueError(f"{name} must have shape (N, 4, 4), got {array.shape}")
-    present = np.flatnonzero(np.isfinite(array).all(axis=(1, 2)))
+    is_present = np.isfinite(array).all(axis=(1, 2))
+    if np.isinf(array).any():
+        array = np.where(is_present[:, None, None], array, np.nan)
+    present = np.flatnonzero(is_present)
     rotation = array[present, :3, :3]
-    is_rigid = (
-        np.isclose(rotation @ rotation.transpose(0, 2, 1), np.eye(3), atol=1e-5).all(axis=(1, 2))
-        & (np.linalg.det(rotation) > 0)
-        & np.isclose(array[present, 3], (0, 0, 0, 1)).all(axis=1)
-    )
+    with np.errstate(over="ignore", invalid="ignore"):
+        is_rigid = (
+            np.isclose(rotation @ rotation.transpose(0, 2, 1), np.eye(3), atol=1e-5).all(axis=(1, 2))
+            & (np.linalg.det(rotation) > 0)
+            & np.isclose(array[present, 3], (0, 0, 0, 1)).all(axis=1)
+        )
     if not is_rigid.all():
         bad = present[np.argmin(is_rigid)]
         raise ValueError(f"{name}[{bad}] must be a rigid transform, got\n{array[bad]}")
@@ -96,23 +156,18 @@ def as_depth(name: str, value: npt.ArrayLike, depth_scale: float = 1.0) -> npt.N
 
     ``depth_scale`` is in stored units per metre. 0 and 65535 of integer images become NaN.
     """
-    array = _real(name, value)
+    array = as_real(name, value)
     if array.ndim != 2:
         raise ValueError(f"{name} must have shape (H, W), got {array.shape}")
-    if not (np.isfinite(depth_scale) and depth_scale > 0):
-        raise ValueError(
-            f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}"
-        )
+    scale = as_scale("depth_scale", depth_scale)
     if array.dtype == np.uint16:
-        raw = np.ascontiguousarray(array, dtype=np.uint16)
-        return _core.depth_from_raw(raw, depth_scale)
+        return _core.depth_from_raw(as_rows(array, np.uint16), scale)
+    metres = as_rows(array, np.float32)
     if array.dtype.kind in "bui":
-        metres = array.astype(np.float32)
-        metres[(array == 0) | (array == 65535)] = np.nan
-    else:
-        metres = np.ascontiguousarray(array, dtype=np.float32)
-    if depth_scale != 1.0:
-        metres = metres / np.float32(depth_scale)
+        metres = np.where((array == 0) | (array == 65535), np.float32(np.nan), metres)
+    if scale != 1.0:
+        with np.errstate(over="ignore"):
+            metres = metres / np.float32(scale)
     return metres
 
 
@@ -120,10 +175,10 @@ def as_mask(name: str, value: npt.ArrayLike | None, shape: tuple[int, int]) -> n
     """Return a mask as (H, W) uint8, 1 where a pixel is used; an empty array for None."""
     if value is None:
         return np.zeros((0, 0), dtype=np.uint8)
-    array = _real(name, value)
+    array = as_real(name, value)
     if array.shape != shape:
         raise ValueError(f"{name} must have the depth image's shape {shape}, got {array.shape}")
-    return np.ascontiguousarray(array != 0, dtype=np.uint8)
+    return as_rows(array != 0, np.uint8)
 
 
 def as_attributes(
@@ -131,17 +186,19 @@ def as_attributes(
 ) -> list[tuple[str, npt.NDArray[np.float32]]]:
     """Return named images, (H, W) or (H, W, C), as float32 arrays with a row for each pixel."""
     images = []
-    for key, image in ({} if value is None else dict(value)).items():
+    if not isinstance(value, Mapping | None):
+        raise TypeError(f"{name} must be a mapping of names to images, got {type(value).__name__}")
+    for key, image in (value or {}).items():
         if not isinstance(key, str) or not key:
             raise TypeError(f"{name} must be named by words, got {key!r}")
-        array = _real(f"{name}[{key!r}]", image)
+        array = as_real(f"{name}[{key!r}]", image)
         if array.shape[:2] != shape or array.ndim not in (2, 3) or array.size == 0:
             raise ValueError(
                 f"{name}[{key!r}] must have the depth image's shape {shape}, or {(*shape, 'C')} with "
                 f"C channels, got {array.shape}"
             )
         rows = array.reshape(shape[0] * shape[1], -1)
-        images.append((key, np.ascontiguousarray(rows, dtype=np.float32)))
+        images.append((key, as_rows(rows, np.float32)))
     return images
 
 
@@ -160,24 +217,28 @@ def localize(points: FloatArray) -> tuple[npt.NDArray[np.float32], npt.NDArray[n
     finite = sample[np.isfinite(sample).all(axis=1)]
     if len(finite) == 0:
         finite = points[np.isfinite(points).all(axis=1)]
-    origin = np.round(finite.mean(axis=0, dtype=np.float64)) if len(finite) else np.zeros(3)
+    with np.errstate(over="ignore"):
+        origin = np.round(finite.mean(axis=0, dtype=np.float64)) if len(finite) else np.zeros(3)
+    if not np.isfinite(origin).all():
+        origin = np.zeros(3)
     # Many rows side by side: NumPy is slow on rows of three.
     local = np.empty(points.shape, np.float32)
     width = 256
     end = len(points) // width * width
     for part, shift in ((slice(0, end), np.tile(origin, width)), (slice(end, None), origin)):
-        np.subtract(
-            points[part].reshape(-1, shift.size),
-            shift,
-            out=local[part].reshape(-1, shift.size),
-            casting="same_kind",
-        )
+        with np.errstate(over="ignore", invalid="ignore"):
+            np.subtract(
+                points[part].reshape(-1, shift.size),
+                shift,
+                out=local[part].reshape(-1, shift.size),
+                casting="same_kind",
+            )
     return local, origin
 
 
 def as_triangles(name: str, value: npt.ArrayLike, num_vertices: int) -> npt.NDArray[np.int32]:
     """Return ``value`` as a C-contiguous (N, 3) int32 array of indices of ``num_vertices`` vertices."""
-    array = np.asarray(value)
+    array = as_array(name, value)
     if array.dtype.kind not in "iu" and array.size:
         raise TypeError(f"{name} must be an array of integers, got dtype {array.dtype}")
     if array.ndim != 2 or array.shape[1] != 3 or len(array) == 0:
@@ -185,7 +246,7 @@ def as_triangles(name: str, value: npt.ArrayLike, num_vertices: int) -> npt.NDAr
     for index in (array.min(), array.max()):
         if not 0 <= index < num_vertices:
             raise ValueError(f"{name} must hold indices of the {num_vertices} vertices, got {index}")
-    return np.ascontiguousarray(array, dtype=np.int32)
+    return as_rows(array, np.int32)
 
 
 def as_count(name: str, value: Any, *, minimum: int = 0) -> int:
@@ -195,16 +256,47 @@ def as_count(name: str, value: Any, *, minimum: int = 0) -> int:
     except TypeError:
         raise TypeError(f"{name} must be an integer, got {value!r}") from None
     if not minimum <= count < 2**31:
-        raise ValueError(f"{name} must be an integer of at least {minimum}, got {count}")
+        raise ValueError(f"{name} must be an integer of at least {minimum} and below 2^31, got {count}")
     return count
+
+
+def as_number(name: str, value: Any) -> float:
+    """Return ``value`` as a float, NaN and infinite ones too; words are no numbers."""
+    try:
+        if isinstance(value, str | bytes):
+            raise TypeError
+        return float(value)
+    except (TypeError, ValueError):
+        raise TypeError(f"{name} must be a number, got {value!r}") from None
+    except OverflowError:
+        raise ValueError(f"{name} must be a number that a float can hold, got {value!r}") from None
 
 
 def as_length(name: str, value: Any) -> float:
     """Return ``value`` as a float that is not negative and not NaN."""
-    try:
-        length = float(value)
-    except (TypeError, ValueError):
-        raise TypeError(f"{name} must be a number, got {value!r}") from None
+    length = as_number(name, value)
     if not length >= 0:
         raise ValueError(f"{name} must be at least 0, got {length}")
     return length
+
+
+def as_scale(name: str, value: Any) -> float:
+    """Return ``value`` as the stored units per metre of a depth image."""
+    scale = as_number(name, value)
+    if not 1e-30 <= scale <= 1e30:
+        raise ValueError(f"{name} must be a positive number of stored units per metre, got {value!r}")
+    return scale
+
+
+def as_flag(name: str, value: Any) -> bool:
+    """Return ``value`` as a bool, which it must be."""
+    if not isinstance(value, bool | np.bool_):
+        raise TypeError(f"{name} must be True or False, got {value!r}")
+    return bool(value)
+
+
+def as_camera(name: str, value: Any) -> _core.Camera:
+    """Return ``value``, which must be a camera."""
+    if not isinstance(value, _core.Camera):
+        raise TypeError(f"{name} must be a nacre.Camera, got {type(value).__name__}")
+    return value

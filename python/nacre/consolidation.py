@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_count, as_length, as_matching_points, as_points
+from nacre.arrays import FloatArray, as_count, as_length, as_matching_points, as_points, as_real, as_rows
 from nacre.parameters import as_choice
 from nacre.progress import as_progress
 from nacre.values import Value
@@ -204,10 +204,10 @@ def project_samples(
     options = _options(radius, iterations, mu, method, theta, num_threads)
     hints = _core.ProjectionHints()
     if point_weights is not None:
-        hints.point_weights = _as_column("point_weights", point_weights, len(point_array)).astype(np.float32)
+        hints.point_weights = as_rows(_as_column("point_weights", point_weights, len(point_array)), np.float32)
     if sample_normals is not None:
         normals = as_matching_points("sample_normals", sample_normals, "samples", len(sample_array))
-        hints.sample_normals = normals.astype(np.float32)
+        hints.sample_normals = as_rows(normals, np.float32)
     if frozen is not None:
         hints.frozen = (_as_column("frozen", frozen, len(sample_array)) != 0).astype(np.uint8)
     common = np.promote_types(sample_array.dtype, point_array.dtype)
@@ -230,15 +230,8 @@ def _options(
     return options
 
 
-def _real(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
-    array = np.asarray(value)
-    if array.dtype.kind not in "buif":
-        raise TypeError(f"{name} must be an array of real numbers, got dtype {array.dtype}")
-    return array
-
-
 def _as_column(name: str, value: npt.ArrayLike, size: int) -> npt.NDArray[Any]:
-    array = _real(name, value)
+    array = as_real(name, value)
     if array.shape != (size,):
         raise ValueError(f"{name} must have shape ({size},), got {array.shape}")
     return array
@@ -259,19 +252,20 @@ class _Cargo:
         blocks = [np.zeros((num_points, 0), dtype=np.float32)]
         for name, value in attributes.items():
             label = f"attributes[{name!r}]"
-            array = _real(label, value)
+            array = as_real(label, value)
             if array.ndim not in (1, 2) or len(array) != num_points:
                 expected = f"one row per point, ({num_points},) or ({num_points}, A)"
                 raise ValueError(f"{label} must have {expected}, got shape {array.shape}")
             if name == "normals" and (array.dtype.kind != "f" or array.shape[1:] != (3,)):
                 expected = f"floating-point of shape ({num_points}, 3)"
                 raise ValueError(f"{label} must be {expected}, got {array.dtype} {array.shape}")
-            rows = array.reshape(num_points, math.prod(array.shape[1:])).astype(np.float64)
+            rows = array.reshape(num_points, math.prod(array.shape[1:])).astype(np.float64, order="C")
             finite = np.isfinite(rows)
             mean = np.where(finite, rows, 0.0).sum(axis=0) / np.maximum(finite.sum(axis=0), 1)
             self._arrays[name] = array
             self._means[name] = mean
-            blocks.append((rows - mean).astype(np.float32))
+            with np.errstate(over="ignore"):
+                blocks.append((rows - mean).astype(np.float32))
         self.columns = np.ascontiguousarray(np.hstack(blocks))
 
     def unpack(

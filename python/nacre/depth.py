@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import as_depth, as_mask
+from nacre.arrays import as_camera, as_count, as_depth, as_flag, as_mask
 from nacre.noise import Noise, NoiseModel, NoiseName, as_noise, estimate_noise
 from nacre.parameters import to_core
 
@@ -29,6 +29,8 @@ __all__ = [
 
 PIXEL_LABELS = ("kept", "invalid", "out_of_range", "masked", "edge", "slanted", "isolated")
 """What the values of :func:`label_pixels` mean."""
+
+_FARTHEST = 1e15  # [m]: beyond it single precision cannot tell a normal
 
 DepthArray = npt.NDArray[np.float32]
 EdgeTest = Literal["inverse_depth", "gradient", "none"]
@@ -57,7 +59,7 @@ class DepthParameters:
 
     def for_camera(self, camera: _core.Camera) -> DepthParameters:
         """Return the same with the noise model of that camera, where only its kind is named."""
-        return replace(self, noise=as_noise("depth.noise", self.noise, camera))
+        return replace(self, noise=as_noise("depth.noise", self.noise, as_camera("camera", camera)))
 
 
 @dataclass(frozen=True)
@@ -202,6 +204,7 @@ def preprocess_depth(
         ``depth_scale``); an option is out of its range.
     """
     image = as_depth("depth", depth, depth_scale)
+    camera, wants_report = as_camera("camera", camera), as_flag("return_report", return_report)
     parameters = DepthParameters(
         edge_test=edge_test,
         min_depth=min_depth,
@@ -221,9 +224,9 @@ def preprocess_depth(
         camera,
         to_core(parameters, _core.DepthOptions()),
         as_mask("mask", mask, shape),
-        num_threads,
+        as_count("num_threads", num_threads),
     )
-    return (clean, DepthReport._from_core(report)) if return_report else clean
+    return (clean, DepthReport._from_core(report)) if wants_report else clean
 
 
 def label_pixels(
@@ -264,9 +267,12 @@ def label_pixels(
         As :func:`preprocess_depth`.
     """
     image = as_depth("depth", depth, depth_scale)
+    camera = as_camera("camera", camera)
+    if not isinstance(parameters, DepthParameters | None):
+        raise TypeError(f"parameters must be nacre.DepthParameters, got {type(parameters).__name__}")
     options = to_core((parameters or DepthParameters()).for_camera(camera), _core.DepthOptions())
     labels: npt.NDArray[np.uint8] = _core.label_pixels(
-        image, camera, options, as_mask("mask", mask, (image.shape[0], image.shape[1])), num_threads
+        image, camera, options, as_mask("mask", mask, (image.shape[0], image.shape[1])), as_count("num_threads", num_threads)
     )
     return labels
 
@@ -299,7 +305,7 @@ def back_project(
         Depth and camera differ in size.
     """
     points: npt.NDArray[np.float32] = _core.back_project(
-        as_depth("depth", depth, depth_scale), camera, num_threads
+        as_depth("depth", depth, depth_scale), as_camera("camera", camera), as_count("num_threads", num_threads)
     )
     return points
 
@@ -336,7 +342,7 @@ def depth_normals(
     Returns
     -------
     normals : (H, W, 3) float32
-        Unit length, towards the camera; NaN where the depth is missing or no plane fits.
+        Unit length, towards the camera; NaN where the depth is missing (or beyond 1e15 m) or no plane fits.
 
     Raises
     ------
@@ -344,7 +350,11 @@ def depth_normals(
         Depth and camera differ in size.
     """
     image = as_depth("depth", depth, depth_scale)
-    model = as_noise("noise", noise, camera)
+    model = as_noise("noise", noise, as_camera("camera", camera))
     core_model = None if model is None else model.to_core()
-    normals: npt.NDArray[np.float32] = _core.depth_normals(image, camera, core_model, num_threads)
+    threads = as_count("num_threads", num_threads)
+    too_far = image > _FARTHEST
+    if too_far.any():
+        image = np.where(too_far, np.float32(np.nan), image)
+    normals: npt.NDArray[np.float32] = _core.depth_normals(image, camera, core_model, threads)
     return normals.reshape(*image.shape, 3)

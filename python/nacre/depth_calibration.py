@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
-from nacre.arrays import as_depth, as_pose
+from nacre.arrays import as_camera, as_depth, as_pose
 from nacre.depth import back_project, preprocess_depth
 
 _log = logging.getLogger(__name__)
@@ -321,5 +321,6 @@ def _checked(depth: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.float32]:
 
 
 def _check_camera(camera: Camera) -> None:
+    as_camera("camera", camera)
     if not can_calibrate(camera):
         raise ValueError(f"camera: expected a pinhole camera with depth along its axis, got {camera!r}")

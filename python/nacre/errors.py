@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import os
+import reprlib
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -44,8 +45,22 @@ class FileFormatError(ValueError):
         return f"{self.path}{place}: {self.reason}"
 
 
+class UnknownRecordingError(FileFormatError):
+    """What was given is no recording, or not one without more options: not the files are wrong."""
+
+
+_repr = reprlib.Repr()
+_repr.maxlist = _repr.maxdict = 10
+_repr.maxstring = _repr.maxother = 60
+
+
 class CameraError(RuntimeError):
     """A camera that is not there, or that gives no more frames; the message says what to do."""
+
+
+def shown(value: object) -> str:
+    """Return a value from a file in a form and length that is fit for an error message."""
+    return _repr.repr(value)
 
 
 def meant(word: object, known: Iterable[str]) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_matching_points, as_points, as_vector, localize
+from nacre.arrays import FloatArray, as_points, as_unit_rows, as_vector, localize
 from nacre.parameters import to_core
 from nacre.values import Value
 
@@ -95,9 +95,7 @@ def _cloud(
     points = as_points(name, points)
     rows = np.zeros((0, 3), np.float32)
     if normals is not None:
-        rows = as_matching_points(f"{name}_normals", normals, name, len(points)).astype(
-            np.float32, copy=False
-        )
+        rows = as_unit_rows(f"{name}_normals", normals, name, len(points))
     place = None if viewpoint is None else as_vector(f"{name}_viewpoint", viewpoint, 3)
     return points, rows, place
 
@@ -140,7 +138,8 @@ def align_global(
     source, target : (N, 3), (M, 3) real
         Points [m]. Rows that are not finite are ignored.
     source_normals, target_normals : (N, 3), (M, 3) real, optional
-        Unit normals, on the side that the surface is seen from. Estimated where they are not given; without a
+        Normals, on the side that the surface is seen from; a point whose normal is 0 or not finite is left out.
+        Estimated where they are not given; without a
         viewpoint their sides are then ignored.
     source_viewpoint, target_viewpoint : (3,), optional
         From where each cloud was seen [m], in its own frame. Nothing is between it and the points.

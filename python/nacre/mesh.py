@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import numpy as np
 import numpy.typing as npt
@@ -11,6 +12,8 @@ from nacre import _core, arrays
 from nacre.noise import NoiseModel, NoiseName, as_noise
 from nacre.parameters import to_core
 from nacre.values import Value
+
+_FARTHEST = 1e150  # [m]: beyond it squared distances overflow
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -35,7 +38,7 @@ class ClosestPoints(Value):
     """
     The points of a mesh that are nearest to given points, one row per point.
 
-    Rows of points that are not finite are NaN, with triangle -1.
+    Rows of points that are not finite, or beyond 1e150 m, are NaN, with triangle -1.
 
     Attributes
     ----------
@@ -119,7 +122,10 @@ class Mesh:
         ClosestPoints
         """
         queries = arrays.as_points("points", points).astype(np.float64) - self._origin
-        nearest, normals, distances, triangles = self._tree.closest(queries, num_threads)
+        queries[np.abs(queries).max(axis=1) > _FARTHEST] = np.nan
+        nearest, normals, distances, triangles = self._tree.closest(
+            queries, arrays.as_count("num_threads", num_threads)
+        )
         return ClosestPoints(nearest + self._origin, normals, distances, triangles)
 
     def distance(self, points: npt.ArrayLike, *, num_threads: int = 0) -> npt.NDArray[np.float64]:
@@ -159,7 +165,7 @@ class Mesh:
         """
         starts = arrays.as_points("origins", origins).astype(np.float64) - self._origin
         ways = arrays.as_matching_points("directions", directions, "origins", len(starts)).astype(np.float64)
-        return RayHits(*self._tree.cast(starts, ways, num_threads))
+        return RayHits(*self._tree.cast(starts, ways, arrays.as_count("num_threads", num_threads)))
 
     def simulate_depth(
         self,
@@ -193,6 +199,7 @@ class Mesh:
         TypeError, ValueError
             Naming the argument, what was expected and what came.
         """
+        camera = arrays.as_camera("camera", camera)
         pose = arrays.as_pose("world_from_camera", world_from_camera).copy()
         pose[:3, 3] -= self._origin
         parameters = _Simulation(
@@ -237,6 +244,7 @@ class _Simulation:
 def _background(depth: float | None) -> float:
     if depth is None:
         return 0.0
-    if not (np.isfinite(depth) and depth > 0):
+    length = arrays.as_number("background_depth", depth)
+    if not 0 < length < math.inf:
         raise ValueError(f"background_depth must be None or a positive length in metres, got {depth!r}")
-    return float(depth)
+    return length

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import numbers
+import os
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -13,9 +15,23 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._core import Camera
-from nacre.arrays import as_attributes, as_depth, as_mask, as_pose
+from nacre.arrays import (
+    as_array,
+    as_attributes,
+    as_camera,
+    as_depth,
+    as_flag,
+    as_mask,
+    as_number,
+    as_pose,
+    as_rows,
+    as_scale,
+)
 from nacre.depth import DepthParameters, DepthReport
+from nacre.errors import FileFormatError
 from nacre.exchange import ExchangeablePoints
+from nacre.io.atomic import atomic_writer
+from nacre.io.raw import read_file
 from nacre.noise import NoiseModel
 from nacre.parameters import from_core, to_core, updated
 from nacre.region import RegionParameters, RegionReport
@@ -141,6 +157,8 @@ class ModelParameters:
     @classmethod
     def preset(cls, name: Preset) -> ModelParameters:
         """Return "default" (what measures best) or "paper" (every number of the 2010 paper)."""
+        if not isinstance(name, str):
+            raise TypeError(f"preset must be 'default' or 'paper', got {name!r}")
         return from_core(cls, _core.ModelOptions.preset(name))
 
 
@@ -239,6 +257,16 @@ class FrameReport(Value):
         )
 
 
+def _corrected(report: FrameReport, now: Any) -> FrameReport:
+    """Return a report with what a later frame has changed."""
+    return replace(
+        report,
+        world_from_camera=now.world_from_camera,
+        information=now.information,
+        weak_directions=now.weak_directions,
+    )
+
+
 class Model(ExchangeablePoints):
     """
     A 3D model that grows with every depth frame.
@@ -279,19 +307,14 @@ class Model(ExchangeablePoints):
         depth_scale: float = 1.0,
         **changes: Any,
     ) -> None:
-        if not isinstance(camera, Camera):
-            raise TypeError(f"camera must be a nacre.Camera, got {type(camera).__name__}")
+        camera = as_camera("camera", camera)
         if parameters is None:
-            if not isinstance(preset, str):
-                raise TypeError(f"preset must be 'default' or 'paper', got {preset!r}")
             parameters = ModelParameters.preset(preset)
         elif not isinstance(parameters, ModelParameters):
             raise TypeError(f"parameters must be nacre.ModelParameters, got {type(parameters).__name__}")
-        if not (np.isfinite(depth_scale) and depth_scale > 0):
-            raise ValueError(f"depth_scale must be positive (stored units per metre), got {depth_scale!r}")
         parameters = updated(parameters, changes)
         self.parameters = replace(parameters, depth=parameters.depth.for_camera(camera))
-        self._depth_scale = depth_scale
+        self._depth_scale = as_scale("depth_scale", depth_scale)
         self._core = _core.Model(camera, to_core(self.parameters, _core.ModelOptions()))
         self._lock = threading.Lock()
         self._frames: list[FrameReport] = []
@@ -346,18 +369,20 @@ class Model(ExchangeablePoints):
         pixels = as_mask("mask", mask, image.shape)
         colors = np.zeros((0, 3), np.uint8)
         if color is not None:
-            array = np.asarray(color)
+            array = as_array("color", color)
             if array.shape != (*image.shape, 3) or array.dtype != np.uint8:
                 raise ValueError(
                     f"color must be uint8 of shape {(*image.shape, 3)}, got {array.dtype} {array.shape}"
                 )
-            colors = np.ascontiguousarray(array).reshape(-1, 3)
+            colors = as_rows(array.reshape(-1, 3), np.uint8)
         more = as_attributes("attributes", attributes, (image.shape[0], image.shape[1]))
         pose = None if guess is None else as_pose("guess", guess)
         if timestamp is not None and not isinstance(timestamp, numbers.Real):
             raise TypeError(f"timestamp must be a number of seconds or None, got {timestamp!r}")
+        time = None if timestamp is None else as_number("timestamp", timestamp)
+        keeps = as_flag("keep_guess", keep_guess)
         with self._lock:
-            self._core.add_frame(image, pixels, colors, more, timestamp, pose, keep_guess)
+            self._core.add_frame(image, pixels, colors, more, time, pose, keeps)
             return self._reports()[-1]
 
     def _reports(self) -> list[FrameReport]:
@@ -366,9 +391,80 @@ class Model(ExchangeablePoints):
         new = [FrameReport._from_core(self._core.report(i)) for i in range(num_known, self._core.num_frames)]
         known = self._frames
         if any(report.corrects_earlier for report in new):
-            known = [replace(report, world_from_camera=self._core.pose(report.index)) for report in known]
+            known = [_corrected(report, self._core.report(report.index)) for report in known]
         self._frames = known + new if new else known
         return self._frames
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """
+        Write all that the model knows to a file, so that :meth:`load` can go on with it.
+
+        A model that was saved and loaded goes on to the same bits as one that was not. The file is complete
+        or not there at all. It is for going on, on any machine, with any nacre of the same checkpoint format
+        (its changes are in the change log); what is to be kept for years is written with
+        :func:`nacre.write_points`.
+
+        Parameters
+        ----------
+        path : path-like
+            The file; its folder must exist.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written; what was there before is left as it was.
+        """
+        data = self._saved()
+        with atomic_writer(path) as stream:
+            stream.write(data)
+
+    def _saved(self, more: Mapping[str, Any] | None = None) -> bytes:
+        note = json.dumps({"depth_scale": self._depth_scale, **(more or {})})
+        with self._lock:
+            return self._core.save(note)
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Model:
+        """
+        Read a model that :meth:`save` wrote.
+
+        Parameters
+        ----------
+        path : path-like
+            The file. It may come from anybody: nothing in it is run, and no more memory is taken than it
+            fills.
+
+        Returns
+        -------
+        Model
+
+        Raises
+        ------
+        FileFormatError
+            It is no saved model, it is damaged or not all there, or another version's; with the place.
+        OSError
+            It cannot be read.
+        """
+        return cls._loaded(path)[0]
+
+    @classmethod
+    def _loaded(cls, path: str | os.PathLike[str]) -> tuple[Model, dict[str, Any]]:
+        data = read_file(path)
+        try:
+            core, note = _core.Model.load(data)
+        except _core.CheckpointError as error:
+            reason, offset = error.args
+            raise FileFormatError(path, reason, offset=offset) from None
+        try:
+            more = json.loads(note)
+            scale = float(more.pop("depth_scale"))
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            raise FileFormatError(path, "it was saved by C++: it does not say the depth_scale") from None
+        if not (np.isfinite(scale) and scale > 0):
+            raise FileFormatError(path, f"its depth_scale must be positive, got {scale!r}")
+        model = cls(core.camera, parameters=from_core(ModelParameters, core.given_options), depth_scale=scale)
+        model._core = core
+        return model, more
 
     def __len__(self) -> int:
         """Return the number of points."""
@@ -377,8 +473,8 @@ class Model(ExchangeablePoints):
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         raise TypeError(
-            "a Model cannot be pickled or copied: pickle what it holds (model.points, model.normals, "
-            "model.poses, model.frames, model.parameters), or write it with nacre.write_points"
+            "a Model cannot be pickled or copied: write it with model.save and read it with Model.load, or "
+            "pickle what it holds (model.points, model.normals, model.poses, model.frames, model.parameters)"
         )
 
     def __repr__(self) -> str:

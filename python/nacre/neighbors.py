@@ -11,10 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_count, as_length, as_points
+from nacre.arrays import FloatArray, as_array, as_count, as_length, as_points
 from nacre.values import Value
 
 IndexArray = npt.NDArray[np.int64]
+
+_LARGEST_ROW = 1 << 16  # of neighbours, where there are fewer points
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -120,7 +122,7 @@ class KdTree:
         queries : (..., 3) array_like of real numbers
             A query that is not finite finds nothing.
         k : int
-            At least 1.
+            At least 1. More than there are points is as many as there are, in longer rows.
         max_distance : float
             Farther points are not found; a point at exactly this distance is.
         num_threads : int
@@ -133,14 +135,24 @@ class KdTree:
         indices : (..., k) int64
             Rows of the tree's points; the tree's size where fewer were found.
 
+        Raises
+        ------
+        TypeError, ValueError
+            Naming the argument, what was expected and what came; ``k`` beyond 65536 and the number of points.
+
         Notes
         -----
         As in SciPy, the last axis is dropped for ``k = 1``.
         """
         array = _as_queries(queries)
+        k = as_count("k", k, minimum=1)
+        if k > max(len(self), _LARGEST_ROW):
+            raise ValueError(
+                f"k must be at most the number of points ({len(self)}), or {_LARGEST_ROW}, got {k}"
+            )
         distances, indices = self._core.query(
             array.reshape(-1, 3),
-            as_count("k", k, minimum=1),
+            k,
             as_length("max_distance", max_distance),
             as_count("num_threads", num_threads),
         )
@@ -175,7 +187,7 @@ class KdTree:
 
 
 def _as_queries(value: npt.ArrayLike) -> FloatArray:
-    array = np.asarray(value)
+    array = as_array("queries", value)
     if array.ndim == 0 or array.shape[-1] != 3:
         raise ValueError(f"queries must have shape (..., 3), got {array.shape}")
     return as_points("queries", array.reshape(-1, 3)).reshape(array.shape)

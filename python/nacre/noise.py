@@ -7,10 +7,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from typing import Any, Literal, overload
 
+import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import as_depth
+from nacre.arrays import as_camera, as_count, as_depth, as_number, as_real
 from nacre.parameters import to_core
 
 NoiseName = Literal["auto", "kinect", "stereo", "tof"]
@@ -52,7 +53,10 @@ class NoiseModel:
     def sigma(self, z: npt.NDArray[Any]) -> npt.NDArray[Any]: ...
     def sigma(self, z: float | npt.NDArray[Any]) -> float | npt.NDArray[Any]:
         """Return the standard deviation at depth ``z``, both in metres."""
-        return self.constant + self.quadratic * (z - self.offset) ** 2
+        depth = as_real("z", z)
+        with np.errstate(over="ignore", invalid="ignore"):
+            sigma = self.constant + self.quadratic * (depth - self.offset) ** 2
+        return sigma if depth.ndim else float(sigma)
 
     def local(self) -> NoiseModel:
         """Return the noise about a smooth surface fitted to 7 x 7 pixels, without most of what they share."""
@@ -81,7 +85,13 @@ class NoiseModel:
         -------
         NoiseModel
         """
-        return cls._from_core(_core.NoiseModel.stereo(fx, baseline, disparity_sigma))
+        return cls._from_core(
+            _core.NoiseModel.stereo(
+                as_number("fx", fx),
+                as_number("baseline", baseline),
+                as_number("disparity_sigma", disparity_sigma),
+            )
+        )
 
     @classmethod
     def time_of_flight(cls) -> NoiseModel:
@@ -123,7 +133,7 @@ def as_noise_choice(name: str, value: Noise) -> NoiseModel | NoiseName | None:
         return None if value == "auto" else value
     if isinstance(value, bool) or not isinstance(value, numbers.Real):
         raise TypeError(f"{expected}, got {type(value).__name__}")
-    return NoiseModel(constant=float(value))
+    return NoiseModel(constant=as_number(name, value))
 
 
 def estimate_noise(
@@ -159,7 +169,9 @@ def estimate_noise(
         Depth and camera differ in size.
     """
     return NoiseModel._from_core(
-        _core.estimate_noise(as_depth("depth", depth, depth_scale), camera, num_threads)
+        _core.estimate_noise(
+            as_depth("depth", depth, depth_scale), as_camera("camera", camera), as_count("num_threads", num_threads)
+        )
     )
 
 
@@ -198,7 +210,8 @@ def calibrate_noise(
     ValueError
         A depth image and the camera differ in size.
     """
-    calibration = _core.NoiseCalibration(camera)
+    calibration = _core.NoiseCalibration(as_camera("camera", camera))
+    threads = as_count("num_threads", num_threads)
     for image in images:
-        calibration.add(as_depth("images", image, depth_scale), num_threads)
+        calibration.add(as_depth("images", image, depth_scale), threads)
     return NoiseModel._from_core(calibration.model())

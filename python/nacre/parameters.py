@@ -6,6 +6,9 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
+import numpy as np
+
+from nacre.arrays import as_number
 from nacre.errors import meant
 
 Core = TypeVar("Core")
@@ -32,6 +35,8 @@ def to_core(parameters: Any, core: Core) -> Core:
                 raise ValueError(f"{field.name} must be one of {names}, got {value!r}{hint}")
             value = members[value.replace("+", "_plus")]
         try:
+            if isinstance(current, bool) and not isinstance(value, bool | np.bool_):
+                raise TypeError
             setattr(core, field.name, value)
         except TypeError:
             expected = type(current).__name__
@@ -80,7 +85,7 @@ def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
         elif isinstance(value, Mapping) and dataclasses.is_dataclass(current):
             value = updated(current, value)
         elif isinstance(current, float) and isinstance(value, int) and not isinstance(value, bool):
-            value = float(value)
+            value = as_number(name, value)
         parameters = dataclasses.replace(parameters, **{head: value})  # type: ignore[type-var]
     return parameters
 

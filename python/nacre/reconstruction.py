@@ -6,6 +6,7 @@ import collections.abc
 import dataclasses
 import itertools
 import logging
+import os
 import platform
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -23,9 +24,11 @@ from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result, plain, result_dict
 from nacre.frame_figures import frame_dict, frame_entry
+from nacre.io.atomic import atomic_writer
 from nacre.io.trajectories import Trajectory
 from nacre.model import FrameReport, Model
 from nacre.progress import as_progress
+from nacre.run_state import STATUSES, record_from, record_state
 from nacre.values import Value
 
 if TYPE_CHECKING:
@@ -33,7 +36,6 @@ if TYPE_CHECKING:
 
 _log = logging.getLogger(__name__)
 
-STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
 _RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
 
 
@@ -77,6 +79,14 @@ class FrameRecord(Value):
         return self.error is not None and not isinstance(self.error, FileFormatError)
 
 
+@dataclass
+class _Retry:
+    """How far lost frames were gone over again."""
+
+    place: int = 0  # the next of the frames
+    found_any: bool = False  # since the first of them
+
+
 class Reconstruction:
     """
     A recording run through a model.
@@ -107,6 +117,7 @@ class Reconstruction:
         self.evaluation: dict[str, Result] = {}
         self.cancelled = False
         self._kept: dict[str, SequenceFrame] = {}  # the first frame of each status
+        self._retry: _Retry | None = None
 
     def __repr__(self) -> str:
         ended = ", cancelled" * self.cancelled
@@ -128,7 +139,7 @@ class Reconstruction:
         Parameters
         ----------
         indices : iterable of int, optional
-            Of the recording's frames; all of them by default.
+            Of the recording's frames; by default all that are not done yet.
         progress : callable, optional
             Called with each :class:`FrameRecord` when it is done. To return False, or to raise
             :class:`nacre.Cancelled`, ends the run; what is done is kept, and ``cancelled`` says so. Other
@@ -152,7 +163,10 @@ class Reconstruction:
 
     def run(self, indices: Iterable[int] | None = None) -> Iterator[FrameRecord]:
         """Add frames to the model, those with the given indices or all, and yield each when it is done."""
-        for index in range(len(self.sequence)) if indices is None else indices:
+        if indices is None:
+            done = {frame.index for frame in self.frames}
+            indices = [index for index in range(len(self.sequence)) if index not in done]
+        for index in indices:
             record = self._add(index)
             self.frames.append(record)
             yield record
@@ -165,19 +179,99 @@ class Reconstruction:
         place of its lost record in ``frames``; so do WEAK ones of which the model now knows enough. Frames
         that could not be read, or that the model refused, stay as they are.
         """
-        found_any = self.counts["LOST"] > 0
-        while found_any:
-            found_any = False
-            for place, before in enumerate(self.frames):
+        if self._retry is None:
+            if not self.counts["LOST"]:
+                return
+            self._retry = _Retry()
+        state = self._retry
+        while True:
+            while state.place < len(self.frames):
+                before = self.frames[state.place]
                 if before.report is None or before.status not in ("LOST", "WEAK"):
+                    state.place += 1
                     continue
                 record = self._add(before.index, before.world_from_camera)
                 if record.status == "TRACKED":
                     record = dataclasses.replace(record, status="RELOCALISED")
                 if _RANK[record.status] > _RANK[before.status]:
-                    found_any = True
-                    self.frames[place] = record
-                yield self.frames[place]
+                    state.found_any = True
+                    self.frames[state.place] = record
+                state.place += 1
+                yield self.frames[state.place - 1]
+            if not state.found_any:
+                break
+            self._retry = state = _Retry()
+        self._retry = None
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """
+        Write the run and its model to a file, so that :meth:`load` can go on with it.
+
+        It may be called between any two frames, also while lost ones are tried again. What is in the file,
+        and for whom, is said at :meth:`nacre.Model.save`.
+
+        Parameters
+        ----------
+        path : path-like
+            The file; its folder must exist.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written; what was there before is left as it was.
+        """
+        self._save(path)
+
+    def _save(self, path: str | os.PathLike[str], **more: Any) -> None:
+        """Write the run with more plain values of the caller's."""
+        retry = None if self._retry is None else dataclasses.asdict(self._retry)
+        run = {"records": [record_state(record) for record in self.frames], "retry": retry}
+        data = self.model._saved({"run": run, **more})
+        with atomic_writer(path) as stream:
+            stream.write(data)
+
+    @classmethod
+    def load(
+        cls, path: str | os.PathLike[str], sequence: collections.abc.Sequence[SequenceFrame]
+    ) -> Reconstruction:
+        """
+        Read a run that :meth:`save` wrote; :meth:`complete` then goes on to the same bits.
+
+        Parameters
+        ----------
+        path : path-like
+            The file.
+        sequence : sequence of SequenceFrame
+            The same recording.
+
+        Returns
+        -------
+        Reconstruction
+
+        Raises
+        ------
+        FileFormatError
+            It is no saved run, or it is damaged; with the place.
+        OSError
+            It cannot be read.
+        """
+        return cls._load(path, sequence)[0]
+
+    @classmethod
+    def _load(
+        cls, path: str | os.PathLike[str], sequence: collections.abc.Sequence[SequenceFrame]
+    ) -> tuple[Reconstruction, dict[str, Any]]:
+        model, more = Model._loaded(path)
+        done = cls(sequence, model)
+        reports = model.frames
+        try:
+            run = more.pop("run")
+            done.frames = [record_from(state, reports) for state in run["records"]]
+            if run["retry"] is not None:
+                done._retry = _Retry(int(run["retry"]["place"]), bool(run["retry"]["found_any"]))
+        except (KeyError, TypeError, ValueError, IndexError) as error:
+            raise FileFormatError(path, f"it holds a model, but no run that can go on ({error})") from None
+        return done, more
 
     def _add(self, index: int, guess: npt.NDArray[np.float64] | None = None) -> FrameRecord:
         try:
@@ -369,8 +463,9 @@ class Reconstruction:
         """Return the place in the recording of the frame that another closed a loop with."""
         if frame.report is None or frame.report.loop_frame is None:
             return None
-        given = (other.index for other in self.frames if other.report is not None)
-        return next(itertools.islice(given, frame.report.loop_frame, None))
+        number = frame.report.loop_frame  # of the model, which counts frames that were tried again once more
+        found = (f.index for f in self.frames if f.report is not None and f.report.index == number)
+        return next(found, None)
 
     def _depth_examples(self) -> list[DepthExample]:
         """Return the depth image of the first frame that was tracked and of the first one that was not."""

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import as_depth, as_mask
+from nacre.arrays import as_camera, as_count, as_depth, as_flag, as_mask
 from nacre.noise import Noise, as_noise
 from nacre.parameters import to_core, updated
 from nacre.values import Value
@@ -162,14 +162,15 @@ def select_region(
         Depth, camera or ``previous`` differ in size; an option is out of its range or does not exist.
     """
     image = as_depth("depth", depth, depth_scale)
-    model = as_noise("noise", noise, camera)
+    wants_report = as_flag("return_report", return_report)
+    model = as_noise("noise", noise, as_camera("camera", camera))
     mask, report = _core.select_region(
         image,
         camera,
         to_core(updated(RegionParameters(), changes), _core.RegionOptions()),
         as_mask("previous", previous, (image.shape[0], image.shape[1])),
         None if model is None else model.to_core(),
-        num_threads,
+        as_count("num_threads", num_threads),
     )
     selected: Mask = mask != 0
-    return (selected, RegionReport._from_core(report)) if return_report else selected
+    return (selected, RegionReport._from_core(report)) if wants_report else selected

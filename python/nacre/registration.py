@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_matching_points, as_points, as_pose, localize
+from nacre.arrays import FloatArray, as_points, as_pose, as_real, as_rows, as_unit_rows, localize
 from nacre.parameters import to_core
 from nacre.values import Value
 
@@ -101,15 +101,10 @@ def _cloud(
     points = as_points(name, points)
     rows = np.zeros((0, 3), np.float32)
     if normals is not None:
-        rows = as_matching_points(f"{name}_normals", normals, name, len(points)).astype(
-            np.float32, copy=False
-        )
+        rows = as_unit_rows(f"{name}_normals", normals, name, len(points))
     values = np.zeros(0, np.float32)
     if sigma is not None:
-        given = np.asarray(sigma)
-        if given.dtype.kind not in "buif":
-            raise TypeError(f"{name}_sigma must be an array of real numbers, got dtype {given.dtype}")
-        values = np.ascontiguousarray(given, dtype=np.float32)
+        values = as_rows(as_real(f"{name}_sigma", sigma), np.float32)
         if values.shape != (len(points),):
             raise ValueError(
                 f"{name}_sigma must have one value per point of {name} ({len(points)}), got {values.shape}"
@@ -123,13 +118,11 @@ def _brightness(name: str, colors: npt.ArrayLike | None, num_points: int) -> npt
     """Return one value a point (luma of ITU-R BT.601 for three), or none."""
     if colors is None:
         return np.zeros(0, np.float32)
-    given = np.asarray(colors)
-    if given.dtype.kind not in "buif":
-        raise TypeError(f"{name} must be an array of real numbers, got dtype {given.dtype}")
+    given = as_real(name, colors)
     if given.shape not in ((num_points,), (num_points, 3)):
         raise ValueError(f"{name} must have shape ({num_points},) or ({num_points}, 3), got {given.shape}")
     luma = given @ np.array([0.299, 0.587, 0.114]) if given.ndim == 2 else given
-    return np.ascontiguousarray(luma, dtype=np.float32)
+    return as_rows(luma, np.float32)
 
 
 def _shifted(
@@ -181,7 +174,7 @@ def align(
         Points [m]. Rows that are not finite are ignored. float32 and float64 arrays that are C-contiguous are
         not copied, but float64 is converted to float32 about its centre.
     source_normals, target_normals : (N, 3), (M, 3) real, optional
-        Unit normals. Estimated from the 16 nearest neighbours where the method needs them and they are not
+        Normals; a point whose normal is 0 or not finite is left out. Estimated from the 16 nearest neighbours where the method needs them and they are not
         given; then their sides are ignored.
     source_sigma, target_sigma : (N,), (M,) real, optional
         Standard deviation of each point along its normal [m]; pairs count by 1 / (sum of squares).

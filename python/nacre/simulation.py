@@ -130,20 +130,22 @@ def turntable_poses(
     (num_views, 4, 4) float64
         ``world_from_camera``, OpenCV axes.
     """
-    if num_views < 1:
-        raise ValueError(f"num_views must be at least 1, got {num_views!r}")
-    if not math.isfinite(step):
+    num_views = arrays.as_count("num_views", num_views, minimum=1)
+    if camera is not None:
+        arrays.as_camera("camera", camera)
+    if not math.isfinite(arrays.as_number("step", step)):
         raise ValueError(f"step must be a finite angle in radians, got {step!r}")
-    if not abs(elevation) < math.pi / 2:
+    if not abs(arrays.as_number("elevation", elevation)) < math.pi / 2:
         raise ValueError(f"elevation must lie between -pi/2 and pi/2, got {elevation!r}")
     lower, upper = _bounds(mesh)
     up = arrays.as_vector("axis", axis, 3)
     if not up.any():
-        raise ValueError("axis must not be 0")
+        raise ValueError(f"axis must not be 0, got {axis!r}")
+    up = up / np.abs(up).max()
     up = up / np.linalg.norm(up)
     if distance is None:
         distance = _viewing_distance(0.5 * float(np.linalg.norm(upper - lower)), camera)
-    if not (math.isfinite(distance) and distance > 0):
+    if not (math.isfinite(arrays.as_number("distance", distance)) and distance > 0):
         raise ValueError(f"distance must be a positive length in metres, got {distance!r}")
 
     # The side that the first camera stands on: the world axis after `axis`, made orthogonal to it.
@@ -180,11 +182,11 @@ def default_camera(
     -------
     nacre.Camera
     """
+    lower, upper = _bounds(mesh)
     if model == "pinhole":
         return Camera(width=640, height=480, fx=525, fy=525, cx=319.5, cy=239.5)
     if model != "orthographic":
         raise ValueError(f"model must be 'orthographic' or 'pinhole', got {model!r}")
-    lower, upper = _bounds(mesh)
     extent = float((upper - lower).max())
     if extent == 0:
         raise ValueError("mesh must have an extent, got a single point")
@@ -198,7 +200,7 @@ def _bounds(mesh: Mesh | npt.ArrayLike) -> npt.NDArray[np.float64]:
         return mesh.bounds
     vertices = arrays.as_points("mesh", mesh).astype(np.float64)
     if len(vertices) == 0 or not np.isfinite(vertices).all():
-        raise ValueError("mesh must be a Mesh or at least one vertex, all finite")
+        raise ValueError(f"mesh must be a Mesh or at least one vertex, all finite, got {len(vertices)} vertices")
     return np.stack([vertices.min(axis=0), vertices.max(axis=0)])
 
 

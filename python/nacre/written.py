@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from nacre.errors import FileFormatError
+from nacre.errors import FileFormatError, shown
+from nacre.io.cameras import camera_of
+from nacre.io.json_files import read_json
 
 if TYPE_CHECKING:
     from nacre import Camera
 
 Matrix = npt.NDArray[np.float64]
+
+FIGURES = ("overlap", "consistency", "evidence", "rmse", "num_inliers", "num_points")
 
 
 class Written:
@@ -26,6 +29,11 @@ class Written:
     folder : Path
         It holds ``report.json``.
 
+    Attributes
+    ----------
+    camera : Camera or None
+        The recording's camera, where the report names it.
+
     Raises
     ------
     FileFormatError
@@ -35,15 +43,20 @@ class Written:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
         path = folder / "report.json"
-        try:
-            self.report: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-            frames = self.report["frames"]
-            good = isinstance(frames, list)
-        except (ValueError, KeyError, TypeError):
-            good = False
-        if not good:
+        report = read_json(path)
+        if not isinstance(report, dict) or not isinstance(report.get("frames"), list):
             raise FileFormatError(path, "not a report of nacre reconstruct")
-        self.frames: list[dict[str, Any]] = frames
+        self.report: dict[str, Any] = report
+        self.frames: list[dict[str, Any]] = report["frames"]
+        for i, frame in enumerate(self.frames):
+            wrong = _wrong_in_frame(frame)
+            if wrong:
+                raise FileFormatError(path, f"not a report of nacre reconstruct: frames[{i}]{wrong}")
+        wrong = _wrong_in_report(report)
+        if wrong:
+            raise FileFormatError(path, f"not a report of nacre reconstruct: {wrong}")
+        document = (report.get("recording") or {}).get("camera")
+        self.camera: Camera | None = None if document is None else camera_of(path, document).camera
 
     @property
     def poses(self) -> Matrix:
@@ -57,18 +70,10 @@ class Written:
         return poses if np.isfinite(poses).any() else None
 
     @property
-    def camera(self) -> Camera | None:
-        """The recording's camera, where the report names it."""
-        from nacre.io.cameras import camera_of
-
-        document = (self.report.get("recording") or {}).get("camera")
-        return None if document is None else camera_of(self.folder / "report.json", document).camera
-
-    @property
     def truth_from_world(self) -> Matrix | None:
         """What takes the model into the frame of the true poses, by the first frame that has both."""
         for frame in self.frames:
-            if frame["truth"] is not None and frame["world_from_camera"] is not None:
+            if frame.get("truth") is not None and frame.get("world_from_camera") is not None:
                 pose: Matrix = np.array(frame["truth"]) @ np.linalg.inv(frame["world_from_camera"])
                 return pose
         return None
@@ -76,7 +81,7 @@ class Written:
     @property
     def counts(self) -> dict[str, int]:
         """How many frames there are, and how many of each status."""
-        from nacre.reconstruction import STATUSES
+        from nacre.run_state import STATUSES
 
         found = [frame.get("status") for frame in self.frames]
         return {"num_frames": len(found), **{f"num_{s.lower()}": found.count(s) for s in STATUSES}}
@@ -85,3 +90,58 @@ class Written:
         missing = np.full((4, 4), np.nan)
         poses = [missing if frame.get(name) is None else frame[name] for frame in self.frames]
         return np.array(poses, dtype=np.float64).reshape(-1, 4, 4)
+
+
+def _wrong_in_report(report: dict[str, Any]) -> str | None:
+    """Say what is not as nacre reconstruct writes it, apart from the frames."""
+    recording = report.get("recording")
+    if recording is not None and not isinstance(recording, dict):
+        return f"recording must be an object, got {shown(recording)}"
+    for name in ("path", "format"):
+        value = (recording or {}).get(name)
+        if value is not None and not (isinstance(value, str) and "\0" not in value):
+            return f"recording.{name} must be a text, got {shown(value)}"
+    spacing = report.get("spacing")
+    return None if spacing is None or _is_number(spacing) else f"spacing must be a number, got {shown(spacing)}"
+
+
+def _wrong_in_frame(frame: Any) -> str | None:
+    """Say what is not as nacre reconstruct writes a frame."""
+    from nacre.reconstruction import STATUSES
+
+    if not isinstance(frame, dict):
+        return f" must be an object, got {shown(frame)}"
+    index, status = frame.get("index"), frame.get("status")
+    if type(index) is not int or index < 0:
+        return f".index must be a whole number, got {shown(index)}"
+    if status not in STATUSES:
+        return f".status must be one of {', '.join(STATUSES)}, got {shown(status)}"
+    for name in ("world_from_camera", "truth"):
+        pose = frame.get(name)
+        if pose is not None and not _is_pose(pose):
+            return f".{name} must be a rigid 4x4 matrix, got {shown(pose)}"
+    for name in FIGURES:
+        value = frame.get(name)
+        if value is not None and not _is_number(value):
+            return f".{name} must be a number, got {shown(value)}"
+    milliseconds = frame.get("milliseconds")
+    if milliseconds is None or (
+        isinstance(milliseconds, dict) and all(v is None or _is_number(v) for v in milliseconds.values())
+    ):
+        return None
+    return f".milliseconds must be an object of numbers, got {shown(milliseconds)}"
+
+
+def _is_number(value: Any) -> bool:
+    return type(value) in (int, float) and -1e300 < value < 1e300
+
+
+def _is_pose(value: Any) -> bool:
+    try:
+        pose = np.array(value, dtype=np.float64)
+    except (ValueError, TypeError, OverflowError):
+        return False
+    if pose.shape != (4, 4) or not np.isfinite(pose).all() or (np.abs(pose[:3, :3]) > 2).any():
+        return False
+    is_rotation = np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=0.01)
+    return bool(is_rotation and np.linalg.det(pose[:3, :3]) > 0 and np.allclose(pose[3], (0, 0, 0, 1)))

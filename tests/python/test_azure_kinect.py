@@ -151,7 +151,7 @@ class TestBroken:
     @pytest.mark.parametrize(
         ("text", "message"),
         [
-            ("{", "not the calibration of an Azure Kinect: JSONDecodeError"),
+            ("[]", "not the calibration of an Azure Kinect: TypeError"),
             ("{}", "not the calibration of an Azure Kinect: KeyError"),
             (calibration(PARAMETERS[:5]), "14 finite parameters of .*BrownConrady were expected, got 5"),
             (calibration([0.5, 0.5, 0, 0] + [0.0] * 10), "14 finite parameters"),

@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # The public headers from the bottom up: an include may only point to a lower line.
 LAYERS = [
-    ["version", "system", "cancel", "types"],
+    ["version", "system", "cancel", "checkpoint", "types"],
     ["camera"],
     ["kdtree", "mesh"],
     ["normals", "depth"],

@@ -286,7 +286,7 @@ BROKEN = {
     "list without length": (ply(FLOATS, f"element vertex 2\n{XYZ}\nproperty list int w"), "line 7"),
     "too many elements": (
         ply(b"", "\n".join(f"element e{i} 0" for i in range(20_000))),
-        "more than 10000 lines",
+        "more than 1000 elements",
     ),
     "data cut": (ply(FLOATS[:-1]), "23 bytes are left"),
     "no data": (ply(b""), "0 bytes are left"),

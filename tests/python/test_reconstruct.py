@@ -109,7 +109,7 @@ def test_reports_have_the_poses_that_later_views_of_an_object_adjusted() -> None
         patch.syspath_prepend(Path(__file__).resolve().parents[2] / "examples" / "python")
         from simulated import turntable
     done = nacre.reconstruct(list(turntable(6)), region={"object": True})
-    expected = [done.model._core.pose(i) for i in range(6)]
+    expected = [done.model._core.report(i).world_from_camera for i in range(6)]
     assert np.array_equal([frame.world_from_camera for frame in done.frames], expected)
     assert np.array_equal(done.model.poses, expected)
 

@@ -157,7 +157,7 @@ class TestBroken:
     @pytest.mark.parametrize(
         ("name", "data", "message"),
         [
-            ("metadata", b"{", "metadata: not a JSON file"),
+            ("metadata", b"{", "metadata, line 1: not a JSON file"),
             ("metadata", b"[]", "metadata: an object was expected, not a list"),
             ("metadata", b'{"dw": 192, "dh": 256}', "metadata: w must be a number of pixels, got None"),
             ("metadata", b'{"dw": 0, "dh": 256}', "metadata: dw must be a number of pixels, got 0"),
@@ -193,7 +193,7 @@ class TestBroken:
         path = packed(tmp_path / "a.r3d", contents() | {"rgbd/1.depth": data})
         sequence = nacre.open_sequence(path)
         assert sequence[0].depth.shape == (HEIGHT, WIDTH)
-        with pytest.raises(nacre.FileFormatError, match=rf"rgbd/1\.depth: .*({message})"):
+        with pytest.raises(nacre.FileFormatError, match=rf"rgbd/1\.depth.*: .*({message})"):
             sequence[1]
 
     def test_a_photograph(self, tmp_path: Path) -> None:

@@ -111,6 +111,7 @@ class NoiseCalibration {
   NoiseModel model() const;
 
  private:
+  friend struct PrivateState;
   struct Mean {
     double value = 0.0, count = 0.0;
   };

@@ -105,7 +105,8 @@ void fill_surface_row(const FrameRow& row, float reference_sigma, bool orthograp
   for (int u = 0; u < row.width; ++u) {
     const float x = row.points[3 * u], y = row.points[3 * u + 1], z = row.points[3 * u + 2];
     const float nx = row.normals[3 * u], ny = row.normals[3 * u + 1], nz = row.normals[3 * u + 2];
-    const float ratio = reference_sigma / row.sigma[u];
+    float ratio = reference_sigma / row.sigma[u];
+    ratio = ratio < least_sigma_ratio ? least_sigma_ratio : ratio > largest_sigma_ratio ? largest_sigma_ratio : ratio;
     const float facing = orthographic ? -nz : -(nx * x + ny * y + nz * z) / ::sqrtf(x * x + y * y + z * z);
     const float weight = facing > 0.0F ? ratio * ratio : 0.0F;
     const bool counts = weight > 0.0F;  // not where a value is NaN

@@ -31,7 +31,8 @@ struct SurfaceRow {
 };
 
 // weight = (reference_sigma / sigma)^2, 0 where the surface turns away: information relative to a measurement of the
-// reference noise.
+// reference noise. The ratio has bounds, so that sums of weights, and their squares, neither overflow nor vanish.
+constexpr float least_sigma_ratio = 1e-6F, largest_sigma_ratio = 1e6F;
 using FillSurfaceRow = void(const FrameRow& row, float reference_sigma, bool orthographic, const SurfaceRow& out);
 NACRE_DECLARE_KERNEL(FillSurfaceRow, fill_surface_row)
 

@@ -21,6 +21,7 @@ from nacre.cli.info import info
 from nacre.cli.mesh import mesh
 from nacre.cli.reconstruct import reconstruct
 from nacre.cli.simulate import simulate
+from nacre.cli.stopping import Stopped
 from nacre.cli.terminal import CommandError, set_verbosity
 from nacre.cli.view import view
 from nacre.errors import CameraError, FileFormatError, meant
@@ -96,6 +97,9 @@ def run(arguments: Sequence[str] | None = None) -> int:
     try:
         wanted = app if "_NACRE_COMPLETE" in os.environ else make_app(only=command)
         return wanted(arguments, prog_name="nacre", standalone_mode=False) or 0
+    except Stopped as stopped:
+        print("error: stopped", file=sys.stderr)
+        return 128 + stopped.number
     except Exception as error:
         message, code = explain(error)
         if message:
@@ -121,6 +125,8 @@ def explain(error: Exception) -> tuple[str, int]:
         return message.rstrip(".") + near + hint, 2
     if isinstance(error, CommandError):
         return str(error), error.code
+    if type(error).__name__ == "Abort":  # the parser's for Ctrl-C
+        return "stopped", 130
     if isinstance(error, (CameraError, FileFormatError)):
         return str(error), 1
     if isinstance(error, OSError):

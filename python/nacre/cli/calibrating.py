@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from nacre.cli.running import run_frames
+from nacre.cli.stopping import Interruption, Stopped
 from nacre.cli.terminal import Terminal
+from nacre.cli.unfinished import Stage, Unfinished
 
 if TYPE_CHECKING:
     from nacre import DepthCalibration
@@ -16,76 +18,100 @@ if TYPE_CHECKING:
 
 
 class Views:
-    """Frames in different directions, as far as a calibration of depth needs them."""
+    """Frames in different directions, as far as a calibration of depth needs them, kept in a stage."""
 
-    def __init__(self) -> None:
-        self.frames: list[FrameRecord] = []
+    def __init__(self, stage: Stage) -> None:
+        self.chosen = stage.views
+
+    @property
+    def are_enough(self) -> bool:
+        """Whether no more are needed."""
+        from nacre.depth_calibration import MOST_VIEWS
+
+        return len(self.chosen) == MOST_VIEWS
 
     def add(self, frame: FrameRecord) -> bool:
         """Take a frame that looks in a new direction; say whether there are enough."""
-        from nacre.depth_calibration import LEAST_TURN, MOST_VIEWS, turn_between
+        from nacre.depth_calibration import LEAST_TURN, turn_between
+        from nacre.run_state import pose_from
 
         pose = frame.world_from_camera
         if pose is not None and frame.status != "WEAK":
-            last = self.frames[-1].world_from_camera if self.frames else None
+            last = pose_from(self.chosen[-1][1]) if self.chosen else None
             if last is None or turn_between(last, pose) >= LEAST_TURN:
-                self.frames.append(frame)
-        return len(self.frames) == MOST_VIEWS
+                self.chosen.append((frame.index, pose.ravel().tolist()))
+        return self.are_enough
 
     def calibrate(self, recording: Recording) -> DepthCalibration | None:
         """Return what the views say; None where they are too few."""
         import nacre
         from nacre.depth_calibration import LEAST_VIEWS
+        from nacre.run_state import pose_from
 
-        if len(self.frames) < LEAST_VIEWS:
+        if len(self.chosen) < LEAST_VIEWS:
             return None
-        views = (
-            (recording[frame.index].depth, pose)
-            for frame in self.frames
-            if (pose := frame.world_from_camera) is not None
-        )
+        views = ((recording[index].depth, pose_from(pose)) for index, pose in self.chosen)
         return nacre.calibrate_depth(views, recording.camera)
 
 
-def run_calibrated(
+def run_staged(
     terminal: Terminal,
     done: Reconstruction,
     recording: Recording,
     indices: Sequence[int],
+    unfinished: Unfinished,
+    stop: Interruption,
     live: LiveView | None = None,
-) -> tuple[Reconstruction, DepthCalibration | None, bool]:
+) -> Reconstruction:
     """
-    Run the frames of a recording; where they show that its depth is wrong, run them again with it corrected.
+    Run the frames of a recording that are not done yet, from the stage where the run is.
 
-    ``live`` shows the run that is going on.
-
-    Returns
-    -------
-    done : Reconstruction
-        The given one, or a new one.
-    calibration : DepthCalibration or None
-        What was found, whether or not it was used; None where nothing could be.
-    interrupted : bool
-        Whether Ctrl-C stopped the run.
+    Where they show that its depth is wrong, they are run again with it corrected. ``live`` shows the run that
+    is going on. Returns the given run, or the new one.
     """
     import nacre
     from nacre.reconstruction import Reconstruction
 
-    watch = live.add if live else None
-    views = Views()
-    interrupted = run_frames(terminal, done, indices, views.add, watch)
-    calibration = None if interrupted else views.calibrate(recording)
+    stage = unfinished.stage
+    watch = watching(done, unfinished, live)
+    if stage.name == "views":
+        views = Views(stage)
+        if not views.are_enough:
+            rest = indices[len(done.frames) :]
+            run_frames(terminal, done, rest, stop, until=views.add, watch=watch)
+        if stop.wanted:
+            return done
+        try:
+            with stop.at_once():
+                calibration = views.calibrate(recording)
+        except Stopped:
+            return done
+        stage.calibration = calibration
+        if calibration is not None and stage.corrects_depth:
+            terminal.say(
+                f"depth is tilted by {calibration.tilt:.4f} (sigma {calibration.sigma:.4f}) per metre: "
+                "beginning again with corrected depth"
+            )
+            corrected = recording.with_depth_calibration(calibration)
+            done = Reconstruction(corrected, nacre.Model(recording.camera, parameters=done.model.parameters))
+            watch = watching(done, unfinished, live)
+            if live is not None:
+                live.begin_again(done)
+        stage.name = "frames"
     rest = indices[len(done.frames) :]
-    if calibration is not None and calibration.is_significant:
-        terminal.say(
-            f"depth is tilted by {calibration.tilt:.4f} (sigma {calibration.sigma:.4f}) per metre: "
-            "beginning again with corrected depth"
-        )
-        recording = recording.with_depth_calibration(calibration)
-        done = Reconstruction(recording, nacre.Model(recording.camera, parameters=done.model.parameters))
-        rest = indices
+    if rest:
+        run_frames(terminal, done, rest, stop, watch=watch)
+    return done
+
+
+def watching(
+    done: Reconstruction, unfinished: Unfinished, live: LiveView | None
+) -> Callable[[FrameRecord], None]:
+    """Return what is to be told of each frame: the files of the unfinished run, and the viewer."""
+
+    def watch(frame: FrameRecord) -> None:
+        unfinished.add(done, frame)
         if live is not None:
-            live.begin_again(done)
-    if rest and not interrupted:
-        interrupted = run_frames(terminal, done, rest, watch=watch)
-    return done, calibration, interrupted
+            live.add(frame)
+
+    return watch

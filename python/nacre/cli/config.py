@@ -13,9 +13,15 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nacre.cli.terminal import CommandError
+from nacre.errors import FileFormatError, shown
+from nacre.io.raw import read_text
 
 if TYPE_CHECKING:
     from nacre.model import ModelParameters
+
+
+_MOST_BYTES = 1 << 16
+_DEEP_KEY = re.compile(r"(?:[^\s.,=\[\]{}]+[ \t]*\.[ \t]*){16}")
 
 
 class Preset(str, Enum):
@@ -71,15 +77,34 @@ def model_parameters(
 
     document = dict(_read_toml(config)) if config is not None else {}
     name = document.pop("preset", "default")
-    if name not in Preset.__members__:
-        raise CommandError(f"{config}: preset must be default or paper, got {name!r}", 2)
+    if not isinstance(name, str) or name not in Preset.__members__:
+        raise FileFormatError(config or "", f"preset must be default or paper, got {shown(name)}")
     name = preset.value if preset is not None else name
     parameters = ModelParameters.preset(name)  # type: ignore[arg-type]
-    changes = dict(_leaves(document))
+    if config is not None:
+        parameters = _told_by_file(config, document, parameters)
+    changes: dict[str, Any] = {}
     for setting in settings or ():
         changes.update(_setting(setting))
     changes.update({key: value for key, value in more.items() if value is not None})
     return updated(parameters, {k: _checked(parameters, k, v) for k, v in changes.items()}), name
+
+
+def _told_by_file(path: Path, document: Mapping[str, Any], parameters: ModelParameters) -> ModelParameters:
+    """Return the parameters with the changes of a file, which must make a model."""
+    from nacre._core import Camera
+    from nacre.model import Model
+    from nacre.parameters import updated
+
+    try:
+        changes = dict(_leaves(document))
+        changed = updated(parameters, {key: _checked(parameters, key, value) for key, value in changes.items()})
+        Model(Camera(width=8, height=8, fx=8, fy=8, cx=4, cy=4), parameters=changed)
+    except RecursionError:
+        raise FileFormatError(path, "its tables are nested too deep") from None
+    except (CommandError, ValueError, TypeError) as error:
+        raise FileFormatError(path, str(error)) from error
+    return changed
 
 
 def _toml() -> Any:
@@ -91,11 +116,19 @@ def _toml() -> Any:
 
 def _read_toml(path: Path) -> Mapping[str, Any]:
     toml = _toml()
+    text = read_text(path, _MOST_BYTES)
+    deep = _DEEP_KEY.search(text)
+    if deep is not None:  # Python's parser takes the square of its length
+        line = 1 + text.count("\n", 0, deep.start())
+        raise FileFormatError(path, "not TOML that can be read: a key is nested too deep", line=line)
     try:
-        with path.open("rb") as stream:
-            document: Mapping[str, Any] = toml.load(stream)
-    except (toml.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise CommandError(f"{path}: not TOML: {error}", 2) from error
+        document: Mapping[str, Any] = toml.loads(text)
+    except RecursionError:
+        raise FileFormatError(path, "not TOML that can be read: it is nested too deep") from None
+    except ValueError as error:  # TOMLDecodeError, or a number of more digits than Python reads
+        found = re.search(r"line (\d+)", str(error))
+        line = int(found[1]) if found else 1 + text.rstrip().count("\n")
+        raise FileFormatError(path, f"not TOML: {error}", line=line) from error
     return document
 
 
@@ -134,7 +167,11 @@ def _checked(parameters: Any, key: str, value: Any) -> Any:
     if key == "depth.noise":
         from nacre.noise import NoiseModel, as_noise_choice
 
-        return NoiseModel(**value) if isinstance(value, Mapping) else as_noise_choice(key, value)
+        try:
+            return NoiseModel(**value) if isinstance(value, Mapping) else as_noise_choice(key, value)
+        except TypeError as error:
+            names = ", ".join(field.name for field in dataclasses.fields(NoiseModel))
+            raise CommandError(f"{key} must have numbers for {names}, got {shown(value)}", 2) from error
     if dataclasses.is_dataclass(current):
         raise CommandError(
             f"{key} is a group; set one of {', '.join(f.name for f in dataclasses.fields(current))}", 2

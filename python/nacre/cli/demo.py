@@ -12,6 +12,7 @@ import typer
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
 from nacre.cli.results import file_rows, trajectory_rows, write_results
 from nacre.cli.running import run_frames
+from nacre.cli.stopping import interruptible
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
 
 
@@ -63,7 +64,8 @@ def demo(
     if parameters.predict_motion:
         start += ", and from the one that continues the last motion"
     terminal.say(f"{words}; preset {preset_name}\neach view is registered starting from {start}")
-    interrupted = run_frames(terminal, done, range(views))
+    with interruptible() as stop:
+        run_frames(terminal, done, range(views), stop)
     done.evaluate_trajectory()
     figures: dict[str, Any] = {}
     if len(done.model):
@@ -81,7 +83,7 @@ def demo(
             "edge_mixing": edge_mixing, "seed": seed,
         },
         "preset": preset_name,
-        "interrupted": interrupted,
+        "interrupted": stop.wanted,
         "pose_error": pose_error,
         **figures,
     }  # fmt: skip
@@ -100,8 +102,8 @@ def demo(
     terminal.say(table(_rows(done, pose_error)))
     terminal.say()
     terminal.say(table([*file_rows(out), ("pictures", str(out / "pictures"))]))
-    if interrupted:
-        raise typer.Exit(130)
+    if stop.wanted:
+        raise typer.Exit(stop.exit_code)
     if done.num_tracked == 0:
         raise CommandError(f"every frame was lost: {done.frames[0].reason}")
 

@@ -11,6 +11,7 @@ from nacre.cli.feed import is_camera, open_camera
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
 from nacre.cli.surfaces import MESH_SUFFIXES, POINT_SUFFIXES, has_faces
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
+from nacre.cli.unfinished import describe_unfinished
 
 Rows = list[tuple[str, str]]
 
@@ -36,6 +37,9 @@ def info(
         return
     if not source.exists():
         raise CommandError(f"no such file or folder: {source}", 2)
+    if (source / "unfinished" / "run.json").is_file():
+        terminal.answer(*describe_unfinished(source))
+        return
     from nacre.datasets.detect import FILE_SUFFIXES
 
     if source.is_dir() or source.suffix.lower() in FILE_SUFFIXES or format is not None:
@@ -82,7 +86,7 @@ def _camera(source: Path) -> tuple[dict[str, Any], Rows]:
 def _recording(sequence: Any) -> tuple[dict[str, Any], Rows]:
     import numpy as np
 
-    from nacre.cli.reconstruct import recording
+    from nacre.cli.run import recording
     from nacre.errors import FileFormatError
 
     figures = {"kind": "recording", **recording(sequence), "timestamps": sequence.has_timestamps}

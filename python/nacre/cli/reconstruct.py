@@ -2,38 +2,57 @@
 
 from __future__ import annotations
 
-import dataclasses
-from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nacre.cli.calibrating import run_calibrated
+from nacre.cli.asked import Asked, asked_before, check_recording, describe
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
 from nacre.cli.feed import LiveFeed, camera_feed, is_camera, real_time_feed
-from nacre.cli.results import file_rows, trajectory_rows, write_results
-from nacre.cli.running import retry_lost, run_frames
+from nacre.cli.run import Run, carry_out
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
-from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
+from nacre.cli.stopping import interruptible
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_folder
+from nacre.cli.unfinished import Unfinished, read_asked
 from nacre.cli.view import PortOption
 
 if TYPE_CHECKING:
-    from nacre.datasets import Sequence
+    from nacre import ModelParameters
 
 
 def reconstruct(
+    context: typer.Context,
     source: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
             metavar="SOURCE",
             help="The recording: a folder or a file; or a camera: realsense, realsense:SERIAL.",
             show_default=False,
         ),
-    ],
+    ] = None,
     out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.", show_default=False)
-    ],
+        Path | None,
+        typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.", show_default=False),
+    ] = None,
+    resume: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="OUT",
+            help="Go on with the run that was stopped or killed while it wrote to this folder; source and "
+            "options are those that it had.",
+            show_default=False,
+        ),
+    ] = None,
+    checkpoint_every: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            metavar="N",
+            help="Save the run in OUT/unfinished after every N frames; 0: only where it is stopped.",
+            show_default="about 2 % of the time",
+        ),
+    ] = None,
     format: FormatOption = None,
     camera: CameraOption = None,
     depth_scale: DepthScaleOption = None,
@@ -127,135 +146,120 @@ def reconstruct(
     OUT gets model.ply (points with normals, in the first camera's frame), trajectory.txt, report.json and
     report.html. A frame that cannot be read or registered is LOST and changes nothing.
     The frames may be far apart and in any order: a lost camera is searched for everywhere.
+
+    Ctrl-C (and SIGTERM) saves the run and writes what there is; --resume OUT goes on with it, and with one
+    that was killed, to the same model. OUT/unfinished is there as long as a run is not finished.
     """
     terminal = Terminal(json, quiet, verbose)
-    more: dict[str, Any] = {
-        "depth.min_depth": min_depth,
-        "depth.max_depth": max_depth,
-        "loop_closure": loop_closure,
-    }
-    sides = ("min_x", "max_x", "min_y", "max_y", "min_z", "max_z")
-    more |= {f"region.{side}": value for side, value in zip(sides, box or (), strict=box is not None)}
-    more["region.object"] = object or None
-    parameters, preset_name = model_parameters(preset, config, settings, **more)
+    with interruptible() as stop:
+        if resume is not None:
+            run = _resumed(context, resume, checkpoint_every)
+        else:
+            if source is None or out is None:
+                missing = "argument 'SOURCE'" if source is None else "option '--out' / '-o'"
+                raise CommandError(f"missing {missing} (see nacre reconstruct --help)", 2)
+            more: dict[str, Any] = {
+                "depth.min_depth": min_depth,
+                "depth.max_depth": max_depth,
+                "loop_closure": loop_closure,
+            }
+            sides = ("min_x", "max_x", "min_y", "max_y", "min_z", "max_z")
+            more |= {f"region.{side}": value for side, value in zip(sides, box or (), strict=box is not None)}
+            more["region.object"] = object or None
+            parameters, preset_name = model_parameters(preset, config, settings, **more)
+            asked = Asked(
+                str(source),
+                format=format,
+                camera=_text(camera),
+                depth_scale=depth_scale,
+                masks=_text(masks),
+                attribute=attribute or [],
+                color=color,
+                first=first,
+                last=last,
+                every=every,
+                realtime=realtime,
+                retry=retry,
+                calibrate=calibrate,
+                preset=preset_name,
+                is_camera=is_camera(source),
+            )
+            run = _begun(terminal, asked, out, parameters, checkpoint_every)
+        carry_out(terminal, run, stop, port if view else None)
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)
+
+
+def _begun(
+    terminal: Terminal, asked: Asked, out: Path, parameters: ModelParameters, checkpoint_every: int | None
+) -> Run:
+    """Open what was asked for, and note it in ``OUT/unfinished``."""
     feed: LiveFeed | None = None
-    pick = (first, None if last is None else last + 1, every)
-    if is_camera(source):
-        given = {"--format": format, "--camera": camera, "--depth-scale": depth_scale, "--masks": masks}
-        for option, value in (given | {"--attribute": attribute, "--realtime": realtime or None}).items():
+    indices: range | None = None
+    if asked.is_camera:
+        given: dict[str, Any] = {
+            "--format": asked.format,
+            "--camera": asked.camera,
+            "--depth-scale": asked.depth_scale,
+        }
+        given |= {"--masks": asked.masks, "--attribute": asked.attribute or None}
+        for option, value in (given | {"--realtime": asked.realtime or None}).items():
             if value is not None:
-                raise CommandError(f"{option} is for recordings, and {source} is a camera", 2)
-        feed = camera_feed(source, writable_folder(out), color, pick)
+                raise CommandError(f"{option} is for recordings, and {asked.source} is a camera", 2)
+        feed = camera_feed(Path(asked.source), writable_folder(out), asked.color, asked.pick)
         sequence, words = feed.sequence, f"live, {describe_camera(feed.sequence.camera)}"
     else:
-        sequence = open_source(source, format, camera, depth_scale)
-        if masks is not None:
-            sequence = sequence.with_masks(masks)
-        for text in attribute or ():
-            name, equals, folder = text.partition("=")
-            if not (name and equals and folder):
-                raise CommandError(f"--attribute needs NAME=FOLDER, got {text!r}", 2)
-            sequence = sequence.with_attribute(name, folder)
-        if not color:
-            sequence = sequence.without_color()
-        indices = range(len(sequence))[slice(*pick)]
-        if not indices:
-            raise CommandError(f"no frames are left of {len(sequence)} (0 to {len(sequence) - 1})", 2)
+        sequence = asked.open()
+        indices = asked.indices(sequence)
         words = describe(sequence, indices)
-        if realtime:
+        if asked.realtime:
             feed = real_time_feed(sequence, indices)
     import nacre
     from nacre.depth_calibration import can_calibrate
+    from nacre.io.atomic import remove_leftovers
     from nacre.reconstruction import Reconstruction
 
     done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
     writable_folder(out)
-    terminal.say(f"{sequence.name}: {words}")
-    live = None
-    if view:
-        from nacre.viewer import LiveView
-
-        live = LiveView(done, sequence.name, port=port)
-        terminal.say(f"the model is at {live.viewer.url}")
+    remove_leftovers(out)
     # What turns before a camera that stands still is not one scene with what is around it.
-    whole = masks is None and parameters.region == nacre.RegionParameters()
-    calibration = None
-    if feed is not None:
-        with closing(feed):
-            interrupted = run_frames(terminal, done, feed, watch=live.add if live else None)
-        # Who stops a camera is content with what it saw.
-        interrupted = interrupted and not feed.is_camera
-    elif calibrate and whole and preset_name != "paper" and can_calibrate(sequence.camera):
-        done, calibration, interrupted = run_calibrated(terminal, done, sequence, indices, live)
-    else:
-        interrupted = run_frames(terminal, done, indices, watch=live.add if live else None)
-    if retry and not interrupted:
-        interrupted = retry_lost(terminal, done)
-    done.evaluate_trajectory()
-    report = write_results(
-        out,
-        done,
-        title=sequence.name,
-        source=words if feed is None else f"{words}; {feed.summary}",
-        document={
-            "recording": recording(sequence),
-            "preset": preset_name,
-            "interrupted": interrupted,
-            "depth_calibration": calibration
-            and dataclasses.asdict(calibration) | {"used": calibration.is_significant},
-            "live": None if feed is None else feed.figures,
-        },
-        figures=None if feed is None else dict(feed.rows),
-    )
-    if json:
-        print(to_json(report))
-    rows = [] if feed is None else feed.rows
-    terminal.say(table([*trajectory_rows(done), *rows, *file_rows(out)]))
-    if live is not None:
-        live.finish()
-        if not interrupted:
-            terminal.say(f"the model stays at {live.viewer.url}; Ctrl-C ends it")
-            live.viewer.wait()
-        live.viewer.close()
-    if interrupted:
+    whole = asked.masks is None and parameters.region == nacre.RegionParameters()
+    calibrates = asked.calibrate and feed is None and whole and asked.preset != "paper"
+    unfinished = Unfinished(out, checkpoint_every)
+    if unfinished.checkpoint.exists():
         terminal.say(
-            f"interrupted after {len(done.frames)} of {len(indices)} frames; what there is was written"
+            f"{out} held an unfinished run, which --resume would have gone on with: it is begun again"
         )
-        raise typer.Exit(130)
-    if feed is not None and feed.error is not None:
-        raise CommandError(f"{feed.error}; what there is was written")
-    if done.num_tracked == 0:
-        reasons = list(dict.fromkeys(frame.reason for frame in done.frames))
-        others = " (and other reasons)" * (len(reasons) > 1)
-        raise CommandError(
-            f"every frame was lost: {reasons[0]}{others}; nacre info {source} looks at its depth"
-        )
+    unfinished.stage.name = "views" if calibrates and can_calibrate(sequence.camera) else "frames"
+    unfinished.begin(done, asked.document(sequence))
+    return Run(asked, out, done, sequence, unfinished, words, indices, feed)
 
 
-def describe(sequence: Sequence, indices: range) -> str:
-    """Return in words where the frames come from."""
-    step = f", every {indices.step} frames" if indices.step > 1 else ""
-    part = "" if len(indices) == len(sequence) else f" (frames {indices[0]} to {indices[-1]}{step})"
-    truth = ", with true poses" if sequence.truth is not None else ""
-    return (
-        f"{len(indices)} of {len(sequence)} frames{part}, {sequence.format} format, "
-        f"{describe_camera(sequence.camera)}{truth}"
-    )
+def _resumed(context: typer.Context, out: Path, checkpoint_every: int | None) -> Run:
+    """Open what a run was asked for that was stopped or killed, and load what it had."""
+    allowed = ("resume", "checkpoint_every", "view", "port", "json", "quiet", "verbose")
+    for name in context.params:
+        if name not in allowed and str(context.get_parameter_source(name)).endswith("COMMANDLINE"):
+            option = "SOURCE" if name == "source" else "--" + name.replace("_", "-")
+            raise CommandError(f"--resume takes everything from {out / 'unfinished'}: leave out {option}", 2)
+    document = read_asked(out)
+    asked, folder = asked_before(document, out / "unfinished" / "run.json")
+    unfinished = Unfinished(out, checkpoint_every)
+    if asked.is_camera:
+        from nacre.datasets.growing import mend
 
-
-def recording(sequence: Sequence) -> dict[str, Any]:
-    """Return what report.json says about the recording."""
-    camera = sequence.camera
-    names: tuple[str, ...] = ("model", "width", "height", "pixel_size")
-    if camera.model != "orthographic":
-        names = ("model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "depth")
-    return {
-        "path": str(sequence.path),
-        "name": sequence.name,
-        "format": sequence.format,
-        "num_frames": len(sequence),
-        "camera": {name: getattr(camera, name) for name in names},
-        "depth_scale": sequence.depth_scale,
-        "color": sequence.has_color,
-        "truth": sequence.truth is not None,
-    }
+        mend(out / "recording")
+        sequence = open_source(out / "recording")
+        words = f"live, {describe_camera(sequence.camera)}"
+        indices: Any = range(len(sequence))
+    else:
+        sequence = asked.open(folder)
+        check_recording(document, sequence)
+        indices = asked.indices(sequence)
+        words = describe(sequence, indices)
+        if asked.realtime:  # what it had seen; which frames come, is the clock's doing
+            indices = unfinished.journaled_indices()
+    done = unfinished.resume(sequence, compare=not asked.is_camera)  # its colours were kept as JPEG
+    return Run(asked, out, done, sequence, unfinished, words, indices, None)

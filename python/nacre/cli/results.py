@@ -30,10 +30,10 @@ def write_results(
     document: Mapping[str, Any],
     figures: Mapping[str, Any] | None = None,
     pictures: bool = False,
+    page: bool = True,
 ) -> dict[str, Any]:
-    """Write the files of a run and return what report.json, the last one, holds."""
+    """Write the files of a run, the page if wanted, and return what report.json, the last one, holds."""
     import nacre
-    from nacre.report import render_page
 
     model = done.model
     nacre.write_points(
@@ -46,12 +46,15 @@ def write_results(
     )
     trajectory = done.trajectory
     nacre.write_trajectory(folder / "trajectory.txt", trajectory.timestamps, trajectory.poses)
-    page = render_page(
-        done.report_data(title, source, figures, interrupted=bool(document.get("interrupted")))
-    )
-    _write(folder / "report.html", page.encode())
-    if pictures:
-        _write_pictures(folder / "pictures", page)
+    if page:
+        from nacre.report import render_page
+
+        text = render_page(
+            done.report_data(title, source, figures, interrupted=bool(document.get("interrupted")))
+        )
+        _write(folder / "report.html", text.encode())
+        if pictures:
+            _write_pictures(folder / "pictures", text)
     report = done.as_dict(title=title, source=source, **document)
     _write(folder / "report.json", (to_json(report) + "\n").encode())
     return report

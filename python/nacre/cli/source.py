@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nacre.cli.terminal import CommandError
-from nacre.errors import FileFormatError
+from nacre.errors import FileFormatError, UnknownRecordingError
 
 if TYPE_CHECKING:
     from nacre import Camera
@@ -58,8 +58,7 @@ def open_source(
     try:
         return nacre.open_sequence(source, format=format, camera=camera, depth_scale=depth_scale)
     except FileFormatError as error:
-        # About the whole folder: it is no recording, or not without more options.
-        code = 2 if error.path == source else 1
+        code = 2 if isinstance(error, UnknownRecordingError) else 1
         text, *layouts = str(error).split(" Known formats:")
         if layouts:
             names = ", ".join(line.split(":")[0].strip() for line in layouts[0].splitlines() if line)

@@ -86,6 +86,7 @@ def has_faces(path: Path) -> bool:
     if path.suffix.lower() != ".ply":
         return True
     from nacre.io.ply_header import read_header
+    from nacre.io.raw import read_file
 
-    header = read_header(path, path.read_bytes())
+    header = read_header(path, read_file(path))
     return any(element.name == "face" and element.num_rows > 0 for element in header.elements)

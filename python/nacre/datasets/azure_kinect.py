@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,10 @@ from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
+from nacre.io.cameras import check_lens
 from nacre.io.images import DEPTH_SUFFIXES, read_depth
+from nacre.io.json_files import parse_json
+from nacre.io.raw import read_file
 
 FORMAT = "azure-kinect"
 LAYOUT = "calibration.json and the depth images, in depth/ or beside it, as ffmpeg takes them out of the .mkv"
@@ -31,6 +33,7 @@ _MODES = {
     (512, 512): (512, 0, 0),
 }
 _MODEL = "CALIBRATION_LensDistortionModelBrownConrady"
+_MOST_BYTES = 1 << 20
 _PURPOSE = "CALIBRATION_CameraPurposeDepth"
 
 
@@ -101,10 +104,11 @@ def _camera(path: Path, width: int, height: int) -> Camera:
         _log.warning("the lens is known to %.1f pixels at the edges of the images", error * side * fx)
     # The file measures from the corner of the sensor in its sides; pixel centres are integers.
     try:
-        return Camera(
+        camera = Camera(
             width, height, side * fx, side * fy, side * cx - left - 0.5, side * cy - top - 0.5,
             distortion=[k1, k2, lens[9], lens[8], k3],
         )  # fmt: skip
+        return check_lens(path, camera)
     except ValueError as error:
         raise FileFormatError(path, str(error)) from error
 
@@ -112,11 +116,13 @@ def _camera(path: Path, width: int, height: int) -> Camera:
 def _parameters(path: Path) -> npt.NDArray[np.float64]:
     """Return cx cy fx fy k1 ... k6, the centre of distortion, p2 and p1 of the depth camera."""
     try:
-        cameras: Any = json.loads(path.read_text(encoding="utf-8").rstrip("\0"))
+        cameras: Any = parse_json(path, read_file(path, _MOST_BYTES).rstrip(b"\0"))
         cameras = cameras["CalibrationInformation"]["Cameras"]
         (lens,) = (camera["Intrinsics"] for camera in cameras if camera["Purpose"] == _PURPOSE)
         model, values = lens["ModelType"], np.array(lens["ModelParameters"], np.float64)
-    except (ValueError, KeyError, TypeError, OSError) as error:
+    except FileFormatError:
+        raise
+    except (ValueError, KeyError, TypeError, OverflowError, OSError) as error:
         raise FileFormatError(path, f"not the calibration of an Azure Kinect: {error!r}") from error
     if model != _MODEL or len(values) < 14 or not np.isfinite(values).all() or not (values[2:4] > 0).all():
         raise FileFormatError(

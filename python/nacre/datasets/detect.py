@@ -25,7 +25,7 @@ from nacre.datasets import (
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files
 from nacre.datasets.sequence import Sequence, check_first_view
-from nacre.errors import FileFormatError, meant
+from nacre.errors import UnknownRecordingError, meant
 from nacre.io.cameras import read_camera
 from nacre.io.images import COLOR_SUFFIXES, DEPTH_SUFFIXES
 
@@ -129,7 +129,7 @@ def _recognised(path: Path, given: Given) -> Reader:
         for module in (stanford, rosbag, record3d, azure_kinect):
             if module.recognise(path):
                 return READERS[module.FORMAT]
-        raise FileFormatError(
+        raise UnknownRecordingError(
             path,
             "not a recording: a recording is a folder, a .bag, .mcap, .db3 or .r3d, or a range scan (.ply "
             "with a range_grid)",
@@ -137,7 +137,7 @@ def _recognised(path: Path, given: Given) -> Reader:
     for name, reader in READERS.items():
         if reader.recognise(path) and not (name == images.FORMAT and _needs_more(path, given)):
             return reader
-    raise FileFormatError(path, _explanation(path))
+    raise UnknownRecordingError(path, _explanation(path))
 
 
 def _needs_more(folder: Path, given: Given) -> bool:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from nacre._core import Camera
-from nacre.errors import FileFormatError
+from nacre.errors import UnknownRecordingError
 from nacre.io.cameras import read_camera
 
 
@@ -37,5 +37,5 @@ class Given:
         """Return camera and depth scale, or raise with a hint where they are missing."""
         missing = [n for n, v in (("camera", self.camera), ("depth_scale", self.depth_scale)) if v is None]
         if self.camera is None or self.depth_scale is None:
-            raise FileFormatError(path, f"{' and '.join(missing)} not known: {hint}")
+            raise UnknownRecordingError(path, f"{' and '.join(missing)} not known: {hint}")
         return self.camera, self.depth_scale

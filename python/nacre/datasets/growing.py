@@ -14,7 +14,7 @@ from nacre._core import Camera
 from nacre.datasets import plain
 from nacre.datasets.sequence import FrameSource, Sequence, SequenceFrame
 from nacre.errors import CameraError
-from nacre.io.atomic import atomic_writer
+from nacre.io.atomic import atomic_writer, remove_leftovers
 from nacre.io.cameras import write_camera
 from nacre.io.images import write_color_jpeg, write_color_png, write_depth_png
 
@@ -25,8 +25,8 @@ class GrowingRecording(Sequence):
     """
     A plain recording that views are added to; a thread of its own writes them.
 
-    What is in the folder is a whole recording at any moment, but for the time stamps, which :meth:`close`
-    writes. Colours are kept as JPEG, for the time that PNG takes.
+    What is in the folder is a whole recording at any moment, but for the view that is just being written:
+    :func:`mend` takes that back. Colours are kept as JPEG, for the time that PNG takes.
 
     Parameters
     ----------
@@ -104,16 +104,39 @@ class GrowingRecording(Sequence):
                     raise CameraError(f"images cannot be kept in {self.path}: {error.strerror}") from error
 
     def _write(self, frame: SequenceFrame, source: FrameSource) -> None:
-        stored = np.rint(np.nan_to_num(frame.depth) * self.depth_scale)
-        write_depth_png(source.depth, np.where(stored < 65535, stored, 0).astype(np.uint16), fast=True)
         if source.color is not None and frame.color is not None:
             write_color_jpeg(source.color, frame.color)
         if source.mask is not None and frame.mask is not None:
             white = np.repeat(frame.mask[..., None], 3, axis=2).astype(np.uint8) * 255
             write_color_png(source.mask, white)
+        stored = np.rint(np.nan_to_num(frame.depth) * self.depth_scale)
+        write_depth_png(source.depth, np.where(stored < 65535, stored, 0).astype(np.uint16), fast=True)
+        if source.timestamp is not None:
+            with (self.path / "timestamps.txt").open("ab", buffering=0) as stream:
+                stream.write(f"{source.timestamp!r}\n".encode())
+
+    def settle(self) -> None:
+        """Wait until all views are written."""
+        self._settle(0)
 
     def _read(self, source: FrameSource) -> SequenceFrame:
         if self._newest is not None and source.index == self._newest.index:
             return self._newest
         self._settle(0)
         return super()._read(source)
+
+
+def mend(path: str | os.PathLike[str]) -> None:
+    """Take back the view that a killed process was writing to a :class:`GrowingRecording`."""
+    folder = Path(path)
+    for inside in ("", "depth", "color", "mask"):
+        remove_leftovers(folder / inside)
+    times = folder / "timestamps.txt"
+    if not times.exists():
+        return
+    lines = [line for line in times.read_bytes().splitlines(keepends=True) if line.endswith(b"\n")]
+    depth = sorted((folder / "depth").glob("*.png"))
+    for image in depth[len(lines) :]:
+        image.unlink()
+    with atomic_writer(times) as stream:
+        stream.write(b"".join(lines[: len(depth)]))

@@ -15,11 +15,12 @@ import numpy as np
 
 from nacre._core import Camera
 from nacre.datasets.given import Given
-from nacre.datasets.listing import describe, files, pair
+from nacre.datasets.listing import describe, files, inside, pair, require_order
 from nacre.datasets.sequence import FrameSource, Sequence
-from nacre.datasets.tum import poses_at, read_list
+from nacre.datasets.tum import lines_of, poses_at, time_of
 from nacre.errors import FileFormatError
 from nacre.io.images import COLOR_SUFFIXES, DEPTH_SUFFIXES
+from nacre.io.raw import excerpt
 from nacre.io.trajectories import Trajectory, read_trajectory
 
 FORMAT = "icl-nuim"
@@ -62,17 +63,21 @@ def read(folder: Path, given: Given) -> Sequence:
 
 def _read_associations(path: Path) -> list[tuple[float, Path, Path | None]]:
     views: list[tuple[float, Path, Path | None]] = []
-    for time, rest in read_list(path):
-        words = rest.split()
-        if len(words) != 3:
-            raise FileFormatError(
-                path, f"expected 'number depth-file number rgb-file', got '{time:g} {rest[:60]}'"
-            )
+    for number, line in lines_of(path):
+        words = line.split()
+        times = [time_of(word) for word in words[::2]]
+        if len(words) != 4 or not np.isfinite(times).all():
+            reason = f"expected 'number depth-file number rgb-file', got {excerpt(line.encode())}"
+            raise FileFormatError(path, reason, line=number)
+        first, second = (inside(path.parent, name, path, number) for name in words[1::2])
         # The dataset's own lists have depth first; lists made by TUM's associate.py mostly have colour first.
-        if words[0].startswith("depth"):
-            views.append((time, path.parent / words[0], path.parent / words[2]))
+        if words[1].startswith("depth"):
+            views.append((times[0], first, second))
         else:
-            views.append((float(words[1]), path.parent / words[2], path.parent / words[0]))
+            views.append((times[1], second, first))
+        require_order(path, number, views[-1][0], views[-2][0] if len(views) > 1 else None)
+    if not views:
+        raise FileFormatError(path, "the list is empty")
     return views
 
 

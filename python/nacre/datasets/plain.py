@@ -20,9 +20,9 @@ import numpy.typing as npt
 from nacre import arrays
 from nacre._core import Camera
 from nacre.datasets.given import Given
-from nacre.datasets.listing import describe, files
+from nacre.datasets.listing import describe, files, require_order
 from nacre.datasets.sequence import FrameSource, Sequence
-from nacre.datasets.tum import read_truth
+from nacre.datasets.tum import lines_of, read_truth, time_of
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 from nacre.io.cameras import write_camera
@@ -33,6 +33,7 @@ from nacre.io.images import (
     write_color_png,
     write_depth_png,
 )
+from nacre.io.raw import excerpt
 from nacre.io.trajectories import write_trajectory
 
 FORMAT = "plain"
@@ -133,10 +134,8 @@ def write_recording(
         The folder holds a recording already.
     """
     folder = Path(path)
-    if not (np.isfinite(depth_scale) and depth_scale > 0):
-        raise ValueError(
-            f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}"
-        )
+    arrays.as_camera("camera", camera)
+    depth_scale = arrays.as_scale("depth_scale", depth_scale)
     require_no_recording(folder)
     (folder / "depth").mkdir(parents=True, exist_ok=True)
     if colors is not None:
@@ -152,13 +151,14 @@ def write_recording(
             folder / "depth" / f"{index:06d}.png", _stored(view["depth_images"], camera, depth_scale, index)
         )
         if "colors" in view:
-            color = np.asarray(view["colors"])
-            if color.shape != (camera.height, camera.width, 3):
+            color = arrays.as_real(f"colors[{index}]", view["colors"])
+            if color.shape != (camera.height, camera.width, 3) or color.dtype != np.uint8:
                 raise ValueError(
-                    f"colors[{index}] must have shape ({camera.height}, {camera.width}, 3), got {color.shape}"
+                    f"colors[{index}] must be uint8 of shape ({camera.height}, {camera.width}, 3), "
+                    f"got {color.dtype} {color.shape}"
                 )
             write_color_png(folder / "color" / f"{index:06d}.png", color)
-        times.append(float(view.get("timestamps", index)))
+        times.append(arrays.as_number(f"timestamps[{index}]", view.get("timestamps", index)))
         if "poses" in view:
             truth.append(arrays.as_pose(f"poses[{index}]", view["poses"]))
         index += 1
@@ -193,21 +193,22 @@ def _next_view(iterators: dict[str, Any], index: int) -> dict[str, Any]:
 
 
 def _stored(depth: Any, camera: Camera, depth_scale: float, index: int) -> npt.NDArray[np.uint16]:
-    metres = np.asarray(depth, dtype=np.float64)
     name, shape = f"depth_images[{index}]", (camera.height, camera.width)
+    metres = arrays.as_rows(arrays.as_real(name, depth), np.float64)
     if metres.shape != shape:
         raise ValueError(f"{name} must have the camera's shape {shape}, got {metres.shape}")
     valid = np.isfinite(metres) & (metres > 0)
-    units = np.rint(np.where(valid, metres, 0.0) * depth_scale)
+    with np.errstate(over="ignore"):
+        units = np.rint(np.where(valid, metres, 0.0) * depth_scale)
     if units.max() > _LARGEST_STORED:
         raise ValueError(
-            f"{name} reaches {metres[valid].max():g} m, which does not fit 16 bits at "
-            f"depth_scale={depth_scale:g} (at most {_LARGEST_STORED / depth_scale:g} m); give a smaller one"
+            f"{name} must fit 16 bits at depth_scale={depth_scale:g} (at most {_LARGEST_STORED / depth_scale:g} "
+            f"m), got {metres[valid].max():g} m; give a smaller scale"
         )
     if (units[valid] == 0).any():
         raise ValueError(
-            f"{name} has depths of {metres[valid].min():g} m, which round to 0 (no measurement) at "
-            f"depth_scale={depth_scale:g}; give a larger one"
+            f"{name} must not round to 0 (no measurement) at depth_scale={depth_scale:g}, got "
+            f"{metres[valid].min():g} m; give a larger scale"
         )
     return units.astype(np.uint16)
 
@@ -215,18 +216,15 @@ def _stored(depth: Any, camera: Camera, depth_scale: float, index: int) -> npt.N
 def _read_timestamps(path: Path, count: int) -> npt.NDArray[np.float64] | None:
     if not path.is_file():
         return None
-    lines = [line.strip() for line in path.read_text(encoding="utf-8").splitlines()]
-    times = []
-    for number, line in enumerate(lines, start=1):
-        if not line or line.startswith("#"):
-            continue
-        try:
-            times.append(float(line))
-        except ValueError as error:
-            raise FileFormatError(
-                path, f"expected a time in seconds, got {line[:60]!r}", line=number
-            ) from error
-    if len(times) != count or not np.isfinite(times).all():
+    times: list[float] = []
+    for number, line in lines_of(path):
+        time = time_of(line)
+        if not np.isfinite(time):
+            reason = f"expected a time in seconds, a finite number, got {excerpt(line.encode())}"
+            raise FileFormatError(path, reason, line=number)
+        require_order(path, number, time, times[-1] if times else None)
+        times.append(time)
+    if len(times) != count:
         raise FileFormatError(
             path, f"expected {count} finite times, one for each depth image, got {len(times)}"
         )

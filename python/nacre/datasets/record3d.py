@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import io
-import json
 import re
 from pathlib import Path, PurePosixPath
 from typing import Any
@@ -15,8 +13,12 @@ from nacre._core import Camera
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe
 from nacre.datasets.sequence import FrameSource, Sequence
-from nacre.errors import FileFormatError
+from nacre.errors import FileFormatError, shown
 from nacre.io.images import decode_color, read_depth
+from nacre.io.cameras import check_lens
+from nacre.io.image_limits import check_lzfse
+from nacre.io.json_files import parse_json
+from nacre.io.raw import read_file, require_regular
 from nacre.io.trajectories import Trajectory, matrix_from_quaternion
 
 FORMAT = "record3d"
@@ -25,6 +27,9 @@ LAYOUT = (
 )
 SUFFIXES = (".r3d",)
 
+_MOST_METADATA = 1 << 25
+_MOST_RATIO = 100  # of what the archive holds to its packed size, beyond the first megabyte
+_COMPRESSIONS = (0, 8)  # none and deflate; zipfile unpacks the others in one go, whatever their size
 _MISSING = 'Record3D recordings need pyliblzfse: pip install "nacre[record3d]"'
 _SIZES = {256 * 192: (192, 256), 640 * 480: (480, 640), 960 * 720: (720, 960)}  # of early versions, upright
 
@@ -108,10 +113,7 @@ class _Files:
         return place.relative_to(self.path).as_posix()
 
     def read(self, name: str, most: int) -> bytes:
-        path = self.path / name
-        if path.stat().st_size > most:
-            raise FileFormatError(path, f"larger than what it can hold: {path.stat().st_size} bytes")
-        return path.read_bytes()
+        return read_file(self.path / name, most)
 
     def depth(self, name: str, size: tuple[int, int] | None) -> npt.NDArray[np.float32]:
         """Return a depth image [m], NaN where nothing was measured."""
@@ -130,6 +132,7 @@ class _Files:
         place, each = self.path / name, np.dtype(kind).itemsize
         pixels = max(_SIZES) if size is None else size[0] * size[1]
         packed = self.read(name, 2 * pixels * each + 4096)
+        check_lzfse(place, packed, max(_SIZES) * each if size is None else pixels * each)
         try:
             data = liblzfse.decompress(packed)
         except Exception as error:
@@ -144,7 +147,7 @@ class _Files:
 
     def color(self, name: str, size: tuple[int, int]) -> npt.NDArray[np.uint8]:
         """Return a colour image, brought to a size (width, height)."""
-        return decode_color(io.BytesIO(self.read(name, 1 << 26)), self.path / name, size)
+        return decode_color(self.read(name, 1 << 26), self.path / name, size)
 
 
 class _Archive(_Files):
@@ -154,11 +157,12 @@ class _Archive(_Files):
         import zipfile
 
         self.path = path
+        require_regular(path)
         try:
             self._zip = zipfile.ZipFile(path)
-        except (zipfile.BadZipFile, OSError) as error:
+            self.names = [info.filename for info in self._zip.infolist() if not info.is_dir()]
+        except Exception as error:  # zipfile has several, and lets through what damaged names and sizes cause
             raise FileFormatError(path, f"not a whole .r3d archive: {error}") from error
-        self.names = [info.filename for info in self._zip.infolist() if not info.is_dir()]
         for name in self.names:
             parts = PurePosixPath(name.replace("\\", "/")).parts
             if ".." in parts or parts[:1] == ("/",) or re.match(r"[A-Za-z]:", name):
@@ -167,9 +171,16 @@ class _Archive(_Files):
     def read(self, name: str, most: int) -> bytes:
         info = self._zip.getinfo(name)
         if info.file_size > most:
-            raise FileFormatError(self.path / name, f"larger than what it can hold: {info.file_size} bytes")
+            reason = f"larger than what it can hold: {info.file_size} bytes, more than {most}"
+            raise FileFormatError(self.path / name, reason)
+        if info.compress_type not in _COMPRESSIONS:
+            raise FileFormatError(self.path / name, "refused: it is compressed by neither deflate nor nothing")
+        if info.file_size > (1 << 20) + _MOST_RATIO * info.compress_size:
+            reason = f"refused: {info.file_size} bytes from {info.compress_size}"
+            raise FileFormatError(self.path / name, reason)
         try:
-            return self._zip.read(info)
+            with self._zip.open(info) as stream:
+                return stream.read(info.file_size)  # no more, whatever there is
         except Exception as error:  # zipfile's, and those of its decompressors
             raise FileFormatError(self.path / name, f"damaged in the archive: {error}") from error
 
@@ -182,10 +193,7 @@ class _Metadata:
         if name is None:
             raise FileFormatError(files.path, "the file 'metadata' is missing")
         self.place = files.path / name
-        try:
-            self.told = json.loads(files.read(name, 1 << 28))
-        except ValueError as error:
-            raise FileFormatError(self.place, f"not a JSON file: {error}") from error
+        self.told = parse_json(self.place, files.read(name, _MOST_METADATA))
         if not isinstance(self.told, dict):
             raise FileFormatError(self.place, f"an object was expected, not a {type(self.told).__name__}")
         self.times = self._table("frameTimestamps", 1)
@@ -202,7 +210,9 @@ class _Metadata:
         if self.times is not None and number < len(self.times):
             return float(self.times[number, 0])
         fps = self.told.get("fps")
-        return number / fps if isinstance(fps, (int, float)) and fps > 0 else None
+        if fps is not None and not (type(fps) in (int, float) and 0 <= fps < 1e6):
+            raise FileFormatError(self.place, f"fps must be a number of frames per second, got {shown(fps)}")
+        return number / fps if fps else None
 
     def camera(self, width: int, height: int) -> Camera:
         """Return the camera of depth images of a size; the file has that of the colours, which are larger."""
@@ -218,7 +228,8 @@ class _Metadata:
         x, y = width / color_width, height / color_height
         # Pixel centres are integers: the middle of a wider pixel moves.
         try:
-            return Camera(width, height, x * fx, y * fy, x * (cx + 0.5) - 0.5, y * (cy + 0.5) - 0.5)
+            camera = Camera(width, height, x * fx, y * fy, x * (cx + 0.5) - 0.5, y * (cy + 0.5) - 0.5)
+            return check_lens(self.place, camera)
         except ValueError as error:
             raise FileFormatError(self.place, str(error)) from error
 
@@ -242,17 +253,19 @@ class _Metadata:
         sides = [self.told.get(key) for key in keys]
         for key, side in zip(keys, sides, strict=True):
             if not isinstance(side, int) or not 0 < side <= 1 << 14:
-                raise FileFormatError(self.place, f"{key} must be a number of pixels, got {side!r}")
+                raise FileFormatError(self.place, f"{key} must be a number of pixels, got {shown(side)}")
         return sides[0], sides[1]
 
     def _table(self, key: str, columns: int) -> npt.NDArray[np.float64] | None:
         """Return numbers, (N, columns); None where there are none."""
         value = self.told.get(key)
-        if not value:
+        if value is None or value == []:
             return None
+        if not isinstance(value, list):
+            raise FileFormatError(self.place, f"{key} must be a table of numbers, got {shown(value)}")
         try:
             table = np.array(value, np.float64).reshape(len(value), -1)
-        except (ValueError, TypeError) as error:
+        except (ValueError, TypeError, OverflowError) as error:
             raise FileFormatError(self.place, f"{key} must be a table of numbers: {error}") from error
         if table.shape[1] != columns or not np.isfinite(table).all():
             raise FileFormatError(self.place, f"{key} must have {columns} finite numbers for each frame")

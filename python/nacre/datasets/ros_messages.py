@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import struct
 from pathlib import Path
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.errors import FileFormatError
+from nacre.io.images import decoded
 
 MILLIMETRES, METRES = ("16UC1", "mono16", "Z16"), ("32FC1",)
 CHANNELS = {"rgb8": (0, 1, 2), "bgr8": (2, 1, 0), "rgba8": (0, 1, 2), "bgra8": (2, 1, 0), "mono8": (0, 0, 0)}
@@ -35,16 +35,12 @@ def pixels(message: Any, place: Path) -> npt.NDArray[Any]:
 
 def compressed_depth(message: Any, place: Path) -> npt.NDArray[Any]:
     """Return the pixels of a compressedDepth image: a header of 12 bytes, then a PNG of 16 bits."""
-    from PIL import Image, UnidentifiedImageError
-
     data = bytes(message.data)
     start = data.find(b"\x89PNG")
     if start < 0 or "32FC1" in message.format:
         raise FileFormatError(place, f"compressed depth must be a PNG of 16 bits, this is {message.format!r}")
-    try:
-        return np.asarray(Image.open(io.BytesIO(data[start:])), dtype=np.uint16)
-    except (UnidentifiedImageError, OSError, SyntaxError) as error:
-        raise FileFormatError(place, f"the PNG is damaged: {error}") from error
+    with decoded(data[start:], place, ("PNG",)) as image:
+        return np.array(image, dtype=np.uint16)
 
 
 def without_tail(data: bytes) -> bytes:

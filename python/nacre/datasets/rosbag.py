@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import logging
 import re
 import weakref
 from collections.abc import Iterator
 from contextlib import suppress
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +28,9 @@ from nacre.datasets.ros_messages import (
 )
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
+from nacre.io.cameras import check_lens
 from nacre.io.images import decode_color
+from nacre.io.raw import read_file, require_regular
 
 _log = logging.getLogger(__name__)
 
@@ -41,6 +43,8 @@ SUFFIXES = (".bag", ".mcap", ".db3")
 
 _IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
 _INFO = "sensor_msgs/msg/CameraInfo"
+_MOST_METADATA = 1 << 18
+_MOST_NESTED = 64
 _MISSING = 'ROS recordings need rosbags: pip install "nacre[ros]"'
 
 
@@ -92,6 +96,7 @@ class _Bag:
         except ImportError as error:
             raise ImportError(_MISSING) from error
         self.path = path
+        _check_metadata(path)
         try:
             self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
             self._reader.open()
@@ -136,10 +141,11 @@ class _Bag:
         matrix, coefficients = intrinsics(info)
         distortion = coefficients if len(coefficients) in (4, 5) else np.zeros(5)
         try:
-            return Camera(
+            camera = Camera(
                 info.width, info.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2],
                 distortion=list(distortion),
             )  # fmt: skip
+            return check_lens(self.path, camera)
         except ValueError as error:
             raise FileFormatError(self.path, f"{chosen.topic}: {error}") from error
 
@@ -210,7 +216,7 @@ class _Bag:
         """Read a colour image."""
         message = self._message(place)
         if not hasattr(message, "encoding"):
-            return decode_color(io.BytesIO(bytes(message.data)), place)
+            return decode_color(bytes(message.data), place)
         if message.encoding not in CHANNELS:
             raise FileFormatError(
                 place, f"colour images are {', '.join(CHANNELS)}, this is {message.encoding}"
@@ -223,7 +229,7 @@ class _Bag:
         """Read where an image of confidence is not 0."""
         message = self._message(place)
         if not hasattr(message, "encoding"):
-            return np.asarray(decode_color(io.BytesIO(bytes(message.data)), place).any(axis=2), np.bool_)
+            return np.asarray(decode_color(bytes(message.data), place).any(axis=2), np.bool_)
         return np.asarray(pixels(message, place) > 0, np.bool_)
 
     def _depth_scale(self) -> float:
@@ -258,6 +264,16 @@ class _Bag:
             return self._reader.deserialize(data, connection.msgtype)
         except Exception as error:  # rosbags' own, and whatever damaged lengths cause
             raise FileFormatError(place, f"the message is damaged: {error!r}") from error
+
+
+def _check_metadata(path: Path) -> None:
+    """Refuse a metadata.yaml that would take the parser of YAML long."""
+    if not path.is_dir():
+        require_regular(path)
+        return
+    data = read_file(path / "metadata.yaml", _MOST_METADATA)
+    if max(accumulate((+1 if c in b"[{" else -1 for c in data if c in b"[]{}"), initial=0)) > _MOST_NESTED:
+        raise FileFormatError(path / "metadata.yaml", "not the metadata of a ROS recording: nested too deep")
 
 
 def _preference(topic: str) -> tuple[bool, bool, str]:

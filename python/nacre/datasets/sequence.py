@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections.abc
 import dataclasses
+import hashlib
 import logging
 import os
 from collections.abc import Callable, Iterator, Mapping
@@ -195,6 +196,28 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
     def timestamp(self, index: int) -> float | None:
         """Return when a view was taken [s]; None where that is not known."""
         return self._sources[index].timestamp
+
+    def digests(self) -> dict[str, str]:
+        """
+        Return digests by which a recording that has changed is known again.
+
+        Returns
+        -------
+        dict
+            "files" of the names and sizes of the views' files, "times" of when they were written last; of a
+            recording within a file that file's.
+        """
+        files, times = hashlib.sha256(), hashlib.sha256()
+        for source in self._sources:
+            given = (source.depth, source.color, source.mask, *source.attributes.values())
+            for path in (path for path in given if path is not None):
+                try:
+                    found = path.stat()
+                except OSError:
+                    found = self.path.stat()
+                files.update(f"{path.name} {found.st_size}\n".encode())
+                times.update(f"{found.st_mtime_ns}\n".encode())
+        return {"files": files.hexdigest(), "times": times.hexdigest()}
 
     def without_color(self) -> Sequence:
         """Return the same recording with ``color`` None in every view."""

@@ -23,6 +23,7 @@ from nacre.datasets.listing import describe, files
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.ply import read_range_grid
+from nacre.io.raw import decode, read_file
 from nacre.io.trajectories import Trajectory, matrix_from_quaternion
 
 FORMAT = "stanford"
@@ -232,7 +233,7 @@ def _read_conf(folder: Path, scale: float) -> dict[str, Float64]:
     poses: dict[str, Float64] = {}
     for conf in sorted(folder.glob("*.conf")):
         for number, line in enumerate(
-            conf.read_text(encoding="utf-8", errors="replace").splitlines(), start=1
+            decode(read_file(conf)).splitlines(), start=1
         ):
             words = line.split()
             if not words or words[0] != "bmesh":
@@ -240,6 +241,8 @@ def _read_conf(folder: Path, scale: float) -> dict[str, Float64]:
             try:
                 tx, ty, tz, qx, qy, qz, qw = (float(word) for word in words[2:])
                 rotation = matrix_from_quaternion((-qx, -qy, -qz, qw))
+                if not np.isfinite((tx, ty, tz)).all():
+                    raise ValueError
             except ValueError as error:
                 raise FileFormatError(
                     conf,

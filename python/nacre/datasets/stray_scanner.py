@@ -9,10 +9,12 @@ import numpy.typing as npt
 
 from nacre._core import Camera
 from nacre.datasets.given import Given
-from nacre.datasets.listing import describe, files, pair
+from nacre.datasets.listing import describe, files, pair, require_order
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
+from nacre.io.cameras import check_lens
 from nacre.io.images import DEPTH_SUFFIXES, read_depth
+from nacre.io.raw import excerpt, number_of, read_text
 from nacre.io.trajectories import Trajectory, matrix_from_quaternion
 
 FORMAT = "stray-scanner"
@@ -68,7 +70,9 @@ def read(folder: Path, given: Given) -> Sequence:
 def _camera(path: Path, depth: Path) -> Camera:
     """Return the camera of the depth images; the file has that of the video, which is larger."""
     try:
-        matrix = _numbers(path.read_text(encoding="utf-8").splitlines())
+        matrix = _numbers(read_text(path).splitlines())
+    except FileFormatError:
+        raise
     except (ValueError, OSError) as error:
         raise FileFormatError(path, f"three lines of three numbers were expected: {error}") from error
     if matrix.shape != (3, 3) or not np.isfinite(matrix).all() or not (matrix[[0, 1], [0, 1]] > 0).all():
@@ -78,27 +82,35 @@ def _camera(path: Path, depth: Path) -> Camera:
     scale = width / color_width
     # Pixel centres are integers: the middle of a wider pixel moves.
     cx, cy = scale * (matrix[:2, 2] + 0.5) - 0.5
-    return Camera(width, height, scale * matrix[0, 0], scale * matrix[1, 1], cx, cy)
+    try:
+        camera = Camera(width, height, scale * matrix[0, 0], scale * matrix[1, 1], cx, cy)
+        return check_lens(path, camera)
+    except ValueError as error:
+        raise FileFormatError(path, str(error)) from error
 
 
 def _odometry(path: Path, num_frames: int) -> tuple[list[float | None], Trajectory | None]:
     times: list[float | None] = [None] * num_frames
     if not path.is_file():
         return times, None
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = read_text(path).splitlines()
     names = [name.strip() for name in lines[0].split(",")] if lines else []
     if names[: len(_FIELDS)] != list(_FIELDS):
         raise FileFormatError(path, f"the first line must name {', '.join(_FIELDS)}", line=1)
-    stamps, poses = [], []
+    stamps: list[float] = []
+    poses = []
     for number, line in enumerate(lines[1:], start=2):
         if not line.strip():
             continue
         try:
             row = _numbers([line])[0]
+            if len(row) < len(_FIELDS) or not np.isfinite(row).all():
+                raise ValueError(f"got {excerpt(line.encode())}")
             pose = np.eye(4)
             pose[:3, :3], pose[:3, 3] = matrix_from_quaternion(row[5:9]), row[2:5]
         except (ValueError, IndexError) as error:
             raise FileFormatError(path, f"nine numbers were expected: {error}", line=number) from error
+        require_order(path, number, float(row[0]), stamps[-1] if stamps else None)
         frame = int(row[1])
         if 0 <= frame < num_frames:
             times[frame] = float(row[0])
@@ -108,5 +120,5 @@ def _odometry(path: Path, num_frames: int) -> tuple[list[float | None], Trajecto
 
 
 def _numbers(lines: list[str]) -> npt.NDArray[np.float64]:
-    rows = [[float(text) for text in line.split(",")] for line in lines if line.strip()]
+    rows = [[number_of(text.strip()) for text in line.split(",")] for line in lines if line.strip()]
     return np.array(rows, dtype=np.float64)

@@ -5,16 +5,20 @@ from __future__ import annotations
 import logging
 import math
 import re
+from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
 from nacre.datasets.given import Given
-from nacre.datasets.listing import describe
+from nacre.datasets.listing import describe, inside, require_order
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
+from nacre.io.raw import excerpt, number_of, read_text
 from nacre.io.trajectories import Trajectory, associate, read_trajectory
 
 FORMAT = "tum"
@@ -46,18 +50,21 @@ def read(folder: Path, given: Given) -> Sequence:
     if (folder / "camera.json").is_file():
         given = given.filled_from(folder / "camera.json")
     depth = read_list(folder / "depth.txt")
-    if not any((folder / name).is_file() for _, name in depth):
+    for before, entry in pairwise(depth):
+        require_order(folder / "depth.txt", entry.line, entry.time, before.time)
+    if not any(entry.path.is_file() for entry in depth):
+        first = depth[0].path.relative_to(folder).as_posix()
         raise FileFormatError(
             folder / "depth.txt",
-            f"none of the {len(depth)} files that it lists is there, {depth[0][1]!r} the first; "
+            f"none of the {len(depth)} files that it lists is there, {first!r} the first; "
             f"the folder holds {describe(folder)}",
         )
-    times = np.array([time for time, _ in depth])
+    times = np.array([entry.time for entry in depth])
     colors: dict[int, Path] = {}
     if (folder / "rgb.txt").is_file():
         color = read_list(folder / "rgb.txt")
-        pairs = associate(times, [time for time, _ in color], given.max_difference)
-        colors = {int(i): folder / color[j][1] for i, j in zip(*pairs, strict=True)}
+        pairs = associate(times, [entry.time for entry in color], given.max_difference)
+        colors = {int(i): color[j].path for i, j in zip(*pairs, strict=True)}
     truth, poses = read_truth(folder / "groundtruth.txt", times, given.max_difference)
     return Sequence(
         folder,
@@ -65,30 +72,48 @@ def read(folder: Path, given: Given) -> Sequence:
         camera=given.camera or _default_camera(folder),
         depth_scale=given.scale_or(DEPTH_SCALE),
         sources=[
-            FrameSource(i, folder / name, colors.get(i), time, poses[i])
-            for i, (time, name) in enumerate(depth)
+            FrameSource(i, entry.path, colors.get(i), entry.time, poses[i]) for i, entry in enumerate(depth)
         ],
         truth=truth,
     )
 
 
-def read_list(path: Path) -> list[tuple[float, str]]:
+class Entry(NamedTuple):
+    """A line of a list: when, and which file, in the list's folder."""
+
+    line: int
+    time: float
+    path: Path
+
+
+def read_list(path: Path) -> list[Entry]:
     """Read lines of ``timestamp file``; ``#`` starts a comment line."""
     entries = []
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
+    for number, line in lines_of(path):
         words = line.split(maxsplit=1)
-        try:
-            time = float(words[0])
-        except ValueError:
-            time = math.nan
+        time = time_of(words[0])
         if len(words) != 2 or not math.isfinite(time):
-            raise FileFormatError(path, f"expected 'timestamp file', got {line.strip()[:60]!r}", line=number)
-        entries.append((time, words[1].strip()))
+            reason = f"expected 'timestamp file', got {excerpt(line.encode())}"
+            raise FileFormatError(path, reason, line=number)
+        entries.append(Entry(number, time, inside(path.parent, words[1].strip(), path, number)))
     if not entries:
         raise FileFormatError(path, "the list is empty")
     return entries
+
+
+def lines_of(path: Path) -> Iterator[tuple[int, str]]:
+    """Yield the numbered lines of a list without those that are empty or comments."""
+    for number, line in enumerate(read_text(path).splitlines(), start=1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            yield number, line.strip()
+
+
+def time_of(word: str) -> float:
+    """Return a time [s], or NaN where it is none."""
+    try:
+        return number_of(word)
+    except ValueError:
+        return math.nan
 
 
 def read_truth(

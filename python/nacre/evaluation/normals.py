@@ -24,6 +24,7 @@ class NormalError(Result):
     num_normals: Count  #: pairs that were compared
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def normal_error(normals: npt.ArrayLike, reference_normals: npt.ArrayLike) -> NormalError:
     """
     Measure the angles between normals and their references.

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_poses
+from nacre.arrays import as_poses, as_vector
 from nacre.evaluation.result import Array, Count, Metres, Radians, Result
 from nacre.evaluation.trajectory import absolute_trajectory_error
 
@@ -66,9 +66,7 @@ def pose_error(
         When an argument has the wrong type, shape or value; the message names it.
     """
     poses, true_poses = as_poses("estimated", estimated), as_poses("truth", truth)
-    middle = np.asarray(center, dtype=np.float64)
-    if middle.shape != (3,) or not np.isfinite(middle).all():
-        raise ValueError(f"center must be three finite numbers, got {center!r}")
+    middle = as_vector("center", center, 3)
     if align not in ("first", False):
         raise ValueError(f'align must be "first" or False, got {align!r}')
     if len(poses) != len(true_poses):

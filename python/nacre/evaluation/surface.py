@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_matching_points, as_points
+from nacre.arrays import as_array, as_count, as_matching_points, as_points, as_real
 from nacre.evaluation.result import Array, Count, ManyFractions, ManyMetres, Metres, Result
 from nacre.mesh import Mesh
 
@@ -58,6 +58,7 @@ class FScore(Result):
     f_score: ManyFractions
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def sample_surface(
     vertices: npt.ArrayLike, triangles: npt.ArrayLike, num_samples: int = 100_000, *, seed: int = 0
 ) -> SurfaceSamples:
@@ -86,19 +87,21 @@ def sample_surface(
         When a triangle names a vertex that is not there, or the mesh has no area.
     """
     corners = as_points("vertices", vertices).astype(np.float64)
-    faces = np.asarray(triangles)
+    faces = as_array("triangles", triangles)
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "ui":
         raise ValueError(f"triangles must be whole numbers of shape (T, 3), got {faces.dtype} {faces.shape}")
     if len(faces) and not (faces.min() >= 0 and faces.max() < len(corners)):
-        raise ValueError(f"triangles must name rows of vertices (0 to {len(corners) - 1})")
-    if num_samples < 1:
-        raise ValueError(f"num_samples must be at least 1, got {num_samples!r}")
+        raise ValueError(
+            f"triangles must name rows of vertices (0 to {len(corners) - 1}), got {faces.min()} to {faces.max()}"
+        )
+    num_samples, seed = as_count("num_samples", num_samples, minimum=1), as_count("seed", seed)
     a, b, c = (corners[faces[:, i]] for i in range(3))
     cross = np.cross(b - a, c - a)
     doubled_area = np.linalg.norm(cross, axis=1)
     cumulative = np.cumsum(doubled_area)
     if not len(cumulative) or not (np.isfinite(cumulative[-1]) and cumulative[-1] > 0):
-        raise ValueError("triangles must have finite corners and an area")
+        area = 0.5 * cumulative[-1] if len(cumulative) else 0.0
+        raise ValueError(f"triangles must have finite vertices and an area, got one of {area}")
     random = np.random.default_rng(seed)
     strata = (np.arange(num_samples) + random.random(num_samples)) / num_samples
     chosen = np.minimum(np.searchsorted(cumulative, strata * cumulative[-1], side="right"), len(faces) - 1)
@@ -108,6 +111,7 @@ def sample_surface(
     return SurfaceSamples(points, cross[chosen] / doubled_area[chosen, None], chosen)
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def surface_accuracy(
     points: npt.ArrayLike, reference: Mesh | npt.ArrayLike, *, reference_normals: npt.ArrayLike | None = None
 ) -> SurfaceAccuracy:
@@ -167,6 +171,7 @@ def surface_accuracy(
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def completeness(
     points: npt.ArrayLike,
     reference: Mesh | npt.ArrayLike,
@@ -203,7 +208,7 @@ def completeness(
     else:
         samples = as_points("reference", reference).astype(np.float64)
     if seen is not None:
-        mask = np.asarray(seen)
+        mask = as_real("seen", seen)
         if mask.shape != (len(samples),):
             raise ValueError(f"seen must have one entry per sample ({len(samples)}), got shape {mask.shape}")
         samples = samples[mask.astype(bool)]
@@ -224,6 +229,7 @@ def completeness(
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def f_score(
     points: npt.ArrayLike,
     reference: Mesh | npt.ArrayLike,
@@ -269,8 +275,9 @@ def _harmonic_mean(a: float, b: float) -> float:
 
 
 def _thresholds(tau: float | Sequence[float]) -> tuple[float, ...]:
-    thresholds = tuple(float(t) for t in np.atleast_1d(np.asarray(tau, dtype=np.float64)))
-    if not thresholds or not all(np.isfinite(t) and t > 0 for t in thresholds):
+    given = np.atleast_1d(as_real("tau", tau))
+    thresholds = tuple(float(t) for t in given.reshape(-1))
+    if given.ndim > 1 or not thresholds or not all(np.isfinite(t) and t > 0 for t in thresholds):
         raise ValueError(f"tau must be one or more positive distances, got {tau!r}")
     return thresholds
 
@@ -284,7 +291,8 @@ def _as_reference(reference: Any, reference_normals: npt.ArrayLike | None) -> tu
         usable &= np.isfinite(given).all(axis=1)
         normals = given[usable].astype(np.float64)
     if not usable.any():
-        raise ValueError("reference must have at least one point that is finite")
+        given = "" if reference_normals is None else " with a finite row of reference_normals"
+        raise ValueError(f"reference must have at least one finite point{given}, got {len(cloud)} that are not")
     return cloud[usable], normals
 
 

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_poses
+from nacre.arrays import as_count, as_length, as_number, as_poses, as_times, as_values
 from nacre.evaluation.result import Array, Count, Fraction, Metres, Radians, Result
 from nacre.io.trajectories import associate
 
@@ -114,7 +114,7 @@ def absolute_trajectory_error(
     true_poses = as_poses("truth", truth)
     rows, true_rows = _matching_rows(poses, true_poses, timestamps, truth_timestamps, max_time_difference)
     num_tracked = int(tracked.sum())
-    total = len(poses) if num_frames is None else num_frames
+    total = len(poses) if num_frames is None else as_count("num_frames", num_frames)
     if total < num_tracked:
         raise ValueError(f"num_frames must be at least the {num_tracked} tracked frames, got {num_frames}")
 
@@ -186,7 +186,8 @@ def relative_pose_error(
     """
     if unit not in ("frames", "seconds"):
         raise ValueError(f'unit must be "frames" or "seconds", got {unit!r}')
-    if not (np.isfinite(delta) and delta > 0) or (unit == "frames" and delta != int(delta)):
+    step = as_number("delta", delta)
+    if not (np.isfinite(step) and step > 0) or (unit == "frames" and step != int(step)):
         raise ValueError(f"delta must be a positive number (whole for frames), got {delta!r}")
     poses, tracked = _tracked(estimated, valid)
     true_poses = as_poses("truth", truth)
@@ -196,13 +197,13 @@ def relative_pose_error(
     usable = tracked & np.isfinite(true_of).all(axis=(1, 2))
 
     if unit == "frames":
-        first = np.arange(max(len(poses) - int(delta), 0))
-        last = first + int(delta)
+        first = np.arange(max(len(poses) - int(step), 0))
+        last = first + min(int(step), len(poses))
     else:
         if timestamps is None:
             raise ValueError('timestamps must be given where unit is "seconds"')
         times = _times("timestamps", timestamps, len(poses))
-        first, last = associate(times + delta, times, max_time_difference)
+        first, last = associate(times + step, times, as_length("max_time_difference", max_time_difference))
     both = usable[first] & usable[last]
     first, last = first[both], last[both]
 
@@ -213,7 +214,7 @@ def relative_pose_error(
     return RelativePoseError(
         **_statistics("translation_", np.linalg.norm(error[:, :3, 3], axis=1), names),
         **_statistics("rotation_", _rotation_angles(error[:, :3, :3]), names),
-        delta=delta,
+        delta=step,
         unit=unit,
         num_pairs=len(first),
     )
@@ -223,17 +224,13 @@ def _tracked(estimated: npt.ArrayLike, valid: npt.ArrayLike | None) -> tuple[Arr
     poses = as_poses("estimated", estimated)
     tracked = np.isfinite(poses).all(axis=(1, 2))
     if valid is not None:
-        mask = np.asarray(valid)
-        if mask.shape != (len(poses),):
-            raise ValueError(f"valid must have one entry per pose ({len(poses)}), got shape {mask.shape}")
+        mask = as_values("valid", valid, len(poses), "pose")
         return poses, np.asarray(tracked & mask.astype(bool))
     return poses, np.asarray(tracked)
 
 
 def _times(name: str, value: npt.ArrayLike, size: int | None = None) -> Array:
-    times = np.asarray(value, dtype=np.float64)
-    if times.ndim != 1 or not np.isfinite(times).all():
-        raise ValueError(f"{name} must be a list of finite times, got shape {times.shape}")
+    times = as_times(name, value)
     if size is not None and len(times) != size:
         raise ValueError(f"{name} must have one entry per pose ({size}), got {len(times)}")
     return times
@@ -250,7 +247,7 @@ def _matching_rows(
         return associate(
             _times("timestamps", timestamps, len(poses)),
             _times("truth_timestamps", truth_timestamps, len(true_poses)),
-            max_time_difference,
+            as_length("max_time_difference", max_time_difference),
         )
     if truth_timestamps is not None:
         raise ValueError("timestamps must be given where truth_timestamps are")

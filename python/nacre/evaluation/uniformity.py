@@ -24,6 +24,7 @@ class Uniformity(Result):
     num_points: Count  #: points that are finite
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def uniformity(points: npt.ArrayLike) -> Uniformity:
     """
     Measure how evenly points are spread over their surface.

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
-from nacre.arrays import as_poses
+from nacre.arrays import as_camera, as_number, as_poses
 from nacre.evaluation.surface import SurfaceSamples
 from nacre.mesh import Mesh
 
@@ -48,7 +48,10 @@ def seen_samples(
     ValueError
         When a pose or the slant is out of its range.
     """
-    if not 0 < max_slant <= math.pi / 2:
+    as_camera("camera", camera)
+    if not isinstance(mesh, Mesh):
+        raise TypeError(f"mesh must be a nacre.Mesh, got {type(mesh).__name__}")
+    if not 0 < as_number("max_slant", max_slant) <= math.pi / 2:
         raise ValueError(f"max_slant must be an angle from 0 to pi / 2, got {max_slant!r}")
     seen = np.zeros(len(samples.points), dtype=bool)
     for pose in as_poses("poses", poses):

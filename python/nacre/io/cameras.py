@@ -6,16 +6,23 @@ import json
 import logging
 import math
 import os
+from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from nacre._core import Camera
-from nacre.errors import FileFormatError
+from nacre.arrays import as_camera, as_scale
+from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
+from nacre.io.image_limits import MAX_PIXELS
+from nacre.io.json_files import read_json
 
 _log = logging.getLogger(__name__)
 
+_MOST_BYTES = 1 << 15
+# Lenses that are none: what lies beyond makes points that are not finite.
+_FOCAL_LENGTHS = (1e-3, 1e9)
+_LARGEST_DISTORTION = 1e6
 _KEYS = {
     "pinhole": {"model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "depth", "depth_scale"},
     "orthographic": {"model", "width", "height", "pixel_size", "depth_scale"},
@@ -59,13 +66,7 @@ def read_camera(path: str | os.PathLike[str]) -> CameraFile:
     FileFormatError
         Names the file and the key that is missing or wrong.
     """
-    try:
-        document = json.loads(Path(path).read_text(encoding="utf-8"))
-    except json.JSONDecodeError as error:
-        raise FileFormatError(path, f"not a JSON file: {error.msg}", line=error.lineno) from error
-    except UnicodeDecodeError as error:
-        raise FileFormatError(path, "not a JSON file: it is not text") from error
-    return camera_of(path, document)
+    return camera_of(path, read_json(path, _MOST_BYTES))
 
 
 def camera_of(path: str | os.PathLike[str], document: Any) -> CameraFile:
@@ -84,7 +85,18 @@ def camera_of(path: str | os.PathLike[str], document: Any) -> CameraFile:
         raise
     except ValueError as error:
         raise FileFormatError(path, str(error)) from error
-    return CameraFile(camera, scale)
+    return CameraFile(check_lens(path, camera), scale)
+
+
+def check_lens(path: str | os.PathLike[str], camera: Camera) -> Camera:
+    """Return a camera that a file describes; refuse a lens whose points would not be finite."""
+    for key, low, high, values in (
+        ("fx and fy", *_FOCAL_LENGTHS, (camera.fx, camera.fy) if camera.model == "pinhole" else ()),
+        ("distortion", 0.0, _LARGEST_DISTORTION, camera.distortion),
+    ):
+        if not all(low <= abs(value) <= high for value in values):
+            raise FileFormatError(path, f"{key} must be from {low:g} to {high:g}, got {list(values)}")
+    return camera
 
 
 def write_camera(path: str | os.PathLike[str], camera: Camera, depth_scale: float | None = None) -> None:
@@ -100,6 +112,7 @@ def write_camera(path: str | os.PathLike[str], camera: Camera, depth_scale: floa
     depth_scale : float, optional
         Stored depth units per metre.
     """
+    as_camera("camera", camera)
     document: dict[str, Any] = {"model": camera.model, "width": camera.width, "height": camera.height}
     if camera.model == "orthographic":
         document["pixel_size"] = camera.pixel_size
@@ -107,11 +120,7 @@ def write_camera(path: str | os.PathLike[str], camera: Camera, depth_scale: floa
         document.update(fx=camera.fx, fy=camera.fy, cx=camera.cx, cy=camera.cy)
         document.update(distortion=list(camera.distortion), depth=camera.depth)
     if depth_scale is not None:
-        if not (math.isfinite(depth_scale) and depth_scale > 0):
-            raise ValueError(
-                f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}"
-            )
-        document["depth_scale"] = depth_scale
+        document["depth_scale"] = as_scale("depth_scale", depth_scale)
     with atomic_writer(path) as stream:
         stream.write((json.dumps(document, indent=2) + "\n").encode())
 
@@ -138,28 +147,39 @@ class _Fields:
             raise FileFormatError(self.path, f"{key} must be a whole number, got {value!r}")
         return int(value)
 
+    def size(self) -> tuple[int, int]:
+        width, height = self.integer("width"), self.integer("height")
+        if not (width > 0 and height > 0 and width * height <= MAX_PIXELS):
+            reason = f"width and height must be positive and give at most {MAX_PIXELS} pixels"
+            raise FileFormatError(self.path, f"{reason}, got {width} x {height}")
+        return width, height
+
     def numbers(self, key: str, count: int) -> list[float]:
         value = self.get(key)
         if not isinstance(value, list) or len(value) != count:
-            raise FileFormatError(self.path, f"{key} must be a list of {count} numbers, got {value!r}")
+            raise FileFormatError(self.path, f"{key} must be a list of {count} numbers, got {shown(value)}")
         return [self._checked(key, item) for item in value]
 
     def _checked(self, key: str, value: Any) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
-            raise FileFormatError(self.path, f"{key} must be a finite number, got {value!r}")
-        return float(value)
+        number = math.nan
+        if isinstance(value, (int, float)) and not isinstance(value, bool):
+            with suppress(OverflowError):
+                number = float(value)
+        if not math.isfinite(number):
+            raise FileFormatError(self.path, f"{key} must be a finite number, got {shown(value)}")
+        return number
 
 
 def _plain(fields: _Fields) -> Camera:
     model = fields.get("model")
     if not isinstance(model, str) or model not in _KEYS:
-        raise FileFormatError(fields.path, f"model must be 'pinhole' or 'orthographic', got {model!r}")
+        raise FileFormatError(fields.path, f"model must be 'pinhole' or 'orthographic', got {shown(model)}")
     unknown = sorted(set(fields.document) - _KEYS[model])
     if unknown:
         _log.warning(
             "%s: ignored keys that a %s camera does not have: %s", fields.path, model, ", ".join(unknown)
         )
-    width, height = fields.integer("width"), fields.integer("height")
+    width, height = fields.size()
     if model == "orthographic":
         return Camera.orthographic(width=width, height=height, pixel_size=fields.number("pixel_size"))
     return Camera(
@@ -180,4 +200,5 @@ def _open3d(fields: _Fields) -> Camera:
             "intrinsic_matrix must be [fx, 0, 0, 0, fy, 0, cx, cy, 1], column by column and without skew, "
             f"got {matrix}",
         )
-    return Camera(width=fields.integer("width"), height=fields.integer("height"), fx=fx, fy=fy, cx=cx, cy=cy)
+    width, height = fields.size()
+    return Camera(width=width, height=height, fx=fx, fy=fy, cx=cx, cy=cy)

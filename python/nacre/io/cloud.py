@@ -118,7 +118,7 @@ def check_comments(comments: Sequence[str]) -> list[str]:
 
 
 def _as_colors(value: npt.ArrayLike, num_points: int) -> npt.NDArray[np.uint8]:
-    array = np.asarray(value)
+    array = arrays.as_array("colors", value)
     if array.shape != (num_points, 3):
         raise ValueError(f"colors must have shape ({num_points}, 3), one row per point, got {array.shape}")
     if array.dtype.kind not in "ui":
@@ -131,7 +131,7 @@ def _as_colors(value: npt.ArrayLike, num_points: int) -> npt.NDArray[np.uint8]:
 def _as_attribute(name: str, value: npt.ArrayLike, num_points: int) -> npt.NDArray[Any]:
     if not isinstance(name, str) or not name.isascii() or not name.isprintable() or " " in name or not name:
         raise ValueError(f"attributes must have names of visible ASCII characters, got {name!r}")
-    array = np.asarray(value)
+    array = arrays.as_array(f"attributes[{name!r}]", value)
     if array.dtype.kind not in "buif" or array.dtype.itemsize > 8:
         raise TypeError(f"attributes[{name!r}] must be an array of real numbers, got dtype {array.dtype}")
     if array.ndim not in (1, 2) or len(array) != num_points:

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from io import BytesIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from nacre.errors import FileFormatError
+from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
+from nacre.io.image_limits import check_exr, check_pixels, check_png
+from nacre.io.raw import check_padding, read_file
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -22,9 +26,12 @@ DEPTH_SUFFIXES = (".png", ".pgm", ".npy", ".exr")
 ATTRIBUTE_SUFFIXES = (".png", ".tif", ".tiff", ".jpg", ".jpeg", ".npy")
 COLOR_SUFFIXES = (".png", ".jpg", ".jpeg", ".ppm", ".bmp", ".webp")
 
+_COLOR_FORMATS = ("PNG", "JPEG", "PPM", "BMP", "WEBP")
+_ATTRIBUTE_FORMATS = ("PNG", "TIFF", "JPEG")
 _EXR_DEPTH_CHANNELS = ("Z", "depth", "Depth", "Y", "R")
-_PGM_GAP = rb"\s+(?:#[^\n]*\n\s*)*"
-_PGM_HEADER = re.compile(_PGM_GAP.join((rb"P5", rb"(\d+)", rb"(\d+)", rb"(\d+)")) + rb"\s")
+_MOST_NPY_HEADER = 1000
+_PGM_GAP = rb"(?:\s|#[^\n]*\n){1,1000}"
+_PGM_HEADER = re.compile(_PGM_GAP.join((rb"P5", *3 * (rb"(\d{1,20})",))) + rb"\s")
 
 
 def read_depth(path: str | os.PathLike[str]) -> npt.NDArray[Any]:
@@ -72,15 +79,14 @@ def read_color(path: str | os.PathLike[str]) -> npt.NDArray[np.uint8]:
     ImportError
         pillow is not installed.
     """
-    with Path(path).open("rb") as stream:
-        return decode_color(stream, path)
+    return decode_color(read_file(path), path)
 
 
 def decode_color(
-    stream: BinaryIO, path: str | os.PathLike[str], size: tuple[int, int] | None = None
+    data: bytes, path: str | os.PathLike[str], size: tuple[int, int] | None = None
 ) -> npt.NDArray[np.uint8]:
-    """Read a colour image from a stream, brought to a size (width, height); ``path`` names it in errors."""
-    with _decoded(stream, Path(path)) as image:
+    """Read a colour image from bytes, brought to a size (width, height); ``path`` names it in errors."""
+    with decoded(data, path, _COLOR_FORMATS) as image:
         if image.mode.startswith(("I", "F")):
             raise FileFormatError(
                 path, f"a colour image must have 8 bits per channel, this has mode {image.mode}"
@@ -106,7 +112,7 @@ def read_attribute(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
     if path.suffix.lower() == ".npy":
         stored = _read_npy(path)
     else:
-        with _open_image(path) as image:
+        with decoded(read_file(path), path, _ATTRIBUTE_FORMATS) as image:
             stored = np.array(image.convert("L") if image.mode in ("1", "P") else image)
     if stored.ndim not in (2, 3) or stored.size == 0 or stored.dtype.kind not in "buif":
         raise FileFormatError(
@@ -157,18 +163,20 @@ def _write_image(path: str | os.PathLike[str], array: npt.NDArray[Any], format: 
 
 
 @contextmanager
-def _open_image(path: Path) -> Iterator[Image]:
-    with path.open("rb") as stream, _decoded(stream, path) as image:
-        yield image
+def decoded(data: bytes, path: str | os.PathLike[str], formats: Sequence[str]) -> Iterator[Image]:
+    """
+    Decode an image of certain formats; whatever pillow raises for a damaged file becomes a FileFormatError.
 
-
-@contextmanager
-def _decoded(stream: BinaryIO, path: Path) -> Iterator[Image]:
-    """Decode an image; whatever pillow raises for a damaged file becomes a FileFormatError."""
+    Other formats are not tried, some of which start programs (Ghostscript).
+    """
     pillow = _pillow()
+    check_png(path, data)
     try:
-        image = pillow.open(stream)
+        image = pillow.open(BytesIO(data), formats=formats)
+        check_pixels(path, *image.size, file_size=len(data), format=image.format)
         image.load()
+    except (FileFormatError, MemoryError):
+        raise
     except pillow.DecompressionBombError as error:
         raise FileFormatError(path, f"refused: {error}") from error
     except Exception as error:
@@ -179,18 +187,18 @@ def _decoded(stream: BinaryIO, path: Path) -> Iterator[Image]:
 
 
 def _read_png(path: Path) -> npt.NDArray[Any]:
-    with _open_image(path) as image:
+    with decoded(read_file(path), path, ("PNG",)) as image:
         if not image.mode.startswith("I"):
             raise FileFormatError(
                 path,
                 f"a depth image must have 16 bits and one channel, this is 8-bit with mode {image.mode}; "
                 "save the depth itself, in millimetres say, not a picture of it",
             )
-        return np.array(image).astype(np.uint16, copy=False)
+        return np.asarray(image).astype(np.uint16, copy=False)
 
 
 def _read_pgm(path: Path) -> npt.NDArray[Any]:
-    data = path.read_bytes()
+    data = read_file(path)
     header = _PGM_HEADER.match(data)
     if header is None:
         raise FileFormatError(
@@ -206,17 +214,34 @@ def _read_pgm(path: Path) -> npt.NDArray[Any]:
             f"truncated: {expected} bytes of pixels expected, {len(data) - header.end()} found",
             offset=len(data),
         )
+    check_padding(path, data, header.end() + expected)
     pixels = np.frombuffer(data, dtype=">u2", count=width * height, offset=header.end())
     return pixels.reshape(height, width).astype(np.uint16)
 
 
 def _read_npy(path: Path) -> npt.NDArray[Any]:
+    data = read_file(path)
+    stream = BytesIO(data)
     try:
-        with path.open("rb") as stream:
-            array: npt.NDArray[Any] = np.lib.format.read_array(stream, allow_pickle=False)
-    except (ValueError, EOFError) as error:
-        raise FileFormatError(path, f"not a readable .npy array: {error}") from error
-    return array
+        version = np.lib.format.read_magic(stream)
+        read_header = {
+            (1, 0): np.lib.format.read_array_header_1_0,
+            (2, 0): np.lib.format.read_array_header_2_0,
+        }[version]
+        shape, by_columns, dtype = read_header(stream, _MOST_NPY_HEADER)
+    except Exception as error:  # of numpy's own, and of Python's, with which it reads the header
+        reason = str(error).partition(": <")[0]
+        raise FileFormatError(path, f"not a readable .npy array: {reason}", offset=0) from error
+    start = stream.tell()
+    if dtype.kind not in "buif" or len(shape) not in (2, 3) or min(shape) < 1:
+        raise FileFormatError(path, f"an image must be (H, W) numbers, this is {shown(shape)} of {shown(dtype)}")
+    num_bytes = math.prod(shape) * dtype.itemsize
+    if num_bytes > len(data) - start:
+        reason = f"not a readable .npy array: its shape promises {num_bytes} bytes, {len(data) - start} are there"
+        raise FileFormatError(path, reason, offset=start)
+    check_padding(path, data, start + num_bytes)
+    array = np.frombuffer(data, dtype, math.prod(shape), start)
+    return array.reshape(shape, order="F" if by_columns else "C").copy()
 
 
 def _read_exr(path: Path) -> npt.NDArray[Any]:
@@ -224,10 +249,12 @@ def _read_exr(path: Path) -> npt.NDArray[Any]:
         import OpenEXR  # type: ignore[import-not-found, unused-ignore]
     except ImportError as error:
         raise ImportError('EXR images need OpenEXR: pip install "nacre[exr]"', name="OpenEXR") from error
-    path.stat()
+    check_exr(path, read_file(path))
     try:
         with OpenEXR.File(str(path), separate_channels=True) as image:
             channels = {name: np.array(channel.pixels) for name, channel in image.channels().items()}
+    except MemoryError:
+        raise
     except Exception as error:
         raise FileFormatError(path, f"the image is damaged or truncated: {error}") from error
     names = [name for name in _EXR_DEPTH_CHANNELS if name in channels] or list(channels)

@@ -155,7 +155,7 @@ def _read_ply(path: str | os.PathLike[str]) -> MeshArrays:
     faces = table.get("vertex_indices", table.get("vertex_index"))
     if not isinstance(faces, Ragged) or faces.values.dtype.kind == "f":
         raise FileFormatError(path, "not a mesh: there is no element face with lists vertex_indices")
-    return vertices, _fan(path, faces.values.astype(np.int64), faces.counts, len(vertices))
+    return vertices, _fan(path, faces.values.astype(np.int64), faces.counts.astype(np.int64), len(vertices))
 
 
 class _Polygons:
@@ -184,8 +184,8 @@ class _Polygons:
 
     def finish(self, path: str | os.PathLike[str]) -> MeshArrays:
         """Return vertices and triangles."""
-        corners, counts = (np.array(values, dtype=np.int64) for values in (self.corners, self.counts))
-        vertices = np.array(self.coordinates, dtype=np.float64).reshape(-1, 3)
+        corners, counts = (np.frombuffer(values, np.int64) for values in (self.corners, self.counts))
+        vertices = np.frombuffer(self.coordinates, np.float64).reshape(-1, 3)
         return vertices, _fan(path, corners, counts, len(vertices))
 
 

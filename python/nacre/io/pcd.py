@@ -79,7 +79,7 @@ def _read_header(path: str | os.PathLike[str], data: bytes) -> _Header:
                 if not line.startswith(b"# .PCD v"):
                     comments.append(decode(line[1:].strip()))
             elif line:
-                keyword, *words = decode(line).split()
+                keyword, *words = map(decode, line.split())
                 keyword = "FIELDS" if keyword == "COLUMNS" else keyword
                 if keyword not in _KEYWORDS:
                     raise ValueError(f"unknown keyword in the header: {excerpt(line)}")

@@ -29,6 +29,7 @@ TYPES = {
 }
 BYTE_ORDERS: dict[str, Literal["<", ">"]] = {"binary_little_endian": "<", "binary_big_endian": ">"}
 _FORMATS = ("ascii", *BYTE_ORDERS)
+_MAX_ELEMENTS = 1_000
 _MAX_ENTRIES = 10_000
 
 
@@ -117,11 +118,12 @@ class _Parser:
 
     def take(self, line: bytes, number: int) -> None:
         """Take in the line of this number, or raise a ValueError that says what is wrong with it."""
-        keyword, *words = decode(line).split(maxsplit=1) or [""]
+        first, *rest = line.split(maxsplit=1) or [b""]
+        keyword = decode(first)
         if keyword in self._notes:
-            self._notes[keyword].append(words[0].strip() if words else "")
+            self._notes[keyword].append(decode(rest[0]).strip() if rest else "")
             return
-        words = words[0].split() if words else []
+        words = [decode(word) for word in rest[0].split()] if rest else []
         self._num_entries += 1
         if self._num_entries > _MAX_ENTRIES:
             raise ValueError(f"more than {_MAX_ENTRIES} lines of elements and properties")
@@ -136,6 +138,8 @@ class _Parser:
         elif keyword == "element":
             if len(words) != 2 or not (words[1].isascii() and words[1].isdigit() and len(words[1]) < 20):
                 raise ValueError(f"expected 'element', a name and a number of rows, got {excerpt(line)}")
+            if len(self._elements) == _MAX_ELEMENTS:
+                raise ValueError(f"more than {_MAX_ELEMENTS} elements")
             if words[0] in self._elements:
                 raise ValueError(f"a second element {excerpt(words[0].encode())}")
             self._properties = {}

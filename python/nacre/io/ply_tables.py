@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
+from array import array
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -25,7 +26,7 @@ class Ragged:
     """The lists of one property: all their values in one array, and the length of each list."""
 
     values: npt.NDArray[Any]
-    counts: npt.NDArray[np.int64]
+    counts: npt.NDArray[np.signedinteger[Any]]
 
     def as_array(self) -> npt.NDArray[Any]:
         """Return an (N, K) array where all lists have K values, else an array of arrays."""
@@ -156,7 +157,7 @@ def _read_equal_rows(
     for i, entry in enumerate(element.properties):
         table[entry.name] = column = rows[f"values{i}"]
         if entry.count_dtype is not None:
-            counts = rows[f"count{i}"].astype(np.int64)
+            counts = rows[f"count{i}"].astype(_counting(entry.count_dtype))
             if (counts != column.shape[1]).any():
                 return None
             table[entry.name] = Ragged(column.reshape(-1), counts)
@@ -168,16 +169,19 @@ def _read_unequal_rows(
 ) -> tuple[Table, int]:
     """Return the table and its end when each row says only at its lists where the next begins."""
     start = position
-    steps: list[tuple[Property, struct.Struct | None, int, bytearray, list[int]]] = []
+    steps: list[tuple[Property, struct.Struct | None, int, bytearray, array[int]]] = []
     for entry in element.properties:
         count_type = None if entry.count_dtype is None else _integer_struct(entry.count_dtype, byte_order)
-        steps.append((entry, count_type, entry.dtype.itemsize, bytearray(), []))
+        counts = array("q" if entry.count_dtype is None else _counting(entry.count_dtype).char)
+        steps.append((entry, count_type, entry.dtype.itemsize, bytearray(), counts))
     try:
         for _ in range(element.num_rows):
             for _, count_type, size, payload, counts in steps:
                 if count_type is not None:
                     (count,) = count_type.unpack_from(data, position)
                     position += count_type.size
+                    if count > len(data):
+                        raise struct.error
                     counts.append(count)
                     size *= count
                 payload += data[position : position + size]
@@ -190,8 +194,13 @@ def _read_unequal_rows(
     table: Table = {}
     for entry, count_type, _, payload, counts in steps:
         values = np.frombuffer(payload, entry.dtype.newbyteorder(byte_order))
-        table[entry.name] = values if count_type is None else Ragged(values, np.array(counts, dtype=np.int64))
+        table[entry.name] = values if count_type is None else Ragged(values, np.frombuffer(counts, counts.typecode))
     return table, position
+
+
+def _counting(dtype: np.dtype[Any]) -> np.dtype[np.signedinteger[Any]]:
+    """Return a small type that holds what the lengths of lists of this type can be."""
+    return np.dtype({1: np.int16, 2: np.int32}.get(dtype.itemsize, np.int64))
 
 
 def _integer_struct(dtype: np.dtype[Any], byte_order: ByteOrder) -> struct.Struct:

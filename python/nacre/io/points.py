@@ -9,6 +9,7 @@ from types import ModuleType
 
 import numpy.typing as npt
 
+from nacre.arrays import as_flag
 from nacre.io import pcd, ply
 from nacre.io.cloud import Cloud
 
@@ -89,6 +90,7 @@ def write_points(
     OSError
         When the file cannot be written (no such folder, no permission, a full disk); it has the path.
     """
+    binary = as_flag("binary", binary)
     _format_of(path).write_cloud(
         path, points, normals=normals, colors=colors, attributes=attributes, comments=comments, binary=binary
     )

@@ -23,13 +23,33 @@ _IS_SPACE = np.zeros(256, dtype=bool)
 _IS_SPACE[list(b" \t\n\r\v\f")] = True
 
 
-def read_file(path: str | os.PathLike[str]) -> bytes:
-    """Return the bytes of a regular file; what would never end (a pipe, a device) is refused."""
-    source = Path(path)
-    mode = source.stat().st_mode
+def read_file(path: str | os.PathLike[str], most: int | None = None) -> bytes:
+    """Return the bytes of a regular file, ``most`` at most; what would never end (a pipe, a device) is refused."""
+    size = require_regular(path).stat().st_size
+    if most is not None and size > most:
+        raise FileFormatError(path, f"larger than what it can hold: {size} bytes, more than {most}")
+    return Path(path).read_bytes()
+
+
+def require_regular(path: str | os.PathLike[str]) -> Path:
+    """Return a path; raise where it is neither a regular file nor a folder."""
+    mode = Path(path).stat().st_mode
     if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
         raise FileFormatError(path, "not a regular file")
-    return source.read_bytes()
+    return Path(path)
+
+
+def read_text(path: str | os.PathLike[str], most: int | None = None) -> str:
+    """Return the text of a regular file of UTF-8."""
+    return text_of(path, read_file(path, most))
+
+
+def text_of(path: str | os.PathLike[str], data: bytes) -> str:
+    """Return the text of a file's bytes, which must be UTF-8."""
+    try:
+        return data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise FileFormatError(path, "not text: these bytes are no UTF-8", offset=error.start) from None
 
 
 @contextmanager
@@ -133,6 +153,13 @@ class TextBlock:
             return np.array([int(self.tokens[token]) for token in tokens], dtype=dtype)
         except (ValueError, OverflowError):
             raise self.error(int(tokens[0]), f"{name} holds a value that does not fit {dtype.name}") from None
+
+
+def number_of(text: str) -> float:
+    """Return a number written in ASCII digits; raise a ValueError where Python alone would take it (1_0)."""
+    if not text.isascii() or "_" in text:
+        raise ValueError(f"{excerpt(text.encode())} is not a number")
+    return float(text)
 
 
 def _is_number(text: bytes) -> bool:

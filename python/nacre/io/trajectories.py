@@ -2,18 +2,52 @@
 
 from __future__ import annotations
 
+import math
 import os
+from array import array
 from dataclasses import dataclass
-from pathlib import Path
+from io import BytesIO
 
 import numpy as np
 import numpy.typing as npt
 
+from nacre.arrays import as_length, as_real, as_times
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
+from nacre.io.raw import excerpt, number_of, read_file, text_of
 from nacre.values import Value
 
 Float64 = npt.NDArray[np.float64]
+
+_ROWS_PER_BLOCK = 1024
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The lines of a text that hold numbers: the lines' numbers, where their values end, and all values."""
+
+    path: str | os.PathLike[str]
+    lines: npt.NDArray[np.int64]
+    ends: npt.NDArray[np.int64]
+    numbers: Float64
+
+    def __len__(self) -> int:
+        return len(self.lines)
+
+    @property
+    def widths(self) -> npt.NDArray[np.int64]:
+        """How many values each line has."""
+        return np.diff(self.ends, prepend=0)
+
+    def error(self, row: int, reason: str) -> FileFormatError:
+        """Return the error for a row."""
+        return FileFormatError(self.path, reason, line=int(self.lines[row]))
+
+    def require_width(self, width: int, what: str) -> None:
+        """Raise where a row has not so many values."""
+        wrong = np.flatnonzero(self.widths != width)
+        if len(wrong):
+            raise self.error(int(wrong[0]), f"expected {what}, got {self.widths[wrong[0]]}")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -33,14 +67,10 @@ class Trajectory(Value):
     poses: Float64
 
     def __post_init__(self) -> None:
-        timestamps = np.array(self.timestamps, dtype=np.float64)
-        poses = np.array(self.poses, dtype=np.float64)
-        if timestamps.ndim != 1 or not np.isfinite(timestamps).all():
-            raise ValueError(f"timestamps must be (N,) finite numbers, got shape {timestamps.shape}")
+        timestamps = _frozen(as_times("timestamps", self.timestamps))
+        poses = _frozen(as_real("poses", self.poses))
         if poses.shape != (len(timestamps), 4, 4):
             raise ValueError(f"poses must have shape ({len(timestamps)}, 4, 4), got {poses.shape}")
-        timestamps.flags.writeable = False
-        poses.flags.writeable = False
         object.__setattr__(self, "timestamps", timestamps)
         object.__setattr__(self, "poses", poses)
 
@@ -70,7 +100,7 @@ class Trajectory(Value):
         (M, 4, 4) float64
             ``world_from_camera``; NaN where no pose is near enough.
         """
-        wanted = np.asarray(timestamps, dtype=np.float64)
+        wanted, max_difference = as_times("timestamps", timestamps), as_length("max_difference", max_difference)
         result = np.full((len(wanted), 4, 4), np.nan)
         if not len(self):
             return result
@@ -89,6 +119,16 @@ class Trajectory(Value):
         fraction = (wanted[between] - times[first]) / (times[second] - times[first])
         result[between] = _interpolate(poses[first], poses[second], fraction)
         return result
+
+
+def _frozen(values: npt.ArrayLike) -> Float64:
+    """Return values that nobody can change: themselves where they are so already, else a copy."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float64:
+        if values.base is None and not values.flags.writeable:
+            return values
+    copy = np.array(values, dtype=np.float64)
+    copy.flags.writeable = False
+    return copy
 
 
 def matrix_from_quaternion(quaternions: npt.ArrayLike) -> Float64:
@@ -164,10 +204,8 @@ def associate(
     indices_a, indices_b : (K,) arrays
         The pairs, ordered by ``indices_a``.
     """
-    a = np.asarray(timestamps_a, dtype=np.float64)
-    b = np.asarray(timestamps_b, dtype=np.float64)
-    if a.ndim != 1 or b.ndim != 1:
-        raise ValueError(f"timestamps must be one-dimensional, got shapes {a.shape} and {b.shape}")
+    a, b = as_times("timestamps_a", timestamps_a), as_times("timestamps_b", timestamps_b)
+    max_difference = as_length("max_difference", max_difference)
     order = np.argsort(b, kind="stable")
     sorted_b = b[order]
     first = np.searchsorted(sorted_b, a - max_difference, side="left")
@@ -211,39 +249,21 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     FileFormatError
         Names the file and the line.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise FileFormatError(path, "not a trajectory: it is not text") from error
-    rows: list[tuple[int, list[float]]] = []
-    for line, content in enumerate(text.splitlines(), start=1):
-        words = content.split("#", 1)[0].split()
-        if not words:
-            continue
-        try:
-            numbers = [float(word) for word in words]
-        except ValueError as error:
-            raise FileFormatError(
-                path, f"expected numbers, got {content.strip()[:60]!r}", line=line
-            ) from error
-        if not np.isfinite(numbers).all():
-            raise FileFormatError(path, f"expected finite numbers, got {content.strip()[:60]!r}", line=line)
-        rows.append((line, numbers))
-    if not rows:
+    rows = _read_rows(path)
+    if not len(rows):
         raise FileFormatError(path, "the trajectory is empty")
-
-    width = len(rows[0][1])
+    width = int(rows.widths[0])
     if width == 8:
-        return _parse_tum(path, rows)
+        return _parse_tum(rows)
     if width == 3:
-        return _parse_log(path, rows)
+        return _parse_log(rows)
     if width == 4 and len(rows) == 4:
-        return Trajectory(np.zeros(1), _parse_matrix(path, rows)[None])
-    raise FileFormatError(
-        path,
+        rows.require_width(4, "4 numbers of a 4x4 matrix")
+        return Trajectory(np.zeros(1), _exact(rows, rows.numbers.reshape(1, 4, 4), 0, 4))
+    raise rows.error(
+        0,
         "expected lines of 8 numbers (TUM), blocks of 3 numbers and a 4x4 matrix (Redwood), or a 4x4 matrix "
         f"(7-Scenes), got {width} numbers",
-        line=rows[0][0],
     )
 
 
@@ -260,9 +280,12 @@ def write_trajectory(path: str | os.PathLike[str], timestamps: npt.ArrayLike, po
     poses : (N, 4, 4) array
         ``world_from_camera``.
     """
-    trajectory = Trajectory(np.asarray(timestamps), np.asarray(poses))
+    trajectory = Trajectory(timestamps, poses)  # type: ignore[arg-type]
     if not np.isfinite(trajectory.poses).all():
-        raise ValueError("poses must be finite")
+        raise ValueError("poses must be finite, got NaN or infinity")
+    largest = np.abs(trajectory.poses[:, :3, :3]).max(initial=0.0)
+    if largest > 2:
+        raise ValueError(f"poses must be rigid, got a rotation matrix with an entry of {largest:g}")
     rows = np.column_stack(
         [
             trajectory.timestamps,
@@ -276,52 +299,80 @@ def write_trajectory(path: str | os.PathLike[str], timestamps: npt.ArrayLike, po
             stream.write((" ".join(_shortest(value) for value in row) + "\n").encode())
 
 
+def _read_rows(path: str | os.PathLike[str]) -> Rows:
+    """Return the lines that hold numbers."""
+    lines, ends, numbers = array("q"), array("q"), array("d")
+    for line, content in enumerate(BytesIO(read_file(path)), start=1):
+        words = content.partition(b"#")[0].split()
+        if not words:
+            continue
+        try:
+            numbers.extend(number_of(word.decode("ascii")) for word in words)
+        except ValueError:
+            text_of(path, content)
+            reason = f"expected numbers, got {excerpt(content.strip())}"
+            raise FileFormatError(path, reason, line=line) from None
+        if not all(map(math.isfinite, numbers[-len(words) :])):
+            reason = f"expected finite numbers, got {excerpt(content.strip())}"
+            raise FileFormatError(path, reason, line=line)
+        lines.append(line)
+        ends.append(len(numbers))
+    return Rows(path, np.frombuffer(lines, np.int64), np.frombuffer(ends, np.int64), np.frombuffer(numbers))
+
+
 def _shortest(value: float) -> str:
     return repr(float(value)).removesuffix(".0")
 
 
-def _parse_tum(path: str | os.PathLike[str], rows: list[tuple[int, list[float]]]) -> Trajectory:
-    for line, numbers in rows:
-        if len(numbers) != 8:
-            raise FileFormatError(
-                path, f"expected 8 numbers (t tx ty tz qx qy qz qw), got {len(numbers)}", line=line
-            )
-        if not any(numbers[4:]):
-            raise FileFormatError(path, "the quaternion is 0", line=line)
-    table = np.array([numbers for _, numbers in rows])
-    poses = np.tile(np.eye(4), (len(table), 1, 1))
-    poses[:, :3, :3] = matrix_from_quaternion(table[:, 4:])
+def _parse_tum(rows: Rows) -> Trajectory:
+    rows.require_width(8, "8 numbers (t tx ty tz qx qy qz qw)")
+    table = rows.numbers.reshape(-1, 8)
+    zero = np.flatnonzero((table[:, 4:] == 0).all(axis=1))
+    if len(zero):
+        raise rows.error(int(zero[0]), "the quaternion is 0")
+    poses = np.zeros((len(table), 4, 4))
+    for start in range(0, len(table), _ROWS_PER_BLOCK):  # a few rows at a time, for the sake of memory
+        block = slice(start, start + _ROWS_PER_BLOCK)
+        poses[block, :3, :3] = matrix_from_quaternion(table[block, 4:])
     poses[:, :3, 3] = table[:, 1:4]
+    poses[:, 3, 3] = 1
+    poses.flags.writeable = False
     return Trajectory(table[:, 0], poses)
 
 
-def _parse_log(path: str | os.PathLike[str], rows: list[tuple[int, list[float]]]) -> Trajectory:
-    timestamps, poses = [], []
-    for start in range(0, len(rows), 5):
-        line, numbers = rows[start]
-        if len(numbers) != 3:
-            raise FileFormatError(path, f"expected 3 numbers before a matrix, got {len(numbers)}", line=line)
-        timestamps.append(numbers[0])
-        poses.append(_parse_matrix(path, rows[start + 1 : start + 5]))
-    return Trajectory(np.array(timestamps), np.array(poses))
+def _parse_log(rows: Rows) -> Trajectory:
+    is_header = np.arange(len(rows)) % 5 == 0
+    wrong = np.flatnonzero(rows.widths != np.where(is_header, 3, 4))
+    if len(wrong):
+        what = "3 numbers before a matrix" if is_header[wrong[0]] else "4 numbers of a 4x4 matrix"
+        raise rows.error(int(wrong[0]), f"expected {what}, got {rows.widths[wrong[0]]}")
+    if len(rows) % 5:
+        raise FileFormatError(rows.path, "the last 4x4 matrix is cut off", line=int(rows.lines[-1]))
+    table = rows.numbers.reshape(-1, 19)
+    broken = np.flatnonzero(table[:, 0] != np.floor(table[:, 0]))
+    if len(broken):
+        reason = f"expected three whole numbers before a matrix, got {table[broken[0], 0]:g} first"
+        raise rows.error(5 * int(broken[0]), reason)
+    poses = np.empty((len(table), 4, 4))
+    for start in range(0, len(table), _ROWS_PER_BLOCK):
+        block = slice(start, start + _ROWS_PER_BLOCK)
+        poses[block] = _exact(rows, table[block, 3:].reshape(-1, 4, 4), 5 * start + 1, 5)
+    poses.flags.writeable = False
+    return Trajectory(table[:, 0], poses)
 
 
-def _parse_matrix(path: str | os.PathLike[str], rows: list[tuple[int, list[float]]]) -> Float64:
-    for line, numbers in rows:
-        if len(numbers) != 4:
-            raise FileFormatError(path, f"expected 4 numbers of a 4x4 matrix, got {len(numbers)}", line=line)
-    if len(rows) != 4:
-        raise FileFormatError(path, "the last 4x4 matrix is cut off")
-    pose = np.array([numbers for _, numbers in rows])
-    u, stretch, vt = np.linalg.svd(pose[:3, :3])
-    if (
-        np.abs(stretch - 1).max() > 0.01
-        or np.linalg.det(u @ vt) < 0
-        or not np.allclose(pose[3], (0, 0, 0, 1))
-    ):
-        raise FileFormatError(path, "the 4x4 matrix is not a rotation and a translation", line=rows[0][0])
-    pose[:3, :3] = u @ vt
-    return pose
+def _exact(rows: Rows, poses: Float64, first: int, step: int) -> Float64:
+    """Return poses with exact rotations; pose i stands from row ``first + step * i`` on."""
+    is_far = np.abs(poses[:, :3, :3]).max(axis=(1, 2)) > 2  # also what has no finite singular values
+    u, stretch, vt = np.linalg.svd(np.where(is_far[:, None, None], np.eye(3), poses[:, :3, :3]))
+    wrong = is_far | (np.abs(stretch - 1).max(axis=1) > 0.01) | (np.linalg.det(u @ vt) < 0)
+    wrong |= ~np.isclose(poses[:, 3], (0, 0, 0, 1)).all(axis=1)
+    if wrong.any():
+        row = first + step * int(np.flatnonzero(wrong)[0])
+        raise rows.error(row, "the 4x4 matrix is not a rotation and a translation")
+    exact = poses.copy()
+    exact[:, :3, :3] = u @ vt
+    return exact
 
 
 def _interpolate(first: Float64, second: Float64, fraction: Float64) -> Float64:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from nacre.errors import FileFormatError
 from nacre.io.points import read_points
 from nacre.viewer.story import Moment, Snapshot, Story, words
-from nacre.written import Written
+from nacre.written import FIGURES, Written
 
 
 def written_story(folder: str | os.PathLike[str]) -> Story:
@@ -55,9 +55,8 @@ def written_story(folder: str | os.PathLike[str]) -> Story:
 
 
 def _moment(frame: dict[str, Any], world_from_truth: npt.NDArray[np.float64] | None) -> Moment:
-    pose, truth = frame["world_from_camera"], frame["truth"]
-    names = ("overlap", "consistency", "evidence", "rmse", "num_inliers", "num_points")
-    figures = {name: frame.get(name) for name in names}
+    pose, truth = frame.get("world_from_camera"), frame.get("truth")
+    figures = {name: frame.get(name) for name in FIGURES}
     figures["milliseconds"] = (frame.get("milliseconds") or {}).get("total")
     return Moment(
         frame["index"],

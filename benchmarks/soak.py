@@ -1,0 +1,152 @@
+"""
+Ten thousand frames: does the memory grow, do frames become slower, does a camera that stands still drift away?
+
+    python benchmarks/soak.py                              # 10 000 frames of each scene
+    python benchmarks/soak.py --scene static --frames 500
+
+Prints a line for each scene and ends with 1 where a limit is missed. Frame times are processor time on one thread, so
+that other programs on the machine hardly count. "Begin" is a tenth of the frames, a thousand at most, from the frame of
+that number on; "end" is as many frames, the last ones.
+"""
+
+from __future__ import annotations
+
+import argparse
+import gc
+import json
+import math
+import os
+import sys
+import time
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from simulated import SCENES, Scene
+
+import nacre
+
+LIMITS = {"memory_growth": 0.05, "p99_ratio": 1.1, "drift_mm": 1.0, "drift_degrees": 0.05}
+
+
+@dataclass
+class Outcome:
+    """What a run measured; growth and ratios are of the end to the beginning."""
+
+    scene: str
+    frames: int
+    width: int
+    tracked: int
+    loops: int
+    points: int
+    cap: int
+    frames_above_cap: int
+    memory_mb: float
+    memory_growth: float
+    bytes_per_frame: float
+    p99_ms: float
+    p99_ratio: float
+    median_ms: float
+    median_ratio: float
+    drift_mm: float
+    drift_degrees: float
+    error_mm: float
+    error_degrees: float
+
+    def missed(self) -> list[str]:
+        """Name the limits that do not hold; only a camera that stands still can drift."""
+        names = [name for name in LIMITS if self.scene == "static" or not name.startswith("drift")]
+        found = [
+            f"{name} {getattr(self, name):.4g} > {LIMITS[name]}"
+            for name in names
+            if not getattr(self, name) <= LIMITS[name]
+        ]
+        found += [f"{self.frames_above_cap} frames above the cap"] * (self.frames_above_cap > 0)
+        return found
+
+
+def memory() -> int:
+    """Return the resident memory of this process [bytes]; linux."""
+    gc.collect()
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def motion(pose: np.ndarray) -> tuple[float, float]:
+    """Return how far a pose is from none: [mm], [degrees]."""
+    sine = np.linalg.norm(pose[:3, :3] - pose[:3, :3].T) / math.sqrt(8)
+    angle = math.atan2(float(sine), (np.trace(pose[:3, :3]) - 1) / 2)
+    return 1000 * float(np.linalg.norm(pose[:3, 3])), math.degrees(angle)
+
+
+def soak(name: str, frames: int, width: int, cap: int) -> Outcome:
+    """Run one scene."""
+    scene = Scene(name, width)
+    model = nacre.Model(scene.camera, max_points=cap, num_threads=1, region={"object": name == "object"})
+    part = min(1000, frames // 10)
+    seconds = np.zeros(frames)
+    errors = np.full((frames, 2), np.nan)
+    tracked = above = loops = begin = 0
+    for index in range(frames):
+        depth, color = scene.depth(index), scene.color(index)
+        before = time.process_time()
+        report = model.add_frame(depth, color)
+        seconds[index] = time.process_time() - before
+        tracked += report.tracked
+        loops += report.loop_frame is not None
+        above += report.num_points > cap
+        if report.tracked:
+            errors[index] = motion(report.world_from_camera @ np.linalg.inv(scene.truth(index)))
+        if index + 1 == part:
+            begin = memory()
+        if (index + 1) % 1000 == 0:
+            print(f"  {name}: {index + 1} frames, {memory() / 1e6:.1f} MB, {report}", file=sys.stderr, flush=True)
+    end = memory()
+    first, last = seconds[part : 2 * part] * 1000, seconds[-part:] * 1000
+    drift = np.nanmax(errors, axis=0)
+    return Outcome(
+        scene=name,
+        frames=frames,
+        width=width,
+        tracked=tracked,
+        loops=loops,
+        points=len(model),
+        cap=cap,
+        frames_above_cap=above,
+        memory_mb=end / 1e6,
+        memory_growth=end / begin - 1,
+        bytes_per_frame=(end - begin) / (frames - part),
+        p99_ms=float(np.percentile(last, 99)),
+        p99_ratio=float(np.percentile(last, 99) / np.percentile(first, 99)),
+        median_ms=float(np.median(last)),
+        median_ratio=float(np.median(last) / np.median(first)),
+        drift_mm=float(drift[0]),
+        drift_degrees=float(drift[1]),
+        error_mm=float(np.nanmedian(errors[:, 0])),
+        error_degrees=float(np.nanmedian(errors[:, 1])),
+    )
+
+
+def main(words: list[str] | None = None) -> int:
+    """Run the scenes that are asked for, and say what was missed."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scene", choices=SCENES, action="append", help="by default each of them")
+    parser.add_argument("--frames", type=int, default=10_000)
+    parser.add_argument("--width", type=int, default=160, help="of the images [pixels]; the height is 3/4 of it")
+    parser.add_argument("--max-points", type=int, default=4000, help="the model's cap")
+    parser.add_argument("--json", type=Path, help="write the figures there")
+    options = parser.parse_args(words)
+    outcomes = []
+    for name in options.scene or SCENES:
+        outcome = soak(name, options.frames, options.width, options.max_points)
+        outcomes.append(asdict(outcome))
+        print(*(f"{key}={value:.4g}" if isinstance(value, float) else f"{key}={value}"
+                for key, value in asdict(outcome).items()))  # fmt: skip
+        print(f"{name}: " + ("; ".join(outcome.missed()) or "every limit holds"), flush=True)
+        outcomes[-1]["missed"] = outcome.missed()
+    if options.json:
+        options.json.write_text(json.dumps(outcomes, indent=1) + "\n")
+    return int(any(outcome["missed"] for outcome in outcomes))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

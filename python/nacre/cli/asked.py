@@ -1,0 +1,123 @@
+"""What a run was asked to do with which recording, so that it can be resumed."""
+
+from __future__ import annotations
+
+import dataclasses
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nacre.cli.source import describe_camera, open_source
+from nacre.cli.terminal import CommandError
+
+if TYPE_CHECKING:
+    from nacre.datasets import Sequence
+
+_log = logging.getLogger(__name__)
+
+
+@dataclass
+class Asked:
+    """The options of ``nacre reconstruct`` but for those that the model keeps itself; paths as given."""
+
+    source: str
+    format: str | None = None
+    camera: str | None = None
+    depth_scale: float | None = None
+    masks: str | None = None
+    attribute: list[str] = dataclasses.field(default_factory=list)
+    color: bool = True
+    first: int = 0
+    last: int | None = None
+    every: int = 1
+    realtime: bool = False
+    retry: bool = True
+    calibrate: bool = True
+    preset: str = "default"
+    is_camera: bool = False
+
+    @property
+    def pick(self) -> tuple[int, int | None, int]:
+        """Which frames, as a slice."""
+        return self.first, None if self.last is None else self.last + 1, self.every
+
+    def open(self, folder: Path | None = None) -> Sequence:
+        """Open the recording; paths that are not absolute begin at a folder, or where we are."""
+
+        def path(name: str) -> Path:
+            return Path(name) if folder is None or folder == Path.cwd() else folder / name
+
+        sequence = open_source(
+            path(self.source),
+            self.format,
+            None if self.camera is None else path(self.camera),
+            self.depth_scale,
+        )
+        if self.masks is not None:
+            sequence = sequence.with_masks(path(self.masks))
+        for text in self.attribute:
+            name, equals, images = text.partition("=")
+            if not (name and equals and images):
+                raise CommandError(f"--attribute needs NAME=FOLDER, got {text!r}", 2)
+            sequence = sequence.with_attribute(name, path(images))
+        return sequence if self.color else sequence.without_color()
+
+    def indices(self, sequence: Sequence) -> range:
+        """Return which frames to run."""
+        indices = range(len(sequence))[slice(*self.pick)]
+        if not indices:
+            raise CommandError(f"no frames are left of {len(sequence)} (0 to {len(sequence) - 1})", 2)
+        return indices
+
+    def document(self, sequence: Sequence) -> dict[str, Any]:
+        """Return what ``run.json`` says."""
+        import nacre
+
+        return {
+            "nacre": nacre.__version__,
+            "folder": str(Path.cwd()),
+            "options": dataclasses.asdict(self),
+            "recording": None if self.is_camera else sequence.digests(),
+        }
+
+
+def asked_before(document: Mapping[str, Any], path: Path) -> tuple[Asked, Path]:
+    """Return what ``run.json`` says, and the folder that paths begin at."""
+    from nacre.errors import FileFormatError
+
+    try:
+        return Asked(**document["options"]), Path(document["folder"])
+    except (KeyError, TypeError) as error:
+        raise FileFormatError(path, f"it does not say what was asked for ({error})") from None
+
+
+def check_recording(document: Mapping[str, Any], sequence: Sequence) -> None:
+    """Compare a recording with what it was; a CommandError says that it is another one."""
+    import nacre
+
+    if document.get("nacre") != nacre.__version__:
+        _log.warning(
+            "the run began with nacre %s; this is nacre %s", document.get("nacre"), nacre.__version__
+        )
+    before, now = document.get("recording"), sequence.digests()
+    if before is None or before == now:
+        return
+    if before.get("files") != now["files"]:
+        raise CommandError(
+            f"{sequence.path} is not the recording that it was: files were added, removed or have another "
+            "size; run it again without --resume",
+        )
+    _log.warning("%s: files were written again since the run began", sequence.path)
+
+
+def describe(sequence: Sequence, indices: range) -> str:
+    """Return in words where the frames come from."""
+    step = f", every {indices.step} frames" if indices.step > 1 else ""
+    part = "" if len(indices) == len(sequence) else f" (frames {indices[0]} to {indices[-1]}{step})"
+    truth = ", with true poses" if sequence.truth is not None else ""
+    return (
+        f"{len(indices)} of {len(sequence)} frames{part}, {sequence.format} format, "
+        f"{describe_camera(sequence.camera)}{truth}"
+    )

@@ -1,0 +1,193 @@
+"""``OUT/unfinished``: what ``nacre reconstruct --resume OUT`` needs, while a run is not finished."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nacre.cli.journal import Journal, read_journal
+from nacre.cli.terminal import CommandError
+
+if TYPE_CHECKING:
+    from nacre import DepthCalibration
+    from nacre.datasets import Sequence
+    from nacre.reconstruction import FrameRecord, Reconstruction
+
+_FORMAT = 1
+_RARE = 50.0  # a checkpoint is written when so many times what the last one took has gone by: 2 % of the time
+_LEAST_SECONDS = 5.0
+
+
+@dataclass
+class Stage:
+    """
+    Where a run is.
+
+    Attributes
+    ----------
+    name : str
+        "views": frames, until there are enough views to calibrate depth; "frames": the rest, or all of them.
+        Lost frames are tried again when there are no more.
+    views : list of (index, pose)
+        That were chosen for the calibration; poses row by row.
+    calibration : DepthCalibration or None
+        That was found.
+    live : mapping or None
+        What report.json says of a camera.
+    """
+
+    name: str = "frames"
+    views: list[tuple[int, list[float]]] = field(default_factory=list)
+    calibration: DepthCalibration | None = None
+    live: Mapping[str, Any] | None = None
+
+    @property
+    def corrects_depth(self) -> bool:
+        """Whether the depth of the recording is corrected."""
+        return self.calibration is not None and self.calibration.is_significant
+
+    @classmethod
+    def of(cls, state: Any) -> Stage:
+        """Return the stage that plain values tell."""
+        from nacre import DepthCalibration
+
+        calibration = state["calibration"]
+        return cls(
+            str(state["name"]),
+            [(int(index), [float(x) for x in pose]) for index, pose in state["views"]],
+            None if calibration is None else DepthCalibration(**calibration),
+            state["live"],
+        )
+
+
+class Unfinished:
+    """
+    The folder ``OUT/unfinished``: run.json (what was asked for), journal.txt and checkpoint.
+
+    Parameters
+    ----------
+    out : Path
+        The folder of the results.
+    every : int, optional
+        A checkpoint after so many frames; 0: only where the run is stopped. None: by time, see above.
+    """
+
+    def __init__(self, out: Path, every: int | None) -> None:
+        self.out = out
+        self.folder = out / "unfinished"
+        self.stage = Stage()
+        self._every = every
+        self._journal: Journal | None = None
+        self._num_since = 0
+        self._next = time.monotonic() + _LEAST_SECONDS
+
+    @property
+    def checkpoint(self) -> Path:
+        """The file of the newest checkpoint."""
+        return self.folder / "checkpoint"
+
+    def begin(self, done: Reconstruction, asked: Mapping[str, Any]) -> None:
+        """Begin a new run; what was left of another goes."""
+        from nacre.io.atomic import atomic_writer
+
+        self.remove()
+        self.folder.mkdir(exist_ok=True)
+        self._journal = Journal(self.folder / "journal.txt")
+        self.save(done)
+        data = json.dumps({"format": _FORMAT, **asked}, indent=2, default=str)
+        with atomic_writer(self.folder / "run.json") as stream:  # the last: from here on it can be resumed
+            stream.write(data.encode() + b"\n")
+
+    def resume(self, sequence: Sequence, compare: bool) -> Reconstruction:
+        """Return the run as it was at the newest checkpoint; what is done again may be compared."""
+        from nacre.errors import FileFormatError
+        from nacre.reconstruction import Reconstruction
+
+        done, more = Reconstruction._load(self.checkpoint, sequence)
+        try:
+            self.stage = Stage.of(more["stage"])
+            num_frames = int(more["num_journaled"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise FileFormatError(self.checkpoint, f"it is no run of nacre reconstruct ({error})") from None
+        self._journal = Journal(self.folder / "journal.txt", num_frames, compare)
+        if self.stage.corrects_depth and self.stage.calibration is not None:
+            done.sequence = sequence.with_depth_calibration(self.stage.calibration)
+        return done
+
+    def journaled_indices(self) -> list[int]:
+        """Return which frames had been done, in order, each once."""
+        return list(dict.fromkeys(entry[0] for entry in read_journal(self.folder / "journal.txt")[0]))
+
+    def add(self, done: Reconstruction, record: FrameRecord) -> None:
+        """Note a frame that is done; write a checkpoint where it is time."""
+        assert self._journal is not None
+        self._journal.add(record)
+        self._num_since += 1
+        due = time.monotonic() >= self._next if self._every is None else self._num_since == self._every
+        if due:
+            self.save(done)
+
+    def save(self, done: Reconstruction) -> None:
+        """Write a checkpoint."""
+        assert self._journal is not None
+        start = time.monotonic()
+        self._journal.sync()
+        stage = asdict(self.stage)
+        done._save(self.checkpoint, stage=stage, num_journaled=self._journal.num_frames)
+        now = time.monotonic()
+        self._next = now + max(_LEAST_SECONDS, _RARE * (now - start))
+        self._num_since = 0
+
+    def remove(self) -> None:
+        """Remove the folder: the run is finished."""
+        if self._journal is not None:
+            self._journal.close()
+            self._journal = None
+        from nacre.io.atomic import remove_leftovers
+
+        remove_leftovers(self.folder)
+        for name in ("run.json", "checkpoint", "journal.txt"):  # without the first it is no run any more
+            (self.folder / name).unlink(missing_ok=True)
+        with suppress(OSError):
+            self.folder.rmdir()
+
+
+def read_asked(out: Path) -> dict[str, Any]:
+    """Return what ``OUT/unfinished/run.json`` says, or say that there is nothing to resume."""
+    from nacre.errors import FileFormatError
+
+    path = out / "unfinished" / "run.json"
+    try:
+        asked = json.loads(path.read_bytes())
+    except FileNotFoundError:
+        if (out / "report.json").exists():
+            raise CommandError(f"{out} holds a run that is finished: there is nothing to resume", 2) from None
+        what = f"{out} holds no unfinished run" if out.is_dir() else f"there is no folder {out}"
+        raise CommandError(f"{what}; give the folder that nacre reconstruct wrote to (its -o)", 2) from None
+    except (ValueError, RecursionError) as error:
+        raise FileFormatError(path, f"not JSON: {error}") from None
+    if not isinstance(asked, dict) or asked.get("format") != _FORMAT:
+        raise FileFormatError(
+            path, "it was written by another version of nacre; run it again without --resume"
+        )
+    return asked
+
+
+def describe_unfinished(out: Path) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+    """Return what there is to tell of an unfinished run."""
+    asked = read_asked(out)
+    entries, _ = read_journal(out / "unfinished" / "journal.txt")
+    source = asked.get("options", {}).get("source")
+    figures = {"kind": "unfinished run", "path": os.fspath(out), "source": source, "num_done": len(entries)}
+    lost = sum(entry[2] == "LOST" for entry in entries)
+    return figures, [
+        ("unfinished run", f"of {source}"),
+        ("frames done", f"{len(entries)}" + f", {lost} lost" * bool(lost)),
+        ("go on", f"nacre reconstruct --resume {out}"),
+    ]

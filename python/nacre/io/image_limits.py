@@ -1,0 +1,123 @@
+"""What an image says of its size, believed only as far as its file can hold it: before a decoder sets memory aside."""
+
+from __future__ import annotations
+
+import os
+import struct
+import zlib
+
+from nacre.errors import FileFormatError
+
+MAX_PIXELS = 1 << 26
+"""More than any depth camera has; 8192 x 8192."""
+
+_PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
+# At most: bitmaps, runs of 255 in two bytes, blocks of 64 in half a bit, rows of a fax in one bit.
+_PIXELS_PER_BYTE: dict[str | None, int] = {"PPM": 8, "BMP": 256, "JPEG": 1024, "TIFF": 1 << 14}
+_DEFLATE_RATIO = 1032  # 258 bytes of two bits
+_LZFSE_HEADER = 772  # of a block of version 1
+_EXR_MAGIC = b"\x76\x2f\x31\x01"
+
+
+def check_pixels(
+    path: str | os.PathLike[str], width: int, height: int, *, file_size: int = 0, format: str | None = None
+) -> None:
+    """Refuse an image of more pixels than a camera has, or than its file can hold."""
+    if width * height > MAX_PIXELS:
+        reason = f"refused: {width} x {height} pixels are more than {MAX_PIXELS}"
+        raise FileFormatError(path, reason)
+    if width * height > _PIXELS_PER_BYTE.get(format, MAX_PIXELS) * file_size > 0:
+        reason = f"refused: {width} x {height} pixels in {file_size} bytes, which cannot hold them"
+        raise FileFormatError(path, reason)
+
+
+def check_png(path: str | os.PathLike[str], data: bytes) -> None:
+    """
+    Check what a PNG file is made of, its check sums included, and that it can hold as many pixels as it says.
+
+    Decoders pass over damaged parts that they have no use for, and give zeros for what is missing. What is no PNG
+    at all is left to them.
+    """
+    if not data.startswith(_PNG_SIGNATURE):
+        return
+    position, name, num_packed = len(_PNG_SIGNATURE), b"", 0
+    view = memoryview(data)
+    while name != b"IEND":
+        if position + 12 > len(data):
+            raise _damaged(path, "it ends before IEND", len(data))
+        size, name = struct.unpack_from(">I4s", data, position)
+        end = position + 12 + size
+        if end > len(data):
+            raise _damaged(path, f"a part of {size} bytes goes on after the end of the file", position)
+        if zlib.crc32(view[position + 4 : end - 4]) != int.from_bytes(view[end - 4 : end], "big"):
+            raise _damaged(path, "the check sum of a part is wrong", position)
+        if (name == b"IHDR") != (position == len(_PNG_SIGNATURE)) or (name == b"IHDR" and size != 13):
+            raise _damaged(path, "it must have one header, at its beginning", position)
+        num_packed += size if name == b"IDAT" else 0
+        position = end
+    width, height, bits, color = struct.unpack_from(">IIBB", data, 16)
+    check_pixels(path, width, height)
+    num_bytes = width * height * bits * _PNG_CHANNELS.get(color, 1) // 8
+    if num_bytes > _DEFLATE_RATIO * num_packed:
+        reason = f"refused: {width} x {height} pixels in {num_packed} bytes, which cannot hold them"
+        raise FileFormatError(path, reason, offset=16)
+
+
+def check_exr(path: str | os.PathLike[str], data: bytes) -> None:
+    """Check how many pixels the header of an EXR file promises; what is no such header is refused."""
+    if not data.startswith(_EXR_MAGIC):
+        raise _damaged(path, "not an EXR image", 0)
+    position = 8
+    while position < len(data) and data[position]:
+        try:
+            name, position = _word(data, position)
+            kind, position = _word(data, position)
+            (size,) = struct.unpack_from("<I", data, position)
+            position += 4
+            if name == b"dataWindow" and kind == b"box2i":
+                left, top, right, bottom = struct.unpack_from("<4i", data, position)
+                if right < left or bottom < top:
+                    raise _damaged(path, "its data window has no pixels", position)
+                check_pixels(path, right - left + 1, bottom - top + 1)
+            position += size
+        except FileFormatError:
+            raise
+        except (ValueError, struct.error):
+            raise _damaged(path, "not an EXR image with a whole header", position) from None
+
+
+def check_lzfse(path: str | os.PathLike[str], data: bytes, most: int) -> None:
+    """Check how many bytes the blocks of LZFSE data say that they hold; the library asks for any amount."""
+    position, total = 0, 0
+    try:
+        while (kind := data[position : position + 4]) != b"bvx$":
+            (num_raw,) = struct.unpack_from("<I", data, position + 4)
+            total += num_raw
+            if kind == b"bvx-":
+                position += 8 + num_raw
+            elif kind == b"bvxn":
+                position += 12 + struct.unpack_from("<I", data, position + 8)[0]
+            elif kind == b"bvx2":
+                first, second, third = struct.unpack_from("<3Q", data, position + 8)
+                position += (third & 0xFFFFFFFF) + (first >> 20 & 0xFFFFF) + (second >> 40 & 0xFFFFF)
+            elif kind == b"bvx1":
+                literals, commands = struct.unpack_from("<2I", data, position + 20)
+                position += _LZFSE_HEADER + literals + commands
+            else:
+                raise ValueError
+            if total > most:
+                raise FileFormatError(path, f"refused: its LZFSE data holds {total} bytes, more than {most}")
+    except FileFormatError:
+        raise
+    except (ValueError, struct.error):
+        raise FileFormatError(path, "the LZFSE data is damaged: a block is cut short", offset=position) from None
+
+
+def _word(data: bytes, position: int) -> tuple[bytes, int]:
+    end = data.index(b"\0", position)
+    return data[position:end], end + 1
+
+
+def _damaged(path: str | os.PathLike[str], reason: str, offset: int) -> FileFormatError:
+    return FileFormatError(path, f"the image is damaged or truncated: {reason}", offset=offset)

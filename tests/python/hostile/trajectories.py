@@ -1,0 +1,66 @@
+"""Hostile trajectories: TUM, Redwood's .log, 7-Scenes, matrices."""
+
+import numpy as np
+
+from hostile.case import single
+
+GOOD = "0 0 0 0 0 0 0 1\n"
+EYE = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
+_random = np.random.default_rng(4)
+
+TUM = {
+    "tum empty": ("", "the trajectory is empty"),
+    "tum of comments": ("# nothing\n" * 1000, "the trajectory is empty"),
+    "tum nul bytes": ("\0" * 300, "line 1"),
+    "tum word": (GOOD + "1 0 0 zero 0 0 0 1\n", "line 2: expected numbers"),
+    "tum nan": (GOOD + "1 nan 0 0 0 0 0 1\n", "line 2: expected finite numbers"),
+    "tum time infinite": ("inf 0 0 0 0 0 0 1\n", "line 1: expected finite numbers"),
+    "tum 1e400": (GOOD + "1 1e400 0 0 0 0 0 1\n", "line 2: expected finite numbers"),
+    "tum underscore": (GOOD + "1_0 0 0 0 0 0 0 1\n", "line 2: expected numbers"),
+    "tum arabic digits": (GOOD + "\u0661 0 0 0 0 0 0 1\n", "line 2: expected numbers"),
+    "tum comma": ("0,0,0,0,0,0,0,1\n", "line 1: expected numbers"),
+    "tum value short": (GOOD + "1 0 0 0 0 0 1\n", "line 2: expected 8 numbers"),
+    "tum value more": (GOOD + "1 0 0 0 0 0 0 1 9\n", "line 2: expected 8 numbers"),
+    "tum cut in the last line": (GOOD * 2 + "2 0 0 0 0 0", "line 3: expected 8 numbers"),
+    "tum quaternion of zero length": (GOOD + "1 0 0 0 0 0 0 0\n", "line 2: the quaternion is 0"),
+    "tum number of 100000 digits": (GOOD + "9" * 100_000 + " 0 0 0 0 0 0 1\n", "line 2: expected finite"),
+    "tum of one endless line": ("0 " * 60_000, "line 1: .*60000 numbers"),
+}
+LOG = {
+    "log header short": ("0 0\n" + EYE, "line 1"),
+    "log header of words": ("a b c\n" + EYE, "line 1: expected numbers"),
+    "log index a fraction": ("0.5 0 1\n" + EYE, "line 1: .*whole"),
+    "log matrix cut": ("0 0 1\n" + EYE[:24], "the last 4x4 matrix is cut off|line"),
+    "log matrix with a row short": ("0 0 1\n" + EYE.replace("0 1 0 0", "0 1 0"), "line 3: expected 4 numbers"),
+    "log matrix of zeros": ("0 0 1\n" + EYE.replace("1", "0"), "line 2: .*not a rotation"),
+    "log matrix mirrors": ("0 0 1\n" + EYE.replace("0 1 0 0", "0 -1 0 0"), "line 2: .*not a rotation"),
+    "log matrix scales": ("0 0 1\n" + EYE.replace("1 0 0 0", "2 0 0 0"), "line 2: .*not a rotation"),
+    "log matrix with a wrong last row": ("0 0 1\n" + EYE.replace("0 0 0 1", "0 0 1 1"), "line 2: .*not a rot"),
+    "log matrix nan": ("0 0 1\n" + EYE.replace("0 1 0 0", "0 nan 0 0"), "line 3: expected finite"),
+    "log matrix 1e308": ("0 0 1\n" + EYE.replace("0 1 0 0", "0 1e308 1e308 0"), "line 2: .*not a rotation"),
+    "log second matrix missing": ("0 0 1\n" + EYE + "1 1 2\n", "cut off"),
+}
+OTHER = {
+    "pose of three rows": ("\n".join(EYE.split("\n")[:3]), "line 1: expected lines of 8 numbers"),
+    "pose of five rows": (EYE + "0 0 0 1\n", "line 1: expected lines of 8 numbers"),
+    "pose of one number": ("1\n", "line 1: expected lines of 8 numbers"),
+    "pose no rotation": (EYE.replace("1 0 0 0", "1 1 0 0"), "line 1: .*not a rotation"),
+}
+BYTES = {
+    "tum utf-16": (GOOD.encode("utf-16"), "not text|line 1"),
+    "tum garbage": (_random.bytes(2000), "not text|line"),
+    "tum latin-1": (GOOD.encode() + b"# gr\xfc\xdf\n1 x\n", "line 3|not text"),
+    "tum nul in a number": (GOOD.encode() + b"1 0\0 0 0 0 0 0 1\n", "line 2: expected numbers"),
+}
+
+
+def _encoded(table: dict[str, tuple[str, str]]) -> dict[str, tuple[bytes, str]]:
+    return {name: (body.encode(), message) for name, (body, message) in table.items()}
+
+
+TRAJECTORIES = (
+    single("trajectory", "trajectory", ".txt", _encoded(TUM) | BYTES)
+    + single("trajectory", "trajectory", ".log", _encoded(LOG))
+    + single("trajectory", "trajectory", ".pose.txt", _encoded(OTHER))
+    + single("trajectory", "matrix", ".mat", {"matrix of two poses": ((GOOD + "1" + GOOD[1:]).encode(), "2 poses")})
+)

@@ -1,0 +1,90 @@
+"""Small files that are as they should be, and what is in them: the seeds of damage."""
+
+import json
+import struct
+import zlib
+
+from hostile.cameras import OPEN3D, PINHOLE
+from hostile.case import Case
+from hostile.configs import TEXTS  # noqa: F401
+from hostile.depth_images import exr, npy, pgm, png
+from hostile.meshes import OFF, TRIANGLE, stl
+from hostile.outputs import FRAME, MODEL, report
+from hostile.pcd import TWO as PCD_TWO
+from hostile.pcd import packed, pcd
+from hostile.phones import HEAD, TOLD, r3d, stray
+from hostile.ply import FACES, GRID, TEXT, TWO, ply, text, vertices
+from hostile.recordings import plain, tum
+from hostile.trajectories import EYE, GOOD
+
+import numpy as np
+
+PIXELS = np.arange(12, dtype=">u2").reshape(3, 4) + 500
+ROWS = b"".join(b"\0" + row.tobytes() for row in PIXELS)
+LISTS = f"{vertices(2)}\nproperty uchar q\n{FACES}"
+MANY = f"{vertices(40)}\nproperty float nx\nproperty float ny\nproperty float nz\nproperty uchar red"
+MANY += "\nproperty uchar green\nproperty uchar blue\nproperty double t"
+_many = np.random.default_rng(6).normal(size=(40, 6)).astype("<f4")
+_wide = b"".join(
+    row.tobytes() + bytes((i, 2 * i, 3 * i)) + struct.pack("<d", i / 7) for i, row in enumerate(_many)
+)
+FILES = {
+    "points": {
+        "binary.ply": ply(TWO),
+        "big.ply": ply(struct.pack(">6f", *range(6)), form="binary_big_endian"),
+        "text.ply": text(TEXT),
+        "lists.ply": text("0 1 2 7\n3 4 5 8\n3 0 1 0\n", LISTS),
+        "many.ply": ply(_wide, MANY),
+        "binary.pcd": pcd(PCD_TWO),
+        "text.pcd": pcd(b"0 1 2\n3 4 5\n", "ascii"),
+        "image.pcd": pcd(PCD_TWO * 2, WIDTH=2, HEIGHT=2, POINTS=4),
+        "packed.pcd": packed(23, *PCD_TWO),
+    },
+    "range grid": {"grid.ply": text(TEXT + "1 0\n1 1\n", GRID)},
+    "mesh": {
+        "a.obj": (TRIANGLE + "f 1 2 3\n").encode(),
+        "a.off": (OFF + "3 0 1 2\n").encode(),
+        "a.stl": stl(1, struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)),
+        "text.stl": b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n"
+        b"endfacet\nendsolid\n",
+        "a.ply": text("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", f"{vertices(3)}\n{FACES}"),
+    },
+    "depth": {
+        "a.png": png(data=zlib.compress(ROWS)),
+        "a.pgm": pgm(body=PIXELS.tobytes()),
+        "a.npy": npy(PIXELS.astype(np.float32)),
+        "a.exr": exr(),
+    },
+    "color": {"a.png": png(bits=8, color=2, data=zlib.compress(3 * (b"\0" + bytes(range(12)))))},
+    "attribute": {"a.npy": npy(np.ones((3, 4, 2)))},
+    "camera": {"camera.json": json.dumps(PINHOLE).encode(), "open3d.json": json.dumps(OPEN3D).encode()},
+    "trajectory": {
+        "a.txt": (GOOD + "1 0.5 0 0 0 0 0.6 0.8\n").encode(),
+        "a.log": ("0 0 1\n" + EYE + "1 1 2\n" + EYE).encode(),
+        "a.pose.txt": EYE.encode(),
+    },
+    "matrix": {"a.txt": EYE.encode()},
+    "config": {
+        "a.toml": b"preset = 'paper'\nmax_points = 1000\n[registration]\nmax_angle = 0.5\nrobust = false\n"
+        b"[depth]\nmax_depth = 3\n",
+    },
+}  # fmt: skip
+VALID = {
+    f"{kind}/valid_{name}": Case(f"{kind}/valid_{name}", kind, {name: data}, "", name)
+    for kind, files in FILES.items()
+    for name, data in files.items()
+}
+for _name, _files in {
+    "tum": tum("1 depth/1.pgm\n2 depth/2.pgm\n", groundtruth=GOOD + "1" + GOOD[1:], rgb="1 rgb/1.png\n"),
+    "plain": plain(timestamps__txt="1\n2\n"),
+    "stray": stray(HEAD + "0,0,0,0,0,0,0,0,1\n"),
+}.items():
+    VALID[f"recording/{_name}"] = Case(f"recording/{_name}", "recording", _files, "")
+VALID["recording/r3d"] = Case("recording/r3d", "recording", {"a.r3d": r3d()}, "", "a.r3d", needs="liblzfse")
+VALID["recording/metadata"] = Case(
+    "recording/metadata", "recording", {"metadata": json.dumps(TOLD).encode(), "rgbd/0.depth": bytes(8)}, "",
+    needs="liblzfse",
+)  # fmt: skip
+VALID["output/valid"] = Case(
+    "output/valid", "output", {"report.json": report(frames=[FRAME, {**FRAME, "index": 1}]), "model.ply": MODEL}, "",
+)  # fmt: skip

@@ -1,0 +1,93 @@
+"""Damaged files give an error or what an independent reader reads in them: never something else."""
+
+import math
+import random
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nacre
+from nacre.io.cameras import read_camera
+from nacre.io.images import read_depth
+
+sys.path.insert(0, str(Path(__file__).parent))
+from hostile import CASES, oracle
+from hostile.damage import damaged, scratched
+from hostile.valid import VALID
+
+NUM_FILES = 1000
+
+
+def same(values, expected):
+    return len(values) == len(expected) and all(
+        a == b or (math.isnan(a) and math.isnan(b)) or (abs(b) > 3.4e38 and math.isinf(a))
+        for a, b in zip(values, expected, strict=True)
+    )
+
+
+def check_points(path, data, read):
+    cloud, columns = nacre.read_points(path), read(data)
+    for axis, name in enumerate("xyz"):
+        assert same(cloud.points[:, axis].tolist(), columns[name])
+    for name, array in cloud.attributes.items():
+        if array.ndim == 1 and array.dtype != object and name in columns:
+            assert same(array.tolist(), columns[name])
+
+
+def check_trajectory(path, data):
+    found, (times, poses) = nacre.read_trajectory(path), oracle.trajectory(data)
+    assert found.timestamps.tolist() == times
+    np.testing.assert_allclose(found.poses, poses, atol=0.02)
+
+
+def check_camera(path, data):
+    found = read_camera(path).camera
+    if found.model == "pinhole":
+        assert [found.width, found.height, found.fx, found.fy, found.cx, found.cy] == oracle.camera(data)
+
+
+CHECKS = {
+    ".ply": lambda path, data: check_points(path, data, oracle.ply),
+    ".pcd": lambda path, data: check_points(path, data, oracle.pcd),
+    ".png": lambda path, data: np.testing.assert_array_equal(read_depth(path), oracle.png(data)),
+    ".pgm": lambda path, data: np.testing.assert_array_equal(read_depth(path), oracle.pgm(data)),
+    ".txt": check_trajectory,
+    ".log": check_trajectory,
+    ".json": check_camera,
+}
+READERS = {".ply": "points", ".pcd": "points", ".png": "depth", ".pgm": "depth", ".json": "camera"}
+
+
+def seeds(suffix):
+    """Return the valid files of a suffix, each many times, and the small hostile ones."""
+    reader = READERS.get(suffix, "trajectory")
+    found = []
+    for cases, times in ((VALID, 40), (CASES, 1)):
+        for case in cases.values():
+            if case.reader == reader and Path(case.opens).suffix == suffix:
+                data = case.files[case.opens]
+                if len(data) < 5000 and b"binary_compressed" not in data:
+                    found += times * [data]
+    return found
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("suffix", CHECKS)
+def test_what_is_read_is_what_is_there(tmp_path, suffix):
+    chance = random.Random(suffix)
+    path = tmp_path / f"a{suffix}"
+    originals = seeds(suffix)
+    num_read = 0
+    for k in range(NUM_FILES):
+        data = (damaged, scratched)[k % 2](originals, chance)
+        path.write_bytes(data)
+        try:
+            CHECKS[suffix](path, data)
+            num_read += 1
+        except nacre.FileFormatError:
+            pass
+        except Exception as error:
+            raise AssertionError(f"{error!r} with {data!r}") from error
+    assert num_read >= (1 if suffix == ".png" else 50), num_read  # else nothing was compared; PNG has check sums

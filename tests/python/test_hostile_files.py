@@ -1,0 +1,36 @@
+"""Files from strangers: each of the corpus gives nacre's own error, with file, place and reason, in time."""
+
+import importlib.util
+import re
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import nacre
+
+sys.path.insert(0, str(Path(__file__).parent))
+from hostile import CASES, opened, write
+
+MOST_SECONDS = 2.0
+RUNNABLE = [name for name, case in CASES.items() if importlib.util.find_spec(case.needs) is not None]
+
+
+def test_corpus_is_large_and_always_the_same():
+    assert len(CASES) >= 500
+    kinds = {name.split("/")[0] for name in CASES}
+    assert kinds >= {"ply", "pcd", "mesh", "image", "trajectory", "camera", "config", "recording", "output"}
+    assert CASES["ply/garbage"].files["a.ply"][:4].hex() == "ffe42279"
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", RUNNABLE)
+def test_error_names_file_place_and_reason(tmp_path, name):
+    path = write(CASES[name], tmp_path)
+    start = time.process_time()
+    with pytest.raises(nacre.FileFormatError, match=CASES[name].message) as caught:
+        opened(CASES[name], path)
+    assert time.process_time() - start < MOST_SECONDS
+    assert str(caught.value.path).startswith(str(path))
+    assert len(str(caught.value)) < 3000

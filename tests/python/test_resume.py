@@ -1,0 +1,287 @@
+"""Runs that were killed or stopped: resumed they give the same bytes, and say what is wrong where they cannot."""
+
+import contextlib
+import io
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import nacre
+from nacre.reconstruction import Reconstruction
+
+pytest.importorskip("typer")
+from nacre.cli import main
+from nacre.cli.journal import read_journal
+from nacre.cli.unfinished import Unfinished
+
+sys.path.insert(0, str(Path(__file__).parent))
+import test_depth_calibration as tilted
+from test_wide_views import view
+
+
+class Killed(BaseException):
+    """Ends a process, as far as its files are concerned."""
+
+
+def command(*arguments: Any) -> tuple[int, str, str]:
+    out, err = io.StringIO(), io.StringIO()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            main([str(word) for word in arguments])
+        except SystemExit as stopped:
+            return int(stopped.code or 0), out.getvalue(), err.getvalue()
+    raise AssertionError("it did not exit")
+
+
+def killed_after(count: int, *arguments: Any) -> None:
+    """Run a command that ends when so many frames are done."""
+    whole, frames = Unfinished.add, iter(range(10_000))
+
+    def add(self: Unfinished, *more: Any) -> None:
+        whole(self, *more)
+        if next(frames) + 1 == count:
+            raise Killed
+
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(Killed):
+        patch.setattr(Unfinished, "add", add)
+        command(*arguments)
+
+
+def results(out: Path) -> tuple[bytes, bytes, Any]:
+    def without_times(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {name: without_times(item) for name, item in value.items() if name != "milliseconds"}
+        return [without_times(item) for item in value] if isinstance(value, list) else value
+
+    report = json.loads((out / "report.json").read_text())
+    return (out / "model.ply").read_bytes(), (out / "trajectory.txt").read_bytes(), without_times(report)
+
+
+@pytest.fixture(autouse=True)
+def plain_page(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its pictures take seconds."""
+    import nacre.report
+
+    monkeypatch.setattr(nacre.report, "render_page", lambda data: "<html></html>")
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Seven views: one sees nothing, and two come before what they can be registered to."""
+    folder = tmp_path_factory.mktemp("resume") / "recording"
+    degrees = (0, 180, 15, None, 30, 60, 120)
+    depth = [np.full_like(view(0), np.nan) if angle is None else view(angle) for angle in degrees]
+    nacre.write_recording(folder, nacre.default_camera(nacre.built_in_object()), depth, depth_scale=20000)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def undisturbed(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, bytes, Any]:
+    out = tmp_path_factory.mktemp("resume") / "out"
+    with pytest.MonkeyPatch.context() as patch:
+        import nacre.report
+
+        patch.setattr(nacre.report, "render_page", lambda data: "<html></html>")
+        assert command("reconstruct", recording, "-o", out)[0] == 0
+    assert not (out / "unfinished").exists()
+    return results(out)
+
+
+class TestKilled:
+    @pytest.mark.parametrize("every", ["0", "1", "3"])
+    def test_after_any_frame_it_goes_on_to_the_same_bytes(
+        self, recording: Path, undisturbed: Any, tmp_path: Path, every: str
+    ) -> None:
+        statuses = [frame["status"] for frame in undisturbed[2]["frames"]]
+        assert "LOST" in statuses
+        assert "RELOCALISED" in statuses
+        for count in (1, 2, 5, 7, 8, 9):  # those after the seventh are lost ones that are tried again
+            out = tmp_path / f"{count}"
+            killed_after(count, "reconstruct", recording, "-o", out, "--checkpoint-every", every)
+            assert len(read_journal(out / "unfinished" / "journal.txt")[0]) == count
+            killed_after(1, "reconstruct", "--resume", out, "--checkpoint-every", every)
+            assert command("reconstruct", "--resume", out)[0] == 0
+            assert results(out) == undisturbed
+            assert not (out / "unfinished").exists()
+
+    def test_while_depth_is_calibrated_and_after(self, tmp_path: Path) -> None:
+        depths, poses = tilted.room.__wrapped__()  # type: ignore[attr-defined]
+        wrong = [depth / (1.0 + 0.01 * tilted.SIDE * depth) for depth in depths]
+        folder = tmp_path / "recording"
+        nacre.write_recording(folder, tilted.CAMERA, wrong, depth_scale=5000, poses=poses)
+        assert command("reconstruct", folder, "-o", tmp_path / "whole")[0] == 0
+        expected = results(tmp_path / "whole")
+        assert expected[2]["depth_calibration"]["used"]
+        for count, every in ((7, 3), (17, 2)):
+            out = tmp_path / f"{count}-{every}"
+            killed_after(count, "reconstruct", folder, "-o", out, "--checkpoint-every", every)
+            assert command("reconstruct", "--resume", out)[0] == 0
+            assert results(out) == expected
+
+    def test_while_results_are_written(
+        self, recording: Path, undisturbed: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def kill(*_: Any, **__: Any) -> None:
+            raise Killed
+
+        for name in ("write_points", "write_trajectory"):
+            with monkeypatch.context() as patch, pytest.raises(Killed):
+                patch.setattr(nacre, name, kill)
+                command("reconstruct", recording, "-o", tmp_path / name)
+            assert command("reconstruct", "--resume", tmp_path / name)[0] == 0
+            assert results(tmp_path / name) == undisturbed
+
+    def test_a_torn_line_of_the_journal_is_the_frame_in_flight(
+        self, recording: Path, undisturbed: Any, tmp_path: Path
+    ) -> None:
+        killed_after(4, "reconstruct", recording, "-o", tmp_path / "o")
+        journal = tmp_path / "o" / "unfinished" / "journal.txt"
+        journal.write_bytes(journal.read_bytes()[:-5])
+        (tmp_path / "o" / ".model.ply.abcd1234.tmp").write_bytes(b"half")
+        assert len(read_journal(journal)[0]) == 3
+        assert "3" in command("info", tmp_path / "o")[1]
+        assert command("reconstruct", "--resume", tmp_path / "o")[0] == 0
+        assert results(tmp_path / "o") == undisturbed
+
+    def test_a_run_that_is_begun_again_says_so(
+        self, recording: Path, undisturbed: Any, tmp_path: Path
+    ) -> None:
+        killed_after(4, "reconstruct", recording, "-o", tmp_path / "o")
+        code, told, _ = command("reconstruct", recording, "-o", tmp_path / "o")
+        assert code == 0
+        assert "held an unfinished run" in told
+        assert results(tmp_path / "o") == undisturbed
+
+
+class TestRefused:
+    @pytest.fixture
+    def killed(self, recording: Path, tmp_path: Path) -> tuple[Path, Path]:
+        copied = tmp_path / "recording"
+        shutil.copytree(recording, copied)
+        killed_after(5, "reconstruct", copied, "-o", tmp_path / "o", "--checkpoint-every", 3)
+        return copied, tmp_path / "o"
+
+    def fails(self, code: int, *arguments: Any) -> str:
+        got, _, err = command("reconstruct", *arguments)
+        assert got == code, err
+        assert err.startswith("error: ") or "\nerror: " in err
+        assert "Traceback" not in err
+        return err
+
+    def test_there_is_nothing_to_resume(self, recording: Path, tmp_path: Path) -> None:
+        assert "there is no folder" in self.fails(2, "--resume", tmp_path / "none")
+        assert "holds no unfinished run" in self.fails(2, "--resume", tmp_path)
+        command("reconstruct", recording, "-o", tmp_path / "o", "--last", 0)
+        assert "finished: there is nothing to resume" in self.fails(2, "--resume", tmp_path / "o")
+
+    def test_options_are_those_of_the_run(self, killed: tuple[Path, Path]) -> None:
+        assert "leave out --every" in self.fails(2, "--resume", killed[1], "--every", 2)
+        assert "leave out SOURCE" in self.fails(2, killed[0], "--resume", killed[1])
+
+    def test_another_recording(self, killed: tuple[Path, Path]) -> None:
+        (killed[0] / "depth" / "000006.png").unlink()
+        assert "not the recording that it was" in self.fails(1, "--resume", killed[1])
+
+    def test_a_frame_that_changed_before_the_kill(self, killed: tuple[Path, Path]) -> None:
+        image = killed[0] / "depth" / "000004.png"
+        other = nacre.io.images.read_depth(image).astype(np.uint16)
+        other[other > 0] += 40
+        size = image.stat().st_size
+        nacre.io.images.write_depth_png(image, other)
+        with image.open("ab") as stream:  # what follows a PNG's end is no part of it
+            stream.write(bytes(max(0, size - image.stat().st_size)))
+        if image.stat().st_size == size:
+            assert "has changed" in self.fails(1, "--resume", killed[1])
+
+    def test_a_damaged_checkpoint(self, killed: tuple[Path, Path]) -> None:
+        checkpoint = killed[1] / "unfinished" / "checkpoint"
+        data = bytearray(checkpoint.read_bytes())
+        data[len(data) // 2] ^= 4
+        checkpoint.write_bytes(data)
+        assert f"{checkpoint}, byte 40: it is damaged" in self.fails(1, "--resume", killed[1])
+
+    def test_a_run_file_that_is_none(self, killed: tuple[Path, Path]) -> None:
+        asked = killed[1] / "unfinished" / "run.json"
+        for text in ("{", "[]", "{}", '{"format": 1, "options": {"path": 1}, "folder": "."}'):
+            asked.write_text(text)
+            assert str(asked) in self.fails(1, "--resume", killed[1])
+
+
+def test_python_code_can_resume_too(recording: Path, undisturbed: Any, tmp_path: Path) -> None:
+    sequence = nacre.open_sequence(recording)
+    whole = nacre.reconstruct(recording)
+    done = Reconstruction(sequence, nacre.Model(sequence.camera))
+
+    def frames() -> Iterator[Any]:
+        yield from done.run()
+        yield from done.retry_lost()
+
+    for k, _ in enumerate(frames()):
+        done.save(tmp_path / "run")
+        if k in (2, 8):
+            other = Reconstruction.load(tmp_path / "run", sequence)
+            assert other.frames == done.frames
+            other.complete()
+            assert other.model.points.tobytes() == whole.model.points.tobytes()
+            assert other.frames[-1].report == other.model.frames[other.frames[-1].report.index]  # type: ignore[union-attr]
+            assert [f.status for f in other.frames] == [f.status for f in whole.frames]
+
+
+SLOW_RUN = """
+import sys, time
+from nacre.cli import main
+from nacre.reconstruction import Reconstruction
+add = Reconstruction._add
+def slow(self, *arguments):
+    time.sleep({seconds})
+    return add(self, *arguments)
+Reconstruction._add = slow
+import nacre.report
+def page(data):
+    print("page", flush=True)
+    time.sleep({page})
+    return "<html></html>"
+nacre.report.render_page = page
+main()
+"""
+
+
+class TestSignals:
+    @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+    @pytest.mark.parametrize("when", ["frames", "results"])
+    def test_it_is_saved_and_goes_on(
+        self, recording: Path, undisturbed: Any, tmp_path: Path, number: int, when: str
+    ) -> None:
+        out = tmp_path / "o"
+        code = SLOW_RUN.format(seconds=0.1 if when == "frames" else 0, page=0 if when == "frames" else 60)
+        words = [sys.executable, "-c", code, "reconstruct", str(recording), "-o", str(out)]
+        journal = out / "unfinished" / "journal.txt"
+        running = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        if when == "results":
+            assert running.stdout is not None
+            while "page" not in running.stdout.readline():
+                pass
+        while not (journal.exists() and len(read_journal(journal)[0]) >= 3):
+            time.sleep(0.01)
+        start = time.monotonic()
+        running.send_signal(number)
+        told, errors = running.communicate(timeout=60)
+        took = time.monotonic() - start
+        assert running.returncode == 128 + number, errors
+        assert took < 2, "on a machine that is not busy"
+        assert f"nacre reconstruct --resume {out}" in told
+        report = json.loads((out / "report.json").read_text())
+        assert report["interrupted"]
+        assert 3 <= len(report["frames"]) <= 7
+        assert len(nacre.read_points(out / "model.ply")) > 0
+        assert command("reconstruct", "--resume", out)[0] == 0
+        assert results(out) == undisturbed
