@@ -143,6 +143,7 @@ DepthImage depth_from_raw(
   require(std::isfinite(depth_scale) && depth_scale > 0.0, "depth_scale", "a positive number of stored units per metre",
           depth_scale);
   DepthImage depth(raw.rows(), raw.cols());
+  if (raw.size() == 0) return depth;
   const auto fill_row = simd::fill_depth_row();
   for (Eigen::Index v = 0; v < raw.rows(); ++v) {
     fill_row(&raw.coeffRef(v, 0), static_cast<float>(depth_scale), static_cast<int>(raw.cols()), &depth(v, 0));

@@ -13,6 +13,7 @@
 #include "parallel.hpp"
 #include "point_grid.hpp"
 #include "point_spacing.hpp"
+#include "pose_check.hpp"
 
 namespace nacre {
 namespace {
@@ -291,6 +292,7 @@ FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, c
                   int num_threads, const std::vector<FrameAttribute>& attributes) {
   options.check();
   require(spacing > 0.0, "spacing", "a positive distance in metres", spacing);
+  require_rigid(world_from_camera, "world_from_camera");
   require(frame.width == camera.width() && frame.height == camera.height(), "frame", "of the camera's size",
           std::to_string(frame.width) + " x " + std::to_string(frame.height));
   require(colors.rows() == 0 || colors.rows() == frame.points.rows(), "colors", "one row per pixel", colors.rows());

@@ -212,6 +212,7 @@ MeshTree::Closest MeshTree::closest(const Vector3d& point) const {
           best.triangle = triangle.id;
         }
       });
+  if (best.triangle < 0) return {Vector3d::Constant(nan), -1, nan};
   best.distance = std::sqrt(nearest);
   return best;
 }

@@ -14,6 +14,7 @@
 #include "model_impl.hpp"
 #include "nacre/cancel.hpp"
 #include "point_spacing.hpp"
+#include "pose_check.hpp"
 #include "rigid_motion.hpp"
 #include "view_adjustment.hpp"
 
@@ -53,6 +54,7 @@ void check_extras(const Camera& camera, const FrameExtras& extras, const PointMo
           extras.colors.rows());
   check_attributes(extras.attributes, camera, model);
   require(!extras.keep_guess || extras.guess.has_value(), "keep_guess", "used with a guess", "no guess");
+  if (extras.guess) require_rigid(*extras.guess, "guess");
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include "check.hpp"
 #include "color_registration.hpp"
 #include "icp_target.hpp"
+#include "pose_check.hpp"
 
 namespace nacre {
 namespace {
@@ -228,6 +229,7 @@ IcpResult align_held(const IcpTarget& target, const IcpSource& source, const Pos
 AlignResult align(const AlignCloud& source, const AlignCloud& target, const Pose& initial,
                   const AlignOptions& options) {
   options.check();
+  require_rigid(initial, "initial");
   const IcpTarget prepared_target(target, options);
   const IcpSource prepared_source(source, options);
   const IcpResult result = align_to(prepared_target, prepared_source, initial, options);

@@ -7,6 +7,7 @@
 
 #include "check.hpp"
 #include "parallel.hpp"
+#include "pose_check.hpp"
 #include "random.hpp"
 
 namespace nacre {
@@ -202,7 +203,7 @@ void SimulationOptions::check() const {
 DepthImage simulate_depth(const MeshTree& mesh, const Camera& camera, const Pose& world_from_camera,
                           const SimulationOptions& options) {
   options.check();
-  require(world_from_camera.matrix().allFinite(), "world_from_camera", "finite", "NaN or infinity");
+  require_rigid(world_from_camera, "world_from_camera");
   const View view(mesh, camera, world_from_camera);
   const Hits hits = cast_pixels(view, options.num_threads);
   Depths depths(hits.size());

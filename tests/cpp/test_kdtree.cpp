@@ -192,6 +192,19 @@ TEST_CASE("extreme magnitudes") {
   check_all(Points(random_points(500, 10).cast<float>()), PointsDouble(random_points(20, 11) * 1e100), 4, inf);
 }
 
+TEST_CASE("queries in double beyond the floats of the points") {
+  Points points(20, 3);
+  for (int i = 0; i < 60; ++i) points.data()[i] = static_cast<float>(i % 7);
+  const KdTree tree(points);
+  PointsDouble queries(3, 3);
+  queries << -1e300, -1e300, -1e300, 1e300, 1e300, 1e300, -1e300, 1.0, 1e39;
+  for (const double reach : {KdTree::infinity, 1e39, 1.0}) {
+    const Neighbors found = tree.query(queries, 3, reach);
+    CHECK((found.indices.array() >= 0).all());
+    CHECK((found.indices.array() <= 20).all());
+  }
+}
+
 TEST_CASE("points that are not finite are never found, queries that are not finite find nothing") {
   Points points = random_points(1000, 12).cast<float>();
   Points queries = random_points(40, 13).cast<float>();

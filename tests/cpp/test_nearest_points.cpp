@@ -1,5 +1,6 @@
 #define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "doctest/doctest.h"
@@ -88,4 +89,19 @@ TEST_CASE("many points in one place") {
   Cloud queries(50, 5);
   queries.x[7] = queries.y[7] = queries.z[7] = 0.5F;
   check(points, queries, inf);
+}
+
+TEST_CASE("queries whose squared distances are no floats find nothing outside of the tree") {
+  const Cloud points(50, 1);
+  const std::vector<float> rows = points.rows();
+  const BlockTree<float> tree(rows.data(), 50, 1);
+  constexpr auto infinite = std::numeric_limits<float>::infinity();
+  for (const float far : {1e30F, -1e30F, infinite, -infinite, std::numeric_limits<float>::quiet_NaN()}) {
+    const std::vector<float> place(3, far);
+    std::vector<std::uint32_t> slots(3, no_slot);
+    std::vector<float> d2(3), next(3);
+    find_nearest_points(tree, {place.data(), place.data(), place.data(), slots.data(), d2.data(), next.data()}, 0, 3,
+                        inf);
+    for (const std::uint32_t slot : slots) CHECK((slot == no_slot || slot < 50));
+  }
 }

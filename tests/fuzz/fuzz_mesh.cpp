@@ -22,7 +22,9 @@ NACRE_FUZZ_TARGET(bytes) {
   }
   const MeshTree::ClosestPoints closest = tree.closest(origins, bytes.threads());
   for (Eigen::Index i = 0; i < closest.distances.size(); ++i) {
-    NACRE_HOLDS((closest.triangles[i] >= 0) == origins.row(i).allFinite());
+    const bool is_near = origins.row(i).squaredNorm() < 1e300;
+    NACRE_HOLDS(closest.triangles[i] >= 0 ? origins.row(i).allFinite() : !is_near);
+    NACRE_HOLDS(std::isfinite(closest.distances[i]) == (closest.triangles[i] >= 0));
     NACRE_HOLDS(closest.triangles[i] < triangles.rows());
   }
   for (std::int32_t i = 0; i < triangles.rows(); ++i) {

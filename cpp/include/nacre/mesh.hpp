@@ -59,7 +59,8 @@ class MeshTree {
     std::int32_t triangle = -1;
     double distance = 0.0;  ///< unsigned [m]
   };
-  /// The point of the surface nearest to a point; NaN and triangle -1 for one that is not finite.
+  /// The point of the surface nearest to a point; NaN and triangle -1 for one that is not finite, or so far off that
+  /// its squared distance is not.
   Closest closest(const Eigen::Vector3d& point) const;
 
   /// The nearest points of the surface, one a row.

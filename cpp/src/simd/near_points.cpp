@@ -41,7 +41,8 @@ int near_boxes(const BoxGroup<float>& group, const float* place, float limit, ui
     F32 sum = broadcast(0.0F);
     for (int axis = 0; axis < 3; ++axis) {
       const F32 q = broadcast(place[axis]);
-      const F32 gap = max(max(load(group.lo[axis] + lane) - q, q - load(group.hi[axis] + lane)), broadcast(0.0F));
+      // NaN, of a box that does not exist and a query beyond floats, stays NaN and is not near.
+      const F32 gap = max(broadcast(0.0F), max(load(group.lo[axis] + lane) - q, q - load(group.hi[axis] + lane)));
       sum += gap * gap;
     }
     const Mask near = sum <= broadcast(limit);

@@ -18,9 +18,10 @@ struct NearBlocks {
 
 NACRE_INLINE F32 box_distances(const BoxGroup<float>& group, int lane, F32 x, F32 y, F32 z) {
   const F32 zero = broadcast(0.0F);
-  const F32 dx = max(max(load(group.lo[0] + lane) - x, x - load(group.hi[0] + lane)), zero);
-  const F32 dy = max(max(load(group.lo[1] + lane) - y, y - load(group.hi[1] + lane)), zero);
-  const F32 dz = max(max(load(group.lo[2] + lane) - z, z - load(group.hi[2] + lane)), zero);
+  // NaN, which is near nothing, where the query is.
+  const F32 dx = max(zero, max(load(group.lo[0] + lane) - x, x - load(group.hi[0] + lane)));
+  const F32 dy = max(zero, max(load(group.lo[1] + lane) - y, y - load(group.hi[1] + lane)));
+  const F32 dz = max(zero, max(load(group.lo[2] + lane) - z, z - load(group.hi[2] + lane)));
   return dx * dx + dy * dy + dz * dz;
 }
 
@@ -31,6 +32,7 @@ NACRE_INLINE bool find_near_blocks(const BlockTreeView<float>& tree, F32 x, F32 
   int32_t* below = tree.num_levels % 2 == 0 ? others : out.number;
   boxes[0] = 0;
   out.count = 1;
+  if (!(limit < FLT_MAX)) limit = FLT_MAX;  // boxes that do not exist are at infinity
   for (int level = tree.num_levels - 1; level >= 0; --level) {
     int n = 0;
     for (int i = 0; i < out.count; ++i) {

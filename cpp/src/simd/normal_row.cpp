@@ -349,7 +349,9 @@ int fit_normals(const PlanarRow& row, const NormalRule& rule, const RayRow& rays
       const Group& g = groups[i / group];
       const int part = i % group / lanes, u = begin + i, left = count - i;
       Normals n = normals_of(g.planes[part], g.pixels[part].value, rule, rays, u, row.is_inverse);
-      const Mask found = n.x == n.x;
+      // Values whose squares are no floats have no normal.
+      const F32 squared_length = n.x * n.x + (n.y * n.y + n.z * n.z);
+      const Mask found = (squared_length > broadcast(0.99F)) & (squared_length < broadcast(1.01F));
       n = {select(found, n.x, missing), select(found, n.y, missing), select(found, n.z, missing)};
       if (left >= lanes) {
         store_interleaved(normals + 3 * u, n.x, n.y, n.z);
