@@ -239,7 +239,7 @@ void BlockTree<T>::search_nearest_first(const Eigen::Vector3d& query, Blocks see
     if (distance > limit) continue;
     const auto level = static_cast<int>(boxes[size] >> level_bits);
     const std::uint32_t box = boxes[size] & ((1U << level_bits) - 1);
-    if (distance >= tie) {
+    if (!(distance < tie)) {  // as where the tie is NaN: squares that are no floats
       const BoxGroup<T>& group = view_.levels[level][box / group_boxes];
       if (!(nearest_possible(group, static_cast<int>(box % group_boxes), query) < results.bound())) continue;
     }

@@ -28,7 +28,7 @@ struct RayTable {
                         origin_x.data(),
                         origin_y[i],
                         {}};
-    for (int k = 0; k < 4; ++k) {
+    for (std::size_t k = 0; k < 4; ++k) {
       row.pixel_from_ray[k] = pixel_from_ray[k].empty() ? nullptr : pixel_from_ray[k].data() + first;
     }
     return row;

@@ -21,19 +21,18 @@ TEST_CASE("A thousand models are made, run and destroyed") {
   world_from_camera.translation().x() += 0.003;
   const DepthImage second = simulate_depth(tree, camera, world_from_camera, simulation);
 
-  int num_tracked = 0;
   for (int cycle = 0; cycle < 1000; ++cycle) {
     ModelOptions options;
     options.fold_in = static_cast<FoldIn>(cycle % 3);
     options.num_threads = 1 + cycle % 2;
+    options.relocalise = cycle % 100 == 0;  // takes long
     Model model(camera, options);
     FrameExtras extras;
     if (cycle % 2 == 1) extras.colors = Colors::Constant(first.size(), 3, 100);
     model.add_frame(first, extras);
-    num_tracked += model.add_frame(second, extras).status == FrameStatus::tracked ? 1 : 0;
+    model.add_frame(second, extras);
     CHECK_THROWS_AS(model.add_frame(DepthImage::Ones(2, 2)), std::invalid_argument);
     const Model moved = std::move(model);
     REQUIRE(moved.cloud().size() > 0);
   }
-  CHECK(num_tracked > 900);
 }
