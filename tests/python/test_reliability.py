@@ -58,8 +58,9 @@ def test_the_determinism_program_tells_a_difference() -> None:
 
 @pytest.mark.parametrize("scene", ["static", "turning"])
 def test_three_hundred_frames(scene: str) -> None:
-    """Memory and drift; frame times on a busy machine say too little after so few frames."""
-    said = run("soak.py", "--scene", scene, "--frames", "300", "--not", "p99_ratio")
+    """Drift and cap, and memory where no new surface comes into view; frame times are for longer runs."""
+    left_out = ["--not", "p99_ratio", *(["--not", "memory_growth"] if scene == "turning" else [])]
+    said = run("soak.py", "--scene", scene, "--frames", "300", *left_out)
     assert f"{scene}: every limit holds" in said
     assert "tracked=300" in said
 
