@@ -1,13 +1,13 @@
 """
-Whole reconstructions, again and again: are model, trajectory and report the same bits?
+Whole reconstructions, again and again: model, trajectory and report have the same bits.
 
     python benchmarks/determinism.py                                  # simulated recordings
     python benchmarks/determinism.py --recording FOLDER --frames 40   # and a real one
     python benchmarks/determinism.py --threads 1,2 --repeats 2        # as the tests run it
 
-Each recording is run with each number of threads, some more times in one process, and in other processes: with each
-instruction set, hash seed, locale and time zone, on one processor, with dirty memory. Prints the SHA-256 of each
-result, and where one differs from the first, by how much. Ends with 1 where one does that may not.
+Each recording is run with each number of threads, some more times in one process, saved and loaded on the
+way, and in other processes: with each instruction set, hash seed, locale and time zone, on one processor, and
+with dirty memory. Prints the SHA-256 of each, and by how much it differs; ends with 1 where it may not.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -35,14 +35,15 @@ from nacre.reconstruction import Reconstruction
 Array = npt.NDArray[Any]
 
 MODELS: dict[str, dict[str, Any]] = {
-    "room": {"max_points": 8000},  # a full turn with wrong focal length, so that a loop closes; lost frames; colours
+    "room": {
+        "max_points": 8000
+    },  # a full turn with wrong focal length, so that a loop closes; lost frames; colours
     "object": {"region": {"object": True}},
     "wlop": {"fold_in": "wlop", "max_points": 1000},
     "wlop+": {"fold_in": "wlop+", "max_points": 1000},
     "recording": {},
 }
-ALONE = {"MALLOC_PERTURB_": "0"}
-"""Environments of other processes, by name; "processors" is how many of them the process may use."""
+# Environments of other processes; "processors" is how many the process may use.
 ELSEWHERE: dict[str, dict[str, str]] = {
     "another process": {"PYTHONHASHSEED": "1"},
     "another hash seed, dirty memory": {"PYTHONHASHSEED": "271828", "MALLOC_PERTURB_": "170"},
@@ -55,13 +56,13 @@ ELSEWHERE: dict[str, dict[str, str]] = {
 FREE = {"wlop", "wlop+"}  # may differ between instruction sets
 
 
-@dataclass
+@dataclass(eq=False)
 class Result:
     """What a run left: its arrays, and the figures of its report that are no times."""
 
     arrays: dict[str, Array]
     figures: str
-    about: str = field(default="", compare=False)
+    about: str = ""
 
     @property
     def sha256(self) -> str:
@@ -86,7 +87,8 @@ def recording(name: str, frames: int, path: str | None) -> Sequence[SequenceFram
     """Return the frames of a case."""
     if name == "recording":
         assert path is not None
-        return nacre.open_sequence(path)[:frames]
+        opened: Sequence[SequenceFrame] = nacre.open_sequence(path)[:frames]
+        return opened
     if name.startswith("wlop"):
         thing = nacre.built_in_object()
         camera, poses = nacre.default_camera(thing), nacre.turntable_poses(thing, 8, np.radians(15))
@@ -115,12 +117,22 @@ def without_times(value: Any) -> Any:
     return [without_times(entry) for entry in value] if isinstance(value, list) else value
 
 
-def reconstruct(name: str, sequence: Sequence[SequenceFrame], num_threads: int) -> Result:
-    """Run one case."""
+def reconstruct(
+    name: str, sequence: Sequence[SequenceFrame], num_threads: int, interrupted: int | None = None
+) -> Result:
+    """Run one case; save it after some frames, forget it, load it and go on, if asked to."""
     model = nacre.Model(sequence[0].camera, num_threads=num_threads, **MODELS[name])
-    done = Reconstruction(sequence, model).complete()
+    done = Reconstruction(sequence, model)
+    if interrupted is not None:
+        for _ in done.run(range(interrupted)):
+            pass
+        with tempfile.TemporaryDirectory() as folder:
+            done.save(Path(folder) / "checkpoint")
+            done = Reconstruction.load(Path(folder) / "checkpoint", sequence)
+    done.complete()
+    model = done.model
     figures = without_times(done.as_dict())
-    arrays = {
+    arrays: dict[str, Array] = {
         "points": model.points,
         "normals": model.normals,
         "confidence": model.confidence,
@@ -181,10 +193,19 @@ def compare(name: str, options: argparse.Namespace) -> bool:
     print(f"  {'SHA-256':36} {first.sha256}")
     for threads in options.threads[1:]:
         tell(f"{threads} threads", reconstruct(name, sequence, threads))
-    repeats = [reconstruct(name, sequence, 0) for _ in range(options.repeats)]
-    others = [result for result in repeats if result != first and result.sha256 != first.sha256]
-    tell(f"{options.repeats} times, all threads", (others or repeats or [first])[0])
-    words = ["--frames", str(options.frames), *(["--recording", options.recording] if options.recording else [])]
+    repeats = {first.sha256: first}
+    for _ in range(options.repeats):
+        repeated = reconstruct(name, sequence, 0)
+        repeats[repeated.sha256] = repeated
+    tell(f"{options.repeats} times, all threads", list(repeats.values())[-1])
+    for part in (0.25, 0.5, 0.9):
+        frames = int(part * len(sequence))
+        tell(f"saved and loaded after {frames} frames", reconstruct(name, sequence, 0, frames))
+    words = [
+        "--frames",
+        str(options.frames),
+        *(["--recording", options.recording] if options.recording else []),
+    ]
     for way, environment in ELSEWHERE.items():
         free = "NACRE_SIMD" in environment and name in FREE
         tell(way, in_another_process(name, words, environment), free)
@@ -193,21 +214,26 @@ def compare(name: str, options: argparse.Namespace) -> bool:
 
 def main() -> int:
     """Compare the cases that are asked for."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     numbers = lambda text: [int(word) for word in text.split(",")]  # noqa: E731
     parser.add_argument("--threads", type=numbers, default=[1, 2, 3, 4, 7, 8, 16])
     parser.add_argument("--repeats", type=int, default=20)
     parser.add_argument("--frames", type=int, default=76, help="of each recording")
-    parser.add_argument("--recording", help="a folder or file of a recording, as `nacre reconstruct` takes it")
+    parser.add_argument(
+        "--recording", help="a folder or file of a recording, as `nacre reconstruct` takes it"
+    )
     parser.add_argument("--only", choices=MODELS, action="append", help="by default all")
     parser.add_argument("--save", type=Path, help=argparse.SUPPRESS)
     options = parser.parse_args()
     names = options.only or [name for name in MODELS if name != "recording" or options.recording]
     if options.save:
         result = reconstruct(names[0], recording(names[0], options.frames, options.recording), 2)
-        np.savez(options.save, figures=result.figures, **result.arrays)
+        np.savez(options.save, allow_pickle=False, figures=result.figures, **result.arrays)
         return 0
-    return 0 if all([compare(name, options) for name in names]) else 1
+    hold = [compare(name, options) for name in names]
+    return 0 if all(hold) else 1
 
 
 if __name__ == "__main__":

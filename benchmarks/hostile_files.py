@@ -3,9 +3,10 @@ Hostile point files in nacre and in other libraries: who tells, who is silent, w
 
     python benchmarks/hostile_files.py [--python PATH]
 
-reads the PLY and PCD files of ``tests/python/hostile`` with nacre and with what is installed of Open3D, OpenCV, meshio and
-trimesh, each in a process of its own that is started again where it dies. ``--python`` is another interpreter, in
-whose environment the others are. ``--data FOLDER`` adds files: all those in it but ok.ply and nan.ply are broken.
+reads the PLY and PCD files of ``tests/python/hostile_files`` with nacre and with what is there of Open3D,
+OpenCV, meshio and trimesh, each in a process of its own that is started again where it dies. ``--python`` is another
+interpreter, in whose environment the others are. ``--data FOLDER`` adds files: all those in it but ok.ply and
+nan.ply are broken.
 """
 
 import argparse
@@ -19,15 +20,15 @@ from pathlib import Path
 
 TESTS = Path(__file__).resolve().parents[1] / "tests" / "python"
 SECONDS = 5.0
+QUIET = "import open3d\nopen3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)\n"
 READ = {
     "nacre": "import nacre\ndef read(p): return len(nacre.read_points(p))",
-    "Open3D": "import open3d\nopen3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)\n"
-    "def read(p): return len(open3d.io.read_point_cloud(p).points)",
-    "Open3D (tensor)": "import open3d\nopen3d.utility.set_verbosity_level(open3d.utility.VerbosityLevel.Error)\n"
-    "def read(p): return len(open3d.t.io.read_point_cloud(p).point.positions)",
-    "OpenCV": "import cv2\ndef read(p):\n  v = cv2.loadPointCloud(p)[0]\n  return 0 if v is None else v.size // 3",
+    "Open3D": f"{QUIET}def read(p): return len(open3d.io.read_point_cloud(p).points)",
+    "Open3D (tensor)": QUIET + "def read(p): return len(open3d.t.io.read_point_cloud(p).point.positions)",
+    "OpenCV": "import cv2\ndef read(p):\n  v = cv2.loadPointCloud(p)[0]\n"
+    "  return 0 if v is None else v.size // 3",
     "meshio": "import meshio\ndef read(p): return len(meshio.read(p).points)",
-    "trimesh": "import trimesh\ndef read(p):\n  v = trimesh.load(p)\n  return len(getattr(v, 'vertices', ()))",
+    "trimesh": "import trimesh\ndef read(p): return len(getattr(trimesh.load(p), 'vertices', ()))",
 }
 ENDINGS = {"nacre": (".ply", ".pcd"), "Open3D": (".ply", ".pcd"), "Open3D (tensor)": (".ply", ".pcd")}
 WORKER = """
@@ -61,7 +62,8 @@ class Reader:
         """Return what comes of a file: told, empty, points, exit, crash or hang."""
         if self.process is None and not self.start():
             return "exit"
-        assert self.process is not None and self.process.stdin is not None
+        assert self.process is not None
+        assert self.process.stdin is not None
         self.process.stdin.write(f"{path}\n")
         self.process.stdin.flush()
         line = self._line("ANSWER ", SECONDS)
@@ -74,7 +76,8 @@ class Reader:
         return "empty" if line.startswith("0 ") else "points"
 
     def _line(self, start: str, seconds: float) -> str | None:
-        assert self.process is not None and self.process.stdout is not None
+        assert self.process is not None
+        assert self.process.stdout is not None
         while select.select([self.process.stdout], [], [], seconds)[0]:
             line = self.process.stdout.readline()
             if not line:
@@ -95,7 +98,7 @@ class Reader:
 def broken_files(folder: Path, data: Path | None) -> list[Path]:
     """Write the hostile point files, and return them and those of a folder of others."""
     sys.path.insert(0, str(TESTS))
-    from hostile import CASES, write
+    from hostile_files import CASES, write
 
     cases = [case for case in CASES.values() if case.reader == "points"]
     found = [write(case, folder) for case in cases]

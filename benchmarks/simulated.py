@@ -17,7 +17,8 @@ SCENES = ("static", "turning", "object")
 
 def box(center: Any, size: Any, turn: float) -> tuple[Array, Array]:
     """Return the vertices and the triangles of a box that is turned about y."""
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)]) * size
+    corners: Array = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+    corners = corners * size
     cos, sin = math.cos(turn), math.sin(turn)
     quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
     triangles = [t for a, b, c, d in quads for t in ([a, b, c], [a, c, d])]
@@ -33,13 +34,14 @@ def merged(parts: list[tuple[Array, Array]]) -> nacre.Mesh:
 
 
 def furnished_room() -> nacre.Mesh:
-    """Return a room of 2 m x 1.4 m x 2 m with boxes along its walls: they are about a metre from its middle."""
+    """Return a room with boxes along its walls, which are about a metre from its middle."""
     random = np.random.default_rng(3)
     parts = [box(np.zeros(3), [2.2, 1.6, 2.2], 0.0)]
     for i in range(60):
         angle = 2 * math.pi * (i + random.random()) / 60
         way = np.array([math.sin(angle), 0, math.cos(angle)])
-        place = (1.1 / abs(way).max() - 0.15 * random.random()) * way + [0, random.uniform(-0.7, 0.7), 0]
+        place = (1.1 / abs(way).max() - 0.15 * random.random()) * way
+        place = place + np.array([0, random.uniform(-0.7, 0.7), 0])
         parts.append(box(place, random.uniform(0.1, [0.35, 0.4, 0.35]), random.uniform(0, math.pi)))
     return merged(parts)
 
@@ -48,7 +50,7 @@ def turn_about_y(angle: float) -> Array:
     """Return the pose of a camera at the origin that looks along z, turned."""
     pose = np.eye(4)
     cos, sin = math.cos(angle), math.sin(angle)
-    pose[:3, :3] = [[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]]
+    pose[:3, :3] = np.array([[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]])
     return pose
 
 
@@ -69,8 +71,8 @@ class Scene:
     """
     Depth and colour images with new noise in every frame.
 
-    "static": a camera that stands in a furnished room; "turning": one that turns in it, again and again; "object":
-    a thing that turns on a table before a camera that stands. The images of a full turn are made once.
+    "static": a camera that stands in a furnished room; "turning": one that turns in it, again and again;
+    "object": a thing that turns on a table before a camera that stands. The images of a turn are made once.
     """
 
     def __init__(self, name: str, width: int, *, views: int = 180, sigma: float = 0.002) -> None:

@@ -1,12 +1,12 @@
 """
-Ten thousand frames: does the memory grow, do frames become slower, does a camera that stands still drift away?
+Ten thousand frames: growth of memory and of frame times, and the drift of a camera that stands still.
 
     python benchmarks/soak.py                              # 10 000 frames of each scene
     python benchmarks/soak.py --scene static --frames 500
 
-Prints a line for each scene and ends with 1 where a limit is missed. Frame times are processor time on one thread, so
-that other programs on the machine hardly count. "Begin" is a tenth of the frames, a thousand at most, from the frame of
-that number on; "end" is as many frames, the last ones.
+Prints a line for each scene and ends with 1 where a limit is missed. Frame times are processor time on one
+thread, so that other programs on the machine hardly count. "Begin" is a tenth of the frames, a thousand at
+most, from the frame of that number on; "end" is as many frames, the last ones.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ import gc
 import json
 import math
 import os
+import pickle
 import sys
 import time
+import tracemalloc
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -26,12 +28,18 @@ from simulated import SCENES, Scene
 
 import nacre
 
+CORE_REPORT = 936  # bytes that the C++ model keeps of a frame: its report and its pose
 LIMITS = {"memory_growth": 0.05, "p99_ratio": 1.1, "drift_mm": 1.0, "drift_degrees": 0.05}
 
 
 @dataclass
 class Outcome:
-    """What a run measured; growth and ratios are of the end to the beginning."""
+    """
+    What a run measured; growth and ratios are of the end to the beginning.
+
+    A model keeps the report of every frame: ``bytes_per_frame`` is by how much memory grew, ``report_bytes``
+    what of that is the report, and ``memory_growth`` the rest, as a part of the memory at the beginning.
+    """
 
     scene: str
     frames: int
@@ -44,6 +52,7 @@ class Outcome:
     memory_mb: float
     memory_growth: float
     bytes_per_frame: float
+    report_bytes: float
     p99_ms: float
     p99_ratio: float
     median_ms: float
@@ -53,9 +62,10 @@ class Outcome:
     error_mm: float
     error_degrees: float
 
-    def missed(self) -> list[str]:
+    def missed(self, left_out: list[str]) -> list[str]:
         """Name the limits that do not hold; only a camera that stands still can drift."""
-        names = [name for name in LIMITS if self.scene == "static" or not name.startswith("drift")]
+        names = [name for name in LIMITS if name not in left_out]
+        names = [name for name in names if self.scene == "static" or not name.startswith("drift")]
         found = [
             f"{name} {getattr(self, name):.4g} > {LIMITS[name]}"
             for name in names
@@ -71,6 +81,16 @@ def memory() -> int:
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
+def report_bytes(model: nacre.Model) -> float:
+    """Return what the report of a frame takes, on average [bytes]."""
+    reports = model.frames[-200:]
+    tracemalloc.start()
+    copies = [pickle.loads(pickle.dumps(report)) for report in reports]
+    taken = tracemalloc.get_traced_memory()[0] / len(copies)
+    tracemalloc.stop()
+    return taken + CORE_REPORT
+
+
 def motion(pose: np.ndarray) -> tuple[float, float]:
     """Return how far a pose is from none: [mm], [degrees]."""
     sine = np.linalg.norm(pose[:3, :3] - pose[:3, :3].T) / math.sqrt(8)
@@ -78,9 +98,9 @@ def motion(pose: np.ndarray) -> tuple[float, float]:
     return 1000 * float(np.linalg.norm(pose[:3, 3])), math.degrees(angle)
 
 
-def soak(name: str, frames: int, width: int, cap: int) -> Outcome:
+def soak(name: str, frames: int, width: int, cap: int, sigma: float) -> Outcome:
     """Run one scene."""
-    scene = Scene(name, width)
+    scene = Scene(name, width, sigma=sigma)
     model = nacre.Model(scene.camera, max_points=cap, num_threads=1, region={"object": name == "object"})
     part = min(1000, frames // 10)
     seconds = np.zeros(frames)
@@ -99,10 +119,15 @@ def soak(name: str, frames: int, width: int, cap: int) -> Outcome:
         if index + 1 == part:
             begin = memory()
         if (index + 1) % 1000 == 0:
-            print(f"  {name}: {index + 1} frames, {memory() / 1e6:.1f} MB, {report}", file=sys.stderr, flush=True)
+            print(
+                f"  {name}: {index + 1} frames, {memory() / 1e6:.1f} MB, {report}",
+                file=sys.stderr,
+                flush=True,
+            )
     end = memory()
     first, last = seconds[part : 2 * part] * 1000, seconds[-part:] * 1000
     drift = np.nanmax(errors, axis=0)
+    reports = report_bytes(model)
     return Outcome(
         scene=name,
         frames=frames,
@@ -113,8 +138,9 @@ def soak(name: str, frames: int, width: int, cap: int) -> Outcome:
         cap=cap,
         frames_above_cap=above,
         memory_mb=end / 1e6,
-        memory_growth=end / begin - 1,
+        memory_growth=(end - begin - reports * (frames - part)) / begin,
         bytes_per_frame=(end - begin) / (frames - part),
+        report_bytes=reports,
         p99_ms=float(np.percentile(last, 99)),
         p99_ratio=float(np.percentile(last, 99) / np.percentile(first, 99)),
         median_ms=float(np.median(last)),
@@ -128,21 +154,29 @@ def soak(name: str, frames: int, width: int, cap: int) -> Outcome:
 
 def main(words: list[str] | None = None) -> int:
     """Run the scenes that are asked for, and say what was missed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--scene", choices=SCENES, action="append", help="by default each of them")
     parser.add_argument("--frames", type=int, default=10_000)
-    parser.add_argument("--width", type=int, default=160, help="of the images [pixels]; the height is 3/4 of it")
+    parser.add_argument(
+        "--width", type=int, default=160, help="of the images [pixels]; the height is 3/4 of it"
+    )
     parser.add_argument("--max-points", type=int, default=4000, help="the model's cap")
+    parser.add_argument("--sigma", type=float, default=0.002, help="of the depth [m]")
+    parser.add_argument(
+        "--not", dest="left_out", choices=LIMITS, action="append", default=[], help="do not demand it"
+    )
     parser.add_argument("--json", type=Path, help="write the figures there")
     options = parser.parse_args(words)
     outcomes = []
     for name in options.scene or SCENES:
-        outcome = soak(name, options.frames, options.width, options.max_points)
-        outcomes.append(asdict(outcome))
+        outcome = soak(name, options.frames, options.width, options.max_points, options.sigma)
+        missed = outcome.missed(options.left_out)
+        outcomes.append({**asdict(outcome), "missed": missed})
         print(*(f"{key}={value:.4g}" if isinstance(value, float) else f"{key}={value}"
                 for key, value in asdict(outcome).items()))  # fmt: skip
-        print(f"{name}: " + ("; ".join(outcome.missed()) or "every limit holds"), flush=True)
-        outcomes[-1]["missed"] = outcome.missed()
+        print(f"{name}: " + ("; ".join(missed) or "every limit holds"), flush=True)
     if options.json:
         options.json.write_text(json.dumps(outcomes, indent=1) + "\n")
     return int(any(outcome["missed"] for outcome in outcomes))

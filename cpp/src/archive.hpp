@@ -30,7 +30,8 @@ namespace archive_detail {
 template <class T>
 struct IsFixedMatrix : std::false_type {};
 template <class S, int R, int C, int O, int MR, int MC>
-struct IsFixedMatrix<Eigen::Matrix<S, R, C, O, MR, MC>> : std::bool_constant<R != Eigen::Dynamic && C != Eigen::Dynamic> {};
+struct IsFixedMatrix<Eigen::Matrix<S, R, C, O, MR, MC>>
+    : std::bool_constant<R != Eigen::Dynamic && C != Eigen::Dynamic> {};
 
 // Copied byte by byte.
 template <class T>

@@ -56,8 +56,8 @@ void check_seal(std::string_view bytes) {
     writer = writer.substr(0, writer.find('\0'));
     writer.erase(std::remove_if(writer.begin(), writer.end(), [](char c) { return c < ' ' || c > '~'; }), writer.end());
     std::ostringstream reason;
-    reason << "it has checkpoint format " << format << " (nacre " << writer << " wrote it), and nacre "
-           << NACRE_VERSION << " reads format " << checkpoint_format << ": use that version, or run the recording again";
+    reason << "it has checkpoint format " << format << " (nacre " << writer << " wrote it), and nacre " << NACRE_VERSION
+           << " reads format " << checkpoint_format << ": use that version, or run the recording again";
     throw CheckpointError(reason.str(), sizeof(magic));
   }
   const auto length = number_at<std::uint64_t>(bytes, length_at);
@@ -169,9 +169,8 @@ bool PrivateState::is_sound(const PoseGraph& graph) {
     if (unknown != -1) next += 6;
   }
   return graph.num_unknowns_ == next &&
-         std::all_of(graph.edges_.begin(), graph.edges_.end(), [&](const PoseEdge& edge) {
-           return is_within(edge.from, count) && is_within(edge.to, count);
-         });
+         std::all_of(graph.edges_.begin(), graph.edges_.end(),
+                     [&](const PoseEdge& edge) { return is_within(edge.from, count) && is_within(edge.to, count); });
 }
 
 bool PrivateState::is_sound(const LoopClosure& loops, std::size_t num_frames) {

@@ -136,8 +136,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("milliseconds", &milliseconds);
 
   // Its arguments: the reason, and the place in the bytes.
-  static py::handle checkpoint_error =
-      py::exception<CheckpointError>(m, "CheckpointError", PyExc_ValueError).release();
+  static py::handle checkpoint_error = py::exception<CheckpointError>(m, "CheckpointError", PyExc_ValueError).release();
   py::register_local_exception_translator([](std::exception_ptr pointer) {
     try {
       if (pointer) std::rethrow_exception(pointer);
@@ -150,16 +149,15 @@ void bind_model(py::module_& m) {
   py::class_<Model>(m, "Model")
       .def(py::init<const Camera&, const ModelOptions&>())
       .def("add_frame", &add_frame, ReleaseGil())
-      .def(
-          "save",
-          [](const Model& model, const std::string& note) {
-            std::string bytes;
-            {
-              const py::gil_scoped_release unlocked;
-              bytes = model.save(note);
-            }
-            return py::bytes(bytes);
-          })
+      .def("save",
+           [](const Model& model, const std::string& note) {
+             std::string bytes;
+             {
+               const py::gil_scoped_release unlocked;
+               bytes = model.save(note);
+             }
+             return py::bytes(bytes);
+           })
       .def_static("load",
                   [](const py::bytes& bytes) {
                     std::string note;

@@ -102,12 +102,14 @@ def _wrong_in_report(report: dict[str, Any]) -> str | None:
         if value is not None and not (isinstance(value, str) and "\0" not in value):
             return f"recording.{name} must be a text, got {shown(value)}"
     spacing = report.get("spacing")
-    return None if spacing is None or _is_number(spacing) else f"spacing must be a number, got {shown(spacing)}"
+    return (
+        None if spacing is None or _is_number(spacing) else f"spacing must be a number, got {shown(spacing)}"
+    )
 
 
 def _wrong_in_frame(frame: Any) -> str | None:
     """Say what is not as nacre reconstruct writes a frame."""
-    from nacre.reconstruction import STATUSES
+    from nacre.run_state import STATUSES
 
     if not isinstance(frame, dict):
         return f" must be an object, got {shown(frame)}"

@@ -243,3 +243,32 @@ TEST_CASE("a model can be moved") {
   CHECK(other.cloud().size() == count);
   CHECK(other.add_frame(turntable().view(20.0)).status == FrameStatus::tracked);
 }
+
+TEST_CASE("a model that is saved and loaded goes on to the same bits, and no other bytes are taken for one") {
+  Turntable table;
+  Model undisturbed(Turntable::camera());
+  Model other(Turntable::camera());
+  std::string note;
+  for (const double degrees : {0.0, 10.0, 20.0}) {
+    undisturbed.add_frame(table.view(degrees));
+    other.add_frame(table.view(degrees));
+    other = Model::load(other.save("somebody's note"), &note);
+    REQUIRE(other.cloud().size() == undisturbed.cloud().size());
+    CHECK(note == "somebody's note");
+    CHECK(std::memcmp(other.cloud().points.data(), undisturbed.cloud().points.data(),
+                      other.cloud().points.size() * sizeof(Eigen::Vector3f)) == 0);
+    CHECK(other.frames().back().world_from_camera.matrix() == undisturbed.frames().back().world_from_camera.matrix());
+  }
+  CHECK(other.given_options().fusion.reference_sigma == 0.0);
+  CHECK(other.options().fusion.reference_sigma == undisturbed.options().fusion.reference_sigma);
+
+  const std::string bytes = other.save();
+  CHECK(Model::load(bytes).save() == bytes);
+  CHECK_THROWS_AS(Model::load(""), CheckpointError);
+  CHECK_THROWS_AS(Model::load(std::string_view(bytes).substr(0, bytes.size() - 1)), CheckpointError);
+  for (const std::size_t place : {std::size_t{0}, std::size_t{9}, std::size_t{35}, std::size_t{60}, bytes.size() / 2}) {
+    std::string damaged = bytes;
+    damaged[place] = static_cast<char>(damaged[place] ^ 1);
+    CHECK_THROWS_AS(Model::load(damaged), CheckpointError);
+  }
+}

@@ -1,11 +1,11 @@
 """
-Fuzz nacre's readers, the hostile files of ``hostile`` and valid ones being the seeds.
+Fuzz nacre's readers, the hostile files of ``hostile_files`` and valid ones being the seeds.
 
     python tests/python/fuzz_readers.py KIND [--seconds 60] [--seed 0]
 
-damages files at random; with atheris (``pip install atheris``, Python 3.11 to 3.13) what it tries follows the
-branches that it has seen. KIND is one of those of ``hostile.READERS``. Whatever is not a result or an error of
-nacre's is written to ``fuzz-findings/`` and ends the run with 1.
+damages files at random; with atheris (``pip install atheris``, Python 3.11 to 3.13) what it tries follows
+the branches that it has seen. KIND is one of those of ``hostile_files.READERS``. Whatever is neither a result
+nor an error of nacre's is written to ``fuzz-findings/`` and ends the run with 1.
 """
 
 import argparse
@@ -32,9 +32,9 @@ if atheris is not None and __name__ == "__main__":
         import nacre.viewer.written
 else:
     import nacre
-from hostile import CASES, READERS, Case, write
-from hostile.damage import damaged
-from hostile.valid import VALID
+from hostile_files import CASES, READERS, Case, write
+from hostile_files.damage import damaged
+from hostile_files.valid import VALID
 
 MOST_BYTES = 1 << 16
 MOST_SECONDS = 2.0
@@ -49,7 +49,7 @@ class Findings:
         self._known: set[str] = set()
         self.num_runs = self.num_refused = self.num_found = 0
         cases = [case for case in (*CASES.values(), *VALID.values()) if case.reader == kind]
-        # Of each suffix the cases' main files are the seeds; what lies beside them stays as in the first case.
+        # What lies beside a damaged file stays as it is in the first case that has such a file.
         self.seeds: dict[str, list[bytes]] = {}
         self.homes: dict[str, tuple[Case, Path, str]] = {}
         for case in sorted(cases, key=lambda case: case.name not in VALID):
@@ -134,7 +134,10 @@ def _guided(findings: Findings, seed: int, seconds: float) -> None:
         if data:
             findings.run(findings.keys[data[0] % len(findings.keys)], data[1:])
 
-    atheris.Setup([sys.argv[0], corpus, f"-seed={seed + 1}", f"-max_len={MOST_BYTES}", "-timeout=30", "-verbosity=0"], one)
+    atheris.Setup(
+        [sys.argv[0], corpus, f"-seed={seed + 1}", f"-max_len={MOST_BYTES}", "-timeout=30", "-verbosity=0"],
+        one,
+    )
     atheris.Fuzz()
 
 

@@ -490,7 +490,9 @@ class TestParameters:
     @pytest.mark.parametrize("text", ["x", "foo = 1", 'preset = "foo"', "[registration]\nfoo = 1"])
     def test_wrong_files(self, recording, tmp_path, text):
         (tmp_path / "c.toml").write_text(text)
-        assert "c.toml" in fails(1, "reconstruct", recording, "-o", tmp_path / "o", "--config", tmp_path / "c.toml")
+        assert "c.toml" in fails(
+            1, "reconstruct", recording, "-o", tmp_path / "o", "--config", tmp_path / "c.toml"
+        )
 
     def test_missing_file(self, recording, tmp_path):
         fails(2, "reconstruct", recording, "-o", tmp_path / "o", "--config", tmp_path / "c.toml")

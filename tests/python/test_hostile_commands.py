@@ -11,29 +11,38 @@ import pytest
 
 pytest.importorskip("typer")
 sys.path.insert(0, str(Path(__file__).parent))
-from hostile import CASES, write
-from hostile.meshes import TRIANGLE
-from hostile.recordings import plain
-from hostile.trajectories import GOOD
+from hostile_files import CASES, write
+from hostile_files.meshes import TRIANGLE
+from hostile_files.ply import text, vertices
+from hostile_files.recordings import plain
+from hostile_files.trajectories import GOOD
 
 from nacre.cli.app import run
 
 GOOD_FILES = {
-    "points.ply": b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-    b"end_header\n0 0 0\n1 0 0\n0 1 0\n",
+    "points.ply": text("0 0 0\n1 0 0\n0 1 0\n", vertices(3)),
     "mesh.obj": (TRIANGLE + "f 1 2 3\n").encode(),
     "truth.txt": GOOD.encode(),
     **{f"recording/{name}": data for name, data in plain().items()},
 }
 COMMANDS = {
-    "points": ("info {bad}", "consolidate {bad} {out}.ply", "align {bad} {good}/points.ply", "mesh {bad} -o {out}.ply"),
+    "points": (
+        "info {bad}",
+        "consolidate {bad} {out}.ply",
+        "align {bad} {good}/points.ply",
+        "mesh {bad} -o {out}.ply",
+    ),
     "range grid": ("reconstruct {bad} -o {out}",),
     "mesh": ("info {bad}", "simulate {bad} -o {out}", "evaluate {good}/points.ply {bad}"),
-    "camera": ("info {good}/recording --camera {bad}", "reconstruct {good}/recording --camera {bad} -o {out}"),
+    "camera": (
+        "info {good}/recording --camera {bad}",
+        "reconstruct {good}/recording --camera {bad} -o {out}",
+    ),
     "trajectory": ("evaluate {bad} {good}/truth.txt", "evaluate {good}/truth.txt {bad}"),
     "matrix": ("evaluate {good}/points.ply {good}/mesh.obj --world-from-model {bad}",),
     "config": ("reconstruct {good}/recording --config {bad} -o {out}",),
     "recording": ("reconstruct {bad} -o {out}",),
+    "run": ("info {bad}", "reconstruct --resume {bad}"),
     "output": ("view {bad} --html {out}.html", "evaluate {bad} {good}/mesh.obj"),
 }
 # Told as wrong usage: the folder or file is not what the command takes.
@@ -73,7 +82,9 @@ def test_bad_file_ends_a_command(good, tmp_path, kind):
             words = command.format(bad=bad, good=good, out=tmp_path / "out").split()
             code, err = said(*words)
             lines = [line for line in err.splitlines() if not line.startswith("warning: ")]
-            expected = {2} if re.search(USAGE, err) else {0, 1} if re.match(f"{LEFT_OUT}|{ALSO_GOOD}", name) else {1}
+            expected = (
+                {2} if re.search(USAGE, err) else {0, 1} if re.match(f"{LEFT_OUT}|{ALSO_GOOD}", name) else {1}
+            )
             is_told = code == 0 or (lines and lines[0].startswith("error: ") and str(tmp_path) in lines[0])
             if code not in expected or not is_told or "Traceback" in err or "should not happen" in err:
                 wrong.append(f"{name}: nacre {words[0]} gave {code}: {err[:300]}")

@@ -13,9 +13,9 @@ from nacre.io.cameras import read_camera
 from nacre.io.images import read_depth
 
 sys.path.insert(0, str(Path(__file__).parent))
-from hostile import CASES, oracle
-from hostile.damage import damaged, scratched
-from hostile.valid import VALID
+from hostile_files import CASES, oracle
+from hostile_files.damage import damaged, scratched
+from hostile_files.valid import VALID
 
 NUM_FILES = 1000
 
@@ -90,4 +90,6 @@ def test_what_is_read_is_what_is_there(tmp_path, suffix):
             pass
         except Exception as error:
             raise AssertionError(f"{error!r} with {data!r}") from error
-    assert num_read >= (1 if suffix == ".png" else 50), num_read  # else nothing was compared; PNG has check sums
+    assert num_read >= (1 if suffix == ".png" else 50), (
+        num_read
+    )  # else nothing was compared; PNG has check sums

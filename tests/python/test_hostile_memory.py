@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE))
-from hostile.measure import allowed
+sys.path.insert(0, str(Path(__file__).parent))
+from hostile_files.measure import allowed
 
+HERE = Path(__file__).parent
 # rosbags asks for as many bytes as a record of a .bag says, before it finds that they are not there.
 NOT_UNDER_A_LIMIT = ("recording/bag_",)
 
@@ -19,7 +19,10 @@ def measured(*options):
     if not Path("/proc/self/clear_refs").exists():
         pytest.skip("the peak of memory can be read on Linux only")
     done = subprocess.run(
-        [sys.executable, HERE / "hostile" / "measure.py", *options], capture_output=True, text=True, check=False
+        [sys.executable, HERE / "hostile_files" / "measure.py", *options],
+        capture_output=True,
+        text=True,
+        check=False,
     )
     assert done.returncode == 0, done.stderr
     return [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
@@ -33,7 +36,9 @@ def rows():
 
 
 def test_peak_of_memory_is_bounded(rows):
-    assert [(row["name"], row["size"], row["peak"]) for row in rows if row["peak"] > allowed(row["size"])] == []
+    assert [
+        (row["name"], row["size"], row["peak"]) for row in rows if row["peak"] > allowed(row["size"])
+    ] == []
 
 
 def test_error_is_the_same_where_no_more_memory_can_be_had(rows):

@@ -1,6 +1,7 @@
 """Depth and colour images: what is stored comes back, and what is damaged is named."""
 
 import sys
+import tracemalloc
 import zlib
 
 import numpy as np
@@ -131,6 +132,23 @@ def test_flipped_bits_are_told(tmp_path, depth):
     path.write_bytes(bytes(data))
     with pytest.raises(FileFormatError, match=r"bad\.png"):
         read_depth(path)
+
+
+@pytest.mark.parametrize("part", [b"zTXt", b"iCCP", b"iTXt"])
+def test_bombs_beside_the_pixels_are_not_unpacked(tmp_path, part):
+    def chunk(name, data):
+        return len(data).to_bytes(4, "big") + name + data + zlib.crc32(name + data).to_bytes(4, "big")
+
+    stored = np.arange(12, dtype=np.uint16).reshape(3, 4)
+    write_depth_png(tmp_path / "d.png", stored)
+    data = (tmp_path / "d.png").read_bytes()
+    bomb = chunk(part, b"a\0\0" + zlib.compress(bytes(1 << 25), 9))
+    (tmp_path / "d.png").write_bytes(data[:33] + bomb + data[33:])
+    tracemalloc.start()
+    np.testing.assert_array_equal(read_depth(tmp_path / "d.png"), stored)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1 << 19
 
 
 def test_gigantic_png_is_refused(tmp_path):

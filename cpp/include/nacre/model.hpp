@@ -124,16 +124,16 @@ class Model {
   const Camera& camera() const;
   const ModelOptions& options() const;        ///< with what the first frame decided
   const ModelOptions& given_options() const;  ///< as given
-  const PointModel& cloud() const;     ///< in the world frame
-  PointModel cloud_in_camera() const;  ///< in the newest registered camera's frame
+  const PointModel& cloud() const;            ///< in the world frame
+  PointModel cloud_in_camera() const;         ///< in the newest registered camera's frame
   /// One report per frame that was added. Where a later frame closed a loop, the poses are the corrected ones.
   const std::vector<FrameReport>& frames() const;
   NoiseModel noise() const;  ///< given, or measured from the frames so far
   double spacing() const;    ///< [m]; 0 before the first frame
 
-  /// All that the model knows, as bytes; a model that is loaded from them goes on to the same bits. `note`: bytes of the
-  /// caller's to keep with it. Read by every nacre with the same checkpoint_format, on every machine. To replace a file
-  /// safely, write another one, flush it to disk and rename it.
+  /// All that the model knows, as bytes; a model that is loaded from them goes on to the same bits. `note`: bytes of
+  /// the caller's to keep with it. Read by every nacre with the same checkpoint_format, on every machine. To replace a
+  /// file safely, write another one, flush it to disk and rename it.
   std::string save(const std::string& note = {}) const;
   /// Throws CheckpointError where the bytes are damaged, not all there, or of another format. They may come from
   /// anybody: sizes are checked before memory is allocated, and no code is run.

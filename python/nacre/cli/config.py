@@ -14,14 +14,13 @@ import typer
 
 from nacre.cli.terminal import CommandError
 from nacre.errors import FileFormatError, shown
-from nacre.io.raw import read_text
 
 if TYPE_CHECKING:
     from nacre.model import ModelParameters
 
 
 _MOST_BYTES = 1 << 16
-_DEEP_KEY = re.compile(r"(?:[^\s.,=\[\]{}]+[ \t]*\.[ \t]*){16}")
+_DEEP_KEY = re.compile(r"(?<![^\s.,=\[\]{}])(?:[^\s.,=\[\]{}]+[ \t]*\.[ \t]*){16}")
 
 
 class Preset(str, Enum):
@@ -92,13 +91,15 @@ def model_parameters(
 
 def _told_by_file(path: Path, document: Mapping[str, Any], parameters: ModelParameters) -> ModelParameters:
     """Return the parameters with the changes of a file, which must make a model."""
-    from nacre._core import Camera
+    from nacre import Camera
     from nacre.model import Model
     from nacre.parameters import updated
 
     try:
         changes = dict(_leaves(document))
-        changed = updated(parameters, {key: _checked(parameters, key, value) for key, value in changes.items()})
+        changed = updated(
+            parameters, {key: _checked(parameters, key, value) for key, value in changes.items()}
+        )
         Model(Camera(width=8, height=8, fx=8, fy=8, cx=4, cy=4), parameters=changed)
     except RecursionError:
         raise FileFormatError(path, "its tables are nested too deep") from None
@@ -115,6 +116,8 @@ def _toml() -> Any:
 
 
 def _read_toml(path: Path) -> Mapping[str, Any]:
+    from nacre.io.raw import read_text
+
     toml = _toml()
     text = read_text(path, _MOST_BYTES)
     deep = _DEEP_KEY.search(text)
@@ -170,8 +173,8 @@ def _checked(parameters: Any, key: str, value: Any) -> Any:
         try:
             return NoiseModel(**value) if isinstance(value, Mapping) else as_noise_choice(key, value)
         except TypeError as error:
-            names = ", ".join(field.name for field in dataclasses.fields(NoiseModel))
-            raise CommandError(f"{key} must have numbers for {names}, got {shown(value)}", 2) from error
+            parts = ", ".join(field.name for field in dataclasses.fields(NoiseModel))
+            raise CommandError(f"{key} must have numbers for {parts}, got {shown(value)}", 2) from error
     if dataclasses.is_dataclass(current):
         raise CommandError(
             f"{key} is a group; set one of {', '.join(f.name for f in dataclasses.fields(current))}", 2

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from nacre.cli.terminal import CommandError
+from nacre.errors import FileFormatError
 
 if TYPE_CHECKING:
     from nacre.reconstruction import FrameRecord
@@ -27,9 +28,19 @@ def read_journal(path: Path) -> tuple[list[list[Any]], int]:
         text, _, checksum = line.rpartition(b" ")
         if checksum != b"%08x\n" % zlib.crc32(text):
             break
-        entries.append(json.loads(text))
+        entries.append(_entry(path, text, len(entries) + 1))
         size += len(line)
     return entries, size
+
+
+def _entry(path: Path, text: bytes, line: int) -> list[Any]:
+    try:
+        entry = json.loads(text)
+    except (ValueError, RecursionError):
+        entry = None
+    if not isinstance(entry, list) or len(entry) != 4 or type(entry[0]) is not int:
+        raise FileFormatError(path, "not a line of a run's journal, though its check sum fits", line=line)
+    return entry
 
 
 class Journal:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -185,7 +186,8 @@ def reconstruct(
                 is_camera=is_camera(source),
             )
             run = _begun(terminal, asked, out, parameters, checkpoint_every)
-        carry_out(terminal, run, stop, port if view else None)
+        with closing(run.unfinished):
+            carry_out(terminal, run, stop, port if view else None)
 
 
 def _text(path: Path | None) -> str | None:
@@ -261,5 +263,9 @@ def _resumed(context: typer.Context, out: Path, checkpoint_every: int | None) ->
         words = describe(sequence, indices)
         if asked.realtime:  # what it had seen; which frames come, is the clock's doing
             indices = unfinished.journaled_indices()
+    from nacre.io.atomic import remove_leftovers
+
+    for place in (out, unfinished.folder):
+        remove_leftovers(place)
     done = unfinished.resume(sequence, compare=not asked.is_camera)  # its colours were kept as JPEG
     return Run(asked, out, done, sequence, unfinished, words, indices, None)

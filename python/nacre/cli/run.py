@@ -60,6 +60,9 @@ def carry_out(terminal: Terminal, run: Run, stop: Interruption, port: int | None
         if all(frame.report is None for frame in run.done.frames):
             run.unfinished.remove()
         raise
+    except OSError:
+        terminal.say(f"nacre reconstruct --resume {run.out} goes on where files can be written again")
+        raise
     if not stop.wanted:
         with suppress(Stopped), stop.at_once():
             report = _write(run, done, stop)

@@ -47,9 +47,7 @@ def retry_lost(
 ) -> None:
     """Go over the lost frames again, while any of them is found, until the run is stopped."""
     num_lost = done.counts["LOST"]
-    if not num_lost:
-        return
-    with terminal.progress("lost frames", num_lost) as advance:
+    with terminal.progress("lost frames", num_lost or None) as advance:
         for frame in done.retry_lost():
             if watch is not None:
                 watch(frame)

@@ -99,10 +99,16 @@ class Unfinished:
         self.remove()
         self.folder.mkdir(exist_ok=True)
         self._journal = Journal(self.folder / "journal.txt")
-        self.save(done)
-        data = json.dumps({"format": _FORMAT, **asked}, indent=2, default=str)
-        with atomic_writer(self.folder / "run.json") as stream:  # the last: from here on it can be resumed
-            stream.write(data.encode() + b"\n")
+        try:
+            self.save(done)
+            data = json.dumps({"format": _FORMAT, **asked}, indent=2, default=str)
+            with atomic_writer(
+                self.folder / "run.json"
+            ) as stream:  # the last: from here on it can be resumed
+                stream.write(data.encode() + b"\n")
+        except BaseException:
+            self.close()
+            raise
 
     def resume(self, sequence: Sequence, compare: bool) -> Reconstruction:
         """Return the run as it was at the newest checkpoint; what is done again may be compared."""
@@ -144,11 +150,15 @@ class Unfinished:
         self._next = now + max(_LEAST_SECONDS, _RARE * (now - start))
         self._num_since = 0
 
-    def remove(self) -> None:
-        """Remove the folder: the run is finished."""
+    def close(self) -> None:
+        """Close the journal."""
         if self._journal is not None:
             self._journal.close()
             self._journal = None
+
+    def remove(self) -> None:
+        """Remove the folder: the run is finished."""
+        self.close()
         from nacre.io.atomic import remove_leftovers
 
         remove_leftovers(self.folder)
@@ -176,6 +186,8 @@ def read_asked(out: Path) -> dict[str, Any]:
         raise FileFormatError(
             path, "it was written by another version of nacre; run it again without --resume"
         )
+    if not isinstance(asked.get("options"), dict):
+        raise FileFormatError(path, "options must be an object: it is no run of nacre reconstruct")
     return asked
 
 

@@ -14,9 +14,9 @@ from nacre.datasets.given import Given
 from nacre.datasets.listing import describe
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError, shown
-from nacre.io.images import decode_color, read_depth
 from nacre.io.cameras import check_lens
 from nacre.io.image_limits import check_lzfse
+from nacre.io.images import decode_color, read_depth
 from nacre.io.json_files import parse_json
 from nacre.io.raw import read_file, require_regular
 from nacre.io.trajectories import Trajectory, matrix_from_quaternion
@@ -174,7 +174,9 @@ class _Archive(_Files):
             reason = f"larger than what it can hold: {info.file_size} bytes, more than {most}"
             raise FileFormatError(self.path / name, reason)
         if info.compress_type not in _COMPRESSIONS:
-            raise FileFormatError(self.path / name, "refused: it is compressed by neither deflate nor nothing")
+            raise FileFormatError(
+                self.path / name, "refused: it is compressed by neither deflate nor nothing"
+            )
         if info.file_size > (1 << 20) + _MOST_RATIO * info.compress_size:
             reason = f"refused: {info.file_size} bytes from {info.compress_size}"
             raise FileFormatError(self.path / name, reason)

@@ -232,9 +232,7 @@ def _read_conf(folder: Path, scale: float) -> dict[str, Float64]:
     """
     poses: dict[str, Float64] = {}
     for conf in sorted(folder.glob("*.conf")):
-        for number, line in enumerate(
-            decode(read_file(conf)).splitlines(), start=1
-        ):
+        for number, line in enumerate(decode(read_file(conf)).splitlines(), start=1):
             words = line.split()
             if not words or words[0] != "bmesh":
                 continue

@@ -13,7 +13,7 @@ from typing import BinaryIO
 
 
 @contextmanager
-def atomic_writer(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+def atomic_writer(path: str | os.PathLike[str], *, named: bool = True) -> Iterator[BinaryIO]:
     """
     Open a file for writing that takes its name only when everything is written and on disk.
 
@@ -23,6 +23,8 @@ def atomic_writer(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     ----------
     path : path-like
         The file to write; its folder must exist.
+    named : bool
+        Whether its name must be on disk, too, when this ends; for many small files that takes long.
 
     Yields
     ------
@@ -34,26 +36,40 @@ def atomic_writer(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     OSError
         The file cannot be written; it names ``path``.
     """
+    with atomic_path(path, named=named) as temporary, temporary.open("wb") as stream:
+        yield stream
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike[str], *, named: bool = True) -> Iterator[Path]:
+    """Do as :func:`atomic_writer` does for who needs a name to write to: yield that of an empty file."""
     target = Path(path)
-    name = ""
+    temporary: Path | None = None
     try:
         descriptor, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".tmp")
-        with os.fdopen(descriptor, "wb") as stream:
-            yield stream
-            stream.flush()
+        os.close(descriptor)
+        temporary = Path(name)
+        yield temporary
+        with temporary.open("r+b") as stream:
             os.fsync(stream.fileno())
         umask = os.umask(0)
         os.umask(umask)
-        Path(name).chmod(0o666 & ~umask)
-        Path(name).replace(target)
-        _sync_folder(target.parent)
+        temporary.chmod(0o666 & ~umask)
+        temporary.replace(target)
+        if named:
+            _sync_folder(target.parent)
     except BaseException as error:
-        if name:
+        if temporary is not None:
             with suppress(OSError):
-                Path(name).unlink()
-        if isinstance(error, OSError) and error.filename in (None, name) and error.errno is not None:
+                temporary.unlink()
+        if isinstance(error, OSError) and error.errno is not None and _is_about(error, target):
             raise OSError(error.errno, error.strerror, os.fspath(path)) from error
         raise
+
+
+def _is_about(error: OSError, target: Path) -> bool:
+    name = error.filename
+    return name is None or (isinstance(name, str) and Path(name).name.startswith(f".{target.name}."))
 
 
 def _sync_folder(folder: Path) -> None:

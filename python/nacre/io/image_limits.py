@@ -1,4 +1,4 @@
-"""What an image says of its size, believed only as far as its file can hold it: before a decoder sets memory aside."""
+"""What an image says of its size, believed only as far as its file can hold it, before it is decoded."""
 
 from __future__ import annotations
 
@@ -12,11 +12,13 @@ MAX_PIXELS = 1 << 26
 """More than any depth camera has; 8192 x 8192."""
 
 _PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_PNG_LEFT_OUT = (b"zTXt", b"iTXt", b"iCCP")
 _PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 # At most: bitmaps, runs of 255 in two bytes, blocks of 64 in half a bit, rows of a fax in one bit.
 _PIXELS_PER_BYTE: dict[str | None, int] = {"PPM": 8, "BMP": 256, "JPEG": 1024, "TIFF": 1 << 14}
 _DEFLATE_RATIO = 1032  # 258 bytes of two bits
 _LZFSE_HEADER = 772  # of a block of version 1
+_MOST_EXR_CHANNELS = 4096
 _EXR_MAGIC = b"\x76\x2f\x31\x01"
 
 
@@ -32,16 +34,19 @@ def check_pixels(
         raise FileFormatError(path, reason)
 
 
-def check_png(path: str | os.PathLike[str], data: bytes) -> None:
+def checked_png(path: str | os.PathLike[str], data: bytes) -> bytes:
     """
-    Check what a PNG file is made of, its check sums included, and that it can hold as many pixels as it says.
+    Check what a PNG file is made of, its check sums included, and that it can hold its pixels.
 
-    Decoders pass over damaged parts that they have no use for, and give zeros for what is missing. What is no PNG
-    at all is left to them.
+    Returns the file without compressed texts and profiles, which could be of any size and have no use here.
+
+    Decoders pass over damaged parts that they have no use for, and give zeros for what is missing. What is no
+    PNG at all is left to them.
     """
     if not data.startswith(_PNG_SIGNATURE):
-        return
+        return data
     position, name, num_packed = len(_PNG_SIGNATURE), b"", 0
+    left_out: list[slice] = []
     view = memoryview(data)
     while name != b"IEND":
         if position + 12 > len(data):
@@ -55,6 +60,8 @@ def check_png(path: str | os.PathLike[str], data: bytes) -> None:
         if (name == b"IHDR") != (position == len(_PNG_SIGNATURE)) or (name == b"IHDR" and size != 13):
             raise _damaged(path, "it must have one header, at its beginning", position)
         num_packed += size if name == b"IDAT" else 0
+        if name in _PNG_LEFT_OUT:
+            left_out.append(slice(position, end))
         position = end
     width, height, bits, color = struct.unpack_from(">IIBB", data, 16)
     check_pixels(path, width, height)
@@ -62,6 +69,9 @@ def check_png(path: str | os.PathLike[str], data: bytes) -> None:
     if num_bytes > _DEFLATE_RATIO * num_packed:
         reason = f"refused: {width} x {height} pixels in {num_packed} bytes, which cannot hold them"
         raise FileFormatError(path, reason, offset=16)
+    starts = [0, *(part.stop for part in left_out)]
+    ends = [*(part.start for part in left_out), len(data)]
+    return b"".join(view[a:b] for a, b in zip(starts, ends, strict=True)) if left_out else data
 
 
 def check_exr(path: str | os.PathLike[str], data: bytes) -> None:
@@ -75,6 +85,8 @@ def check_exr(path: str | os.PathLike[str], data: bytes) -> None:
             kind, position = _word(data, position)
             (size,) = struct.unpack_from("<I", data, position)
             position += 4
+            if name == b"channels" and size > _MOST_EXR_CHANNELS:
+                raise FileFormatError(path, f"refused: {size} bytes of names of channels", offset=position)
             if name == b"dataWindow" and kind == b"box2i":
                 left, top, right, bottom = struct.unpack_from("<4i", data, position)
                 if right < left or bottom < top:
@@ -111,7 +123,9 @@ def check_lzfse(path: str | os.PathLike[str], data: bytes, most: int) -> None:
     except FileFormatError:
         raise
     except (ValueError, struct.error):
-        raise FileFormatError(path, "the LZFSE data is damaged: a block is cut short", offset=position) from None
+        raise FileFormatError(
+            path, "the LZFSE data is damaged: a block is cut short", offset=position
+        ) from None
 
 
 def _word(data: bytes, position: int) -> tuple[bytes, int]:

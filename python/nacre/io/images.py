@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
-from nacre.io.image_limits import check_exr, check_pixels, check_png
+from nacre.io.image_limits import check_exr, check_pixels, checked_png
 from nacre.io.raw import check_padding, read_file
 
 if TYPE_CHECKING:
@@ -158,7 +158,7 @@ def _pillow() -> Any:
 
 def _write_image(path: str | os.PathLike[str], array: npt.NDArray[Any], format: str, **options: Any) -> None:
     image = _pillow().fromarray(array)
-    with atomic_writer(path) as stream:
+    with atomic_writer(path, named=False) as stream:
         image.save(stream, format=format, **options)
 
 
@@ -170,7 +170,7 @@ def decoded(data: bytes, path: str | os.PathLike[str], formats: Sequence[str]) -
     Other formats are not tried, some of which start programs (Ghostscript).
     """
     pillow = _pillow()
-    check_png(path, data)
+    data = checked_png(path, data)
     try:
         image = pillow.open(BytesIO(data), formats=formats)
         check_pixels(path, *image.size, file_size=len(data), format=image.format)
@@ -234,10 +234,14 @@ def _read_npy(path: Path) -> npt.NDArray[Any]:
         raise FileFormatError(path, f"not a readable .npy array: {reason}", offset=0) from error
     start = stream.tell()
     if dtype.kind not in "buif" or len(shape) not in (2, 3) or min(shape) < 1:
-        raise FileFormatError(path, f"an image must be (H, W) numbers, this is {shown(shape)} of {shown(dtype)}")
+        raise FileFormatError(
+            path, f"an image must be (H, W) numbers, this is {shown(shape)} of {shown(dtype)}"
+        )
     num_bytes = math.prod(shape) * dtype.itemsize
     if num_bytes > len(data) - start:
-        reason = f"not a readable .npy array: its shape promises {num_bytes} bytes, {len(data) - start} are there"
+        reason = (
+            f"not a readable .npy array: its shape promises {num_bytes} bytes, {len(data) - start} are there"
+        )
         raise FileFormatError(path, reason, offset=start)
     check_padding(path, data, start + num_bytes)
     array = np.frombuffer(data, dtype, math.prod(shape), start)

@@ -32,7 +32,7 @@ def read_json(path: str | os.PathLike[str], most: int | None = None) -> Any:
 
 
 def parse_json(path: str | os.PathLike[str], data: bytes) -> Any:
-    """Return what the bytes of a JSON file say; ``path`` names it in errors, which :func:`read_json` lists."""
+    """Return what the bytes of a JSON file say; ``path`` names it in errors, see :func:`read_json`."""
     text = text_of(path, data)
     try:
         return json.loads(text, object_pairs_hook=_once)

@@ -30,7 +30,7 @@ TYPES = {
 BYTE_ORDERS: dict[str, Literal["<", ">"]] = {"binary_little_endian": "<", "binary_big_endian": ">"}
 _FORMATS = ("ascii", *BYTE_ORDERS)
 _MAX_ELEMENTS = 1_000
-_MAX_ENTRIES = 10_000
+_MAX_ENTRIES = 5_000
 
 
 @dataclass(frozen=True)

@@ -194,13 +194,17 @@ def _read_unequal_rows(
     table: Table = {}
     for entry, count_type, _, payload, counts in steps:
         values = np.frombuffer(payload, entry.dtype.newbyteorder(byte_order))
-        table[entry.name] = values if count_type is None else Ragged(values, np.frombuffer(counts, counts.typecode))
+        table[entry.name] = (
+            values if count_type is None else Ragged(values, np.frombuffer(counts, counts.typecode))
+        )
     return table, position
 
 
 def _counting(dtype: np.dtype[Any]) -> np.dtype[np.signedinteger[Any]]:
     """Return a small type that holds what the lengths of lists of this type can be."""
-    return np.dtype({1: np.int16, 2: np.int32}.get(dtype.itemsize, np.int64))
+    if dtype.itemsize == 1:
+        return np.dtype(np.int16)
+    return np.dtype(np.int32) if dtype.itemsize == 2 else np.dtype(np.int64)
 
 
 def _integer_struct(dtype: np.dtype[Any], byte_order: ByteOrder) -> struct.Struct:

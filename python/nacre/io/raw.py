@@ -17,14 +17,14 @@ import numpy.typing as npt
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 
-_BLOCK_BYTES = 1 << 17
+_BLOCK_BYTES = 1 << 16
 _BYTES_PER_ROW_GUESS = 32
 _IS_SPACE = np.zeros(256, dtype=bool)
 _IS_SPACE[list(b" \t\n\r\v\f")] = True
 
 
 def read_file(path: str | os.PathLike[str], most: int | None = None) -> bytes:
-    """Return the bytes of a regular file, ``most`` at most; what would never end (a pipe, a device) is refused."""
+    """Return the bytes of a regular file, ``most`` at most; a pipe or a device is refused."""
     size = require_regular(path).stat().st_size
     if most is not None and size > most:
         raise FileFormatError(path, f"larger than what it can hold: {size} bytes, more than {most}")

@@ -19,6 +19,7 @@ from nacre.values import Value
 
 Float64 = npt.NDArray[np.float64]
 
+_LONGEST_LINE = 4096
 _ROWS_PER_BLOCK = 1024
 
 
@@ -126,9 +127,9 @@ class Trajectory(Value):
 
 def _frozen(values: npt.ArrayLike) -> Float64:
     """Return values that nobody can change: themselves where they are so already, else a copy."""
-    if isinstance(values, np.ndarray) and values.dtype == np.float64:
-        if values.base is None and not values.flags.writeable:
-            return values
+    is_array = isinstance(values, np.ndarray) and values.dtype == np.float64
+    if is_array and values.base is None and not values.flags.writeable:  # type: ignore[union-attr]
+        return values  # type: ignore[return-value]
     copy = np.array(values, dtype=np.float64)
     copy.flags.writeable = False
     return copy
@@ -306,7 +307,10 @@ def _read_rows(path: str | os.PathLike[str]) -> Rows:
     """Return the lines that hold numbers."""
     lines, ends, numbers = array("q"), array("q"), array("d")
     for line, content in enumerate(BytesIO(read_file(path)), start=1):
-        words = content.partition(b"#")[0].split()
+        told = content.partition(b"#")[0]
+        if len(told) > _LONGEST_LINE:
+            raise FileFormatError(path, f"not a trajectory: a line of {len(told)} bytes", line=line)
+        words = told.split()
         if not words:
             continue
         try:

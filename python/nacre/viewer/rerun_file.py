@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from nacre.errors import FileFormatError
+from nacre.io.atomic import atomic_path
 from nacre.viewer.colors import STATUS_COLORS, color_kinds, point_colors
 from nacre.viewer.story import Moment, Story
 
@@ -42,11 +43,13 @@ def export_rrd(story: Story, path: str | os.PathLike[str]) -> None:
     except ImportError as error:
         raise ImportError(_MISSING) from error
     rr: Any = rerun
-    target = Path(path)
-    with target.open("wb"):  # a folder that is missing is told by Python's own error
-        pass
+    with atomic_path(path) as temporary:
+        _write(rr, temporary, story)
+
+
+def _write(rr: Any, path: Path, story: Story) -> None:
     recording = rr.RecordingStream("nacre")
-    recording.save(str(target))
+    recording.save(str(path))
     recording.send_recording_name(story.title)
     recording.log("world", rr.ViewCoordinates.RDF, static=True)
     for place, cloud in story.snapshots:

@@ -31,7 +31,7 @@ def status(key: str) -> int:
 
 
 def cost(read, path: Path) -> tuple[str, float, int]:
-    """Return what came of reading a file, the processor time [s] and the memory that it took at most [bytes]."""
+    """Return what came of reading a file, the processor time [s], and the memory taken at most [bytes]."""
     gc.collect()
     _trim(0)  # what was freed is given back, so that it counts when it is taken again
     Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
@@ -66,12 +66,12 @@ def limited(read, path: Path, num_bytes: int) -> str:
 
 
 def large() -> None:
-    """Measure large files that are as they should be, dense ones among them; print a line of JSON for each."""
+    """Measure large files that are as they should be; print a line of JSON for each."""
     import numpy as np
 
     import nacre
-    from hostile.case import READERS
-    from hostile.ply import ply, text, vertices
+    from hostile_files.case import READERS
+    from hostile_files.ply import ply, text, vertices
 
     n, normal = 100_000, np.random.default_rng(0).normal
     points = normal(size=(n, 3)).astype(np.float32)
@@ -95,11 +95,17 @@ def large() -> None:
         for path in sorted(folder.iterdir()):
             read = READERS[readers.get(path.suffix, "points")]
             found = read(path)
-            arrays = [a for a in (*vars(found).values(), *vars(found).get("attributes", {}).values())]
+            arrays = [*vars(found).values(), *vars(found).get("attributes", {}).values()]
             held = sum(a.nbytes for a in arrays if isinstance(a, np.ndarray))
             del found, arrays
             _, seconds, peak = cost(read, path)
-            row = {"name": path.name, "size": path.stat().st_size, "held": held, "seconds": seconds, "peak": peak}
+            row = {
+                "name": path.name,
+                "size": path.stat().st_size,
+                "held": held,
+                "seconds": seconds,
+                "peak": peak,
+            }
             print(json.dumps(row), flush=True)
 
 
@@ -107,8 +113,8 @@ def main() -> None:
     """Measure every hostile file in this process; print a line of JSON for each."""
     from importlib.util import find_spec
 
-    from hostile import CASES, opened, write
-    from hostile.valid import VALID
+    from hostile_files import CASES, opened, write
+    from hostile_files.valid import VALID
 
     warnings.simplefilter("ignore")
     logging.disable(logging.WARNING)
@@ -125,7 +131,14 @@ def main() -> None:
             size = sum(map(len, case.files.values()))
             said, seconds, peak = cost(lambda path, case=case: opened(case, path), path)
             under_limit = limited(lambda path, case=case: opened(case, path), path, size)
-            row = {"name": name, "size": size, "said": said, "seconds": seconds, "peak": peak, "limited": under_limit}
+            row = {
+                "name": name,
+                "size": size,
+                "said": said,
+                "seconds": seconds,
+                "peak": peak,
+                "limited": under_limit,
+            }
             print(json.dumps(row), flush=True)
 
 

@@ -7,11 +7,19 @@ import zipfile
 import zlib
 from io import BytesIO
 
-from hostile.case import Case
-from hostile.depth_images import pgm
+from hostile_files.case import Case
+from hostile_files.depth_images import pgm
 
 SIZE = 4 * 3 * 4
-TOLD = {"w": 8, "h": 6, "dw": 4, "dh": 3, "fps": 30, "K": [8, 0, 0, 0, 8, 0, 4, 3, 1], "poses": [[0, 0, 0, 1, 0, 0, 0]]}
+TOLD = {
+    "w": 8,
+    "h": 6,
+    "dw": 4,
+    "dh": 3,
+    "fps": 30,
+    "K": [8, 0, 0, 0, 8, 0, 4, 3, 1],
+    "poses": [[0, 0, 0, 1, 0, 0, 0]],
+}
 PLANE = b"bvx-" + struct.pack("<I", SIZE) + struct.pack("<f", 1.5) * 12 + b"bvx$"  # LZFSE, as it is
 
 
@@ -67,11 +75,20 @@ R3D = {
     "garbage": (b"PK\x03\x04" + bytes(range(256)) * 4, "not a whole .r3d archive"),
     "cut in the middle": (_good[: len(_good) // 2], "not a whole .r3d archive"),
     "of no files": (archive({}), "metadata"),
-    "of version 9.7": (_good.replace(b"PK\x01\x02\x14\x03\x14", b"PK\x01\x02\x14\x03\x61"), "not a whole .r3d"),
+    "of version 9.7": (
+        _good.replace(b"PK\x01\x02\x14\x03\x14", b"PK\x01\x02\x14\x03\x61"),
+        "not a whole .r3d",
+    ),
     "of a nameless file": (_nameless(_good), "not a whole .r3d archive|damaged in the archive|missing"),
-    "name leads up": (archive({"../rgbd/0.depth": PLANE, "metadata": b"{}"}), "refused: the name .*leads out"),
+    "name leads up": (
+        archive({"../rgbd/0.depth": PLANE, "metadata": b"{}"}),
+        "refused: the name .*leads out",
+    ),
     "name absolute": (archive({"/rgbd/0.depth": PLANE, "metadata": b"{}"}), "refused: the name .*leads out"),
-    "name of another drive": (archive({"C:/0.depth": PLANE, "metadata": b"{}"}), "refused: the name .*leads out"),
+    "name of another drive": (
+        archive({"C:/0.depth": PLANE, "metadata": b"{}"}),
+        "refused: the name .*leads out",
+    ),
     "name leads up by backslashes": (archive({"..\\0.depth": PLANE, "metadata": b"{}"}), "refused: the name"),
     "bomb of metadata": (
         archive({"metadata": b"[" + b"0," * (1 << 24) + b"0]", "rgbd/0.depth": PLANE}, zipfile.ZIP_DEFLATED),
@@ -81,7 +98,10 @@ R3D = {
     "bomb of a depth image": (depth(bytes(1 << 24), zipfile.ZIP_DEFLATED), "0.depth: larger than"),
     "size lies": (bytes(_lies), "damaged in the archive|metadata"),
     "crc wrong": (_good.replace(struct.pack("<f", 1.5), struct.pack("<f", 2.5), 1), "damaged in the archive"),
-    "encrypted": (_good.replace(b"PK\x01\x02\x14\x03\x14\x00\x00", b"PK\x01\x02\x14\x03\x14\x00\x01"), "damaged|enc"),
+    "encrypted": (
+        _good.replace(b"PK\x01\x02\x14\x03\x14\x00\x00", b"PK\x01\x02\x14\x03\x14\x00\x01"),
+        "damaged|enc",
+    ),
     "metadata no json": (raw(b"{"), "metadata, line 1: not a JSON file"),
     "metadata deep": (raw(b"[" * 100_000), "metadata.*nested"),
     "metadata a list": (raw(b"[]"), "metadata: .*object"),
@@ -99,21 +119,30 @@ R3D = {
     "poses of six": (with_told(poses=[[0] * 6]), "poses must have 7 finite numbers"),
     "poses of many lengths": (with_told(poses=[[0] * 7, [0]]), "poses must be a table of numbers"),
     "poses a text": (with_told(poses="0001000"), "poses must"),
-    "times infinite": (raw(json.dumps({**TOLD, "frameTimestamps": [float("inf")]}).encode()), "frameTimestamps"),
+    "times infinite": (
+        raw(json.dumps({**TOLD, "frameTimestamps": [float("inf")]}).encode()),
+        "frameTimestamps",
+    ),
     "fps a list": (with_told(fps=[30]), "fps must be"),
     "fps nan": (raw(json.dumps({**TOLD, "fps": float("nan")}).encode()), "fps must be"),
     "depth no lzfse": (depth(b"not lzfse at all"), "0.depth, byte .*: the LZFSE data is damaged"),
     "depth empty": (depth(b""), "0.depth, byte .*: the LZFSE data is damaged"),
     "depth cut": (depth(PLANE[:-20]), "0.depth, byte .*: the LZFSE data is damaged"),
-    "depth of other size": (depth(PLANE.replace(struct.pack("<I", SIZE), struct.pack("<I", 40))), "0.depth, byte 48: the LZFSE data is damaged"),
+    "depth of other size": (
+        depth(PLANE.replace(struct.pack("<I", SIZE), struct.pack("<I", 40))),
+        "0.depth, byte 48: the LZFSE data is damaged",
+    ),
     "depth bomb of lzvn": (depth(lying_lzfse(SIZE)), "0.depth: "),
     "depth promises 4 GB": (depth(lying_lzfse(2**32 - 1)), "0.depth: refused: .*4294967295"),
     "depth of zlib": (depth(zlib.compress(bytes(48))), "0.depth, byte .*: the LZFSE data is damaged"),
     "depth of bzip2": (depth(bz2.compress(bytes(48))), "0.depth, byte .*: the LZFSE data is damaged"),
     "colour damaged": (
-        archive({"metadata": json.dumps(TOLD).encode(), "rgbd/0.depth": PLANE, "rgbd/0.jpg": b"\xff\xd8\xff"}), None,
+        archive(
+            {"metadata": json.dumps(TOLD).encode(), "rgbd/0.depth": PLANE, "rgbd/0.jpg": b"\xff\xd8\xff"}
+        ),
+        None,
     ),
-}  # fmt: skip
+}
 HEAD = "timestamp, frame, x, y, z, qx, qy, qz, qw\n"
 MATRIX = "500,0,320\n0,500,240\n0,0,1\n"
 
@@ -126,7 +155,10 @@ def stray(odometry: str = HEAD, matrix: str | bytes = MATRIX) -> dict[str, bytes
 
 
 STRAY = {
-    "odometry without names": (stray("0,0,0,0,0,0,0,0,1\n"), r"odometry\.csv, line 1: the first line must name"),
+    "odometry without names": (
+        stray("0,0,0,0,0,0,0,0,1\n"),
+        r"odometry\.csv, line 1: the first line must name",
+    ),
     "odometry of words": (stray(HEAD + "0,zero,0,0,0,0,0,0,1\n"), r"odometry\.csv, line 2: nine numbers"),
     "odometry short": (stray(HEAD + "0,0,0,0,0,0,0\n"), r"odometry\.csv, line 2: nine numbers"),
     "odometry of zero length": (stray(HEAD + "0,0,0,0,0,0,0,0,0\n"), r"odometry\.csv, line 2"),
@@ -135,7 +167,8 @@ STRAY = {
     "odometry frame infinite": (stray(HEAD + "0,inf,0,0,0,0,0,0,1\n"), r"odometry\.csv, line 2"),
     "odometry place infinite": (stray(HEAD + "0,0,inf,0,0,0,0,0,1\n"), r"odometry\.csv, line 2"),
     "odometry goes back in time": (
-        stray(HEAD + "1,0,0,0,0,0,0,0,1\n0,1,0,0,0,0,0,0,1\n"), r"odometry\.csv, line 3: .*does not come",
+        stray(HEAD + "1,0,0,0,0,0,0,0,1\n0,1,0,0,0,0,0,0,1\n"),
+        r"odometry\.csv, line 3: .*does not come",
     ),
     "matrix empty": (stray(matrix=""), r"camera_matrix\.csv"),
     "matrix of words": (stray(matrix="a,b,c\n" * 3), r"camera_matrix\.csv: three lines"),
@@ -144,7 +177,7 @@ STRAY = {
     "matrix nan": (stray(matrix=MATRIX.replace("320", "nan")), r"camera_matrix\.csv: a camera matrix"),
     "matrix 1e308": (stray(matrix=MATRIX.replace("500", "1e308")), r"camera_matrix\.csv"),
     "matrix utf-16": (stray(matrix=MATRIX.encode("utf-16")), r"camera_matrix\.csv"),
-}  # fmt: skip
+}
 PHONES = [
     *(
         Case(f"record3d/{n.replace(' ', '_')}", "recording", {"a.r3d": data}, said, "a.r3d", needs="liblzfse")

@@ -1,6 +1,6 @@
 """Hostile TOML files for ``--config``."""
 
-from hostile.case import single
+from hostile_files.case import single
 
 TEXTS = {
     "nul bytes": ("\0" * 64, "line 1: not TOML"),

@@ -6,7 +6,7 @@ from io import BytesIO
 
 import numpy as np
 
-from hostile.case import Case, single
+from hostile_files.case import Case, single
 
 SIGNATURE = b"\x89PNG\r\n\x1a\n"
 _random = np.random.default_rng(3)
@@ -18,9 +18,15 @@ def chunk(name: bytes, data: bytes, crc: int = 0) -> bytes:
 
 
 def png(
-    width: int = 4, height: int = 3, bits: int = 16, color: int = 0, data: bytes | None = None, extra: bytes = b"",
-    interlace: int = 0, crc: int = 0,
-) -> bytes:  # fmt: skip
+    width: int = 4,
+    height: int = 3,
+    bits: int = 16,
+    color: int = 0,
+    data: bytes | None = None,
+    extra: bytes = b"",
+    interlace: int = 0,
+    crc: int = 0,
+) -> bytes:
     """Return a PNG file, of zeros if it is not said of what."""
     header = struct.pack(">IIBBBBB", width, height, bits, color, 0, 0, interlace)
     body = zlib.compress(bytes(3 * 9)) if data is None else data
@@ -46,11 +52,18 @@ def npy_header(text: str, body: bytes = bytes(48)) -> bytes:
 
 
 def exr(
-    window: tuple[int, int, int, int] = (0, 0, 3, 2), channels: tuple[str, ...] = ("Z",), compression: int = 0,
-    kind: int = 2, body: bytes | None = None, sampling: int = 1,
-) -> bytes:  # fmt: skip
+    window: tuple[int, int, int, int] = (0, 0, 3, 2),
+    channels: tuple[str, ...] = ("Z",),
+    compression: int = 0,
+    kind: int = 2,
+    body: bytes | None = None,
+    sampling: int = 1,
+) -> bytes:
     """Return an EXR file of 4 x 3 zeros, or what its header says."""
-    named = b"".join(c.encode() + b"\0" + struct.pack("<iiii", kind, 0, sampling, sampling) for c in channels) + b"\0"
+    named = (
+        b"".join(c.encode() + b"\0" + struct.pack("<iiii", kind, 0, sampling, sampling) for c in channels)
+        + b"\0"
+    )
     attributes = (
         ("channels", "chlist", named),
         ("compression", "compression", bytes([compression])),
@@ -73,7 +86,7 @@ def exr(
     return head + body
 
 
-_bomb = zlib.compress(bytes(1 << 24), 9)
+BOMB = zlib.compress(bytes(1 << 24), 9)
 _lying = {"descr": "'<u2'", "fortran_order": "False", "shape": "(100000, 100000)"}
 PNG = {
     "png empty": (b"", "damaged or truncated"),
@@ -87,10 +100,6 @@ PNG = {
     "png larger than it can hold": (png(4000, 4000), "refused: .*4000 x 4000 .* cannot hold"),
     "png of no width": (png(0, 3), "damaged or truncated|refused"),
     "png of width 2 to the 32 - 1": (png(2**32 - 1, 1), "refused|damaged"),
-    "png bomb of a comment": (
-        png(extra=chunk(b"zTXt", b"a\0\0" + _bomb)), "damaged or truncated|refused",
-    ),
-    "png bomb of a colour profile": (png(extra=chunk(b"iCCP", b"a\0\0" + _bomb)), "refused|damaged"),
     "png of bad crc": (png(crc=1), "damaged or truncated"),
     "png of bad zlib": (png(data=b"\x78\x9c" + _random.bytes(40)), "damaged or truncated"),
     "png of bad adler": (png(data=zlib.compress(bytes(27))[:-4] + b"\1\2\3\4"), "damaged or truncated"),
@@ -107,13 +116,20 @@ PNG = {
     "png of 8 bits": (png(bits=8, data=zlib.compress(bytes(15))), "must have 16 bits"),
     "png of 16-bit palette": (png(color=3), "damaged or truncated|must have 16 bits"),
     "png of 7 bits": (png(bits=7), "damaged or truncated|must have 16 bits"),
-    "png of 16-bit colour": (png(color=2, data=zlib.compress(bytes(75))), "must have 16 bits and one channel"),
-    "png of 16-bit grey with alpha": (png(color=4, data=zlib.compress(bytes(51))), "must have 16 bits and one"),
+    "png of 16-bit colour": (
+        png(color=2, data=zlib.compress(bytes(75))),
+        "must have 16 bits and one channel",
+    ),
+    "png of 16-bit grey with alpha": (
+        png(color=4, data=zlib.compress(bytes(51))),
+        "must have 16 bits and one",
+    ),
     "png of unknown colour": (png(color=5), "damaged or truncated|must have 16 bits"),
     "png that is a jpeg": (b"\xff\xd8\xff\xe0" + bytes(100), "damaged or truncated|not a PNG"),
     "png that is a tiff": (b"II*\0\x08\0\0\0" + bytes(100), "damaged or truncated|not a PNG"),
     "png that is postscript": (
-        b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 4 3\n(x) run\n", "damaged or truncated|not a PNG",
+        b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 4 3\n(x) run\n",
+        "damaged or truncated|not a PNG",
     ),
 }
 PGM = {
@@ -126,7 +142,10 @@ PGM = {
     "pgm maxval negative": (pgm(-1), "byte 0: expected"),
     "pgm maxval of 5000 digits": (pgm("9" * 5000), "byte 0: expected|whole number"),
     "pgm of no width": (pgm(size="0 3"), "byte .*follow|must be .H, W. numbers"),
-    "pgm of size 2 to the 32 squared": (pgm(size=f"{2**32} {2**32}"), "truncated: 36893488147419103232 bytes"),
+    "pgm of size 2 to the 32 squared": (
+        pgm(size=f"{2**32} {2**32}"),
+        "truncated: 36893488147419103232 bytes",
+    ),
     "pgm of size that wraps": (pgm(size=f"{2**63 + 6} 2"), "truncated"),
     "pgm of negative size": (pgm(size="-4 -3"), "byte 0: expected"),
     "pgm of size of 5000 digits": (pgm(size="9" * 5000 + " 3"), "byte 0: expected|whole number"),
@@ -140,13 +159,16 @@ NPY = {
     "npy empty": (b"", "not a readable .npy array"),
     "npy pickle": (npy(np.array([[print, {"a": 1}]], dtype=object)), "must be .H, W. numbers"),
     "npy shape huge": (
-        npy_header("{'descr': '<u2', 'fortran_order': False, 'shape': (1000000, 1000000), }"), "not a readable",
+        npy_header("{'descr': '<u2', 'fortran_order': False, 'shape': (1000000, 1000000), }"),
+        "not a readable",
     ),
     "npy shape wraps": (
-        npy_header(f"{{'descr': '<u2', 'fortran_order': False, 'shape': ({2**33}, {2**31}), }}"), "not a readable",
+        npy_header(f"{{'descr': '<u2', 'fortran_order': False, 'shape': ({2**33}, {2**31}), }}"),
+        "not a readable",
     ),
     "npy shape negative": (
-        npy_header("{'descr': '<u2', 'fortran_order': False, 'shape': (-4, -3), }"), "not a readable|must be",
+        npy_header("{'descr': '<u2', 'fortran_order': False, 'shape': (-4, -3), }"),
+        "not a readable|must be",
     ),
     "npy header is code": (npy_header("__import__('os').abort()"), "not a readable"),
     "npy header deep": (npy_header("(" * 9000), "not a readable"),
@@ -168,13 +190,20 @@ NPY = {
 EXR = {
     "exr empty": (b"", "damaged or truncated|not an EXR"),
     "exr garbage": (struct.pack("<II", 20000630, 2) + _random.bytes(300), "damaged or truncated|not an EXR"),
-    "exr huge data window": (exr((0, 0, 2**30, 2**30), body=bytes(100)), "refused: .*1073741825 x 1073741825"),
+    "exr huge data window": (
+        exr((0, 0, 2**30, 2**30), body=bytes(100)),
+        "refused: .*1073741825 x 1073741825",
+    ),
     "exr data window of 60000": (exr((0, 0, 59_999, 59_999), body=bytes(100)), "refused: .*60000 x 60000"),
     "exr data window negative": (exr((5, 5, 0, 0), body=bytes(100)), "damaged or truncated|refused"),
     "exr data window wraps": (
-        exr((-(2**31), -(2**31), 2**31 - 1, 2**31 - 1), body=bytes(100)), "refused: .*4294967296 x 4294967296",
+        exr((-(2**31), -(2**31), 2**31 - 1, 2**31 - 1), body=bytes(100)),
+        "refused: .*4294967296 x 4294967296",
     ),
-    "exr larger than it can hold": (exr((0, 0, 3999, 3999), body=bytes(100)), "refused: .*cannot hold|damaged"),
+    "exr larger than it can hold": (
+        exr((0, 0, 3999, 3999), body=bytes(100)),
+        "refused: .*cannot hold|damaged",
+    ),
     "exr cut in the header": (exr()[:80], "damaged or truncated|refused|not an EXR"),
     "exr cut in the pixels": (exr()[:-10], "damaged or truncated"),
     "exr without pixels": (exr(body=b""), "damaged or truncated"),
@@ -182,7 +211,8 @@ EXR = {
     "exr of unknown compression": (exr(compression=77), "damaged or truncated|refused"),
     "exr of colours": (exr(channels=("x", "y")), "no channel Z"),
     "exr of thousand channels": (
-        exr(channels=tuple(f"c{i:04}" for i in range(1000)), body=b""), "no channel Z|damaged|refused",
+        exr(channels=tuple(f"c{i:04}" for i in range(1000)), body=b""),
+        "refused: .*channels",
     ),
     "exr of sampling 0": (exr(sampling=0), "damaged or truncated|refused"),
 }
@@ -197,24 +227,34 @@ COLOR = {
 }
 BMP = {
     "color bmp larger than it can hold": (
-        b"BM" + struct.pack("<IHHI", 70, 0, 0, 54) + struct.pack("<IiiHHIIiiII", 40, 9000, 7000, 1, 24, 0, 0, 0, 0, 0, 0)
-        + bytes(16), "damaged or truncated|refused",
+        b"BM"
+        + struct.pack("<IHHI", 70, 0, 0, 54)
+        + struct.pack("<IiiHHIIiiII", 40, 9000, 7000, 1, 24, 0, 0, 0, 0, 0, 0)
+        + bytes(16),
+        "damaged or truncated|refused",
     ),
     "color bmp of negative size": (
-        b"BM" + struct.pack("<IHHI", 70, 0, 0, 54) + struct.pack("<IiiHHIIiiII", 40, -4, -3, 1, 24, 0, 0, 0, 0, 0, 0)
-        + bytes(16), "damaged or truncated|refused",
+        b"BM"
+        + struct.pack("<IHHI", 70, 0, 0, 54)
+        + struct.pack("<IiiHHIIiiII", 40, -4, -3, 1, 24, 0, 0, 0, 0, 0, 0)
+        + bytes(16),
+        "damaged or truncated|refused",
     ),
-}  # fmt: skip
+}
 TIFF = {
     "attribute tiff of 2 to the 31 squared": (
         b"II*\0\x08\0\0\0\x03\0"
-        + b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in ((256, 2**31), (257, 2**31), (273, 8)))
-        + bytes(4), "refused|damaged or truncated",
+        + b"".join(
+            struct.pack("<HHII", tag, 4, 1, value) for tag, value in ((256, 2**31), (257, 2**31), (273, 8))
+        )
+        + bytes(4),
+        "refused|damaged or truncated",
     ),
     "attribute tiff whose directories go round": (
-        b"II*\0\x08\0\0\0\x01\0" + struct.pack("<HHII", 256, 4, 1, 4) + struct.pack("<I", 8), "damaged or truncated",
+        b"II*\0\x08\0\0\0\x01\0" + struct.pack("<HHII", 256, 4, 1, 4) + struct.pack("<I", 8),
+        "damaged or truncated",
     ),
-}  # fmt: skip
+}
 DEPTH_IMAGES: list[Case] = (
     single("image", "depth", ".png", PNG, needs="PIL")
     + single("image", "depth", ".pgm", PGM)

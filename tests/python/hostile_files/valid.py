@@ -4,20 +4,20 @@ import json
 import struct
 import zlib
 
-from hostile.cameras import OPEN3D, PINHOLE
-from hostile.case import Case
-from hostile.configs import TEXTS  # noqa: F401
-from hostile.depth_images import exr, npy, pgm, png
-from hostile.meshes import OFF, TRIANGLE, stl
-from hostile.outputs import FRAME, MODEL, report
-from hostile.pcd import TWO as PCD_TWO
-from hostile.pcd import packed, pcd
-from hostile.phones import HEAD, TOLD, r3d, stray
-from hostile.ply import FACES, GRID, TEXT, TWO, ply, text, vertices
-from hostile.recordings import plain, tum
-from hostile.trajectories import EYE, GOOD
-
 import numpy as np
+
+from hostile_files.cameras import OPEN3D, PINHOLE
+from hostile_files.case import Case
+from hostile_files.configs import TEXTS  # noqa: F401
+from hostile_files.depth_images import exr, npy, pgm, png
+from hostile_files.meshes import OFF, TRIANGLE, stl
+from hostile_files.outputs import FRAME, MODEL, report
+from hostile_files.pcd import TWO as PCD_TWO
+from hostile_files.pcd import packed, pcd
+from hostile_files.phones import HEAD, TOLD, r3d, stray
+from hostile_files.ply import FACES, GRID, TEXT, TWO, ply, text, vertices
+from hostile_files.recordings import plain, tum
+from hostile_files.trajectories import EYE, GOOD
 
 PIXELS = np.arange(12, dtype=">u2").reshape(3, 4) + 500
 ROWS = b"".join(b"\0" + row.tobytes() for row in PIXELS)
@@ -45,8 +45,8 @@ FILES = {
         "a.obj": (TRIANGLE + "f 1 2 3\n").encode(),
         "a.off": (OFF + "3 0 1 2\n").encode(),
         "a.stl": stl(1, struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)),
-        "text.stl": b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n"
-        b"endfacet\nendsolid\n",
+        "text.stl": b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+        b"endloop\nendfacet\nendsolid\n",
         "a.ply": text("0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", f"{vertices(3)}\n{FACES}"),
     },
     "depth": {
@@ -68,7 +68,7 @@ FILES = {
         "a.toml": b"preset = 'paper'\nmax_points = 1000\n[registration]\nmax_angle = 0.5\nrobust = false\n"
         b"[depth]\nmax_depth = 3\n",
     },
-}  # fmt: skip
+}
 VALID = {
     f"{kind}/valid_{name}": Case(f"{kind}/valid_{name}", kind, {name: data}, "", name)
     for kind, files in FILES.items()
@@ -82,9 +82,15 @@ for _name, _files in {
     VALID[f"recording/{_name}"] = Case(f"recording/{_name}", "recording", _files, "")
 VALID["recording/r3d"] = Case("recording/r3d", "recording", {"a.r3d": r3d()}, "", "a.r3d", needs="liblzfse")
 VALID["recording/metadata"] = Case(
-    "recording/metadata", "recording", {"metadata": json.dumps(TOLD).encode(), "rgbd/0.depth": bytes(8)}, "",
+    "recording/metadata",
+    "recording",
+    {"metadata": json.dumps(TOLD).encode(), "rgbd/0.depth": bytes(8)},
+    "",
     needs="liblzfse",
-)  # fmt: skip
+)
 VALID["output/valid"] = Case(
-    "output/valid", "output", {"report.json": report(frames=[FRAME, {**FRAME, "index": 1}]), "model.ply": MODEL}, "",
-)  # fmt: skip
+    "output/valid",
+    "output",
+    {"report.json": report(frames=[FRAME, {**FRAME, "index": 1}]), "model.ply": MODEL},
+    "",
+)

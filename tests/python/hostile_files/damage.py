@@ -23,7 +23,7 @@ def scratched(seeds: Sequence[bytes], chance: random.Random) -> bytes:
 
 
 def damaged(seeds: Sequence[bytes], chance: random.Random) -> bytes:
-    """Return one of the seeds with one to four pieces flipped, cut, doubled, replaced, or from another seed."""
+    """Return one of the seeds with one to four pieces flipped, cut, doubled or replaced."""
     data = chance.choice(seeds)
     for _ in range(chance.randint(1, 4)):
         at = chance.randint(0, len(data))

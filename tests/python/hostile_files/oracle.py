@@ -9,10 +9,25 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 KINDS = {
-    "char": "b", "int8": "b", "uchar": "B", "uint8": "B", "short": "h", "int16": "h", "ushort": "H", "uint16": "H",
-    "int": "i", "int32": "i", "uint": "I", "uint32": "I", "float": "f", "float32": "f", "double": "d", "float64": "d",
-    "int64": "q", "uint64": "Q",
-}  # fmt: skip
+    "char": "b",
+    "int8": "b",
+    "uchar": "B",
+    "uint8": "B",
+    "short": "h",
+    "int16": "h",
+    "ushort": "H",
+    "uint16": "H",
+    "int": "i",
+    "int32": "i",
+    "uint": "I",
+    "uint32": "I",
+    "float": "f",
+    "float32": "f",
+    "double": "d",
+    "float64": "d",
+    "int64": "q",
+    "uint64": "Q",
+}
 BLANK = " \t\r\n\v\f\0"
 
 
@@ -48,11 +63,26 @@ def pcd(data: bytes) -> dict[str, list]:
     end = re.search(rb"(?:^|\n)[ \t]*DATA[ \t]+(\w+)[^\n]*\n", data)
     lines = [line.split() for line in data[: end.start()].decode("latin-1").split("\n")]
     header = {"FIELDS" if words[0] == "COLUMNS" else words[0]: words[1:] for words in lines if words}
-    count = int(header["WIDTH"][0]) * int(header.get("HEIGHT", "1")[0]) if "WIDTH" in header else int(header["POINTS"][0])
+    count = (
+        int(header["WIDTH"][0]) * int(header.get("HEIGHT", "1")[0])
+        if "WIDTH" in header
+        else int(header["POINTS"][0])
+    )
     kinds = [
-        {"F4": "f", "F8": "d", "I1": "b", "I2": "h", "I4": "i", "I8": "q", "U1": "B", "U2": "H", "U4": "I", "U8": "Q"}[t + s]
+        {
+            "F4": "f",
+            "F8": "d",
+            "I1": "b",
+            "I2": "h",
+            "I4": "i",
+            "I8": "q",
+            "U1": "B",
+            "U2": "H",
+            "U4": "I",
+            "U8": "Q",
+        }[t + s]
         for t, s in zip(header["TYPE"], header["SIZE"], strict=True)
-    ]  # fmt: skip
+    ]
     body = data[end.end() :]
     next_value = _words(body) if end[1] == b"ascii" else _values(body, "<")
     columns = {name: [] for name in header["FIELDS"]}
@@ -80,7 +110,9 @@ def _words(body: bytes):
 
     def value(kind: str):
         number = float(next(words))
-        return struct.unpack("f", struct.pack("f", number))[0] if kind == "f" and abs(number) < 3e38 else number
+        return (
+            struct.unpack("f", struct.pack("f", number))[0] if kind == "f" and abs(number) < 3e38 else number
+        )
 
     return value
 
@@ -97,7 +129,10 @@ def png(data: bytes) -> np.ndarray:
     raw = zlib.decompressobj().decompress(b"".join(data for name, data in chunks if name == b"IDAT"))
     above, rows = bytes(2 * width), []
     for y in range(height):
-        kind, line = raw[y * (2 * width + 1)], bytearray(raw[y * (2 * width + 1) + 1 : (y + 1) * (2 * width + 1)])
+        kind, line = (
+            raw[y * (2 * width + 1)],
+            bytearray(raw[y * (2 * width + 1) + 1 : (y + 1) * (2 * width + 1)]),
+        )
         for i in range(2 * width):
             a, b, c = (line[i - 2] if i > 1 else 0), above[i], (above[i - 2] if i > 1 else 0)
             nearest = min((a, b, c), key=lambda value, p=a + b - c: abs(p - value))

@@ -2,11 +2,18 @@
 
 import json
 
-from hostile.case import single
+from hostile_files.case import single
 
 PINHOLE = {
-    "model": "pinhole", "width": 4, "height": 3, "fx": 5.0, "fy": 5.0, "cx": 1.5, "cy": 1.0, "depth_scale": 1000,
-}  # fmt: skip
+    "model": "pinhole",
+    "width": 4,
+    "height": 3,
+    "fx": 5.0,
+    "fy": 5.0,
+    "cx": 1.5,
+    "cy": 1.0,
+    "depth_scale": 1000,
+}
 OPEN3D = {"width": 4, "height": 3, "intrinsic_matrix": [5, 0, 0, 0, 5, 0, 1.5, 1, 1]}
 
 
@@ -62,9 +69,15 @@ TEXTS = {
     "depth_scale infinite": (raw("depth_scale", "Infinity"), "depth_scale must be a finite number"),
     "orthographic without pixel_size": (changed(model="orthographic"), "the key 'pixel_size' is missing"),
     "orthographic of pixel_size 0": (changed(model="orthographic", pixel_size=0), "pixel_size"),
-    "open3d by rows": (json.dumps({**OPEN3D, "intrinsic_matrix": [5, 0, 1.5, 0, 5, 1, 0, 0, 1]}), "column by"),
+    "open3d by rows": (
+        json.dumps({**OPEN3D, "intrinsic_matrix": [5, 0, 1.5, 0, 5, 1, 0, 0, 1]}),
+        "column by",
+    ),
     "open3d of 8 numbers": (json.dumps({**OPEN3D, "intrinsic_matrix": [0] * 8}), "a list of 9 numbers"),
-    "open3d with skew": (json.dumps({**OPEN3D, "intrinsic_matrix": [5, 0, 0, 1, 5, 0, 1, 1, 1]}), "without skew"),
+    "open3d with skew": (
+        json.dumps({**OPEN3D, "intrinsic_matrix": [5, 0, 0, 1, 5, 0, 1, 1, 1]}),
+        "without skew",
+    ),
     "a megabyte of lists": ("[" + "{}," * 300_000 + "{}]", "larger than"),
     "a megabyte of blanks": (" " * 1_000_000 + changed(), "larger than"),
 }

@@ -2,8 +2,8 @@
 
 import struct
 
-from hostile.case import single
-from hostile.ply import FACES, TEXT, text, vertices
+from hostile_files.case import single
+from hostile_files.ply import FACES, TEXT, text, vertices
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 OFF = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n"
@@ -53,12 +53,15 @@ _PLY = {
     "ply face negative": (text(TEXT + "3 0 1 -1\n", f"{vertices(2)}\n{FACES}"), "face 0 names vertex -1"),
     "ply face of two": (text(TEXT + "2 0 1\n", f"{vertices(2)}\n{FACES}"), "face 0 has 2 corners"),
     "ply face of floats": (
-        text(TEXT + "3 0 1 0\n", f"{vertices(2)}\n{FACES.replace('int', 'float')}"), "no element face with",
+        text(TEXT + "3 0 1 0\n", f"{vertices(2)}\n{FACES.replace('int', 'float')}"),
+        "no element face with",
     ),
 }
 MESHES = (
     single("mesh", "mesh", ".obj", {name: (body.encode(), message) for name, (body, message) in _OBJ.items()})
-    + single("mesh", "mesh", ".off", {name: (body.encode(), message) for name, (body, message) in _OFF.items()})
+    + single(
+        "mesh", "mesh", ".off", {name: (body.encode(), message) for name, (body, message) in _OFF.items()}
+    )
     + single("mesh", "mesh", ".stl", _STL)
     + single("mesh", "mesh", ".ply", _PLY)
 )

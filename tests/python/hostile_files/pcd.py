@@ -4,7 +4,7 @@ import struct
 
 import numpy as np
 
-from hostile.case import single
+from hostile_files.case import single
 
 TWO = struct.pack("<6f", 0, 1, 2, 3, 4, 5)
 _LINES = {
@@ -50,10 +50,12 @@ POINTS = {
     "COUNT 0": (pcd(TWO, COUNT="1 1 0"), "COUNT 0"),
     "COUNT negative": (pcd(TWO, COUNT="1 1 -1"), "COUNT must be a whole number"),
     "COUNT huge": (
-        pcd(TWO, FIELDS="x y z w", SIZE="4 4 4 4", TYPE="F F F F", COUNT=f"1 1 1 {2**40}"), "too large",
+        pcd(TWO, FIELDS="x y z w", SIZE="4 4 4 4", TYPE="F F F F", COUNT=f"1 1 1 {2**40}"),
+        "too large",
     ),
     "WIDTH times HEIGHT wraps to 2": (
-        pcd(TWO, WIDTH=2**63 + 1, HEIGHT=2, POINTS=None), "promises 18446744073709551618 points",
+        pcd(TWO, WIDTH=2**63 + 1, HEIGHT=2, POINTS=None),
+        "promises 18446744073709551618 points",
     ),
     "WIDTH times HEIGHT 2 to the 64": (pcd(TWO, WIDTH=2**32, HEIGHT=2**32, POINTS=None), "byte .*promises"),
     "WIDTH negative": (pcd(TWO, WIDTH=-2), "WIDTH must be a whole number"),
@@ -77,10 +79,12 @@ POINTS = {
     "text row too many": (pcd(b"0 1 2\n3 4 5\n6 7 8\n", "ascii"), "6 bytes follow"),
     "text of bytes": (pcd(b"\xff\xfe\xfd\xfc" * 6, "ascii"), "line 11"),
     "text 1e400 in a whole field": (
-        pcd(b"0 1 1e400\n3 4 5\n", "ascii", TYPE="F F I"), "line 11: '1e400' does not fit z",
+        pcd(b"0 1 1e400\n3 4 5\n", "ascii", TYPE="F F I"),
+        "line 11: '1e400' does not fit z",
     ),
     "text 300 in a byte": (
-        pcd(b"0 1 300\n3 4 5\n", "ascii", TYPE="F F U", SIZE="4 4 1"), "line 11: '300' does not fit z",
+        pcd(b"0 1 300\n3 4 5\n", "ascii", TYPE="F F U", SIZE="4 4 1"),
+        "line 11: '300' does not fit z",
     ),
     "lzf without sizes": (pcd(b"\0" * 7, "binary_compressed"), "byte .*before the compressed data"),
     "lzf longer than the file": (packed(2, 1, 2, 3, told=500), "byte .*500 bytes of compressed data"),

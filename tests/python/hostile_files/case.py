@@ -51,10 +51,14 @@ class Case:
     needs: str = "numpy"
 
 
-def single(kind: str, reader: str, suffix: str, table: Mapping[str, tuple[bytes, str]], **more: str) -> list[Case]:
+def single(
+    kind: str, reader: str, suffix: str, table: Mapping[str, tuple[bytes, str]], **more: str
+) -> list[Case]:
     """Return a case for each file of a table: name to content and message."""
     return [
-        Case(f"{kind}/{name.replace(' ', '_')}", reader, {f"a{suffix}": content}, message, f"a{suffix}", **more)
+        Case(
+            f"{kind}/{name.replace(' ', '_')}", reader, {f"a{suffix}": content}, message, f"a{suffix}", **more
+        )
         for name, (content, message) in table.items()
     ]
 
@@ -85,6 +89,13 @@ def read_output(path: Path) -> Any:
     return written_story(path)
 
 
+def read_run(path: Path) -> Any:
+    """Read what an unfinished run left, as ``nacre info`` does."""
+    from nacre.cli.unfinished import describe_unfinished
+
+    return describe_unfinished(path)
+
+
 READERS: dict[str, Callable[[Path], Any]] = {
     "points": nacre.read_points,
     "mesh": nacre.read_mesh,
@@ -98,6 +109,8 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "recording": read_recording,
     "config": lambda path: model_parameters(None, path, None),
     "output": read_output,
+    "checkpoint": nacre.Model.load,
+    "run": read_run,
 }
 
 

@@ -2,9 +2,9 @@
 
 import json
 
-from hostile.case import Case
-from hostile.cameras import PINHOLE
-from hostile.ply import TEXT, text, vertices
+from hostile_files.cameras import PINHOLE
+from hostile_files.case import Case
+from hostile_files.ply import TEXT, text, vertices
 
 _POSE = [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]
 FRAME = {"index": 0, "status": "TRACKED", "world_from_camera": _POSE, "truth": None}
@@ -16,7 +16,9 @@ MODEL = text(
 
 def report(**changes: object) -> bytes:
     """Return report.json with some things changed."""
-    return json.dumps({"title": "a", "recording": {"camera": PINHOLE}, "spacing": 0.1, "frames": [FRAME], **changes}).encode()
+    return json.dumps(
+        {"title": "a", "recording": {"camera": PINHOLE}, "spacing": 0.1, "frames": [FRAME], **changes}
+    ).encode()
 
 
 def frames(*changes: dict[str, object]) -> bytes:
@@ -44,10 +46,14 @@ REPORTS = {
     "pose of three rows": (frames({"world_from_camera": _POSE[:3]}), r"frames\[0\].*world_from_camera"),
     "pose of words": (frames({"world_from_camera": "eye"}), r"frames\[0\].*world_from_camera"),
     "pose of nan": (
-        frames({"world_from_camera": [[float("nan")] * 4] * 4}), r"frames\[0\].*world_from_camera",
+        frames({"world_from_camera": [[float("nan")] * 4] * 4}),
+        r"frames\[0\].*world_from_camera",
     ),
     "pose of zeros": (frames({"world_from_camera": [[0] * 4] * 4}), r"frames\[0\].*world_from_camera"),
-    "pose of second frame ragged": (frames({}, {"world_from_camera": [[1], [2, 3]]}), r"frames\[1\].*world_from"),
+    "pose of second frame ragged": (
+        frames({}, {"world_from_camera": [[1], [2, 3]]}),
+        r"frames\[1\].*world_from",
+    ),
     "truth of zeros": (frames({"truth": [[0] * 4] * 4}), r"frames\[0\].*truth"),
     "camera a list": (report(recording={"camera": [1]}), r"report\.json: a camera file must hold"),
     "camera of width 0": (report(recording={"camera": {**PINHOLE, "width": 0}}), r"report\.json: .*width"),

@@ -1,0 +1,213 @@
+"""
+What a long-lived program sees of nacre: models that come and go, threads, forks, other thread pools.
+
+    python benchmarks/life.py                 # 1000 cycles, ten seconds of ticks
+    python benchmarks/life.py --cycles 60 --seconds 2 --busy    # as the tests run it
+
+Prints a line for each and ends with 1 where a promise does not hold.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from simulated import Scene
+from soak import memory
+
+import nacre
+
+MOST_GROWTH = 2e6  # [bytes]: what the allocator's arenas vary by
+FOLDERS = [str(Path(__file__).resolve().parent), str(Path(str(nacre.__file__)).parents[1])]
+MOST_LOST = 0.05  # of a thread's ticks
+
+
+def grown(scene: Scene, frames: int = 3) -> nacre.Model:
+    """Return a small model."""
+    model = nacre.Model(scene.camera, num_threads=2)
+    for index in range(frames):
+        model.add_frame(scene.depth(index), scene.color(index))
+    return model
+
+
+def bits(model: nacre.Model) -> str:
+    """Return the SHA-256 of a model's points and poses."""
+    return hashlib.sha256(
+        model.points.tobytes() + model.normals.tobytes() + model.poses.tobytes()
+    ).hexdigest()
+
+
+def growth_of_cycles(cycles: int) -> float:
+    """Make models and drop them; return by how much memory grows from a tenth of the cycles on [bytes]."""
+    scene = Scene("static", 96)
+    begin = 0
+    for cycle in range(cycles):
+        grown(scene)
+        nacre.align(np.eye(3), np.eye(3))
+        if cycle + 1 == max(10, cycles // 10):
+            begin = memory()
+    return memory() - begin
+
+
+def ticks_per_second(seconds: float, work: Callable[[], Any]) -> float:
+    """Return how often a thread wakes up that sleeps for 5 ms at a time, while this one works."""
+    ticks = 0
+    ended = threading.Event()
+
+    def tick() -> None:
+        nonlocal ticks
+        while not ended.is_set():
+            time.sleep(0.005)
+            ticks += 1
+
+    thread = threading.Thread(target=tick)
+    thread.start()
+    begin = time.perf_counter()
+    while time.perf_counter() - begin < seconds:
+        work()
+    ended.set()
+    thread.join()
+    return ticks / (time.perf_counter() - begin)
+
+
+def lost_ticks(seconds: float) -> float:
+    """
+    Return the part of its ticks that a thread loses while frames are added: in turns, the median of nine.
+
+    The other turns are as busy, but without Python's lock: a hash of a large array.
+    """
+    scene = Scene("static", 640)
+    large = bytes(2**24)
+    depths = [scene.depth(index) for index in range(8)]
+    model = nacre.Model(scene.camera, num_threads=1)
+    frames = iter(range(10**9))
+    lost = []
+    for _ in range(9):
+        free = ticks_per_second(seconds / 18, lambda: hashlib.sha256(large))
+        busy = ticks_per_second(seconds / 18, lambda: model.add_frame(depths[next(frames) % 8]))
+        lost.append(1 - busy / free)
+    return float(np.median(lost))
+
+
+def two_at_once() -> bool:
+    """Return whether two models in two threads have the bits that each has alone."""
+    scenes = [Scene("static", 96), Scene("turning", 96, views=60)]
+    alone = [bits(grown(scene, 12)) for scene in scenes]
+    found = ["", ""]
+
+    def run(k: int) -> None:
+        found[k] = bits(grown(scenes[k], 12))
+
+    threads = [threading.Thread(target=run, args=(k,)) for k in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    return found == alone
+
+
+# In a fresh interpreter: before and after, in the same process, each has to work.
+BESIDE = """
+import sys
+sys.path[:0] = {path!r}
+import {first}
+import {second}
+import numpy as np
+import nacre
+def other():
+    {work}
+from life import bits, grown
+from simulated import Scene
+scene = Scene("static", 96)
+other(); first = bits(grown(scene)); other(); assert bits(grown(scene)) == first
+print(first)
+"""
+POOLS = {
+    "numpy.linalg": "np.random.default_rng(0).random((300, 300)) @ np.eye(300)",
+    "scipy.spatial": "scipy.spatial.cKDTree(np.random.rand(2000, 3)).query(np.eye(3), workers=2)",
+    "torch": "torch.rand(300, 300) @ torch.rand(300, 300)",
+    "open3d": "open3d.geometry.PointCloud(open3d.utility.Vector3dVector(np.eye(3))).estimate_normals()",
+    "cv2": "cv2.GaussianBlur(np.zeros((400, 400), np.float32), (9, 9), 2)",
+}
+
+
+def beside(library: str) -> str:
+    """Say whether a library with threads of its own works beside nacre, imported before or after."""
+    said = set()
+    for first, second in ((library, "nacre"), ("nacre", library)):
+        program = BESIDE.format(path=FOLDERS, first=first, second=second, work=POOLS[library])
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+        if "ModuleNotFoundError" in done.stderr:
+            return "not installed"
+        said.add(done.stdout.split()[-1] if done.returncode == 0 else f"FAILED: {done.stderr[-300:]}")
+    if any(text.startswith("FAILED") for text in said):
+        return "; ".join(sorted(said))
+    return "same bits in either order" if len(said) == 1 else "FAILED: other bits in the other order"
+
+
+FORKED = """
+import os, sys, warnings
+sys.path[:0] = {path!r}
+warnings.simplefilter("ignore")  # newer Pythons warn of fork with threads
+from life import bits, grown
+from simulated import Scene
+scene = Scene("static", 96)
+model = grown(scene)
+child = os.fork()
+model.add_frame(scene.depth(3))
+if child == 0:
+    os.write(1, bits(model).encode() + b" ")
+    os._exit(0)
+os.waitpid(child, 0)
+print(bits(model))
+"""
+
+
+def goes_on_after_fork() -> bool:
+    """Return whether a child process gets the same bits out of a model that its parent has begun."""
+    command = [sys.executable, "-c", FORKED.format(path=FOLDERS)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    child, parent = done.stdout.split()
+    return child == parent
+
+
+def main(words: list[str] | None = None) -> int:
+    """Measure all of it."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--cycles", type=int, default=1000)
+    parser.add_argument("--seconds", type=float, default=10.0, help="of the ticking thread")
+    parser.add_argument(
+        "--busy", action="store_true", help="the machine is: print the ticks, and demand nothing"
+    )
+    options = parser.parse_args(words)
+    holds = [two_at_once()]
+    print(f"two models in two threads have the bits of each alone: {holds[-1]}")
+    if hasattr(os, "fork"):
+        holds.append(goes_on_after_fork())
+        print(f"a child process gets its parent's bits: {holds[-1]}", flush=True)
+    for library in POOLS:
+        said = beside(library)
+        holds.append(not said.startswith("FAILED"))
+        print(f"beside {library}: {said}", flush=True)
+    growth = growth_of_cycles(options.cycles)
+    holds.append(growth < MOST_GROWTH)
+    print(f"{options.cycles} models made and dropped: memory grows by {growth / 1e3:.0f} kB", flush=True)
+    lost = lost_ticks(options.seconds)
+    holds.append(lost < MOST_LOST or options.busy)
+    print(f"a thread beside add_frame loses {100 * lost:.1f} % of its ticks")
+    return 0 if all(holds) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,65 @@
+"""Hostile checkpoints, and folders of runs that are said to be unfinished."""
+
+import json
+import pickle
+import struct
+import zlib
+
+import numpy as np
+
+from hostile_files.case import Case, single
+
+_random = np.random.default_rng(7)
+
+
+def checkpoint(body: bytes = b"", *, form: int = 1, told: int | None = None, checksum: int = 0) -> bytes:
+    """Return the header of a checkpoint, and a body."""
+    length = 48 + len(body) if told is None else told
+    return b"nacremdl" + struct.pack("<I20sQQ", form, b"0.1.0", length, checksum) + body
+
+
+MODELS = {
+    "empty": (b"", "byte 0"),
+    "nul bytes": (bytes(500), "byte 0"),
+    "garbage": (_random.bytes(2000), "byte 0"),
+    "a pickle": (pickle.dumps(print), "byte 0"),
+    "magic alone": (b"nacremdl", "byte"),
+    "of another format": (checkpoint(form=77), "byte 8: .*format 77"),
+    "of format 2 to the 32 - 1": (checkpoint(form=2**32 - 1), "byte 8"),
+    "header alone": (checkpoint(), "byte"),
+    "cut": (checkpoint(bytes(100), told=10_000), "byte .*148 of its 10000 bytes"),
+    "length 2 to the 64 - 1": (checkpoint(bytes(100), told=2**64 - 1), "byte"),
+    "length too small": (checkpoint(bytes(100), told=48), "byte"),
+    "checksum wrong": (checkpoint(bytes(100), checksum=1), "byte"),
+    "body garbage": (checkpoint(_random.bytes(1000)), "byte"),
+}
+GOOD_RUN = {"format": 1, "options": {"source": "here"}}
+
+
+def run(asked: object, journal: bytes = b"") -> dict[str, bytes]:
+    """Return OUT with an unfinished run."""
+    text = asked if isinstance(asked, bytes) else json.dumps(asked).encode()
+    return {"unfinished/run.json": text, "unfinished/journal.txt": journal, "unfinished/checkpoint": b""}
+
+
+def sealed(text: bytes) -> bytes:
+    """Return a line of a journal with the check sum that fits it."""
+    return text + b" %08x\n" % zlib.crc32(text)
+
+
+RUNS = {
+    "run empty": (run(b""), r"run\.json"),
+    "run nul bytes": (run(bytes(50)), r"run\.json"),
+    "run a list": (run([]), r"run\.json"),
+    "run nested deep": (run(b"[" * 100_000), r"run\.json"),
+    "run of another format": (run({**GOOD_RUN, "format": 9}), r"run\.json: .*another version"),
+    "run without options": (run({"format": 1}), r"run\.json: .*options"),
+    "run whose options are a text": (run({"format": 1, "options": "all"}), r"run\.json: .*options"),
+    "journal forged": (run(GOOD_RUN, sealed(b"{")), r"journal\.txt, line 1"),
+    "journal forged deep": (run(GOOD_RUN, sealed(b"[" * 100_000)), r"journal\.txt, line 1"),
+    "journal of a number": (run(GOOD_RUN, sealed(b"7")), r"journal\.txt, line 1"),
+    "journal of short entries": (run(GOOD_RUN, sealed(b"[1]")), r"journal\.txt, line 1"),
+}
+CHECKPOINTS = single("checkpoint", "checkpoint", "", MODELS) + [
+    Case(f"checkpoint/{name.replace(' ', '_')}", "run", files, said) for name, (files, said) in RUNS.items()
+]

@@ -1,0 +1,74 @@
+"""The programs that measure reliability, small: they run, and their limits hold."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import nacre
+
+BENCHMARKS = Path(__file__).resolve().parents[2] / "benchmarks"
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="they read /proc"),
+]
+
+
+def run(program: str, *words: str) -> str:
+    """Run one of them, with this nacre."""
+    path = os.pathsep.join([str(Path(str(nacre.__file__)).parents[1]), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, str(BENCHMARKS / program), *words],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+def test_whole_reconstructions_have_the_same_bits() -> None:
+    cases = ("--only", "room", "--only", "object", "--frames", "40")
+    said = run("determinism.py", "--threads", "1,3", "--repeats", "1", *cases)
+    results = [line for line in said.splitlines() if line.startswith("  ") and "SHA-256" not in line]
+    assert len(results) == 2 * 12
+    assert "1 loops" in said
+    assert "LOST" in said
+
+
+def test_the_determinism_program_tells_a_difference() -> None:
+    """A program that finds everything the same would be no use."""
+    code = """
+    import sys, numpy as np
+    sys.path.insert(0, sys.argv[1])
+    from determinism import Result
+    points = np.ones((5, 3), np.float32)
+    moved = points.copy()
+    moved[4, 2] = np.nextafter(moved[4, 2], np.float32(2))
+    a, b = (Result({"points": p, "poses": np.eye(4)[None]}, "{}") for p in (points, moved))
+    assert a.sha256 != b.sha256 and a.sha256 != Result(a.arrays, "{1}").sha256
+    assert "points up to 1.2e-07 m" in a.difference(b)
+    """
+    command = [sys.executable, "-c", "\n".join(line.strip() for line in code.splitlines()), str(BENCHMARKS)]
+    subprocess.run(command, check=True)
+
+
+@pytest.mark.parametrize("scene", ["static", "turning"])
+def test_three_hundred_frames(scene: str) -> None:
+    """Memory and drift; frame times on a busy machine say too little after so few frames."""
+    said = run("soak.py", "--scene", scene, "--frames", "300", "--not", "p99_ratio")
+    assert f"{scene}: every limit holds" in said
+    assert "tracked=300" in said
+
+
+def test_a_missed_limit_is_an_error() -> None:
+    with pytest.raises(AssertionError, match="static: drift_mm"):
+        run("soak.py", "--scene", "static", "--frames", "60", "--not", "p99_ratio", "--sigma", "0.03")
+
+
+def test_models_come_and_go_and_others_live_beside_them() -> None:
+    said = run("life.py", "--cycles", "60", "--seconds", "2", "--busy")
+    assert "two models in two threads have the bits of each alone: True" in said
