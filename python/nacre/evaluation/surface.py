@@ -58,6 +58,9 @@ class FScore(Result):
     f_score: ManyFractions
 
 
+_MOST_SAMPLES = 10_000_000  # what memory surely holds
+
+
 @np.errstate(over="ignore", invalid="ignore")
 def sample_surface(
     vertices: npt.ArrayLike, triangles: npt.ArrayLike, num_samples: int = 100_000, *, seed: int = 0
@@ -96,6 +99,8 @@ def sample_surface(
             f"got {faces.min()} to {faces.max()}"
         )
     num_samples, seed = as_count("num_samples", num_samples, minimum=1), as_count("seed", seed)
+    if num_samples > _MOST_SAMPLES:
+        raise ValueError(f"num_samples must be at most {_MOST_SAMPLES}, got {num_samples}")
     a, b, c = (corners[faces[:, i]] for i in range(3))
     cross = np.cross(b - a, c - a)
     doubled_area = np.linalg.norm(cross, axis=1)
