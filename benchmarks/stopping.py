@@ -3,7 +3,7 @@ Stop ``nacre reconstruct`` by a signal and measure how long it takes to save the
 
 More options are those of nacre reconstruct.
 
-    python benchmarks/stopping.py ../shared/data/tum-fr3-teddy --after 195 --set spacing=0.002
+    python benchmarks/stopping.py tum-fr3-teddy --after 195 --set spacing=0.002
 """
 
 from __future__ import annotations

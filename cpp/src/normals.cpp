@@ -31,6 +31,8 @@ PointMatrix<T> estimate(const Eigen::Ref<const PointMatrix<T>>& points, const No
   const BlockTree<T> tree(Rows<T>(points).data(), points.rows(), options.num_threads);
   PointMatrix<T> normals(points.rows(), 3);
   if (tree.num_points() < points.rows()) normals.setConstant(std::numeric_limits<T>::quiet_NaN());
+  // All points are as many neighbours as any larger number.
+  const int k = static_cast<int>(std::min<std::int64_t>(options.k, std::max<std::int64_t>(3, tree.num_points())));
   constexpr int points_per_task = 64 * block_points;
   parallel_blocks(
       tree.num_points(), points_per_task, options.num_threads, [&](auto, std::int64_t begin, std::int64_t end) {

@@ -1,7 +1,7 @@
 """Write the inputs that the fuzz targets start from: `python tests/fuzz/make_seeds.py FOLDER`.
 
-The targets read any bytes as numbers, sizes and choices, so that seeds are bytes by chance, low ones among them,
-since those mean "as usual".
+The targets read any bytes as numbers, sizes and choices, so that seeds are bytes by chance, low ones among
+them, since those mean "as usual".
 """
 
 import random

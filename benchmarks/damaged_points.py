@@ -1,12 +1,12 @@
 """
 Hostile point files in nacre and in other libraries: who tells, who is silent, who crashes or hangs.
 
-    python benchmarks/hostile_files.py [--python PATH]
+    python benchmarks/damaged_points.py [--python PATH]
 
 reads the PLY and PCD files of ``tests/python/hostile_files`` with nacre and with what is there of Open3D,
-OpenCV, meshio and trimesh, each in a process of its own that is started again where it dies. ``--python`` is another
-interpreter, in whose environment the others are. ``--data FOLDER`` adds files: all those in it but ok.ply and
-nan.ply are broken.
+OpenCV, meshio and trimesh, each in a process of its own that is started again where it dies. ``--python`` is
+another interpreter, in whose environment the others are. ``--data FOLDER`` adds files: all
+those in it but ok.ply and nan.ply are broken.
 """
 
 import argparse
