@@ -293,8 +293,8 @@ template <class Cloud, class Matrix>
 Matrix project(const Cloud& samples, CellOrder sample_order, const Cloud& points, CellOrder point_order,
                const CellLattice& lattice, const ConsolidateOptions& options, const ProjectionHints& hints,
                const Cargo* cargo, int* iterations) {
-  constexpr double farthest = 1e30;  // in cells: what single precision can hold, with room to spare
-  require(lattice.reach < farthest, "points", "within 1e29 radii of their middle", "points too far away");
+  constexpr double farthest = 1e36;  // in cells: what single precision can hold, with room to spare
+  require(lattice.reach < farthest, "points", "within 1e35 radii of their middle", "points too far away");
   const Form form = form_of(options);
   const Scaling scaling{lattice.center, form.scale};
   const PointBlocks point_blocks(points, std::move(point_order), scaling, options.num_threads);

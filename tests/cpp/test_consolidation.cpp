@@ -322,8 +322,13 @@ TEST_CASE("coordinates beyond what the radius can measure do no harm") {
       options.method = method;
       options.radius = 1e-3;
       options.num_points = 20;
-      CHECK(consolidate(points, options).points.rows() == 20);
-      if (size < 3e38) CHECK(consolidate(Points(points.cast<float>()), options).points.rows() == 20);
+      if (size < 3e38) {
+        CHECK(consolidate(points, options).points.rows() == 20);
+        CHECK(consolidate(Points(points.cast<float>()), options).points.rows() == 20);
+      } else {
+        CHECK_THROWS_WITH_AS(consolidate(points, options), doctest::Contains("points must be within"),
+                             std::invalid_argument);
+      }
     }
   }
 }
