@@ -271,6 +271,7 @@ void Model::Impl::adjust(FrameReport& report) {
     }
     return orthonormal(adjusted[nearest] * views[nearest].world_from_camera.inverse());
   };
+  report.corrects_earlier = true;
   for (Pose& pose : poses) pose = motion_of(pose) * pose;
   std::vector<Pose> corrections;
   for (FrameReport& earlier : reports) {
@@ -291,6 +292,7 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
   if (loop.corrections.empty()) return;
   report.loop_frame = loop.frame;
   report.loop_distance = loop.distance;
+  report.corrects_earlier = true;
   if (report.status == FrameStatus::weak) {  // what it saw before determines its pose
     report.status = FrameStatus::tracked;
     report.reason.clear();

@@ -117,8 +117,8 @@ void exchange(Archive& archive, FrameReport& report) {
   archive.choice(report.status, FrameStatus::relocalised);
   archive(report.reason, report.world_from_camera, report.num_inliers, report.overlap, report.consistency,
           report.evidence, report.rmse, report.information, report.weak_directions, report.loop_frame,
-          report.loop_distance, report.depth, report.region, report.fusion, report.num_points, report.spacing,
-          report.milliseconds);
+          report.loop_distance, report.corrects_earlier, report.depth, report.region, report.fusion, report.num_points,
+          report.spacing, report.milliseconds);
 }
 
 template <class Archive>

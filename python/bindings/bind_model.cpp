@@ -126,6 +126,7 @@ void bind_model(py::module_& m) {
                              [](const FrameReport& report) { return Twists(report.weak_directions.transpose()); })
       .def_readonly("loop_frame", &FrameReport::loop_frame)
       .def_readonly("loop_distance", &FrameReport::loop_distance)
+      .def_readonly("corrects_earlier", &FrameReport::corrects_earlier)
       .def_readonly("depth", &FrameReport::depth)
       .def_readonly("region", &FrameReport::region)
       .def_property_readonly("num_updated", [](const FrameReport& report) { return report.fusion.num_updated; })

@@ -195,6 +195,8 @@ class FrameReport(Value):
         The earlier frame that this one closed a loop with: model and poses were corrected.
     loop_distance : float
         Between the surfaces that the two saw, before the correction [m].
+    corrects_earlier : bool
+        Whether it changed poses of earlier frames: a loop was closed, or the views of an object adjusted.
     depth : DepthReport
         Pixels that were removed, by reason.
     region : RegionReport
@@ -223,6 +225,7 @@ class FrameReport(Value):
     weak_directions: npt.NDArray[np.float64]
     loop_frame: int | None
     loop_distance: float
+    corrects_earlier: bool
     depth: DepthReport
     region: RegionReport
     num_updated: int
@@ -236,11 +239,6 @@ class FrameReport(Value):
     def tracked(self) -> bool:
         """Whether the camera's pose is known: every status but LOST."""
         return self.status != "LOST"
-
-    @property
-    def corrects_earlier(self) -> bool:
-        """Whether earlier poses may have changed: a loop was closed, or views of an object adjusted."""
-        return self.loop_frame is not None or self.region.support >= 0
 
     @classmethod
     def _from_core(cls, core: Any) -> FrameReport:

@@ -71,7 +71,12 @@ def recording(views, tmp_path_factory):
 def done(recording):
     sequence = nacre.open_sequence(recording)
     done = Reconstruction(sequence, nacre.Model(sequence.camera))
-    done.first = [frame.world_from_camera for frame in done.run()]
+    done.first, done.changed = [], []
+    before = done.model.poses
+    for frame in done.run():
+        done.first.append(frame.world_from_camera)
+        done.changed.append(not np.array_equal(before, done.model.poses[:-1]))
+        before = done.model.poses
     return done
 
 
@@ -94,6 +99,11 @@ def test_a_reconstruction_holds_the_corrected_poses(done):
     assert [frame.index for frame in done.loops] == [
         report.index for report in done.model.frames if report.loop_frame is not None
     ]
+
+
+def test_a_report_says_whether_earlier_poses_changed(done):
+    assert done.changed == [report.corrects_earlier for report in done.model.frames]
+    assert 0 < sum(done.changed) < FRAMES
 
 
 def test_a_loop_with_a_frame_that_was_tried_again_names_its_place_in_the_recording(done):

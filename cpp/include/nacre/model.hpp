@@ -90,6 +90,7 @@ struct FrameReport {
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult
   std::optional<std::int64_t> loop_frame;                    ///< the earlier frame that this one closed a loop with
   double loop_distance = 0.0;                                ///< between the surfaces that the two saw, before [m]
+  bool corrects_earlier = false;                             ///< whether it changed poses of earlier frames
   DepthReport depth;
   RegionReport region;
   FusionReport fusion;
