@@ -235,6 +235,7 @@ def _begun(
             f"{out} held an unfinished run, which --resume would have gone on with: it is begun again"
         )
     unfinished.stage.name = "views" if calibrates and can_calibrate(sequence.camera) else "frames"
+    unfinished.stage.live = None if feed is None else feed.figures
     unfinished.begin(done, asked.document(sequence))
     return Run(asked, out, done, sequence, unfinished, words, indices, feed)
 
@@ -268,4 +269,7 @@ def _resumed(context: typer.Context, out: Path, checkpoint_every: int | None) ->
     for place in (out, unfinished.folder):
         remove_leftovers(place)
     done = unfinished.resume(sequence, compare=not asked.is_camera)  # its colours were kept as JPEG
+    live = unfinished.stage.live
+    if live is not None and len(done.frames) < len(unfinished.journaled_indices()):  # since, nobody counted
+        unfinished.stage.live = {**live, "num_received": None, "num_dropped": None}
     return Run(asked, out, done, sequence, unfinished, words, indices, None)
