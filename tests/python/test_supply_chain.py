@@ -199,7 +199,7 @@ SPELLINGS = [
     (r"public domain|unlicense", "Unlicense"),
 ]
 # Whose metadata does not say; from the licence that is in the package.
-READ = {"openexr": "BSD-3-Clause", "apsw": "Unlicense", "pkgconf": "ISC"}
+READ = {"openexr": "BSD-3-Clause", "apsw": "Unlicense"}
 
 
 def licence_of(name: str) -> str | None:
