@@ -281,7 +281,7 @@ class TestSignals:
         told, errors = running.communicate(timeout=60)
         took = time.monotonic() - start
         assert running.returncode == 128 + number, errors
-        assert took < 10, "2 s by itself; the machine may be busy"
+        assert took < 2
         assert f"nacre reconstruct --resume {out}" in told
         report = json.loads((out / "report.json").read_text())
         assert report["interrupted"]
