@@ -150,7 +150,7 @@ TEST_CASE("a board that slides and turns in its plane is recovered to a fraction
     CHECK(off.translation().head<2>().norm() < 0.25 * pixel);
     CHECK(angle_of(off) < 0.25);
     // What it knows of the pose is finite in every direction.
-    const Eigen::SelfAdjointEigenSolver<Matrix6> eigen(report.information);
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(report.information);
     CHECK(eigen.eigenvalues().minCoeff() > 0.0);
   }
 }
