@@ -3,7 +3,8 @@
 //   template <class Archive>
 //   void exchange(Archive& archive, Thing& thing) { archive(thing.size, thing.points); }
 //
-// Numbers are little endian, counts have 64 bits. Nothing is allocated that the bytes that are left cannot fill.
+// Numbers are little endian. Whole numbers on their own, and counts, take as many bytes as they need, 7 bits a byte, the
+// lowest first. Nothing is allocated that the bytes that are left cannot fill.
 #pragma once
 
 #include <Eigen/Core>
@@ -37,6 +38,14 @@ struct IsFixedMatrix<Eigen::Matrix<S, R, C, O, MR, MC>>
 template <class T>
 inline constexpr bool is_plain = (std::is_arithmetic_v<T> && !std::is_same_v<T, bool>) || IsFixedMatrix<T>::value;
 
+// Whole numbers: 0, -1, 1, -2, 2, ... are 0, 1, 2, 3, 4, ..., so that small ones are short.
+inline std::uint64_t folded(std::int64_t value) {
+  return (static_cast<std::uint64_t>(value) << 1) ^ static_cast<std::uint64_t>(value >> 63);
+}
+inline std::int64_t unfolded(std::uint64_t bits) {
+  return static_cast<std::int64_t>((bits >> 1) ^ (~(bits & 1) + 1));
+}
+
 // Written by its own `exchange`.
 template <class T>
 inline constexpr bool is_struct = std::is_class_v<T> && !std::is_base_of_v<Eigen::EigenBase<T>, T>;
@@ -57,6 +66,11 @@ class StateWriter {
   void choice(Enum& value, Enum /*last*/) {
     put_plain(static_cast<std::uint8_t>(value));
   }
+  // In single precision.
+  template <class... Ts>
+  void single(Ts&... values) {
+    (put_plain(static_cast<float>(values)), ...);
+  }
   void require(bool /*condition*/, const char* /*what*/) const {}
 
  private:
@@ -67,11 +81,14 @@ class StateWriter {
   void put_plain(const T& value) {
     put_bytes(&value, sizeof(T));
   }
-  void put_count(std::size_t count) { put_plain(static_cast<std::uint64_t>(count)); }
+  void put_number(std::uint64_t number) {
+    for (; number >= 0x80; number >>= 7) put_plain(static_cast<std::uint8_t>(number | 0x80));
+    put_plain(static_cast<std::uint8_t>(number));
+  }
 
   void put(bool& value) { put_plain(static_cast<std::uint8_t>(value)); }
   void put(std::string& value) {
-    put_count(value.size());
+    put_number(value.size());
     put_bytes(value.data(), value.size());
   }
   template <class T>
@@ -82,7 +99,7 @@ class StateWriter {
   }
   template <class T>
   void put(std::vector<T>& values) {
-    put_count(values.size());
+    put_number(values.size());
     if constexpr (archive_detail::is_plain<T>) {
       put_bytes(values.data(), values.size() * sizeof(T));
     } else {
@@ -97,14 +114,22 @@ class StateWriter {
   void put(Eigen::PlainObjectBase<Derived>& matrix) {
     using Scalar = typename Derived::Scalar;
     if constexpr (Derived::SizeAtCompileTime == Eigen::Dynamic) {
-      put_count(static_cast<std::size_t>(matrix.rows()));
-      put_count(static_cast<std::size_t>(matrix.cols()));
+      put_number(static_cast<std::size_t>(matrix.rows()));
+      put_number(static_cast<std::size_t>(matrix.cols()));
     }
     put_bytes(matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(Scalar));
   }
   template <class T>
-  std::enable_if_t<std::is_arithmetic_v<T>> put(T& value) {
+  std::enable_if_t<std::is_floating_point_v<T>> put(T& value) {
     put_plain(value);
+  }
+  template <class T>
+  std::enable_if_t<std::is_integral_v<T>> put(T& value) {
+    if constexpr (std::is_signed_v<T>) {
+      put_number(archive_detail::folded(value));
+    } else {
+      put_number(value);
+    }
   }
   template <class T>
   std::enable_if_t<archive_detail::is_struct<T>> put(T& value) {
@@ -132,6 +157,10 @@ class StateReader {
     require(number <= static_cast<std::uint8_t>(last), "a choice is none of those there are");
     value = static_cast<Enum>(number);
   }
+  template <class... Ts>
+  void single(Ts&... values) {
+    (get_single(values), ...);
+  }
   void require(bool condition, const char* what) const {
     if (!condition) fail(what);
   }
@@ -151,10 +180,25 @@ class StateReader {
   void get_plain(T& value) {
     get_bytes(&value, sizeof(T));
   }
+  void get_single(double& value) {
+    float single = 0.0F;
+    get_plain(single);
+    value = static_cast<double>(single);
+  }
+  std::uint64_t get_number() {
+    std::uint64_t number = 0;
+    std::uint8_t byte = 0x80;
+    for (int shift = 0; (byte & 0x80) != 0; shift += 7) {
+      get_plain(byte);
+      const auto bits = static_cast<std::uint64_t>(byte & 0x7F);
+      require(shift < 63 || (shift == 63 && bits <= 1), "a whole number has more than 64 bits");
+      number |= bits << shift;
+    }
+    return number;
+  }
   // Of items that take at least so many bytes each.
   std::size_t get_count(std::size_t item) {
-    std::uint64_t count = 0;
-    get_plain(count);
+    const std::uint64_t count = get_number();
     require(count <= left() / item, "an array is longer than what is left");
     return static_cast<std::size_t>(count);
   }
@@ -196,9 +240,7 @@ class StateReader {
     using Scalar = typename Derived::Scalar;
     if constexpr (Derived::SizeAtCompileTime == Eigen::Dynamic) {
       constexpr std::uint64_t most = std::uint64_t{1} << 40;
-      std::uint64_t rows = 0, cols = 0;
-      get_plain(rows);
-      get_plain(cols);
+      const std::uint64_t rows = get_number(), cols = get_number();
       const bool has_rows = Derived::RowsAtCompileTime == Eigen::Dynamic ||
                             rows == static_cast<std::uint64_t>(Derived::RowsAtCompileTime);
       const bool has_cols = Derived::ColsAtCompileTime == Eigen::Dynamic ||
@@ -211,8 +253,20 @@ class StateReader {
     get_bytes(matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(Scalar));
   }
   template <class T>
-  std::enable_if_t<std::is_arithmetic_v<T>> get(T& value) {
+  std::enable_if_t<std::is_floating_point_v<T>> get(T& value) {
     get_plain(value);
+  }
+  template <class T>
+  std::enable_if_t<std::is_integral_v<T>> get(T& value) {
+    const std::uint64_t bits = get_number();
+    if constexpr (std::is_signed_v<T>) {
+      const std::int64_t number = archive_detail::unfolded(bits);
+      value = static_cast<T>(number);
+      require(value == number, "a whole number is too large");
+    } else {
+      value = static_cast<T>(bits);
+      require(value == bits, "a whole number is too large");
+    }
   }
   template <class T>
   std::enable_if_t<archive_detail::is_struct<T>> get(T& value) {

@@ -151,6 +151,8 @@ std::optional<NoiseScale> measure_noise(const WindowFits& fits, int num_threads)
   });
   const double local = *std::max_element(scales.begin(), scales.end());
   const double total = scales[0] * std::sqrt(total_by_left(bends_by_fits(fits, static_cast<float>(scales[0]))));
+  // Values that overflow where they are squared leave nothing to measure.
+  if (!(local > 0.0 && std::isfinite(local) && std::isfinite(total))) return std::nullopt;
   return NoiseScale{local, std::max(local, total)};
 }
 

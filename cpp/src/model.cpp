@@ -87,7 +87,7 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   check_extras(camera, extras, cloud);
   StopWatch total, watch;
   FrameReport report;
-  report.index = static_cast<std::int64_t>(reports.size());
+  report.index = static_cast<std::int64_t>(history.size());
   report.timestamp = extras.timestamp;
 
   const DepthImage clean =
@@ -121,10 +121,9 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   report.milliseconds.registration = watch.lap();
 
   if (report.status == FrameStatus::lost) {
-    report.world_from_camera = poses.empty() ? Pose::Identity() : poses.back();
+    report.world_from_camera = history.num_registered() == 0 ? Pose::Identity() : history.registered_pose(0);
   } else {
     hypothesis.forget();
-    poses.push_back(report.world_from_camera);
     if (options.loop_closure && options.fold_in == FoldIn::fuse) close_loops(report, tracking, extras.keep_guess);
     report.milliseconds.loop_closure = watch.lap();
     if (report.status == FrameStatus::tracked) {
@@ -135,13 +134,13 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
       before = {frame.points.col(2), frame.sigma, report.world_from_camera, measured};
     }
   }
-  num_lost = report.status == FrameStatus::lost && !poses.empty() ? num_lost + 1 : 0;
+  num_lost = report.status == FrameStatus::lost && history.num_registered() > 0 ? num_lost + 1 : 0;
   report.milliseconds.fold_in = watch.lap() - report.milliseconds.normals;
   report.num_points = cloud.size();
   report.spacing = spacing;
   report.milliseconds.total = total.lap();
-  reports.push_back(report);
-  return report;
+  history.add(report);
+  return history.back();
 }
 
 void Model::Impl::keep_region(FrameReport& report) {
@@ -175,29 +174,31 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport
 // Whether the camera's last motion was none that goes on: views far apart, in any order.
 bool Model::Impl::jumped() const {
   constexpr double largest_turn = 0.7;
-  if (poses.size() < 2) return false;
-  return Eigen::AngleAxisd(poses[poses.size() - 2].linear().transpose() * poses.back().linear()).angle() > largest_turn;
+  if (history.num_registered() < 2) return false;
+  const Pose motion = history.registered_pose(1).inverse() * history.registered_pose(0);
+  return Eigen::AngleAxisd(motion.linear()).angle() > largest_turn;
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
   if (extras.guess) return {*extras.guess};
-  const Pose& last = poses.back();
-  if (!options.predict_motion || poses.size() < 2 || was_lost() || jumped()) return {last};
-  Pose predicted = last * (poses[poses.size() - 2].inverse() * last);
+  const Pose last = history.registered_pose(0);
+  if (!options.predict_motion || history.num_registered() < 2 || was_lost() || jumped()) return {last};
+  Pose predicted = last * (history.registered_pose(1).inverse() * last);
   predicted.linear() = Eigen::Quaterniond(predicted.linear()).normalized().toRotationMatrix();
   return {predicted, last};
 }
 
 // Some of the newest poses from which the camera looked in different directions.
-static std::vector<Pose> key_poses(const std::vector<Pose>& poses) {
+static std::vector<Pose> key_poses(const FrameHistory& history) {
   constexpr std::size_t most = 8;
   constexpr double least_angle = 0.35;
   std::vector<Pose> chosen;
-  for (auto pose = poses.rbegin(); pose != poses.rend() && chosen.size() < most; ++pose) {
+  for (std::size_t age = 0; age < history.num_registered() && chosen.size() < most; ++age) {
+    const Pose pose = history.registered_pose(age);
     const bool is_new = std::all_of(chosen.begin(), chosen.end(), [&](const Pose& other) {
-      return Eigen::AngleAxisd(other.linear().transpose() * pose->linear()).angle() > least_angle;
+      return Eigen::AngleAxisd(other.linear().transpose() * pose.linear()).angle() > least_angle;
     });
-    if (is_new) chosen.push_back(*pose);
+    if (is_new) chosen.push_back(pose);
   }
   return chosen;
 }
@@ -209,7 +210,7 @@ WhereElse Model::Impl::elsewhere(const RegionReport& region_report) const {
   if (!options.relocalise) return where;
   where.views = &views;
   where.view_of_frame = [&] { return view_of_object(region_report); };
-  where.key_poses = [this] { return key_poses(poses); };
+  where.key_poses = [this] { return key_poses(history); };
   where.everywhere = num_lost < patience || num_lost % patience == 0;
   return where;
 }
@@ -217,10 +218,7 @@ WhereElse Model::Impl::elsewhere(const RegionReport& region_report) const {
 // Moves the pose of a frame, and turns with it what is told about the pose's uncertainty.
 static void correct(FrameReport& report, const Pose& correction) {
   report.world_from_camera = correction * report.world_from_camera;
-  Matrix6 turn = Matrix6::Zero();
-  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = correction.linear();
-  report.information = turn * report.information * turn.transpose();
-  report.weak_directions = turn * report.weak_directions;
+  turn_uncertainty(report, correction.linear());
 }
 
 // Of the newest frame, where it shows an object that stands on a plane.
@@ -272,12 +270,9 @@ void Model::Impl::adjust(FrameReport& report) {
     return orthonormal(adjusted[nearest] * views[nearest].world_from_camera.inverse());
   };
   report.corrects_earlier = true;
-  for (Pose& pose : poses) pose = motion_of(pose) * pose;
   std::vector<Pose> corrections;
-  for (FrameReport& earlier : reports) {
-    corrections.push_back(motion_of(earlier.world_from_camera));
-    correct(earlier, corrections.back());
-  }
+  for (std::size_t i = 0; i < history.size(); ++i) corrections.push_back(motion_of(history.pose(i)));
+  history.move(corrections);
   corrections.push_back(motion_of(report.world_from_camera));
   correct(report, corrections.back());
   move_points(cloud, corrections, options.num_threads);
@@ -307,12 +302,7 @@ void Model::Impl::close_loops(FrameReport& report, const TrackingResult& trackin
     const double sigma = noise * farther * farther;  // noise grows with the square
     return spacing_at(static_cast<float>(distance), static_cast<float>(sigma), camera, spacing);
   });
-  poses.clear();
-  for (FrameReport& earlier : reports) {
-    correct(earlier, loop.corrections[static_cast<std::size_t>(earlier.index)]);
-    if (earlier.status != FrameStatus::lost) poses.push_back(earlier.world_from_camera);
-  }
-  poses.push_back(report.world_from_camera);
+  history.move(loop.corrections);
   for (ObjectView& view : views) {
     view.world_from_camera = loop.corrections[static_cast<std::size_t>(view.frame)] * view.world_from_camera;
   }
@@ -352,14 +342,14 @@ const Camera& Model::camera() const { return impl_->camera; }
 const ModelOptions& Model::options() const { return impl_->options; }
 const ModelOptions& Model::given_options() const { return impl_->given; }
 const PointModel& Model::cloud() const { return impl_->cloud; }
-const std::vector<FrameReport>& Model::frames() const { return impl_->reports; }
+FrameReports Model::frames() const { return FrameReports(impl_->history); }
 NoiseModel Model::noise() const { return impl_->noise(); }
 double Model::spacing() const { return impl_->spacing; }
 
 PointModel Model::cloud_in_camera() const {
   PointModel moved = impl_->cloud;
-  if (impl_->poses.empty()) return moved;
-  const Eigen::Isometry3f camera_from_world(impl_->poses.back().inverse().cast<float>());
+  if (impl_->history.num_registered() == 0) return moved;
+  const Eigen::Isometry3f camera_from_world(impl_->history.registered_pose(0).inverse().cast<float>());
   for (Eigen::Vector3f& point : moved.points) point = camera_from_world * point;
   for (Eigen::Vector3f& normal : moved.normals) normal = camera_from_world.linear() * normal;
   return moved;

@@ -104,7 +104,7 @@ void exchange(Archive& archive, CameraFields& fields) {
 template <class Archive, class Impl>
 void exchange_state(Archive& archive, Impl& state) {
   archive(state.options.fusion.reference_sigma, state.region, state.calibration, state.cloud, state.loops,
-          state.reports, state.before, state.hypothesis, state.poses, state.views, state.spacing, state.num_lost);
+          state.history, state.before, state.hypothesis, state.views, state.spacing, state.num_lost);
 }
 
 // Space that the table of rays may take before a frame was folded in: see load.
@@ -142,9 +142,8 @@ bool is_sound(const PointModel& cloud, std::size_t num_frames) {
                      [&](std::int32_t frame) { return is_within(frame, num_frames); });
 }
 
-bool is_sound(const FrameReport& report, std::size_t index, std::size_t num_frames) {
-  return report.index == static_cast<std::int64_t>(index) && report.region.support >= -1 &&
-         report.region.support < static_cast<int>(report.region.planes.size()) &&
+bool is_sound(const FrameReport& report, std::size_t num_frames) {
+  return report.region.support >= -1 && report.region.support < static_cast<int>(report.region.planes.size()) &&
          (!report.loop_frame || is_within(*report.loop_frame, num_frames));
 }
 
@@ -159,6 +158,30 @@ bool is_sound(const ObjectView& view, const Camera& camera, std::size_t num_fram
 }
 
 }  // namespace
+
+bool PrivateState::is_sound(const FrameHistory& history) {
+  const std::size_t num_frames = history.size();
+  for (const FrameHistory::Chunk& chunk : history.chunks_) {
+    const bool is_last = &chunk == &history.chunks_.back();
+    if (chunk.ends.empty() || chunk.ends.size() > FrameHistory::per_chunk ||
+        (!is_last && chunk.ends.size() < FrameHistory::per_chunk) || chunk.poses.size() != chunk.ends.size() ||
+        chunk.ends.back() != chunk.bytes.size() || !std::is_sorted(chunk.ends.begin(), chunk.ends.end()) ||
+        !std::all_of(chunk.poses.begin(), chunk.poses.end(), [](const auto& pose) { return pose.allFinite(); })) {
+      return false;
+    }
+  }
+  std::vector<std::int32_t> registered;
+  try {
+    for (std::size_t i = 0; i < num_frames; ++i) {
+      const FrameReport report = history[i];
+      if (!nacre::is_sound(report, num_frames)) return false;
+      if (report.status != FrameStatus::lost) registered.push_back(static_cast<std::int32_t>(i));
+    }
+  } catch (const CheckpointError&) {  // whose place is none in the file
+    return false;
+  }
+  return registered == history.registered_;
+}
 
 bool PrivateState::is_sound(const PoseGraph& graph) {
   const std::size_t count = graph.poses_.size();
@@ -246,7 +269,8 @@ Model Model::load(std::string_view bytes, std::string* note) {
   archive(kept);
   archive.require_end();
 
-  const std::size_t num_frames = state.reports.size();
+  archive.require(PrivateState::is_sound(state.history), "the report of a frame contradicts itself");
+  const std::size_t num_frames = state.history.size();
   const Eigen::Index num_pixels = camera.num_pixels();
   const auto is_pixels = [&](const Values& values) { return values.size() == num_pixels; };
   const Sight& before = state.before;
@@ -256,13 +280,9 @@ Model Model::load(std::string_view bytes, std::string* note) {
   archive.require(is_sound(state.cloud, num_frames), "the points are not all there, or not finite");
   archive.require(is_first || (is_pixels(before.depth) && is_pixels(before.sigma) && is_pixels(before.measured)),
                   "the newest view has another size than the camera");
-  archive.require(is_first || !state.poses.empty(), "the poses are missing");
-  archive.require(state.poses.size() <= num_frames && is_within(state.num_lost, num_frames + 1),
-                  "there are more poses than frames");
+  archive.require(is_first || state.history.num_registered() > 0, "the poses are missing");
+  archive.require(is_within(state.num_lost, num_frames + 1), "more frames are lost than there are");
   archive.require(std::isfinite(state.spacing) && state.spacing >= 0.0, "the spacing is not a distance");
-  for (std::size_t i = 0; i < num_frames; ++i) {
-    archive.require(is_sound(state.reports[i], i, num_frames), "the report of a frame contradicts itself");
-  }
   for (const ObjectView& view : state.views) {
     archive.require(is_sound(view, state.camera, num_frames), "a view of the object contradicts the camera");
   }

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "frame_history.hpp"
 #include "loop_closure.hpp"
 #include "nacre/model.hpp"
 #include "object_view.hpp"
@@ -24,11 +25,10 @@ struct Model::Impl {
   NoiseCalibration calibration{camera};
   PointModel cloud;
   LoopClosure loops{camera, options};
-  std::vector<FrameReport> reports;
+  FrameHistory history;
   Values measured;                // by the newest, before it was cleaned
   Sight before;                   // of the newest frame that was folded in
   PlaceHypothesis hypothesis;     // while the camera is lost
-  std::vector<Pose> poses;        // of the registered frames, oldest first
   std::vector<ObjectView> views;  // of an object that stands on a plane, from different directions
   double spacing = 0.0;
   std::int64_t num_lost = 0;  // frames in a row, up to the newest

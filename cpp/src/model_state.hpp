@@ -2,7 +2,10 @@
 // adds it here, and raises the format's version in model_checkpoint.cpp.
 #pragma once
 
+#include <cmath>
+
 #include "archive.hpp"
+#include "frame_history.hpp"
 #include "loop_closure.hpp"
 #include "nacre/model.hpp"
 #include "object_view.hpp"
@@ -105,20 +108,41 @@ void exchange(Archive& archive, FusionReport& report) {
   archive(report.num_updated, report.num_inserted, report.num_removed);
 }
 
+// As whole nanoseconds.
 template <class Archive>
 void exchange(Archive& archive, StepTimes& times) {
-  archive(times.preprocess, times.back_project, times.region, times.registration, times.loop_closure, times.fold_in,
-          times.normals, times.total);
+  for (double* milliseconds : {&times.preprocess, &times.back_project, &times.region, &times.registration,
+                               &times.loop_closure, &times.fold_in, &times.normals, &times.total}) {
+    std::int64_t nanoseconds = std::llround(1e6 * *milliseconds);
+    archive(nanoseconds);
+    *milliseconds = 1e-6 * static_cast<double>(nanoseconds);
+  }
 }
 
+// Single precision, with one exponent for all, since that has few of them.
+template <class Archive>
+void exchange_symmetric(Archive& archive, Matrix6& matrix) {
+  int exponent = 0;
+  std::frexp(matrix.cwiseAbs().maxCoeff(), &exponent);
+  archive(exponent);
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column <= row; ++column) {
+      double value = std::ldexp(matrix(row, column), -exponent);
+      archive.single(value);
+      matrix(row, column) = matrix(column, row) = std::ldexp(value, exponent);
+    }
+  }
+}
+
+// Without index and pose; see FrameHistory.
 template <class Archive>
 void exchange(Archive& archive, FrameReport& report) {
-  archive(report.index, report.timestamp);
   archive.choice(report.status, FrameStatus::relocalised);
-  archive(report.reason, report.world_from_camera, report.num_inliers, report.overlap, report.consistency,
-          report.evidence, report.rmse, report.information, report.weak_directions, report.loop_frame,
-          report.loop_distance, report.corrects_earlier, report.depth, report.region, report.fusion, report.num_points,
-          report.spacing, report.milliseconds);
+  archive(report.timestamp, report.reason, report.num_inliers);
+  archive.single(report.overlap, report.consistency, report.evidence, report.rmse, report.loop_distance);
+  exchange_symmetric(archive, report.information);
+  archive(report.weak_directions, report.loop_frame, report.corrects_earlier, report.depth, report.region,
+          report.fusion, report.num_points, report.spacing, report.milliseconds);
 }
 
 template <class Archive>
@@ -170,6 +194,15 @@ struct PrivateState {
   }
 
   template <class Archive>
+  static void exchange(Archive& archive, FrameHistory::Chunk& chunk) {
+    archive(chunk.poses, chunk.ends, chunk.bytes);
+  }
+  template <class Archive>
+  static void exchange(Archive& archive, FrameHistory& history) {
+    archive(history.chunks_, history.registered_);
+  }
+
+  template <class Archive>
   static void exchange(Archive& archive, PoseGraph& graph) {
     archive(graph.poses_, graph.unknowns_, graph.num_unknowns_, graph.edges_);
   }
@@ -203,6 +236,7 @@ struct PrivateState {
 
   // Whether what was read can be gone on with.
   static bool is_sound(const NoiseCalibration& calibration);
+  static bool is_sound(const FrameHistory& history);
   static bool is_sound(const PoseGraph& graph);
   static bool is_sound(const LoopClosure& loops, std::size_t num_frames);
   static bool is_sound(const PlaceHypothesis& hypothesis);

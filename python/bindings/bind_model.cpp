@@ -176,6 +176,6 @@ void bind_model(py::module_& m) {
       .def("cloud_in_camera", &Model::cloud_in_camera)
       .def_property_readonly("noise", &Model::noise)
       .def_property_readonly("num_frames", [](const Model& model) { return model.frames().size(); })
-      .def("report", [](const Model& model, std::size_t i) { return model.frames().at(i); })
+      .def("report", [](const Model& model, std::size_t i) { return model.frames()[i]; })  // i < num_frames
       .def_property_readonly("spacing", &Model::spacing);
 }

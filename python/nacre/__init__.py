@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     )
     from nacre.depth_calibration import DepthCalibration, calibrate_depth
     from nacre.errors import CameraError, FileFormatError
+    from nacre.frame_report import FrameReport
     from nacre.global_registration import GlobalAlignResult, GlobalRegistrationParameters, align_global
     from nacre.io.cameras import CameraFile, read_camera, write_camera
     from nacre.io.cloud import Cloud
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
     from nacre.io.points import read_points, write_points
     from nacre.io.trajectories import Trajectory, associate, read_trajectory, write_trajectory
     from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
-    from nacre.model import FrameReport, Model, ModelParameters
+    from nacre.model import Model, ModelParameters
     from nacre.neighbors import KdTree, RadiusNeighbors
     from nacre.noise import NoiseModel, calibrate_noise, estimate_noise
     from nacre.normals import estimate_normals
@@ -113,6 +114,7 @@ _NAMES = {
     "preprocess_depth",
     "depth_calibration": "DepthCalibration calibrate_depth",
     "errors": "CameraError FileFormatError",
+    "frame_report": "FrameReport",
     "global_registration": "GlobalAlignResult GlobalRegistrationParameters align_global",
     "io.cameras": "CameraFile read_camera write_camera",
     "io.cloud": "Cloud",
@@ -120,7 +122,7 @@ _NAMES = {
     "io.points": "read_points write_points",
     "io.trajectories": "Trajectory associate read_trajectory write_trajectory",
     "mesh": "ClosestPoints Mesh RayHits built_in_object",
-    "model": "FrameReport Model ModelParameters",
+    "model": "Model ModelParameters",
     "neighbors": "KdTree RadiusNeighbors",
     "noise": "NoiseModel calibrate_noise estimate_noise",
     "normals": "estimate_normals",

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from nacre.model import FrameReport
+    from nacre.frame_report import FrameReport
     from nacre.reconstruction import FrameRecord
     from nacre.report import FrameEntry
 

@@ -6,8 +6,8 @@ import json
 import numbers
 import os
 import threading
-from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -27,16 +27,16 @@ from nacre.arrays import (
     as_rows,
     as_scale,
 )
-from nacre.depth import DepthParameters, DepthReport
+from nacre.depth import DepthParameters
 from nacre.errors import FileFormatError
 from nacre.exchange import ExchangeablePoints
+from nacre.frame_report import FrameReport, FrameReports
 from nacre.io.atomic import atomic_writer
 from nacre.io.raw import read_file
 from nacre.noise import NoiseModel
 from nacre.parameters import from_core, to_core, updated
-from nacre.region import RegionParameters, RegionReport
+from nacre.region import RegionParameters
 from nacre.registration import RegistrationParameters
-from nacre.values import Value
 
 Preset = Literal["default", "paper"]
 
@@ -162,109 +162,6 @@ class ModelParameters:
         return from_core(cls, _core.ModelOptions.preset(name))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class FrameReport(Value):
-    """
-    What became of one frame.
-
-    Attributes
-    ----------
-    index : int
-        Number of the frame, from 0.
-    timestamp : float or None
-        As given [s].
-    status : str
-        TRACKED: registered and folded in. WEAK: registered, but the data leaves a direction of the pose open;
-        not folded in. LOST: not registered, the model is as it was. RELOCALISED: registered again after being
-        lost.
-    reason : str
-        Why the frame is weak or lost; empty otherwise.
-    world_from_camera : (4, 4) float64
-        The camera's pose; of a lost frame the last known one. Where a later frame closes a loop, the reports
-        in ``Model.frames`` have the corrected poses.
-    num_inliers, overlap, rmse, information, weak_directions
-        Of the registration; see :class:`nacre.AlignResult`.
-    consistency : float
-        Part of the model's points in view that the frame does not see through, or of the frame's points that
-        the camera did not see through before, whichever is smaller.
-    evidence : float
-        That the registration is right, against chance: what the residuals tell a match, times overlap^2 and
-        consistency^4. Unrelated surfaces seldom reach 0.3; good registrations have 0.35 to 3. Of an object
-        that was found turned on its supporting plane: what agrees less what contradicts, as parts.
-    loop_frame : int or None
-        The earlier frame that this one closed a loop with: model and poses were corrected.
-    loop_distance : float
-        Between the surfaces that the two saw, before the correction [m].
-    corrects_earlier : bool
-        Whether it changed poses of earlier frames: a loop was closed, or the views of an object adjusted.
-    depth : DepthReport
-        Pixels that were removed, by reason.
-    region : RegionReport
-        What was left out of the rest.
-    num_updated, num_inserted, num_removed : int
-        Points of the model that the frame moved, added and removed.
-    num_points : int
-        Points of the model after the frame.
-    spacing : float
-        Of the model's points [m].
-    milliseconds : dict
-        Wall time by step of the loop, and "total".
-    """
-
-    index: int
-    timestamp: float | None
-    status: str
-    reason: str
-    world_from_camera: npt.NDArray[np.float64]
-    num_inliers: int
-    overlap: float
-    consistency: float
-    evidence: float
-    rmse: float
-    information: npt.NDArray[np.float64]
-    weak_directions: npt.NDArray[np.float64]
-    loop_frame: int | None
-    loop_distance: float
-    corrects_earlier: bool
-    depth: DepthReport
-    region: RegionReport
-    num_updated: int
-    num_inserted: int
-    num_removed: int
-    num_points: int
-    spacing: float
-    milliseconds: dict[str, float]
-
-    @property
-    def tracked(self) -> bool:
-        """Whether the camera's pose is known: every status but LOST."""
-        return self.status != "LOST"
-
-    @classmethod
-    def _from_core(cls, core: Any) -> FrameReport:
-        values = {f.name: getattr(core, f.name) for f in fields(cls)}
-        values["depth"] = DepthReport._from_core(core.depth)
-        values["region"] = RegionReport._from_core(core.region)
-        return cls(**values)
-
-    def __repr__(self) -> str:
-        reason = f" ({self.reason})" if self.reason else ""
-        return (
-            f"FrameReport(index={self.index}, {self.status}{reason}, overlap={self.overlap:.2f}, "
-            f"num_points={self.num_points}, {self.milliseconds['total']:.1f} ms)"
-        )
-
-
-def _corrected(report: FrameReport, now: Any) -> FrameReport:
-    """Return a report with what a later frame has changed."""
-    return replace(
-        report,
-        world_from_camera=now.world_from_camera,
-        information=now.information,
-        weak_directions=now.weak_directions,
-    )
-
-
 class Model(ExchangeablePoints):
     """
     A 3D model that grows with every depth frame.
@@ -315,7 +212,6 @@ class Model(ExchangeablePoints):
         self._depth_scale = as_scale("depth_scale", depth_scale)
         self._core = _core.Model(camera, to_core(self.parameters, _core.ModelOptions()))
         self._lock = threading.Lock()
-        self._frames: list[FrameReport] = []
 
     def add_frame(
         self,
@@ -380,18 +276,9 @@ class Model(ExchangeablePoints):
         time = None if timestamp is None else as_number("timestamp", timestamp)
         keeps = as_flag("keep_guess", keep_guess)
         with self._lock:
-            self._core.add_frame(image, pixels, colors, more, time, pose, keeps)
-            return self._reports()[-1]
-
-    def _reports(self) -> list[FrameReport]:
-        """Return the reports of all frames, those too after whose fusion Ctrl-C came before this."""
-        num_known = len(self._frames)
-        new = [FrameReport._from_core(self._core.report(i)) for i in range(num_known, self._core.num_frames)]
-        known = self._frames
-        if any(report.corrects_earlier for report in new):
-            known = [_corrected(report, self._core.report(report.index)) for report in known]
-        self._frames = known + new if new else known
-        return self._frames
+            return FrameReport._from_core(
+                self._core.add_frame(image, pixels, colors, more, time, pose, keeps)
+            )
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """
@@ -476,8 +363,10 @@ class Model(ExchangeablePoints):
         )
 
     def __repr__(self) -> str:
-        reports = self.frames
-        frames = f"{sum(report.tracked for report in reports)} of {len(reports)} frames tracked"
+        with self._lock:
+            count = self._core.num_frames
+            tracked = sum(self._core.report(i).status != "LOST" for i in range(count))
+        frames = f"{tracked} of {count} frames tracked"
         return f"Model({len(self)} points, {frames}, spacing={self.spacing:.4g} m)"
 
     @property
@@ -532,18 +421,23 @@ class Model(ExchangeablePoints):
 
         Where a later frame closed a loop, the corrected poses.
         """
-        frames = self.frames
-        poses = np.full((len(frames), 4, 4), np.nan)
-        for pose, report in zip(poses, frames, strict=True):
-            if report.tracked:
-                pose[:] = report.world_from_camera
+        with self._lock:
+            poses = np.full((self._core.num_frames, 4, 4), np.nan)
+            for index, pose in enumerate(poses):
+                report = self._core.report(index)
+                if report.status != "LOST":
+                    pose[:] = report.world_from_camera
         return poses
 
     @property
-    def frames(self) -> tuple[FrameReport, ...]:
-        """The report of every frame that was added, with poses as corrected by later frames."""
+    def frames(self) -> Sequence[FrameReport]:
+        """
+        The reports of the frames that were added so far, with poses as corrected by later frames.
+
+        Each is made when it is asked for, since the model keeps of a frame only the few bytes that tell it.
+        """
         with self._lock:
-            return tuple(self._reports())
+            return FrameReports(self._core, self._lock, self._core.num_frames)
 
     @property
     def spacing(self) -> float:

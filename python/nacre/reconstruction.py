@@ -24,9 +24,10 @@ from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result, plain, result_dict
 from nacre.frame_figures import frame_dict, frame_entry
+from nacre.frame_report import FrameReport
 from nacre.io.atomic import atomic_writer
 from nacre.io.trajectories import Trajectory
-from nacre.model import FrameReport, Model
+from nacre.model import Model
 from nacre.progress import as_progress
 from nacre.run_state import STATUSES, record_from, record_state
 from nacre.values import Value

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.errors import FileFormatError
-from nacre.model import FrameReport
+from nacre.frame_report import FrameReport
 
 if TYPE_CHECKING:
     from nacre.reconstruction import FrameRecord

@@ -204,6 +204,14 @@ def test_absurd_depths_leave_no_points_without_a_normal(fold_in: str, value: flo
     assert np.isfinite(model.points).all()
 
 
+def test_noise_that_overflows_is_not_measured() -> None:
+    depth = np.ones(SHAPE)
+    depth.ravel()[random().choice(depth.size, 12000, replace=False)] = 1e-30
+    noise = nacre.estimate_noise(depth, CAMERA)
+    assert np.isfinite([noise.constant, noise.quadratic, noise.shared]).all()
+    assert noise.sigma(1.0) > 0
+
+
 @pytest.mark.parametrize("sigma", [1e-30, 1e-12, 1e9, 1e300])
 def test_an_absurd_reference_leaves_unit_normals(sigma: float) -> None:
     model = nacre.Model(CAMERA, fusion={"reference_sigma": sigma})

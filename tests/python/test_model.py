@@ -745,7 +745,7 @@ def test_reports() -> None:
             assert 0.0001 < report.rmse < 0.001
             assert report.num_updated > 500
             assert (np.linalg.eigvalsh(report.information) > 0).all()
-    assert model.frames[2] is report
+    assert model.frames[2] == report
     assert len(model.frames) == 3
     assert repr(report).startswith("FrameReport(index=2, TRACKED, overlap=")
     assert repr(model) == f"Model({len(model)} points, 3 of 3 frames tracked, spacing=0.002 m)"

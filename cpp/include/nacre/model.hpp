@@ -20,6 +20,8 @@
 
 namespace nacre {
 
+class FrameHistory;
+
 /// What became of a frame.
 enum class FrameStatus {
   tracked,      ///< registered and folded in
@@ -71,7 +73,7 @@ struct StepTimes {
          total = 0;
 };
 
-/// What became of one frame.
+/// What became of one frame. What comes of a registration is in single precision, but for the pose.
 struct FrameReport {
   std::int64_t index = 0;
   std::optional<double> timestamp;  ///< [s], as given
@@ -97,6 +99,40 @@ struct FrameReport {
   std::int64_t num_points = 0;  ///< of the model, after the frame
   double spacing = 0.0;         ///< of the model [m]
   StepTimes milliseconds;
+};
+
+/// The reports of a model's frames, oldest first; each is made when it is asked for. Valid as long as the model.
+class FrameReports {
+ public:
+  std::size_t size() const { return size_; }
+  bool empty() const { return size_ == 0; }
+  FrameReport operator[](std::size_t index) const;  ///< index < size()
+  FrameReport front() const { return (*this)[0]; }
+  FrameReport back() const { return (*this)[size_ - 1]; }
+
+  class Iterator {
+   public:
+    FrameReport operator*() const { return (*reports_)[index_]; }
+    Iterator& operator++() {
+      ++index_;
+      return *this;
+    }
+    bool operator!=(const Iterator& other) const { return index_ != other.index_; }
+
+   private:
+    friend class FrameReports;
+    Iterator(const FrameReports* reports, std::size_t index) : reports_(reports), index_(index) {}
+    const FrameReports* reports_;
+    std::size_t index_;
+  };
+  Iterator begin() const { return {this, 0}; }
+  Iterator end() const { return {this, size_}; }
+
+ private:
+  friend class Model;
+  explicit FrameReports(const FrameHistory& history);
+  const FrameHistory* history_;
+  std::size_t size_;
 };
 
 /// What may come with a depth image.
@@ -128,7 +164,7 @@ class Model {
   const PointModel& cloud() const;            ///< in the world frame
   PointModel cloud_in_camera() const;         ///< in the newest registered camera's frame
   /// One report per frame that was added. Where a later frame closed a loop, the poses are the corrected ones.
-  const std::vector<FrameReport>& frames() const;
+  FrameReports frames() const;
   NoiseModel noise() const;  ///< given, or measured from the frames so far
   double spacing() const;    ///< [m]; 0 before the first frame
 

@@ -1,0 +1,152 @@
+"""What became of the frames of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre.depth import DepthReport
+from nacre.region import RegionReport
+from nacre.values import Value
+
+if TYPE_CHECKING:
+    import threading
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FrameReport(Value):
+    """
+    What became of one frame.
+
+    Attributes
+    ----------
+    index : int
+        Number of the frame, from 0.
+    timestamp : float or None
+        As given [s].
+    status : str
+        TRACKED: registered and folded in. WEAK: registered, but the data leaves a direction of the pose open;
+        not folded in. LOST: not registered, the model is as it was. RELOCALISED: registered again after being
+        lost.
+    reason : str
+        Why the frame is weak or lost; empty otherwise.
+    world_from_camera : (4, 4) float64
+        The camera's pose; of a lost frame the last known one. Where a later frame closes a loop, the reports
+        in ``Model.frames`` have the corrected poses.
+    num_inliers, overlap, rmse, information, weak_directions
+        Of the registration; see :class:`nacre.AlignResult`.
+    consistency : float
+        Part of the model's points in view that the frame does not see through, or of the frame's points that
+        the camera did not see through before, whichever is smaller.
+    evidence : float
+        That the registration is right, against chance: what the residuals tell a match, times overlap^2 and
+        consistency^4. Unrelated surfaces seldom reach 0.3; good registrations have 0.35 to 3. Of an object
+        that was found turned on its supporting plane: what agrees less what contradicts, as parts.
+    loop_frame : int or None
+        The earlier frame that this one closed a loop with: model and poses were corrected.
+    loop_distance : float
+        Between the surfaces that the two saw, before the correction [m].
+    corrects_earlier : bool
+        Whether it changed poses of earlier frames: a loop was closed, or the views of an object adjusted.
+    depth : DepthReport
+        Pixels that were removed, by reason.
+    region : RegionReport
+        What was left out of the rest.
+    num_updated, num_inserted, num_removed : int
+        Points of the model that the frame moved, added and removed.
+    num_points : int
+        Points of the model after the frame.
+    spacing : float
+        Of the model's points [m].
+    milliseconds : dict
+        Wall time by step of the loop, and "total".
+    """
+
+    index: int
+    timestamp: float | None
+    status: str
+    reason: str
+    world_from_camera: npt.NDArray[np.float64]
+    num_inliers: int
+    overlap: float
+    consistency: float
+    evidence: float
+    rmse: float
+    information: npt.NDArray[np.float64]
+    weak_directions: npt.NDArray[np.float64]
+    loop_frame: int | None
+    loop_distance: float
+    corrects_earlier: bool
+    depth: DepthReport
+    region: RegionReport
+    num_updated: int
+    num_inserted: int
+    num_removed: int
+    num_points: int
+    spacing: float
+    milliseconds: dict[str, float]
+
+    @property
+    def tracked(self) -> bool:
+        """Whether the camera's pose is known: every status but LOST."""
+        return self.status != "LOST"
+
+    @classmethod
+    def _from_core(cls, core: Any) -> FrameReport:
+        values = {f.name: getattr(core, f.name) for f in fields(cls)}
+        values["depth"] = DepthReport._from_core(core.depth)
+        values["region"] = RegionReport._from_core(core.region)
+        return cls(**values)
+
+    def __repr__(self) -> str:
+        reason = f" ({self.reason})" if self.reason else ""
+        return (
+            f"FrameReport(index={self.index}, {self.status}{reason}, overlap={self.overlap:.2f}, "
+            f"num_points={self.num_points}, {self.milliseconds['total']:.1f} ms)"
+        )
+
+
+class FrameReports(Sequence[FrameReport]):
+    """
+    The reports of a model's frames up to now, oldest first.
+
+    As a tuple of them, except that each is made when it is asked for. Two are equal when their reports are;
+    pickled, they become a tuple.
+    """
+
+    def __init__(self, core: Any, lock: threading.Lock, count: int) -> None:
+        self._core = core
+        self._lock = lock
+        self._count = count
+
+    def __len__(self) -> int:
+        return self._count
+
+    @overload
+    def __getitem__(self, index: int) -> FrameReport: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[FrameReport, ...]: ...
+    def __getitem__(self, index: int | slice) -> FrameReport | tuple[FrameReport, ...]:
+        place = range(self._count)[index]
+        if isinstance(place, range):
+            return tuple(self[i] for i in place)
+        with self._lock:
+            return FrameReport._from_core(self._core.report(place))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, FrameReports | tuple):
+            return NotImplemented
+        return tuple(self) == tuple(other)
+
+    def __hash__(self) -> int:
+        raise TypeError("reports of frames have no hash")
+
+    def __reduce__(self) -> Any:
+        return tuple, (list(self),)
+
+    def __repr__(self) -> str:
+        return f"FrameReports({self._count} frames)"
