@@ -208,6 +208,8 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   Vector6 scale;
   scale << extent, extent, extent, 1.0, 1.0, 1.0;
   step.hessian = scale.asDiagonal() * equations.hessian * scale.asDiagonal();
+  const Eigen::Matrix<double, 6, 6> axes = scale.asDiagonal() * eigen.eigenvectors();
+  step.shape = axes * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * axes.transpose();
 
   const Eigen::Vector3d rotation_vector = solution.head<3>() / extent, translation = solution.tail<3>();
   if (metric == Metric::point_to_point && num_weak == 0) {

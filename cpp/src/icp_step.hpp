@@ -31,6 +31,7 @@ struct IcpStep {
   double variance = 0.0;           // weighted mean of the squared residuals before the motion [m^2]
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   Matrix6 hessian = Matrix6::Zero();  // of half the weighted squares, for a twist (rotation, translation) about center
+  Matrix6 shape = Matrix6::Zero();    // what the normals of both sides agree on of the hessian
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  // scaled unit twists about center
 };
 

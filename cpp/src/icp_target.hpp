@@ -63,6 +63,7 @@ class IcpTarget {
 
 struct IcpResult : AlignResult {
   double residual_ratio = std::numeric_limits<double>::quiet_NaN();  // residuals to the largest they may be, rms
+  Matrix6 shape_information = Matrix6::Zero();                       // the part of it on which normals agree
   double normal_information = 0.0;                                   // see normal_information
 };
 

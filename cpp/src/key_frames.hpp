@@ -1,9 +1,10 @@
-// Key frames: a few views that stand for all, each with samples of the surface that it saw.
+// Key frames: a few views that stand for all, each with samples of the surface that it saw, and with its outline.
 #pragma once
 
 #include <cstdint>
 
 #include "frame_samples.hpp"
+#include "outline.hpp"
 
 namespace nacre {
 
@@ -15,6 +16,7 @@ FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, con
 struct KeyFrame {
   std::int32_t frame;  // its number
   FrameCloud cloud;
+  std::vector<OutlinePoint> outline;  // camera frame
   int last_seen;  // the last stop of the camera where its surface was in view and known to be in place
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "icp_target.hpp"
+#include "outline_match.hpp"
 #include "rigid_motion.hpp"
 #include "view_adjustment.hpp"
 
@@ -69,6 +70,18 @@ std::int32_t LoopClosure::oldest_frame() const {
   return std::max(first_in_place_, stops_[static_cast<std::size_t>(now() - 1 - stops_in_place)].frame);
 }
 
+std::vector<std::vector<OutlinePoint>> LoopClosure::outlines_near(const Pose& pose) const {
+  constexpr std::size_t most = 3;
+  constexpr double nearest_view = 4.0;
+  std::vector<std::vector<OutlinePoint>> outlines;
+  for (int k = 0; k < num_key_frames() && outlines.size() < most; ++k) {
+    const KeyFrame& other = key_frames_[static_cast<std::size_t>(k)];
+    if (!is_in_place(k) || view_distance(pose_of(k), pose, other.cloud.depth) > nearest_view) continue;
+    if (!other.outline.empty()) outlines.push_back(moved(other.outline, pose_of(k)));
+  }
+  return outlines;
+}
+
 LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
   LoopReport report;
   const Pose& pose = frame.alignment.target_from_source;
@@ -77,7 +90,7 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
     const double depth = key_frames_[static_cast<std::size_t>(last.key_frame)].cloud.depth;
     if (!frame.to_whole_model && view_distance(last.pose, pose, depth) < 1.0) return report;
   }
-  KeyFrame key{frame.index, sample_cloud(frame.frame, frame.observer, options_), now()};
+  KeyFrame key{frame.index, sample_cloud(frame.frame, frame.observer, options_), frame.outline, now()};
 
   // Which key frames' surfaces are in view?
   std::vector<std::pair<double, int>> in_question;

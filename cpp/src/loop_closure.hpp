@@ -17,6 +17,7 @@ struct LoopFrame {
   std::int32_t index;
   const Frame& frame;
   const SurfaceObserver& observer;
+  const std::vector<OutlinePoint>& outline;
   const AlignResult& alignment;  // world_from_camera as target_from_source
   double spacing;                // of the model [m]
   bool is_given;                 // its pose is not to be corrected
@@ -37,6 +38,9 @@ class LoopClosure {
   LoopReport add_frame(const LoopFrame& now);
   // The frames have moved, each by its motion.
   void move(const std::vector<Pose>& motions);
+
+  // The outlines of the oldest key frames that are near a pose, and in place (world frame).
+  std::vector<std::vector<OutlinePoint>> outlines_near(const Pose& pose) const;
 
   // Of what was last seen by earlier frames it is not known whether it is still in place.
   std::int32_t oldest_frame() const;

@@ -13,6 +13,7 @@
 #include "model_correction.hpp"
 #include "model_impl.hpp"
 #include "nacre/cancel.hpp"
+#include "outline_refinement.hpp"
 #include "point_spacing.hpp"
 #include "pose_check.hpp"
 #include "rigid_motion.hpp"
@@ -94,8 +95,8 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
       clean_depth(depth, camera, options.depth, extras.mask, &calibration, &report.depth, nullptr, options.num_threads);
   report.milliseconds.preprocess = watch.lap();
 
-  measured.resize(depth.size());
-  Eigen::Map<DepthImage>(measured.data(), depth.rows(), depth.cols()) = depth;
+  now.measured.resize(depth.size());
+  Eigen::Map<DepthImage>(now.measured.data(), depth.rows(), depth.cols()) = depth;
   make_frame(clean, camera, noise(), options.num_threads, frame);
   report.milliseconds.back_project = watch.lap();
 
@@ -107,6 +108,8 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
   observer.look_at(frame, colors, options.num_threads);
   report.milliseconds.back_project += watch.lap();
 
+  now.depth = frame.points.col(2);
+  now.sigma = frame.sigma;
   const TrackingResult tracking = locate(extras, report.region);
   report.status = tracking.status;
   report.reason = tracking.reason;
@@ -124,14 +127,16 @@ FrameReport Model::Impl::add_frame(const DepthRef& depth, const FrameExtras& ext
     report.world_from_camera = history.num_registered() == 0 ? Pose::Identity() : history.registered_pose(0);
   } else {
     hypothesis.forget();
-    if (options.loop_closure && options.fold_in == FoldIn::fuse) close_loops(report, tracking, extras.keep_guess);
+    if (keeps_key_frames()) close_loops(report, tracking, extras.keep_guess);
     report.milliseconds.loop_closure = watch.lap();
     if (report.status == FrameStatus::tracked) {
       if (was_lost()) report.status = FrameStatus::relocalised;
       keep_view(report);
       if (tracking.is_on_plane) adjust(report);
       fold_in(extras, report);
-      before = {frame.points.col(2), frame.sigma, report.world_from_camera, measured};
+      std::swap(before, now);
+      before.world_from_camera = report.world_from_camera;
+      now.world_from_camera = Pose::Identity();
     }
   }
   num_lost = report.status == FrameStatus::lost && history.num_registered() > 0 ? num_lost + 1 : 0;
@@ -152,13 +157,16 @@ void Model::Impl::keep_region(FrameReport& report) {
 }
 
 TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport& region_report) {
+  constexpr std::size_t most_outline_points = 800;
   TrackingResult result;
   result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
+  outline.clear();
   if (frame.valid.size() < least_pixels) {
     const std::string count = "only " + std::to_string(frame.valid.size()) + " pixels of the frame are usable";
     result.reason = region_report.reason.empty() ? count : region_report.reason;
     return result;
   }
+  if (keeps_key_frames()) outline = find_outline(now, camera, most_outline_points, options.num_threads);
   if (cloud.size() == 0 || extras.keep_guess) {
     result.status = FrameStatus::tracked;
     result.alignment.target_from_source = extras.guess.value_or(Pose::Identity());
@@ -166,9 +174,14 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  return track(cloud, frame, camera, observer, measured, guesses(extras), elsewhere(region_report),
-               was_lost() || jumped(), before, hypothesis,
-               options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
+  result = track(cloud, frame, camera, observer, now, guesses(extras), elsewhere(region_report), was_lost() || jumped(),
+                 before, hypothesis, options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
+  const bool is_determined = result.status == FrameStatus::tracked && result.alignment.weak_directions.cols() == 0;
+  if (is_determined && !result.is_on_plane) {
+    refine_by_outlines(result.alignment, outline, loops.outlines_near(result.alignment.target_from_source),
+                       options.num_threads);
+  }
+  return result;
 }
 
 // Whether the camera's last motion was none that goes on: views far apart, in any order.
@@ -276,14 +289,15 @@ void Model::Impl::adjust(FrameReport& report) {
   corrections.push_back(motion_of(report.world_from_camera));
   correct(report, corrections.back());
   move_points(cloud, corrections, options.num_threads);
-  if (options.loop_closure && options.fold_in == FoldIn::fuse) loops.move(corrections);
+  if (keeps_key_frames()) loops.move(corrections);
   for (std::size_t k = 0; k < views.size(); ++k) views[k].world_from_camera = adjusted[k];
 }
 
 void Model::Impl::close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given) {
   const std::int32_t oldest_frame = loops.oldest_frame();
-  const LoopReport loop = loops.add_frame({static_cast<std::int32_t>(report.index), frame, observer, tracking.alignment,
-                                           spacing, is_given, was_lost() || tracking.is_to_whole_model});
+  const LoopReport loop =
+      loops.add_frame({static_cast<std::int32_t>(report.index), frame, observer, outline, tracking.alignment, spacing,
+                       is_given, was_lost() || tracking.is_to_whole_model});
   if (loop.corrections.empty()) return;
   report.loop_frame = loop.frame;
   report.loop_distance = loop.distance;

@@ -26,10 +26,11 @@ struct Model::Impl {
   PointModel cloud;
   LoopClosure loops{camera, options};
   FrameHistory history;
-  Values measured;                // by the newest, before it was cleaned
-  Sight before;                   // of the newest frame that was folded in
-  PlaceHypothesis hypothesis;     // while the camera is lost
-  std::vector<ObjectView> views;  // of an object that stands on a plane, from different directions
+  Sight now;                          // of the newest, from the origin: where the camera is, is to be found
+  std::vector<OutlinePoint> outline;  // of the newest
+  Sight before;                       // of the newest frame that was folded in
+  PlaceHypothesis hypothesis;         // while the camera is lost
+  std::vector<ObjectView> views;      // of an object that stands on a plane, from different directions
   double spacing = 0.0;
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
 
@@ -47,6 +48,7 @@ struct Model::Impl {
   std::optional<ObjectView> view_of_object(const RegionReport& region) const;
   void keep_view(const FrameReport& report);
   void adjust(FrameReport& report);
+  bool keeps_key_frames() const { return options.loop_closure && options.fold_in == FoldIn::fuse; }
   void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
   void fold_in(const FrameExtras& extras, FrameReport& report);
 };

@@ -162,8 +162,15 @@ void exchange(Archive& archive, FrameCloud& cloud) {
 }
 
 template <class Archive>
+void exchange(Archive& archive, OutlinePoint& point) {
+  archive(point.point, point.normal, point.outward, point.pixel);
+  const bool is_finite = point.point.allFinite() && point.normal.allFinite() && point.outward.allFinite();
+  archive.require(is_finite, "an outline is not finite");
+}
+
+template <class Archive>
 void exchange(Archive& archive, KeyFrame& key_frame) {
-  archive(key_frame.frame, key_frame.cloud, key_frame.last_seen);
+  archive(key_frame.frame, key_frame.cloud, key_frame.outline, key_frame.last_seen);
 }
 
 template <class Archive>
@@ -176,7 +183,7 @@ void exchange(Archive& archive, IcpResult& result) {
   archive(result.target_from_source);
   archive.choice(result.status, AlignStatus::too_few_pairs);
   archive(result.iterations, result.num_inliers, result.overlap, result.rmse, result.center, result.information,
-          result.weak_directions, result.residual_ratio, result.normal_information);
+          result.weak_directions, result.residual_ratio, result.shape_information, result.normal_information);
 }
 
 // Of classes that keep theirs to themselves.

@@ -171,7 +171,9 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   result.residual_ratio = residual_ratio_of(pairs, options.method);
   result.normal_information = normal_information(pairs, options.method);
   result.center = last.center;
-  result.information = last.hessian / std::max(last.variance, resolution * resolution);
+  const double variance = std::max(last.variance, resolution * resolution);
+  result.information = last.hessian / variance;
+  result.shape_information = last.shape / variance;
   result.weak_directions = last.weak_directions;
   return result;
 }

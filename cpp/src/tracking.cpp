@@ -92,7 +92,7 @@ struct Search {
   const ModelOptions& options;
   IcpSource source;
   const Values& noise;  // of the sampled points [m]
-  const Sight now;      // from the origin: where the camera is, is to be found
+  const Sight& now;     // from the origin: where the camera is, is to be found
   const Sight& before;
   double spacing;             // of the model [m]
   std::int32_t oldest_frame;  // see track
@@ -215,7 +215,7 @@ TrackingResult on_plane(const PlaneFit& fit) {
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const Values& measured, std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost,
+                     const Sight& now, std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost,
                      const Sight& before, PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing,
                      const ModelOptions& options) {
   const FrameSamples samples = sample_frame(frame, observer, options);
@@ -223,7 +223,7 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
       model,         frame,
       camera,        observer,
       options,       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
-      samples.noise, Sight{frame.points.col(2), frame.sigma, Pose::Identity(), measured},
+      samples.noise, now,
       before,        spacing,
       oldest_frame};
   TrackingResult best;

@@ -25,7 +25,7 @@ struct WhereElse {
 // oldest_frame may have drifted away: they are left out, except by the search. Where no single registration is
 // convincing, `hypothesis` may become so over several frames.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const Values& measured, std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost,
+                     const Sight& now, std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost,
                      const Sight& before, PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing,
                      const ModelOptions& options);
 

@@ -354,7 +354,7 @@ TEST_CASE("a ring is not closed by a view that leaves directions open") {
       alignment.center = Turntable::middle();
       alignment.information = 1e6 * Matrix6::Identity();
       if (is_weak) alignment.weak_directions = Vector6::Unit(4);
-      const LoopReport report = loops.add_frame({k, frame, observer, alignment, 0.003, false, false});
+      const LoopReport report = loops.add_frame({k, frame, observer, {}, alignment, 0.003, false, false});
       num_closed += report.frame.has_value() ? 1 : 0;
       CHECK(report.frame.has_value() == !report.corrections.empty());
     }

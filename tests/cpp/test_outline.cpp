@@ -9,6 +9,7 @@
 #include "doctest/doctest.h"
 #include "nacre/model.hpp"
 #include "outline.hpp"
+#include "outline_refinement.hpp"
 #include "random.hpp"
 
 using namespace nacre;
@@ -77,6 +78,25 @@ std::vector<OutlinePoint> outline_of(const Shape& shape) {
   sight.depth = Eigen::Map<const Values>(depth.data(), depth.size());
   sight.sigma = Values::Constant(depth.size(), static_cast<float>(noise));
   return find_outline(sight, camera, 100000, 1);
+}
+
+// Pairs of surface points have found the origin; of a turn about the viewing axis they know little.
+IcpResult found_by_shape(double roll_information) {
+  IcpResult result;
+  result.center = Eigen::Vector3d(0.0, 0.0, far_off);
+  result.shape_information = 1e12 * Matrix6::Identity();
+  result.shape_information(2, 2) = roll_information;
+  return result;
+}
+
+// Of a camera that looks at the square from elsewhere.
+std::vector<OutlinePoint> square_from(const Pose& pose) {
+  std::vector<OutlinePoint> outline = outline_of(square);
+  const Pose back = pose.inverse();
+  for (OutlinePoint& edge : outline) {
+    edge = {back * edge.point, back.linear() * edge.normal, back.linear() * edge.outward, edge.pixel};
+  }
+  return outline;
 }
 
 }  // namespace
@@ -199,4 +219,39 @@ TEST_CASE("outlines give the same bits for any number of threads") {
     CHECK(std::memcmp(one.information.data(), more.information.data(), 36 * sizeof(double)) == 0);
     CHECK(one.status == more.status);
   }
+}
+
+TEST_CASE("outlines add to what shape says: as much as it leaves open") {
+  const Pose truth = slid(0.4, 0.0, 0.0);
+  const auto refined = [&](double roll_information) {
+    IcpResult result = found_by_shape(roll_information);
+    refine_by_outlines(result, square_from(truth), {outline_of(square)}, 1);
+    return result;
+  };
+  const IcpResult open = refined(1.0), certain = refined(1e12), between = refined(5e6);
+  CHECK(angle_of(truth.inverse() * open.target_from_source) < 0.03);
+  CHECK(open.information(2, 2) > 0.0);
+  CHECK(angle_of(certain.target_from_source) < 0.01);
+  CHECK(angle_of(between.target_from_source) > 0.1);
+  CHECK(angle_of(between.target_from_source) < 0.3);
+}
+
+TEST_CASE("an outline as a whole is not believed more than half a pixel") {
+  IcpResult result = found_by_shape(1.0);
+  result.shape_information(0, 0) = result.shape_information(1, 1) = 1e12;
+  const double sigma = 0.5 * pixel;
+  result.shape_information(3, 3) = 30.0 / (sigma * sigma);  // shape knows it to half a pixel, too
+  refine_by_outlines(result, square_from(slid(0.0, pixel, 0.0)), {outline_of(square)}, 1);
+  CHECK(result.target_from_source.translation().x() == doctest::Approx(0.5 * pixel).epsilon(0.1));
+}
+
+TEST_CASE("outlines that do not lie on each other leave the pose as it is") {
+  const auto smaller = [](double x, double y) { return square(x * 1.05, y * 1.05); };  // 2 pixels on each side
+  IcpResult result = found_by_shape(1.0);
+  refine_by_outlines(result, square_from(slid(0.4, 0.0, 0.0)), {outline_of(smaller)}, 1);
+  CHECK(result.target_from_source.matrix() == Pose::Identity().matrix());
+  CHECK(result.information == Matrix6::Zero());
+  refine_by_outlines(result, square_from(slid(0.4, 0.0, 0.0)), {}, 1);
+  refine_by_outlines(result, {}, {outline_of(square)}, 1);
+  CHECK(result.target_from_source.matrix() == Pose::Identity().matrix());
 }

@@ -87,9 +87,9 @@ std::vector<Pair> pairs_of(const Cloud& source, const Cloud& target, Metric metr
     pair.p = source.points.row(i).transpose().cast<double>();
     pair.q = target.points.row(i).transpose().cast<double>();
     pair.normal = target.normals.row(i).transpose().cast<double>();
-    if (metric == Metric::symmetric) {
-      pair.normal = 0.5 * (pair.normal + source.normals.row(i).transpose().cast<double>());
-    }
+    const Eigen::Vector3d other = source.normals.row(i).transpose().cast<double>();
+    pair.half_difference = 0.5 * (other - pair.normal);
+    if (metric == Metric::symmetric) pair.normal = 0.5 * (pair.normal + other);
     pair.weight = 1.0;
     pairs.push_back(pair);
   }
