@@ -16,10 +16,8 @@ import gc
 import json
 import math
 import os
-import pickle
 import sys
 import time
-import tracemalloc
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -28,18 +26,12 @@ from simulated import SCENES, Scene
 
 import nacre
 
-CORE_REPORT = 936  # bytes that the C++ model keeps of a frame: its report and its pose
 LIMITS = {"memory_growth": 0.05, "p99_ratio": 1.1, "drift_mm": 1.0, "drift_degrees": 0.05}
 
 
 @dataclass
 class Outcome:
-    """
-    What a run measured; growth and ratios are of the end to the beginning.
-
-    A model keeps the report of every frame: ``bytes_per_frame`` is by how much memory grew, ``report_bytes``
-    what of that is the report, and ``memory_growth`` the rest, as a part of the memory at the beginning.
-    """
+    """What a run measured; growth and ratios are of the end to the beginning."""
 
     scene: str
     frames: int
@@ -52,7 +44,6 @@ class Outcome:
     memory_mb: float
     memory_growth: float
     bytes_per_frame: float
-    report_bytes: float
     p99_ms: float
     p99_ratio: float
     median_ms: float
@@ -79,16 +70,6 @@ def memory() -> int:
     """Return the resident memory of this process [bytes]; linux."""
     gc.collect()
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
-
-
-def report_bytes(model: nacre.Model) -> float:
-    """Return what the report of a frame takes, on average [bytes]."""
-    reports = model.frames[-200:]
-    tracemalloc.start()
-    copies = [pickle.loads(pickle.dumps(report)) for report in reports]
-    taken = tracemalloc.get_traced_memory()[0] / len(copies)
-    tracemalloc.stop()
-    return taken + CORE_REPORT
 
 
 def motion(pose: np.ndarray) -> tuple[float, float]:
@@ -127,7 +108,6 @@ def soak(name: str, frames: int, width: int, cap: int, sigma: float) -> Outcome:
     end = memory()
     first, last = seconds[part : 2 * part] * 1000, seconds[-part:] * 1000
     drift = np.nanmax(errors, axis=0)
-    reports = report_bytes(model)
     return Outcome(
         scene=name,
         frames=frames,
@@ -138,9 +118,8 @@ def soak(name: str, frames: int, width: int, cap: int, sigma: float) -> Outcome:
         cap=cap,
         frames_above_cap=above,
         memory_mb=end / 1e6,
-        memory_growth=(end - begin - reports * (frames - part)) / begin,
+        memory_growth=(end - begin) / begin,
         bytes_per_frame=(end - begin) / (frames - part),
-        report_bytes=reports,
         p99_ms=float(np.percentile(last, 99)),
         p99_ratio=float(np.percentile(last, 99) / np.percentile(first, 99)),
         median_ms=float(np.median(last)),

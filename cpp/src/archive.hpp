@@ -3,8 +3,8 @@
 //   template <class Archive>
 //   void exchange(Archive& archive, Thing& thing) { archive(thing.size, thing.points); }
 //
-// Numbers are little endian. Whole numbers on their own, and counts, take as many bytes as they need, 7 bits a byte, the
-// lowest first. Nothing is allocated that the bytes that are left cannot fill.
+// Numbers are little endian. Whole numbers on their own, and counts, take as many bytes as they need: 7 bits a byte,
+// the lowest first. Nothing is allocated that the bytes that are left cannot fill.
 #pragma once
 
 #include <Eigen/Core>
@@ -42,9 +42,7 @@ inline constexpr bool is_plain = (std::is_arithmetic_v<T> && !std::is_same_v<T, 
 inline std::uint64_t folded(std::int64_t value) {
   return (static_cast<std::uint64_t>(value) << 1) ^ static_cast<std::uint64_t>(value >> 63);
 }
-inline std::int64_t unfolded(std::uint64_t bits) {
-  return static_cast<std::int64_t>((bits >> 1) ^ (~(bits & 1) + 1));
-}
+inline std::int64_t unfolded(std::uint64_t bits) { return static_cast<std::int64_t>((bits >> 1) ^ (~(bits & 1) + 1)); }
 
 // Written by its own `exchange`.
 template <class T>

@@ -13,7 +13,9 @@ void turn_uncertainty(FrameReport& report, const Eigen::Matrix3d& rotation);
 
 class FrameHistory {
  public:
-  std::size_t size() const { return chunks_.empty() ? 0 : per_chunk * (chunks_.size() - 1) + chunks_.back().ends.size(); }
+  std::size_t size() const {
+    return chunks_.empty() ? 0 : per_chunk * (chunks_.size() - 1) + chunks_.back().ends.size();
+  }
   void add(const FrameReport& report);  // the next
   FrameReport operator[](std::size_t index) const;
   FrameReport back() const { return (*this)[size() - 1]; }

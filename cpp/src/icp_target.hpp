@@ -65,6 +65,7 @@ struct IcpResult : AlignResult {
   double residual_ratio = std::numeric_limits<double>::quiet_NaN();  // residuals to the largest they may be, rms
   Matrix6 shape_information = Matrix6::Zero();                       // the part of it on which normals agree
   double normal_information = 0.0;                                   // see normal_information
+  double misfit = 0.0;  // what neighbouring residuals have in common, by what noise and resolution explain, rms
 };
 
 // align with a prepared target. Held: directions that the pairs do not determine stay as they are in every step.

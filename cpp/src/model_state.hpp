@@ -183,7 +183,8 @@ void exchange(Archive& archive, IcpResult& result) {
   archive(result.target_from_source);
   archive.choice(result.status, AlignStatus::too_few_pairs);
   archive(result.iterations, result.num_inliers, result.overlap, result.rmse, result.center, result.information,
-          result.weak_directions, result.residual_ratio, result.shape_information, result.normal_information);
+          result.weak_directions, result.residual_ratio, result.shape_information, result.normal_information,
+          result.misfit);
 }
 
 // Of classes that keep theirs to themselves.

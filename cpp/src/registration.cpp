@@ -119,6 +119,25 @@ double residual_ratio_of(const std::vector<Pair>& pairs, Metric metric) {
   return std::sqrt(squares / static_cast<double>(pairs.size()));
 }
 
+// Of pairs in the order of space. Noise is independent from one to the next; the error of a surface that is bent
+// another way is not: what neighbours lie off by on average, in units of what noise and the model's resolution explain.
+double misfit_of(const std::vector<Pair>& pairs, Metric metric) {
+  constexpr std::size_t neighbours = 32;
+  constexpr double resolution = 0.06;  // of the largest residual
+  double sum = 0.0, count = 0.0;
+  for (std::size_t first = 0; first + neighbours <= pairs.size(); first += neighbours) {
+    double offset = 0.0, variance = 0.0;
+    for (std::size_t i = first; i < first + neighbours; ++i) {
+      const double coarse = resolution * pairs[i].largest_residual;
+      offset += residual(pairs[i], metric);
+      variance += pairs[i].agreement / pairs[i].weight + coarse * coarse;
+    }
+    sum += offset * offset / (static_cast<double>(neighbours) * variance);
+    count += 1.0;
+  }
+  return count > 0.0 ? std::sqrt(sum / count) : 0.0;
+}
+
 std::size_t least_pairs(std::int64_t num_samples) {
   return static_cast<std::size_t>(std::max<std::int64_t>(6, num_samples / 100));
 }
@@ -161,6 +180,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
     pairs = target.match(source, schedule.num_samples(), pose, schedule.gate(), nearest);
   }
   if (pairs.size() < least_pairs(schedule.num_samples())) return result;
+  result.misfit = misfit_of(pairs, options.method);
   weight_pairs(pairs, options.method, options.robust, resolution);
   const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);
   result.target_from_source = pose;

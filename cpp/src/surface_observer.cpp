@@ -167,6 +167,9 @@ void SurfaceObserver::observe(ObservationBlock& b, const simd::SurfaceImage& ima
                           {b.weight_, b.offset_, b.seen_normal_x_, b.seen_normal_y_, b.seen_normal_z_, channels[0],
                            channels[1], channels[2]},
                           cover);
+  for (int i = 0; i < b.count_; ++i) {  // what overflows says nothing
+    if (!std::isfinite(b.offset_[i])) b.weight_[i] = b.offset_[i] = 0.0F;
+  }
 }
 
 bool SurfaceObserver::sees_through(const Eigen::Vector3f& point, std::int32_t pixel, float margin) const {

@@ -62,9 +62,10 @@ void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
   result.status = FrameStatus::lost;
   const double overlap = result.alignment.overlap;
   const double ratio = std::max(least_ratio, result.alignment.residual_ratio);
-  result.evidence = overlap * overlap * std::pow(result.consistency, 4) * std::max(0.0, std::log(chance / ratio));
-  result.recognition = overlap * std::pow(result.consistency, 8) * std::max(0.0, std::log(chance / ratio)) *
-                       result.alignment.normal_information;
+  const double misfit = std::max(1.0, result.alignment.misfit);
+  const double per_match = std::max(0.0, std::log(chance / ratio)) / (misfit * misfit);
+  result.evidence = overlap * overlap * std::pow(result.consistency, 4) * per_match;
+  result.recognition = overlap * std::pow(result.consistency, 8) * per_match * result.alignment.normal_information;
   const double least = options.min_evidence * (strict ? strictness : 1.0);
   if (result.alignment.status == AlignStatus::too_few_pairs) {
     result.evidence = result.recognition = 0.0;
@@ -72,6 +73,7 @@ void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
   } else if (options.verify && !(result.evidence >= least)) {
     reason << "evidence " << result.evidence << " is below " << least << ": overlap " << overlap << ", consistency "
            << result.consistency << ", residuals " << ratio << " of the largest that match";
+    if (misfit > 1.0) reason << ", bent " << misfit << " times as much as noise explains";
   } else if (options.verify && result.alignment.weak_directions.cols() > 0) {
     result.status = FrameStatus::weak;
     reason << result.alignment.weak_directions.cols() << " direction(s) of the pose are not determined";

@@ -109,6 +109,8 @@ WRONG: dict[str, Callable[[], Array]] = {
     "half as far": lambda: 0.5 * view(GROWN),
     "ten times as far": lambda: 10 * view(GROWN),
     "a fifth farther": lambda: 1.2 * view(GROWN),
+    "a tenth farther": lambda: 1.1 * view(GROWN),
+    "mirrored": lambda: view(GROWN)[:, ::-1],
 }
 
 
@@ -137,8 +139,8 @@ def test_millimetres_for_metres_are_refused(factor: float) -> None:
 
 
 def test_a_scale_that_is_a_little_wrong_is_not_recognised() -> None:
-    """A limit: an object a tenth larger is an object farther away, as far as one view tells."""
-    report = grown().add_frame(np.float32(1.1) * view(GROWN))
+    """A limit: an object a twentieth larger is an object farther away, as far as one view tells."""
+    report = grown().add_frame(np.float32(1.05) * view(GROWN))
     assert report.status == "TRACKED"
     assert not is_right(report, GROWN)
 
@@ -231,7 +233,6 @@ def test_the_measured_experiments() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="a round bump fits another: not mended yet, see docs/promises.md")
 def test_smooth_shapes_that_have_nothing_in_common_are_never_tracked() -> None:
     import failures
 
@@ -249,3 +250,13 @@ def test_random_frames(seed: int) -> None:
     for trial in range(15):
         random_frames.run_model(seed, trial, 40, 8, told)
     assert sum(told[status] for status in random_frames.STATUSES) + told["refused"] == told["frames"]
+
+
+@pytest.mark.parametrize("trial", [3509, 7916])
+def test_random_frames_that_once_broke_a_promise(trial: int) -> None:
+    """Noise that was not a number, and points that were not: values that overflow where they are squared."""
+    import collections
+
+    import random_frames
+
+    random_frames.run_model(0, trial, 20, 12, collections.Counter())
