@@ -50,7 +50,8 @@ nacre::DepthImage depth(float x) {
     for (int u = 0; u < 640; ++u) {
       float z = 0.6F;
       for (int step = 0; step < 8; ++step) {  // along the ray, to where it meets the wall
-        const Eigen::Vector3f at((u - 319.5F) / 525 * z + x, (v - 239.5F) / 525 * z, 0.6F);
+        const Eigen::Vector3f at((static_cast<float>(u) - 319.5F) / 525 * z + x,
+                                 (static_cast<float>(v) - 239.5F) / 525 * z, 0.6F);
         z = 0.6F + 0.02F * bump(4 * at);
       }
       image(v, u) = z + noise(generator);

@@ -57,7 +57,8 @@ void denoise(const PointsRef& all, const Points& all_normals, const std::vector<
       sum += (all.row(row) - all.row(rows[static_cast<std::size_t>(i)])).dot(normals.row(i));
       count += 1.0F;
     }
-    if (count > 0.0F) points.row(i) += sum / count * normals.row(i);
+    const Eigen::RowVector3f mean = points.row(i) + sum / count * normals.row(i);
+    if (mean.allFinite()) points.row(i) = mean;  // it is not where nothing is near, nor where normals are no directions
   });
 }
 

@@ -72,7 +72,7 @@ SearchSide::SearchSide(const GlobalCloud& cloud_in, const GlobalAlignOptions& op
       all(AlignCloud(cloud.points, cloud.normals), icp_options(options)),
       few(few_of(all)),
       target(AlignCloud(cloud.points, cloud.normals), icp_options(options)) {
-  if (cloud.points.rows() > 0) middle = cloud.points.colwise().mean().transpose().cast<double>();
+  if (cloud.points.rows() > 0) middle = cloud.points.cast<double>().colwise().mean().transpose();
   if (!cloud_in.viewpoint) return;
   seen.emplace(cloud_in.points, *cloud_in.viewpoint);
   middle += body_depth * seen->radius() * seen->axis();

@@ -35,7 +35,7 @@ Buffer<std::uint32_t> visiting_order(const Rows<T>& queries, int num_threads) {
   return rows;
 }
 
-// Whether the queries are the points of the tree, row by row.
+// Whether the queries are the points of the tree, row by row, and all of them: one that is not finite is not in it.
 template <class T>
 bool are_points_of(const BlockTree<T>& tree, const Rows<T>& queries, int num_threads) {
   const PointBlock<T>* const blocks = tree.view().blocks;
@@ -44,9 +44,10 @@ bool are_points_of(const BlockTree<T>& tree, const Rows<T>& queries, int num_thr
     for (std::int64_t slot = begin; slot < end && equal.load(std::memory_order_relaxed); slot += block_points) {
       const PointBlock<T>& block = blocks[slot / block_points];
       bool same = true;
-      for (int lane = 0; lane < std::min<std::int64_t>(block_points, end - slot); ++lane) {
-        const T* const query = queries[block.id[lane]];
-        same = same && query[0] == block.p[0][lane] && query[1] == block.p[1][lane] && query[2] == block.p[2][lane];
+      for (int lane = 0; same && lane < std::min<std::int64_t>(block_points, end - slot); ++lane) {
+        const std::uint32_t id = block.id[lane];
+        same = id < queries.size() && queries[id][0] == block.p[0][lane] && queries[id][1] == block.p[1][lane] &&
+               queries[id][2] == block.p[2][lane];
       }
       if (!same) equal = false;
     }

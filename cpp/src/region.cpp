@@ -23,7 +23,7 @@ MaskImage box_mask(const Frame& frame, const RegionOptions& options) {
   MaskImage mask(frame.height, frame.width);
   const auto inside = [](float value, double low, double high) { return value >= low && value <= high; };
   for (Eigen::Index row = 0; row < mask.size(); ++row) {
-    mask.data()[row] = inside(frame.points(row, 0), options.min_x, options.max_x) &&
+    mask.data()[row] = frame.points(row, 2) > 0.0F && inside(frame.points(row, 0), options.min_x, options.max_x) &&
                        inside(frame.points(row, 1), options.min_y, options.max_y) &&
                        inside(frame.points(row, 2), options.min_z, options.max_z);
   }

@@ -121,7 +121,8 @@ void SurfaceObserver::add(ObservationBlock& block, const Eigen::Vector3f& point,
   block.radius_[i] = radius;
   block.largest_offset_[i] = std::max(radius, 4.0F * sigma);
   block.spacing_[i] = spacing;
-  block.window_[i] = std::clamp(static_cast<int>(std::ceil(reach / footprint)), 1, simd::largest_window);
+  constexpr auto largest = static_cast<float>(simd::largest_window);
+  block.window_[i] = static_cast<int>(std::ceil(std::min(largest, std::max(1.0F, reach / footprint))));
 }
 
 PixelWindow ObservationBlock::cover(int i) const {

@@ -172,7 +172,6 @@ std::vector<Eigen::Vector3d> normals_of(const PlanarImage& image, const Camera& 
          evaluate(rule.sigma, own) > rule.slope_sigma * evaluate(rule.unit_slope, own) * std::sqrt(spread(radius))) {
     ++radius;
   }
-  const double window_spread = spread(radius);
   const int r = radius;
   const auto fit = [&](const Window& window) { return fit_window(image, rule, window, r, spread(r), u, v); };
   const PlaneFit all = fit({-r, r, -r, r});

@@ -218,6 +218,14 @@ TEST_CASE("points that are not finite are never found, queries that are not fini
   check_all(points, queries, 2, inf);
 }
 
+TEST_CASE("all rows but the last of a tree's, with one that is not finite, as many as the tree has points") {
+  Points points = Points::Random(40, 3);
+  points(7, 1) = missing;
+  const KdTree tree(points);
+  const Neighbors found = tree.query(points.topRows(39), 1);
+  for (Eigen::Index i = 0; i < 39; ++i) CHECK(found.indices(i, 0) == (i == 7 ? points.rows() : i));
+}
+
 TEST_CASE("a point at exactly the distance is found") {
   Points points(2, 3);
   points << 3, 4, 0, 0, 0, 9;

@@ -281,7 +281,7 @@ TEST_CASE("matches are the nearest points, whatever was matched before") {
   std::vector<std::uint32_t> nearest(600, no_slot);
   for (const double size : {0.3, 0.1, 0.0}) {
     const Pose pose = motion({size, 0.0, -size}, {0.0, 0.02 * size, 0.0});
-    const std::vector<Pair> pairs = icp_target.match(icp_source, 600, pose, Gate{1.0, -2.0}, nearest);
+    const std::vector<Pair> pairs = icp_target.match(icp_source, 600, pose, Gate{1.0, -2.0, false}, nearest);
     REQUIRE(pairs.size() == 600);
     for (const Pair& pair : pairs) {
       const double least = (target.points.cast<double>().rowwise() - pair.p.transpose()).rowwise().norm().minCoeff();

@@ -305,7 +305,10 @@ NACRE_INLINE Normals normals_of(const Planes& planes, F32 value, const NormalRul
     x = x / z;
     y = load(rays.y + u) / z;
   }
-  return scaled(a, b, value + planes.w - (a * x + b * y), -1.0F);
+  // A point that is too far for floats has no normal either.
+  const F32 farthest = broadcast(1e38F) * value;
+  const Mask is_point = (abs(x) < farthest) & (abs(y) < farthest);
+  return scaled(a, b, select(is_point, value, broadcast(NAN)) + planes.w - (a * x + b * y), -1.0F);
 }
 
 // The pixels that are set, of `count`; returns how many.
