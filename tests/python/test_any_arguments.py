@@ -153,7 +153,6 @@ ERRORS = {"CameraError", "Cancelled", "FileFormatError"}
 FILES = {
     "nacre.datasets.detect.open_sequence",
     "nacre.model.Model.load",
-    "nacre.model.Model.save",
     "nacre.io.cameras.read_camera", "nacre.io.meshes.read_mesh",
     "nacre.io.points.read_points", "nacre.io.trajectories.read_trajectory",
     "nacre.reconstructing.reconstruct",
