@@ -4,18 +4,14 @@ import contextlib
 import dataclasses
 import functools
 import struct
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from test_determinism import digest
 
 import nacre
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from test_determinism import digest
 
 Frames = list[dict[str, Any]]
 MESH = nacre.built_in_object()
