@@ -16,9 +16,7 @@ void run(nacre_fuzz::Bytes& bytes) {
   }
   const Matrix moved = project_samples(samples, points, options, hints);
   NACRE_HOLDS(moved.rows() == samples.rows());
-  const bool is_moderate = !(points.array().abs() > 1e15).any() && !(samples.array().abs() > 1e15).any() &&
-                           options.radius > 1e-6 && options.radius < 1e15;
-  for (Eigen::Index i = 0; is_moderate && i < moved.rows(); ++i) {
+  for (Eigen::Index i = 0; i < moved.rows(); ++i) {
     NACRE_HOLDS(moved.row(i).allFinite() == samples.row(i).allFinite());
   }
 }
