@@ -174,7 +174,10 @@ class StateReader {
     bool has_value = false;
     get(has_value);
     value.reset();
-    if (has_value) get(value.emplace());
+    if (!has_value) return;
+    T kept{};  // emplace() of a nested class with default values is what Clang does not compile
+    get(kept);
+    value = std::move(kept);
   }
   template <class T>
   void get(std::vector<T>& values) {
