@@ -19,6 +19,8 @@
 namespace nacre {
 namespace {
 
+constexpr double cells_a_radius = 4.0;
+
 std::size_t as_size(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 // What makes a method, in the unit of length in which theta(r) = 2^(-r^2).
@@ -94,7 +96,12 @@ class Projection {
       : options_(options), form_(form), hints_(hints), samples_(samples), points_(points) {
     counts_ = Values::Ones(points.num_readable());
     if (hints.point_weights.size() > 0) {
-      for (std::int64_t j = 0; j < points.num_points(); ++j) counts_[j] = hints.point_weights[points.row(j)];
+      // Only their ratios matter: sums of them stay within single precision, and keep their bits.
+      const float largest = hints.point_weights.maxCoeff();
+      const int exponent = largest > 0.0F ? std::ilogb(largest) : 0;
+      for (std::int64_t j = 0; j < points.num_points(); ++j) {
+        counts_[j] = std::scalbn(hints.point_weights[points.row(j)], -exponent);
+      }
     }
     point_mass_ = counts_;
     sample_mass_.setZero(samples.num_readable());
@@ -293,9 +300,12 @@ template <class Cloud, class Matrix>
 Matrix project(const Cloud& samples, CellOrder sample_order, const Cloud& points, CellOrder point_order,
                const CellLattice& lattice, const ConsolidateOptions& options, const ProjectionHints& hints,
                const Cargo* cargo, int* iterations) {
-  constexpr double farthest = 1e36;  // in cells: what single precision can hold, with room to spare
-  require(lattice.reach < farthest, "points", "within 1e35 radii of their middle", "points too far away");
   const Form form = form_of(options);
+  constexpr double farthest = 1e36;  // in the kernels' unit: what single precision can hold, with room to spare
+  const int digits = static_cast<int>(std::floor(std::log10(farthest / (options.radius * form.scale))));
+  const double radii = lattice.reach / cells_a_radius;
+  require(radii < std::pow(10.0, digits), "points", "within 1e" + std::to_string(digits) + " radii of their middle",
+          radii);
   const Scaling scaling{lattice.center, form.scale};
   const PointBlocks point_blocks(points, std::move(point_order), scaling, options.num_threads);
   halve_cubes(samples, sample_order, PointBlocks::size, options.num_threads);
@@ -317,8 +327,6 @@ Matrix project(const Cloud& samples, CellOrder sample_order, const Cloud& points
   });
   return result;
 }
-
-constexpr double cells_a_radius = 4.0;
 
 template <class Matrix, class Cloud>
 BasicConsolidated<Matrix> consolidate_cloud(const Cloud& points, const ConsolidateOptions& options,

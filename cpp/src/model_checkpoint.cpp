@@ -120,9 +120,16 @@ bool is_within(Number number, std::size_t count) {
   return number >= 0 && static_cast<std::uint64_t>(number) < count;
 }
 
-bool are_finite(const std::vector<Eigen::Vector3f>& vectors) {
-  return std::all_of(vectors.begin(), vectors.end(), [](const Eigen::Vector3f& v) { return v.allFinite(); });
+template <class T, class Test>
+bool are_all(const std::vector<T>& values, Test&& test) {
+  return std::all_of(values.begin(), values.end(), test);
 }
+
+bool is_place(const Eigen::Vector3f& point) {
+  return (point.array().abs() < static_cast<float>(2.0 * farthest_place)).all();  // of a camera, and from it
+}
+
+bool is_unit(const Eigen::Vector3f& normal) { return std::abs(normal.squaredNorm() - 1.0F) < 0.01F; }
 
 bool is_sound(const PointModel& cloud, std::size_t num_frames) {
   const std::size_t count = cloud.points.size();
@@ -137,9 +144,10 @@ bool is_sound(const PointModel& cloud, std::size_t num_frames) {
       return false;
     }
   }
-  return are_finite(cloud.points) && are_finite(cloud.normals) &&
-         std::all_of(cloud.last_seen.begin(), cloud.last_seen.end(),
-                     [&](std::int32_t frame) { return is_within(frame, num_frames); });
+  const auto is_count = [](auto number) { return number >= 0 && std::isfinite(static_cast<float>(number)); };
+  return are_all(cloud.points, is_place) && are_all(cloud.normals, is_unit) && are_all(cloud.confidence, is_count) &&
+         are_all(cloud.sightings, is_count) && are_all(cloud.violations, is_count) &&
+         are_all(cloud.last_seen, [&](std::int32_t frame) { return is_within(frame, num_frames); });
 }
 
 bool is_sound(const FrameReport& report, std::size_t num_frames) {
@@ -277,12 +285,14 @@ Model Model::load(std::string_view bytes, std::string* note) {
   const bool is_first = state.cloud.size() == 0 && before.depth.size() == 0;
   archive.require(filler == filler_of(camera, state), "its length does not fit the camera");
   archive.require(state.region.size() == 0 || is_image(state.region, state.camera), "the region has another size");
-  archive.require(is_sound(state.cloud, num_frames), "the points are not all there, or not finite");
+  archive.require(is_sound(state.cloud, num_frames), "the points are not all there, or no surface");
   archive.require(is_first || (is_pixels(before.depth) && is_pixels(before.sigma) && is_pixels(before.measured)),
                   "the newest view has another size than the camera");
   archive.require(is_first || state.history.num_registered() > 0, "the poses are missing");
   archive.require(is_within(state.num_lost, num_frames + 1), "more frames are lost than there are");
-  archive.require(std::isfinite(state.spacing) && state.spacing >= 0.0, "the spacing is not a distance");
+  const bool is_spaced = state.spacing > 0.0 || state.cloud.size() == 0;
+  archive.require(is_spaced && state.spacing >= given.spacing && state.spacing < farthest_place,
+                  "the spacing is not a distance between the points");
   for (const ObjectView& view : state.views) {
     archive.require(is_sound(view, state.camera, num_frames), "a view of the object contradicts the camera");
   }

@@ -10,6 +10,7 @@
 #include "nacre/model.hpp"
 #include "object_view.hpp"
 #include "place_hypothesis.hpp"
+#include "pose_check.hpp"
 #include "verdict.hpp"
 
 namespace nacre {
@@ -17,7 +18,7 @@ namespace nacre {
 template <class Archive>
 void exchange(Archive& archive, Pose& pose) {
   archive(pose.matrix());
-  archive.require(pose.matrix().allFinite(), "a pose is not finite");
+  archive.require(is_rigid(pose), "a pose is not a rotation and a finite translation");
 }
 
 template <class Archive>
@@ -87,9 +88,15 @@ void exchange(Archive& archive, PointModel& model) {
           model.sightings, model.violations);
 }
 
+template <class Archive, class... Counts>
+void exchange_counts(Archive& archive, Counts&... counts) {
+  archive(counts...);
+  archive.require((... && (counts >= 0)), "a count is negative");
+}
+
 template <class Archive>
 void exchange(Archive& archive, DepthReport& report) {
-  archive(report.num_pixels, report.num_invalid, report.num_out_of_range, report.num_masked, report.num_edge,
+  exchange_counts(archive, report.num_pixels, report.num_invalid, report.num_out_of_range, report.num_masked, report.num_edge,
           report.num_slanted, report.num_isolated, report.num_kept);
 }
 
@@ -100,12 +107,13 @@ void exchange(Archive& archive, SupportPlane& plane) {
 
 template <class Archive>
 void exchange(Archive& archive, RegionReport& report) {
-  archive(report.num_inside, report.num_outside, report.planes, report.support, report.reason);
+  exchange_counts(archive, report.num_inside, report.num_outside);
+  archive(report.planes, report.support, report.reason);
 }
 
 template <class Archive>
 void exchange(Archive& archive, FusionReport& report) {
-  archive(report.num_updated, report.num_inserted, report.num_removed);
+  exchange_counts(archive, report.num_updated, report.num_inserted, report.num_removed);
 }
 
 // As whole nanoseconds.

@@ -1,4 +1,4 @@
-// The check of poses that come from the caller.
+// The check of poses that come from outside.
 #pragma once
 
 #include <string>
@@ -8,12 +8,16 @@
 
 namespace nacre {
 
-// Throws std::invalid_argument; what is moved is to stay within floats.
-inline void require_rigid(const Pose& pose, const std::string& name) {
+constexpr double farthest_place = 1e30;  // [m]: what is moved is to stay within floats
+
+inline bool is_rigid(const Pose& pose) {
   const Eigen::Matrix3d rotation = pose.linear();
-  const bool is_rigid = pose.matrix().allFinite() && pose.translation().cwiseAbs().maxCoeff() < 1e30 &&
-                        (rotation * rotation.transpose()).isIdentity(1e-3) && rotation.determinant() > 0.0;
-  require(is_rigid, name, "a rotation and a finite translation in metres", pose.matrix());
+  return pose.matrix().allFinite() && pose.translation().cwiseAbs().maxCoeff() < farthest_place &&
+         (rotation * rotation.transpose()).isIdentity(1e-3) && rotation.determinant() > 0.0;
+}
+
+inline void require_rigid(const Pose& pose, const std::string& name) {
+  require(is_rigid(pose), name, "a rotation and a finite translation in metres", pose.matrix());
 }
 
 }  // namespace nacre

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import numbers
 import os
 import threading
@@ -27,12 +26,10 @@ from nacre.arrays import (
     as_rows,
     as_scale,
 )
+from nacre.checkpoint import Checkpointed, checkpoint_of, read_checkpoint
 from nacre.depth import DepthParameters
-from nacre.errors import FileFormatError
 from nacre.exchange import ExchangeablePoints
 from nacre.frame_report import FrameReport, FrameReports
-from nacre.io.atomic import atomic_writer
-from nacre.io.raw import read_file
 from nacre.noise import NoiseModel
 from nacre.parameters import from_core, to_core, updated
 from nacre.region import RegionParameters
@@ -162,7 +159,7 @@ class ModelParameters:
         return from_core(cls, _core.ModelOptions.preset(name))
 
 
-class Model(ExchangeablePoints):
+class Model(ExchangeablePoints, Checkpointed):
     """
     A 3D model that grows with every depth frame.
 
@@ -280,33 +277,9 @@ class Model(ExchangeablePoints):
                 self._core.add_frame(image, pixels, colors, more, time, pose, keeps)
             )
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """
-        Write all that the model knows to a file, so that :meth:`load` can go on with it.
-
-        A model that was saved and loaded goes on to the same bits as one that was not. The file is complete
-        or not there at all. It is for going on, on any machine, with any nacre of the same checkpoint format
-        (its changes are in the change log); what is to be kept for years is written with
-        :func:`nacre.write_points`.
-
-        Parameters
-        ----------
-        path : path-like
-            The file; its folder must exist.
-
-        Raises
-        ------
-        OSError
-            The file cannot be written; what was there before is left as it was.
-        """
-        data = self._saved()
-        with atomic_writer(path) as stream:
-            stream.write(data)
-
-    def _saved(self, more: Mapping[str, Any] | None = None) -> bytes:
-        note = json.dumps({"depth_scale": self._depth_scale, **(more or {})})
+    def _checkpoint(self, **more: Any) -> bytes:
         with self._lock:
-            return self._core.save(note)
+            return checkpoint_of(self._core, self._depth_scale, more)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Model:
@@ -334,19 +307,7 @@ class Model(ExchangeablePoints):
 
     @classmethod
     def _loaded(cls, path: str | os.PathLike[str]) -> tuple[Model, dict[str, Any]]:
-        data = read_file(path)
-        try:
-            core, note = _core.Model.load(data)
-        except _core.CheckpointError as error:
-            reason, offset = error.args
-            raise FileFormatError(path, reason, offset=offset) from None
-        try:
-            more = json.loads(note)
-            scale = float(more.pop("depth_scale"))
-        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
-            raise FileFormatError(path, "it was saved by C++: it does not say the depth_scale") from None
-        if not (np.isfinite(scale) and scale > 0):
-            raise FileFormatError(path, f"its depth_scale must be positive, got {scale!r}")
+        core, scale, more = read_checkpoint(path)
         model = cls(core.camera, parameters=from_core(ModelParameters, core.given_options), depth_scale=scale)
         model._core = core
         return model, more

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import __version__
+from nacre.checkpoint import Checkpointed
 from nacre.datasets.sequence import SequenceFrame
 from nacre.depth import PIXEL_LABELS, label_pixels
 from nacre.errors import FileFormatError
@@ -25,7 +26,6 @@ from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result, plain, result_dict
 from nacre.frame_figures import frame_dict, frame_entry
 from nacre.frame_report import FrameReport
-from nacre.io.atomic import atomic_writer
 from nacre.io.trajectories import Trajectory
 from nacre.model import Model
 from nacre.progress import as_progress
@@ -88,7 +88,7 @@ class _Retry:
     found_any: bool = False  # since the first of them
 
 
-class Reconstruction:
+class Reconstruction(Checkpointed):
     """
     A recording run through a model.
 
@@ -204,32 +204,10 @@ class Reconstruction:
             self._retry = state = _Retry()
         self._retry = None
 
-    def save(self, path: str | os.PathLike[str]) -> None:
-        """
-        Write the run and its model to a file, so that :meth:`load` can go on with it.
-
-        It may be called between any two frames, also while lost ones are tried again. What is in the file,
-        and for whom, is said at :meth:`nacre.Model.save`.
-
-        Parameters
-        ----------
-        path : path-like
-            The file; its folder must exist.
-
-        Raises
-        ------
-        OSError
-            The file cannot be written; what was there before is left as it was.
-        """
-        self._save(path)
-
-    def _save(self, path: str | os.PathLike[str], **more: Any) -> None:
-        """Write the run with more plain values of the caller's."""
+    def _checkpoint(self, **more: Any) -> bytes:
         retry = None if self._retry is None else dataclasses.asdict(self._retry)
         run = {"records": [record_state(record) for record in self.frames], "retry": retry}
-        data = self.model._saved({"run": run, **more})
-        with atomic_writer(path) as stream:
-            stream.write(data)
+        return self.model._checkpoint(run=run, **more)
 
     @classmethod
     def load(

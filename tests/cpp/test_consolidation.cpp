@@ -333,6 +333,52 @@ TEST_CASE("coordinates beyond what the radius can measure do no harm") {
   }
 }
 
+TEST_CASE("what is finite stays finite, or is refused") {
+  int num_refused = 0;
+  for (const double size : {1e15, 1e27, 1e33, 1e38, 1e45, 1e120}) {
+    PointsDouble points(40, 3);
+    for (int i = 0; i < 120; ++i) points.data()[i] = size * (random_uniform(5, static_cast<std::uint64_t>(i)) - 0.5);
+    for (const double radius : {1e-12, 1.0, 1e12}) {
+      for (const ConsolidationMethod method : all_methods) {
+        for (const Theta theta : {Theta::huang, Theta::printed}) {
+          ConsolidateOptions options;
+          options.method = method;
+          options.theta = theta;
+          options.radius = radius;
+          CAPTURE(size);
+          CAPTURE(radius);
+          try {
+            const PointsDouble thinned = consolidate(points, options).points;
+            const PointsDouble moved = project_samples(points, points, options);
+            CHECK(thinned.allFinite());
+            CHECK(moved.allFinite());
+          } catch (const std::invalid_argument&) {
+            ++num_refused;
+          }
+        }
+      }
+    }
+  }
+  CHECK(num_refused > 0);
+  CHECK(num_refused < 80);
+}
+
+TEST_CASE("only the ratios of weights matter, however large they are") {
+  const Points points = noisy_sphere(500, 0.03, 0.0005);
+  ConsolidateOptions options;
+  options.method = ConsolidationMethod::wlop_plus;
+  ProjectionHints hints;
+  hints.point_weights = Values::Ones(points.rows());
+  hints.point_weights.head(100) *= 3.0F;
+  const Points samples = points.topRows(60), moved = project_samples(samples, points, options, hints);
+  CHECK(moved != samples);
+  for (const float scale : {0x1p-120F, 0x1p126F}) {
+    ProjectionHints scaled = hints;
+    scaled.point_weights *= scale;
+    CHECK(project_samples(samples, points, options, scaled) == moved);
+  }
+}
+
 TEST_CASE("cgal: one neighbour alone does not repel, two do") {
   const Points points = noisy_plane(3000, 0.05, 0.0);
   ConsolidateOptions options;

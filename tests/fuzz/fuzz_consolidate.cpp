@@ -16,10 +16,7 @@ void run(nacre_fuzz::Bytes& bytes) {
   NACRE_HOLDS(result.points.rows() <= options.num_points && result.points.rows() <= points.rows());
   NACRE_HOLDS(static_cast<Eigen::Index>(result.sources.size()) == result.points.rows());
   for (const std::int64_t source : result.sources) NACRE_HOLDS(source >= 0 && source < points.rows());
-  constexpr double large = 1e15;
-  const auto is_far = [](const auto& value) { return std::abs(static_cast<double>(value)) > large; };
-  const bool is_moderate = !points.unaryExpr(is_far).any() && options.radius > 1e-6 && options.radius < large;
-  NACRE_HOLDS(!is_moderate || result.points.allFinite());
+  NACRE_HOLDS(result.points.allFinite());
 }
 
 }  // namespace

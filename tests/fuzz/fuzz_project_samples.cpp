@@ -16,11 +16,7 @@ void run(nacre_fuzz::Bytes& bytes) {
   }
   const Matrix moved = project_samples(samples, points, options, hints);
   NACRE_HOLDS(moved.rows() == samples.rows());
-  constexpr double large = 1e15;
-  const auto is_far = [](const auto& value) { return std::abs(static_cast<double>(value)) > large; };
-  const bool is_moderate = !points.unaryExpr(is_far).any() && !samples.unaryExpr(is_far).any() &&
-                           options.radius > 1e-6 && options.radius < large;
-  for (Eigen::Index i = 0; is_moderate && i < moved.rows(); ++i) {
+  for (Eigen::Index i = 0; i < moved.rows(); ++i) {
     NACRE_HOLDS(moved.row(i).allFinite() == samples.row(i).allFinite());
   }
 }

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(Path(__file__).parent))  # for what tests share
+
 RECORDINGS = ROOT.parent / "shared" / "data"
 
 hypothesis.settings.register_profile("nacre", derandomize=True, deadline=None, database=None)

@@ -3,35 +3,21 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
 import re
 import signal
-import sys
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
+import public_names as names
 import pytest
+import recipes
+import strange_values as strange
 
 import nacre
-
-
-def _neighbor(name: str) -> ModuleType:
-    """Import a module that lies beside this one."""
-    spec = importlib.util.spec_from_file_location(name, Path(__file__).with_name(f"{name}.py"))
-    assert spec
-    assert spec.loader
-    module = sys.modules[name] = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-names, recipes, strange = map(_neighbor, ("public_names", "recipes", "strange_values"))
-
 
 SECONDS = 2.0  # of CPU time, for a call on a few points
 
@@ -153,7 +139,6 @@ ERRORS = {"CameraError", "Cancelled", "FileFormatError"}
 FILES = {
     "nacre.datasets.detect.open_sequence",
     "nacre.model.Model.load",
-    "nacre.model.Model.save",
     "nacre.io.cameras.read_camera", "nacre.io.meshes.read_mesh",
     "nacre.io.points.read_points", "nacre.io.trajectories.read_trajectory",
     "nacre.reconstructing.reconstruct",

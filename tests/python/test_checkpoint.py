@@ -3,19 +3,16 @@
 import contextlib
 import dataclasses
 import functools
+import re
 import struct
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from test_determinism import digest
 
 import nacre
-
-sys.path.insert(0, str(Path(__file__).parent))
-
-from test_determinism import digest
 
 Frames = list[dict[str, Any]]
 MESH = nacre.built_in_object()
@@ -233,3 +230,31 @@ def test_whoever_forges_the_checksum_breaks_nothing(tmp_path: Path) -> None:
         with contextlib.suppress(ValueError):
             other.add_frame(np.full(depth.shape, 1.0) if other.camera == camera else np.ones((1, 1)))
     assert 0 < num_loaded < 80
+
+
+def test_finite_but_absurd_values_are_refused(tmp_path: Path) -> None:
+    frames = lost_and_found()[:4]
+    model = nacre.Model(CAMERA, spacing=0.004)
+    for given in frames:
+        model.add_frame(**given)
+    model.save(tmp_path / "model")
+    data = (tmp_path / "model").read_bytes()
+    pose = model.frames[1].world_from_camera
+    sheared, far = pose.copy(), pose.copy()
+    sheared[0, 1] += 0.1
+    far[0, 3] = 2e30
+    first, normal = model.points[0], model.normals[0]
+    forgeries = {
+        "points": (model.points.tobytes(), np.float32([3e38, *first[1:]]).tobytes()),
+        "normals": (model.normals.tobytes(), (2 * normal).tobytes()),
+        "confidence": (model.confidence.tobytes(), np.float32(-1).tobytes()),
+        "spacing": (struct.pack("<d", model.spacing), struct.pack("<d", 1e-30)),
+        "a large spacing": (struct.pack("<d", model.spacing), struct.pack("<d", 1e35)),
+        "a pose": (pose.T.tobytes(), sheared.T.tobytes()),
+        "a far pose": (pose.T.tobytes(), far.T.tobytes()),
+    }
+    for name, (known, absurd) in forgeries.items():
+        place = data.rfind(known)
+        assert place > 0, name
+        error = refused(sealed(data[:place] + absurd + data[place + len(absurd) :]), tmp_path / "forged")
+        assert re.search("no surface|spacing is not|a pose is not", error.reason), (name, error)

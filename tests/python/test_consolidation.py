@@ -210,6 +210,23 @@ def test_any_dtype_and_layout(dtype):
         np.testing.assert_allclose(nacre.consolidate(same, **options).points, thin.points, atol=1e-4)
 
 
+@pytest.mark.parametrize("theta", ["huang", "printed"])
+@pytest.mark.parametrize("method", ["wlop", "wlop+", "cgal"])
+def test_finite_points_stay_finite_or_are_refused(method, theta):
+    points = np.random.default_rng(4).uniform(-1, 1, (60, 3))
+    refused = []
+    for size in 10.0 ** np.arange(0, 271, 15):
+        for radius in (1e-12, 1.0, 1e12):
+            options = {"radius": radius, "method": method, "theta": theta, "iterations": 3}
+            try:
+                assert np.isfinite(nacre.consolidate(size * points, **options).points).all()
+                assert np.isfinite(nacre.project_samples(size * points[:9], size * points, **options)).all()
+            except ValueError as error:
+                assert "radii of their middle" in str(error)
+                refused.append(size / radius)
+    assert min(refused) > 1e29
+
+
 def test_far_away_coordinates_keep_their_digits():
     points, _ = sphere(2000)
     shift = np.array([4.4e6, -1.2e6, 3.3e3])

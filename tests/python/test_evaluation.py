@@ -110,6 +110,18 @@ class TestAbsoluteTrajectoryError:
             other = nudge @ best.truth_from_estimated @ estimated
             assert absolute_trajectory_error(other, truth, align=False).rmse >= best.rmse
 
+    def test_a_path_too_short_to_turn_by_leaves_no_error_of_rotation(self) -> None:
+        random = np.random.default_rng(3)
+        truth = np.tile(np.eye(4), (50, 1, 1))
+        for pose, angle in zip(truth, np.linspace(-0.7, 0.7, 50), strict=True):
+            pose[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        truth[:, :3, 3] = random.normal(scale=0.01, size=(50, 3))
+        estimated = truth.copy()
+        estimated[:, :3, 3] = random.normal(scale=0.01, size=(50, 3))  # nothing of the positions is right
+        error = absolute_trajectory_error(estimated, truth)
+        assert error.rotation_max < 1e-6
+        assert np.trace(error.truth_from_estimated[:3, :3]) < 2.9  # the positions ask for 18 degrees and more
+
     def test_a_mirrored_trajectory_is_not_made_to_fit(self) -> None:
         truth = wandering(10)
         estimated = truth.copy()

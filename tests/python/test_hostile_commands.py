@@ -4,13 +4,10 @@ import contextlib
 import importlib.util
 import io
 import re
-import sys
-from pathlib import Path
 
 import pytest
 
 pytest.importorskip("typer")
-sys.path.insert(0, str(Path(__file__).parent))
 from hostile_files import CASES, write
 from hostile_files.meshes import TRIANGLE
 from hostile_files.ply import text, vertices

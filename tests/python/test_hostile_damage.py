@@ -2,20 +2,17 @@
 
 import math
 import random
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hostile_files import CASES, oracle
+from hostile_files.damage import damaged, scratched
+from hostile_files.valid import VALID
 
 import nacre
 from nacre.io.cameras import read_camera
 from nacre.io.images import read_depth
-
-sys.path.insert(0, str(Path(__file__).parent))
-from hostile_files import CASES, oracle
-from hostile_files.damage import damaged, scratched
-from hostile_files.valid import VALID
 
 NUM_FILES = 1000
 

@@ -1,16 +1,12 @@
 """Files from strangers: each of the corpus gives nacre's own error, with file, place and reason, in time."""
 
 import importlib.util
-import sys
 import time
-from pathlib import Path
 
 import pytest
+from hostile_files import CASES, opened, write
 
 import nacre
-
-sys.path.insert(0, str(Path(__file__).parent))
-from hostile_files import CASES, opened, write
 
 MOST_SECONDS = 2.0
 RUNNABLE = [name for name, case in CASES.items() if importlib.util.find_spec(case.needs) is not None]

@@ -3,25 +3,16 @@
 from __future__ import annotations
 
 import copy
-import importlib.util
 import inspect
 import pickle
 import re
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
+import public_names as names
 import pytest
 
 import nacre
-
-_spec = importlib.util.spec_from_file_location("public_names", Path(__file__).with_name("public_names.py"))
-assert _spec is not None
-assert _spec.loader is not None
-names = importlib.util.module_from_spec(_spec)
-sys.modules["public_names"] = names
-_spec.loader.exec_module(names)
 
 BY_IDENTITY = {"Mesh", "KdTree", "Sequence"}  # large, and equal to themselves alone
 LIVING = {"Model", "Reconstruction"}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import os
 import signal
@@ -12,6 +11,7 @@ import time
 from pathlib import Path
 from typing import Any
 
+import fake_realsense as fake
 import numpy as np
 import pytest
 
@@ -22,18 +22,6 @@ from nacre.viewer import written_story
 pytest.importorskip("PIL")
 HERE = Path(__file__).parent
 WIDTH, HEIGHT, FRAMES, SHIFT = 64, 48, 6, 0.1
-
-
-def load_fake() -> Any:
-    spec = importlib.util.spec_from_file_location("fake_realsense", HERE / "fake_realsense.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-fake = load_fake()
 
 
 def video_stream(rs: Any, stream: Any, uid: int, format: Any, size: int) -> Any:

@@ -76,7 +76,9 @@ def absolute_trajectory_error(
     align : bool or "first", optional
         True moves the estimate by the rigid transform that brings its positions closest to the true ones
         (Umeyama 1991, without scale); where the positions leave the rotation open (a straight line, a camera
-        that stays in one place), the orientations decide. "first" moves the first compared pose onto its true
+        that stays in one place), the orientations decide. Errors of rotation are those that are left by the
+        rotation that brings positions and orientations closest, each weighted by what they leave: a path that
+        is too short for its errors says little of it. "first" moves the first compared pose onto its true
         pose. False compares the poses as they are.
     valid : array_like of bool, shape (N,), optional
         False where a pose of ``estimated`` is not to be counted as tracked.
@@ -127,11 +129,14 @@ def absolute_trajectory_error(
     elif len(rows) and align is True:
         transform = _umeyama(source, target)
     moved = transform @ source
+    turned = moved[:, :3, :3]
+    if len(rows) and align is True:
+        turned = _likeliest_rotation(source, target) @ source[:, :3, :3]
 
     errors = np.full(len(poses), np.nan)
     rotation_errors = np.full(len(poses), np.nan)
     errors[rows] = np.linalg.norm(moved[:, :3, 3] - target[:, :3, 3], axis=1)
-    rotation_errors[rows] = _rotation_angles(moved[:, :3, :3].transpose(0, 2, 1) @ target[:, :3, :3])
+    rotation_errors[rows] = _rotation_angles(turned.transpose(0, 2, 1) @ target[:, :3, :3])
     return AbsoluteTrajectoryError(
         **_statistics("", errors[rows], ("rmse", "mean", "median", "max")),
         **_statistics("rotation_", rotation_errors[rows], ("rmse", "mean", "median", "max")),
@@ -264,17 +269,41 @@ def _umeyama(source: Array, target: Array) -> Array:
     """Return the rigid transform that brings the positions of ``source`` closest to those of ``target``."""
     source_mean, target_mean = source[:, :3, 3].mean(axis=0), target[:, :3, 3].mean(axis=0)
     centered, target_centered = source[:, :3, 3] - source_mean, target[:, :3, 3] - target_mean
-    covariance = target_centered.T @ centered  # Umeyama 1991, eq. 38
-    scale = np.sqrt((centered**2).sum() * (target_centered**2).sum())
-    if scale > 0:
-        covariance /= scale
-    orientations = np.einsum("nij,nkj->ik", target[:, :3, :3], source[:, :3, :3]) / len(source)
-    u, _, vt = np.linalg.svd(covariance + 1e-9 * orientations)
-    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))])  # eq. 39, 43
+    scale = np.sqrt((centered**2).sum() * (target_centered**2).sum()) or 1.0
+    covariance = target_centered.T @ centered / scale  # Umeyama 1991, eq. 38
     transform = np.eye(4)
-    transform[:3, :3] = (u * sign) @ vt  # eq. 40
+    transform[:3, :3] = _closest_rotation(covariance + 1e-9 * _orientations(source, target))
     transform[:3, 3] = target_mean - transform[:3, :3] @ source_mean  # eq. 41
     return transform
+
+
+def _likeliest_rotation(source: Array, target: Array) -> Array:
+    """Return the rotation that fits positions and orientations best, where each has the errors that it shows."""
+    centered = source[:, :3, 3] - source[:, :3, 3].mean(axis=0)
+    target_centered = target[:, :3, 3] - target[:, :3, 3].mean(axis=0)
+    covariance = target_centered.T @ centered / len(source)
+    left = centered @ _umeyama(source, target)[:3, :3].T - target_centered
+    orientations = _orientations(source, target)
+    turned = _closest_rotation(orientations) @ source[:, :3, :3]
+    angles = _rotation_angles(turned.transpose(0, 2, 1) @ target[:, :3, :3])
+    exact = 1e-18  # [rad^2]: a variance that is not 0
+    size = (centered**2).sum() / len(source) or 1.0
+    of_positions = (left**2).sum() / len(source) / size + exact
+    of_orientations = (angles**2).mean() + exact
+    return _closest_rotation(covariance / size * of_orientations + orientations * of_positions)
+
+
+def _orientations(source: Array, target: Array) -> Array:
+    """Return the mean of the rotations from one pose's orientation to the other's."""
+    mean: Array = np.einsum("nij,nkj->ik", target[:, :3, :3], source[:, :3, :3]) / len(source)
+    return mean
+
+
+def _closest_rotation(matrix: Array) -> Array:
+    u, _, vt = np.linalg.svd(matrix)
+    sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))])  # Umeyama 1991, eq. 39, 43
+    rotation: Array = (u * sign) @ vt  # eq. 40
+    return rotation
 
 
 def _inverse(poses: Array) -> Array:

@@ -18,7 +18,13 @@ _PNG_CHANNELS = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}
 _PIXELS_PER_BYTE: dict[str | None, int] = {"PPM": 8, "BMP": 256, "JPEG": 1024, "TIFF": 1 << 14}
 _DEFLATE_RATIO = 1032  # 258 bytes of two bits
 _LZFSE_HEADER = 772  # of a block of version 1
+_LZFSE_MATCH, _LZVN_RATIO = 2359, 136  # bytes of a match; 271 of an opcode of two bytes
 _MOST_EXR_CHANNELS = 4096
+_EXR_PIXEL = {0: 4, 1: 2, 2: 4}  # bytes
+# By the number of the compression: none, runs of 128 in two bytes, deflate twice, 256 words of 16 bits in 9 bits, deflate
+# of three bytes of four, blocks of 4 x 4 in three bytes; of the others 64 pixels of a block in a deflated word.
+_EXR_RATIO = {0: 1, 1: 64, 2: _DEFLATE_RATIO, 3: _DEFLATE_RATIO, 4: 512, 5: 4 * _DEFLATE_RATIO // 3, 6: 11, 7: 11}
+_EXR_RATIO_ELSE = 64 * _DEFLATE_RATIO
 _EXR_MAGIC = b"\x76\x2f\x31\x01"
 
 
@@ -75,10 +81,10 @@ def checked_png(path: str | os.PathLike[str], data: bytes) -> bytes:
 
 
 def check_exr(path: str | os.PathLike[str], data: bytes) -> None:
-    """Check how many pixels the header of an EXR file promises; what is no such header is refused."""
+    """Check that an EXR file can hold the pixels that its header promises; what is no such header is refused."""
     if not data.startswith(_EXR_MAGIC):
         raise _damaged(path, "not an EXR image", 0)
-    position = 8
+    position, width, height, ratio, depth = 8, 0, 0, _EXR_RATIO_ELSE, 0.0
     while position < len(data) and data[position]:
         try:
             name, position = _word(data, position)
@@ -91,35 +97,64 @@ def check_exr(path: str | os.PathLike[str], data: bytes) -> None:
                 left, top, right, bottom = struct.unpack_from("<4i", data, position)
                 if right < left or bottom < top:
                     raise _damaged(path, "its data window has no pixels", position)
-                check_pixels(path, right - left + 1, bottom - top + 1)
+                width, height = right - left + 1, bottom - top + 1
+                check_pixels(path, width, height)
+            elif name == b"channels":
+                depth = _bytes_per_pixel(data[position : position + size])
+            elif name == b"compression":
+                ratio = _EXR_RATIO.get(data[position], _EXR_RATIO_ELSE)
             position += size
         except FileFormatError:
             raise
-        except (ValueError, struct.error):
+        except (ValueError, struct.error, IndexError, ZeroDivisionError):
             raise _damaged(path, "not an EXR image with a whole header", position) from None
+    num_packed = len(data) - position
+    if width * height * depth > ratio * num_packed:
+        reason = f"refused: {width} x {height} pixels in {num_packed} bytes, which cannot hold them"
+        raise FileFormatError(path, reason, offset=position)
+
+
+def _bytes_per_pixel(channels: bytes) -> float:
+    position, total = 0, 0.0
+    while channels[position]:
+        _, position = _word(channels, position)
+        kind, _, x_sampling, y_sampling = struct.unpack_from("<4i", channels, position)
+        total += _EXR_PIXEL.get(kind, 2) / (x_sampling * y_sampling)
+        position += 16
+    return total
 
 
 def check_lzfse(path: str | os.PathLike[str], data: bytes, most: int) -> None:
-    """Check how many bytes the blocks of LZFSE data say that they hold; the library asks for any amount."""
-    position, total = 0, 0
+    """Check how many bytes the blocks of LZFSE data say that they hold, and can; the library asks for any amount."""
+    position, total, possible = 0, 0, 0
     try:
         while (kind := data[position : position + 4]) != b"bvx$":
             (num_raw,) = struct.unpack_from("<I", data, position + 4)
             total += num_raw
             if kind == b"bvx-":
+                possible += num_raw
                 position += 8 + num_raw
             elif kind == b"bvxn":
-                position += 12 + struct.unpack_from("<I", data, position + 8)[0]
+                (num_packed,) = struct.unpack_from("<I", data, position + 8)
+                possible += _LZVN_RATIO * num_packed
+                position += 12 + num_packed
             elif kind == b"bvx2":
                 first, second, third = struct.unpack_from("<3Q", data, position + 8)
+                possible += (first & 0xFFFFF) + _LZFSE_MATCH * (first >> 40 & 0xFFFFF)
                 position += (third & 0xFFFFFFFF) + (first >> 20 & 0xFFFFF) + (second >> 40 & 0xFFFFF)
             elif kind == b"bvx1":
-                literals, commands = struct.unpack_from("<2I", data, position + 20)
+                num_literals, num_matches, literals, commands = struct.unpack_from("<4I", data, position + 12)
+                possible += num_literals + _LZFSE_MATCH * num_matches
                 position += _LZFSE_HEADER + literals + commands
             else:
                 raise ValueError
+            if position > len(data):
+                raise ValueError
             if total > most:
                 raise FileFormatError(path, f"refused: its LZFSE data holds {total} bytes, more than {most}")
+            if total > possible:
+                reason = f"refused: its LZFSE data promises {total} bytes, and cannot hold more than {possible}"
+                raise FileFormatError(path, reason, offset=position)
     except FileFormatError:
         raise
     except (ValueError, struct.error):

@@ -202,11 +202,23 @@ EXR = {
     ),
     "exr larger than it can hold": (
         exr((0, 0, 3999, 3999), body=bytes(100)),
-        "refused: .*cannot hold|damaged",
+        "refused: .*4000 x 4000 .*cannot hold",
+    ),
+    "exr larger than runs can hold": (
+        exr((0, 0, 1999, 1999), compression=1, body=bytes(200_000)),
+        "refused: .*cannot hold",
+    ),
+    "exr larger than deflate can hold": (
+        exr((0, 0, 7999, 7999), compression=3, body=bytes(200_000)),
+        "refused: .*cannot hold",
+    ),
+    "exr larger than wavelets can hold": (
+        exr((0, 0, 7999, 7999), compression=9, body=bytes(2000)),
+        "refused: .*cannot hold",
     ),
     "exr cut in the header": (exr()[:80], "damaged or truncated|refused|not an EXR"),
     "exr cut in the pixels": (exr()[:-10], "damaged or truncated"),
-    "exr without pixels": (exr(body=b""), "damaged or truncated"),
+    "exr without pixels": (exr(body=b""), "refused: 4 x 3 pixels .*cannot hold"),
     "exr offsets outside": (exr(body=b"\xff" * 24 + bytes(72)), "damaged or truncated"),
     "exr of unknown compression": (exr(compression=77), "damaged or truncated|refused"),
     "exr of colours": (exr(channels=("x", "y")), "no channel Z"),

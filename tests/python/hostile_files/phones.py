@@ -29,6 +29,12 @@ def lying_lzfse(told: int) -> bytes:
     return b"bvxn" + struct.pack("<II", told, len(payload)) + payload + b"bvx$"
 
 
+def short_lzfse(told: int) -> bytes:
+    """Return a block of LZVN, as long as PLANE, that says that it holds more than it can."""
+    size = len(PLANE) - 16
+    return b"bvxn" + struct.pack("<II", told, size) + bytes(size) + b"bvx$"
+
+
 def archive(files: dict[str, bytes], compression: int = zipfile.ZIP_STORED) -> bytes:
     """Return a .r3d archive."""
     stream = BytesIO()
@@ -134,6 +140,10 @@ R3D = {
     ),
     "depth bomb of lzvn": (depth(lying_lzfse(SIZE)), "0.depth: "),
     "depth promises 4 GB": (depth(lying_lzfse(2**32 - 1)), "0.depth: refused: .*4294967295"),
+    "depth larger than lzvn can hold": (
+        r3d({**TOLD, "dw": 4000, "dh": 4000}, **{"rgbd/0.depth": short_lzfse(4 * 4000 * 4000)}),
+        "0.depth.*: refused: .*64000000 bytes, and cannot hold more than",
+    ),
     "depth of zlib": (depth(zlib.compress(bytes(48))), "0.depth, byte .*: the LZFSE data is damaged"),
     "depth of bzip2": (depth(bz2.compress(bytes(48))), "0.depth, byte .*: the LZFSE data is damaged"),
     "colour damaged": (

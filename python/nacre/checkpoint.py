@@ -1,0 +1,73 @@
+"""Checkpoints: files from which a model, or a run, goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from nacre import _core
+from nacre.errors import FileFormatError
+from nacre.io.atomic import atomic_writer
+from nacre.io.raw import read_file
+
+
+class Checkpointed(ABC):
+    """What can be written to a file between any two frames, and goes on from there to the same bits."""
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """
+        Write all that is known to a file, so that ``load`` can go on with it.
+
+        It may be called between any two frames, also while a run tries lost ones again. What was saved and
+        loaded goes on to the same bits as what was not. The file is complete or not there at all. It is for
+        going on, on any machine, with any nacre of the same checkpoint format (its changes are in the change
+        log); what is to be kept for years is written with :func:`nacre.write_points`.
+
+        Parameters
+        ----------
+        path : path-like
+            The file; its folder must exist.
+
+        Raises
+        ------
+        OSError
+            The file cannot be written; what was there before is left as it was.
+        """
+        self._save(path)
+
+    def _save(self, path: str | os.PathLike[str], **more: Any) -> None:
+        data = self._checkpoint(**more)
+        with atomic_writer(path) as stream:
+            stream.write(data)
+
+    @abstractmethod
+    def _checkpoint(self, **more: Any) -> bytes:
+        """Return the file's bytes, with more plain values of the caller's."""
+
+
+def checkpoint_of(core: _core.Model, depth_scale: float, more: Mapping[str, Any]) -> bytes:
+    """Return a model as bytes, with what Python knows beside it."""
+    return core.save(json.dumps({"depth_scale": depth_scale, **more}))
+
+
+def read_checkpoint(path: str | os.PathLike[str]) -> tuple[_core.Model, float, dict[str, Any]]:
+    """Return the model, the scale of its depth images, and the rest of what was written beside it."""
+    data = read_file(path)
+    try:
+        core, note = _core.Model.load(data)
+    except _core.CheckpointError as error:
+        reason, offset = error.args
+        raise FileFormatError(path, reason, offset=offset) from None
+    try:
+        more = json.loads(note)
+        scale = float(more.pop("depth_scale"))
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        raise FileFormatError(path, "it was saved by C++: it does not say the depth_scale") from None
+    if not (np.isfinite(scale) and scale > 0):
+        raise FileFormatError(path, f"its depth_scale must be positive, got {scale!r}")
+    return core, scale, more

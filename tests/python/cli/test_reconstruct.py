@@ -1,0 +1,206 @@
+"""``nacre reconstruct``: its files, its figures and its exit codes."""
+
+import shutil
+import signal
+import sys
+
+import numpy as np
+import pytest
+from command_line import Run, fails, run, strict_json
+
+import nacre
+from nacre.io.images import write_depth_png
+from nacre.reconstruction import Reconstruction
+
+pytestmark = pytest.mark.usefixtures("no_pictures")
+
+
+def test_writes_every_file(reconstructed):
+    out, result = reconstructed
+    assert result.code == 0, result.err
+    assert sorted(path.name for path in out.iterdir()) == [
+        "model.ply", "report.html", "report.json", "trajectory.txt",
+    ]  # fmt: skip
+    cloud = nacre.read_points(out / "model.ply")
+    report = strict_json(out / "report.json")
+    assert len(cloud) == report["num_points"] > 100
+    assert cloud.normals is not None
+    assert cloud.attributes["confidence"].shape == (len(cloud),)
+    assert "<html" in (out / "report.html").read_text()
+
+
+def test_json_is_the_report_and_nothing_else(reconstructed):
+    out, result = reconstructed
+    assert result.json == strict_json(out / "report.json")
+    assert result.err == ""
+
+
+def test_report_has_every_figure(reconstructed, recording):
+    report = strict_json(reconstructed[0] / "report.json")
+    assert report["nacre"] == nacre.__version__
+    assert report["recording"]["path"] == str(recording)
+    assert report["parameters"]["registration"]["method"] == "symmetric"
+    assert report["absolute_trajectory_error"]["rmse"] < 0.002
+    assert report["relative_pose_error"]["num_pairs"] == 3
+    assert [frame["index"] for frame in report["frames"]] == [0, 1, 2, 3]
+    for frame in report["frames"]:
+        assert frame["status"] == "TRACKED"
+        assert np.array(frame["world_from_camera"]).shape == (4, 4)
+        assert frame["milliseconds"]["total"] > 0
+        assert frame["translation_error"] < 0.002
+        assert frame["removed"]["edge"] > 0
+        assert {"overlap", "rmse", "num_inliers", "num_points", "reason", "timestamp"} <= set(frame)
+
+
+def test_trajectory_has_the_indices_as_times(reconstructed):
+    out, _ = reconstructed
+    trajectory = nacre.read_trajectory(out / "trajectory.txt")
+    assert trajectory.timestamps.tolist() == [0, 1, 2, 3]
+    np.testing.assert_allclose(trajectory.poses[0], np.eye(4), atol=1e-12)
+
+
+def test_frames_are_chosen_and_keep_their_indices(recording, tmp_path):
+    result = run(
+        "reconstruct", recording, "-o", tmp_path / "o", "--first", 1, "--last", 3, "--every", 2, "--json"
+    )
+    assert [frame["index"] for frame in result.json["frames"]] == [1, 3]
+    assert nacre.read_trajectory(tmp_path / "o" / "trajectory.txt").timestamps.tolist() == [1, 3]
+
+
+def test_no_frames_left(recording, tmp_path):
+    assert "0 to 3" in fails(2, "reconstruct", recording, "-o", tmp_path / "o", "--first", 4)
+
+
+def test_frames_that_cannot_be_read_are_lost_and_the_run_goes_on(copied, tmp_path):
+    (copied / "depth" / "000001.png").write_bytes(b"\x89PNG\r\n\x1a\nshort")
+    write_depth_png(copied / "depth" / "000002.png", np.full((7, 9), 1000, np.uint16))
+    result = run("reconstruct", copied, "-o", tmp_path / "o", "--json")
+    assert result.code == 0
+    report = result.json
+    assert [frame["status"] for frame in report["frames"]] == ["TRACKED", "LOST", "LOST", "TRACKED"]
+    assert "000001.png" in report["frames"][1]["reason"]
+    assert "9 wide and 7 high" in report["frames"][2]["reason"]
+    assert report["frames"][1]["world_from_camera"] is None
+    assert report["num_lost"] == 2
+    assert report["coverage"] == 0.5
+    assert nacre.read_trajectory(tmp_path / "o" / "trajectory.txt").timestamps.tolist() == [0, 3]
+    assert "LOST" in (tmp_path / "o" / "report.html").read_text()
+
+
+def test_every_frame_lost(copied, tmp_path):
+    for path in (copied / "depth").iterdir():
+        write_depth_png(path, np.zeros((112, 112), np.uint16))
+    result = run("reconstruct", copied, "-o", tmp_path / "o")
+    assert result.code == 1
+    assert "every frame was lost" in result.err
+    assert strict_json(tmp_path / "o" / "report.json")["num_tracked"] == 0
+    assert len(nacre.read_points(tmp_path / "o" / "model.ply")) == 0
+    assert (tmp_path / "o" / "report.html").exists()
+
+
+def test_wrong_depth_scale_names_the_option(recording, tmp_path):
+    error = run("reconstruct", recording, "-o", tmp_path / "o", "--depth-scale", 1, "-q")
+    assert error.code == 1
+    assert "--depth-scale" in error.err
+    assert error.err.count("\n") == 1
+
+
+def test_a_bad_depth_later_on_is_lost(copied, tmp_path):
+    write_depth_png(copied / "depth" / "000002.png", np.full((112, 112), 3, np.uint16))
+    report = run("reconstruct", copied, "-o", tmp_path / "o", "--json").json
+    assert report["frames"][2]["status"] == "LOST"
+    assert "median" in report["frames"][2]["reason"]
+
+
+def test_unwritable_out_fails_before_the_work(recording, tmp_path, monkeypatch):
+    monkeypatch.setattr(Reconstruction, "run", lambda *_: pytest.fail("the work began"))
+    (tmp_path / "file").write_text("x")
+    assert "it is a file" in fails(2, "reconstruct", recording, "-o", tmp_path / "file")
+    fails(2, "reconstruct", recording, "-o", tmp_path / "file" / "below")
+
+
+def test_interrupted_runs_write_what_there_is(recording, tmp_path, monkeypatch):
+    whole = Reconstruction.run
+
+    def interrupted(self, indices=None):
+        for record in whole(self, indices):
+            if record.index == 1:
+                signal.raise_signal(signal.SIGINT)
+            yield record
+
+    monkeypatch.setattr(Reconstruction, "run", interrupted)
+    result = run("reconstruct", recording, "-o", tmp_path / "o")
+    assert result.code == 130
+    assert "2 of 4 frames" in result.out
+    report = strict_json(tmp_path / "o" / "report.json")
+    assert report["interrupted"] is True
+    assert len(report["frames"]) == 2
+    assert len(nacre.read_points(tmp_path / "o" / "model.ply")) > 0
+
+
+def test_quiet_says_nothing(recording, tmp_path):
+    assert run("reconstruct", recording, "-o", tmp_path / "o", "-q", "--last", 0) == Run(0, "", "")
+
+
+@pytest.mark.parametrize(
+    ("build", "words"),
+    [
+        (lambda path: None, "no such recording"),
+        (lambda path: path.mkdir(), "empty"),
+        (
+            lambda path: shutil.rmtree(path / "x", ignore_errors=True) or path.write_text("x"),
+            "not a recording",
+        ),
+    ],
+)
+def test_no_recording(tmp_path, build, words):
+    build(tmp_path / "source")
+    assert words in fails(2, "reconstruct", tmp_path / "source", "-o", tmp_path / "o")
+
+
+def test_almost_a_tum_recording(recording, tmp_path):
+    shutil.copytree(recording / "depth", tmp_path / "almost" / "depth")
+    (tmp_path / "almost" / "rgb.txt").write_text("")
+    error = fails(2, "reconstruct", tmp_path / "almost", "-o", tmp_path / "o")
+    assert "almost a TUM recording: depth.txt is missing" in error
+
+
+def test_depth_images_alone_ask_for_options(recording, tmp_path):
+    error = fails(2, "reconstruct", recording / "depth", "-o", tmp_path / "o")
+    assert "--camera" in error
+    assert "--depth-scale" in error
+    result = run(
+        "reconstruct",
+        recording / "depth",
+        "-o",
+        tmp_path / "o",
+        "--camera",
+        recording / "camera.json",
+        "--json",
+    )
+    assert result.json["num_tracked"] == 4
+    assert "absolute_trajectory_error" not in result.json
+
+
+def test_missing_extra_names_the_command(recording, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "PIL", None)
+    assert 'pip install "nacre[images]"' in fails(2, "reconstruct", recording, "-o", tmp_path / "o")
+
+
+@pytest.mark.data
+def test_tum(recordings, tmp_path):
+    result = run("reconstruct", recordings / "tum-fr3-teddy", "-o", tmp_path / "o", "--last", 4, "--json")
+    assert result.code == 0, result.err
+    report = result.json
+    assert report["num_tracked"] == 5
+    assert report["absolute_trajectory_error"]["rmse"] < 0.01
+    assert report["frames"][0]["timestamp"] > 1e9
+
+
+@pytest.mark.data
+def test_redwood_with_and_without_colour(recordings, tmp_path):
+    for name, options in (("color", ()), ("plain", ("--no-color",))):
+        source = recordings / "redwood-livingroom1"
+        assert run("reconstruct", source, "-o", tmp_path / name, "--last", 0, *options).code == 0
+        cloud = nacre.read_points(tmp_path / name / "model.ply")
+        assert (cloud.colors is not None) == (name == "color")
