@@ -61,3 +61,11 @@ def test_its_bill_of_materials_says_what_is_compiled_in(files: list[PackagePath]
         "pybind11": "BSD-3-Clause",
     }
     assert all(c["version"][:1].isdigit() for c in components.values())
+
+
+def test_its_bill_of_materials_keeps_to_the_schema(files: list[PackagePath]) -> None:
+    reason = "cyclonedx-python-lib is missing: pip install --group dev"
+    validation = pytest.importorskip("cyclonedx.validation.json", reason=reason)
+    version = pytest.importorskip("cyclonedx.schema", reason=reason).SchemaVersion.V1_6
+    error = validation.JsonStrictValidator(version).validate_str(text_of(files, "sboms/nacre.cdx.json"))
+    assert error is None, error
