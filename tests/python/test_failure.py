@@ -261,3 +261,16 @@ def test_random_frames_that_once_broke_a_promise(trial: int) -> None:
     import random_frames
 
     random_frames.run_model(0, trial, 20, 12, collections.Counter())
+
+
+def test_a_frame_is_kept_in_a_few_bytes(tmp_path: Path) -> None:
+    model = grown(2)
+    sizes = []
+    for _ in range(2):
+        for _ in range(40):
+            model.add_frame(WRONG["zeros"]())
+        model.save(tmp_path / "model")
+        sizes.append((tmp_path / "model").stat().st_size)
+    assert (sizes[1] - sizes[0]) / 40 < 300
+    assert len(model.frames) == 82
+    assert model.frames[-1].reason
