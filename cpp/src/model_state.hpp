@@ -96,8 +96,8 @@ void exchange_counts(Archive& archive, Counts&... counts) {
 
 template <class Archive>
 void exchange(Archive& archive, DepthReport& report) {
-  exchange_counts(archive, report.num_pixels, report.num_invalid, report.num_out_of_range, report.num_masked, report.num_edge,
-          report.num_slanted, report.num_isolated, report.num_kept);
+  exchange_counts(archive, report.num_pixels, report.num_invalid, report.num_out_of_range, report.num_masked,
+                  report.num_edge, report.num_slanted, report.num_isolated, report.num_kept);
 }
 
 template <class Archive>

@@ -278,7 +278,7 @@ def _umeyama(source: Array, target: Array) -> Array:
 
 
 def _likeliest_rotation(source: Array, target: Array) -> Array:
-    """Return the rotation that fits positions and orientations best, where each has the errors that it shows."""
+    """Return the rotation that fits positions and orientations best, by the errors that each shows."""
     centered = source[:, :3, 3] - source[:, :3, 3].mean(axis=0)
     target_centered = target[:, :3, 3] - target[:, :3, 3].mean(axis=0)
     covariance = target_centered.T @ centered / len(source)

@@ -21,9 +21,18 @@ _LZFSE_HEADER = 772  # of a block of version 1
 _LZFSE_MATCH, _LZVN_RATIO = 2359, 136  # bytes of a match; 271 of an opcode of two bytes
 _MOST_EXR_CHANNELS = 4096
 _EXR_PIXEL = {0: 4, 1: 2, 2: 4}  # bytes
-# By the number of the compression: none, runs of 128 in two bytes, deflate twice, 256 words of 16 bits in 9 bits, deflate
-# of three bytes of four, blocks of 4 x 4 in three bytes; of the others 64 pixels of a block in a deflated word.
-_EXR_RATIO = {0: 1, 1: 64, 2: _DEFLATE_RATIO, 3: _DEFLATE_RATIO, 4: 512, 5: 4 * _DEFLATE_RATIO // 3, 6: 11, 7: 11}
+# By the number of the compression: none, runs of 128 in two bytes, deflate twice, 256 words of 16 bits in 9
+# bits, deflate of three bytes of four, blocks of 4 x 4 in three bytes; else 64 pixels in a deflated word.
+_EXR_RATIO = {
+    0: 1,
+    1: 64,
+    2: _DEFLATE_RATIO,
+    3: _DEFLATE_RATIO,
+    4: 512,
+    5: 4 * _DEFLATE_RATIO // 3,
+    6: 11,
+    7: 11,
+}
 _EXR_RATIO_ELSE = 64 * _DEFLATE_RATIO
 _EXR_MAGIC = b"\x76\x2f\x31\x01"
 
@@ -81,7 +90,7 @@ def checked_png(path: str | os.PathLike[str], data: bytes) -> bytes:
 
 
 def check_exr(path: str | os.PathLike[str], data: bytes) -> None:
-    """Check that an EXR file can hold the pixels that its header promises; what is no such header is refused."""
+    """Check that an EXR file can hold the pixels that its header promises; other files are refused."""
     if not data.startswith(_EXR_MAGIC):
         raise _damaged(path, "not an EXR image", 0)
     position, width, height, ratio, depth = 8, 0, 0, _EXR_RATIO_ELSE, 0.0
@@ -125,7 +134,7 @@ def _bytes_per_pixel(channels: bytes) -> float:
 
 
 def check_lzfse(path: str | os.PathLike[str], data: bytes, most: int) -> None:
-    """Check how many bytes the blocks of LZFSE data say that they hold, and can; the library asks for any amount."""
+    """Check how many bytes the blocks of LZFSE data say that they hold, and can hold."""
     position, total, possible = 0, 0, 0
     try:
         while (kind := data[position : position + 4]) != b"bvx$":
@@ -153,7 +162,7 @@ def check_lzfse(path: str | os.PathLike[str], data: bytes, most: int) -> None:
             if total > most:
                 raise FileFormatError(path, f"refused: its LZFSE data holds {total} bytes, more than {most}")
             if total > possible:
-                reason = f"refused: its LZFSE data promises {total} bytes, and cannot hold more than {possible}"
+                reason = f"refused: its LZFSE data holds {total} bytes, and cannot hold more than {possible}"
                 raise FileFormatError(path, reason, offset=position)
     except FileFormatError:
         raise
