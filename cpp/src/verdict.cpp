@@ -63,9 +63,10 @@ void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
   const double overlap = result.alignment.overlap;
   const double ratio = std::max(least_ratio, result.alignment.residual_ratio);
   const double misfit = std::max(1.0, result.alignment.misfit);
-  const double per_match = std::max(0.0, std::log(chance / ratio)) / (misfit * misfit);
-  result.evidence = overlap * overlap * std::pow(result.consistency, 4) * per_match;
-  result.recognition = overlap * std::pow(result.consistency, 8) * per_match * result.alignment.normal_information;
+  const double per_match = std::max(0.0, std::log(chance / ratio));
+  result.evidence = overlap * overlap * std::pow(result.consistency, 4) * per_match / (misfit * misfit);
+  result.recognition =
+      misfit > 1.0 ? 0.0 : overlap * std::pow(result.consistency, 8) * per_match * result.alignment.normal_information;
   const double least = options.min_evidence * (strict ? strictness : 1.0);
   if (result.alignment.status == AlignStatus::too_few_pairs) {
     result.evidence = result.recognition = 0.0;

@@ -233,7 +233,6 @@ def test_the_measured_experiments() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="a round bump fits another: not mended yet, see docs/promises.md")
 def test_smooth_shapes_that_have_nothing_in_common_are_never_tracked() -> None:
     import failures
 
