@@ -24,7 +24,7 @@ if found.status == "not_found":
 moved = after @ found.target_from_source[:3, :3].T + found.target_from_source[:3, 3]
 
 distances, _ = nacre.KdTree(moved).query(before)
-typical = float(np.median(distances))
+typical = max(float(np.median(distances)), 1e-6)  # [m]: no scanner knows better
 changed = distances > 5 * typical
 print(f"typically {typical:.4g} apart; {changed.mean():.0%} of the first scan is more than five times that")
 red_where_changed = np.where(changed[:, None], (220, 40, 40), (190, 190, 190)).astype(np.uint8)

@@ -111,6 +111,7 @@ class FrameReports {
   FrameReport front() const { return (*this)[0]; }
   FrameReport back() const { return (*this)[size_ - 1]; }
 
+  /// From one report to the next, each made where it is asked for.
   class Iterator {
    public:
     FrameReport operator*() const { return (*reports_)[index_]; }
