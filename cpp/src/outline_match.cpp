@@ -1,5 +1,6 @@
 #include "outline_match.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -55,6 +56,15 @@ std::vector<OutlinePoint> moved(std::vector<OutlinePoint> outline, const Pose& p
     edge = {pose * edge.point, pose.linear() * edge.normal, pose.linear() * edge.outward, edge.pixel};
   }
   return outline;
+}
+
+double median_pixel(const std::vector<OutlinePoint>& outline) {
+  std::vector<double> pixels;
+  pixels.reserve(outline.size());
+  for (const OutlinePoint& edge : outline) pixels.push_back(edge.pixel);
+  const auto middle = pixels.begin() + static_cast<std::ptrdiff_t>(pixels.size() / 2);
+  std::nth_element(pixels.begin(), middle, pixels.end());
+  return *middle;
 }
 
 std::vector<int> nearest_edges(const std::vector<OutlinePoint>& outline, const std::vector<OutlinePoint>& others,

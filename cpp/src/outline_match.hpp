@@ -9,6 +9,8 @@ namespace nacre {
 
 std::vector<OutlinePoint> moved(std::vector<OutlinePoint> outline, const Pose& pose);
 
+double median_pixel(const std::vector<OutlinePoint>& outline);  // of one that is not empty [m]
+
 // Of each point the nearest of another outline, closer than the gate [m], that ends a like surface towards a like side;
 // -1 where there is none.
 std::vector<int> nearest_edges(const std::vector<OutlinePoint>& outline, const std::vector<OutlinePoint>& others,

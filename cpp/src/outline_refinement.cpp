@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <algorithm>
 #include <cmath>
 
 #include "outline_match.hpp"
@@ -18,15 +17,6 @@ constexpr double point_sigma = 0.5;     // [pixels]
 constexpr double shift_sigma = 0.5;     // [pixels], of an outline as a whole: mixed pixels differ with the slant
 constexpr double points_for_one = 4.0;  // neighbours on an outline err together
 constexpr double pairs_for_one = 30.0;  // so do pairs of surface points
-
-double median_pixel(const std::vector<OutlinePoint>& outline) {
-  std::vector<double> pixels;
-  pixels.reserve(outline.size());
-  for (const OutlinePoint& edge : outline) pixels.push_back(edge.pixel);
-  const auto middle = pixels.begin() + static_cast<std::ptrdiff_t>(pixels.size() / 2);
-  std::nth_element(pixels.begin(), middle, pixels.end());
-  return *middle;
-}
 
 // The pose moved by a twist (rotation, translation) about a center.
 Pose moved_by(const Vector6& twist, const Eigen::Vector3d& center, const Pose& pose) {

@@ -56,12 +56,8 @@ class EdgeSearch {
     held_.max_distance = reach;
     held_.max_iterations = 6;
     Eigen::AlignedBox3d box;
-    std::vector<double> pixels;
-    for (const OutlinePoint& edge : edges_) {
-      box.extend(edge.point);
-      pixels.push_back(edge.pixel);
-    }
-    pixel_ = median_of(pixels);
+    for (const OutlinePoint& edge : edges_) box.extend(edge.point);
+    pixel_ = median_pixel(edges_);
     // Outlines that the image cuts off slide along themselves.
     const bool is_cut =
         is_cut_off(outlines.depth, outlines.camera) || is_cut_off(outlines.before.depth, outlines.camera);
