@@ -68,11 +68,11 @@ TEST_CASE("the order holds each finite row once, by the curve, the same for any 
     CHECK(std::set<std::uint32_t>(order.rows.begin(), order.rows.end()).size() == 19998);
     std::uint64_t last = 0;
     for (std::size_t i = 0; i < order.rows.size(); ++i) {
-      std::uint32_t cells[3];
-      for (int axis = 0; axis < 3; ++axis) {
-        cells[axis] = static_cast<std::uint32_t>((points(order.rows[i], axis) - lattice.origin[axis]) / cell);
-      }
       if (cell > 1e-7) {  // finer ones than the lattice has
+        std::uint32_t cells[3];
+        for (int axis = 0; axis < 3; ++axis) {
+          cells[axis] = static_cast<std::uint32_t>((points(order.rows[i], axis) - lattice.origin[axis]) / cell);
+        }
         const std::uint64_t index = hilbert_index(cells, lattice.num_bits);
         CHECK(index >= last);
         if (index == last && i > 0) CHECK(order.rows[i] > order.rows[i - 1]);
