@@ -52,6 +52,11 @@ Eigen::Vector2d undistort(const Eigen::Vector2d& distorted, const Camera::Distor
   return found ? undistorted : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
 }
 
+// The largest |x / z| of the rays of a row, or |y / z| of a column, of `size` pixels.
+double steepest_ray(int size, double focal_length, double centre) {
+  return std::max(std::abs(centre), std::abs(size - 1 - centre)) / std::abs(focal_length);
+}
+
 // Vectors may read beyond the last value.
 std::size_t padded(std::size_t size) { return size + 15; }
 
@@ -102,6 +107,9 @@ Camera Camera::pinhole(int width, int height, double fx, double fy, double cx, d
   require(std::isfinite(cx), "cx", "finite", cx);
   require(std::isfinite(cy), "cy", "finite", cy);
   for (const double coefficient : distortion) require(std::isfinite(coefficient), "distortion", "finite", coefficient);
+  constexpr const char* finite_rays = "a focal length that leaves the rays of all pixels finite";
+  require(steepest_ray(width, fx, cx) <= std::numeric_limits<float>::max(), "fx", finite_rays, fx);
+  require(steepest_ray(height, fy, cy) <= std::numeric_limits<float>::max(), "fy", finite_rays, fy);
 
   Camera camera;
   camera.model_ = Model::pinhole;

@@ -99,6 +99,8 @@ def test_project_takes_any_layout():
         ({"height": -4}, "height must be"),
         ({"fx": 0}, "fx must be a finite focal length in pixels, not 0, got 0"),
         ({"fy": float("nan")}, "fy must be"),
+        ({"fx": 1e-300}, "fx must be a focal length that leaves the rays of all pixels finite, got 1e-300"),
+        ({"cy": -1e300}, "fy must be a focal length that leaves the rays"),
         ({"cx": float("inf")}, "cx must be finite"),
         ({"cy": float("nan")}, "cy must be finite"),
         ({"distortion": (1.0, 2.0)}, "distortion must be the 4 or 5 coefficients k1 k2 p1 p2"),
