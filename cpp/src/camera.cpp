@@ -11,6 +11,8 @@ namespace {
 void check_size(int width, int height) {
   require(width > 0 && width <= 1 << 16, "width", "1 to 65536 pixels", width);
   require(height > 0 && height <= 1 << 16, "height", "1 to 65536 pixels", height);
+  require(height <= (1 << 28) / width, "height", "of an image of at most 2^28 pixels",
+          height);  // int has their indices
 }
 
 // Normalised coordinates (x / z, y / z) of an undistorted ray to those of the distorted image, Brown-Conrady.

@@ -216,7 +216,7 @@ IcpResult determine_by_color(const IcpTarget& target, const IcpSource& source, c
   Basis known;
   IcpResult result = geometric;
   for (const bool restricted : {false, true}) {
-    const IcpResult found = search.run(levels, geometric, restricted ? &known : nullptr);
+    IcpResult found = search.run(levels, geometric, restricted ? &known : nullptr);
     const std::vector<ColorPair> pairs = search.match(levels.back(), found.target_from_source, found.center);
     const bool still_fits = found.num_inliers > 0.8 * geometric.num_inliers;
     if (pairs.size() < ColorSearch::fewest || !still_fits || search.correlation() < least_correlation) return geometric;

@@ -105,7 +105,7 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
         }
         observer.observe_and_cover(block, sheet_cosine);
         for (int k = 0; k < block.size(); ++k) {
-          const int j = seen[k];
+          const int j = seen[k];  // NOLINT(clang-analyzer-core.uninitialized.Assign): filled with the block
           const std::size_t i = first + static_cast<std::size_t>(j);
           const Observation observed = block[k];
           if (observed.weight > least_weight * observer.frontal_weight(block.sigma(k))) {

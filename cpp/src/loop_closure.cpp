@@ -110,6 +110,7 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
   std::sort(in_question.begin(), in_question.end());
   in_question.resize(std::min(in_question.size(), most_candidates));
   std::vector<int> candidates;
+  candidates.reserve(in_question.size());
   for (const auto& [part, k] : in_question) candidates.push_back(k);
   std::optional<Match> found = match(frame, key.cloud, candidates);
   const double tolerance = std::max(frame.spacing, static_cast<double>(median_sigma(frame.frame)));
@@ -290,7 +291,7 @@ std::vector<Pose> LoopClosure::close(const std::vector<Match>& matches, double d
     graph_.set_poses(before);
     return {};
   }
-  const std::vector<Pose> motions = corrections(before, frame + 1);
+  std::vector<Pose> motions = corrections(before, frame + 1);
   for (Stop& stop : stops_) stop.pose = motions[static_cast<std::size_t>(stop.frame)] * stop.pose;
   return motions;
 }

@@ -52,7 +52,7 @@ std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& regio
 }
 
 Pose ObjectView::foot() const {
-  const Eigen::Vector3d middle = points.colwise().mean().transpose().cast<double>();
+  Eigen::Vector3d middle = points.colwise().mean().transpose().cast<double>();
   Pose camera_from_foot = Pose::Identity();
   const Eigen::Vector3d x = support.normal.unitOrthogonal();
   camera_from_foot.linear() << x, support.normal.cross(x), support.normal;

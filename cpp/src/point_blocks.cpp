@@ -1,6 +1,7 @@
 #include "point_blocks.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -55,6 +56,7 @@ PointBlocks::PointBlocks(const Cloud& points, CellOrder order, const Scaling& sc
   const std::int64_t stride = points.outerStride();
   parallel_for(num_blocks(), size * nodes_per_task, num_threads, [&](std::int64_t block) {
     const std::int64_t count = end(block) - begin(block);
+    assert(count > 0);
     double places[3][size];
     for (std::int64_t i = 0; i < count; ++i) {
       const Scalar* const point = data + row(begin(block) + i) * stride;

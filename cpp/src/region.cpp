@@ -128,6 +128,7 @@ void draw_group(const Frame& frame, const CoarseFrame& coarse, const Camera& cam
                 std::int32_t chosen, const std::vector<SupportPlane>& planes, const RegionOptions& options,
                 int num_threads, MaskImage& mask) {
   std::vector<PlaneCut> cuts;
+  cuts.reserve(planes.size());
   for (const SupportPlane& plane : planes) cuts.emplace_back(plane, options.plane_margin);
   parallel_for(frame.height, rows_per_block(frame.width), num_threads, [&](std::int64_t v) {
     for (int u = 0; u < frame.width; ++u) {

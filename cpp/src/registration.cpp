@@ -238,7 +238,7 @@ AlignCloud::AlignCloud(const PointsRef& points_in, const PointsRef& normals_in, 
 
 IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options) {
   // What pairs know of a direction shows at the end only: while source and target are apart their normals disagree.
-  const IcpResult free = iterate(target, source, initial, options, false);
+  IcpResult free = iterate(target, source, initial, options, false);
   if (free.status != AlignStatus::too_few_pairs && free.weak_directions.cols() == 0) return free;
   return iterate(target, source, initial, options, true);
 }
@@ -254,7 +254,7 @@ AlignResult align(const AlignCloud& source, const AlignCloud& target, const Pose
   require_rigid(initial, "initial");
   const IcpTarget prepared_target(target, options);
   const IcpSource prepared_source(source, options);
-  const IcpResult result = align_to(prepared_target, prepared_source, initial, options);
+  IcpResult result = align_to(prepared_target, prepared_source, initial, options);
   const bool has_colors = source.brightness.size() > 0 && target.brightness.size() > 0;
   if (result.weak_directions.cols() == 0 || !has_colors) return result;
   return determine_by_color(prepared_target, prepared_source, BrightCloud(target.points, target.brightness),

@@ -104,6 +104,7 @@ struct JointEquations {
 std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const MotionBasis& motions, double tolerance,
                                double weak_threshold, int num_threads) {
   std::vector<Pose> poses;
+  poses.reserve(views.size());
   for (const AdjustableView& view : views) poses.push_back(view.world_from_camera);
   if (views.size() < 3) return poses;
   AlignOptions options;

@@ -97,6 +97,7 @@ def test_project_takes_any_layout():
     [
         ({"width": 0}, "width must be 1 to 65536 pixels, got 0"),
         ({"height": -4}, "height must be"),
+        ({"width": 65536, "height": 65536}, "height must be of an image of at most 2"),
         ({"fx": 0}, "fx must be a finite focal length in pixels, not 0, got 0"),
         ({"fy": float("nan")}, "fy must be"),
         ({"fx": 1e-300}, "fx must be a focal length that leaves the rays of all pixels finite, got 1e-300"),

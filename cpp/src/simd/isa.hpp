@@ -27,6 +27,7 @@ Signature* choose([[maybe_unused]] Signature* baseline, [[maybe_unused]] Signatu
 
 // Declares a kernel of a function type: name() is a pointer to the one to call. The file that defines it, in the
 // namespace NACRE_ISA, is compiled once for each instruction set.
+// NOLINTBEGIN(bugprone-macro-parentheses): names
 #ifdef NACRE_SIMD_X86
 #define NACRE_DECLARE_KERNEL(Signature, name) \
   namespace baseline {                        \
@@ -46,3 +47,4 @@ Signature* choose([[maybe_unused]] Signature* baseline, [[maybe_unused]] Signatu
   }                                           \
   inline Signature* name() { return baseline::name; }
 #endif
+// NOLINTEND(bugprone-macro-parentheses)

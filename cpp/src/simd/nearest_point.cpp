@@ -84,7 +84,7 @@ void nearest_alone(const BlockTreeView<float>& tree, PointGroup& group) {
   for (int i = 1; i < blocks.count; ++i) first = blocks.d2[i] < blocks.d2[first] ? i : first;
   float least = INFINITY, beyond = group.radius2;
   if (blocks.count > 0) {
-    look_at(tree, blocks.number[first], x, y, z, found);
+    look_at(tree, blocks.number[first], x, y, z, found);  // NOLINT(clang-analyzer-core.CallAndMessage): counted
     least = least_of(found.least);
   }
   for (int i = 0; i < blocks.count; ++i) {

@@ -47,6 +47,7 @@ void nearest_pixels(const float* __restrict u, const float* __restrict v, int co
     const bool is_inside = (u[i] > -0.5F) & (v[i] > -0.5F) & (u[i] < right + 0.5F) & (v[i] < bottom + 0.5F);
     const float column = u[i] > 0.0F ? (u[i] < right ? u[i] : right) : 0.0F;
     const float row = v[i] > 0.0F ? (v[i] < bottom ? v[i] : bottom) : 0.0F;
+    // NOLINTNEXTLINE(bugprone-incorrect-roundings): half-way between two pixels either will do
     const int32_t nearest = static_cast<int32_t>(row + 0.5F) * width + static_cast<int32_t>(column + 0.5F);
     pixel[i] = u[i] == u[i] ? nearest : -1;
     inside[i] = is_inside;
