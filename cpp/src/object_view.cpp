@@ -52,7 +52,7 @@ std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& regio
 }
 
 Pose ObjectView::foot() const {
-  Eigen::Vector3d middle = points.colwise().mean().transpose().cast<double>();
+  const Eigen::Vector3d middle = points.colwise().mean().transpose().cast<double>();
   Pose camera_from_foot = Pose::Identity();
   const Eigen::Vector3d x = support.normal.unitOrthogonal();
   camera_from_foot.linear() << x, support.normal.cross(x), support.normal;
@@ -61,7 +61,7 @@ Pose ObjectView::foot() const {
 }
 
 Eigen::Vector3d ObjectView::body() const {
-  const Eigen::Vector3d middle = points.colwise().mean().transpose().cast<double>();
+  Eigen::Vector3d middle = points.colwise().mean().transpose().cast<double>();
   const Eigen::Vector3d level = middle - support.normal.dot(middle) * support.normal;
   if (!(level.norm() > 1e-6 * middle.norm())) return middle;
   const Eigen::Vector3d away = level.normalized(), side = support.normal.cross(away);

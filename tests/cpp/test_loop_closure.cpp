@@ -172,6 +172,11 @@ void append(PointModel& model, const PointModel& more) {
   model.last_seen.insert(model.last_seen.end(), more.last_seen.begin(), more.last_seen.end());
   model.sightings.insert(model.sightings.end(), more.sightings.begin(), more.sightings.end());
   model.violations.insert(model.violations.end(), more.violations.begin(), more.violations.end());
+  model.colors.insert(model.colors.end(), more.colors.begin(), more.colors.end());
+  for (std::size_t k = 0; k < model.attributes.size(); ++k) {
+    std::vector<float>& values = model.attributes[k].values;
+    values.insert(values.end(), more.attributes[k].values.begin(), more.attributes[k].values.end());
+  }
 }
 
 }  // namespace
@@ -417,6 +422,27 @@ TEST_CASE("two layers of one surface become one, weighted by confidence") {
     CHECK(model.confidence[i] == 4.0F);
     CHECK(model.last_seen[i] == 50);
     CHECK(model.sightings[i] == 255);
+  }
+}
+
+TEST_CASE("what two layers carry is averaged by confidence, and what one has alone is kept") {
+  constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+  const auto carrying = [](PointModel model, float value) {
+    model.colors.assign(400, Eigen::Vector3f::Constant(value));
+    model.attributes = {{"heat", 2, std::vector<float>(800, value)}};
+    return model;
+  };
+  PointModel model = carrying(plane(0.0F, 0, 3.0F), 10.0F), newer = carrying(plane(0.0F, 50, 1.0F), 50.0F);
+  model.colors[1].fill(nan), model.attributes[0].values[2 * 1 + 1] = nan;  // never seen by the older layer
+  newer.colors[2].fill(nan), newer.attributes[0].values[2 * 2] = nan;      // nor by the newer one
+  append(model, newer);
+  merge_layers(model, 10, 0.01, [](const Eigen::Vector3f&) { return 0.01; });
+  REQUIRE(model.size() == 400);
+  for (std::size_t i = 0; i < 400; ++i) {
+    CAPTURE(i);
+    CHECK(model.colors[i].y() == doctest::Approx(i == 1 ? 50.0 : i == 2 ? 10.0 : 20.0));
+    CHECK(model.attributes[0].values[2 * i] == doctest::Approx(i == 2 ? 10.0 : 20.0));
+    CHECK(model.attributes[0].values[2 * i + 1] == doctest::Approx(i == 1 ? 50.0 : 20.0));
   }
 }
 
