@@ -95,3 +95,17 @@ def test_parameters_and_results_can_be_pickled(model: nacre.Model) -> None:
         assert pickle.loads(pickle.dumps(thing)) == thing
     found = nacre.align(model.points, model.points)
     assert np.array_equal(pickle.loads(pickle.dumps(found)).target_from_source, found.target_from_source)
+
+
+def test_reports_are_a_sequence(model: nacre.Model) -> None:
+    reports = model.frames
+    assert reports[-2:] == reports[:2] == (reports[0], reports[1])
+    assert reports == model.frames
+    assert reports != reports[:1]
+    assert reports != [reports[0], reports[1]]
+    assert repr(reports) == "FrameReports(2 frames)"
+    assert pickle.loads(pickle.dumps(reports)) == tuple(reports)
+    with pytest.raises(TypeError, match="no hash"):
+        hash(reports)
+    with pytest.raises(IndexError):
+        reports[2]
