@@ -70,6 +70,32 @@ def test_a_missed_limit_is_an_error() -> None:
         run("soak.py", "--scene", "static", "--frames", "60", "--not", "p99_ratio", "--sigma", "0.03")
 
 
+def test_the_load_program_tells_a_slower_model_from_a_slower_machine() -> None:
+    code = """
+    import sys, time
+    sys.path.insert(0, sys.argv[1])
+    import nacre
+    from soak import soak
+    real = nacre.Model.add_frame
+    calls = 0
+    def slower(model, depth, color):
+        global calls
+        calls += 1
+        report = real(model, depth, color)
+        end = time.process_time() + 0.0005 * (report.index if sys.argv[2] == "model" else calls)
+        while time.process_time() < end:
+            pass
+        return report
+    nacre.Model.add_frame = slower
+    outcome = soak("static", 60, 64, 4000, 0.002)
+    missed = [words.split()[0] for words in outcome.missed([])]
+    assert ("p99_ratio" in missed) == (sys.argv[2] == "model"), outcome
+    """
+    program = "\n".join(line.removeprefix("    ") for line in code.splitlines())
+    for cause in ("model", "machine"):
+        subprocess.run([sys.executable, "-c", program, str(BENCHMARKS), cause], check=True)
+
+
 def test_models_come_and_go_and_others_live_beside_them() -> None:
     said = run("life.py", "--cycles", "60", "--seconds", "2", "--busy")
     assert "two models in two threads have the bits of each alone: True" in said
