@@ -67,6 +67,8 @@ class Outcome:
             if not getattr(self, name) <= LIMITS[name]
         ]
         found += [f"{self.frames_above_cap} frames above the cap"] * (self.frames_above_cap > 0)
+        if self.scene != "object" and self.tracked < self.frames:
+            found.append(f"{self.frames - self.tracked} frames not tracked")
         return found
 
 
