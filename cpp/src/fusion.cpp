@@ -34,8 +34,12 @@ bool same_surface(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, c
 
 // What of the image the model knows.
 struct Known {
+  struct Point {
+    std::size_t point;
+    std::int32_t pixel;
+  };
   PixelSet covered;  // pixels whose surface the model has
-  PixelIndex points;
+  std::vector<Point> points;
 };
 
 struct NewPoint {
@@ -44,6 +48,7 @@ struct NewPoint {
   Eigen::Vector3f color = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
   float weight = 0.0F;
   float spacing = 0.0F;  // to its neighbours [m]
+  int reach = 0;         // as far may they be in the image [pixels]
   PixelWindow cover;
 };
 
@@ -59,6 +64,13 @@ std::vector<T> concatenate(const std::vector<std::vector<T>>& parts) {
   return all;
 }
 
+// Whether a point beside the image stands for surface within it: where points are farther apart than windows reach.
+bool reaches_image(const ModelView::Block& points, int i, const Camera& camera, double spacing) {
+  const double reach = spacing / camera.footprint(points.z[i]);
+  return reach > simd::largest_window && points.u[i] > -reach && points.u[i] < camera.width() - 1 + reach &&
+         points.v[i] > -reach && points.v[i] < camera.height() - 1 + reach;
+}
+
 // Moves the model's points by what the frame says about them.
 Known update(PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
              const Pose& world_from_camera, double spacing, std::int32_t frame_index, const FusionOptions& options,
@@ -72,7 +84,9 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
     std::int32_t pixel;
     PixelWindow window;
   };
-  std::vector<std::vector<Cover>> covers(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
+  const auto num_blocks = static_cast<std::size_t>((model.size() + block_size - 1) / block_size);
+  std::vector<std::vector<Cover>> covers(num_blocks);
+  std::vector<std::vector<Known::Point>> beside(num_blocks);  // the image
 
   parallel_blocks(
       model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
@@ -91,6 +105,9 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
         ObservationBlock block;
         int seen[block_size];  // of the points
         for (int j = 0; j < static_cast<int>(end - begin); ++j) {
+          if (!points.inside[j] && reaches_image(points, j, camera, spacing)) {
+            beside[static_cast<std::size_t>(number)].push_back({first + static_cast<std::size_t>(j), points.pixel[j]});
+          }
           if (!points.inside[j] || !(points.facing[j] > least_facing)) continue;
           const float measured_sigma = frame.sigma[points.pixel[j]];
           const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
@@ -128,15 +145,22 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
         }
       });
 
-  Known known{PixelSet(frame.width, frame.height), PixelIndex(frame.width, frame.height)};
+  Known known{PixelSet(frame.width, frame.height), concatenate(beside)};
   for (const std::vector<Cover>& block : covers) {
     report.num_updated += static_cast<std::int64_t>(block.size());
     for (const Cover& cover : block) {
       known.covered.insert(cover.window);
-      known.points.add(cover.pixel, cover.point);
+      known.points.push_back({cover.point, cover.pixel});
     }
   }
   return known;
+}
+
+// How far the neighbours of a point may be in the image: beyond the pixels that it covers where those are few.
+int reach_of(const NewPoint& point, const Camera& camera) {
+  const double pixels = std::ceil(static_cast<double>(point.spacing) / camera.footprint(point.point.z()));
+  const int largest = std::max(camera.width(), camera.height());
+  return std::max(point.cover.num_rows / 2, pixels < largest ? static_cast<int>(pixels) : largest) + 1;
 }
 
 // The frame's surface where the model does not cover it, denoised.
@@ -182,6 +206,7 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
       if (observer.has_colors()) candidate.color = observed.color;
       candidate.weight = observed.weight;
       candidate.cover = block.cover(k);
+      candidate.reach = reach_of(candidate, camera);
       candidates[kept++] = candidate;
     }
     candidates.resize(kept);
@@ -193,18 +218,24 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
 // pixels rule most of them out at once, by what was measured; the others are compared as they are, without the noise.
 void insert(PointModel& model, const std::vector<NewPoint>& candidates, Known& known, const Frame& frame,
             const Pose& world_from_camera, std::int32_t frame_index, bool with_colors, FusionReport& report) {
+  if (candidates.empty()) return;
   const Eigen::Isometry3f to_world(world_from_camera.cast<float>());
+  int farthest = 0;
+  for (const NewPoint& candidate : candidates) farthest = std::max(farthest, candidate.reach);
+  constexpr int squares_across = 8;  // of a reach
+  PixelIndex points(frame.width, frame.height, std::max(1, farthest / squares_across));
+  for (const Known::Point& seen : known.points) points.add(seen.pixel, seen.point);
   for (const NewPoint& candidate : candidates) {
     if (known.covered.contains(candidate.row % frame.width, candidate.row / frame.width)) continue;
     known.covered.insert(candidate.cover);
     const Eigen::Vector3f point = to_world * candidate.point;
     const Eigen::Vector3f normal = to_world.linear() * candidate.normal;
     const float largest_offset = std::max(candidate.spacing, 3.0F * frame.sigma[candidate.row]);
-    const bool is_known = known.points.any_near(candidate.row, candidate.cover.num_rows / 2 + 1, [&](std::size_t i) {
+    const bool is_known = points.any_near(candidate.row, candidate.reach, [&](std::size_t i) {
       return same_surface(point, normal, model.points[i], model.normals[i], candidate.spacing, largest_offset);
     });
     if (is_known) continue;
-    known.points.add(candidate.row, model.points.size());
+    points.add(candidate.row, model.points.size());
     model.points.push_back(point);
     model.normals.push_back(normal);
     if (with_colors) model.colors.push_back(candidate.color);

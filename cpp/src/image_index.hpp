@@ -38,28 +38,29 @@ class PixelSet {
   std::vector<std::uint64_t> bits_;
 };
 
-// Which points are at the pixels of an image.
+// Which points are at the pixels of an image, in squares of so many pixels a side.
 class PixelIndex {
  public:
-  PixelIndex(int width, int height)
+  PixelIndex(int width, int height, int side)
       : width_(width),
-        height_(height),
-        newest_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), nobody) {}
+        side_(side),
+        columns_((width + side - 1) / side),
+        rows_((height + side - 1) / side),
+        newest_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), nobody) {}
 
   void add(std::int32_t pixel, std::size_t point) {
-    std::int32_t& newest = newest_[static_cast<std::size_t>(pixel)];
+    std::int32_t& newest = newest_at(pixel % width_ / side_, pixel / width_ / side_);
     entries_.push_back({point, newest});
     newest = static_cast<std::int32_t>(entries_.size()) - 1;
   }
 
-  // Whether test(point) holds for a point at one of the pixels around one.
+  // Whether test(point) holds for a point of a square that has a pixel at most `reach` from one.
   template <class Test>
   bool any_near(std::int32_t pixel, int reach, Test&& test) const {
     const int u = pixel % width_, v = pixel / width_;
-    for (int y = std::max(0, v - reach); y <= std::min(height_ - 1, v + reach); ++y) {
-      for (int x = std::max(0, u - reach); x <= std::min(width_ - 1, u + reach); ++x) {
-        for (std::int32_t i = newest_[static_cast<std::size_t>(y * width_ + x)]; i != nobody;
-             i = entries_[static_cast<std::size_t>(i)].older) {
+    for (int y = std::max(0, v - reach) / side_; y <= std::min(rows_ - 1, (v + reach) / side_); ++y) {
+      for (int x = std::max(0, u - reach) / side_; x <= std::min(columns_ - 1, (u + reach) / side_); ++x) {
+        for (std::int32_t i = newest_at(x, y); i != nobody; i = entries_[static_cast<std::size_t>(i)].older) {
           if (test(entries_[static_cast<std::size_t>(i)].point)) return true;
         }
       }
@@ -71,9 +72,12 @@ class PixelIndex {
   static constexpr std::int32_t nobody = -1;
   struct Entry {
     std::size_t point;
-    std::int32_t older;  // entry of the same pixel
+    std::int32_t older;  // entry of the same square
   };
-  int width_, height_;
+  std::int32_t& newest_at(int x, int y) { return newest_[static_cast<std::size_t>(y * columns_ + x)]; }
+  std::int32_t newest_at(int x, int y) const { return newest_[static_cast<std::size_t>(y * columns_ + x)]; }
+
+  int width_, side_, columns_, rows_;
   std::vector<std::int32_t> newest_;
   std::vector<Entry> entries_;
 };

@@ -117,6 +117,20 @@ TEST_CASE("an exact plane stays exact, covered at the spacing") {
   for (const Eigen::Vector3f& n : model.normals) CHECK(n.dot(normal) > 0.9999F);
 }
 
+TEST_CASE("a spacing of many pixels is kept too, from frame to frame") {
+  for (const double wide : {0.006, 0.008, 0.02, 0.5}) {  // 6 to 500 pixels
+    CAPTURE(wide);
+    PointModel model;
+    for (int frame = 0; frame < 4; ++frame) {
+      const Pose pose = shifted(0.011 * frame, -0.007 * frame, 0.0);
+      const auto moved = [&](double x, double y) { return slope(x + 0.011 * frame, y - 0.007 * frame); };
+      fuse(model, to_frame(image_of(moved), 1e-5), camera(), pose, wide, frame);
+      CHECK(least_distance_on_a_sheet(model) > 0.999 * wide);
+    }
+    CHECK(static_cast<double>(model.size()) >= 0.6 * 0.1 * 0.08 / (wide * wide));
+  }
+}
+
 TEST_CASE("a steep surface is covered like one that faces the camera") {
   // At 65 degrees a pixel says two fifths of what one from the front says, and there are fewer.
   for (const double degrees : {0.0, 45.0, 55.0, 65.0}) {
