@@ -1,122 +1,29 @@
-"""Recordings: every format is recognised and read, and what is missing is told."""
+"""Every format of recordings is recognised and read."""
 
 import json
 import logging
 import os
-import pickle
-import tracemalloc
 
 import numpy as np
 import pytest
+from recording_folders import (
+    SMALL,
+    check_depth,
+    colors,
+    matrix_lines,
+    pose,
+    tum_line,
+    write_icl_nuim,
+    write_plain,
+    write_redwood,
+    write_seven_scenes,
+    write_tum,
+    write_views,
+)
 
 import nacre
-from nacre import Camera, FileFormatError, open_sequence, write_recording
-from nacre.io.images import write_color_png, write_depth_png
-from nacre.io.trajectories import matrix_from_quaternion, quaternion_from_matrix
-
-WIDTH, HEIGHT = 640, 480
-SMALL = Camera(width=8, height=6, fx=10, fy=11, cx=3.5, cy=2.5)
-
-
-def stored(index, shape=(HEIGHT, WIDTH)):
-    """Return a depth image that says which one it is, with pixels without a measurement."""
-    image = np.full(shape, 5000 + index, dtype=np.uint16)
-    image[0, :2] = 0, 65535
-    return image
-
-
-def colors(index, shape=(HEIGHT, WIDTH)):
-    return np.full((*shape, 3), (index, 100, 200), dtype=np.uint8)
-
-
-def pose(index):
-    result = np.eye(4)
-    result[:3, :3] = matrix_from_quaternion([0.1 * index, -0.2, 0.3, 1.0])
-    result[:3, 3] = 0.1 * index, 0.2, -0.3
-    return result
-
-
-def tum_line(time, matrix):
-    return (
-        " ".join(f"{x:.9f}" for x in (time, *matrix[:3, 3], *quaternion_from_matrix(matrix[:3, :3]))) + "\n"
-    )
-
-
-def matrix_lines(matrix):
-    return "".join(" ".join(f"{x:.9f}" for x in row) + "\n" for row in matrix)
-
-
-def write_views(folder, names, depth="depth", color=None, shape=(HEIGHT, WIDTH)):
-    (folder / depth).mkdir(parents=True, exist_ok=True)
-    for index, name in enumerate(names):
-        write_depth_png(folder / depth / f"{name}.png", stored(index, shape))
-    if color is not None:
-        (folder / color).mkdir(exist_ok=True)
-        for index, name in enumerate(names):
-            write_color_png(folder / color / f"{name}.png", colors(index, shape))
-
-
-def write_tum(folder, comment="# file: 'rgbd_dataset_freiburg3_teddy.bag'\n", truth=True):
-    times = [100.0 + 0.1 * i for i in range(4)]
-    write_views(folder, [f"{t:.6f}" for t in times], color="rgb")
-    header = "# timestamp filename\n"
-    (folder / "depth.txt").write_text(header + "".join(f"{t:.6f} depth/{t:.6f}.png\n" for t in times))
-    # The second colour image is too late for its depth image.
-    late = [t + (0.05 if i == 1 else 0.01) for i, t in enumerate(times)]
-    lines = [f"{stamp:.6f} rgb/{t:.6f}.png\n" for stamp, t in zip(late, times, strict=True)]
-    (folder / "rgb.txt").write_text(header + "".join(lines))
-    if truth:
-        ends = [(t + shift, pose(i)) for i, t in enumerate(times[:3]) for shift in (-0.01, 0.01)]
-        (folder / "groundtruth.txt").write_text(comment + "".join(tum_line(*end) for end in ends))
-    return folder
-
-
-def write_redwood(folder, color="image"):
-    write_views(folder, [f"{i:05d}" for i in range(3)], color=color)
-    return folder
-
-
-def write_seven_scenes(folder):
-    folder.mkdir(parents=True, exist_ok=True)
-    for i in range(3):
-        write_depth_png(folder / f"frame-{i:06d}.depth.png", stored(i))
-        write_color_png(folder / f"frame-{i:06d}.color.png", colors(i))
-        text = matrix_lines(pose(i)) if i != 1 else "-1.#IND " * 4 + "\n"
-        (folder / f"frame-{i:06d}.pose.txt").write_text(text)
-    return folder
-
-
-def write_icl_nuim(folder):
-    write_views(folder, ["0", "1", "2"], color="rgb")
-    (folder / "associations.txt").write_text(
-        "".join(f"{i} depth/{i}.png {i} rgb/{i}.png\n" for i in range(3))
-    )
-    (folder / "livingRoom1.gt.freiburg").write_text("".join(tum_line(i, pose(i)) for i in (1, 2)))
-    return folder
-
-
-def write_plain(folder, suffix=".png"):
-    frames = [stored(i, (6, 8)) for i in range(3)]
-    (folder / "depth").mkdir(parents=True)
-    nacre.write_camera(folder / "camera.json", SMALL, 1000)
-    for i, frame in enumerate(frames):
-        path = folder / "depth" / f"view{i}{suffix}"
-        if suffix == ".png":
-            write_depth_png(path, frame)
-        elif suffix == ".npy":
-            np.save(path, frame.astype(np.float32))
-        else:
-            path.write_bytes(b"P5 8 6 65535\n" + frame.astype(">u2").tobytes())
-    return folder
-
-
-def check_depth(frame, expected):
-    assert frame.depth.dtype == np.float32
-    assert np.isnan(frame.depth[0, :2]).all()
-    np.testing.assert_allclose(frame.depth[1:], expected, rtol=1e-6)
-
-
-# --- formats ------------------------------------------------------------------------------------------------
+from nacre import Camera, FileFormatError, open_sequence
+from nacre.io.images import write_color_png
 
 
 def test_tum(tmp_path):
@@ -389,194 +296,6 @@ def test_camera_may_be_a_file(tmp_path):
     assert (
         open_sequence(tmp_path / "a", camera=os.fspath(tmp_path / "my.json"), depth_scale=9).depth_scale == 9
     )
-
-
-# --- the common sequence ------------------------------------------------------------------------------------
-
-
-def test_indices_and_slices(tmp_path):
-    sequence = open_sequence(write_tum(tmp_path / "fr3"))
-    assert sequence[-1].index == 3
-    part = sequence[1::2]
-    assert [frame.index for frame in part] == [1, 3]
-    assert [frame.index for frame in part[::-1]] == [3, 1]
-    assert (part.camera, part.truth, part.name) == (sequence.camera, sequence.truth, sequence.name)
-    assert len(sequence[9:]) == 0
-    with pytest.raises(IndexError):
-        sequence[4]
-
-
-def test_repr(tmp_path):
-    sequence = open_sequence(write_tum(tmp_path / "fr3"))
-    assert repr(sequence) == (
-        "Sequence('fr3', format='tum', frames=4, camera=pinhole 640x480, depth_scale=5000, color, truth)"
-    )
-    assert repr(sequence[0]) == "SequenceFrame(index=0, depth=640x480, timestamp=100.0, color, truth)"
-
-
-def test_a_sequence_can_be_sent_to_another_process(tmp_path):
-    sequence = pickle.loads(pickle.dumps(open_sequence(write_plain(tmp_path / "p"))))
-    check_depth(sequence[1], 5.001)
-
-
-def test_iteration_goes_on_after_a_broken_view(tmp_path):
-    folder = write_plain(tmp_path / "p")
-    path = folder / "depth" / "view1.png"
-    path.write_bytes(path.read_bytes()[:60])
-    sequence = open_sequence(folder)
-    frames = iter(sequence)
-    assert next(frames).index == 0
-    with pytest.raises(FileFormatError, match=r"view1\.png"):
-        next(frames)
-    assert next(frames).index == 2
-    with pytest.raises(StopIteration):
-        next(frames)
-    assert sequence[2].index == 2
-
-
-@pytest.mark.parametrize("what", ["depth", "rgb"])
-def test_a_listed_file_that_is_missing_is_named_at_its_view(tmp_path, what):
-    folder = write_tum(tmp_path / "fr3")
-    (folder / what / "100.200000.png").unlink()
-    sequence = open_sequence(folder)
-    assert len(sequence) == 4
-    with pytest.raises(FileFormatError, match=r"100\.200000\.png.*cannot be read"):
-        sequence[2]
-    assert sequence[3].color is not None
-
-
-def test_a_broken_first_view_does_not_hide_the_others(tmp_path):
-    folder = write_plain(tmp_path / "p")
-    (folder / "depth" / "view0.png").write_bytes(b"")
-    assert open_sequence(folder)[1].index == 1
-
-
-def test_views_are_read_when_asked_for(tmp_path):
-    camera = Camera(320, 240, 300, 300, 160, 120)
-    write_recording(tmp_path / "p", camera, (np.full((240, 320), 1.0) for _ in range(30)), depth_scale=1000)
-    sequence = open_sequence(tmp_path / "p")
-    sequence[0]
-    tracemalloc.start()
-    for _ in sequence:
-        pass
-    _, peak = tracemalloc.get_traced_memory()
-    tracemalloc.stop()
-    assert peak < 8 * 320 * 240 * 4
-
-
-# --- errors -------------------------------------------------------------------------------------------------
-
-
-def test_nothing_there(tmp_path):
-    with pytest.raises(FileNotFoundError, match="no such recording"):
-        open_sequence(tmp_path / "nowhere")
-
-
-def test_empty_folder(tmp_path):
-    with pytest.raises(FileFormatError, match="the folder is empty"):
-        open_sequence(tmp_path)
-
-
-def test_unknown_folder_tells_what_was_found_and_what_is_known(tmp_path):
-    (tmp_path / "notes.md").write_text("hello")
-    (tmp_path / "clips").mkdir()
-    with pytest.raises(FileFormatError, match="no known recording") as caught:
-        open_sequence(tmp_path)
-    text = str(caught.value)
-    assert "clips/ (0 entries), notes.md" in text
-    assert all(
-        name in text
-        for name in ("tum: depth.txt", "redwood:", "7-scenes:", "icl-nuim:", "plain: camera.json")
-    )
-
-
-@pytest.mark.parametrize("extra", ["groundtruth.txt", "rgb.txt", None])
-def test_almost_a_tum_recording(tmp_path, extra):
-    folder = write_tum(tmp_path / "fr3")
-    (folder / "depth.txt").unlink()
-    for name in {"groundtruth.txt", "rgb.txt"} - {extra}:
-        (folder / name).unlink()
-    with pytest.raises(FileFormatError, match=r"depth\.txt is missing") as caught:
-        open_sequence(folder)
-    assert "depth/ (4 entries)" in str(caught.value)
-    assert len(open_sequence(folder, camera=Camera(640, 480, 535, 539, 320, 247), depth_scale=5000)) == 4
-
-
-def test_a_folder_too_high(tmp_path):
-    write_seven_scenes(tmp_path / "seq-01")
-    write_seven_scenes(tmp_path / "seq-02")
-    with pytest.raises(FileFormatError, match="Give one of the folders in it: seq-01, seq-02"):
-        open_sequence(tmp_path)
-
-
-def test_a_file_that_is_no_recording(tmp_path):
-    (tmp_path / "a.avi").write_bytes(b"video")
-    with pytest.raises(FileFormatError, match="a recording is a folder"):
-        open_sequence(tmp_path / "a.avi")
-
-
-NAMES = (
-    "tum redwood 7-scenes 7_Scenes icl-nuim stray-scanner rosbag record3d azure-kinect plain stanford images"
-)
-
-
-@pytest.mark.parametrize("name", NAMES.split())
-def test_a_named_format_says_what_it_misses(tmp_path, name):
-    (tmp_path / "notes.md").write_text("hello")
-    with pytest.raises(FileFormatError) as caught:
-        open_sequence(tmp_path, format=name, depth_scale=1000, camera=None if name == "stanford" else SMALL)
-    assert "notes.md" in str(caught.value)
-
-
-def test_a_named_format_is_taken(tmp_path):
-    folder = write_redwood(tmp_path / "r")
-    sequence = open_sequence(folder, format="images", camera=Camera(640, 480, 1, 1, 0, 0), depth_scale=1)
-    assert sequence.format == "images"
-
-
-def test_unknown_format_lists_the_known_ones(tmp_path):
-    with pytest.raises(ValueError, match=r"format must be one of 'rosbag', 'record3d', .* got 'kitti'"):
-        open_sequence(tmp_path, format="kitti")
-
-
-@pytest.mark.parametrize("scale", [0, -1, np.nan, np.inf])
-def test_scale_must_be_positive(tmp_path, scale):
-    with pytest.raises(ValueError, match="depth_scale"):
-        open_sequence(tmp_path, depth_scale=scale)
-
-
-@pytest.mark.parametrize("difference", [-0.1, np.nan])
-def test_difference_must_not_be_negative(tmp_path, difference):
-    with pytest.raises(ValueError, match="max_difference"):
-        open_sequence(tmp_path, max_difference=difference)
-
-
-def test_camera_of_another_size_is_told_at_once(tmp_path):
-    folder = write_redwood(tmp_path / "r")
-    with pytest.raises(FileFormatError, match=r"00000\.png: the image is 640 wide and 480 high.*8 by 6"):
-        open_sequence(folder, camera=SMALL)
-
-
-def test_a_view_of_another_size_is_told(tmp_path):
-    folder = write_plain(tmp_path / "p")
-    write_depth_png(folder / "depth" / "view2.png", stored(2, (12, 16)))
-    sequence = open_sequence(folder)
-    with pytest.raises(FileFormatError, match=r"view2\.png: the image is 16 wide"):
-        sequence[2]
-
-
-def test_color_of_another_size_is_left_out(tmp_path, caplog):
-    folder = write_plain(tmp_path / "p")
-    (folder / "color").mkdir()
-    for i in range(3):
-        write_color_png(folder / "color" / f"view{i}.png", colors(i, (12, 16)))
-    with caplog.at_level(logging.WARNING, logger="nacre"):
-        sequence = open_sequence(folder)
-    assert "colour is left out" in caplog.text
-    assert sequence[0].color is None
-
-
-# --- real recordings ----------------------------------------------------------------------------------------
 
 
 @pytest.mark.data
