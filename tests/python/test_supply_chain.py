@@ -281,3 +281,13 @@ def test_actions_are_pinned_to_commits() -> None:
         line.strip() for line in used if not re.search(r"uses: [\w/-]+@[0-9a-f]{40} # v[\d.]+$", line)
     ]
     assert unpinned == []
+
+
+def test_nothing_is_published_before_every_other_job_has_passed() -> None:
+    workflow = ROOT / ".github" / "workflows" / "wheels.yml"
+    if not workflow.exists():
+        pytest.skip("no workflows: this is no clone of the repository")
+    _, jobs = workflow.read_text().split("\njobs:\n")
+    names = re.findall(r"^  ([\w-]+):", jobs, re.MULTILINE)
+    (needed,) = re.findall(r"^  publish:.*?^    needs: \[(.*?)\]", jobs, re.MULTILINE | re.DOTALL)
+    assert {"publish", *needed.split(", ")} == set(names)
