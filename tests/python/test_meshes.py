@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from broken_files import edited, edits
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -303,17 +304,11 @@ SEEDS = {
 @settings(max_examples=400, deadline=None, derandomize=True)
 @given(
     name=st.sampled_from(sorted(SEEDS)),
-    edits=st.lists(
-        st.tuples(st.integers(0, 600), st.integers(0, 3), st.binary(max_size=4)), min_size=1, max_size=4
-    ),
+    edits=edits(600),
 )
 def test_damaged_files_give_a_mesh_or_a_format_error(tmp_path_factory, name, edits):
-    content = SEEDS[name]
-    for position, removed, inserted in edits:
-        position %= len(content) + 1
-        content = content[:position] + inserted + content[position + removed :]
     try:
-        vertices, triangles = read(tmp_path_factory.getbasetemp(), name, content)
+        vertices, triangles = read(tmp_path_factory.getbasetemp(), name, edited(SEEDS[name], edits))
     except nacre.FileFormatError:
         return
     assert triangles.size == 0 or (triangles.min() >= 0 and triangles.max() < len(vertices))
