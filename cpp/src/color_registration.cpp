@@ -5,23 +5,17 @@
 #include <cmath>
 
 #include "parallel.hpp"
+#include "robust.hpp"
 
 namespace nacre {
 namespace {
 
 constexpr int most_steps = 12;             // at each level
 constexpr double least_correlation = 0.6;  // of the brightnesses, for them to be believed
-constexpr double mad_to_sigma = 1.4826;
-constexpr double least_noise = 1.0;  // of the brightness, on a scale to 255
-constexpr double small_step = 0.01;  // of the target's spacing
+constexpr double least_noise = 1.0;        // of the brightness, on a scale to 255
+constexpr double small_step = 0.01;        // of the target's spacing
 
 using Basis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 // A matched pair: how the brightness changes when the source moves, after the target and after the source.
 struct ColorPair {
@@ -151,8 +145,7 @@ class ColorSearch {
     noise_ = std::max(least_noise, mad_to_sigma * median_of(values));
     double products = 0.0, target_squares = 0.0, source_squares = 0.0;
     for (ColorPair& pair : pairs) {
-      const double ratio = pair.residual / (3.0 * noise_);
-      pair.weight = 1.0 / ((1.0 + ratio * ratio) * (1.0 + ratio * ratio));  // Geman and McClure 1985
+      pair.weight = robust_weight(pair.residual, noise_);
       const double a = pair.target_value - target_middle, b = pair.source_value - source_middle;
       products += pair.weight * a * b;
       target_squares += pair.weight * a * a;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "outline_match.hpp"
+#include "robust.hpp"
 
 namespace nacre {
 namespace {
@@ -53,8 +54,7 @@ OutlineEquations equations_of(const std::vector<OutlinePoint>& edges,
       const OutlinePoint &edge = edges[i], &other = seen[static_cast<std::size_t>(nearest[i])];
       const Eigen::Vector3d across = (edge.outward + other.outward).normalized();
       const double residual = (edge.point - other.point).dot(across);
-      const double ratio = residual / (3.0 * sigma);
-      const double weight = certainty / ((1.0 + ratio * ratio) * (1.0 + ratio * ratio));  // Geman and McClure 1985
+      const double weight = robust_weight(residual, sigma, certainty);
       Vector9 row;
       row << (edge.point - center).cross(across), across, across;
       hessian += weight * row * row.transpose();

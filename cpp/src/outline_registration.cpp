@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "outline_match.hpp"
+#include "robust.hpp"
 
 namespace nacre {
 namespace {
@@ -20,7 +21,6 @@ constexpr double largest_ratio = 0.4;           // residuals to the gate, root m
 constexpr double least_information = 0.1;       // per pair, for a direction to be known: outlines that hardly move
                                                 // with it make much of small errors
 constexpr double least_noise = 0.3;             // pixels are where they are to half a pixel
-constexpr double mad_to_sigma = 1.4826;
 
 using Basis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
@@ -29,12 +29,6 @@ struct EdgePair {
   Eigen::Vector3d target_outward, source_outward;
   double residual, weight = 1.0;
 };
-
-double median_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 struct Fit {
   IcpResult result;
@@ -88,10 +82,7 @@ class EdgeSearch {
     }
     if (pairs.size() < fewest) return {};
     noise_ = std::max(least_noise * pixel_, mad_to_sigma * median_of(sizes));
-    for (EdgePair& pair : pairs) {
-      const double ratio = pair.residual / (3.0 * noise_);
-      pair.weight = 1.0 / ((1.0 + ratio * ratio) * (1.0 + ratio * ratio));  // Geman and McClure 1985
-    }
+    for (EdgePair& pair : pairs) pair.weight = robust_weight(pair.residual, noise_);
     return pairs;
   }
 

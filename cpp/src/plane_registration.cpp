@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "robust.hpp"
+
 namespace nacre {
 namespace {
 
@@ -31,14 +33,8 @@ void weight_robustly(std::vector<Pair>& pairs, double floor) {
   std::vector<double> sizes;
   sizes.reserve(pairs.size());
   for (const Pair& pair : pairs) sizes.push_back(std::abs(residual(pair, Metric::symmetric)));
-  const auto middle = sizes.begin() + static_cast<std::ptrdiff_t>(sizes.size() / 2);
-  std::nth_element(sizes.begin(), middle, sizes.end());
-  const double scale = std::max(floor, 1.4826 * *middle);
-  for (Pair& pair : pairs) {
-    const double ratio = residual(pair, Metric::symmetric) / (3.0 * scale);
-    pair.agreement = 1.0 / ((1.0 + ratio * ratio) * (1.0 + ratio * ratio));
-    pair.weight = pair.agreement;
-  }
+  const double scale = std::max(floor, mad_to_sigma * median_of(std::move(sizes)));
+  for (Pair& pair : pairs) pair.weight = pair.agreement = robust_weight(residual(pair, Metric::symmetric), scale);
 }
 
 IcpResult align_on_plane(const IcpTarget& target, const IcpSource& source, const Pose& initial,

@@ -6,7 +6,7 @@
 
 namespace nacre {
 
-// Weights of Geman and McClure 1985, scaled by the median residual but at least by floor [m].
+// Robust weights, scaled by the median residual but at least by floor [m].
 void weight_robustly(std::vector<Pair>& pairs, double floor);
 
 struct PlaneGates {

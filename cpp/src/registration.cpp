@@ -8,11 +8,10 @@
 #include "color_registration.hpp"
 #include "icp_target.hpp"
 #include "pose_check.hpp"
+#include "robust.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr double mad_to_sigma = 1.4826;  // median absolute deviation of a Gaussian to its standard deviation
 
 template <class Value>
 double median_of(const std::vector<Pair>& pairs, Value&& value) {
@@ -21,13 +20,11 @@ double median_of(const std::vector<Pair>& pairs, Value&& value) {
   std::vector<double> values;
   values.reserve(num_probes);
   for (std::size_t i = 0; i < pairs.size(); i += step) values.push_back(value(pairs[i]));
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return nacre::median_of(std::move(values));
 }
 
-// Weights relative to the median pair; with `robust` also those of Geman and McClure 1985 on the whitened residuals,
-// whose scale is their median absolute value but at least `floor` [m]. Returns that scale [m].
+// Weights relative to the median pair; with `robust` also robust ones of the whitened residuals, whose scale is their
+// median absolute value but at least `floor` [m]. Returns that scale [m].
 double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double floor) {
   const double median_weight = median_of(pairs, [](const Pair& pair) { return pair.weight; });
   for (Pair& pair : pairs) pair.weight /= median_weight;
@@ -35,8 +32,7 @@ double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double
   const double scale = std::max(floor, mad_to_sigma * median_of(pairs, whitened));
   if (robust) {
     for (Pair& pair : pairs) {
-      const double ratio = whitened(pair) / (3.0 * scale);
-      const double agreement = 1.0 / ((1.0 + ratio * ratio) * (1.0 + ratio * ratio));
+      const double agreement = robust_weight(whitened(pair), scale);
       pair.agreement *= agreement;
       pair.weight *= agreement;
     }
