@@ -9,6 +9,7 @@ from typing import Any, cast
 from nacre._core import Camera
 from nacre.datasets import Sequence as Recording
 from nacre.datasets import SequenceFrame, open_sequence
+from nacre.depth_views import DepthViews, shows_one_scene
 from nacre.model import Model, ModelParameters, Preset
 from nacre.reconstruction import FrameRecord, Reconstruction
 
@@ -23,13 +24,13 @@ def reconstruct(
     parameters: ModelParameters | None = None,
     progress: Callable[[FrameRecord], bool | None] | None = None,
     retry: bool = True,
+    calibrate: bool = False,
     **changes: Any,
 ) -> Reconstruction:
     """
     Run a recording through a new model.
 
-    It does what ``nacre reconstruct`` does, without the calibration of systematically wrong depth (see
-    :func:`nacre.calibrate_depth`).
+    With ``calibrate`` it does what ``nacre reconstruct`` does.
 
     Parameters
     ----------
@@ -45,11 +46,17 @@ def reconstruct(
         raise :class:`nacre.Cancelled`, ends the run; what is done is the result, whose ``cancelled`` says so.
     retry : bool
         Whether lost frames are tried again at the end.
+    calibrate : bool
+        Whether depth is corrected where views in several directions show that it is systematically wrong
+        (:func:`nacre.calibrate_depth`): all begins again then, and ``progress`` gets the first frames once
+        more. For one scene that stands still, seen by a pinhole camera with depth along its axis. A run that
+        is cancelled before is not calibrated when it goes on.
 
     Returns
     -------
     Reconstruction
-        With ``model``, ``frames``, ``trajectory``, and ``evaluation`` where the recording knows the truth.
+        With ``model``, ``frames``, ``trajectory``, ``depth_calibration``, and ``evaluation`` where the
+        recording knows the truth.
 
     Raises
     ------
@@ -77,4 +84,17 @@ def reconstruct(
         raise ValueError("source must have at least one frame, got none")
     of_all = frames.camera if isinstance(frames, Recording) else frames[0].camera
     model = Model(of_all, preset, parameters=parameters, **changes)
-    return Reconstruction(frames, model).complete(progress=progress, retry=retry)
+    done = Reconstruction(frames, model)
+    if calibrate:
+        if not shows_one_scene(of_all, model.parameters):
+            raise ValueError(
+                "calibrate must be False for a region, or a camera whose depth is not along the axis of a "
+                f"pinhole, got {calibrate!r}"
+            )
+        views = DepthViews()
+        done._work(views.until_enough(done.run()), progress)
+        if done.cancelled:
+            done.evaluate_trajectory()
+            return done
+        done = views.calibrate(done)
+    return done.complete(progress=progress, retry=retry)

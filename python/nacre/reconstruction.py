@@ -19,8 +19,10 @@ import numpy.typing as npt
 
 from nacre._core import __version__
 from nacre.checkpoint import Checkpointed
+from nacre.datasets.corrected import with_corrected_depth
 from nacre.datasets.sequence import SequenceFrame
 from nacre.depth import PIXEL_LABELS, label_pixels
+from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result, plain, result_dict
@@ -29,7 +31,7 @@ from nacre.frame_report import FrameReport
 from nacre.io.trajectories import Trajectory
 from nacre.model import Model
 from nacre.progress import as_progress
-from nacre.run_state import STATUSES, record_from, record_state
+from nacre.run_state import STATUSES, calibration_from, record_from, record_state
 from nacre.values import Value
 
 if TYPE_CHECKING:
@@ -109,6 +111,8 @@ class Reconstruction(Checkpointed):
         What is known beyond the trajectory's errors, by name; may be added to.
     cancelled : bool
         Whether a progress callback ended :meth:`complete` before its last frame.
+    depth_calibration : DepthCalibration or None
+        What the views told of the depth, where it was asked for; if significant, ``sequence`` is corrected.
     """
 
     def __init__(self, sequence: collections.abc.Sequence[SequenceFrame], model: Model) -> None:
@@ -117,6 +121,7 @@ class Reconstruction(Checkpointed):
         self.frames: list[FrameRecord] = []
         self.evaluation: dict[str, Result] = {}
         self.cancelled = False
+        self.depth_calibration: DepthCalibration | None = None
         self._kept: dict[str, SequenceFrame] = {}  # the first frame of each status
         self._retry: _Retry | None = None
 
@@ -153,14 +158,20 @@ class Reconstruction(Checkpointed):
         Reconstruction
             This one.
         """
+        self._work(itertools.chain(self.run(indices), self.retry_lost() if retry else ()), progress)
+        self.evaluate_trajectory()
+        return self
+
+    def _work(
+        self, frames: Iterable[FrameRecord], progress: Callable[[FrameRecord], bool | None] | None
+    ) -> None:
+        """Have frames done one after the other, as far as the callback wants them."""
         goes_on = as_progress("progress", progress) if progress is not None else None
-        for frame in itertools.chain(self.run(indices), self.retry_lost() if retry else ()):
+        for frame in frames:
             if goes_on is not None and not goes_on(frame):
                 self.cancelled = True
                 _log.info("cancelled after %d frames", len(self.frames))
                 break
-        self.evaluate_trajectory()
-        return self
 
     def run(self, indices: Iterable[int] | None = None) -> Iterator[FrameRecord]:
         """Add frames to the model, those with the given indices or all, and yield each when it is done."""
@@ -206,7 +217,12 @@ class Reconstruction(Checkpointed):
 
     def _checkpoint(self, **more: Any) -> bytes:
         retry = None if self._retry is None else dataclasses.asdict(self._retry)
-        run = {"records": [record_state(record) for record in self.frames], "retry": retry}
+        calibration = self.depth_calibration
+        run = {
+            "records": [record_state(record) for record in self.frames],
+            "retry": retry,
+            "depth_calibration": None if calibration is None else dataclasses.asdict(calibration),
+        }
         return self.model._checkpoint(run=run, **more)
 
     @classmethod
@@ -221,7 +237,7 @@ class Reconstruction(Checkpointed):
         path : path-like
             The file.
         sequence : sequence of SequenceFrame
-            The same recording.
+            The same recording, as it was given: where the run corrects its depth, it is corrected again.
 
         Returns
         -------
@@ -248,6 +264,10 @@ class Reconstruction(Checkpointed):
             done.frames = [record_from(state, reports) for state in run["records"]]
             if run["retry"] is not None:
                 done._retry = _Retry(int(run["retry"]["place"]), bool(run["retry"]["found_any"]))
+            if run["depth_calibration"] is not None:
+                done.depth_calibration = calibration = calibration_from(run["depth_calibration"])
+                if calibration.is_significant:
+                    done.sequence = with_corrected_depth(sequence, calibration)
         except (KeyError, TypeError, ValueError, IndexError) as error:
             raise FileFormatError(path, f"it holds a model, but no run that can go on ({error})") from None
         return done, more

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
 from nacre.frame_report import FrameReport
 
@@ -55,6 +56,11 @@ def record_from(state: Any, reports: Sequence[FrameReport]) -> FrameRecord:
         None if truth is None else pose_from(truth),
         _error_from(state.get("error")),
     )
+
+
+def calibration_from(state: Any) -> DepthCalibration:
+    """Return a calibration of depth that was written as plain values."""
+    return DepthCalibration(float(state["tilt"]), float(state["sigma"]), int(state["num_pairs"]))
 
 
 def pose_from(values: Any) -> npt.NDArray[np.float64]:

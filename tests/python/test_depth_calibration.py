@@ -1,5 +1,6 @@
 """The systematic error of depth that overlapping views give away."""
 
+import dataclasses
 import json
 import math
 
@@ -7,6 +8,8 @@ import numpy as np
 import pytest
 
 import nacre
+from nacre.datasets.corrected import with_corrected_depth
+from nacre.reconstruction import Reconstruction
 
 CAMERA = nacre.Camera(width=320, height=240, fx=260, fy=260, cx=159.5, cy=119.5)
 SIDE = ((np.arange(320) - 159.5) / 260)[None, :]
@@ -154,6 +157,90 @@ def test_reconstruct_leaves_good_depth_alone(room, tmp_path):
         tmp_path / "out" / "trajectory.txt"
     ).read_text()
     assert report["num_tracked"] == same["num_tracked"]
+
+
+@pytest.fixture(scope="module")
+def wrong(room):
+    """The same views as frames, with depth that is wrong."""
+    depths, poses = room
+    return [
+        nacre.SequenceFrame(
+            i, (depth / (1.0 + 0.01 * SIDE * depth)).astype(np.float32), CAMERA, None, None, pose
+        )
+        for i, (depth, pose) in enumerate(zip(depths, poses, strict=True))
+    ]
+
+
+@pytest.fixture(scope="module")
+def corrected(wrong):
+    return nacre.reconstruct(wrong, calibrate=True)
+
+
+def test_one_call_corrects_what_it_finds(wrong, corrected):
+    assert corrected.depth_calibration.is_significant
+    assert corrected.depth_calibration.tilt == pytest.approx(0.01, rel=0.1)
+    right = corrected.depth_calibration.correct(wrong[5].depth, CAMERA)
+    np.testing.assert_array_equal(corrected.sequence[5].depth, right)
+    np.testing.assert_array_equal(corrected.sequence[4:6][1].depth, right)
+    assert len(corrected.frames) == len(wrong)
+    left = nacre.reconstruct(wrong)
+    assert left.depth_calibration is None
+    errors = [done.evaluation["absolute_trajectory_error"].rotation_rmse for done in (corrected, left)]
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_one_call_does_what_the_command_does(wrong, tmp_path):
+    nacre.write_recording(tmp_path / "recording", CAMERA, (frame.depth for frame in wrong), depth_scale=5000)
+    report = reconstruct(tmp_path / "recording", tmp_path / "out")
+    done = nacre.reconstruct(tmp_path / "recording", calibrate=True)
+    assert report["depth_calibration"] == {**dataclasses.asdict(done.depth_calibration), "used": True}
+    np.testing.assert_array_equal(nacre.read_points(tmp_path / "out" / "model.ply").points, done.model.points)
+
+
+def test_a_run_with_corrected_depth_goes_on_from_a_file(wrong, corrected, tmp_path):
+    told = []
+
+    def progress(frame):
+        told.append(frame.index)
+        return len(told) < len(wrong) + 3
+
+    done = nacre.reconstruct(wrong, calibrate=True, progress=progress)
+    assert done.cancelled
+    assert told == [*range(len(wrong)), 0, 1, 2]
+    done.save(tmp_path / "run")
+    other = Reconstruction.load(tmp_path / "run", wrong).complete()
+    assert other.depth_calibration == corrected.depth_calibration
+    np.testing.assert_array_equal(other.model.points, corrected.model.points)
+
+
+def test_a_run_that_is_cancelled_before_has_no_calibration(wrong):
+    done = nacre.reconstruct(wrong, calibrate=True, progress=lambda frame: frame.index < 5)
+    assert done.cancelled
+    assert len(done.frames) == 6
+    assert done.depth_calibration is None
+    assert "absolute_trajectory_error" in done.evaluation
+
+
+def test_a_frame_of_another_size_is_lost_after_a_correction(wrong, corrected):
+    small = dataclasses.replace(wrong[0], depth=wrong[0].depth[::2])
+    frames = with_corrected_depth([wrong[0], small], corrected.depth_calibration)
+    done = Reconstruction(frames, nacre.Model(CAMERA)).complete()
+    assert [frame.status for frame in done.frames] == ["TRACKED", "LOST"]
+    assert done.frames[1].refused
+
+
+@pytest.mark.parametrize(
+    ("camera", "changes"),
+    [
+        (nacre.Camera.orthographic(320, 240, 0.01), {}),
+        (nacre.Camera(320, 240, 260, 260, 159.5, 119.5, depth="radial"), {}),
+        (CAMERA, {"region": {"object": True}}),
+    ],
+)
+def test_one_call_says_where_depth_cannot_be_calibrated(camera, changes):
+    frame = nacre.SequenceFrame(0, np.ones((240, 320), np.float32), camera, None, None, None)
+    with pytest.raises(ValueError, match="calibrate must be False for a region, or a camera"):
+        nacre.reconstruct([frame], calibrate=True, **changes)
 
 
 def test_a_camera_that_does_not_turn_says_nothing(room):

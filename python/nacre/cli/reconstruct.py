@@ -219,22 +219,21 @@ def _begun(
         if asked.realtime:
             feed = real_time_feed(sequence, indices)
     import nacre
-    from nacre.depth_calibration import can_calibrate
+    from nacre.depth_views import shows_one_scene
     from nacre.io.atomic import remove_leftovers
     from nacre.reconstruction import Reconstruction
 
     done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
     writable_folder(out)
     remove_leftovers(out)
-    # What turns before a camera that stands still is not one scene with what is around it.
-    whole = asked.masks is None and parameters.region == nacre.RegionParameters()
-    calibrates = asked.calibrate and feed is None and whole and asked.preset != "paper"
+    whole = feed is None and asked.masks is None and shows_one_scene(sequence.camera, parameters)
+    calibrates = asked.calibrate and whole and asked.preset != "paper"
     unfinished = Unfinished(out, checkpoint_every)
     if unfinished.checkpoint.exists():
         terminal.say(
             f"{out} held an unfinished run, which --resume would have gone on with: it is begun again"
         )
-    unfinished.stage.name = "views" if calibrates and can_calibrate(sequence.camera) else "frames"
+    unfinished.stage.name = "views" if calibrates else "frames"
     unfinished.stage.live = None if feed is None else feed.figures
     unfinished.begin(done, asked.document(sequence))
     return Run(asked, out, done, sequence, unfinished, words, indices, feed)

@@ -99,7 +99,7 @@ def _run_all(terminal: Terminal, run: Run, stop: Interruption, live: LiveView | 
         if run.feed.is_camera and stop.number == signal.SIGINT:
             stop.number = 0  # who stops a camera is content with what it saw
     elif run.indices is not None:
-        done = run_staged(terminal, done, run.sequence, run.indices, run.unfinished, stop, live)
+        done = run_staged(terminal, done, run.indices, run.unfinished, stop, live)
     if run.asked.retry and not stop.wanted:
         retry_lost(terminal, done, stop, watching(done, run.unfinished, None))
     return done
@@ -127,7 +127,7 @@ def _write(run: Run, done: Reconstruction, stop: Interruption) -> dict[str, Any]
     """Write the results; of a run that is stopped without the page, whose pictures take long."""
     done.evaluate_trajectory()
     feed, stage = run.feed, run.unfinished.stage
-    calibration = stage.calibration
+    calibration = done.depth_calibration
     return write_results(
         run.out,
         done,

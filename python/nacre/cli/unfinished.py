@@ -15,7 +15,6 @@ from nacre.cli.journal import Journal, read_journal
 from nacre.cli.terminal import CommandError
 
 if TYPE_CHECKING:
-    from nacre import DepthCalibration
     from nacre.datasets import Sequence
     from nacre.reconstruction import FrameRecord, Reconstruction
 
@@ -36,32 +35,20 @@ class Stage:
         Lost frames are tried again when there are no more.
     views : list of (index, pose)
         That were chosen for the calibration; poses row by row.
-    calibration : DepthCalibration or None
-        That was found.
     live : mapping or None
         What report.json says of a camera.
     """
 
     name: str = "frames"
     views: list[tuple[int, list[float]]] = field(default_factory=list)
-    calibration: DepthCalibration | None = None
     live: Mapping[str, Any] | None = None
-
-    @property
-    def corrects_depth(self) -> bool:
-        """Whether the depth of the recording is corrected."""
-        return self.calibration is not None and self.calibration.is_significant
 
     @classmethod
     def of(cls, state: Any) -> Stage:
         """Return the stage that plain values tell."""
-        from nacre import DepthCalibration
-
-        calibration = state["calibration"]
         return cls(
             str(state["name"]),
             [(int(index), [float(x) for x in pose]) for index, pose in state["views"]],
-            None if calibration is None else DepthCalibration(**calibration),
             state["live"],
         )
 
@@ -122,8 +109,6 @@ class Unfinished:
         except (KeyError, TypeError, ValueError) as error:
             raise FileFormatError(self.checkpoint, f"it is no run of nacre reconstruct ({error})") from None
         self._journal = Journal(self.folder / "journal.txt", num_frames, compare)
-        if self.stage.corrects_depth and self.stage.calibration is not None:
-            done.sequence = sequence.with_depth_calibration(self.stage.calibration)
         return done
 
     def journaled_indices(self) -> list[int]:
