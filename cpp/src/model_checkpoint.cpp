@@ -150,9 +150,35 @@ bool is_sound(const PointModel& cloud, std::size_t num_frames) {
          are_all(cloud.last_seen, [&](std::int32_t frame) { return is_within(frame, num_frames); });
 }
 
-bool is_sound(const FrameReport& report, std::size_t num_frames) {
-  return report.region.support >= -1 && report.region.support < static_cast<int>(report.region.planes.size()) &&
-         (!report.loop_frame || is_within(*report.loop_frame, num_frames));
+// Whether all numbers are counts, of at most so many.
+template <class... Counts>
+bool are_counts(std::int64_t most, Counts... numbers) {
+  return (... && (numbers >= 0 && numbers <= most));
+}
+
+bool is_sound(const DepthReport& depth, std::int64_t num_pixels) {
+  std::int64_t left = num_pixels;  // each pixel is counted once; no sum of numbers that are made up may overflow
+  for (const std::int64_t count : {depth.num_invalid, depth.num_out_of_range, depth.num_masked, depth.num_edge,
+                                   depth.num_slanted, depth.num_isolated, depth.num_kept}) {
+    if (!are_counts(left, count)) return false;
+    left -= count;
+  }
+  return depth.num_pixels == num_pixels && left == 0;
+}
+
+bool is_sound(const RegionReport& region, std::int64_t num_kept) {
+  return are_counts(num_kept, region.num_inside, region.num_outside) &&
+         region.num_inside <= num_kept - region.num_outside && region.support >= -1 &&
+         region.support < static_cast<int>(region.planes.size());
+}
+
+bool is_sound(const FrameReport& report, std::int64_t num_pixels, std::int64_t max_points) {
+  return is_rigid(report.world_from_camera) && is_sound(report.depth, num_pixels) &&
+         is_sound(report.region, report.depth.num_kept) &&
+         are_counts(report.region.num_inside, report.num_inliers, report.fusion.num_inserted) &&
+         are_counts(max_points, report.num_points, report.fusion.num_updated) &&
+         are_counts(max_points + report.fusion.num_inserted, report.fusion.num_removed) &&
+         (!report.loop_frame || is_within(*report.loop_frame, static_cast<std::size_t>(report.index)));
 }
 
 bool is_image(const MaskImage& image, const Camera& camera) {
@@ -167,14 +193,14 @@ bool is_sound(const ObjectView& view, const Camera& camera, std::size_t num_fram
 
 }  // namespace
 
-bool PrivateState::is_sound(const FrameHistory& history) {
+bool PrivateState::is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options) {
+  const std::int64_t num_pixels = static_cast<std::int64_t>(camera.width()) * camera.height();
   const std::size_t num_frames = history.size();
   for (const FrameHistory::Chunk& chunk : history.chunks_) {
     const bool is_last = &chunk == &history.chunks_.back();
     if (chunk.ends.empty() || chunk.ends.size() > FrameHistory::per_chunk ||
         (!is_last && chunk.ends.size() < FrameHistory::per_chunk) || chunk.poses.size() != chunk.ends.size() ||
-        chunk.ends.back() != chunk.bytes.size() || !std::is_sorted(chunk.ends.begin(), chunk.ends.end()) ||
-        !std::all_of(chunk.poses.begin(), chunk.poses.end(), [](const auto& pose) { return pose.allFinite(); })) {
+        chunk.ends.back() != chunk.bytes.size() || !std::is_sorted(chunk.ends.begin(), chunk.ends.end())) {
       return false;
     }
   }
@@ -182,7 +208,7 @@ bool PrivateState::is_sound(const FrameHistory& history) {
   try {
     for (std::size_t i = 0; i < num_frames; ++i) {
       const FrameReport report = history[i];
-      if (!nacre::is_sound(report, num_frames)) return false;
+      if (!nacre::is_sound(report, num_pixels, options.max_points)) return false;
       if (report.status != FrameStatus::lost) registered.push_back(static_cast<std::int32_t>(i));
     }
   } catch (const CheckpointError&) {  // whose place is none in the file
@@ -277,7 +303,8 @@ Model Model::load(std::string_view bytes, std::string* note) {
   archive(kept);
   archive.require_end();
 
-  archive.require(PrivateState::is_sound(state.history), "the report of a frame contradicts itself");
+  archive.require(PrivateState::is_sound(state.history, state.camera, given),
+                  "the report of a frame contradicts itself, the camera or the options");
   const std::size_t num_frames = state.history.size();
   const Eigen::Index num_pixels = camera.num_pixels();
   const auto is_pixels = [&](const Values& values) { return values.size() == num_pixels; };
@@ -289,6 +316,8 @@ Model Model::load(std::string_view bytes, std::string* note) {
   archive.require(is_first || (is_pixels(before.depth) && is_pixels(before.sigma) && is_pixels(before.measured)),
                   "the newest view has another size than the camera");
   archive.require(is_first || state.history.num_registered() > 0, "the poses are missing");
+  archive.require(num_frames == 0 || state.history.back().num_points == state.cloud.size(),
+                  "the newest report has another number of points");
   archive.require(is_within(state.num_lost, num_frames + 1), "more frames are lost than there are");
   const bool is_spaced = state.spacing > 0.0 || state.cloud.size() == 0;
   archive.require(is_spaced && state.spacing >= given.spacing && state.spacing < farthest_place,

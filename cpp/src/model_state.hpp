@@ -252,7 +252,7 @@ struct PrivateState {
 
   // Whether what was read can be gone on with.
   static bool is_sound(const NoiseCalibration& calibration);
-  static bool is_sound(const FrameHistory& history);
+  static bool is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options);
   static bool is_sound(const PoseGraph& graph);
   static bool is_sound(const LoopClosure& loops, std::size_t num_frames);
   static bool is_sound(const PlaceHypothesis& hypothesis);

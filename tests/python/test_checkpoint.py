@@ -258,3 +258,53 @@ def test_finite_but_absurd_values_are_refused(tmp_path: Path) -> None:
         assert place > 0, name
         error = refused(sealed(data[:place] + absurd + data[place + len(absurd) :]), tmp_path / "forged")
         assert re.search("no surface|spacing is not|a pose is not", error.reason), (name, error)
+
+
+def whole(*numbers: int) -> bytes:
+    """Return whole numbers as they are written: folded, 7 bits a byte, the lowest first."""
+    written = bytearray()
+    for number in numbers:
+        bits = 2 * number if number >= 0 else -2 * number - 1
+        while bits >= 0x80:
+            written.append(bits & 0x7F | 0x80)
+            bits >>= 7
+        written.append(bits)
+    return bytes(written)
+
+
+def test_reports_that_cannot_be_are_refused(tmp_path: Path) -> None:
+    """Poses that are no motions, more pixels than the frame has, more points than the model may have."""
+    model = nacre.Model(CAMERA, max_points=3000)
+    for given in turning()[:3]:
+        model.add_frame(**given)
+    model.save(tmp_path / "model")
+    data = (tmp_path / "model").read_bytes()
+    middle = model.frames[1]
+    pose = middle.world_from_camera[:3]
+    sheared, far = pose.copy(), pose.copy()
+    sheared[0, 1] += 0.1
+    far[0, 3] = 2e30
+    none, spacing = b"\0", struct.pack("<d", middle.spacing)  # no reason
+    depth, num_inside = dataclasses.astuple(middle.depth), middle.region.num_inside
+    fused = (middle.num_updated, middle.num_inserted, middle.num_removed, middle.num_points)
+    shown = none + whole(middle.num_inliers)
+    forgeries = {
+        "a sheared pose": (pose.T.tobytes(), sheared.T.tobytes()),
+        "a far pose": (pose.T.tobytes(), far.T.tobytes()),
+        "more inliers than points": (shown, none + whole(num_inside + 1)),
+        "fewer inliers than none": (shown, none + b"\x81\0"),
+        "pixels of another camera": (whole(*depth), whole(depth[0] + 1, depth[1] + 1, *depth[2:])),
+        "a pixel counted twice": (whole(*depth), whole(depth[0], depth[1] + 1, *depth[2:])),
+        "a pixel not counted": (whole(*depth), whole(depth[0], depth[1] - 1, *depth[2:])),
+        "more inside than there is": (whole(*depth, num_inside), whole(*depth, num_inside + 1)),
+        "more updated than there were": (whole(*fused), whole(3001, *fused[1:])),
+        "more inserted than were seen": (whole(*fused), whole(fused[0], num_inside + 1, *fused[2:])),
+        "more removed than there were": (whole(*fused), whole(*fused[:2], 3001 + fused[1], 63)),
+        "more points than are allowed": (whole(fused[3]) + spacing, whole(3001) + spacing),
+        "fewer points than the model": (whole(len(model)) + spacing, whole(len(model) - 1) + spacing),
+    }
+    for name, (known, absurd) in forgeries.items():
+        assert data.count(known) == 1, name
+        assert len(absurd) == len(known), name
+        error = refused(sealed(data.replace(known, absurd)), tmp_path / "forged")
+        assert "report" in error.reason, (name, error)
