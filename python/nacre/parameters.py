@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
 
@@ -47,12 +47,15 @@ def to_core(parameters: Any, core: Core) -> Core:
 def from_core(parameters_type: type[Parameters], core: Any) -> Parameters:
     """Return the dataclass that mirrors the C++ options object ``core``."""
     defaults = parameters_type()
+    hints = get_type_hints(parameters_type)
     values = {}
     for field in dataclasses.fields(parameters_type):  # type: ignore[arg-type]
         value = getattr(core, field.name)
         default = getattr(defaults, field.name)
-        if value is not None and dataclasses.is_dataclass(default):
-            value = from_core(type(default), value)
+        kinds = get_args(hints[field.name]) or (hints[field.name],)
+        mirror = next((kind for kind in kinds if dataclasses.is_dataclass(kind)), None)
+        if value is not None and isinstance(mirror, type):
+            value = from_core(mirror, value)
         elif isinstance(default, str):
             value = value.name.replace("_plus", "+")
         values[field.name] = value

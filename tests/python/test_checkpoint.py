@@ -129,6 +129,19 @@ def test_it_goes_on_from_any_frame_for_any_number_of_threads(tmp_path: Path) -> 
         assert bits(other) == bits(model)
 
 
+@pytest.mark.parametrize(
+    "noise", [None, 0.001, nacre.NoiseModel(0.001, 0.002, 0.4, 0.5), "kinect", "stereo", "tof"]
+)
+def test_a_noise_that_was_given_stays_given(noise: Any, tmp_path: Path) -> None:
+    model = nacre.Model(CAMERA, depth={"noise": noise})
+    other = through_a_file(model, tmp_path)
+    assert other.parameters == model.parameters
+    for given in turning()[:2]:
+        model.add_frame(**given)
+        other.add_frame(**given)
+    assert bits(other) == bits(model)
+
+
 def test_what_was_given_stays_given(tmp_path: Path) -> None:
     camera = nacre.Camera(96, 72, 90.0, 91.0, 47.5, 35.5, distortion=(0.1, -0.05, 0.001, 0, 0.01))
     model = nacre.Model(camera, depth_scale=1000, spacing=0.004)
