@@ -1,7 +1,6 @@
-#include <cmath>
-
 #include "check.hpp"
 #include "nacre/model.hpp"
+#include "pose_check.hpp"
 
 namespace nacre {
 
@@ -50,8 +49,8 @@ void ModelOptions::check() const {
   consolidation.check();
   require(normals.k >= 3, "normals.k", "at least 3", normals.k);
   require(normals.max_radius > 0.0, "normals.max_radius", "a positive distance in metres", normals.max_radius);
-  require(spacing >= 0.0 && std::isfinite(spacing), "spacing", "0 (automatic) or a positive distance in metres",
-          spacing);
+  require(spacing >= 0.0 && spacing < farthest_place, "spacing",
+          "0 (automatic) or a positive distance in metres below 1e30", spacing);
   require(max_points >= 100, "max_points", "at least 100", max_points);
   require(min_evidence >= 0.0, "min_evidence", "0 or more", min_evidence);
   require(first_fraction > 0.0 && first_fraction <= 1.0, "first_fraction", "in (0, 1]", first_fraction);

@@ -71,6 +71,7 @@ def test_illegal_parameters() -> None:
         ({"spacing": -1.0}, "spacing must be .* got -1"),
         ({"spacing": float("nan")}, "spacing must be .* got nan"),
         ({"spacing": float("inf")}, "spacing must be .* got inf"),
+        ({"spacing": 1e30}, "spacing must be .* got 1e"),
         ({"max_points": 5}, "max_points must be at least 100, got 5"),
         ({"min_evidence": float("nan")}, "min_evidence must be .* got nan"),
         ({"first_fraction": 0.0}, "first_fraction must be in .* got 0"),
