@@ -160,7 +160,8 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
 int reach_of(const NewPoint& point, const Camera& camera) {
   const double pixels = std::ceil(static_cast<double>(point.spacing) / camera.footprint(point.point.z()));
   const int largest = std::max(camera.width(), camera.height());
-  return std::max(point.cover.num_rows / 2, pixels < largest ? static_cast<int>(pixels) : largest) + 1;
+  const bool is_in_image = pixels >= 0.0 && pixels < largest;  // not so behind the camera
+  return std::max(point.cover.num_rows / 2, is_in_image ? static_cast<int>(pixels) : largest) + 1;
 }
 
 // The frame's surface where the model does not cover it, denoised.
