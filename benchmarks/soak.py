@@ -7,9 +7,9 @@ Ten thousand frames: growth of memory and of frame times, and the drift of a cam
 Prints a line for each scene and ends with 1 where a limit is missed. Memory at the end is compared to that
 after a tenth of the frames, a thousand at most.
 
-Frame times are processor time on one thread, which what else the machine does changes by a fifth within an
-hour. So the model of the beginning is saved, and at the end it and the last one are given the same frames in
-turn, a tenth of the frames again.
+Frame times are processor time on one thread; the same work takes up to a fifth more or less of it within an
+hour, as other programs run beside. So the model of the beginning is saved, and at the end it and the last one
+are given the same frames in turn, a tenth of the frames again.
 """
 
 from __future__ import annotations
