@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "check.hpp"
+#include "pose_check.hpp"
 #include "ray_table.hpp"
 
 namespace nacre {
@@ -155,9 +156,9 @@ Camera Camera::pinhole(int width, int height, double fx, double fy, double cx, d
 Camera Camera::orthographic(int width, int height, double pixel_size) {
   check_size(width, height);
   require(std::isfinite(pixel_size) && pixel_size > 0.0, "pixel_size", "a positive size in metres", pixel_size);
-  require(pixel_size >= std::numeric_limits<float>::min() &&
-              pixel_size * std::max(width, height) <= std::numeric_limits<float>::max(),
-          "pixel_size", "a size in metres that single precision tells from 0, across the image too", pixel_size);
+  require(pixel_size >= std::numeric_limits<float>::min() && pixel_size * std::max(width, height) <= farthest_place,
+          "pixel_size", "a size in metres that single precision tells from 0, of an image at most 1e30 m across",
+          pixel_size);
 
   Camera camera;
   camera.model_ = Model::orthographic;

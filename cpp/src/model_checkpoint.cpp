@@ -126,7 +126,7 @@ bool are_all(const std::vector<T>& values, Test&& test) {
 }
 
 bool is_place(const Eigen::Vector3f& point) {
-  return (point.array().abs() < static_cast<float>(2.0 * farthest_place)).all();  // of a camera, and from it
+  return (point.array().abs() < static_cast<float>(4.0 * farthest_place)).all();  // of a camera, and, turned, from it
 }
 
 bool is_unit(const Eigen::Vector3f& normal) { return std::abs(normal.squaredNorm() - 1.0F) < 0.01F; }

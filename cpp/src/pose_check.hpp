@@ -1,4 +1,4 @@
-// The check of poses that come from outside.
+// How far away a place may be, and the check of poses that come from outside.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace nacre {
 
-constexpr double farthest_place = 1e30;  // [m]: what is moved is to stay within floats
+constexpr double farthest_place = 1e30;  // [m]: of a camera, and from it; what is moved is to stay within floats
 
 inline bool is_rigid(const Pose& pose) {
   const Eigen::Matrix3d rotation = pose.linear();

@@ -206,6 +206,22 @@ def test_absurd_depths_leave_no_points_without_a_normal(fold_in: str, value: flo
     assert np.isfinite(model.points).all()
 
 
+@pytest.mark.parametrize("far", [1e14, 1e29, 1e31, 3e38])
+@pytest.mark.parametrize(
+    "camera", [CAMERA, nacre.Camera.orthographic(160, 120, 0.01)], ids=["pinhole", "orthographic"]
+)
+def test_a_model_with_absurdly_far_points_can_be_loaded(
+    camera: nacre.Camera, far: float, tmp_path: Path
+) -> None:
+    depth = np.ones((camera.height, camera.width), np.float32)
+    depth[: camera.height // 3] = far
+    model = nacre.Model(camera)
+    assert model.add_frame(depth).status == "TRACKED"
+    assert np.abs(model.points).max() < 1e30
+    model.save(tmp_path / "model")
+    assert nacre.Model.load(tmp_path / "model").points.tobytes() == model.points.tobytes()
+
+
 def test_noise_that_overflows_is_not_measured() -> None:
     depth = np.ones(SHAPE)
     depth.ravel()[random().choice(depth.size, 12000, replace=False)] = 1e-30

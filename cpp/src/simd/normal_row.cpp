@@ -282,6 +282,8 @@ NACRE_INLINE F32 window_radius(const NormalRule& rule, F32 value) {
   return select(value == value, radius, value);
 }
 
+constexpr float farthest_point = 1e30F;  // [m]: points beyond, which no float can move, have no normal
+
 struct Normals {
   F32 x, y, z;
 };
@@ -294,7 +296,9 @@ NACRE_INLINE Normals scaled(F32 x, F32 y, F32 z, float length) {
 NACRE_INLINE Normals normals_of(const Planes& planes, F32 value, const NormalRule& rule, const RayRow& rays, int u,
                                 bool is_inverse) {
   F32 a = planes.at_u * broadcast(rule.fx), b = planes.at_v * broadcast(rule.fy);
-  if (!is_inverse) return scaled(a, b, broadcast(-1.0F), 1.0F);
+  if (!is_inverse) {
+    return scaled(select(abs(value) < broadcast(farthest_point), a, broadcast(NAN)), b, broadcast(-1.0F), 1.0F);
+  }
   if (rays.pixel_from_ray[0] != nullptr) {
     a = load(rays.pixel_from_ray[0] + u) * planes.at_u + load(rays.pixel_from_ray[2] + u) * planes.at_v;
     b = load(rays.pixel_from_ray[1] + u) * planes.at_u + load(rays.pixel_from_ray[3] + u) * planes.at_v;
@@ -305,9 +309,8 @@ NACRE_INLINE Normals normals_of(const Planes& planes, F32 value, const NormalRul
     x = x / z;
     y = load(rays.y + u) / z;
   }
-  // A point that is too far for floats has no normal either.
-  const F32 farthest = broadcast(1e38F) * value;
-  const Mask is_point = (abs(x) < farthest) & (abs(y) < farthest);
+  const F32 farthest = broadcast(farthest_point) * value;
+  const Mask is_point = (abs(x) < farthest) & (abs(y) < farthest) & (broadcast(1.0F) < farthest);
   return scaled(a, b, select(is_point, value, broadcast(NAN)) + planes.w - (a * x + b * y), -1.0F);
 }
 
