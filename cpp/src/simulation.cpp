@@ -180,7 +180,8 @@ double measure(double depth, std::int64_t pixel, const SimulationOptions& option
   constexpr std::uint64_t dropout_stream = std::uint64_t{1} << 63;
   const bool dropped =
       options.dropout > 0.0 && random_uniform(options.seed, dropout_stream | counter) < options.dropout;
-  return depth > 0.0 && !dropped ? depth : nan;
+  using Stored = std::numeric_limits<float>;
+  return depth >= Stored::denorm_min() && depth <= Stored::max() && !dropped ? depth : nan;
 }
 
 }  // namespace

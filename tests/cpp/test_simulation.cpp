@@ -255,6 +255,18 @@ TEST_CASE("the seed decides, the number of threads does not") {
   CHECK(!same(nacre::simulate_depth(tree, camera, pose, options), one));
 }
 
+TEST_CASE("depth that no float holds is not measured") {
+  const MeshTree plane = tree_of(nacre_test::quad({-9, -9, 0}, {18, 0, 0}, {0, 18, 0}));
+  const Camera camera = Camera::orthographic(4, 4, 0.01);
+  Pose pose = Pose::Identity();
+  pose.translation().z() = -1e-60;
+  CHECK(nacre::simulate_depth(plane, camera, pose).isNaN().all());
+  pose.translation().z() = -1.0;
+  SimulationOptions options;
+  options.noise.constant = 1e60;
+  CHECK(nacre::simulate_depth(plane, camera, pose, options).isNaN().all());
+}
+
 TEST_CASE("options out of range are refused by name") {
   const MeshTree plane = tree_of(nacre_test::quad({-9, -9, 2}, {18, 0, 0}, {0, 18, 0}));
   const Camera camera = Camera::orthographic(4, 4, 0.01);

@@ -19,5 +19,8 @@ NACRE_FUZZ_TARGET(bytes) {
   options.num_threads = bytes.threads();
   const DepthImage depth = simulate_depth(tree, camera, bytes.pose(), options);
   NACRE_HOLDS(depth.rows() == camera.height() && depth.cols() == camera.width());
-  for (Eigen::Index i = 0; i < depth.size(); ++i) NACRE_HOLDS(std::isnan(depth.data()[i]) || depth.data()[i] > 0.0F);
+  for (Eigen::Index i = 0; i < depth.size(); ++i) {
+    const float z = depth.data()[i];
+    NACRE_HOLDS(std::isnan(z) || (std::isfinite(z) && z > 0.0F));
+  }
 }
