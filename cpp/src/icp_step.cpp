@@ -2,10 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
-#include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <vector>
 
 #include "parallel.hpp"
 #include "simd/pair_equations.hpp"
@@ -155,55 +152,12 @@ Eigen::Matrix3d closest_rotation(const Eigen::Matrix3d& covariance) {
   return svd.matrixU() * sign * svd.matrixV().transpose();
 }
 
-// Which cells, of a grid of 15 degrees on a cube about the sphere, the normals of pairs lie in.
-class NormalCells {
- public:
-  void add(const Eigen::Vector3d& source, const Eigen::Vector3d& target) {
-    ++counts_[cell_of(source) * num_cells + cell_of(target)];
-  }
-
-  // What the one's cell tells about the other's [nats].
-  double information() const {
-    std::vector<double> of_source(num_cells), of_target(num_cells);
-    double all = 0.0, sum = 0.0;
-    for (std::size_t i = 0; i < counts_.size(); ++i) {
-      of_source[i / num_cells] += counts_[i];
-      of_target[i % num_cells] += counts_[i];
-      all += counts_[i];
-    }
-    for (std::size_t i = 0; i < counts_.size(); ++i) {
-      if (counts_[i] == 0) continue;
-      sum += counts_[i] * std::log(counts_[i] * all / (of_source[i / num_cells] * of_target[i % num_cells]));
-    }
-    return all > 0.0 ? sum / all : 0.0;
-  }
-
- private:
-  static constexpr std::size_t across = 6, num_cells = 6 * across * across;
-
-  static std::size_t cell_of(const Eigen::Vector3d& normal) {
-    int axis = 0;
-    const double scale = normal.cwiseAbs().maxCoeff(&axis);
-    if (!(scale > 0.0)) return 0;
-    const auto place = [&](int k) {
-      const double along = (normal[(axis + k) % 3] / scale + 1.0) / 2.0;
-      return std::min(across - 1, static_cast<std::size_t>(along * static_cast<double>(across)));
-    };
-    const auto face = static_cast<std::size_t>(normal[axis] < 0.0 ? axis + 3 : axis);
-    return (face * across + place(1)) * across + place(2);
-  }
-
-  std::vector<std::uint32_t> counts_ = std::vector<std::uint32_t>(num_cells * num_cells);
-};
-
 }  // namespace
 
 double normal_information(const std::vector<Pair>& pairs, Metric metric) {
   constexpr double least_variance = 1e-3;  // of each component: normals are no more certain than 2 degrees
-  constexpr double finer = 2.0;            // than cells normals may tell, so many times
   Eigen::Vector3d source_sum = Eigen::Vector3d::Zero(), target_sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero(), differences = Eigen::Matrix3d::Zero();
-  NormalCells cells;
   double count = 0.0;
   for (const Pair& pair : pairs) {
     if (!pair.half_difference.allFinite()) continue;
@@ -214,7 +168,6 @@ double normal_information(const std::vector<Pair>& pairs, Metric metric) {
     target_sum += target;
     squares += source * source.transpose() + target * target.transpose();
     differences += difference * difference.transpose();
-    cells.add(source, target);
     count += 1.0;
   }
   if (!(count > 0.0)) return 0.0;
@@ -222,8 +175,7 @@ double normal_information(const std::vector<Pair>& pairs, Metric metric) {
   const Eigen::Matrix3d apart = differences / count + floor;
   const Eigen::Matrix3d independent =
       (squares - (source_sum * source_sum.transpose() + target_sum * target_sum.transpose()) / count) / count + floor;
-  const double gaussian = 0.5 * std::log(independent.determinant() / apart.determinant());
-  return std::max(0.0, std::min(gaussian, finer * cells.information()));
+  return std::max(0.0, 0.5 * std::log(independent.determinant() / apart.determinant()));
 }
 
 IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, int num_threads) {

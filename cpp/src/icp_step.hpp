@@ -36,9 +36,7 @@ struct IcpStep {
 };
 
 // What the normals of a source and of the target tell about each other, for each pair: their mutual information, were
-// they Gaussian [nats], but at most twice that of the cells of 15 degrees that they lie in. Large where they vary
-// together over the surface; little where the faces are few, as of a corner, and nothing on a plane, however well it
-// fits.
+// they Gaussian [nats]. Large where they vary together over the surface; nothing on a plane, however well it fits.
 double normal_information(const std::vector<Pair>& pairs, Metric metric);
 
 // Directions in which the normals of source and target agree on less information than weak_threshold, per pair that

@@ -8,11 +8,10 @@ namespace nacre {
 namespace {
 
 // Measured where 1000 images of rooms and objects fit a model of another image best, wrongly: of the 438 with any
-// evidence one in ten has a recognition above `chance`, some ten above 0.6, none above 1.02. Of 5500 pairs of boxes and
-// round shapes two, smooth ones, have more than 1.9.
+// evidence one in ten has a recognition above `chance`, some ten above 0.6, none above 1.02.
 constexpr double chance = 0.3;         // what a view says is what its recognition has beyond
 constexpr double enough = 0.45;        // from several views
-constexpr double enough_alone = 2.0;   // from a single one
+constexpr double enough_alone = 1.3;   // from a single one
 constexpr double least_step = 0.1;     // between views that count, as view_distance: noise makes no new view
 constexpr double largest_gap = 0.2;    // between the places by model and by motion, as view_distance
 constexpr double least_overlap = 0.5;  // of a frame with the one before

@@ -57,29 +57,24 @@ void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
   constexpr double strictness = 1.2;    // times min_evidence
   constexpr double beyond_doubt = 2.0;  // times min_evidence
   constexpr double least_ratio = 0.01;  // data without noise is no more certain
-  // Times min_evidence, where only a plane of the one fits a plane of the other.
-  constexpr double plane_strictness = 4.0, least_information = 0.1;
-  // Of real recordings that are tracked 0.78 at most, where the guess is far off 0.65; of simulated ones 0.13. Of
-  // unrelated round shapes that match 0.54 and more.
-  constexpr double near_misfit = 0.8, far_misfit = 0.5;
   std::ostringstream reason;
   reason.precision(3);
   result.status = FrameStatus::lost;
   const double overlap = result.alignment.overlap;
   const double ratio = std::max(least_ratio, result.alignment.residual_ratio);
-  const double bent = std::max(1.0, result.alignment.misfit / (strict ? far_misfit : near_misfit));
-  const double per_match = std::max(0.0, std::log(chance / ratio)) / (bent * bent);
-  result.evidence = overlap * overlap * std::pow(result.consistency, strict ? 8 : 4) * per_match;
-  result.recognition = overlap * std::pow(result.consistency, 12) * per_match * result.alignment.normal_information;
-  const bool is_plane = result.alignment.normal_information < least_information;
-  const double least = options.min_evidence * (!strict ? 1.0 : is_plane ? plane_strictness : strictness);
+  const double misfit = std::max(1.0, result.alignment.misfit);
+  const double per_match = std::max(0.0, std::log(chance / ratio));
+  result.evidence = overlap * overlap * std::pow(result.consistency, 4) * per_match / (misfit * misfit);
+  result.recognition =
+      misfit > 1.0 ? 0.0 : overlap * std::pow(result.consistency, 8) * per_match * result.alignment.normal_information;
+  const double least = options.min_evidence * (strict ? strictness : 1.0);
   if (result.alignment.status == AlignStatus::too_few_pairs) {
     result.evidence = result.recognition = 0.0;
     reason << "too few points of the frame match the model";
   } else if (options.verify && !(result.evidence >= least)) {
     reason << "evidence " << result.evidence << " is below " << least << ": overlap " << overlap << ", consistency "
            << result.consistency << ", residuals " << ratio << " of the largest that match";
-    if (bent > 1.0) reason << ", bent " << bent << " times as much as true matches are";
+    if (misfit > 1.0) reason << ", bent " << misfit << " times as much as noise explains";
   } else if (options.verify && result.alignment.weak_directions.cols() > 0) {
     result.status = FrameStatus::weak;
     reason << result.alignment.weak_directions.cols() << " direction(s) of the pose are not determined";

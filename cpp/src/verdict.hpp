@@ -44,12 +44,11 @@ double consistency_of(const PointsRef& points, const PointsRef& normals, const S
 // Fills in evidence, recognition, status, reason and is_beyond_doubt. The evidence is what the matches tell against
 // chance: for each a residual that is small among those that would have matched, ln(0.58 / ratio), where chance gives a
 // ratio of 0.58; times overlap^2, since any two surfaces touch somewhere, and consistency^4, since true ones contradict
-// nowhere; by the square of the misfit where it is larger than those of true matches, since a shape that only resembles
-// is bent another way. Strict, for guesses that may be far off: consistency^8, a smaller misfit, and more is asked for,
-// much more of a plane.
+// nowhere; by misfit^2 where it is above 1, since a shape that only resembles is bent another way. Strict, for guesses
+// that may be far off: more is asked for.
 //
 // The recognition is evidence for a place that nothing but the frame speaks for. New surface does not speak against it
-// (overlap, not its square), contradictions do the more (consistency^12), and what the residuals tell counts as much as
+// (overlap, not its square), contradictions do the more (consistency^8), and what the residuals tell counts as much as
 // the normals agree: see normal_information. Where only a plane of the one fits a plane of the other it is 0.
 void judge(TrackingResult& result, const ModelOptions& options, bool strict);
 
