@@ -117,7 +117,7 @@ def test_wrong_values_are_named(change, message):
 def test_wrong_orthographic_camera():
     with pytest.raises(ValueError, match="pixel_size must be a positive size in metres, got 0"):
         Camera.orthographic(width=3, height=3, pixel_size=0)
-    for size in (1e-310, 1e-40, 5e29):
+    for size in (1e-310, 1e-40, 5e29, 2e38):
         with pytest.raises(
             ValueError, match="pixel_size must be a size in metres that single precision tells from 0"
         ):

@@ -282,7 +282,7 @@ NACRE_INLINE F32 window_radius(const NormalRule& rule, F32 value) {
   return select(value == value, radius, value);
 }
 
-constexpr float farthest_point = 1e30F;  // [m]: points beyond, which no float can move, have no normal
+constexpr float farthest_point = 1e30F;  // [m], as farthest_place: points beyond have no normal
 
 struct Normals {
   F32 x, y, z;
