@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "parallel.hpp"
+#include "robust.hpp"
 
 namespace nacre {
 namespace {
@@ -130,9 +131,7 @@ Eigen::Array3d median(const Rows<Scalar>& rows) {
   }
   Eigen::Array3d middle = Eigen::Array3d::Zero();
   for (std::size_t axis = 0; axis < 3 && !samples[axis].empty(); ++axis) {
-    const auto half = samples[axis].begin() + static_cast<std::ptrdiff_t>(samples[axis].size() / 2);
-    std::nth_element(samples[axis].begin(), half, samples[axis].end());
-    middle[static_cast<Eigen::Index>(axis)] = *half;
+    middle[static_cast<Eigen::Index>(axis)] = median_of(std::move(samples[axis]));
   }
   return middle;
 }

@@ -6,6 +6,7 @@
 #include "nacre/normals.hpp"
 #include "parallel.hpp"
 #include "random_choice.hpp"
+#include "robust.hpp"
 
 namespace nacre {
 namespace {
@@ -38,9 +39,7 @@ double roughness(const Points& points, const Points& normals, int num_threads) {
     }
   }
   if (offsets.empty()) return 0.0;
-  const auto middle = offsets.begin() + static_cast<std::ptrdiff_t>(offsets.size() / 2);
-  std::nth_element(offsets.begin(), middle, offsets.end());
-  return 1.4826 * static_cast<double>(*middle) / std::sqrt(2.0);
+  return mad_to_sigma * static_cast<double>(median_of(std::move(offsets))) / std::sqrt(2.0);
 }
 
 // Moves points, which are some rows of a cloud, to the mean of their neighbours.

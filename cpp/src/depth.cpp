@@ -9,6 +9,7 @@
 #include "parallel.hpp"
 #include "planar_image.hpp"
 #include "ray_table.hpp"
+#include "robust.hpp"
 #include "simd/edge_row.hpp"
 #include "simd/keep_row.hpp"
 #include "simd/point_row.hpp"
@@ -34,10 +35,8 @@ void require_plausible_median(const DepthRef& depth) {
   }
   const std::size_t half = sample.size() / 2;
   if (sample.empty() || (num_near <= half && num_far < sample.size() - half)) return;
-  const auto middle = sample.begin() + static_cast<std::ptrdiff_t>(half);
-  std::nth_element(sample.begin(), middle, sample.end());
   std::ostringstream message;
-  message << "depth must be in metres with a median of 0.05 to 50 m, got a median of " << *middle
+  message << "depth must be in metres with a median of 0.05 to 50 m, got a median of " << median_of(std::move(sample))
           << " m: check depth_scale, the stored units per metre (1000 for millimetres, 5000 for TUM RGB-D)";
   throw std::invalid_argument(message.str());
 }

@@ -6,6 +6,7 @@
 #include "nacre/normals.hpp"
 #include "parallel.hpp"
 #include "random.hpp"
+#include "robust.hpp"
 #include "spatial_order.hpp"
 
 namespace nacre {
@@ -62,10 +63,7 @@ double median_spacing(const BlockTree<float>& tree) {
     tree.search(tree.position(static_cast<std::uint32_t>(slot)), nearest);
     if (nearest.size() == 2) distances.push_back(std::sqrt(found[1].d2));
   }
-  if (distances.empty()) return 0.0;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return distances.empty() ? 0.0 : median_of(std::move(distances));
 }
 
 double bounding_diameter(const PointsRef& points) {

@@ -8,6 +8,7 @@
 #include "icp_step.hpp"
 #include "nacre/registration.hpp"
 #include "nearest_points.hpp"
+#include "size_difference.hpp"
 
 namespace nacre {
 
@@ -66,6 +67,7 @@ struct IcpResult : AlignResult {
   Matrix6 shape_information = Matrix6::Zero();                       // the part of it on which normals agree
   double normal_information = 0.0;                                   // see normal_information
   double misfit = 0.0;  // what neighbouring residuals have in common, by what noise and resolution explain, rms
+  SizeDifference size_difference;
 };
 
 // align with a prepared target. Held: directions that the pairs do not determine stay as they are in every step.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "model_view.hpp"
+#include "robust.hpp"
 
 namespace nacre {
 
@@ -12,14 +13,12 @@ FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, con
   ModelOptions fewer = options;
   fewer.registration.max_samples = most_points;
   FrameCloud cloud{sample_frame(frame, observer, fewer), 0.0};
-  const auto count = static_cast<std::size_t>(cloud.points.rows());
-  std::vector<float> z(count);
-  for (std::size_t i = 0; i < count; ++i) z[i] = cloud.points(static_cast<Eigen::Index>(i), 2);
-  if (count > 0) {
-    std::nth_element(z.begin(), z.begin() + static_cast<std::ptrdiff_t>(count / 2), z.end());
-    cloud.depth = static_cast<double>(z[count / 2]);
-  }
+  cloud.depth = median_depth(cloud.points);
   return cloud;
+}
+
+double median_depth(const Points& points) {
+  return points.rows() > 0 ? static_cast<double>(median_of(points.col(2))) : 1.0;
 }
 
 double view_distance(const Pose& a, const Pose& b, double depth) {

@@ -20,6 +20,9 @@ struct KeyFrame {
   int last_seen;  // the last stop of the camera where its surface was in view and known to be in place
 };
 
+// Of points in the camera frame [m]; 1 where there are none.
+double median_depth(const Points& points);
+
 // How far apart two views are of a surface at a depth [m]: 1 turns the camera by 0.2 rad, or moves it by 0.15 depths.
 double view_distance(const Pose& a, const Pose& b, double depth);
 

@@ -6,6 +6,7 @@
 #include "icp_target.hpp"
 #include "outline_match.hpp"
 #include "rigid_motion.hpp"
+#include "robust.hpp"
 #include "view_adjustment.hpp"
 
 namespace nacre {
@@ -42,13 +43,6 @@ double rms_distance(const Points& points, const Pose& a, const Pose& b) {
 double rms_extent(const Points& points) {
   const Eigen::RowVector3d middle = points.cast<double>().colwise().mean();
   return std::sqrt((points.cast<double>().rowwise() - middle).rowwise().squaredNorm().mean());
-}
-
-float median(const Values& values) {
-  std::vector<float> sorted(values.data(), values.data() + values.size());
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  return *middle;
 }
 
 // Between two motions; the pivot goes along a straight line.
@@ -224,7 +218,7 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
     source.largest_residual[i] = static_cast<float>(std::min(std::max(2.75 * frame.spacing, noise), largest));
   }
   align_options.max_distance = reach * cloud.depth;
-  align_options.final_distance = static_cast<double>(median(source.reach));
+  align_options.final_distance = static_cast<double>(median_of(source.reach));
 
   Match found;
   found.stop = now();

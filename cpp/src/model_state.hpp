@@ -192,7 +192,7 @@ void exchange(Archive& archive, IcpResult& result) {
   archive.choice(result.status, AlignStatus::too_few_pairs);
   archive(result.iterations, result.num_inliers, result.overlap, result.rmse, result.center, result.information,
           result.weak_directions, result.residual_ratio, result.shape_information, result.normal_information,
-          result.misfit);
+          result.misfit, result.size_difference.relative, result.size_difference.sigma);
 }
 
 // Of classes that keep theirs to themselves.

@@ -6,6 +6,7 @@
 
 #include "model_view.hpp"
 #include "random.hpp"
+#include "robust.hpp"
 #include "support_planes.hpp"
 
 namespace nacre {
@@ -41,10 +42,8 @@ std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& regio
     errors[static_cast<std::size_t>(i)] =
         std::hypot(3.0F * samples.noise[row], PlaneCut::bend * samples.points.row(row).norm());
   }
-  const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-  std::nth_element(errors.begin(), middle, errors.end());
   view.size = static_cast<double>((view.points.colwise().maxCoeff() - view.points.colwise().minCoeff()).norm());
-  view.tolerance = std::min(static_cast<double>(*middle), largest_part * view.size);
+  view.tolerance = std::min(static_cast<double>(median_of(std::move(errors))), largest_part * view.size);
   view.depth = frame.points.col(2);
   view.region = region;
   view.support = support;

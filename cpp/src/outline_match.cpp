@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "parallel.hpp"
+#include "robust.hpp"
 
 namespace nacre {
 namespace {
@@ -62,9 +63,7 @@ double median_pixel(const std::vector<OutlinePoint>& outline) {
   std::vector<double> pixels;
   pixels.reserve(outline.size());
   for (const OutlinePoint& edge : outline) pixels.push_back(edge.pixel);
-  const auto middle = pixels.begin() + static_cast<std::ptrdiff_t>(pixels.size() / 2);
-  std::nth_element(pixels.begin(), middle, pixels.end());
-  return *middle;
+  return median_of(std::move(pixels));
 }
 
 std::vector<int> nearest_edges(const std::vector<OutlinePoint>& outline, const std::vector<OutlinePoint>& others,

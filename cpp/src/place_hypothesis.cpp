@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "key_frames.hpp"
+#include "robust.hpp"
 
 namespace nacre {
 namespace {
@@ -12,23 +13,15 @@ namespace {
 constexpr double chance = 0.3;         // what a view says is what its recognition has beyond
 constexpr double enough = 0.45;        // from several views
 constexpr double enough_alone = 1.3;   // from a single one
+constexpr double enough_far = 2.0;     // from a single one that is far from all guesses
 constexpr double least_step = 0.1;     // between views that count, as view_distance: noise makes no new view
 constexpr double largest_gap = 0.2;    // between the places by model and by motion, as view_distance
 constexpr double least_overlap = 0.5;  // of a frame with the one before
 
-double median_depth(const IcpSource& frame) {
-  std::vector<float> z(static_cast<std::size_t>(frame.cloud.points.rows()));
-  if (z.empty()) return 1.0;
-  for (std::size_t i = 0; i < z.size(); ++i) z[i] = frame.cloud.points(static_cast<Eigen::Index>(i), 2);
-  const auto middle = z.begin() + static_cast<std::ptrdiff_t>(z.size() / 2);
-  std::nth_element(z.begin(), middle, z.end());
-  return static_cast<double>(*middle);
-}
-
 }  // namespace
 
 std::optional<Pose> PlaceHypothesis::predict(const IcpSource& frame, const AlignOptions& options) {
-  depth_ = median_depth(frame);
+  depth_ = median_depth(frame.cloud.points);
   if (!place_ || !before_) return std::nullopt;
   const IcpTarget target(AlignCloud(before_->points, before_->normals), options);
   const IcpResult moved = align_to(target, frame, motion_, options);
@@ -59,7 +52,7 @@ bool PlaceHypothesis::weigh(const TrackingResult& best, const IcpSource& frame) 
     place_ = Place{pose, pose, {}, 0.0};
   }
   before_ = Surface{frame.cloud.points, frame.cloud.normals};
-  depth_ = median_depth(frame);
+  depth_ = median_depth(frame.cloud.points);
   place_->pose = pose;
   double distance = 1.0;
   for (const Pose& view : place_->views) distance = std::min(distance, view_distance(view, pose, depth_));
@@ -68,7 +61,8 @@ bool PlaceHypothesis::weigh(const TrackingResult& best, const IcpSource& frame) 
   place_->belief += distance * (best.recognition - chance);
   if (place_->belief < 0.0) forget();
   if (!place_) return false;
-  return best.recognition >= enough_alone || (place_->views.size() > 1 && place_->belief >= enough);
+  return best.recognition >= (best.expectation == Expectation::unexpected ? enough_far : enough_alone) ||
+         (place_->views.size() > 1 && place_->belief >= enough);
 }
 
 }  // namespace nacre

@@ -9,6 +9,7 @@
 #include "icp_target.hpp"
 #include "pose_check.hpp"
 #include "robust.hpp"
+#include "size_difference.hpp"
 
 namespace nacre {
 namespace {
@@ -179,6 +180,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   result.misfit = misfit_of(pairs, options.method);
   weight_pairs(pairs, options.method, options.robust, resolution);
   const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);
+  result.size_difference = size_difference(pairs, options.method);
   result.target_from_source = pose;
   result.status = at_rest ? AlignStatus::converged : AlignStatus::max_iterations;
   result.num_inliers = static_cast<int>(pairs.size());

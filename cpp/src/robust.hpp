@@ -1,8 +1,10 @@
 // Statistics that outliers hardly change.
 #pragma once
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 #include <vector>
 
 namespace nacre {
@@ -15,6 +17,13 @@ T median_of(std::vector<T> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
+}
+
+template <class Derived>
+typename Derived::Scalar median_of(const Eigen::DenseBase<Derived>& values) {
+  std::vector<typename Derived::Scalar> copy(static_cast<std::size_t>(values.size()));
+  for (Eigen::Index i = 0; i < values.size(); ++i) copy[static_cast<std::size_t>(i)] = values(i);
+  return median_of(std::move(copy));
 }
 
 // Geman and McClure 1985: what is left of the weight of a residual. Beyond three sigma it is an outlier.

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "parallel.hpp"
+#include "robust.hpp"
 
 namespace nacre {
 namespace {
@@ -18,9 +19,7 @@ float median_sigma(const Frame& frame) {
   const std::size_t step = std::max<std::size_t>(1, frame.valid.size() / num_probes);
   std::vector<float> values;
   for (std::size_t i = 0; i < frame.valid.size(); i += step) values.push_back(frame.sigma[frame.valid[i]]);
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
+  return median_of(std::move(values));
 }
 
 SurfaceObserver::SurfaceObserver(const Camera& camera, const FusionOptions& options)

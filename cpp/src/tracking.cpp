@@ -6,6 +6,7 @@
 #include "color_registration.hpp"
 #include "frame_samples.hpp"
 #include "icp_target.hpp"
+#include "key_frames.hpp"
 #include "model_view.hpp"
 #include "outline_registration.hpp"
 #include "parallel.hpp"
@@ -13,13 +14,14 @@
 #include "point_spacing.hpp"
 #include "random.hpp"
 #include "relocalisation.hpp"
+#include "robust.hpp"
 #include "surface_observer.hpp"
 #include "verdict.hpp"
 
 namespace nacre {
 namespace {
 
-constexpr double far_turn = 0.35;  // from the guess [rad]: a registration that turned farther must be beyond doubt
+constexpr double largest_distance = 1.75;         // from a guess that is near, as view_distance
 constexpr std::size_t max_target_points = 30000;  // that a frame is registered to
 
 // Model points that a camera near a pose may see, as a cloud to register to.
@@ -76,11 +78,7 @@ View points_in_view(const PointModel& model, const Camera& camera, const Pose& w
 }
 
 double median_reach(const IcpSource& source) {
-  std::vector<float> values(source.reach.data(), source.reach.data() + source.reach.size());
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return static_cast<double>(*middle);
+  return source.reach.size() > 0 ? static_cast<double>(median_of(source.reach)) : 0.0;
 }
 
 // What stays the same while one frame is registered from several guesses.
@@ -95,6 +93,7 @@ struct Search {
   const Sight& now;     // from the origin: where the camera is, is to be found
   const Sight& before;
   double spacing;             // of the model [m]
+  double depth;               // of the sampled points, the median [m]
   std::int32_t oldest_frame;  // see track
 
   mutable std::optional<OutlinePair> found_outlines = {};
@@ -134,8 +133,8 @@ struct Search {
     return gated;
   }
 
-  // Near: the guess is about right, and a narrow gate is safest. Wide: it is not. Strict: see judge.
-  TrackingResult register_from(const Pose& guess, bool wide, bool strict) const {
+  // Near: the guess is about right, and a narrow gate is safest. Wide: it is not. expectation: of the guess.
+  TrackingResult register_from(const Pose& guess, bool wide, Expectation expectation) const {
     const View view = points_in_view(model, camera, guess, oldest_frame, options.num_threads);
     AlignOptions align_options = options.registration;
     align_options.max_points = 0;  // the view is thin enough
@@ -163,8 +162,8 @@ struct Search {
     const double earlier =
         consistency_of(points, normals, before, before.world_from_camera, camera, spacing, options.num_threads);
     result.consistency = std::isfinite(in_view) || std::isfinite(earlier) ? std::fmin(in_view, earlier) : 0.0;
-    const double turned = Eigen::AngleAxisd(guess.linear().transpose() * pose.linear()).angle();
-    judge(result, options, strict || turned > far_turn);
+    result.expectation = view_distance(guess, pose, depth) > largest_distance ? Expectation::unexpected : expectation;
+    judge(result, options);
     return result;
   }
 
@@ -194,7 +193,7 @@ struct Search {
     }
     TrackingResult best;
     for (const Pose& candidate : most_promising(model, source, guesses, options.registration, num_finalists)) {
-      const TrackingResult result = register_from(candidate, false, true);
+      const TrackingResult result = register_from(candidate, false, Expectation::unexpected);
       if (result.rank() >= best.rank()) best = result;
     }
     return best;
@@ -219,13 +218,18 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
                      const Sight& before, PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing,
                      const ModelOptions& options) {
   const FrameSamples samples = sample_frame(frame, observer, options);
-  Search search{
-      model,         frame,
-      camera,        observer,
-      options,       IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
-      samples.noise, now,
-      before,        spacing,
-      oldest_frame};
+  Search search{model,
+                frame,
+                camera,
+                observer,
+                options,
+                IcpSource(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
+                samples.noise,
+                now,
+                before,
+                spacing,
+                median_depth(samples.points),
+                oldest_frame};
   TrackingResult best;
   best.alignment.target_from_source = guesses.front();
   const std::optional<Pose> predicted = hypothesis.predict(search.source, options.registration);
@@ -234,7 +238,8 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
     for (const bool wide : {false, true}) {
       if (wide && (best.status != FrameStatus::lost || !search.has_automatic_gate())) return;
       for (const Pose& guess : guesses) {
-        const TrackingResult result = search.register_from(guess, wide, was_lost);
+        const TrackingResult result =
+            search.register_from(guess, wide, was_lost ? Expectation::near_lost : Expectation::expected);
         if (result.rank() >= best.rank()) best = result;
         if (result.is_beyond_doubt) return;
       }
@@ -264,7 +269,7 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
   if (!goes_on && elsewhere.everywhere) {
     const std::optional<Pose> pose = fit_anywhere(model, search.source, options.registration);
     if (pose) {
-      TrackingResult found = search.register_from(*pose, false, true);
+      TrackingResult found = search.register_from(*pose, false, Expectation::unexpected);
       found.is_to_whole_model = true;
       if (found.status != FrameStatus::lost) return found;
       if (found.rank() > best.rank()) best = found;

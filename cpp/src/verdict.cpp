@@ -21,6 +21,26 @@ struct Counts {
   }
 };
 
+// What is asked of a registration. Far from all guesses there are many places, and some resemble: boxes' corners fit
+// corners, and of unrelated round shapes that match the misfit is 0.54 and more.
+struct Demands {
+  double evidence;           // times min_evidence
+  double consistency_power;  // in the evidence
+  double largest_misfit;     // that does not lower the evidence
+  double size_certainty;     // standard deviations by which a size must differ to be another
+};
+
+Demands demands_on(Expectation expectation) {
+  switch (expectation) {
+    case Expectation::expected:
+      return {1.0, 4.0, 1.0, 5.0};
+    case Expectation::near_lost:
+      return {1.2, 4.0, 1.0, 5.0};
+    default:
+      return {1.2, 8.0, 0.5, 3.0};
+  }
+}
+
 }  // namespace
 
 double consistency_of(const PointsRef& points, const PointsRef& normals, const Sight& sight,
@@ -52,32 +72,42 @@ double consistency_of(const PointsRef& points, const PointsRef& normals, const S
                                 : std::numeric_limits<double>::quiet_NaN();
 }
 
-void judge(TrackingResult& result, const ModelOptions& options, bool strict) {
-  constexpr double chance = 0.58;       // the rms of a uniform distribution, 1 / sqrt(3)
-  constexpr double strictness = 1.2;    // times min_evidence
+void judge(TrackingResult& result, const ModelOptions& options) {
+  constexpr double chance = 0.58;  // the rms of a uniform distribution, 1 / sqrt(3)
+  constexpr double plane_information = 0.1, plane_evidence = 4.0;
   constexpr double beyond_doubt = 2.0;  // times min_evidence
   constexpr double least_ratio = 0.01;  // data without noise is no more certain
+  constexpr double other_size = 0.025;  // relative; of right registrations of real depth 0.015 at most
   std::ostringstream reason;
   reason.precision(3);
   result.status = FrameStatus::lost;
-  const double overlap = result.alignment.overlap;
-  const double ratio = std::max(least_ratio, result.alignment.residual_ratio);
-  const double misfit = std::max(1.0, result.alignment.misfit);
-  const double per_match = std::max(0.0, std::log(chance / ratio));
-  result.evidence = overlap * overlap * std::pow(result.consistency, 4) * per_match / (misfit * misfit);
+  const IcpResult& alignment = result.alignment;
+  const Demands demands = demands_on(result.expectation);
+  const double overlap = alignment.overlap;
+  const double ratio = std::max(least_ratio, alignment.residual_ratio);
+  const double bent = std::max(1.0, alignment.misfit / demands.largest_misfit);
+  const double per_match = std::max(0.0, std::log(chance / ratio)) / (bent * bent);
+  result.evidence = overlap * overlap * std::pow(result.consistency, demands.consistency_power) * per_match;
   result.recognition =
-      misfit > 1.0 ? 0.0 : overlap * std::pow(result.consistency, 8) * per_match * result.alignment.normal_information;
-  const double least = options.min_evidence * (strict ? strictness : 1.0);
-  if (result.alignment.status == AlignStatus::too_few_pairs) {
+      overlap * std::pow(result.consistency, 12) * per_match / (bent * bent) * alignment.normal_information;
+  const bool is_plane = alignment.normal_information < plane_information;
+  const bool is_doubtful_plane = is_plane && result.expectation == Expectation::unexpected;
+  const double least = options.min_evidence * (is_doubtful_plane ? plane_evidence : demands.evidence);
+  const double size = alignment.size_difference.relative;
+  const double size_error = std::max(other_size, demands.size_certainty * alignment.size_difference.sigma);
+  if (alignment.status == AlignStatus::too_few_pairs) {
     result.evidence = result.recognition = 0.0;
     reason << "too few points of the frame match the model";
+  } else if (options.verify && std::abs(size) > size_error) {
+    result.recognition = 0.0;
+    reason << "the frame is " << 1.0 / (1.0 + size) << " times as large as the part of the model that it fits";
   } else if (options.verify && !(result.evidence >= least)) {
     reason << "evidence " << result.evidence << " is below " << least << ": overlap " << overlap << ", consistency "
            << result.consistency << ", residuals " << ratio << " of the largest that match";
-    if (misfit > 1.0) reason << ", bent " << misfit << " times as much as noise explains";
-  } else if (options.verify && result.alignment.weak_directions.cols() > 0) {
+    if (bent > 1.0) reason << ", bent " << bent << " times as much as true matches may be";
+  } else if (options.verify && alignment.weak_directions.cols() > 0) {
     result.status = FrameStatus::weak;
-    reason << result.alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
+    reason << alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
   } else {
     result.status = FrameStatus::tracked;
     result.is_beyond_doubt = options.verify && result.evidence >= beyond_doubt * options.min_evidence;

@@ -10,11 +10,19 @@
 
 namespace nacre {
 
+// What speaks for a place before a frame is registered there.
+enum class Expectation {
+  expected,    // near a guess, from the frame before
+  near_lost,   // near the last pose, but frames have been lost since
+  unexpected,  // far from all guesses
+};
+
 struct TrackingResult {
   IcpResult alignment;  // world_from_camera as target_from_source
   // Part of the model's points in view that the frame does not see through, or of the frame's points that the camera
   // did not see through before, whichever is smaller.
   double consistency = 0.0;
+  Expectation expectation = Expectation::expected;
   double evidence = 0.0;     // see judge
   double recognition = 0.0;  // see judge
   FrameStatus status = FrameStatus::lost;
@@ -44,12 +52,17 @@ double consistency_of(const PointsRef& points, const PointsRef& normals, const S
 // Fills in evidence, recognition, status, reason and is_beyond_doubt. The evidence is what the matches tell against
 // chance: for each a residual that is small among those that would have matched, ln(0.58 / ratio), where chance gives a
 // ratio of 0.58; times overlap^2, since any two surfaces touch somewhere, and consistency^4, since true ones contradict
-// nowhere; by misfit^2 where it is above 1, since a shape that only resembles is bent another way. Strict, for guesses
-// that may be far off: more is asked for.
+// nowhere; by misfit^2 where it is above 1, since a shape that only resembles is bent another way. Far from all guesses
+// there are many places that resemble: consistency^8, misfit above half counts, and more is asked for, much more of a
+// plane.
 //
 // The recognition is evidence for a place that nothing but the frame speaks for. New surface does not speak against it
-// (overlap, not its square), contradictions do the more (consistency^8), and what the residuals tell counts as much as
-// the normals agree: see normal_information. Where only a plane of the one fits a plane of the other it is 0.
-void judge(TrackingResult& result, const ModelOptions& options, bool strict);
+// (overlap, not its square), contradictions and misfit do the more (consistency^12, misfit^4), and what the residuals
+// tell counts as much as the normals agree: see normal_information. Where only a plane of the one fits a plane of the
+// other it is 0.
+//
+// A frame that is larger or smaller than what it fits, beyond doubt, is lost: its depth is wrong, or it is another
+// thing.
+void judge(TrackingResult& result, const ModelOptions& options);
 
 }  // namespace nacre

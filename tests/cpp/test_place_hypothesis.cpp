@@ -53,6 +53,14 @@ int believed_at(double step, double recognition, const Pose& error = Pose::Ident
 
 TEST_CASE("a place is believed at once where one view says enough") { CHECK(believed_at(0.03, 1.5) == 0); }
 
+TEST_CASE("where nothing led there, one view must say more") {
+  TrackingResult found = found_at(camera_at(0.0), 1.5);
+  found.expectation = Expectation::unexpected;
+  CHECK_FALSE(PlaceHypothesis().weigh(found, frame_at(0.0)));
+  found.recognition = 2.1;
+  CHECK(PlaceHypothesis().weigh(found, frame_at(0.0)));
+}
+
 TEST_CASE("a place is believed when several views have said enough, the sooner the more they differ") {
   const int slow = believed_at(0.03, 0.65), fast = believed_at(0.1, 0.65);
   CHECK(fast >= 1);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import re
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -138,9 +139,24 @@ def test_millimetres_for_metres_are_refused(factor: float) -> None:
     goes_on(model, first="TRACKED")
 
 
-def test_a_scale_that_is_a_little_wrong_is_not_recognised() -> None:
-    """A limit: an object a twentieth larger is an object farther away, as far as one view tells."""
-    report = grown().add_frame(np.float32(1.05) * view(GROWN))
+@pytest.mark.parametrize("factor", [0.9, 0.95, 0.97, 1.03, 1.05])
+def test_a_scale_that_is_a_little_wrong_is_told(factor: float) -> None:
+    """A larger object is not the same object farther away: its parts are farther from each other."""
+    model = grown()
+    before = fingerprint(model)
+    report = model.add_frame(np.float32(factor) * view(GROWN))
+    assert report.status == "LOST"
+    told = re.search(r"the frame is ([0-9.]+) times as large", report.reason)
+    assert told, report.reason
+    assert float(told[1]) == pytest.approx(factor, abs=0.2 * abs(factor - 1))
+    assert fingerprint(model) == before
+    goes_on(model)
+
+
+@pytest.mark.parametrize("factor", [0.98, 1.02])
+def test_a_scale_that_is_wrong_by_a_fiftieth_is_not_recognised(factor: float) -> None:
+    """A limit: real depth is off by as much."""
+    report = grown().add_frame(np.float32(factor) * view(GROWN))
     assert report.status == "TRACKED"
     assert not is_right(report, GROWN)
 
