@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+import numpy as np
+import numpy.typing as npt
+
 from nacre._core import Camera
 from nacre.datasets.corrected import with_corrected_depth
+from nacre.datasets.sequence import SequenceFrame
 from nacre.depth_calibration import (
     LEAST_TURN,
     LEAST_VIEWS,
@@ -66,10 +70,15 @@ class DepthViews:
         if len(self.chosen) < LEAST_VIEWS:
             return done
         camera = done.model.camera
-        views = ((done.sequence[index].depth, pose_from(pose)) for index, pose in self.chosen)
+        views = ((_of_interest(done.sequence[index]), pose_from(pose)) for index, pose in self.chosen)
         calibration = calibrate_depth(views, camera)
         if calibration.is_significant:
             frames = with_corrected_depth(done.sequence, calibration)
             done = Reconstruction(frames, Model(camera, parameters=done.model.parameters))
         done.depth_calibration = calibration
         return done
+
+
+def _of_interest(frame: SequenceFrame) -> npt.NDArray[np.float32]:
+    """Return the depth that the model sees: what a mask leaves out may move otherwise."""
+    return frame.depth if frame.mask is None else np.where(frame.mask, frame.depth, np.float32(np.nan))

@@ -9,6 +9,7 @@ import pytest
 
 import nacre
 from nacre.datasets.corrected import with_corrected_depth
+from nacre.depth_views import DepthViews
 from nacre.reconstruction import Reconstruction
 
 CAMERA = nacre.Camera(width=320, height=240, fx=260, fy=260, cx=159.5, cy=119.5)
@@ -187,6 +188,21 @@ def test_one_call_corrects_what_it_finds(wrong, corrected):
     assert left.depth_calibration is None
     errors = [done.evaluation["absolute_trajectory_error"].rotation_rmse for done in (corrected, left)]
     assert errors[0] < 0.5 * errors[1]
+
+
+def test_what_a_mask_leaves_out_does_not_count(wrong):
+    """Something that moves with the camera, over a third of the image."""
+    shown = np.ones(wrong[0].depth.shape, bool)
+    shown[:, :100] = False
+    covered = [
+        dataclasses.replace(frame, depth=np.where(shown, frame.depth, np.float32(0.6)), mask=shown)
+        for frame in wrong
+    ]
+    views = DepthViews([(frame.index, frame.truth.ravel().tolist()) for frame in wrong])
+    found = views.calibrate(Reconstruction(covered, nacre.Model(CAMERA))).depth_calibration
+    seen = ((np.where(shown, frame.depth, np.float32(np.nan)), frame.truth) for frame in wrong)
+    assert found.is_significant
+    assert found == nacre.calibrate_depth(seen, CAMERA)
 
 
 def test_one_call_does_what_the_command_does(wrong, tmp_path):

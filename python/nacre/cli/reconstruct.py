@@ -226,7 +226,7 @@ def _begun(
     done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
     writable_folder(out)
     remove_leftovers(out)
-    whole = feed is None and asked.masks is None and shows_one_scene(sequence.camera, parameters)
+    whole = feed is None and shows_one_scene(sequence.camera, parameters)
     calibrates = asked.calibrate and whole and asked.preset != "paper"
     unfinished = Unfinished(out, checkpoint_every)
     if unfinished.checkpoint.exists():
