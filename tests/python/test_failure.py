@@ -233,7 +233,7 @@ def test_a_model_with_absurdly_far_points_can_be_loaded(
     depth[: camera.height // 3] = far
     model = nacre.Model(camera)
     assert model.add_frame(depth).status == "TRACKED"
-    assert np.abs(model.points).max() < 1e30
+    assert np.abs(model.points).max() < 1e18
     model.save(tmp_path / "model")
     assert nacre.Model.load(tmp_path / "model").points.tobytes() == model.points.tobytes()
 

@@ -282,7 +282,8 @@ NACRE_INLINE F32 window_radius(const NormalRule& rule, F32 value) {
   return select(value == value, radius, value);
 }
 
-constexpr float farthest_point = 1e30F;  // [m], as farthest_place: points beyond have no normal
+// [m]: points beyond have no normal, since squares of their inverse depth are no longer floats.
+constexpr float farthest_point = 1e18F;
 
 struct Normals {
   F32 x, y, z;
