@@ -27,17 +27,18 @@ struct Demands {
   double evidence;           // times min_evidence
   double consistency_power;  // in the evidence
   double largest_misfit;     // that does not lower the evidence
+  double size_sigma;         // largest standard deviation of a size that counts
   double size_certainty;     // standard deviations by which a size must differ to be another
 };
 
 Demands demands_on(Expectation expectation) {
   switch (expectation) {
     case Expectation::expected:
-      return {1.0, 4.0, 1.0, 5.0};
+      return {1.0, 4.0, 1.0, 0.005, 5.0};
     case Expectation::near_lost:
-      return {1.2, 4.0, 1.0, 5.0};
+      return {1.2, 4.0, 1.0, 0.005, 5.0};
     default:
-      return {1.2, 8.0, 0.5, 3.0};
+      return {1.2, 8.0, 0.5, std::numeric_limits<double>::infinity(), 3.0};
   }
 }
 
@@ -93,12 +94,13 @@ void judge(TrackingResult& result, const ModelOptions& options) {
   const bool is_plane = alignment.normal_information < plane_information;
   const bool is_doubtful_plane = is_plane && result.expectation == Expectation::unexpected;
   const double least = options.min_evidence * (is_doubtful_plane ? plane_evidence : demands.evidence);
-  const double size = alignment.size_difference.relative;
-  const double size_error = std::max(other_size, demands.size_certainty * alignment.size_difference.sigma);
+  const auto [size, size_sigma] = alignment.size_difference;
+  const bool is_other_size =
+      size_sigma <= demands.size_sigma && std::abs(size) > std::max(other_size, demands.size_certainty * size_sigma);
   if (alignment.status == AlignStatus::too_few_pairs) {
     result.evidence = result.recognition = 0.0;
     reason << "too few points of the frame match the model";
-  } else if (options.verify && std::abs(size) > size_error) {
+  } else if (options.verify && is_other_size) {
     result.recognition = 0.0;
     reason << "the frame is " << 1.0 / (1.0 + size) << " times as large as the part of the model that it fits";
   } else if (options.verify && !(result.evidence >= least)) {

@@ -79,6 +79,7 @@ TEST_CASE("a frame of another size is lost where the difference is certain, with
   CHECK(smaller.status == FrameStatus::lost);
   CHECK(smaller.reason.rfind("the frame is 0.952 times as large", 0) == 0);
   CHECK(of_size(-0.02, 0.001).status == FrameStatus::tracked);
+  CHECK(of_size(-0.05, 0.006).status == FrameStatus::tracked);
   CHECK(of_size(-0.05, 0.0125).status == FrameStatus::tracked);
   CHECK(of_size(-0.05, 0.0125, Expectation::unexpected).status == FrameStatus::lost);
   CHECK(of_size(0.0, std::numeric_limits<double>::infinity()).status == FrameStatus::tracked);
