@@ -12,7 +12,7 @@ from hostile_files.case import Case, single
 _random = np.random.default_rng(7)
 
 
-def checkpoint(body: bytes = b"", *, form: int = 2, told: int | None = None, checksum: int = 0) -> bytes:
+def checkpoint(body: bytes = b"", *, form: int = 3, told: int | None = None, checksum: int = 0) -> bytes:
     """Return the header of a checkpoint, and a body."""
     length = 48 + len(body) if told is None else told
     return b"nacremdl" + struct.pack("<I20sQQ", form, b"0.1.0", length, checksum) + body
@@ -23,15 +23,15 @@ MODELS = {
     "nul bytes": (bytes(500), "byte 0"),
     "garbage": (_random.bytes(2000), "byte 0"),
     "a pickle": (pickle.dumps(print), "byte 0"),
-    "magic alone": (b"nacremdl", "byte"),
+    "magic alone": (b"nacremdl", "byte 0"),
     "of another format": (checkpoint(form=77), "byte 8: .*format 77"),
     "of format 2 to the 32 - 1": (checkpoint(form=2**32 - 1), "byte 8"),
-    "header alone": (checkpoint(), "byte"),
-    "cut": (checkpoint(bytes(100), told=10_000), "byte .*148 of its 10000 bytes"),
-    "length 2 to the 64 - 1": (checkpoint(bytes(100), told=2**64 - 1), "byte"),
-    "length too small": (checkpoint(bytes(100), told=48), "byte"),
-    "checksum wrong": (checkpoint(bytes(100), checksum=1), "byte"),
-    "body garbage": (checkpoint(_random.bytes(1000)), "byte"),
+    "header alone": (checkpoint(), "byte 48"),
+    "cut": (checkpoint(bytes(100), told=10_000), "byte 148: .*148 of its 10000 bytes"),
+    "length 2 to the 64 - 1": (checkpoint(bytes(100), told=2**64 - 1), "byte 148"),
+    "length too small": (checkpoint(bytes(100), told=48), "byte 48"),
+    "checksum wrong": (checkpoint(bytes(100), checksum=1), "byte 40: .*checksum"),
+    "body garbage": (checkpoint(_random.bytes(1000)), "byte 40: .*checksum"),
 }
 GOOD_RUN = {"format": 1, "options": {"source": "here"}}
 
