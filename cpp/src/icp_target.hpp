@@ -67,7 +67,7 @@ struct IcpResult : AlignResult {
   Matrix6 shape_information = Matrix6::Zero();                       // the part of it on which normals agree
   double normal_information = 0.0;                                   // see normal_information
   double misfit = 0.0;  // what neighbouring residuals have in common, by what noise and resolution explain, rms
-  SizeDifference size_difference;
+  SizeDifference size_difference;  // by which the source would have to grow to fit better
 };
 
 // align with a prepared target. Held: directions that the pairs do not determine stay as they are in every step.

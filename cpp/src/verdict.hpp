@@ -22,9 +22,9 @@ struct TrackingResult {
   // Part of the model's points in view that the frame does not see through, or of the frame's points that the camera
   // did not see through before, whichever is smaller.
   double consistency = 0.0;
-  Expectation expectation = Expectation::expected;
-  double evidence = 0.0;     // see judge
-  double recognition = 0.0;  // see judge
+  Expectation expectation = Expectation::expected;  // of where it ended
+  double evidence = 0.0;                            // see judge
+  double recognition = 0.0;                         // see judge
   FrameStatus status = FrameStatus::lost;
   std::string reason;  // why it is weak or lost
   // Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
