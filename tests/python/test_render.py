@@ -112,6 +112,16 @@ class TestRenderPoints:
         image = render_points(points, -normals, colors, view_from="back", size=(100, 100))
         assert image[50, 50, 1] > 100 > image[50, 50, 0]
 
+    def test_a_row_of_points_beside_an_even_surface_is_not_drawn_twice_as_wide(self) -> None:
+        row = np.column_stack([np.arange(-0.2, 0.21, 0.02), np.full(21, 0.55), np.zeros(21)])
+        points = np.concatenate([square((0, 0, 0), 0.4), row])
+        view = View.fit(points, "front", size=(300, 300))
+        image = render_points(points, np.tile([0, 0, -1.0], (len(points), 1)), view=view, background=None)
+        middle = np.flatnonzero(image[:, 150, 3] > 127)
+        _, strip = np.split(middle, np.flatnonzero(np.diff(middle) > 1) + 1)
+        reach = 0.02 * np.sqrt(2)  # as at the border of the square; the fourth point of the row is at 0.04
+        assert len(strip) * view.metres_per_pixel == pytest.approx(2 * reach, abs=0.01)
+
     @pytest.mark.parametrize(
         ("side", "right", "down"),
         [
