@@ -18,8 +18,9 @@ from nacre.depth_calibration import (
     can_calibrate,
     turn_between,
 )
+from nacre.frame_record import FrameRecord
 from nacre.model import Model, ModelParameters
-from nacre.reconstruction import FrameRecord, Reconstruction
+from nacre.reconstruction import Reconstruction
 from nacre.region import RegionParameters
 from nacre.run_state import pose_from
 

@@ -7,7 +7,6 @@ import dataclasses
 import itertools
 import logging
 import os
-import platform
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -17,69 +16,29 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre._core import __version__
 from nacre.checkpoint import Checkpointed
 from nacre.datasets.corrected import with_corrected_depth
 from nacre.datasets.sequence import SequenceFrame
-from nacre.depth import PIXEL_LABELS, label_pixels
 from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
-from nacre.evaluation.result import Result, plain, result_dict
-from nacre.frame_figures import frame_dict, frame_entry
+from nacre.evaluation.result import Result
+from nacre.frame_record import STATUSES, FrameRecord
 from nacre.frame_report import FrameReport
 from nacre.io.trajectories import Trajectory
 from nacre.model import Model
 from nacre.progress import as_progress
-from nacre.run_state import STATUSES, calibration_from, record_from, record_state
-from nacre.values import Value
+from nacre.run_figures import run_dict, run_report
+from nacre.run_state import calibration_from, record_from, record_state
 
 if TYPE_CHECKING:
-    from nacre.report import DepthExample, ReportData
+    from nacre.report import ReportData
+
+__all__ = ["FrameRecord", "Reconstruction"]
 
 _log = logging.getLogger(__name__)
 
 _RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class FrameRecord(Value):
-    """
-    What became of one frame of a recording.
-
-    Attributes
-    ----------
-    index : int
-        Its place in the recording, from 0.
-    timestamp : float or None
-        [s].
-    status, reason : str
-        The model's, or LOST and why for a frame that never came to the model.
-    report : FrameReport or None
-        The model's; None for a frame that could not be read or that the model refused.
-    truth : (4, 4) float64 or None
-        The true ``world_from_camera``.
-    error : Exception or None
-        What reading the frame, or handing it to the model, raised.
-    """
-
-    index: int
-    timestamp: float | None
-    status: str
-    reason: str
-    report: FrameReport | None
-    truth: npt.NDArray[np.float64] | None
-    error: Exception | None = None
-
-    @property
-    def world_from_camera(self) -> npt.NDArray[np.float64] | None:
-        """The camera's pose; None where it is not known."""
-        return self.report.world_from_camera if self.report is not None and self.report.tracked else None
-
-    @property
-    def refused(self) -> bool:
-        """Whether the frame was read, but the model cannot use it: wrong size or wrong depth scale."""
-        return self.error is not None and not isinstance(self.error, FileFormatError)
 
 
 @dataclass
@@ -376,40 +335,7 @@ class Reconstruction(Checkpointed):
 
     def as_dict(self, **more: Any) -> dict[str, Any]:
         """Return every figure as plain values that JSON can hold (NaN and inf become None)."""
-        counts = self.counts
-        times = self.milliseconds
-        errors = self._frame_errors()
-        figures: dict[str, Any] = plain(
-            {
-                "nacre": __version__,
-                "versions": {
-                    "nacre": __version__,
-                    "python": platform.python_version(),
-                    "numpy": np.__version__,
-                },
-                **more,
-                "num_frames": len(self.frames),
-                "num_tracked": self.num_tracked,
-                **{f"num_{name.lower()}": counts[name] for name in STATUSES[1:]},
-                "num_loops": len(self.loops),
-                "coverage": self.num_tracked / len(self.frames) if self.frames else None,
-                "num_points": len(self.model),
-                "spacing": self.model.spacing,
-                "noise": dataclasses.asdict(self.model.noise),
-                "milliseconds": {
-                    "mean": times.mean() if len(times) else None,
-                    "median": np.median(times) if len(times) else None,
-                    "p99": np.percentile(times, 99) if len(times) else None,
-                },
-                **{name: result_dict(result) for name, result in self.evaluation.items()},
-                "parameters": self.parameters,
-                "frames": [
-                    frame_dict(frame, *errors[i], self._loop_frame(frame))
-                    for i, frame in enumerate(self.frames)
-                ],
-            }
-        )
-        return figures
+        return run_dict(self, **more)
 
     def report_data(
         self,
@@ -435,69 +361,7 @@ class Reconstruction(Checkpointed):
         -------
         ReportData
         """
-        from nacre.report import ModelCloud, ReportData
-        from nacre.report.text import label
-
-        errors = self._frame_errors()
-        model = None
-        if len(self.model):
-            model = ModelCloud(
-                self.model.points, self.model.normals, self.model.colors, self.model.confidence
-            )
-        return ReportData(
-            title=title,
-            source=source,
-            frames=[
-                frame_entry(frame, *errors[i], self._loop_frame(frame)) for i, frame in enumerate(self.frames)
-            ],
-            model=model,
-            depth=self._depth_examples(),
-            evaluation={label(name): result for name, result in self.evaluation.items()},
-            figures=figures or {},
-            parameters=self.parameters,
-            interrupted=interrupted,
-        )
-
-    def _loop_frame(self, frame: FrameRecord) -> int | None:
-        """Return the place in the recording of the frame that another closed a loop with."""
-        if frame.report is None or frame.report.loop_frame is None:
-            return None
-        number = frame.report.loop_frame  # of the model, which counts frames that were tried again once more
-        found = (f.index for f in self.frames if f.report is not None and f.report.index == number)
-        return next(found, None)
-
-    def _depth_examples(self) -> list[DepthExample]:
-        """Return the depth image of the first frame that was tracked and of the first one that was not."""
-        from nacre.report import DepthExample
-
-        examples = []
-        for status in ("TRACKED", "LOST", "WEAK"):
-            frame = next((frame for frame in self.frames if frame.status == status), None)
-            if frame is None or frame.report is None:
-                continue
-            given = self._kept.get(frame.status)
-            if given is None or given.index != frame.index:
-                try:
-                    given = self.sequence[frame.index]
-                except (FileFormatError, OSError, LookupError):
-                    continue
-            labels = label_pixels(
-                given.depth, self.model.camera, self.model.parameters.depth, mask=given.mask
-            )
-            reasons = np.where(labels > 1, labels - 1, 0)
-            after = np.where(labels == 0, given.depth, np.nan)
-            note = "" if frame.status == "TRACKED" else f"the first that is {frame.status}"
-            examples.append(DepthExample(given.depth, after, reasons, PIXEL_LABELS[2:], frame.index, note))
-        return examples
-
-    def _frame_errors(self) -> list[tuple[float | None, float | None]]:
-        ate: Any = self.evaluation.get("absolute_trajectory_error")
-        if ate is None:
-            return [(None, None)] * len(self.frames)
-        return [
-            (float(t), float(r)) if np.isfinite(t) else (None, None)
-            for t, r in zip(ate.errors, ate.rotation_errors, strict=True)
-        ]
+        return run_report(self, title, source, figures, interrupted=interrupted)
 
 
 def _stacked(poses: collections.abc.Sequence[npt.NDArray[np.float64] | None]) -> npt.NDArray[np.float64]:

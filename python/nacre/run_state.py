@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
+from nacre.frame_record import STATUSES, FrameRecord
 from nacre.frame_report import FrameReport
-
-if TYPE_CHECKING:
-    from nacre.reconstruction import FrameRecord
-
-STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
 
 
 def record_state(record: FrameRecord) -> dict[str, Any]:
@@ -38,8 +34,6 @@ def record_state(record: FrameRecord) -> dict[str, Any]:
 
 def record_from(state: Any, reports: Sequence[FrameReport]) -> FrameRecord:
     """Return the record; a ValueError says what is wrong with the values."""
-    from nacre.reconstruction import FrameRecord
-
     number, truth = state["report"], state["truth"]
     if state["status"] not in STATUSES or not isinstance(state["reason"], str):
         raise ValueError(f"no frame is {state['status']!r}")

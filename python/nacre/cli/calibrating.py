@@ -11,7 +11,8 @@ from nacre.cli.terminal import Terminal
 from nacre.cli.unfinished import Unfinished
 
 if TYPE_CHECKING:
-    from nacre.reconstruction import FrameRecord, Reconstruction
+    from nacre.frame_record import FrameRecord
+    from nacre.reconstruction import Reconstruction
     from nacre.viewer import LiveView
 
 

@@ -10,7 +10,8 @@ from nacre.cli.stopping import Interruption
 from nacre.cli.terminal import CommandError, Terminal
 
 if TYPE_CHECKING:
-    from nacre.reconstruction import FrameRecord, Reconstruction
+    from nacre.frame_record import FrameRecord
+    from nacre.reconstruction import Reconstruction
 
 
 def run_frames(

@@ -16,7 +16,8 @@ from nacre.cli.terminal import CommandError
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
-    from nacre.reconstruction import FrameRecord, Reconstruction
+    from nacre.frame_record import FrameRecord
+    from nacre.reconstruction import Reconstruction
 
 _FORMAT = 1
 _RARE = 50.0  # a checkpoint is written when so many times what the last one took has gone by: 2 % of the time

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 
-from nacre.reconstruction import FrameRecord, Reconstruction
+from nacre.frame_record import FrameRecord
+from nacre.reconstruction import Reconstruction
 from nacre.viewer.page import Viewer
 from nacre.viewer.story import Moment, Snapshot, Story
 

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre.frame_record import FrameRecord
 from nacre.model import Model
-from nacre.reconstruction import FrameRecord
 from nacre.report.text import count, quantity
 
 

@@ -1,0 +1,54 @@
+"""What became of one frame of a recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre.errors import FileFormatError
+from nacre.frame_report import FrameReport
+from nacre.values import Value
+
+STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class FrameRecord(Value):
+    """
+    What became of one frame of a recording.
+
+    Attributes
+    ----------
+    index : int
+        Its place in the recording, from 0.
+    timestamp : float or None
+        [s].
+    status, reason : str
+        The model's, or LOST and why for a frame that never came to the model.
+    report : FrameReport or None
+        The model's; None for a frame that could not be read or that the model refused.
+    truth : (4, 4) float64 or None
+        The true ``world_from_camera``.
+    error : Exception or None
+        What reading the frame, or handing it to the model, raised.
+    """
+
+    index: int
+    timestamp: float | None
+    status: str
+    reason: str
+    report: FrameReport | None
+    truth: npt.NDArray[np.float64] | None
+    error: Exception | None = None
+
+    @property
+    def world_from_camera(self) -> npt.NDArray[np.float64] | None:
+        """The camera's pose; None where it is not known."""
+        return self.report.world_from_camera if self.report is not None and self.report.tracked else None
+
+    @property
+    def refused(self) -> bool:
+        """Whether the frame was read, but the model cannot use it: wrong size or wrong depth scale."""
+        return self.error is not None and not isinstance(self.error, FileFormatError)

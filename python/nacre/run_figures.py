@@ -1,0 +1,131 @@
+"""A run, as its reports tell of it."""
+
+from __future__ import annotations
+
+import dataclasses
+import platform
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from nacre._core import __version__
+from nacre.depth import PIXEL_LABELS, label_pixels
+from nacre.errors import FileFormatError
+from nacre.evaluation.result import plain, result_dict
+from nacre.frame_figures import frame_dict, frame_entry
+from nacre.frame_record import STATUSES, FrameRecord
+
+if TYPE_CHECKING:
+    from nacre.reconstruction import Reconstruction
+    from nacre.report import DepthExample, ReportData
+
+
+def run_dict(run: Reconstruction, **more: Any) -> dict[str, Any]:
+    """Return what ``report.json`` says of a run."""
+    counts = run.counts
+    times = run.milliseconds
+    errors = _frame_errors(run)
+    figures: dict[str, Any] = plain(
+        {
+            "nacre": __version__,
+            "versions": {
+                "nacre": __version__,
+                "python": platform.python_version(),
+                "numpy": np.__version__,
+            },
+            **more,
+            "num_frames": len(run.frames),
+            "num_tracked": run.num_tracked,
+            **{f"num_{name.lower()}": counts[name] for name in STATUSES[1:]},
+            "num_loops": len(run.loops),
+            "coverage": run.num_tracked / len(run.frames) if run.frames else None,
+            "num_points": len(run.model),
+            "spacing": run.model.spacing,
+            "noise": dataclasses.asdict(run.model.noise),
+            "milliseconds": {
+                "mean": times.mean() if len(times) else None,
+                "median": np.median(times) if len(times) else None,
+                "p99": np.percentile(times, 99) if len(times) else None,
+            },
+            **{name: result_dict(result) for name, result in run.evaluation.items()},
+            "parameters": run.parameters,
+            "frames": [
+                frame_dict(frame, *errors[i], _loop_frame(run, frame)) for i, frame in enumerate(run.frames)
+            ],
+        }
+    )
+    return figures
+
+
+def run_report(
+    run: Reconstruction,
+    title: str,
+    source: str,
+    figures: Mapping[str, Any] | None,
+    *,
+    interrupted: bool,
+) -> ReportData:
+    """Return what ``report.html`` says of a run; it reads some frames again."""
+    from nacre.report import ModelCloud, ReportData
+    from nacre.report.text import label
+
+    errors = _frame_errors(run)
+    model = None
+    if len(run.model):
+        model = ModelCloud(run.model.points, run.model.normals, run.model.colors, run.model.confidence)
+    return ReportData(
+        title=title,
+        source=source,
+        frames=[
+            frame_entry(frame, *errors[i], _loop_frame(run, frame)) for i, frame in enumerate(run.frames)
+        ],
+        model=model,
+        depth=_depth_examples(run),
+        evaluation={label(name): result for name, result in run.evaluation.items()},
+        figures=figures or {},
+        parameters=run.parameters,
+        interrupted=interrupted,
+    )
+
+
+def _loop_frame(run: Reconstruction, frame: FrameRecord) -> int | None:
+    """Return the place in the recording of the frame that another closed a loop with."""
+    if frame.report is None or frame.report.loop_frame is None:
+        return None
+    number = frame.report.loop_frame  # of the model, which counts frames that were tried again once more
+    found = (f.index for f in run.frames if f.report is not None and f.report.index == number)
+    return next(found, None)
+
+
+def _depth_examples(run: Reconstruction) -> list[DepthExample]:
+    """Return the depth image of the first frame that was tracked and of the first one that was not."""
+    from nacre.report import DepthExample
+
+    examples = []
+    for status in ("TRACKED", "LOST", "WEAK"):
+        frame = next((frame for frame in run.frames if frame.status == status), None)
+        if frame is None or frame.report is None:
+            continue
+        given = run._kept.get(frame.status)
+        if given is None or given.index != frame.index:
+            try:
+                given = run.sequence[frame.index]
+            except (FileFormatError, OSError, LookupError):
+                continue
+        labels = label_pixels(given.depth, run.model.camera, run.model.parameters.depth, mask=given.mask)
+        reasons = np.where(labels > 1, labels - 1, 0)
+        after = np.where(labels == 0, given.depth, np.nan)
+        note = "" if frame.status == "TRACKED" else f"the first that is {frame.status}"
+        examples.append(DepthExample(given.depth, after, reasons, PIXEL_LABELS[2:], frame.index, note))
+    return examples
+
+
+def _frame_errors(run: Reconstruction) -> list[tuple[float | None, float | None]]:
+    ate: Any = run.evaluation.get("absolute_trajectory_error")
+    if ate is None:
+        return [(None, None)] * len(run.frames)
+    return [
+        (float(t), float(r)) if np.isfinite(t) else (None, None)
+        for t, r in zip(ate.errors, ate.rotation_errors, strict=True)
+    ]
