@@ -63,7 +63,11 @@ void check_seal(std::string_view bytes) {
   const auto length = number_at<std::uint64_t>(bytes, length_at);
   if (length != bytes.size()) {
     std::ostringstream reason;
-    reason << "it has " << bytes.size() << " of its " << length << " bytes: it was not written or copied to the end";
+    if (length > bytes.size()) {
+      reason << "it has " << bytes.size() << " of its " << length << " bytes: it was not written or copied to the end";
+    } else {
+      reason << "it has " << bytes.size() << " bytes and says that they are " << length << ": it is damaged";
+    }
     throw CheckpointError(reason.str(), static_cast<std::int64_t>(std::min<std::uint64_t>(length, bytes.size())));
   }
   if (number_at<std::uint64_t>(bytes, checksum_at) != checksum_of(bytes.substr(header_size))) {

@@ -177,6 +177,12 @@ def test_a_file_that_is_cut_short_says_so(saved: bytes, tmp_path: Path) -> None:
         assert "no model" in error.reason or f"{length} of its {len(saved)} bytes" in error.reason
 
 
+def test_a_file_that_goes_on_after_its_end_is_refused(saved: bytes, tmp_path: Path) -> None:
+    error = refused(saved + b"x", tmp_path / "longer")
+    assert f"{len(saved) + 1} bytes and says that they are {len(saved)}" in error.reason
+    assert error.offset == len(saved)
+
+
 def test_a_bit_that_flipped_is_found(saved: bytes, tmp_path: Path) -> None:
     random = np.random.default_rng(0)
     for place in [*range(48), *random.integers(48, len(saved), 30)]:
