@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from nacre.io.cloud import Cloud
     from nacre.io.meshes import read_mesh, write_mesh
     from nacre.io.points import read_points, write_points
-    from nacre.io.trajectories import Trajectory, associate, read_trajectory, write_trajectory
+    from nacre.io.trajectories import read_trajectory, write_trajectory
     from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
     from nacre.model import Model, ModelParameters
     from nacre.neighbors import KdTree, RadiusNeighbors
@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from nacre.registration import AlignResult, RegistrationParameters, align
     from nacre.simulation import default_camera, simulate_depth, turntable_poses
     from nacre.system import default_threads, instruction_set
+    from nacre.trajectory import Trajectory, associate
 
 __all__ = [
     "PIXEL_LABELS",
@@ -120,7 +121,8 @@ _NAMES = {
     "io.cloud": "Cloud",
     "io.meshes": "read_mesh write_mesh",
     "io.points": "read_points write_points",
-    "io.trajectories": "Trajectory associate read_trajectory write_trajectory",
+    "io.trajectories": "read_trajectory write_trajectory",
+    "trajectory": "Trajectory associate",
     "mesh": "ClosestPoints Mesh RayHits built_in_object",
     "model": "Model ModelParameters",
     "neighbors": "KdTree RadiusNeighbors",

@@ -25,11 +25,11 @@ from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result
 from nacre.frame_record import STATUSES, FrameRecord
 from nacre.frame_report import FrameReport
-from nacre.io.trajectories import Trajectory
 from nacre.model import Model
 from nacre.progress import as_progress
 from nacre.run_figures import run_dict, run_report
 from nacre.run_state import calibration_from, record_from, record_state
+from nacre.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from nacre.report import ReportData

@@ -304,11 +304,11 @@ RECIPES: dict[str, Recipe] = {
          "timestamps": 1.0},
         lists=("colors",),
     ),
-    "nacre.io.trajectories.associate": Recipe(
+    "nacre.trajectory.associate": Recipe(
         nacre.associate, {"timestamps_a": np.arange(5.0), "timestamps_b": np.arange(4.0),
         "max_difference": 0.1}
     ),
-    "nacre.io.trajectories.Trajectory.at": Recipe(
+    "nacre.trajectory.Trajectory.at": Recipe(
         nacre.Trajectory(np.arange(3.0), POSES).at, {"timestamps": np.arange(4.0), "max_difference": 0.1}
     ),
     "nacre.mesh.Mesh": Recipe(nacre.Mesh, {"vertices": VERTICES, "triangles": TRIANGLES}),

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _MOST_BYTES = 1 << 16
 _DEEP_KEY = re.compile(r"(?<![^\s.,=\[\]{}])(?:[^\s.,=\[\]{}]+[ \t]*\.[ \t]*){16}")
+_LONG_NUMBER = re.compile(r"[0-9_]{400}")
 
 
 class Preset(str, Enum):
@@ -120,17 +121,19 @@ def _read_toml(path: Path) -> Mapping[str, Any]:
 
     toml = _toml()
     text = read_text(path, _MOST_BYTES)
-    deep = _DEEP_KEY.search(text)
-    if deep is not None:  # Python's parser takes the square of its length
-        line = 1 + text.count("\n", 0, deep.start())
-        raise FileFormatError(path, "not TOML that can be read: a key is nested too deep", line=line)
+    # Python's parser takes the square of a key's length, and for a number 150 times its memory.
+    for pattern, what in ((_DEEP_KEY, "a key is nested too deep"), (_LONG_NUMBER, "a number of 400 digits")):
+        found = pattern.search(text)
+        if found is not None:
+            line = 1 + text.count("\n", 0, found.start())
+            raise FileFormatError(path, f"not TOML that can be read: {what}", line=line)
     try:
         document: Mapping[str, Any] = toml.loads(text)
     except RecursionError:
         raise FileFormatError(path, "not TOML that can be read: it is nested too deep") from None
     except ValueError as error:  # TOMLDecodeError, or a number of more digits than Python reads
-        found = re.search(r"line (\d+)", str(error))
-        line = int(found[1]) if found else 1 + text.rstrip().count("\n")
+        told = re.search(r"line (\d+)", str(error))
+        line = int(told[1]) if told else 1 + text.rstrip().count("\n")
         raise FileFormatError(path, f"not TOML: {error}", line=line) from error
     return document
 

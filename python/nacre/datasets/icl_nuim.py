@@ -21,7 +21,8 @@ from nacre.datasets.tum import lines_of, poses_at, time_of
 from nacre.errors import FileFormatError
 from nacre.io.images import COLOR_SUFFIXES, DEPTH_SUFFIXES
 from nacre.io.raw import excerpt
-from nacre.io.trajectories import Trajectory, read_trajectory
+from nacre.io.trajectories import read_trajectory
+from nacre.trajectory import Trajectory
 
 FORMAT = "icl-nuim"
 LAYOUT = "associations.txt or depth/ and rgb/ with numbered images, and *.gt.freiburg"

@@ -19,7 +19,8 @@ from nacre.io.image_limits import check_lzfse
 from nacre.io.images import decode_color, read_depth
 from nacre.io.json_files import parse_json
 from nacre.io.raw import read_file, require_regular
-from nacre.io.trajectories import Trajectory, matrix_from_quaternion
+from nacre.quaternions import matrix_from_quaternion
+from nacre.trajectory import Trajectory
 
 FORMAT = "record3d"
 LAYOUT = (

@@ -15,7 +15,8 @@ from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.datasets.tum import poses_at
 from nacre.errors import FileFormatError
 from nacre.io.images import COLOR_SUFFIXES, DEPTH_SUFFIXES
-from nacre.io.trajectories import Trajectory, read_trajectory
+from nacre.io.trajectories import read_trajectory
+from nacre.trajectory import Trajectory
 
 FORMAT = "redwood"
 LAYOUT = "depth/ and image/, color/ or rgb/, optionally an Open3D intrinsics .json and a trajectory .log"

@@ -23,7 +23,7 @@ from nacre.datasets.listing import files, pair
 from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
 from nacre.io.images import ATTRIBUTE_SUFFIXES, COLOR_SUFFIXES, read_attribute, read_color, read_depth
-from nacre.io.trajectories import Trajectory
+from nacre.trajectory import Trajectory
 from nacre.values import Value
 
 _log = logging.getLogger(__name__)

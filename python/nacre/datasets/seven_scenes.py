@@ -13,7 +13,8 @@ from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, natural_key
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
-from nacre.io.trajectories import Trajectory, read_trajectory
+from nacre.io.trajectories import read_trajectory
+from nacre.trajectory import Trajectory
 
 FORMAT = "7-scenes"
 LAYOUT = "frame-000000.depth.png, optionally frame-000000.color.png and frame-000000.pose.txt"

@@ -24,7 +24,8 @@ from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.ply import read_range_grid
 from nacre.io.raw import decode, read_file
-from nacre.io.trajectories import Trajectory, matrix_from_quaternion
+from nacre.quaternions import matrix_from_quaternion
+from nacre.trajectory import Trajectory
 
 FORMAT = "stanford"
 LAYOUT = "range scans (.ply with a range_grid), optionally placed by a .conf file; or one such scan"

@@ -15,7 +15,8 @@ from nacre.errors import FileFormatError
 from nacre.io.cameras import check_lens
 from nacre.io.images import DEPTH_SUFFIXES, read_depth
 from nacre.io.raw import excerpt, number_of, read_text
-from nacre.io.trajectories import Trajectory, matrix_from_quaternion
+from nacre.quaternions import matrix_from_quaternion
+from nacre.trajectory import Trajectory
 
 FORMAT = "stray-scanner"
 LAYOUT = "depth/, camera_matrix.csv, optionally confidence/ and odometry.csv"

@@ -19,7 +19,8 @@ from nacre.datasets.listing import describe, inside, require_order
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.raw import excerpt, number_of, read_text
-from nacre.io.trajectories import Trajectory, associate, read_trajectory
+from nacre.io.trajectories import read_trajectory
+from nacre.trajectory import Trajectory, associate
 
 FORMAT = "tum"
 LAYOUT = "depth.txt with lines 'timestamp file', optionally rgb.txt and groundtruth.txt"

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from nacre.arrays import as_count, as_length, as_number, as_poses, as_times, as_values
 from nacre.evaluation.result import Array, Count, Fraction, Metres, Radians, Result
-from nacre.io.trajectories import associate
+from nacre.trajectory import associate
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import arrays
+from nacre.io.raw import MAX_COMMENTS
 from nacre.values import Value
 
 Columns = dict[str, npt.NDArray[Any]]
@@ -114,7 +115,10 @@ def check_comments(comments: Sequence[str]) -> list[str]:
     """Return the comments line by line."""
     if isinstance(comments, str):
         raise TypeError(f"comments must be a sequence of strings, got the string {comments!r}")
-    return [line for comment in comments for line in (str(comment).splitlines() or [""])]
+    lines = [line for comment in comments for line in (str(comment).splitlines() or [""])]
+    if len(lines) > MAX_COMMENTS:
+        raise ValueError(f"comments must be at most {MAX_COMMENTS} lines, got {len(lines)}")
+    return lines
 
 
 def _as_colors(value: npt.ArrayLike, num_points: int) -> npt.NDArray[np.uint8]:

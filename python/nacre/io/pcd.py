@@ -15,7 +15,7 @@ import numpy.typing as npt
 from nacre.errors import FileFormatError
 from nacre.io import lzf
 from nacre.io.cloud import Cloud, Columns, check_cloud, check_comments, gather_floats, native, with_attributes
-from nacre.io.raw import TextTable, check_padding, decode, excerpt, file_writer, read_file
+from nacre.io.raw import MAX_COMMENTS, TextTable, check_padding, decode, excerpt, file_writer, read_file
 from nacre.io.rows import encode_rows
 
 _KEYWORDS = frozenset(
@@ -76,10 +76,12 @@ def _read_header(path: str | os.PathLike[str], data: bytes) -> _Header:
             line = data[position:end].strip()
             position = min(end + 1, len(data))
             if line.startswith(b"#"):
+                if len(comments) == MAX_COMMENTS:
+                    raise ValueError(f"more than {MAX_COMMENTS} comments")
                 if not line.startswith(b"# .PCD v"):
                     comments.append(decode(line[1:].strip()))
             elif line:
-                keyword, *words = map(decode, line.split())
+                keyword, *words = map(decode, line.split(maxsplit=_MAX_FIELDS + 1))
                 keyword = "FIELDS" if keyword == "COLUMNS" else keyword
                 if keyword not in _KEYWORDS:
                     raise ValueError(f"unknown keyword in the header: {excerpt(line)}")

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from nacre.errors import FileFormatError
-from nacre.io.raw import decode, excerpt
+from nacre.io.raw import MAX_COMMENTS, decode, excerpt
 
 TYPES = {
     name: np.dtype(code)
@@ -113,7 +113,7 @@ class _Parser:
         self._format: str | None = None
         self._elements: dict[str, tuple[int, int, dict[str, Property]]] = {}
         self._properties: dict[str, Property] | None = None
-        self._num_entries = 0
+        self._num_entries = self._num_notes = 0
         self._notes: dict[str, list[str]] = {"comment": [], "obj_info": []}
 
     def take(self, line: bytes, number: int) -> None:
@@ -121,6 +121,9 @@ class _Parser:
         first, *rest = line.split(maxsplit=1) or [b""]
         keyword = decode(first)
         if keyword in self._notes:
+            self._num_notes += 1
+            if self._num_notes > MAX_COMMENTS:
+                raise ValueError(f"more than {MAX_COMMENTS} comments")
             self._notes[keyword].append(decode(rest[0]).strip() if rest else "")
             return
         words = [decode(word) for word in rest[0].split()] if rest else []

@@ -172,17 +172,19 @@ def _read_unequal_rows(
     steps: list[tuple[Property, struct.Struct | None, int, bytearray, array[int]]] = []
     for entry in element.properties:
         count_type = None if entry.count_dtype is None else _integer_struct(entry.count_dtype, byte_order)
-        counts = array("q" if entry.count_dtype is None else _counting(entry.count_dtype).char)
+        counts = array("b")
+        if entry.count_dtype is not None:
+            counts = array(_counting(entry.count_dtype).char, [0]) * element.num_rows
         steps.append((entry, count_type, entry.dtype.itemsize, bytearray(), counts))
     try:
-        for _ in range(element.num_rows):
+        for row in range(element.num_rows):
             for _, count_type, size, payload, counts in steps:
                 if count_type is not None:
                     (count,) = count_type.unpack_from(data, position)
                     position += count_type.size
                     if count > len(data):
                         raise struct.error
-                    counts.append(count)
+                    counts[row] = count
                     size *= count
                 payload += data[position : position + size]
                 position += size

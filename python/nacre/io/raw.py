@@ -17,7 +17,9 @@ import numpy.typing as npt
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 
-_BLOCK_BYTES = 1 << 16
+MAX_COMMENTS = 10_000
+
+_BLOCK_BYTES = 1 << 15
 _BYTES_PER_ROW_GUESS = 32
 _IS_SPACE = np.zeros(256, dtype=bool)
 _IS_SPACE[list(b" \t\n\r\v\f")] = True

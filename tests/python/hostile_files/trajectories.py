@@ -47,6 +47,7 @@ LOG = {
     ),
     "log matrix nan": ("0 0 1\n" + EYE.replace("0 1 0 0", "0 nan 0 0"), "line 3: expected finite"),
     "log matrix 1e308": ("0 0 1\n" + EYE.replace("0 1 0 0", "0 1e308 1e308 0"), "line 2: .*not a rotation"),
+    "log without matrices": ("0 0 1\n" * 20_000, "line 2: expected 4 numbers"),
     "log second matrix missing": ("0 0 1\n" + EYE + "1 1 2\n", "cut off"),
 }
 OTHER = {
