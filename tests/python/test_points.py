@@ -303,3 +303,12 @@ def test_format_error_travels_between_processes():
     assert str(error) == "a.ply, line 3: no points"
     assert isinstance(error, ValueError)
     assert (error.line, error.offset, error.reason) == (3, None, "no points")
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".pcd"])
+def test_comments_are_bounded(tmp_path, suffix):
+    path = tmp_path / f"cloud{suffix}"
+    nacre.write_points(path, np.zeros((1, 3)), comments=["x"] * 10_000)
+    assert len(nacre.read_points(path).comments) == 10_000
+    with pytest.raises(ValueError, match="comments must be at most 10000 lines, got 10001"):
+        nacre.write_points(path, np.zeros((1, 3)), comments=["x"] * 10_001)

@@ -269,3 +269,16 @@ def test_real_trajectories(recordings):
     estimate = read_trajectory(recordings / "redwood-livingroom1" / "o3d_estimated_trajectory.log")
     assert len(estimate) == 211
     np.testing.assert_array_equal(estimate.timestamps, np.arange(211))
+
+
+def test_a_file_of_many_poses_is_read_whole_and_errors_name_their_line(tmp_path):
+    path = tmp_path / "many.txt"
+    poses = np.tile(np.eye(4), (2500, 1, 1))
+    poses[:, 0, 3] = np.arange(2500)
+    write_trajectory(path, np.arange(2500), poses)
+    read = read_trajectory(path)
+    np.testing.assert_array_equal(read.poses, poses)
+    np.testing.assert_array_equal(read.timestamps, np.arange(2500))
+    path.write_text("0 0 0 0 0 0 0 1\n" * 2000 + "0 0 0 0 0 0 0 0\n")
+    with pytest.raises(FileFormatError, match="line 2001: the quaternion is 0"):
+        read_trajectory(path)

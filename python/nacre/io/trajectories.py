@@ -75,8 +75,7 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     if not blocks:
         raise FileFormatError(path, "the trajectory is empty")
     timestamps, poses = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
-    for array_ in (timestamps, poses):
-        array_.flags.writeable = False  # a Trajectory need not copy them
+    timestamps.flags.writeable = poses.flags.writeable = False  # a Trajectory need not copy them
     return Trajectory(timestamps, poses)
 
 
@@ -136,8 +135,7 @@ def _blocks(path: str | os.PathLike[str], data: bytes) -> Iterator[tuple[_Format
     numbers, lines = array("d"), array("q")
     format_ = None
 
-    def block() -> _Block:
-        assert format_ is not None
+    def block(format_: _Format) -> _Block:
         return _Block(
             path,
             np.array(numbers).reshape(-1, sum(format_.widths)),
@@ -155,7 +153,7 @@ def _blocks(path: str | os.PathLike[str], data: bytes) -> Iterator[tuple[_Format
         numbers.extend(values)
         lines.append(line)
         if len(lines) == _POSES_PER_BLOCK * len(format_.widths):
-            yield format_, block()
+            yield format_, block(format_)
             del numbers[:], lines[:]
     if format_ is None or not lines:
         return
@@ -163,7 +161,7 @@ def _blocks(path: str | os.PathLike[str], data: bytes) -> Iterator[tuple[_Format
         if format_ is _FORMATS[4]:
             raise _unknown(path, lines[0], 4)
         raise FileFormatError(path, "the last 4x4 matrix is cut off", line=lines[-1])
-    yield format_, block()
+    yield format_, block(format_)
 
 
 def _parse_tum(block: _Block) -> tuple[Float64, Float64]:
