@@ -125,7 +125,7 @@ def long_recording(places: Places, row: Row) -> dict[str, Figures]:
 
     mesh = nacre.read_mesh(places.bunny)
     camera = nacre.Camera(320, 240, 262.5, 262.5, 159.5, 119.5)
-    per_turn, num_frames, part = 120, 2000, 200
+    per_turn, num_frames, covered = 120, 2000, 400
     poses = nacre.turntable_poses(mesh, per_turn, 2 * math.pi / per_turn, camera=camera, distance=0.4)
     model = nacre.Model(camera)
     tracked, seconds, points, resident = 0, [], [], []
@@ -136,15 +136,16 @@ def long_recording(places: Places, row: Row) -> dict[str, Figures]:
         seconds.append(time.process_time() - start)
         points.append(len(model.points))
         resident.append(resident_memory())
-    early, late = slice(part, 2 * part), slice(num_frames - part, num_frames)
+    turns = [np.mean(seconds[i : i + per_turn]) for i in range(0, num_frames - per_turn + 1, per_turn)]
+    early, late = np.median(turns[2:7]), np.median(turns[-5:])
     return {
         "nacre": {
             "frames": num_frames,
             "tracked": tracked,
             "points": points[-1],
-            "more_points": 100 * (points[-1] / points[2 * part] - 1),
-            "more_time": 100 * (np.mean(seconds[late]) / np.mean(seconds[early]) - 1),
-            "more_memory": resident[-1] - resident[2 * part],
+            "more_points": 100 * (points[-1] / points[covered] - 1),
+            "more_time": 100 * (late / early - 1),
+            "more_memory": resident[-1] - resident[covered],
             "processor": sum(seconds),
         }
     }

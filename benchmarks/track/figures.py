@@ -41,7 +41,7 @@ FIGURES = [
     Figure("cov", "NN CoV", "uniformity.coefficient_of_variation", 1, 3),
     Figure("points", "points", "uniformity.num_points", digits=0),
     Figure("more_points", "more points than at frame 400 [%]", "", digits=1),
-    Figure("more_time", "more time a frame than at 200-400 [%]", "", digits=1),
+    Figure("more_time", "more time a frame than in turns 3 to 7 [%]", "", digits=1),
     Figure("more_memory", "more memory than at frame 400 [MB]", "", digits=1),
     Figure("milliseconds", "ms a frame", "run.milliseconds", digits=1),
     Figure("processor", "CPU s", "run.processor", digits=1),
