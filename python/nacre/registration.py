@@ -187,7 +187,7 @@ def align(
     method : "symmetric", "point_to_plane" or "point_to_point"
         What a pair costs: Rusinkiewicz 2019; Chen and Medioni 1992; Besl and McKay 1992.
     max_iterations : int
-        Largest number of steps.
+        Largest number of steps on the shapes; what colours decide takes a few more.
     max_distance : float
         Gate on the distance of a pair in the first iteration [m]; 0: a quarter of the target's diameter.
     final_distance : float

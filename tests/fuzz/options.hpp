@@ -67,4 +67,29 @@ inline FusionOptions fusion_options(Bytes& bytes) {
   return options;
 }
 
+inline ModelOptions model_options(Bytes& bytes) {
+  ModelOptions options = bytes.byte() >= 192 ? ModelOptions::preset("paper") : ModelOptions();
+  if (bytes.byte() >= 128) {
+    options.depth = depth_options(bytes);
+    options.region = region_options(bytes);
+    options.registration = align_options(bytes);
+    options.fusion = fusion_options(bytes);
+    options.consolidation = consolidate_options(bytes);
+  }
+  bytes.change_to(options.fold_in, 3);
+  bytes.change(options.region.object), bytes.change(options.spacing), bytes.change(options.max_points, -1, 400);
+  bytes.change(options.predict_motion), bytes.change(options.relocalise), bytes.change(options.loop_closure);
+  bytes.change(options.denoise_samples), bytes.change(options.verify), bytes.change(options.min_evidence);
+  bytes.change(options.first_fraction), bytes.change(options.kept_fraction), bytes.change(options.new_fraction);
+  options.num_threads = bytes.threads();
+  return options;
+}
+
+inline void check_cloud(const PointModel& cloud, const ModelOptions& options) {
+  NACRE_HOLDS(cloud.size() <= options.max_points);
+  NACRE_HOLDS(cloud.normals.size() == cloud.points.size());
+  NACRE_HOLDS(cloud.colors.empty() || cloud.colors.size() == cloud.points.size());
+  for (const Eigen::Vector3f& point : cloud.points) NACRE_HOLDS(point.allFinite());
+}
+
 }  // namespace nacre_fuzz

@@ -19,7 +19,7 @@ enum class Metric {
 /// How align works.
 struct AlignOptions {
   Metric method = Metric::symmetric;
-  int max_iterations = 40;
+  int max_iterations = 40;       ///< on the shapes; what a brightness decides takes a few more
   double max_distance = 0.0;     ///< pairs farther apart are rejected in the first iteration [m]; 0: a quarter of the
                                  ///< target's diameter
   double final_distance = 0.0;   ///< the gate shrinks to this [m]; 0: from the spacing of the target and the residuals
@@ -64,7 +64,7 @@ const char* to_string(AlignStatus status);
 struct AlignResult {
   Pose target_from_source = Pose::Identity();
   AlignStatus status = AlignStatus::too_few_pairs;
-  int iterations = 0;
+  int iterations = 0;    ///< that were run: at most max_iterations, but where a brightness decides directions
   int num_inliers = 0;   ///< pairs inside the last gate, of the source points that were used
   double overlap = 0.0;  ///< num_inliers / source points that were used
   double rmse = 0.0;     ///< of the inliers' residuals along the normals (distances, for point_to_point) [m]
