@@ -12,8 +12,34 @@ import numpy.typing as npt
 from nacre.errors import FileFormatError
 from nacre.io.images import decoded
 
+IMAGE, COMPRESSED_IMAGE = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
+CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 MILLIMETRES, METRES = ("16UC1", "mono16", "Z16"), ("32FC1",)
 CHANNELS = {"rgb8": (0, 1, 2), "bgr8": (2, 1, 0), "rgba8": (0, 1, 2), "bgra8": (2, 1, 0), "mono8": (0, 0, 0)}
+
+# What is read of a message; of arrays, the type of their values.
+_FIELDS: dict[str, dict[str, type | str]] = {
+    IMAGE: {"height": int, "width": int, "encoding": str, "is_bigendian": int, "step": int, "data": "u1"},
+    COMPRESSED_IMAGE: {"format": str, "data": "u1"},
+    CAMERA_INFO: {"height": int, "width": int, "k": "f8", "d": "f8"},
+}
+
+
+def check_fields(message: Any, kind: str, place: Path) -> None:
+    """Refuse a message that has not the fields of its kind: recordings bring their own definitions."""
+    for name, wanted in _FIELDS.get(kind, {}).items():
+        value = _field(message, name)
+        if isinstance(wanted, str):
+            is_right = isinstance(value, np.ndarray) and value.dtype == wanted
+        else:
+            is_right = isinstance(value, wanted) and not (isinstance(value, int) and value < 0)
+        if not is_right or (name == "k" and value.size != 9):
+            raise FileFormatError(place, f"not a {kind} of ROS: its {name} is {str(value)[:40]}")
+
+
+def _field(message: Any, name: str) -> Any:
+    """Return a field, or None; some have capitals in ROS 1."""
+    return getattr(message, name, getattr(message, name.upper(), None))
 
 
 def pixels(message: Any, place: Path) -> npt.NDArray[Any]:
@@ -55,9 +81,5 @@ def without_tail(data: bytes) -> bytes:
 
 
 def intrinsics(info: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-    """Return the matrix and the distortion of a camera_info; capitals in ROS 1."""
-    matrix, distortion = (
-        np.asarray(getattr(info, name if hasattr(info, name) else name.upper()), np.float64)
-        for name in ("k", "d")
-    )
-    return matrix.reshape(3, 3), distortion
+    """Return the matrix and the distortion of a camera_info."""
+    return _field(info, "k").reshape(3, 3), _field(info, "d")

@@ -18,9 +18,13 @@ from nacre._core import Camera
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe
 from nacre.datasets.ros_messages import (
+    CAMERA_INFO,
     CHANNELS,
+    COMPRESSED_IMAGE,
+    IMAGE,
     METRES,
     MILLIMETRES,
+    check_fields,
     compressed_depth,
     intrinsics,
     pixels,
@@ -41,8 +45,6 @@ LAYOUT = (
 )
 SUFFIXES = (".bag", ".mcap", ".db3")
 
-_IMAGES = ("sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage")
-_INFO = "sensor_msgs/msg/CameraInfo"
 _MOST_METADATA = 1 << 18
 _MOST_NESTED = 64
 _MISSING = 'ROS recordings need rosbags: pip install "nacre[ros]"'
@@ -110,7 +112,7 @@ class _Bag:
                 hint = f" (ROS 2 is read; what was cut short: mcap recover {path.name} -o whole.mcap)"
             raise FileFormatError(path, f"not a whole ROS recording: {error}{hint}") from error
         weakref.finalize(self, self._reader.close)
-        topics = [c.topic for c in self._reader.connections if c.msgtype in _IMAGES]
+        topics = [c.topic for c in self._reader.connections if c.msgtype in (IMAGE, COMPRESSED_IMAGE)]
         sure = [topic for topic in topics if re.search("confidence", topic, re.IGNORECASE)]
         depth = [t for t in topics if re.search("depth", t, re.IGNORECASE) and t not in sure]
         if not depth:
@@ -131,7 +133,7 @@ class _Bag:
 
     def camera(self) -> Camera:
         """Return the camera of the depth images."""
-        near = [c for c in self._reader.connections if c.msgtype == _INFO]
+        near = [c for c in self._reader.connections if c.msgtype == CAMERA_INFO]
         if not near:
             raise FileFormatError(self.path, "no camera_info; give the camera")
         chosen = max(near, key=lambda c: _common(c.topic, self.depth_topic))
@@ -156,7 +158,7 @@ class _Bag:
             own = [
                 c
                 for c in self._reader.connections
-                if c.msgtype == _INFO
+                if c.msgtype == CAMERA_INFO
                 and image.startswith(c.topic.rpartition("/")[0].removesuffix("/info") + "/")
             ]
             info = self._first(max(own, key=lambda c: len(c.topic))) if own else None
@@ -236,9 +238,12 @@ class _Bag:
         for connection in self._reader.connections:
             if connection.topic.endswith("option/Depth_Units/value"):
                 message = self._first(connection)
-                with suppress(ValueError, TypeError, AttributeError):  # a text in the SDK's .db3
-                    if float(message.data) > 0:
-                        return round(1 / float(message.data), 3)
+                with suppress(
+                    ValueError, TypeError, AttributeError, ZeroDivisionError
+                ):  # a text in the SDK's .db3
+                    scale = 1 / float(message.data)
+                    if 0 < scale < np.inf:
+                        return round(scale, 3)
         return 1000.0
 
     def _messages(self, topic: str, time: int | None = None) -> Iterator[tuple[Any, int, bytes]]:
@@ -258,12 +263,14 @@ class _Bag:
         raise FileFormatError(place, "the message is missing")
 
     def _decoded(self, connection: Any, data: bytes, place: Path) -> Any:
-        if connection.msgtype == _IMAGES[0] and not self._reader.is2:
+        if connection.msgtype == IMAGE and not self._reader.is2:
             data = without_tail(data)
         try:
-            return self._reader.deserialize(data, connection.msgtype)
+            message = self._reader.deserialize(data, connection.msgtype)
         except Exception as error:  # rosbags' own, and whatever damaged lengths cause
             raise FileFormatError(place, f"the message is damaged: {error!r}") from error
+        check_fields(message, connection.msgtype, place)
+        return message
 
 
 def _check_metadata(path: Path) -> None:

@@ -18,6 +18,7 @@ from hostile_files.pcd import PCD
 from hostile_files.phones import PHONES
 from hostile_files.ply import PLY
 from hostile_files.recordings import RECORDINGS
+from hostile_files.ros import ROS
 from hostile_files.trajectories import TRAJECTORIES
 
 CASES = {
@@ -31,6 +32,7 @@ CASES = {
         CAMERAS,
         CONFIGS,
         RECORDINGS,
+        ROS,
         PHONES,
         OUTPUTS,
         CHECKPOINTS,

@@ -17,6 +17,7 @@ from hostile_files.pcd import packed, pcd
 from hostile_files.phones import HEAD, TOLD, r3d, stray
 from hostile_files.ply import FACES, GRID, TEXT, TWO, ply, text, vertices
 from hostile_files.recordings import plain, tum
+from hostile_files.ros import WHOLE
 from hostile_files.trajectories import EYE, GOOD
 
 PIXELS = np.arange(12, dtype=">u2").reshape(3, 4) + 500
@@ -88,6 +89,10 @@ VALID["recording/metadata"] = Case(
     "",
     needs="liblzfse",
 )
+for _name, _data in WHOLE.items():
+    VALID[f"recording/{_name}"] = Case(
+        f"recording/{_name}", "recording", {_name: _data}, "", _name, needs="rosbags"
+    )
 VALID["output/valid"] = Case(
     "output/valid",
     "output",
