@@ -24,7 +24,7 @@ def main(folder: Path) -> None:
     # Once around each scene, with a focal length that is right and with one that is not.
     for scene, focal in itertools.product(range(6), (0, 40)):
         size, step, noise, mixing, color, options, frames = scene % 3, 80, 20, 0, 200 * (focal > 0), 0, 40
-        seed = bytes((scene, size, focal, step, noise, mixing, color, options, frames))
+        seed = bytes((scene, size, focal, step, noise, mixing, color, options, frames)) + bytes(2 * frames)
         (folder / "recording" / f"{scene}-{focal}").write_bytes(seed)
 
 
