@@ -1,4 +1,4 @@
-"""Writes ROS recordings with rosbags: of any topics, and a small whole one."""
+"""Writes ROS recordings with rosbags."""
 
 from __future__ import annotations
 

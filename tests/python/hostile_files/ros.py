@@ -54,5 +54,5 @@ ROS = [
         needs="rosbags",
     )
     for what, (old, new, said) in CHANGED.items()
-    if "a.mcap" in WHOLE
+    if WHOLE
 ]
