@@ -8,9 +8,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from nacre import _core
+from nacre.arrays import as_scale
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 from nacre.io.raw import read_file
@@ -65,9 +64,10 @@ def read_checkpoint(path: str | os.PathLike[str]) -> tuple[_core.Model, float, d
         raise FileFormatError(path, reason, offset=offset) from None
     try:
         more = json.loads(note)
-        scale = float(more.pop("depth_scale"))
+        written = more.pop("depth_scale")
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         raise FileFormatError(path, "it was saved by C++: it does not say the depth_scale") from None
-    if not (np.isfinite(scale) and scale > 0):
-        raise FileFormatError(path, f"its depth_scale must be positive, got {scale!r}")
-    return core, scale, more
+    try:
+        return core, as_scale("depth_scale", written), more
+    except (TypeError, ValueError) as error:
+        raise FileFormatError(path, str(error)) from None

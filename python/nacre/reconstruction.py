@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre.arrays import as_count, as_flag
 from nacre.checkpoint import Checkpointed
 from nacre.datasets.corrected import with_corrected_depth
 from nacre.datasets.sequence import SequenceFrame
@@ -158,7 +159,8 @@ class Reconstruction(Checkpointed):
         while True:
             while state.place < len(self.frames):
                 before = self.frames[state.place]
-                if before.report is None or before.status not in ("LOST", "WEAK"):
+                is_there = before.index < len(self.sequence)  # not what a killed process had no time to keep
+                if before.report is None or before.status not in ("LOST", "WEAK") or not is_there:
                     state.place += 1
                     continue
                 record = self._add(before.index, before.world_from_camera)
@@ -222,12 +224,14 @@ class Reconstruction(Checkpointed):
             run = more.pop("run")
             done.frames = [record_from(state, reports) for state in run["records"]]
             if run["retry"] is not None:
-                done._retry = _Retry(int(run["retry"]["place"]), bool(run["retry"]["found_any"]))
+                done._retry = _Retry(
+                    as_count("place", run["retry"]["place"]), as_flag("found_any", run["retry"]["found_any"])
+                )
             if run["depth_calibration"] is not None:
                 done.depth_calibration = calibration = calibration_from(run["depth_calibration"])
                 if calibration.is_significant:
                     done.sequence = with_corrected_depth(sequence, calibration)
-        except (KeyError, TypeError, ValueError, IndexError) as error:
+        except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
             raise FileFormatError(path, f"it holds a model, but no run that can go on ({error})") from None
         return done, more
 

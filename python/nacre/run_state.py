@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from nacre.arrays import as_count, as_length, as_number, as_vector
 from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
-from nacre.frame_record import STATUSES, FrameRecord
+from nacre.frame_record import FrameRecord
 from nacre.frame_report import FrameReport
+
+_FOUND_LATER = {"TRACKED": "RELOCALISED"}
 
 
 def record_state(record: FrameRecord) -> dict[str, Any]:
@@ -33,39 +37,51 @@ def record_state(record: FrameRecord) -> dict[str, Any]:
 
 
 def record_from(state: Any, reports: Sequence[FrameReport]) -> FrameRecord:
-    """Return the record; a ValueError says what is wrong with the values."""
-    number, truth = state["report"], state["truth"]
-    if state["status"] not in STATUSES or not isinstance(state["reason"], str):
-        raise ValueError(f"no frame is {state['status']!r}")
-    if number is not None and not 0 <= int(number) < len(reports):
+    """Return the record; ValueError, TypeError, KeyError or IndexError say what is wrong with the values."""
+    number, timestamp, truth = state["report"], state["timestamp"], state["truth"]
+    if number is not None and as_count("report", number) >= len(reports):
         raise ValueError(f"there is no report {number!r}")
-    if state["timestamp"] is not None and not isinstance(state["timestamp"], (int, float)):
-        raise ValueError(f"{state['timestamp']!r} is no time")
+    report = None if number is None else reports[number]
+    known = ("LOST",) if report is None else (report.status, _FOUND_LATER.get(report.status))
+    if state["status"] not in known:
+        raise ValueError(f"no frame is {state['status']!r} whose report says {known[0]}")
     return FrameRecord(
-        int(state["index"]),
-        state["timestamp"],
+        as_count("index", state["index"]),
+        None if timestamp is None else as_number("timestamp", timestamp),
         state["status"],
-        state["reason"],
-        None if number is None else reports[int(number)],
+        _text("reason", state["reason"]),
+        report,
         None if truth is None else pose_from(truth),
         _error_from(state.get("error")),
     )
 
 
 def calibration_from(state: Any) -> DepthCalibration:
-    """Return a calibration of depth that was written as plain values."""
-    return DepthCalibration(float(state["tilt"]), float(state["sigma"]), int(state["num_pairs"]))
+    """Return a calibration of depth that was written as plain values; errors as in :func:`record_from`."""
+    tilt, sigma = as_number("tilt", state["tilt"]), as_length("sigma", state["sigma"])
+    if not math.isfinite(tilt):
+        raise ValueError(f"tilt must be finite, got {tilt}")
+    return DepthCalibration(tilt, sigma, as_count("num_pairs", state["num_pairs"]))
 
 
 def pose_from(values: Any) -> npt.NDArray[np.float64]:
     """Return a pose that was written row by row."""
-    return np.array(values, np.float64).reshape(4, 4)
+    return as_vector("pose", values, 16).reshape(4, 4)
 
 
 def _error_from(state: Any) -> Exception | None:
     if state is None:
         return None
     if state[0] == "file":
-        _, path, reason, line, offset = state
-        return FileFormatError(path, str(reason), line=line, offset=offset)
-    return ValueError(str(state[1]))
+        path, reason, line, offset = state[1:]
+        for place in (line, offset):
+            if place is not None and type(place) is not int:
+                raise TypeError(f"{place!r} is no place in a file")
+        return FileFormatError(_text("path", path), _text("reason", reason), line=line, offset=offset)
+    return ValueError(_text("error", state[1]))
+
+
+def _text(name: str, value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError(f"{name} must be a text, got {value!r}")
+    return value

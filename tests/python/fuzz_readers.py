@@ -1,15 +1,22 @@
 """
 Fuzz nacre's readers, the hostile files of ``hostile_files`` and valid ones being the seeds.
 
-    python tests/python/fuzz_readers.py KIND [--seconds 60] [--seed 0]
+    python tests/python/fuzz_readers.py KIND [--seconds 60] [--seed 0] [--corpus FOLDER]
 
-damages files at random; with atheris (``pip install atheris``, Python 3.11 to 3.13) what it tries follows
-the branches that it has seen. KIND is one of those of ``hostile_files.READERS``. Whatever is neither a result
-nor an error of nacre's is written to ``fuzz-findings/`` and ends the run with 1.
+damages files at random; with atheris (``pip install --group fuzz``) what it tries follows the branches that
+it has seen, and what took a new one is kept in the corpus, from which the next run goes on. Check sums are
+made right again in half of the files. KIND is one of those of ``hostile_files.READERS``. Whatever is neither
+a result nor an error of nacre's is written to ``fuzz-findings/`` and ends the run with 1.
+
+A file of the corpus is what a reader is given, after one byte that says which of the seeds' places it takes.
 """
 
 import argparse
+import contextlib
+import importlib
 import logging
+import os
+import pkgutil
 import random
 import sys
 import tempfile
@@ -25,19 +32,21 @@ except ImportError:
 if atheris is not None and __name__ == "__main__":
     with atheris.instrument_imports(include=["nacre"]):
         import nacre
-        import nacre.cli.config
-        import nacre.datasets
-        import nacre.io.images
-        import nacre.io.points
-        import nacre.viewer.written
+
+        for module in pkgutil.walk_packages(nacre.__path__, "nacre."):  # those, too, that are imported late
+            if not module.name.endswith("__main__"):
+                with contextlib.suppress(ImportError):
+                    importlib.import_module(module.name)
 else:
     import nacre
 from hostile_files import CASES, READERS, Case, write
-from hostile_files.damage import damaged
+from hostile_files.damage import damaged, scratched
+from hostile_files.seals import note_of, sealed, with_note
 from hostile_files.valid import VALID
 
 MOST_BYTES = 1 << 16
 MOST_SECONDS = 2.0
+FOLDERS = ("recording", "output", "run")  # of several files each
 
 
 class Findings:
@@ -48,24 +57,50 @@ class Findings:
         self.keep = keep
         self._known: set[str] = set()
         self.num_runs = self.num_refused = self.num_found = 0
-        cases = [case for case in (*CASES.values(), *VALID.values()) if case.reader == kind]
-        # What lies beside a damaged file stays as it is in the first case that has such a file.
-        self.seeds: dict[str, list[bytes]] = {}
-        self.homes: dict[str, tuple[Case, Path, str]] = {}
-        for case in sorted(cases, key=lambda case: case.name not in VALID):
-            if case.pipes or case.links:
+        # The places that a file may take: in each valid folder; in a hostile one that alone has such a file.
+        self.homes: list[tuple[Case, Path, str]] = []
+        self._seeds: dict[str, list[bytes]] = {}
+        self._valid: dict[str, list[bytes]] = {}
+        for case in (*VALID.values(), *CASES.values()):
+            if case.reader != kind or case.pipes or case.links:
                 continue
             for name, data in case.files.items():
-                key = name if case.reader in ("recording", "output") else Path(name).suffix
-                if len(data) <= MOST_BYTES:
-                    self.seeds.setdefault(key, []).append(data)
-                if key not in self.homes:
-                    self.homes[key] = (case, write(case, folder / key.replace("/", "_")), name)
-        self.keys = sorted(self.seeds.keys() & self.homes.keys())
+                known = self._seeds.setdefault(self._sort_of(name), [])
+                if not known or (case.name in VALID and kind in FOLDERS):
+                    self.homes.append((case, write(case, folder / str(len(self.homes))), name))
+                if len(data) <= MOST_BYTES and data not in known:
+                    known.append(data)
+                    if case.name in VALID:
+                        self._valid.setdefault(self._sort_of(name), []).append(data)
 
-    def run(self, key: str, data: bytes) -> None:
+    def _sort_of(self, name: str) -> str:
+        return name if self.kind in FOLDERS else Path(name).suffix
+
+    def seeds_of(self, home: int) -> list[bytes]:
+        """Return the files of the corpus of seeds that may take a place."""
+        return self._seeds[self._sort_of(self.homes[home][2])]
+
+    def mutated(self, home: int, data: bytes, chance: random.Random) -> bytes:
+        """Return what a file, or every third time a valid one of its sort, becomes by chance."""
+        valid = self._valid.get(self._sort_of(self.homes[home][2]))
+        if valid and chance.random() < 0.33:
+            data = chance.choice(valid)
+        if self.kind == "reconstruction" and (note := note_of(data)):
+            return with_note(data, chance.choice((damaged, scratched))((note,), chance))
+        if chance.random() < 0.5:
+            data = scratched((data,), chance)
+        else:
+            data = damaged((data, *self.seeds_of(home)), chance)
+        return sealed(data) if chance.random() < 0.5 else data
+
+    def run_marked(self, data: bytes) -> None:
+        """Read a file of the corpus, of which the first byte says what it is to be."""
+        if data:
+            self.run(data[0] % len(self.homes), data[1:])
+
+    def run(self, home: int, data: bytes) -> None:
         """Read a file of these bytes."""
-        case, path, name = self.homes[key]
+        case, path, name = self.homes[home]
         place = path / name if not case.opens else path.parent / name
         place.write_bytes(data)
         start = time.process_time()
@@ -78,17 +113,20 @@ class Findings:
         except FileNotFoundError:
             pass
         except Exception as error:
-            self._found(key, data, repr(error))
+            self._found(name, data, repr(error))
         if time.process_time() - start > MOST_SECONDS:
-            self._found(key, data, f"{time.process_time() - start:.1f} s")
+            self._found(name, data, f"{time.process_time() - start:.1f} s")
 
-    def _found(self, key: str, data: bytes, what: str) -> None:
+    def __str__(self) -> str:
+        return f"{self.kind}: {self.num_runs} files, {self.num_refused} refused, {self.num_found} findings"
+
+    def _found(self, name: str, data: bytes, what: str) -> None:
         if what[:40] in self._known:  # one file of each kind is enough
             return
         self._known.add(what[:40])
         self.num_found += 1
-        self.keep.mkdir(exist_ok=True)
-        path = self.keep / f"{self.kind}-{self.num_found}-{Path(key).name}".replace(" ", "-")
+        self.keep.mkdir(parents=True, exist_ok=True)
+        path = self.keep / f"{self.kind}-{self.num_found}-{Path(name).name}".replace(" ", "-")
         path.write_bytes(data)
         print(f"{path}: {what[:300]}", flush=True)
 
@@ -97,47 +135,69 @@ def main() -> int:
     """Fuzz one reader."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[1])
     parser.add_argument("kind", choices=READERS)
-    parser.add_argument("--seconds", type=float, default=60)
+    parser.add_argument(
+        "--seconds", type=float, default=60, help="0: what the corpus and the seeds hold, once"
+    )
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--corpus", type=Path, help="a folder to go on from, and to keep what is new in")
     parser.add_argument("--keep", type=Path, default=Path("fuzz-findings"))
     options = parser.parse_args()
     warnings.simplefilter("ignore")
     logging.disable(logging.WARNING)
-    end = time.monotonic() + options.seconds
     with tempfile.TemporaryDirectory() as folder:
-        findings = Findings(options.kind, Path(folder), options.keep)
-        if atheris is not None:
-            _guided(findings, options.seed, options.seconds)
-        chance = random.Random(options.seed)
-        while time.monotonic() < end:
-            key = chance.choice(findings.keys)
-            findings.run(key, damaged(findings.seeds[key], chance))
-        print(f"{findings.num_runs} files, {findings.num_refused} refused, {findings.num_found} findings")
+        findings = Findings(options.kind, Path(folder) / "files", options.keep)
+        corpus = options.corpus or Path(folder) / "corpus"
+        corpus.mkdir(parents=True, exist_ok=True)
+        if atheris is None or options.seconds == 0:
+            _at_random(findings, corpus, options.seed, options.seconds)
+        else:
+            _guided(findings, corpus, Path(folder) / "seeds", options.seed, options.seconds)
     return int(findings.num_found > 0)
 
 
-def _guided(findings: Findings, seed: int, seconds: float) -> None:
-    """Let libFuzzer choose; it ends the process itself."""
-    corpus = tempfile.mkdtemp()
-    for k, key in enumerate(findings.keys):
-        for i, data in enumerate(findings.seeds[key]):
-            (Path(corpus) / f"{k}-{i}").write_bytes(bytes([k]) + data)
+def _at_random(findings: Findings, corpus: Path, seed: int, seconds: float) -> None:
+    """Try the corpus and the seeds, and then what they are when damaged."""
+    end = time.monotonic() + seconds
+    for path in sorted(corpus.iterdir()):
+        findings.run_marked(path.read_bytes())
+    homes = range(len(findings.homes))
+    for home in homes:
+        for data in findings.seeds_of(home):
+            findings.run(home, data)
+    chance = random.Random(seed)
+    while time.monotonic() < end:
+        home = chance.choice(homes)
+        findings.run(home, findings.mutated(home, chance.choice(findings.seeds_of(home)), chance))
+    print(findings)
+
+
+def _guided(findings: Findings, corpus: Path, seeds: Path, seed: int, seconds: float) -> None:
+    """Let libFuzzer choose; it never returns, so the process is ended here."""
+    seeds.mkdir()
+    for home in range(len(findings.homes)):
+        for i, data in enumerate(findings.seeds_of(home)):
+            (seeds / f"{home}-{i}").write_bytes(bytes([home]) + data)
     end = time.monotonic() + seconds
 
     def one(data: bytes) -> None:
         if time.monotonic() > end:
-            print(f"{findings.num_runs} files, {findings.num_refused} refused, {findings.num_found} findings")
-            sys.stdout.flush()
-            import os
-
+            print(findings, flush=True)
             os._exit(int(findings.num_found > 0))
-        if data:
-            findings.run(findings.keys[data[0] % len(findings.keys)], data[1:])
+        findings.run_marked(data)
 
-    atheris.Setup(
-        [sys.argv[0], corpus, f"-seed={seed + 1}", f"-max_len={MOST_BYTES}", "-timeout=30", "-verbosity=0"],
-        one,
-    )
+    def mutated(data: bytes, most: int, number: int) -> bytes:
+        chance = random.Random(number)
+        if not data or chance.random() < 0.5:
+            data = atheris.Mutate(data, most)
+            return (data[:1] + sealed(data[1:]) if chance.random() < 0.5 else data)[:most]
+        home = data[0] % len(findings.homes)
+        return (bytes([home]) + findings.mutated(home, data[1:], chance))[:most]
+
+    findings.keep.mkdir(parents=True, exist_ok=True)
+    limits = [f"-max_len={MOST_BYTES}", "-timeout=30", "-mutate_depth=2"]
+    limits += [f"-artifact_prefix={findings.keep}/{findings.kind}-"]
+    words = [sys.argv[0], str(corpus), str(seeds), f"-seed={seed + 1}", "-verbosity=0", *limits]
+    atheris.Setup(words, one, custom_mutator=mutated)
     atheris.Fuzz()
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hostile_files.seals import sealed_model
 from test_determinism import digest
 
 import nacre
@@ -199,26 +200,6 @@ def test_another_format_says_who_wrote_it(saved: bytes, tmp_path: Path) -> None:
     assert nacre.__version__ in error.reason
 
 
-MASK = (1 << 64) - 1
-
-
-def mix(x: int) -> int:
-    x = (x + 0x9E3779B97F4A7C15) & MASK
-    x = ((x ^ (x >> 30)) * 0xBF58476D1CE4E5B9) & MASK
-    x = ((x ^ (x >> 27)) * 0x94D049BB133111EB) & MASK
-    return x ^ (x >> 31)
-
-
-def sealed(data: bytes) -> bytes:
-    """Return a file with the length and the checksum that fit its body."""
-    body = data[48:]
-    total = len(body)
-    padded = body + bytes(-len(body) % 8)
-    for word in struct.unpack(f"<{len(padded) // 8}Q", padded):
-        total = mix(total ^ word)
-    return data[:32] + struct.pack("<QQ", len(data), total) + body
-
-
 def test_whoever_forges_the_checksum_breaks_nothing(tmp_path: Path) -> None:
     """Each byte of a small model takes other values: it is refused, or it is a model that goes on."""
     camera = nacre.Camera(24, 20, 30.0, 30.0, 11.5, 9.5)
@@ -229,7 +210,7 @@ def test_whoever_forges_the_checksum_breaks_nothing(tmp_path: Path) -> None:
         model.add_frame(depth + 0.001 * i)
     model.save(tmp_path / "small")
     data = (tmp_path / "small").read_bytes()
-    assert sealed(data) == data
+    assert sealed_model(data) == data
     random = np.random.default_rng(1)
     path, num_loaded = tmp_path / "forged", 0
     for _ in range(80):
@@ -238,7 +219,7 @@ def test_whoever_forges_the_checksum_breaks_nothing(tmp_path: Path) -> None:
         forged[place : place + 8] = random.choice(
             [b"\xff" * 8, b"\0" * 8, random.bytes(8), b"\0\0\0\0\0\0\xf0\x7f"]
         )
-        path.write_bytes(sealed(bytes(forged)))
+        path.write_bytes(sealed_model(bytes(forged)))
         try:
             other = nacre.Model.load(path)
         except nacre.FileFormatError:
@@ -273,7 +254,9 @@ def test_finite_but_absurd_values_are_refused(tmp_path: Path) -> None:
     for name, (known, absurd) in forgeries.items():
         place = data.rfind(known)
         assert place > 0, name
-        error = refused(sealed(data[:place] + absurd + data[place + len(absurd) :]), tmp_path / "forged")
+        error = refused(
+            sealed_model(data[:place] + absurd + data[place + len(absurd) :]), tmp_path / "forged"
+        )
         assert re.search("no surface|spacing is not|a pose is not", error.reason), (name, error)
 
 
@@ -323,5 +306,5 @@ def test_reports_that_cannot_be_are_refused(tmp_path: Path) -> None:
     for name, (known, absurd) in forgeries.items():
         assert data.count(known) == 1, name
         assert len(absurd) == len(known), name
-        error = refused(sealed(data.replace(known, absurd)), tmp_path / "forged")
+        error = refused(sealed_model(data.replace(known, absurd)), tmp_path / "forged")
         assert "report" in error.reason, (name, error)

@@ -5,6 +5,7 @@ import time
 
 import pytest
 from hostile_files import CASES, opened, write
+from hostile_files.valid import VALID
 
 import nacre
 
@@ -29,3 +30,9 @@ def test_error_names_file_place_and_reason(tmp_path, name):
     assert time.process_time() - start < MOST_SECONDS
     assert str(caught.value.path).startswith(str(path))
     assert len(str(caught.value)) < 3000
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("name", [n for n in VALID if importlib.util.find_spec(VALID[n].needs) is not None])
+def test_what_is_to_be_damaged_is_whole(tmp_path, name):
+    opened(VALID[name], write(VALID[name], tmp_path))

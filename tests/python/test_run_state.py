@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from nacre.errors import FileFormatError
 from nacre.reconstruction import FrameRecord
-from nacre.run_state import record_from, record_state
+from nacre.run_state import calibration_from, record_from, record_state
 
 TRUTH = np.eye(4)
 GOOD = record_state(FrameRecord(3, 0.1, "LOST", "nothing was seen", None, TRUTH))
@@ -33,13 +34,41 @@ def test_a_record_comes_back_whole(error: Exception | None) -> None:
     ("change", "message"),
     [
         ({"status": "FOUND"}, "no frame is 'FOUND'"),
-        ({"reason": 5}, "no frame is 'LOST'"),
+        ({"status": "TRACKED"}, "no frame is 'TRACKED' whose report says LOST"),
+        ({"status": []}, r"no frame is \[\]"),
+        ({"reason": 5}, "reason must be a text, got 5"),
         ({"report": 0}, "there is no report 0"),
-        ({"report": -1}, "there is no report -1"),
-        ({"timestamp": "noon"}, "'noon' is no time"),
-        ({"truth": [1.0, 2.0]}, "reshape"),
+        ({"report": -1}, "report must be an integer of at least 0, got -1"),
+        ({"report": math.inf}, "report must be an integer, got inf"),
+        ({"index": -7}, "index must be an integer of at least 0, got -7"),
+        ({"index": math.inf}, "index must be an integer, got inf"),
+        ({"index": 10**400}, "index must be an integer below"),
+        ({"timestamp": "noon"}, "timestamp must be a number, got 'noon'"),
+        ({"timestamp": 10**400}, "timestamp must be a number that a float can hold"),
+        ({"truth": [1.0, 2.0]}, "pose must be 16 finite numbers"),
+        ({"truth": [10**400, *15 * [0]]}, "pose must be"),
+        ({"truth": [math.nan, *15 * [0]]}, "pose must be 16 finite numbers"),
+        ({"error": ["file", 5, "cut short", None, None]}, "path must be a text, got 5"),
+        ({"error": ["file", "a", "cut short", [], None]}, r"\[\] is no place in a file"),
+        ({"error": ["refused", {}]}, "error must be a text"),
     ],
 )
 def test_values_that_no_record_has_are_refused(change: dict[str, object], message: str) -> None:
-    with pytest.raises(ValueError, match=message):
+    with pytest.raises((ValueError, TypeError), match=message):
         record_from({**GOOD, **change}, ())
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tilt": math.nan}, "tilt must be finite"),
+        ({"tilt": "much"}, "tilt must be a number"),
+        ({"sigma": -1.0}, "sigma must be at least 0"),
+        ({"num_pairs": math.inf}, "num_pairs must be an integer"),
+    ],
+)
+def test_values_that_no_calibration_has_are_refused(change: dict[str, object], message: str) -> None:
+    good = {"tilt": 0.01, "sigma": math.inf, "num_pairs": 1}
+    assert calibration_from(json.loads(json.dumps(good))).tilt == 0.01
+    with pytest.raises((ValueError, TypeError), match=message):
+        calibration_from({**good, **change})

@@ -47,11 +47,13 @@ class Stage:
     @classmethod
     def of(cls, state: Any) -> Stage:
         """Return the stage that plain values tell."""
-        return cls(
-            str(state["name"]),
-            [(int(index), [float(x) for x in pose]) for index, pose in state["views"]],
-            state["live"],
-        )
+        from nacre.arrays import as_count, as_vector
+
+        name, live = state["name"], state["live"]
+        if name not in ("views", "frames") or not (live is None or isinstance(live, dict)):
+            raise ValueError(f"no stage is {name!r} with live {live!r}")
+        views = [(as_count("view", i), as_vector("pose", pose, 16).tolist()) for i, pose in state["views"]]
+        return cls(name, views, live)
 
 
 class Unfinished:
@@ -100,15 +102,18 @@ class Unfinished:
 
     def resume(self, sequence: Sequence, compare: bool) -> Reconstruction:
         """Return the run as it was at the newest checkpoint; what is done again may be compared."""
+        from nacre.arrays import as_count
         from nacre.errors import FileFormatError
         from nacre.reconstruction import Reconstruction
 
         done, more = Reconstruction._load(self.checkpoint, sequence)
         try:
             self.stage = Stage.of(more["stage"])
-            num_frames = int(more["num_journaled"])
+            num_frames = as_count("num_journaled", more["num_journaled"])
         except (KeyError, TypeError, ValueError) as error:
             raise FileFormatError(self.checkpoint, f"it is no run of nacre reconstruct ({error})") from None
+        # Views that a killed process had no time to keep are not there any more.
+        self.stage.views = [view for view in self.stage.views if view[0] < len(sequence)]
         self._journal = Journal(self.folder / "journal.txt", num_frames, compare)
         return done
 

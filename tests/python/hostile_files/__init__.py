@@ -19,6 +19,7 @@ from hostile_files.phones import PHONES
 from hostile_files.ply import PLY
 from hostile_files.recordings import RECORDINGS
 from hostile_files.ros import ROS
+from hostile_files.saved_runs import SAVED_RUNS
 from hostile_files.trajectories import TRAJECTORIES
 
 CASES = {
@@ -36,6 +37,7 @@ CASES = {
         PHONES,
         OUTPUTS,
         CHECKPOINTS,
+        SAVED_RUNS,
     )
     for case in cases
 }

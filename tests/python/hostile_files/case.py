@@ -14,6 +14,7 @@ from nacre.cli.config import model_parameters
 from nacre.io.cameras import read_camera
 from nacre.io.images import read_attribute, read_color, read_depth
 from nacre.io.ply import read_range_grid
+from nacre.reconstruction import Reconstruction
 
 
 @dataclass(frozen=True)
@@ -110,6 +111,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "config": lambda path: model_parameters(None, path, None),
     "output": read_output,
     "checkpoint": nacre.Model.load,
+    "reconstruction": lambda path: Reconstruction.load(path, []),
     "run": read_run,
 }
 

@@ -3,11 +3,11 @@
 import json
 import pickle
 import struct
-import zlib
 
 import numpy as np
 
 from hostile_files.case import Case, single
+from hostile_files.seals import sealed_line
 
 _random = np.random.default_rng(7)
 
@@ -42,11 +42,6 @@ def run(asked: object, journal: bytes = b"") -> dict[str, bytes]:
     return {"unfinished/run.json": text, "unfinished/journal.txt": journal, "unfinished/checkpoint": b""}
 
 
-def sealed(text: bytes) -> bytes:
-    """Return a line of a journal with the check sum that fits it."""
-    return text + b" %08x\n" % zlib.crc32(text)
-
-
 RUNS = {
     "run empty": (run(b""), r"run\.json"),
     "run nul bytes": (run(bytes(50)), r"run\.json"),
@@ -55,10 +50,10 @@ RUNS = {
     "run of another format": (run({**GOOD_RUN, "format": 9}), r"run\.json: .*another version"),
     "run without options": (run({"format": 1}), r"run\.json: .*options"),
     "run whose options are a text": (run({"format": 1, "options": "all"}), r"run\.json: .*options"),
-    "journal forged": (run(GOOD_RUN, sealed(b"{")), r"journal\.txt, line 1"),
-    "journal forged deep": (run(GOOD_RUN, sealed(b"[" * 100_000)), r"journal\.txt, line 1"),
-    "journal of a number": (run(GOOD_RUN, sealed(b"7")), r"journal\.txt, line 1"),
-    "journal of short entries": (run(GOOD_RUN, sealed(b"[1]")), r"journal\.txt, line 1"),
+    "journal forged": (run(GOOD_RUN, sealed_line(b"{")), r"journal\.txt, line 1"),
+    "journal forged deep": (run(GOOD_RUN, sealed_line(b"[" * 100_000)), r"journal\.txt, line 1"),
+    "journal of a number": (run(GOOD_RUN, sealed_line(b"7")), r"journal\.txt, line 1"),
+    "journal of short entries": (run(GOOD_RUN, sealed_line(b"[1]")), r"journal\.txt, line 1"),
 }
 CHECKPOINTS = single("checkpoint", "checkpoint", "", MODELS) + [
     Case(f"checkpoint/{name.replace(' ', '_')}", "run", files, said) for name, (files, said) in RUNS.items()

@@ -2,11 +2,17 @@
 
 import importlib.util
 import tempfile
+import zlib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from hostile_files.case import Case
+from hostile_files.depth_images import png
+
+if TYPE_CHECKING:
+    from ros_recorder import Recorder
 
 WIDTH, HEIGHT = 8, 6
 CHANGED = {  # lines of the definitions
@@ -32,18 +38,33 @@ def recording(name: str) -> bytes:
         storage = StoragePlugin.MCAP if suffix == ".mcap" else StoragePlugin.SQLITE3
         recorder = Recorder(path, 1 if suffix == ".bag" else 2, storage)
         recorder.info("/camera/depth/camera_info", 10.0, WIDTH, HEIGHT)
-        for i in range(2):
-            depth = np.arange(500, 500 + WIDTH * HEIGHT, dtype=np.uint16).reshape(HEIGHT, WIDTH)
-            recorder.image("/camera/depth/image_raw", 1.0 + i, depth, "16UC1")
-            recorder.image("/camera/color/image_raw", 1.0 + i, np.zeros((HEIGHT, WIDTH, 3), np.uint8), "rgb8")
-            sure = np.ones((HEIGHT, WIDTH), np.uint8)
-            recorder.image("/camera/confidence/image_raw", 1.0 + i, sure, "8UC1")
+        (_compressed if name.startswith("compressed") else _raw)(recorder)
         recorder.close()
         return (path if path.is_file() else next(path.glob(f"*{suffix}"))).read_bytes()
 
 
-NAMES = ("a.bag", "a.mcap", "a.db3") if importlib.util.find_spec("rosbags") is not None else ()
-WHOLE = {name: recording(name) for name in NAMES}
+def _raw(recorder: "Recorder") -> None:
+    for time in (1.0, 2.0):
+        depth = np.arange(500, 500 + WIDTH * HEIGHT, dtype=np.uint16).reshape(HEIGHT, WIDTH)
+        recorder.image("/camera/depth/image_raw", time, depth, "16UC1")
+        recorder.image("/camera/color/image_raw", time, np.zeros((HEIGHT, WIDTH, 3), np.uint8), "rgb8")
+        sure = np.ones((HEIGHT, WIDTH), np.uint8)
+        recorder.image("/camera/confidence/image_raw", time, sure, "8UC1")
+
+
+def _compressed(recorder: "Recorder") -> None:
+    """Write depth as PNG, colours of its camera, and colours of another."""
+    depth = bytes(12) + png(WIDTH, HEIGHT, data=zlib.compress(bytes((1 + 2 * WIDTH) * HEIGHT)))
+    color = png(WIDTH, HEIGHT, 8, 2, zlib.compress(bytes((1 + 3 * WIDTH) * HEIGHT)))
+    recorder.info("/camera/color/camera_info", 10.0, WIDTH, HEIGHT)
+    recorder.info("/camera/rgb_wide/camera_info", 5.0, WIDTH, HEIGHT)
+    recorder.compressed("/camera/depth/image_raw/compressedDepth", 1.0, depth, "16UC1; compressedDepth png")
+    recorder.compressed("/camera/color/image_raw/compressed", 1.0, color, "rgb8; png compressed")
+    recorder.compressed("/camera/rgb_wide/image_raw/compressed", 1.0, color, "rgb8; png compressed")
+
+
+NAMES = ("a.bag", "a.mcap", "a.db3", "compressed.bag")
+WHOLE = {name: recording(name) for name in NAMES if importlib.util.find_spec("rosbags") is not None}
 ROS = [
     Case(
         f"recording/mcap_{what.replace(' ', '_')}",

@@ -11,14 +11,11 @@ from hostile_files.case import Case
 from hostile_files.configs import TEXTS  # noqa: F401
 from hostile_files.depth_images import exr, npy, pgm, png
 from hostile_files.meshes import OFF, TRIANGLE, stl
-from hostile_files.outputs import FRAME, MODEL, report
 from hostile_files.pcd import TWO as PCD_TWO
 from hostile_files.pcd import packed, pcd
-from hostile_files.phones import HEAD, TOLD, r3d, stray
 from hostile_files.ply import FACES, GRID, TEXT, TWO, ply, text, vertices
-from hostile_files.recordings import plain, tum
-from hostile_files.ros import WHOLE
 from hostile_files.trajectories import EYE, GOOD
+from hostile_files.valid_folders import FOLDERS
 
 PIXELS = np.arange(12, dtype=">u2").reshape(3, 4) + 500
 ROWS = b"".join(b"\0" + row.tobytes() for row in PIXELS)
@@ -75,27 +72,4 @@ VALID = {
     for kind, files in FILES.items()
     for name, data in files.items()
 }
-for _name, _files in {
-    "tum": tum("1 depth/1.pgm\n2 depth/2.pgm\n", groundtruth=GOOD + "1" + GOOD[1:], rgb="1 rgb/1.png\n"),
-    "plain": plain(timestamps__txt="1\n2\n"),
-    "stray": stray(HEAD + "0,0,0,0,0,0,0,0,1\n"),
-}.items():
-    VALID[f"recording/{_name}"] = Case(f"recording/{_name}", "recording", _files, "")
-VALID["recording/r3d"] = Case("recording/r3d", "recording", {"a.r3d": r3d()}, "", "a.r3d", needs="liblzfse")
-VALID["recording/metadata"] = Case(
-    "recording/metadata",
-    "recording",
-    {"metadata": json.dumps(TOLD).encode(), "rgbd/0.depth": bytes(8)},
-    "",
-    needs="liblzfse",
-)
-for _name, _data in WHOLE.items():
-    VALID[f"recording/{_name}"] = Case(
-        f"recording/{_name}", "recording", {_name: _data}, "", _name, needs="rosbags"
-    )
-VALID["output/valid"] = Case(
-    "output/valid",
-    "output",
-    {"report.json": report(frames=[FRAME, {**FRAME, "index": 1}]), "model.ply": MODEL},
-    "",
-)
+VALID |= {case.name: case for case in FOLDERS}
