@@ -32,6 +32,7 @@ _MODES = {
     (1024, 1024): (1024, 0, 0),
     (512, 512): (512, 0, 0),
 }
+_LARGEST = 1e30  # parameter, of a lens whose polynomials a float can hold
 _MODEL = "CALIBRATION_LensDistortionModelBrownConrady"
 _MOST_BYTES = 1 << 20
 _PURPOSE = "CALIBRATION_CameraPurposeDepth"
@@ -124,9 +125,11 @@ def _parameters(path: Path) -> npt.NDArray[np.float64]:
         raise
     except (ValueError, KeyError, TypeError, OverflowError, OSError) as error:
         raise FileFormatError(path, f"not the calibration of an Azure Kinect: {error!r}") from error
-    if model != _MODEL or len(values) < 14 or not np.isfinite(values).all() or not (values[2:4] > 0).all():
+    is_list = values.ndim == 1 and len(values) >= 14 and (np.abs(values) <= _LARGEST).all()
+    if model != _MODEL or not is_list or not (values[2:4] > 0).all():
+        got = len(values) if values.ndim == 1 else f"an array {values.shape}"
         raise FileFormatError(
-            path, f"14 finite parameters of {_MODEL} were expected, got {len(values)} of {model}"
+            path, f"14 finite parameters of {_MODEL} were expected, got {got} of {str(model)[:80]}"
         )
     return values[:14]
 
@@ -139,8 +142,9 @@ def _polynomial(k: npt.NDArray[np.float64], radius: float) -> tuple[npt.NDArray[
     """
     r = np.linspace(0, 2, 2001)[1:]
     powers = np.stack([r**2, r**4, r**6], axis=1)
-    seen = r * (1 + powers @ k[:3]) / (1 + powers @ k[3:])
-    inside = (seen <= radius) & (np.gradient(seen) > 0)
+    with np.errstate(divide="ignore", invalid="ignore"):  # a radius that the lens sends to infinity
+        seen = r * (1 + powers @ k[:3]) / (1 + powers @ k[3:])
+        inside = (seen <= radius) & (np.gradient(seen) > 0)
     terms = (powers * r[:, None])[inside]
     fitted = np.asarray(np.linalg.lstsq(terms, (seen - r)[inside], rcond=None)[0], np.float64)
     return fitted, float(np.abs(terms @ fitted - (seen - r)[inside]).max(initial=0))

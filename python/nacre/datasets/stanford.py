@@ -32,6 +32,9 @@ LAYOUT = "range scans (.ply with a range_grid), optionally placed by a .conf fil
 
 # A triangle with a side longer than this many sample distances bridges a gap between two surfaces.
 _LONGEST_SIDE = 4.0
+_MOST_ROW_DISTANCE = 16.0  # of a scan that is one image [distance of columns]
+_FARTHEST = 1e30  # [m]
+_MOST_SPREAD = 16  # pixels of the common view for each cell of the largest grid
 
 Float64 = npt.NDArray[np.float64]
 
@@ -76,14 +79,18 @@ def read(path: Path, given: Given) -> Sequence:
             "camera must not be given for range scans: the camera that sees them follows from the scans"
         )
     scale = given.scale_or(1.0)
-    view = common_view(_read_all(scans, scale))
+    try:
+        view = common_view(_read_all(scans, scale))
+        camera = Camera.orthographic(width=view.width, height=view.height, pixel_size=view.pixel_size)
+    except ValueError as error:
+        raise FileFormatError(path, f"no camera sees these range scans: {error}") from error
     placed = _read_conf(path if path.is_dir() else path.parent, scale)
     poses = [placed[scan.name] @ view.scan_from_camera if scan.name in placed else None for scan in scans]
     known = [(i, pose) for i, pose in enumerate(poses) if pose is not None]
     return Sequence(
         path,
         format=FORMAT,
-        camera=Camera.orthographic(width=view.width, height=view.height, pixel_size=view.pixel_size),
+        camera=camera,
         depth_scale=scale,
         sources=[
             FrameSource(i, scan, truth=pose) for i, (scan, pose) in enumerate(zip(scans, poses, strict=True))
@@ -96,15 +103,25 @@ def read(path: Path, given: Given) -> Sequence:
 
 
 def common_view(scans: Iterable[Float64]) -> View:
-    """Return the camera that sees all scans, with the first scan's column distance as its pixel size."""
-    pixel_size, low, high = np.nan, np.full(3, np.inf), np.full(3, -np.inf)
+    """
+    Return the camera that sees all scans, with the first scan's column distance as its pixel size.
+
+    A ValueError says why there is none.
+    """
+    pixel_size, low, high, num_cells = 0.0, np.full(3, np.inf), np.full(3, -np.inf), 0
     for scan in scans:
         low = np.fmin(low, np.nanmin(scan, axis=(0, 1)))
         high = np.fmax(high, np.nanmax(scan, axis=(0, 1)))
-        if not np.isfinite(pixel_size):
-            column_distance = np.nanmedian(np.abs(np.diff(scan[..., 0], axis=1)))
-            pixel_size = float(f"{column_distance:.5g}")
-    width, height = (int(np.ceil((high[k] - low[k]) / pixel_size - 0.01)) + 1 for k in (0, 1))
+        num_cells = max(num_cells, scan[..., 0].size)
+        if not pixel_size > 0:
+            pixel_size = float(f"{_median(np.abs(np.diff(scan[..., 0], axis=1))):.5g}")
+    if not pixel_size > 0:
+        raise ValueError("no two columns of a scan are apart in x")
+    columns, rows = ((high[k] - low[k]) / pixel_size for k in (0, 1))
+    if not (columns + 1) * (rows + 1) <= _MOST_SPREAD * num_cells:
+        reason = f"with {pixel_size:.3g} m between columns they are {columns:.3g} x {rows:.3g} pixels"
+        raise ValueError(f"{reason}, and have at most {num_cells} points each")
+    width, height = (int(np.ceil(extent - 0.01)) + 1 for extent in (columns, rows))
     return View(
         width=width,
         height=height,
@@ -149,6 +166,12 @@ def resample(scan: Float64, view: View) -> npt.NDArray[np.float32]:
     return depth.astype(np.float32)
 
 
+def _median(values: Float64) -> float:
+    """Return the median of the finite ones; 0 if there are none."""
+    finite = values[np.isfinite(values)]
+    return float(np.median(finite)) if len(finite) else 0.0
+
+
 def _triangles(scan: Float64) -> npt.NDArray[np.intp]:
     """Return the grid's triangles, indices (N, 3), that lie on one surface and face the scanner."""
     rows, columns = scan.shape[:2]
@@ -173,7 +196,7 @@ def _triangles(scan: Float64) -> npt.NDArray[np.intp]:
         ]
     )
     sides = np.stack([_distance(points, cells[:, i], cells[:, i - 1]) for i in range(3)])
-    sample = np.nanmedian(_distance(points, a, c))
+    sample = _median(_distance(points, a, c))
     cells = cells[(sides <= _LONGEST_SIDE * sample).all(axis=0)]
     p, q, r = points[cells[:, 0], :2], points[cells[:, 1], :2], points[cells[:, 2], :2]
     turn = np.sign(_cross(q - p, r - p))
@@ -191,12 +214,20 @@ def _cross(a: Float64, b: Float64) -> Float64:
 
 
 def _load(path: Path, scale: float, view: View) -> npt.NDArray[np.float32]:
-    return resample(_read_scan(path, scale), view)
+    scan = _read_scan(path, scale)
+    row_distance = _median(np.linalg.norm(np.diff(scan, axis=0), axis=-1))
+    if row_distance > _MOST_ROW_DISTANCE * view.pixel_size:
+        reason = f"its rows are {row_distance:.3g} m apart, columns of the first scan {view.pixel_size:.3g} m"
+        raise FileFormatError(path, reason)
+    return resample(scan, view)
 
 
 def _read_scan(path: Path, scale: float) -> Float64:
-    scan = read_range_grid(path).astype(np.float64) / scale
-    if np.isfinite(scan).all(axis=-1).sum() < 3:
+    with np.errstate(over="ignore"):
+        scan = read_range_grid(path).astype(np.float64) / scale
+    is_there = (np.abs(scan) <= _FARTHEST).all(axis=-1)
+    scan[~is_there] = np.nan
+    if is_there.sum() < 3:
         raise FileFormatError(path, "the range scan has fewer than 3 points")
     return scan
 

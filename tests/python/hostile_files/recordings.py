@@ -1,13 +1,14 @@
 """Hostile recordings: folders whose lists lead astray, and files of ROS."""
 
 import json
+import zlib
 
 import numpy as np
 
 from hostile_files.cameras import PINHOLE, changed
 from hostile_files.case import Case
 from hostile_files.depth_images import pgm, png
-from hostile_files.ply import GRID, TEXT, text
+from hostile_files.ply import GRID, TEXT, text, vertices
 from hostile_files.trajectories import EYE, GOOD
 
 DEPTH = pgm(65535, bytes((3, 232)) * 12)
@@ -28,6 +29,17 @@ def plain(**more: str | bytes) -> dict[str, bytes]:
     for name, body in more.items():
         files[name.replace("__", ".")] = body.encode() if isinstance(body, str) else body
     return files
+
+
+NINE = [(float(x), float(y), 0.1 * x * y) for y in range(3) for x in range(3)]
+
+
+def scan(points: list[tuple[float, float, float]], columns: int = 3, rows: int = 3) -> bytes:
+    """Return a range scan whose grid is full."""
+    told = f"obj_info num_cols {columns}\nobj_info num_rows {rows}\n{vertices(len(points))}\n"
+    told += f"element range_grid {columns * rows}\nproperty list uchar int vertex_indices"
+    lines = ["".join(f"{x} {y} {z}\n" for x, y, z in points), *(f"1 {k}\n" for k in range(len(points)))]
+    return text("".join(lines), told)
 
 
 def _escapes(name: str) -> str:
@@ -98,6 +110,18 @@ PLAIN = {
         r"2\.png: the image is damaged",
     ),
 }
+LENS = [0.5, 0.49, 0.49, 0.49, 3.1, 2.3, 0.13, 3.5, 3.4, 0.66, 0, 0, -5e-5, 8e-5]
+_DARK = zlib.compress(bytes(641 * 288), 9)
+
+
+def calibration(parameters: object) -> bytes:
+    """Return the calibration.json of an Azure Kinect with these parameters of its depth camera."""
+    kind = "CALIBRATION_LensDistortionModelBrownConrady"
+    lens = {"ModelParameters": parameters, "ModelType": kind}
+    cameras = [{"Purpose": "CALIBRATION_CameraPurposeDepth", "Intrinsics": lens}]
+    return json.dumps({"CalibrationInformation": {"Cameras": cameras}}).encode()
+
+
 OTHER = {
     "icl list leads up": (
         {"associations.txt": b"1 ../d.pgm 1 rgb/1.png\n", "depth/1.pgm": DEPTH},
@@ -128,6 +152,38 @@ OTHER = {
     "7-scenes image damaged": ({"frame-000000.depth.png": b"\x89PNG"}, r"frame-000000\.depth\.png"),
     "stanford scan damaged": ({"a.ply": text(TEXT + "1 0\n1 9\n", GRID)}, r"a\.ply: .*outside 0 to 1"),
     "stanford scan of nothing": ({"a.ply": text(TEXT + "0\n0\n", GRID)}, r"a\.ply: .*fewer than 3 points"),
+    "stanford scan of one place": (
+        {"a.ply": scan([(0.0, 0.0, 0.0)] * 9)},
+        "no camera sees these .*no two columns",
+    ),
+    "stanford scan of one column": (
+        {"a.ply": scan([(0.0, float(k), 0.0) for k in range(9)], 1, 9)},
+        "no camera sees these .*no two columns",
+    ),
+    "stanford scan with a far point": (
+        {"a.ply": scan([*NINE[:8], (60000.0, 60000.0, 0.0)])},
+        r"no camera sees these .*6e\+04 x 6e\+04 pixels, and have at most 9 points",
+    ),
+    "stanford scan of 1e-40 m": (
+        {"a.ply": scan([(1e-40 * x, 1e-40 * y, 1.0) for x, y, _ in NINE])},
+        "no camera sees these .*pixel_size",
+    ),
+    "stanford scan of infinite points": (
+        {"a.ply": scan([(1e39, 1e39, 1e39)] * 9)},
+        r"a\.ply: .*fewer than 3 points",
+    ),
+    "stanford scan of rows far apart": (
+        {"a.ply": scan([(x, 20 * y, 0.0) for x, y, _ in NINE])},
+        r"a\.ply: its rows are 20 m apart, columns of the first scan 1 m",
+    ),
+    "stanford place of words": (
+        {"a.ply": scan(NINE), "a.conf": b"bmesh a.ply 0 0 zero 0 0 0 1\n"},
+        r"a\.conf, line 1: expected 'bmesh",
+    ),
+    "stanford place without turn": (
+        {"a.ply": scan(NINE), "a.conf": b"bmesh a.ply 0 0 0 0 0 0 0\n"},
+        r"a\.conf, line 1: expected 'bmesh",
+    ),
     "stanford header without end": (
         {"a.ply": b"ply\nelement range_grid 2\n" + b"x" * 9000},
         r"a\.ply, line 3: unknown keyword",
@@ -144,6 +200,22 @@ OTHER = {
         {"calibration.json": b"[" * 90_000, "depth/1.pgm": b"P5\n512 512\n65535\n" + bytes(2 * 512 * 512)},
         r"calibration\.json",
     ),
+    **{
+        f"azure parameters {what}": (
+            {"calibration.json": calibration(parameters), "depth/1.png": png(320, 288, data=_DARK)},
+            r"calibration\.json: .*" + said,
+        )
+        for what, parameters, said in (
+            ("a number", 5, r"got an array \(\)"),
+            ("of thirteen", LENS[:13], "got 13 of"),
+            ("of tables", [[x] for x in LENS], r"got an array \(14, 1\)"),
+            ("of words", ["wide", *LENS[1:]], "not the calibration"),
+            ("infinite", [float("inf"), *LENS[1:]], "14 finite parameters"),
+            ("of 1e308", [*LENS[:4], 1e308, *LENS[5:]], "14 finite parameters"),
+            ("of no focal length", [0.5, 0.5, 0, 0.5, *LENS[4:]], "14 finite parameters"),
+            ("of 400 digits", [10**400, *LENS[1:]], "not the calibration"),
+        )
+    },
     "an empty folder": ({"folder/.hidden": b""}, "no known recording|the folder is empty"),
 }
 ROS_FILES = {

@@ -11,8 +11,7 @@ from hostile_files.checkpoints import GOOD_RUN, run
 from hostile_files.depth_images import npy, png
 from hostile_files.outputs import FRAME, MODEL, report
 from hostile_files.phones import HEAD, PLANE, TOLD, r3d, stray
-from hostile_files.ply import XYZ, text
-from hostile_files.recordings import DEPTH, plain, tum
+from hostile_files.recordings import DEPTH, LENS, NINE, calibration, plain, scan, tum
 from hostile_files.ros import WHOLE
 from hostile_files.saved_runs import SAVED_MODEL, SAVED_RUN
 from hostile_files.seals import sealed_line
@@ -28,27 +27,6 @@ def _image(width: int, height: int, channels: int = 0) -> bytes:
 
 _VGA, _VGA_COLOR = _image(640, 480), _image(640, 480, 3)
 _COLOR = _image(4, 3, 3)
-_SCAN = text(
-    "".join(f"{x} {y} {0.1 * x * y}\n" for y in (0, 1, 2) for x in (0, 1, 2))
-    + "".join(f"1 {k}\n" for k in range(8))
-    + "0\n",
-    f"obj_info num_cols 3\nobj_info num_rows 3\nelement vertex 9\n{XYZ}\nelement range_grid 9\n"
-    "property list uchar int vertex_indices",
-)
-_LENS = [0.5, 0.49, 0.49, 0.49, 3.1, 2.3, 0.13, 3.5, 3.4, 0.66, 0, 0, -5e-5, 8e-5]
-_CALIBRATION = {
-    "CalibrationInformation": {
-        "Cameras": [
-            {
-                "Purpose": "CALIBRATION_CameraPurposeDepth",
-                "Intrinsics": {
-                    "ModelParameters": _LENS,
-                    "ModelType": "CALIBRATION_LensDistortionModelBrownConrady",
-                },
-            }
-        ]
-    }
-}
 _LOG = "".join(f"{i} {i} {i + 1}\n{EYE}" for i in range(2)).encode()
 _TRUTH = GOOD + "1" + GOOD[1:]
 RECORDINGS: dict[str, dict[str, bytes]] = {
@@ -83,11 +61,11 @@ RECORDINGS: dict[str, dict[str, bytes]] = {
     "plain": plain(timestamps__txt="1\n2\n", groundtruth__txt=_TRUTH)
     | {"color/1.png": _COLOR, "mask/1.png": png(bits=8), "attributes/heat/1.npy": npy(np.ones((3, 4)))},
     "stanford": {
-        "a.ply": _SCAN,
-        "b.ply": _SCAN,
+        "a.ply": scan(NINE),
+        "b.ply": scan(NINE),
         "scans.conf": b"camera 0 0 0 0 0 0 1\nbmesh a.ply 0 0 0 0 0 0 1\nbmesh b.ply 0 0 1 0 0.6 0 0.8\n",
     },
-    "azure": {"calibration.json": json.dumps(_CALIBRATION).encode(), "depth/1.png": _image(320, 288)},
+    "azure": {"calibration.json": calibration(LENS), "depth/1.png": _image(320, 288)},
     "stray": stray(HEAD + "0,0,0,0,0,0,0,0,1\n") | {"confidence/000000.png": png(bits=8)},
 }
 # Those of one file, and those that a module reads.
