@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from nacre.cli.source import describe_camera, open_source
 from nacre.cli.terminal import CommandError
+from nacre.errors import FileFormatError, shown
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
@@ -85,12 +86,34 @@ class Asked:
 
 def asked_before(document: Mapping[str, Any], path: Path) -> tuple[Asked, Path]:
     """Return what ``run.json`` says, and the folder that paths begin at."""
-    from nacre.errors import FileFormatError
-
     try:
-        return Asked(**document["options"]), Path(document["folder"])
-    except (KeyError, TypeError) as error:
+        recording = document["recording"]
+        if not (recording is None or (isinstance(recording, dict) and "files" in recording)):
+            raise TypeError("recording must be an object with files")
+        return _checked(Asked(**document["options"])), Path(document["folder"])
+    except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, f"it does not say what was asked for ({error})") from None
+
+
+def _checked(asked: Asked) -> Asked:
+    """Return options that a file tells; a TypeError or a ValueError says what nobody can have asked for."""
+    from nacre.arrays import as_count, as_flag, as_scale
+
+    for name in ("source", "preset", "format", "camera", "masks"):
+        value = getattr(asked, name)
+        may_be_none = name not in ("source", "preset")
+        if not (isinstance(value, str) and "\0" not in value) and not (value is None and may_be_none):
+            raise TypeError(f"{name} must be a text, got {shown(value)}")
+    for name in ("color", "realtime", "retry", "calibrate", "is_camera"):
+        as_flag(name, getattr(asked, name))
+    for name, minimum in (("first", 0), ("last", 0), ("every", 1)):
+        if getattr(asked, name) is not None or name != "last":
+            as_count(name, getattr(asked, name), minimum=minimum)
+    if asked.depth_scale is not None:
+        as_scale("depth_scale", asked.depth_scale)
+    if not (isinstance(asked.attribute, list) and all(isinstance(text, str) for text in asked.attribute)):
+        raise TypeError(f"attribute must be a list of texts, got {shown(asked.attribute)}")
+    return asked
 
 
 def check_recording(document: Mapping[str, Any], sequence: Sequence) -> None:

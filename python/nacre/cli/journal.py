@@ -38,7 +38,7 @@ def _entry(path: Path, text: bytes, line: int) -> list[Any]:
         entry = json.loads(text)
     except (ValueError, RecursionError):
         entry = None
-    if not isinstance(entry, list) or len(entry) != 4 or type(entry[0]) is not int:
+    if not isinstance(entry, list) or len(entry) != 4 or type(entry[0]) is not int or entry[0] < 0:
         raise FileFormatError(path, "not a line of a run's journal, though its check sum fits", line=line)
     return entry
 

@@ -17,6 +17,7 @@ from nacre.cli.stopping import interruptible
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_folder
 from nacre.cli.unfinished import Unfinished, read_asked
 from nacre.cli.view import PortOption
+from nacre.errors import FileFormatError
 
 if TYPE_CHECKING:
     from nacre import ModelParameters
@@ -263,6 +264,9 @@ def _resumed(context: typer.Context, out: Path, checkpoint_every: int | None) ->
         words = describe(sequence, indices)
         if asked.realtime:  # what it had seen; which frames come, is the clock's doing
             indices = unfinished.journaled_indices()
+            if max(indices, default=0) >= len(sequence):
+                reason = f"frame {max(indices)} is none of the recording's {len(sequence)}"
+                raise FileFormatError(unfinished.folder / "journal.txt", reason)
     from nacre.io.atomic import remove_leftovers
 
     for place in (out, unfinished.folder):

@@ -184,9 +184,10 @@ def read_asked(out: Path) -> dict[str, Any]:
 
 def describe_unfinished(out: Path) -> tuple[dict[str, Any], list[tuple[str, str]]]:
     """Return what there is to tell of an unfinished run."""
-    asked = read_asked(out)
+    from nacre.cli.asked import asked_before
+
+    source = asked_before(read_asked(out), out / "unfinished" / "run.json")[0].source
     entries, _ = read_journal(out / "unfinished" / "journal.txt")
-    source = asked.get("options", {}).get("source")
     figures = {"kind": "unfinished run", "path": os.fspath(out), "source": source, "num_done": len(entries)}
     lost = sum(entry[2] == "LOST" for entry in entries)
     return figures, [

@@ -33,7 +33,7 @@ MODELS = {
     "checksum wrong": (checkpoint(bytes(100), checksum=1), "byte 40: .*checksum"),
     "body garbage": (checkpoint(_random.bytes(1000)), "byte 40: .*checksum"),
 }
-GOOD_RUN = {"format": 1, "options": {"source": "here"}}
+GOOD_RUN = {"format": 1, "nacre": "0.1.0", "folder": "/", "options": {"source": "here"}, "recording": None}
 
 
 def run(asked: object, journal: bytes = b"") -> dict[str, bytes]:
@@ -50,6 +50,33 @@ RUNS = {
     "run of another format": (run({**GOOD_RUN, "format": 9}), r"run\.json: .*another version"),
     "run without options": (run({"format": 1}), r"run\.json: .*options"),
     "run whose options are a text": (run({"format": 1, "options": "all"}), r"run\.json: .*options"),
+    "run without folder": (run(GOOD_RUN | {"folder": None}), r"run\.json: .*what was asked for"),
+    "run whose recording is a list": (run(GOOD_RUN | {"recording": []}), r"run\.json: .*recording must be"),
+    **{
+        f"run whose {name} is {what}": (
+            run(GOOD_RUN | {"options": {"source": "here", name: value}}),
+            rf"run\.json: it does not say what was asked for \(.*{name}",
+        )
+        for name, what, value in (
+            ("source", "a number", 5),
+            ("source", "nul", "a\0b"),
+            ("camera", "a list", []),
+            ("depth_scale", "infinite", float("inf")),
+            ("depth_scale", "a text", "1"),
+            ("first", "negative", -1),
+            ("last", "infinite", float("inf")),
+            ("every", "zero", 0),
+            ("every", "of 400 digits", 10**400),
+            ("realtime", "a number", 2),
+            ("attribute", "a text", "heat=folder"),
+            ("attribute", "a list of numbers", [1]),
+            ("colour", "not known", True),
+        )
+    },
+    "journal of a frame before the first": (
+        run(GOOD_RUN, sealed_line(b'[-1,0,"LOST",null]')),
+        r"journal\.txt, line 1",
+    ),
     "journal forged": (run(GOOD_RUN, sealed_line(b"{")), r"journal\.txt, line 1"),
     "journal forged deep": (run(GOOD_RUN, sealed_line(b"[" * 100_000)), r"journal\.txt, line 1"),
     "journal of a number": (run(GOOD_RUN, sealed_line(b"7")), r"journal\.txt, line 1"),
