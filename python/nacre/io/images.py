@@ -118,7 +118,8 @@ def read_attribute(path: str | os.PathLike[str]) -> npt.NDArray[np.float32]:
         raise FileFormatError(
             path, f"an image must be (H, W) or (H, W, C) numbers, this is {stored.shape} of {stored.dtype}"
         )
-    return np.ascontiguousarray(stored, dtype=np.float32)
+    with np.errstate(over="ignore"):
+        return np.ascontiguousarray(stored, dtype=np.float32)
 
 
 def write_depth_png(path: str | os.PathLike[str], depth: npt.ArrayLike, *, fast: bool = False) -> None:

@@ -37,6 +37,13 @@ FILES = {
         "text.pcd": pcd(b"0 1 2\n3 4 5\n", "ascii"),
         "image.pcd": pcd(PCD_TWO * 2, WIDTH=2, HEIGHT=2, POINTS=4),
         "packed.pcd": packed(23, *PCD_TWO),
+        "full.pcd": pcd(
+            struct.pack("<6fIHd", 0, 1, 2, 0, 0, 1, 0x102030, 7, 0.5) * 2,
+            FIELDS="x y z normal_x normal_y normal_z rgb label time",
+            SIZE="4 4 4 4 4 4 4 2 8",
+            TYPE="F F F F F F U U F",
+            COUNT="1 1 1 1 1 1 1 1 1",
+        ),
     },
     "range grid": {"grid.ply": text(TEXT + "1 0\n1 1\n", GRID)},
     "mesh": {
@@ -54,7 +61,11 @@ FILES = {
         "a.exr": exr(),
     },
     "color": {"a.png": png(bits=8, color=2, data=zlib.compress(3 * (b"\0" + bytes(range(12)))))},
-    "attribute": {"a.npy": npy(np.ones((3, 4, 2)))},
+    "attribute": {
+        "a.npy": npy(np.ones((3, 4, 2))),
+        "a.png": png(bits=8),
+        "far.npy": npy(np.full((3, 4), 1e300)),
+    },
     "camera": {"camera.json": json.dumps(PINHOLE).encode(), "open3d.json": json.dumps(OPEN3D).encode()},
     "trajectory": {
         "a.txt": (GOOD + "1 0.5 0 0 0 0 0.6 0.8\n").encode(),
