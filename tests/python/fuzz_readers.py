@@ -134,7 +134,7 @@ class Findings:
 def main() -> int:
     """Fuzz one reader."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[1])
-    parser.add_argument("kind", choices=READERS, nargs="?", help="without it, the kinds are printed")
+    parser.add_argument("kind", choices=READERS)
     parser.add_argument(
         "--seconds", type=float, default=60, help="0: what the corpus and the seeds hold, once"
     )
@@ -142,9 +142,6 @@ def main() -> int:
     parser.add_argument("--corpus", type=Path, help="a folder to go on from, and to keep what is new in")
     parser.add_argument("--keep", type=Path, default=Path("fuzz-findings"))
     options = parser.parse_args()
-    if options.kind is None:
-        print(*READERS, sep="\n")
-        return 0
     warnings.simplefilter("ignore")
     logging.disable(logging.WARNING)
     with tempfile.TemporaryDirectory() as folder:

@@ -106,6 +106,8 @@ def _interpret(entries: dict[str, list[str]], comments: list[str], size: int) ->
         raise ValueError(f"DATA must be one of {', '.join(_ENCODINGS)}, got {excerpt(encoding.encode())}")
     viewpoint = " ".join(entries.get("VIEWPOINT", []))
     if viewpoint not in ("", "0 0 0 1 0 0 0"):
+        if len(comments) == MAX_COMMENTS:
+            raise ValueError(f"more than {MAX_COMMENTS} comments, as one of which VIEWPOINT is kept")
         comments = [*comments, f"VIEWPOINT {viewpoint}"]
     num_points, shape = _interpret_shape(entries)
     return _Header(_interpret_fields(entries), num_points, shape, encoding, tuple(comments), size)

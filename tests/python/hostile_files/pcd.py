@@ -36,6 +36,10 @@ POINTS = {
     "header without DATA": (pcd(TWO).split(b"DATA")[0], "ends before DATA"),
     "header of one endless line": (b"x" * 200_000, "line 1: unknown keyword"),
     "header of comments": (b"#\n" * 60_000, "line 10001: more than 10000 comments"),
+    "header of comments and a viewpoint": (
+        b"# a\n" * 10_000 + pcd(TWO, VIEWPOINT="1 0 0 1 0 0 0"),
+        "line 10010: more than 10000 comments, .*VIEWPOINT",
+    ),
     "DATA of another kind": (pcd(TWO, "zstd"), "line 10: DATA must be one of"),
     "VERSION 9": (pcd(TWO, VERSION="9"), "VERSION must be"),
     "FIELDS missing": (pcd(TWO, FIELDS=None), "no line FIELDS"),
