@@ -149,7 +149,7 @@ class Reconstruction(Checkpointed):
 
         The model has grown since they were lost. A frame that is found now is RELOCALISED, and takes the
         place of its lost record in ``frames``; so do WEAK ones of which the model now knows enough. Frames
-        that could not be read, or that the model refused, stay as they are.
+        that could not be read, that the model refused, or that the recording has no more, stay as they are.
         """
         if self._retry is None:
             if not self.counts["LOST"]:
@@ -159,7 +159,7 @@ class Reconstruction(Checkpointed):
         while True:
             while state.place < len(self.frames):
                 before = self.frames[state.place]
-                is_there = before.index < len(self.sequence)  # not what a killed process had no time to keep
+                is_there = before.index < len(self.sequence)  # a killed process may not have kept the newest
                 if before.report is None or before.status not in ("LOST", "WEAK") or not is_there:
                     state.place += 1
                     continue

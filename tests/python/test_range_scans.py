@@ -141,3 +141,13 @@ def test_real_range_scans_lie_on_the_model(recordings):
         points = points_of(frame)[::10] @ frame.truth[:3, :3].T + frame.truth[:3, 3]
         distances, _ = tree.query(points, k=1)
         assert np.median(distances) < 0.0006
+
+
+def test_the_error_names_the_scan_that_is_broken(tmp_path):
+    write_scan(tmp_path / "a.ply")
+    broken = (tmp_path / "a.ply").read_bytes()[:-10]
+    (tmp_path / "a.ply").write_bytes(broken)
+    with pytest.raises(FileFormatError) as caught:
+        open_sequence(tmp_path)
+    assert caught.value.path == tmp_path / "a.ply"
+    assert "4800 rows of element range_grid" in caught.value.reason

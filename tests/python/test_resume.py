@@ -240,6 +240,16 @@ def test_python_code_can_resume_too(recording: Path, undisturbed: Any, tmp_path:
             assert [f.status for f in other.frames] == [f.status for f in whole.frames]
 
 
+def test_a_lost_frame_that_is_not_there_any_more_stays_lost(recording: Path, tmp_path: Path) -> None:
+    sequence = nacre.open_sequence(recording)
+    done = Reconstruction(sequence, nacre.Model(sequence.camera))
+    lost, *_ = (frame for frame in done.run() if frame.status == "LOST")
+    done.save(tmp_path / "run")
+    other = Reconstruction.load(tmp_path / "run", [sequence[i] for i in range(lost.index)]).complete()
+    assert other.frames[lost.index] == lost
+    assert done.complete().frames[lost.index].status == "RELOCALISED"
+
+
 SLOW_RUN = """
 import sys, time
 from nacre.cli import main

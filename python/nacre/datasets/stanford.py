@@ -82,6 +82,8 @@ def read(path: Path, given: Given) -> Sequence:
     try:
         view = common_view(_read_all(scans, scale))
         camera = Camera.orthographic(width=view.width, height=view.height, pixel_size=view.pixel_size)
+    except FileFormatError:
+        raise
     except ValueError as error:
         raise FileFormatError(path, f"no camera sees these range scans: {error}") from error
     placed = _read_conf(path if path.is_dir() else path.parent, scale)
