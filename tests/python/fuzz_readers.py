@@ -18,6 +18,7 @@ import logging
 import os
 import pkgutil
 import random
+import shutil
 import sys
 import tempfile
 import time
@@ -151,7 +152,7 @@ def main() -> int:
         if atheris is None or options.seconds == 0:
             _at_random(findings, corpus, options.seed, options.seconds)
         else:
-            _guided(findings, corpus, Path(folder) / "seeds", options.seed, options.seconds)
+            _guided(findings, corpus, Path(folder), options.seed, options.seconds)
     return int(findings.num_found > 0)
 
 
@@ -171,8 +172,9 @@ def _at_random(findings: Findings, corpus: Path, seed: int, seconds: float) -> N
     print(findings)
 
 
-def _guided(findings: Findings, corpus: Path, seeds: Path, seed: int, seconds: float) -> None:
-    """Let libFuzzer choose; it never returns, so the process is ended here."""
+def _guided(findings: Findings, corpus: Path, folder: Path, seed: int, seconds: float) -> None:
+    """Let libFuzzer choose; it never returns, so the process, and what is in the folder, are ended here."""
+    seeds = folder / "seeds"
     seeds.mkdir()
     for home in range(len(findings.homes)):
         for i, data in enumerate(findings.seeds_of(home)):
@@ -182,6 +184,7 @@ def _guided(findings: Findings, corpus: Path, seeds: Path, seed: int, seconds: f
     def one(data: bytes) -> None:
         if time.monotonic() > end:
             print(findings, flush=True)
+            shutil.rmtree(folder, ignore_errors=True)
             os._exit(int(findings.num_found > 0))
         findings.run_marked(data)
 
