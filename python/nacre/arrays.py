@@ -13,6 +13,9 @@ from nacre import _core
 
 FloatArray = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 
+FARTHEST = 1e30
+"""Positions that are farther away [m] are none: their squares are to be computed with."""
+
 
 def as_array(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
     """Return ``value`` as NumPy makes an array of it, of any dtype; nothing of it may be masked."""
@@ -123,6 +126,8 @@ def as_pose(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
     )
     if not is_rigid:
         raise ValueError(f"{name} must be a rigid transform (rotation and translation), got\n{array}")
+    if np.abs(array[:3, 3]).max() > FARTHEST:
+        raise ValueError(f"{name} must lead at most {FARTHEST:g} m away, got\n{array}")
     return array
 
 
@@ -145,6 +150,10 @@ def as_poses(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
     if not is_rigid.all():
         bad = present[np.argmin(is_rigid)]
         raise ValueError(f"{name}[{bad}] must be a rigid transform, got\n{array[bad]}")
+    is_near = np.abs(array[present, :3, 3]).max(axis=1, initial=0) <= FARTHEST
+    if not is_near.all():
+        bad = present[np.argmin(is_near)]
+        raise ValueError(f"{name}[{bad}] must lead at most {FARTHEST:g} m away, got\n{array[bad]}")
     return array
 
 

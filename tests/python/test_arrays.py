@@ -112,6 +112,12 @@ def test_pose_of_wrong_shape_or_not_finite() -> None:
         arrays.as_pose("guess", np.eye(4)[:3])
     with pytest.raises(ValueError, match="guess must be a rigid transform"):
         arrays.as_pose("guess", np.full((4, 4), np.nan))
+    far = np.eye(4)
+    far[1, 3] = -2e30
+    with pytest.raises(ValueError, match=r"guess must lead at most 1e\+30 m away"):
+        arrays.as_pose("guess", far)
+    with pytest.raises(ValueError, match=r"guesses\[2\] must lead at most 1e\+30 m away"):
+        arrays.as_poses("guesses", np.stack([np.eye(4), np.full((4, 4), np.nan), far]))
     with pytest.raises(ValueError, match=r"guesses must have shape \(N, 4, 4\), got \(4, 4\)"):
         arrays.as_poses("guesses", np.eye(4))
 

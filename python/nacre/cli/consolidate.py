@@ -125,8 +125,9 @@ def default_radius(points: npt.NDArray[np.floating[Any]], num_points: int) -> fl
     k = min(17, len(cloud))
     probes = cloud[:: max(len(cloud) // 5000, 1)]
     reach = float(np.median(nacre.KdTree(cloud).query(probes, k=k)[0].reshape(len(probes), -1)[:, -1]))
-    if reach <= 0:
-        raise CommandError("the points lie on top of each other; give --radius", 2)
-    density = k / (math.pi * reach**2)  # per area
+    if not 0 < reach < math.inf:
+        where = "on top of each other" if reach == 0 else "too far from each other"
+        raise CommandError(f"the points lie {where}; give --radius", 2)
     kept = min(num_points / len(cloud), 1.0)
-    return float(f"{2.5 / math.sqrt(density * kept):.3g}")
+    per_area = k * kept / math.pi  # [1 / reach^2]
+    return float(f"{2.5 * reach / math.sqrt(per_area):.3g}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -173,7 +174,9 @@ def _geometry(points: Any) -> tuple[dict[str, Any], Rows]:
         ("bounds", f"({', '.join(f'{x:.4g}' for x in lower)}) to ({', '.join(f'{x:.4g}' for x in upper)})"),
     ]
     if len(finite) > 1:
-        rows.append(("spacing", f"{spacing.mean:.4g} mean, variation {spacing.coefficient_of_variation:.3f}"))
+        variation = spacing.coefficient_of_variation
+        told = f"{spacing.mean:.4g} mean" if math.isfinite(spacing.mean) else "too wide to be measured"
+        rows.append(("spacing", told + f", variation {variation:.3f}" * math.isfinite(variation)))
     if len(finite) < len(points):
         rows.append(("not finite", f"{len(points) - len(finite):,} points"))
     return figures, rows

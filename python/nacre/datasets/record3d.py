@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
+from nacre.arrays import FARTHEST
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe
 from nacre.datasets.sequence import FrameSource, Sequence
@@ -250,6 +251,8 @@ class _Metadata:
                 raise FileFormatError(self.place, f"poses[{number}]: {error}") from error
             pose[:3, :3] *= (1, -1, -1)  # ARKit's camera has y up and looks along -z
             pose[:3, 3] = rows[number, 4:]
+            if np.abs(pose[:3, 3]).max() > FARTHEST:
+                raise FileFormatError(self.place, f"poses[{number}] is more than {FARTHEST:g} m away")
         return Trajectory(np.array([time for _, time in times], np.float64), poses)
 
     def _size(self, *keys: str) -> tuple[int, int]:

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
+from nacre.arrays import FARTHEST
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files
 from nacre.datasets.sequence import FrameSource, Sequence
@@ -33,7 +34,6 @@ LAYOUT = "range scans (.ply with a range_grid), optionally placed by a .conf fil
 # A triangle with a side longer than this many sample distances bridges a gap between two surfaces.
 _LONGEST_SIDE = 4.0
 _MOST_ROW_DISTANCE = 16.0  # of a scan that is one image [distance of columns]
-_FARTHEST = 1e30  # [m]
 _MOST_SPREAD = 16  # pixels of the common view for each cell of the largest grid
 
 Float64 = npt.NDArray[np.float64]
@@ -227,7 +227,7 @@ def _load(path: Path, scale: float, view: View) -> npt.NDArray[np.float32]:
 def _read_scan(path: Path, scale: float) -> Float64:
     with np.errstate(over="ignore"):
         scan = read_range_grid(path).astype(np.float64) / scale
-    is_there = (np.abs(scan) <= _FARTHEST).all(axis=-1)
+    is_there = (np.abs(scan) <= FARTHEST).all(axis=-1)
     scan[~is_there] = np.nan
     if is_there.sum() < 3:
         raise FileFormatError(path, "the range scan has fewer than 3 points")
@@ -273,7 +273,8 @@ def _read_conf(folder: Path, scale: float) -> dict[str, Float64]:
             try:
                 tx, ty, tz, qx, qy, qz, qw = (float(word) for word in words[2:])
                 rotation = matrix_from_quaternion((-qx, -qy, -qz, qw))
-                if not np.isfinite((tx, ty, tz)).all():
+                shift = np.array((tx, ty, tz)) / scale
+                if not (np.abs(shift) <= FARTHEST).all():
                     raise ValueError
             except ValueError as error:
                 raise FileFormatError(
@@ -283,6 +284,6 @@ def _read_conf(folder: Path, scale: float) -> dict[str, Float64]:
                 ) from error
             pose = np.eye(4)
             pose[:3, :3] = rotation
-            pose[:3, 3] = np.array((tx, ty, tz)) / scale
+            pose[:3, 3] = shift
             poses[words[1]] = pose
     return poses

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
+from nacre.arrays import FARTHEST
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files, pair, require_order
 from nacre.datasets.sequence import FrameSource, Sequence
@@ -105,7 +106,7 @@ def _odometry(path: Path, num_frames: int) -> tuple[list[float | None], Trajecto
             continue
         try:
             row = _numbers([line])[0]
-            if len(row) < len(_FIELDS) or not np.isfinite(row).all():
+            if len(row) < len(_FIELDS) or not np.isfinite(row).all() or np.abs(row[2:5]).max() > FARTHEST:
                 raise ValueError(f"got {excerpt(line.encode())}")
             pose = np.eye(4)
             pose[:3, :3], pose[:3, 3] = matrix_from_quaternion(row[5:9]), row[2:5]

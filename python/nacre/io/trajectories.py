@@ -12,6 +12,7 @@ from io import BytesIO
 import numpy as np
 import numpy.typing as npt
 
+from nacre.arrays import FARTHEST
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 from nacre.io.raw import excerpt, number_of, read_file, text_of
@@ -71,7 +72,7 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     FileFormatError
         Names the file and the line.
     """
-    blocks = [format_.parse(block) for format_, block in _blocks(path, read_file(path))]
+    blocks = [_near(block, *format_.parse(block)) for format_, block in _blocks(path, read_file(path))]
     if not blocks:
         raise FileFormatError(path, "the trajectory is empty")
     timestamps, poses = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
@@ -95,6 +96,9 @@ def write_trajectory(path: str | os.PathLike[str], timestamps: npt.ArrayLike, po
     trajectory = Trajectory(timestamps, poses)  # type: ignore[arg-type]
     if not np.isfinite(trajectory.poses).all():
         raise ValueError("poses must be finite, got NaN or infinity")
+    farthest = np.abs(trajectory.poses[:, :3, 3]).max(initial=0.0)
+    if farthest > FARTHEST:
+        raise ValueError(f"poses must lie at most {FARTHEST:g} m away, got {farthest:g}")
     largest = np.abs(trajectory.poses[:, :3, :3]).max(initial=0.0)
     if largest > 2:
         raise ValueError(f"poses must be rigid, got a rotation matrix with an entry of {largest:g}")
@@ -207,6 +211,14 @@ def _unknown(path: str | os.PathLike[str], line: int, width: int) -> FileFormatE
         f"(7-Scenes), got {width} numbers"
     )
     return FileFormatError(path, reason, line=line)
+
+
+def _near(block: _Block, times: Float64, poses: Float64) -> tuple[Float64, Float64]:
+    """Return times and poses as they are, if no position is too far to be computed with."""
+    far = np.flatnonzero((np.abs(poses[:, :3, 3]) > FARTHEST).any(axis=1))
+    if len(far):
+        raise block.error(int(far[0]), f"the position is more than {FARTHEST:g} m away")
+    return times, poses
 
 
 def _exact(block: _Block, poses: Float64, line: int) -> Float64:

@@ -122,6 +122,10 @@ R3D = {
     "K of zeros": (with_told(K=[0] * 9), "metadata: .*fx"),
     "K an object": (with_told(K={"a": 1}), "K must be"),
     "poses of zero length": (with_told(poses=[[0] * 7]), r"poses\[0\]: quaternions"),
+    "poses at 1e300": (
+        with_told(poses=[[0, 0, 0, 1, 0, 0, 1e300]]),
+        r"poses\[0\] is more than 1e.30 m",
+    ),
     "poses of six": (with_told(poses=[[0] * 6]), "poses must have 7 finite numbers"),
     "poses of many lengths": (with_told(poses=[[0] * 7, [0]]), "poses must be a table of numbers"),
     "poses a text": (with_told(poses="0001000"), "poses must"),
@@ -176,6 +180,7 @@ STRAY = {
     "odometry frame nan": (stray(HEAD + "0,nan,0,0,0,0,0,0,1\n"), r"odometry\.csv, line 2"),
     "odometry frame infinite": (stray(HEAD + "0,inf,0,0,0,0,0,0,1\n"), r"odometry\.csv, line 2"),
     "odometry place infinite": (stray(HEAD + "0,0,inf,0,0,0,0,0,1\n"), r"odometry\.csv, line 2"),
+    "odometry place 1e300": (stray(HEAD + "0,0,1e300,0,0,0,0,0,1\n"), r"odometry\.csv, line 2"),
     "odometry goes back in time": (
         stray(HEAD + "1,0,0,0,0,0,0,0,1\n0,1,0,0,0,0,0,0,1\n"),
         r"odometry\.csv, line 3: .*does not come",

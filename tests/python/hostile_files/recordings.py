@@ -180,6 +180,14 @@ OTHER = {
         {"a.ply": scan(NINE), "a.conf": b"bmesh a.ply 0 0 zero 0 0 0 1\n"},
         r"a\.conf, line 1: expected 'bmesh",
     ),
+    "stanford place 1e300": (
+        {"a.ply": scan(NINE), "a.conf": b"bmesh a.ply 0 1e300 0 0 0 0 1\n"},
+        r"a\.conf, line 1: expected 'bmesh",
+    ),
+    "tum truth 1e300": (
+        tum("1 depth/1.pgm\n", groundtruth="1 1e300 0 0 0 0 0 1\n"),
+        r"groundtruth\.txt, line 1",
+    ),
     "stanford place without turn": (
         {"a.ply": scan(NINE), "a.conf": b"bmesh a.ply 0 0 0 0 0 0 0\n"},
         r"a\.conf, line 1: expected 'bmesh",

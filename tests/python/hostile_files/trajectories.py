@@ -16,6 +16,10 @@ TUM = {
     "tum nan": (GOOD + "1 nan 0 0 0 0 0 1\n", "line 2: expected finite numbers"),
     "tum time infinite": ("inf 0 0 0 0 0 0 1\n", "line 1: expected finite numbers"),
     "tum 1e400": (GOOD + "1 1e400 0 0 0 0 0 1\n", "line 2: expected finite numbers"),
+    "tum position 1e300": (
+        GOOD + "1 0 -1e300 0 0 0 0 1\n",
+        "line 2: the position is more than 1e.30 m",
+    ),
     "tum underscore": (GOOD + "1_0 0 0 0 0 0 0 1\n", "line 2: expected numbers"),
     "tum arabic digits": (GOOD + "\u0661 0 0 0 0 0 0 1\n", "line 2: expected numbers"),
     "tum comma": ("0,0,0,0,0,0,0,1\n", "line 1: expected numbers"),
