@@ -83,7 +83,7 @@ def _read_associations(path: Path) -> list[tuple[float, Path, Path | None]]:
 
 
 def _numbered(folder: Path) -> list[tuple[float, Path, Path | None]]:
-    depth = [path for path in files(folder / "depth", DEPTH_SUFFIXES) if path.stem.isdigit()]
+    depth = [path for path in files(folder / "depth", DEPTH_SUFFIXES) if path.stem.isdecimal()]
     if not depth:
         raise FileFormatError(
             folder,

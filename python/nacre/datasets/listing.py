@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import re
 from collections.abc import Iterable
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -15,7 +16,7 @@ _LONGEST_NAME = 1000
 def natural_key(path: Path) -> list[tuple[int, str]]:
     """Sort key under which ``2.png`` comes before ``10.png``."""
     return [
-        (int(part), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", path.name) if part
+        (int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", path.name) if part
     ]
 
 
@@ -59,6 +60,12 @@ def inside(folder: Path, name: str, listing: Path, line: int) -> Path:
     if place.is_absolute() or ".." in place.parts or "\0" in name or PureWindowsPath(name).drive:
         reason = f"refused: the name {excerpt(name.encode())} leads outside the recording's folder"
         raise FileFormatError(listing, reason, line=line)
+    try:
+        (folder / name).is_file()
+    except OSError as error:
+        if error.errno != errno.ENAMETOOLONG:
+            raise
+        raise FileFormatError(listing, f"refused: a name of {len(name)} letters", line=line) from None
     return folder / name
 
 

@@ -72,11 +72,11 @@ def _recorded_depth(out: Written) -> Any:
     """Return what reads a depth image of the recording, or None where the recording is gone."""
     recording = out.report.get("recording") or {}
     path = recording.get("path")
-    if path is None or not Path(path).exists():
-        return None
     from nacre.datasets import open_sequence
 
     try:
+        if path is None or not Path(path).exists():
+            return None
         sequence = open_sequence(path, format=recording.get("format"))
     except (FileFormatError, ValueError, OSError):
         return None

@@ -69,6 +69,10 @@ TUM = {
         tum(_escapes("x" * 5_000 + ".pgm")),
         r"depth\.txt, line 2: refused: a name of 5004 letters",
     ),
+    "tum list name of 300 letters": (
+        tum(_escapes("x" * 300 + ".pgm")),
+        r"depth\.txt, line 2: refused: a name of 304 letters",
+    ),
     "tum list of a folder": (tum(_escapes("depth")), "depth: .*must be one of|cannot be read"),
     "tum colours lead up": (tum("1 depth/1.pgm\n", rgb="1 ../1.png\n"), r"rgb\.txt, line 1: refused"),
     "tum colours absolute": (tum("1 depth/1.pgm\n", rgb="1 /1.png\n"), r"rgb\.txt, line 1: refused"),

@@ -57,7 +57,13 @@ RECORDINGS: dict[str, dict[str, bytes]] = {
         "depth/1.png": _VGA,
         "rgb/1.png": _VGA_COLOR,
     },
-    "icl-nuim_numbered": {"a.gt.freiburg": _TRUTH.encode(), "depth/0.png": _VGA, "depth/1.png": _VGA},
+    "icl-nuim_numbered": {
+        "a.gt.freiburg": _TRUTH.encode(),
+        "depth/0.png": _VGA,
+        "depth/1.png": _VGA,
+        "depth/1\N{SUPERSCRIPT TWO}1.png": _VGA,  # a digit that is no number
+        "depth/\N{SUPERSCRIPT TWO}.png": _VGA,
+    },
     "plain": plain(timestamps__txt="1\n2\n", groundtruth__txt=_TRUTH)
     | {"color/1.png": _COLOR, "mask/1.png": png(bits=8), "attributes/heat/1.npy": npy(np.ones((3, 4)))},
     "stanford": {
@@ -86,6 +92,12 @@ FOLDERS = [
         "output/valid",
         "output",
         {"report.json": report(frames=[FRAME, {**FRAME, "index": 1}]), "model.ply": MODEL},
+        "",
+    ),
+    Case(
+        "output/valid_of_a_recording_that_is_gone",
+        "output",
+        {"report.json": report(recording={"path": 300 * "x"}), "model.ply": MODEL},
         "",
     ),
     Case("checkpoint/valid_model", "checkpoint", {"a": SAVED_MODEL}, "", "a"),
