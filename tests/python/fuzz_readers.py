@@ -47,6 +47,7 @@ from hostile_files.valid import VALID
 
 MOST_BYTES = 1 << 16
 MOST_SECONDS = 2.0
+MOST_MEMORY = 1 << 30  # then a new process goes on
 FOLDERS = ("recording", "output", "run")  # of several files each
 
 
@@ -156,6 +157,11 @@ def main() -> int:
     return int(findings.num_found > 0)
 
 
+def memory() -> int:
+    """Return the bytes that this process has; atheris frees no result of comparing arrays."""
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+
 def _at_random(findings: Findings, corpus: Path, seed: int, seconds: float) -> None:
     """Try the corpus and the seeds, and then what they are when damaged."""
     end = time.monotonic() + seconds
@@ -187,6 +193,13 @@ def _guided(findings: Findings, corpus: Path, folder: Path, seed: int, seconds: 
             shutil.rmtree(folder, ignore_errors=True)
             os._exit(int(findings.num_found > 0))
         findings.run_marked(data)
+        if findings.num_runs % 500 == 0 and memory() > MOST_MEMORY and not findings.num_found:
+            print(findings, flush=True)
+            shutil.rmtree(folder, ignore_errors=True)
+            words = ["--seconds", str(max(end - time.monotonic(), 1)), "--seed", str(seed + 1)]
+            words += ["--keep", str(findings.keep)]
+            words += ["--corpus", str(corpus)] if folder not in corpus.parents else []
+            os.execv(sys.executable, [sys.executable, __file__, findings.kind, *words])
 
     def mutated(data: bytes, most: int, number: int) -> bytes:
         chance = random.Random(number)
@@ -199,8 +212,8 @@ def _guided(findings: Findings, corpus: Path, folder: Path, seed: int, seconds: 
     findings.keep.mkdir(parents=True, exist_ok=True)
     limits = [f"-max_len={MOST_BYTES}", "-timeout=30", "-mutate_depth=2"]
     limits += [f"-artifact_prefix={findings.keep}/{findings.kind}-"]
-    words = [sys.argv[0], str(corpus), str(seeds), f"-seed={seed + 1}", "-verbosity=0", *limits]
-    atheris.Setup(words, one, custom_mutator=mutated)
+    options = [sys.argv[0], str(corpus), str(seeds), f"-seed={seed + 1}", "-verbosity=0", *limits]
+    atheris.Setup(options, one, custom_mutator=mutated)
     atheris.Fuzz()
 
 
