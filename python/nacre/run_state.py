@@ -15,7 +15,7 @@ from nacre.errors import FileFormatError
 from nacre.frame_record import FrameRecord
 from nacre.frame_report import FrameReport
 
-_FOUND_LATER = {"TRACKED": "RELOCALISED"}
+_STATUSES = {"TRACKED": ("TRACKED", "RELOCALISED")}  # of a report: those of a frame, which may be found later
 
 
 def record_state(record: FrameRecord) -> dict[str, Any]:
@@ -42,9 +42,9 @@ def record_from(state: Any, reports: Sequence[FrameReport]) -> FrameRecord:
     if number is not None and as_count("report", number) >= len(reports):
         raise ValueError(f"there is no report {number!r}")
     report = None if number is None else reports[number]
-    known = ("LOST",) if report is None else (report.status, _FOUND_LATER.get(report.status))
-    if state["status"] not in known:
-        raise ValueError(f"no frame is {state['status']!r} whose report says {known[0]}")
+    told = "LOST" if report is None else report.status
+    if state["status"] not in _STATUSES.get(told, (told,)):
+        raise ValueError(f"no frame is {state['status']!r} whose report says {told}")
     return FrameRecord(
         as_count("index", state["index"]),
         None if timestamp is None else as_number("timestamp", timestamp),

@@ -21,11 +21,13 @@ from nacre.reconstruction import Reconstruction
 pytest.importorskip("typer")
 from nacre.cli import main
 from nacre.cli.journal import read_journal
-from nacre.cli.unfinished import Unfinished
+from nacre.cli.unfinished import Stage, Unfinished
 
 sys.path.insert(0, str(Path(__file__).parent))
 import test_depth_calibration as tilted
 from test_wide_views import view
+
+POSE = np.eye(4).ravel().tolist()
 
 
 class Killed(BaseException):
@@ -218,6 +220,24 @@ class TestRefused:
         for text in ("{", "[]", "{}", '{"format": 1, "options": {"path": 1}, "folder": "."}'):
             asked.write_text(text)
             assert str(asked) in self.fails(1, "--resume", killed[1])
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"name": "end"}, "no stage is 'end'"),
+        ({"live": 5}, "no stage is 'views' with live 5"),
+        ({"views": [[-1, POSE]]}, "view must be an integer of at least 0"),
+        ({"views": [[float("inf"), POSE]]}, "view must be an integer"),
+        ({"views": [[0, POSE[:15]]]}, "pose must be 16 finite numbers"),
+        ({"views": [[0]]}, "not enough values"),
+    ],
+)
+def test_stages_that_no_run_is_in_are_refused(change: dict[str, Any], message: str) -> None:
+    good = {"name": "views", "views": [[3, POSE]], "live": None}
+    assert Stage.of(good) == Stage("views", [(3, POSE)], None)
+    with pytest.raises((TypeError, ValueError), match=message):
+        Stage.of({**good, **change})
 
 
 def test_python_code_can_resume_too(recording: Path, undisturbed: Any, tmp_path: Path) -> None:

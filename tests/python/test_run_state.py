@@ -36,6 +36,7 @@ def test_a_record_comes_back_whole(error: Exception | None) -> None:
         ({"status": "FOUND"}, "no frame is 'FOUND'"),
         ({"status": "TRACKED"}, "no frame is 'TRACKED' whose report says LOST"),
         ({"status": []}, r"no frame is \[\]"),
+        ({"status": None}, "no frame is None"),
         ({"reason": 5}, "reason must be a text, got 5"),
         ({"report": 0}, "there is no report 0"),
         ({"report": -1}, "report must be an integer of at least 0, got -1"),

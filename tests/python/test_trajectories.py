@@ -175,6 +175,10 @@ def test_trajectory_shapes_are_checked(tmp_path, times, poses):
 def test_poses_that_are_not_finite_are_not_written(tmp_path):
     with pytest.raises(ValueError, match="finite"):
         write_trajectory(tmp_path / "t.txt", [0], np.full((1, 4, 4), np.nan))
+    far = np.eye(4)[None].copy()
+    far[0, 2, 3] = 1e31
+    with pytest.raises(ValueError, match=r"at most 1e\+30 m away, got 1e\+31"):
+        write_trajectory(tmp_path / "t.txt", [0], far)
 
 
 def test_a_trajectory_owns_its_arrays():

@@ -66,6 +66,7 @@ FORGED = {
     "report infinite": ('"report": 0', '"report": 1e999', "report must be an integer"),
     "report that is not there": ('"report": 0', '"report": 1', "there is no report 1"),
     "status unknown": ('"status": "LOST"', '"status": "SEEN"', "no frame is 'SEEN'"),
+    "status null": ('"status": "LOST"', '"status": null', "no frame is None"),
     "status of another report": ('"status": "LOST"', '"status": "TRACKED"', "no frame is 'TRACKED'"),
     "truth of 400 digits": ('"truth": [1', '"truth": [1' + "0" * 400, "pose must be"),
     "truth infinite": ('"truth": [1.0', '"truth": [1e999', "pose must be 16 finite numbers"),
