@@ -108,7 +108,7 @@ class ColorSearch {
   }
 
   // Information on the directions that source and target agree on, as if it were of distances: noise cancels, as it
-  // does among normals (icp_step.cpp).
+  // does among normals (normal_equations.hpp).
   Eigen::MatrixXd agreed_information(const std::vector<ColorPair>& pairs, const Basis& open,
                                      double distance_noise) const {
     const double extent = extent_of(pairs), scale = distance_noise / noise_;

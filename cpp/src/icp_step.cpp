@@ -4,15 +4,14 @@
 #include <Eigen/SVD>
 #include <cmath>
 
+#include "normal_equations.hpp"
 #include "parallel.hpp"
-#include "simd/pair_equations.hpp"
 
 namespace nacre {
 namespace {
 
 constexpr std::int64_t block_size = 256;
-constexpr double damping = 1e-9;          // information per pair, so that there always is a solution
-constexpr double unknown_chance = 0.008;  // information that normals off by 5 degrees feign
+constexpr double damping = 1e-9;  // information per pair, so that there always is a solution
 
 struct Moments {
   double weight = 0.0, agreement = 0.0, squares = 0.0, weighted_squares = 0.0;
@@ -48,83 +47,6 @@ Moments sum_moments(const std::vector<Pair>& pairs, Metric metric, const Eigen::
       sum.p += pair.weight * p;
       sum.q += pair.weight * (pair.q - origin);
     }
-    return sum;
-  });
-}
-
-// The normal equations of the linearised residuals, and what the closed-form point-to-point solution needs.
-struct NormalEquations {
-  Matrix6 hessian = Matrix6::Zero();
-  Vector6 gradient = Vector6::Zero();
-  Matrix6 chance = Matrix6::Zero();                      // the part of the hessian that noise in the normals feigns
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  // sum of w q~ p~^T
-
-  NormalEquations& operator+=(const NormalEquations& other) {
-    hessian += other.hessian;
-    gradient += other.gradient;
-    chance += other.chance;
-    covariance += other.covariance;
-    return *this;
-  }
-};
-
-Matrix6 symmetric(const double* upper) {
-  Matrix6 matrix;
-  for (int row = 0; row < 6; ++row) {
-    for (int column = row; column < 6; ++column) matrix(row, column) = matrix(column, row) = *upper++;
-  }
-  return matrix;
-}
-
-simd::PairRow row_of(const Pair& pair, double weight, const Eigen::Vector3d& lever, const Eigen::Vector3d& normal) {
-  simd::PairRow row;
-  const bool knows_both = pair.half_difference.allFinite();
-  for (int axis = 0; axis < 3; ++axis) {
-    row.lever[axis] = lever[axis];
-    row.normal[axis] = normal[axis];
-    row.half_difference[axis] = knows_both ? pair.half_difference[axis] : 0.0;
-  }
-  row.right_side = (pair.q - pair.p).dot(normal);
-  row.weight = weight;
-  return row;
-}
-
-// Unknowns: rotation times extent, translation of the centroid. Rotations are about the centroids, so that rotation and
-// translation are as independent as they can be.
-//
-// With rows c(n) for a normal n, normals n +- d of the two points whose errors are independent agree on
-// c(n + d) c(n - d)^T, symmetrised c(n) c(n)^T - c(d) c(d)^T: noise cancels there and not in the hessian.
-NormalEquations build_equations(const std::vector<Pair>& pairs, Metric metric, double Pair::*weight,
-                                const Eigen::Vector3d& p_mean, const Eigen::Vector3d& q_mean, double extent,
-                                int num_threads) {
-  const auto count = static_cast<std::int64_t>(pairs.size());
-  return block_reduce(count, block_size, num_threads, NormalEquations{}, [&](std::int64_t begin, std::int64_t end) {
-    NormalEquations sum;
-    simd::PairRow rows[3 * block_size];
-    std::int64_t num_rows = 0;
-    double weight_of_single = 0.0;
-    for (std::int64_t i = begin; i < end; ++i) {
-      const Pair& pair = pairs[static_cast<std::size_t>(i)];
-      const Eigen::Vector3d p = pair.p - p_mean, q = pair.q - q_mean;
-      if (metric == Metric::point_to_point) {
-        for (int axis = 0; axis < 3; ++axis)
-          rows[num_rows++] = row_of(pair, pair.*weight, p / extent, Eigen::Vector3d::Unit(axis));
-        sum.covariance.noalias() += pair.*weight * q * p.transpose();
-      } else if (metric == Metric::point_to_plane) {
-        // Chen and Medioni 1992 with small angles: (p + a x p + t - q) . n = 0, q about p's centroid.
-        rows[num_rows++] = row_of(pair, pair.*weight, p / extent, pair.normal);
-      } else {
-        // Rusinkiewicz 2019, eq. 9, with the total rotation 2 a~ as the unknown.
-        rows[num_rows++] = row_of(pair, pair.*weight, (p + q) * (0.5 / extent), pair.normal);
-      }
-      if (!pair.half_difference.allFinite()) weight_of_single += pair.*weight;
-    }
-    simd::PairEquations sums;
-    simd::sum_pair_equations()(rows, num_rows, sums);
-    sum.hessian = symmetric(sums.hessian);
-    sum.chance = symmetric(sums.chance);
-    sum.chance.diagonal().array() += unknown_chance * weight_of_single;
-    sum.gradient = Eigen::Map<const Vector6>(sums.gradient);
     return sum;
   });
 }
@@ -191,9 +113,9 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   step.variance = sums.weighted_squares / sums.weight;
   const double extent = std::sqrt(std::max(sums.extent / sums.weight - p_offset.squaredNorm(), 1e-24));
 
-  const NormalEquations equations = build_equations(pairs, metric, &Pair::weight, p_mean, q_mean, extent, num_threads);
+  const NormalEquations equations = normal_equations(pairs, metric, &Pair::weight, p_mean, q_mean, extent, num_threads);
   const NormalEquations shape =
-      weak_threshold > 0.0 ? build_equations(pairs, metric, &Pair::agreement, p_mean, q_mean, extent, num_threads)
+      weak_threshold > 0.0 ? normal_equations(pairs, metric, &Pair::agreement, p_mean, q_mean, extent, num_threads)
                            : equations;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(shape.hessian - shape.chance);
   const double least = weak_threshold * sums.agreement;

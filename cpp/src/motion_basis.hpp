@@ -29,10 +29,9 @@ struct MotionBasis {
   }
 
   // How a residual changes with the amounts.
-  Amounts row(const Pair& pair) const { return row(pair.p, pair.normal); }
-  Amounts row(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {
+  Amounts row(const Pair& pair) const {
     Vector6 by_twist;
-    by_twist << (point - center).cross(normal), normal;
+    by_twist << (pair.p - center).cross(pair.normal), pair.normal;
     return twists.transpose() * by_twist;
   }
   Pose apply(const Amounts& amounts) const {

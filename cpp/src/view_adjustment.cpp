@@ -6,6 +6,7 @@
 #include <memory>
 
 #include "icp_target.hpp"
+#include "normal_equations.hpp"
 #include "parallel.hpp"
 #include "plane_registration.hpp"
 #include "rigid_motion.hpp"
@@ -25,10 +26,11 @@ struct Side {
   IcpTarget target;
 };
 
-// The pairs of two views, in the world.
+// The pairs of two views, in the world; `nearest` as IcpTarget::match has it.
 std::vector<Pair> match(const IcpSource& source, const IcpTarget& target, const Pose& world_from_source,
-                        const Pose& world_from_target, double gate, double tolerance) {
-  std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
+                        const Pose& world_from_target, double gate, double tolerance,
+                        std::vector<std::uint32_t>& nearest) {
+  nearest.resize(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
   std::vector<Pair> pairs =
       target.match(source, source.cloud.points.rows(), world_from_target.inverse() * world_from_source,
                    {gate, cos_angle, false}, nearest);
@@ -48,33 +50,38 @@ std::vector<Pair> match(const IcpSource& source, const IcpTarget& target, const 
   return pairs;
 }
 
+// What the pairs of two views say about the motion of the first, a twist about a centre.
+struct Overlap {
+  double agreement = 0.0;
+  NormalEquations equations;
+
+  Overlap() = default;
+  Overlap(const std::vector<Pair>& pairs, const Eigen::Vector3d& center) {
+    if (pairs.empty()) return;
+    for (const Pair& pair : pairs) agreement += pair.weight;
+    equations = normal_equations(pairs, Metric::point_to_plane, &Pair::weight, center, center, 1.0, 1);
+  }
+};
+
 // The normal equations of all views' motions. Each residual grows with the motion of one view and shrinks with that of
 // the other.
 struct JointEquations {
-  Eigen::MatrixXd hessian, chance;  // see icp_step.cpp
+  Eigen::MatrixXd hessian, chance;  // see normal_equations.hpp
   Eigen::VectorXd gradient;
   double agreement = 0.0;
 
   explicit JointEquations(Eigen::Index size)
       : hessian(Eigen::MatrixXd::Zero(size, size)), chance(hessian), gradient(Eigen::VectorXd::Zero(size)) {}
 
-  void add(const std::vector<Pair>& pairs, const MotionBasis& motions, Eigen::Index moved, Eigen::Index other) {
-    if (pairs.empty()) return;
-    const Eigen::Index freedom = motions.twists.cols(), i = freedom * moved, j = freedom * other;
-    Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(freedom, freedom), feigned = squares;
-    Eigen::VectorXd right_side = Eigen::VectorXd::Zero(freedom);
-    for (const Pair& pair : pairs) {
-      const MotionBasis::Amounts row = motions.row(pair.p, pair.normal);
-      const MotionBasis::Amounts difference = motions.row(pair.p, pair.half_difference);
-      squares.noalias() += pair.weight * row * row.transpose();
-      feigned.noalias() += pair.weight * difference * difference.transpose();
-      right_side += pair.weight * residual(pair, Metric::symmetric) * row;
-      agreement += pair.weight;
-    }
-    add_block(squares, i, j, hessian);
-    add_block(feigned, i, j, chance);
-    gradient.segment(i, freedom) -= right_side;
-    gradient.segment(j, freedom) += right_side;
+  void add(const Overlap& overlap, const MotionBasis::Twists& twists, Eigen::Index moved, Eigen::Index other) {
+    if (!(overlap.agreement > 0.0)) return;
+    const Eigen::Index freedom = twists.cols(), i = freedom * moved, j = freedom * other;
+    const MotionBasis::Amounts by_amounts = twists.transpose() * overlap.equations.gradient;
+    add_block(twists.transpose() * overlap.equations.hessian * twists, i, j, hessian);
+    add_block(twists.transpose() * overlap.equations.chance * twists, i, j, chance);
+    gradient.segment(i, freedom) += by_amounts;
+    gradient.segment(j, freedom) -= by_amounts;
+    agreement += overlap.agreement;
   }
 
   // The first view stays; so do directions that only noise in the normals determines.
@@ -121,18 +128,21 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
   const Eigen::Index freedom = motions.twists.cols();
   std::vector<std::uint8_t> see_the_same(views.size() * views.size(), 1);
   for (std::size_t i = 0; i < views.size(); ++i) see_the_same[i * views.size() + i] = 0;
+  std::vector<std::vector<std::uint32_t>> nearest(see_the_same.size());
   double gate = first_gate;
   for (int iteration = 0; iteration < num_iterations; ++iteration) {
-    std::vector<std::vector<Pair>> matches(see_the_same.size());
+    std::vector<Overlap> overlaps(see_the_same.size());
     parallel_for(count * count, 1, num_threads, [&](std::int64_t index) {
       const auto k = static_cast<std::size_t>(index), i = k / views.size(), j = k % views.size();
       if (see_the_same[k] == 0) return;
-      matches[k] = match(sides[i]->source, sides[j]->target, poses[i], poses[j], gate * tolerance, tolerance);
-      if (gate == last_gate && matches[k].empty()) see_the_same[k] = 0;
+      const std::vector<Pair> pairs =
+          match(sides[i]->source, sides[j]->target, poses[i], poses[j], gate * tolerance, tolerance, nearest[k]);
+      overlaps[k] = Overlap(pairs, motions.center);
+      if (gate == last_gate && pairs.empty()) see_the_same[k] = 0;
     });
     JointEquations equations(freedom * count);
     for (Eigen::Index k = 0; k < count * count; ++k) {
-      equations.add(matches[static_cast<std::size_t>(k)], motions, k / count, k % count);
+      equations.add(overlaps[static_cast<std::size_t>(k)], motions.twists, k / count, k % count);
     }
     const Eigen::VectorXd solution = equations.solve(count, weak_threshold);
     for (Eigen::Index k = 1; k < count; ++k) {

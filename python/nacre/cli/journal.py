@@ -62,14 +62,14 @@ class Journal:
     def __init__(self, path: Path, num_kept: int | None = None, compare: bool = True) -> None:
         self.path = path
         self._expected: list[list[Any]] = []
-        size = 0
+        self.num_frames = size = 0
         if num_kept is not None:
             entries, size = read_journal(path)
             if compare:
                 self._expected = entries[num_kept:][::-1]
             else:
                 size = sum(len(_line(entry)) for entry in entries[:num_kept])
-        self.num_frames = num_kept or 0
+            self.num_frames = min(num_kept, len(entries))  # of a damaged one, the lines before the damage
         try:
             self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
             os.ftruncate(self._descriptor, size)
