@@ -18,7 +18,6 @@ import logging
 import os
 import pkgutil
 import random
-import shutil
 import sys
 import tempfile
 import time
@@ -48,6 +47,7 @@ from hostile_files.valid import VALID
 MOST_BYTES = 1 << 16
 MOST_SECONDS = 2.0
 MOST_MEMORY = 1 << 30  # then a new process goes on
+KEPT_TOO_MUCH = 75  # the exit code of one that has more
 FOLDERS = ("recording", "output", "run")  # of several files each
 
 
@@ -152,9 +152,8 @@ def main() -> int:
         corpus.mkdir(parents=True, exist_ok=True)
         if atheris is None or options.seconds == 0:
             _at_random(findings, corpus, options.seed, options.seconds)
-        else:
-            _guided(findings, corpus, Path(folder), options.seed, options.seconds)
-    return int(findings.num_found > 0)
+            return int(findings.num_found > 0)
+        return _guided(findings, corpus, Path(folder), options.seed, options.seconds)
 
 
 def memory() -> int:
@@ -178,28 +177,38 @@ def _at_random(findings: Findings, corpus: Path, seed: int, seconds: float) -> N
     print(findings)
 
 
-def _guided(findings: Findings, corpus: Path, folder: Path, seed: int, seconds: float) -> None:
-    """Let libFuzzer choose; it never returns, so the process, and what is in the folder, are ended here."""
+def _guided(findings: Findings, corpus: Path, folder: Path, seed: int, seconds: float) -> int:
+    """Let libFuzzer choose, in one child process after the other; return the last one's exit code."""
     seeds = folder / "seeds"
     seeds.mkdir()
     for home in range(len(findings.homes)):
         for i, data in enumerate(findings.seeds_of(home)):
             (seeds / f"{home}-{i}").write_bytes(bytes([home]) + data)
+    findings.keep.mkdir(parents=True, exist_ok=True)
     end = time.monotonic() + seconds
+    code = KEPT_TOO_MUCH
+    while code == KEPT_TOO_MUCH and time.monotonic() < end:
+        seed += 1
+        child = os.fork()
+        if child == 0:
+            _choose(findings, [str(corpus), str(seeds), f"-seed={seed}"], end)
+        code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    return 0 if code == KEPT_TOO_MUCH else code
+
+
+def _choose(findings: Findings, options: list[str], end: float) -> None:
+    """Run libFuzzer, which never returns, until it is time or too much memory is kept."""
+
+    def leave(code: int) -> None:
+        print(findings, flush=True)
+        os._exit(code)
 
     def one(data: bytes) -> None:
         if time.monotonic() > end:
-            print(findings, flush=True)
-            shutil.rmtree(folder, ignore_errors=True)
-            os._exit(int(findings.num_found > 0))
+            leave(int(findings.num_found > 0))
         findings.run_marked(data)
         if findings.num_runs % 500 == 0 and memory() > MOST_MEMORY and not findings.num_found:
-            print(findings, flush=True)
-            shutil.rmtree(folder, ignore_errors=True)
-            words = ["--seconds", str(max(end - time.monotonic(), 1)), "--seed", str(seed + 1)]
-            words += ["--keep", str(findings.keep)]
-            words += ["--corpus", str(corpus)] if folder not in corpus.parents else []
-            os.execv(sys.executable, [sys.executable, __file__, findings.kind, *words])
+            leave(KEPT_TOO_MUCH)
 
     def mutated(data: bytes, most: int, number: int) -> bytes:
         chance = random.Random(number)
@@ -209,11 +218,9 @@ def _guided(findings: Findings, corpus: Path, folder: Path, seed: int, seconds: 
         home = data[0] % len(findings.homes)
         return (bytes([home]) + findings.mutated(home, data[1:], chance))[:most]
 
-    findings.keep.mkdir(parents=True, exist_ok=True)
-    limits = [f"-max_len={MOST_BYTES}", "-timeout=30", "-mutate_depth=2"]
+    limits = [f"-max_len={MOST_BYTES}", "-timeout=30", "-mutate_depth=2", "-verbosity=0"]
     limits += [f"-artifact_prefix={findings.keep}/{findings.kind}-"]
-    options = [sys.argv[0], str(corpus), str(seeds), f"-seed={seed + 1}", "-verbosity=0", *limits]
-    atheris.Setup(options, one, custom_mutator=mutated)
+    atheris.Setup([sys.argv[0], *options, *limits], one, custom_mutator=mutated)
     atheris.Fuzz()
 
 
