@@ -207,8 +207,8 @@ def _choose(findings: Findings, options: list[str], end: float) -> None:
         if time.monotonic() > end:
             leave(int(findings.num_found > 0))
         findings.run_marked(data)
-        if findings.num_runs % 500 == 0 and memory() > MOST_MEMORY and not findings.num_found:
-            leave(KEPT_TOO_MUCH)
+        if findings.num_runs % 500 == 0 and memory() > MOST_MEMORY:
+            leave(1 if findings.num_found else KEPT_TOO_MUCH)
 
     def mutated(data: bytes, most: int, number: int) -> bytes:
         chance = random.Random(number)

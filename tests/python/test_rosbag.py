@@ -51,6 +51,21 @@ def record(path: Path, version: int, storage: StoragePlugin = StoragePlugin.SQLI
     return path
 
 
+@pytest.mark.parametrize(("name", "version"), [("a.bag", 1), ("two", 2)])
+def test_topics_need_not_begin_with_a_slash(name: str, version: int, tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / name, version)
+    recorder.info("camera/info/camera_info")
+    for i in range(FRAMES):
+        recorder.image("camera/depth/image_raw", 1.0 + i, depth_image(i), "16UC1")
+        recorder.image("camera/color/image_raw", 1.0 + i, color_image(i), "rgb8")
+    recorder.close()
+    sequence = nacre.open_sequence(tmp_path / name)
+    for i, frame in enumerate(sequence):
+        np.testing.assert_allclose(frame.depth[2:], 0.7 + 0.001 * i, rtol=1e-6)
+        np.testing.assert_array_equal(frame.color, color_image(i))
+    assert len(sequence) == FRAMES
+
+
 @pytest.mark.parametrize(
     ("name", "version", "storage"),
     [("a.bag", 1, None), ("two", 2, StoragePlugin.SQLITE3), ("three", 2, StoragePlugin.MCAP)],

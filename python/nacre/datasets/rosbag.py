@@ -98,6 +98,7 @@ class _Bag:
         except ImportError as error:
             raise ImportError(_MISSING) from error
         self.path = path
+        self._topics: dict[Path, str] = {}  # by where their images are named; some do not begin with a slash
         _check_metadata(path)
         try:
             self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
@@ -199,7 +200,9 @@ class _Bag:
 
     def place(self, topic: str, time: int) -> Path:
         """Name an image, for errors and for reading it."""
-        return self.path / topic.strip("/") / f"{time}"
+        place = self.path / topic.strip("/") / f"{time}"
+        self._topics[place.parent] = topic
+        return place
 
     def depth(self, place: Path) -> npt.NDArray[np.float32]:
         """Read a depth image [m]."""
@@ -257,8 +260,7 @@ class _Bag:
             raise FileFormatError(self.path, f"damaged in {connections[0].topic}: {error}") from error
 
     def _message(self, place: Path) -> Any:
-        topic, time = "/" + place.parent.relative_to(self.path).as_posix(), int(place.name)
-        for connection, _, data in self._messages(topic, time):
+        for connection, _, data in self._messages(self._topics[place.parent], int(place.name)):
             return self._decoded(connection, data, place)
         raise FileFormatError(place, "the message is missing")
 
