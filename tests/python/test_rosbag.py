@@ -66,6 +66,18 @@ def test_topics_need_not_begin_with_a_slash(name: str, version: int, tmp_path: P
     assert len(sequence) == FRAMES
 
 
+@pytest.mark.parametrize(("name", "version"), [("a.bag", 1), ("two", 2)])
+def test_a_topic_may_have_other_messages_than_images(name: str, version: int, tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / name, version)
+    recorder.info("/camera/depth/image_raw")
+    recorder.connections.clear()
+    for i in range(FRAMES):
+        recorder.image("/camera/depth/image_raw", 1.0 + i, depth_image(i), "16UC1")
+    recorder.close()
+    sequence = nacre.open_sequence(tmp_path / name)
+    assert [frame.depth[5, 5] for frame in sequence] == pytest.approx([0.700, 0.701, 0.702])
+
+
 @pytest.mark.parametrize(
     ("name", "version", "storage"),
     [("a.bag", 1, None), ("two", 2, StoragePlugin.SQLITE3), ("three", 2, StoragePlugin.MCAP)],

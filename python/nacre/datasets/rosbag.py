@@ -45,6 +45,7 @@ LAYOUT = (
 )
 SUFFIXES = (".bag", ".mcap", ".db3")
 
+_IMAGES = (IMAGE, COMPRESSED_IMAGE)
 _MOST_METADATA = 1 << 18
 _MOST_NESTED = 64
 _MISSING = 'ROS recordings need rosbags: pip install "nacre[ros]"'
@@ -113,7 +114,7 @@ class _Bag:
                 hint = f" (ROS 2 is read; what was cut short: mcap recover {path.name} -o whole.mcap)"
             raise FileFormatError(path, f"not a whole ROS recording: {error}{hint}") from error
         weakref.finalize(self, self._reader.close)
-        topics = [c.topic for c in self._reader.connections if c.msgtype in (IMAGE, COMPRESSED_IMAGE)]
+        topics = [c.topic for c in self._reader.connections if c.msgtype in _IMAGES]
         sure = [topic for topic in topics if re.search("confidence", topic, re.IGNORECASE)]
         depth = [t for t in topics if re.search("depth", t, re.IGNORECASE) and t not in sure]
         if not depth:
@@ -250,12 +251,15 @@ class _Bag:
         return 1000.0
 
     def _messages(self, topic: str, time: int | None = None) -> Iterator[tuple[Any, int, bytes]]:
-        connections = [c for c in self._reader.connections if c.topic == topic]
+        connections = [c for c in self._reader.connections if c.topic == topic and c.msgtype in _IMAGES]
         return self._read(connections, time, None if time is None else time + 1)
 
     def _read(self, connections: list[Any], *times: int | None) -> Iterator[tuple[Any, int, bytes]]:
         try:
-            yield from self._reader.messages(connections, *times)
+            for message in self._reader.messages(connections, *times):
+                if message[0] not in connections:
+                    raise ValueError(f"a message of {message[0].topic} in its index")
+                yield message
         except Exception as error:  # rosbags', and those of its decompressors
             raise FileFormatError(self.path, f"damaged in {connections[0].topic}: {error}") from error
 

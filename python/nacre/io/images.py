@@ -208,6 +208,8 @@ def _read_pgm(path: Path) -> npt.NDArray[Any]:
     width, height, largest = (int(field) for field in header.groups())
     if not 255 < largest < 65536:
         raise FileFormatError(path, f"a depth image must have 16 bits, this PGM's largest value is {largest}")
+    if 0 in (width, height):
+        raise FileFormatError(path, f"a depth image must have pixels, this PGM is {width} x {height}")
     expected = 2 * width * height
     if len(data) - header.end() < expected:
         raise FileFormatError(

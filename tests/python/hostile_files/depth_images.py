@@ -141,7 +141,9 @@ PGM = {
     "pgm maxval 65536": (pgm(65536), "largest value is 65536"),
     "pgm maxval negative": (pgm(-1), "byte 0: expected"),
     "pgm maxval of 5000 digits": (pgm("9" * 5000), "byte 0: expected|whole number"),
-    "pgm of no width": (pgm(size="0 3"), "byte .*follow|must be .H, W. numbers"),
+    "pgm of no width": (pgm(size="0 3"), "must have pixels, this PGM is 0 x 3"),
+    "pgm of no height wider than an array": (pgm(size=f"{2**63 + 6} 0"), "must have pixels"),
+    "pgm of no height with more bytes than an array": (pgm(size=f"{2**62} 0"), "must have pixels"),
     "pgm of size 2 to the 32 squared": (
         pgm(size=f"{2**32} {2**32}"),
         "truncated: 36893488147419103232 bytes",

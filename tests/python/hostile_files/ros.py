@@ -77,3 +77,15 @@ ROS = [
     for what, (old, new, said) in CHANGED.items()
     if WHOLE
 ]
+if WHOLE:
+    index = b"op=\x04\x08\x00\x00\x00ver=\x01\x00\x00\x00\t\x00\x00\x00conn="
+    ROS.append(
+        Case(
+            "recording/bag_whose_index_leads_to_another_topic",
+            "recording",
+            {"a.bag": WHOLE["a.bag"].replace(index + b"\0", index + b"\1")},
+            "damaged in /camera/depth/image_raw: a message of /camera/depth/camera_info",
+            "a.bag",
+            needs="rosbags",
+        )
+    )
