@@ -13,8 +13,10 @@ A file of the corpus is what a reader is given, after one byte that says which o
 
 import argparse
 import contextlib
+import ctypes
 import importlib
 import logging
+import mmap
 import os
 import pkgutil
 import random
@@ -51,6 +53,12 @@ KEPT_TOO_MUCH = 75  # the exit code of one that has more
 FOLDERS = ("recording", "output", "run")  # of several files each
 
 
+class Counts(ctypes.Structure):
+    """How many files were read."""
+
+    _fields_ = [(name, ctypes.c_int64) for name in ("files", "refused", "found")]
+
+
 class Findings:
     """Runs a reader over files, and keeps what is neither a result nor nacre's own error."""
 
@@ -58,7 +66,7 @@ class Findings:
         self.kind = kind
         self.keep = keep
         self._known: set[str] = set()
-        self.num_runs = self.num_refused = self.num_found = 0
+        self.num = Counts.from_buffer(mmap.mmap(-1, ctypes.sizeof(Counts)))  # one for all forked processes
         # The places that a file may take: in each valid folder; in a hostile one that alone has such a file.
         self.homes: list[tuple[Case, Path, str]] = []
         self._seeds: dict[str, list[bytes]] = {}
@@ -106,12 +114,12 @@ class Findings:
         place = path / name if not case.opens else path.parent / name
         place.write_bytes(data)
         start = time.process_time()
-        self.num_runs += 1
+        self.num.files += 1
         try:
             READERS[self.kind](path)
         except nacre.FileFormatError as error:
             str(error)
-            self.num_refused += 1
+            self.num.refused += 1
         except FileNotFoundError:
             pass
         except Exception as error:
@@ -120,15 +128,15 @@ class Findings:
             self._found(name, data, f"{time.process_time() - start:.1f} s")
 
     def __str__(self) -> str:
-        return f"{self.kind}: {self.num_runs} files, {self.num_refused} refused, {self.num_found} findings"
+        return f"{self.kind}: {self.num.files} files, {self.num.refused} refused, {self.num.found} findings"
 
     def _found(self, name: str, data: bytes, what: str) -> None:
         if what[:40] in self._known:  # one file of each kind is enough
             return
         self._known.add(what[:40])
-        self.num_found += 1
+        self.num.found += 1
         self.keep.mkdir(parents=True, exist_ok=True)
-        path = self.keep / f"{self.kind}-{self.num_found}-{Path(name).name}".replace(" ", "-")
+        path = self.keep / f"{self.kind}-{self.num.found}-{Path(name).name}".replace(" ", "-")
         path.write_bytes(data)
         print(f"{path}: {what[:300]}", flush=True)
 
@@ -152,7 +160,7 @@ def main() -> int:
         corpus.mkdir(parents=True, exist_ok=True)
         if atheris is None or options.seconds == 0:
             _at_random(findings, corpus, options.seed, options.seconds)
-            return int(findings.num_found > 0)
+            return int(findings.num.found > 0)
         return _guided(findings, corpus, Path(folder), options.seed, options.seconds)
 
 
@@ -205,10 +213,10 @@ def _choose(findings: Findings, options: list[str], end: float) -> None:
 
     def one(data: bytes) -> None:
         if time.monotonic() > end:
-            leave(int(findings.num_found > 0))
+            leave(int(findings.num.found > 0))
         findings.run_marked(data)
-        if findings.num_runs % 500 == 0 and memory() > MOST_MEMORY:
-            leave(1 if findings.num_found else KEPT_TOO_MUCH)
+        if findings.num.files % 500 == 0 and memory() > MOST_MEMORY:
+            leave(1 if findings.num.found else KEPT_TOO_MUCH)
 
     def mutated(data: bytes, most: int, number: int) -> bytes:
         chance = random.Random(number)
