@@ -32,13 +32,14 @@ try:
 except ImportError:
     atheris = None
 if atheris is not None and __name__ == "__main__":
-    with atheris.instrument_imports(include=["nacre"]):
+    with atheris.instrument_imports(include=["nacre", "rosbags"]):
         import nacre
 
-        for module in pkgutil.walk_packages(nacre.__path__, "nacre."):  # those, too, that are imported late
-            if not module.name.endswith("__main__"):
+        modules = [module.name for module in pkgutil.walk_packages(nacre.__path__, "nacre.")]
+        for name in ("rosbags.highlevel", *modules):  # those, too, that are imported late
+            if not name.endswith("__main__"):
                 with contextlib.suppress(ImportError):
-                    importlib.import_module(module.name)
+                    importlib.import_module(name)
 else:
     import nacre
 from hostile_files import CASES, READERS, Case, write
