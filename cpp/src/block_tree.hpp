@@ -40,7 +40,7 @@ inline double squared_bound(double distance) {
   return square;
 }
 
-// The k nearest within a distance, sorted, in the caller's memory.
+// The k nearest within a distance, sorted, in the caller's memory; for few.
 class KNearest {
  public:
   KNearest(int k, double bound_d2, Found* found)
@@ -56,6 +56,31 @@ class KNearest {
     *place = point;
     if (end_ == full_) bound_ = end_[-1];
   }
+
+ private:
+  Found bound_;
+  Found *begin_, *end_, *full_;
+};
+
+// The same for many, where making room in a sorted row takes longer than in a heap; sorted by sort().
+class ManyNearest {
+ public:
+  ManyNearest(int k, double bound_d2, Found* found)
+      : bound_{bound_d2, no_id, no_id}, begin_(found), end_(found), full_(found + k) {}
+  int num_wanted() const { return static_cast<int>(full_ - begin_); }
+  int size() const { return static_cast<int>(end_ - begin_); }
+  const Found& bound() const { return bound_; }
+  void add(const Found& point) {
+    if (!(point < bound_)) return;
+    if (end_ == full_) {
+      std::pop_heap(begin_, end_);
+      --end_;
+    }
+    *end_++ = point;
+    std::push_heap(begin_, end_);
+    if (end_ == full_) bound_ = *begin_;
+  }
+  void sort() { std::sort_heap(begin_, end_); }
 
  private:
   Found bound_;
@@ -253,6 +278,21 @@ void BlockTree<T>::search_nearest_first(const Eigen::Vector3d& query, Blocks see
     }
     tighten();
   }
+}
+
+// Writes the k nearest within a distance, sorted; returns how many there are.
+template <class T>
+int find_nearest(const BlockTree<T>& tree, const Eigen::Vector3d& query, int k, double bound_d2, Found* found) {
+  constexpr int few = 200;
+  if (k <= few) {
+    KNearest nearest(k, bound_d2, found);
+    tree.search(query, nearest);
+    return nearest.size();
+  }
+  ManyNearest nearest(k, bound_d2, found);
+  tree.search(query, nearest);
+  nearest.sort();
+  return nearest.size();
 }
 
 }  // namespace nacre

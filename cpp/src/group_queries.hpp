@@ -43,6 +43,12 @@ inline void write_answer(const simd::NearestSlotsTask& task, std::uint32_t row, 
   task.counts[row] = count;
 }
 
+// How many queries a thread takes at once, `most` where neighbours are few: a call is asked to stop between them.
+inline std::int64_t queries_per_task(int k, std::int64_t most) {
+  constexpr std::int64_t most_neighbors = 1 << 16;
+  return std::clamp<std::int64_t>(most_neighbors / k / block_points * block_points, block_points, most);
+}
+
 // Answers group after group of queries that are close together. The radius within which a group finds its neighbours is
 // not known before: it is guessed from the group before, and enlarged for queries that it is too small for.
 template <class T, class Task>
@@ -101,9 +107,8 @@ class GroupQueries {
   }
 
   void answer_alone(const simd::QueryGroup& group, int i) {
-    KNearest nearest(task_.k, task_.max_distance2, found_.data());
-    tree_.search({group.p[0][i], group.p[1][i], group.p[2][i]}, nearest);
-    const int count = nearest.size();
+    const Eigen::Vector3d query(group.p[0][i], group.p[1][i], group.p[2][i]);
+    const int count = find_nearest(tree_, query, task_.k, task_.max_distance2, found_.data());
     if (count == task_.k) farthest2_ = std::max(farthest2_, found_[static_cast<std::size_t>(count) - 1].d2);
     write_answer(task_, group.row[i], found_.data(), count);
   }

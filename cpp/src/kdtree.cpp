@@ -138,7 +138,8 @@ struct KdTree::Impl {
     const bool in_tree_order = are_points_of(blocks, queries, num_threads);
     const Buffer<std::uint32_t> order = in_tree_order ? Buffer<std::uint32_t>() : visiting_order(queries, num_threads);
     const std::int64_t num_finite = in_tree_order ? blocks.num_points() : static_cast<std::int64_t>(order.size());
-    const std::int64_t per_block = std::clamp<std::int64_t>(num_finite / 64 / 16 * 16, 128, 2048);
+    const std::int64_t per_block =
+        queries_per_task(task.k, std::clamp<std::int64_t>(num_finite / 64 / 16 * 16, 128, 2048));
     parallel_blocks(num_finite, per_block, num_threads, [&](auto, std::int64_t begin, std::int64_t end) {
       GroupQueries search(blocks, task);
       for (std::int64_t first = begin; first < end; first += 16) {
@@ -209,13 +210,14 @@ int KdTree::nearest(const Eigen::Vector3d& query, int k, double max_distance, st
   std::array<Found, small_k> on_stack;
   std::vector<Found> on_heap(k > small_k ? static_cast<std::size_t>(k) : 0);
   Found* found = k > small_k ? on_heap.data() : on_stack.data();
-  KNearest nearest(k, squared_bound(max_distance), found);
-  std::visit([&](const auto& blocks) { blocks.search(query, nearest); }, impl_->tree);
-  for (int j = 0; j < nearest.size(); ++j) {
+  const double bound = squared_bound(max_distance);
+  const int count =
+      std::visit([&](const auto& blocks) { return find_nearest(blocks, query, k, bound, found); }, impl_->tree);
+  for (int j = 0; j < count; ++j) {
     indices[j] = found[j].id;
     squared_distances[j] = found[j].d2;
   }
-  return nearest.size();
+  return count;
 }
 
 }  // namespace nacre

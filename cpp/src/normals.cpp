@@ -33,9 +33,9 @@ PointMatrix<T> estimate(const Eigen::Ref<const PointMatrix<T>>& points, const No
   if (tree.num_points() < points.rows()) normals.setConstant(std::numeric_limits<T>::quiet_NaN());
   // All points are as many neighbours as any larger number.
   const int k = static_cast<int>(std::min<std::int64_t>(options.k, std::max<std::int64_t>(3, tree.num_points())));
-  constexpr int points_per_task = 64 * block_points;
   parallel_blocks(
-      tree.num_points(), points_per_task, options.num_threads, [&](auto, std::int64_t begin, std::int64_t end) {
+      tree.num_points(), queries_per_task(k, 64 * block_points), options.num_threads,
+      [&](auto, std::int64_t begin, std::int64_t end) {
         std::vector<std::uint32_t> slots(static_cast<std::size_t>(block_points) * static_cast<std::size_t>(k));
         simd::Neighborhoods near;
         near.slots = slots.data();

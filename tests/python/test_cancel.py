@@ -24,6 +24,8 @@ LONG: dict[str, Callable[[], object]] = {
         BODY, BODY[::-1] + 5, num_rotations=10**6, max_samples=3000, coarse_samples=3000, num_candidates=10**6
     ),
     "normals": lambda: nacre.estimate_normals(SURFACE, k=300),
+    "normals of many": lambda: nacre.estimate_normals(SURFACE, k=30_000),
+    "neighbors": lambda: nacre.KdTree(SURFACE).query(SURFACE[:10_000], k=10_000),
 }
 
 
