@@ -40,7 +40,7 @@ inline double squared_bound(double distance) {
   return square;
 }
 
-// The k nearest within a distance, sorted, in the caller's memory; for few.
+// The k nearest within a distance, in the caller's memory.
 class KNearest {
  public:
   KNearest(int k, double bound_d2, Found* found)
@@ -48,6 +48,16 @@ class KNearest {
   int num_wanted() const { return static_cast<int>(full_ - begin_); }
   int size() const { return static_cast<int>(end_ - begin_); }
   const Found& bound() const { return bound_; }
+
+ protected:
+  Found bound_;
+  Found *begin_, *end_, *full_;
+};
+
+// Kept sorted, for few.
+class FewNearest : public KNearest {
+ public:
+  using KNearest::KNearest;
   void add(const Found& point) {
     if (!(point < bound_)) return;
     if (end_ != full_) ++end_;
@@ -56,20 +66,12 @@ class KNearest {
     *place = point;
     if (end_ == full_) bound_ = end_[-1];
   }
-
- private:
-  Found bound_;
-  Found *begin_, *end_, *full_;
 };
 
-// The same for many, where making room in a sorted row takes longer than in a heap; sorted by sort().
-class ManyNearest {
+// Kept as a heap, for many, where making room in a sorted row takes longer; sorted by sort().
+class ManyNearest : public KNearest {
  public:
-  ManyNearest(int k, double bound_d2, Found* found)
-      : bound_{bound_d2, no_id, no_id}, begin_(found), end_(found), full_(found + k) {}
-  int num_wanted() const { return static_cast<int>(full_ - begin_); }
-  int size() const { return static_cast<int>(end_ - begin_); }
-  const Found& bound() const { return bound_; }
+  using KNearest::KNearest;
   void add(const Found& point) {
     if (!(point < bound_)) return;
     if (end_ == full_) {
@@ -81,10 +83,6 @@ class ManyNearest {
     if (end_ == full_) bound_ = *begin_;
   }
   void sort() { std::sort_heap(begin_, end_); }
-
- private:
-  Found bound_;
-  Found *begin_, *end_, *full_;
 };
 
 // Everything within a distance, unsorted.
@@ -285,7 +283,7 @@ template <class T>
 int find_nearest(const BlockTree<T>& tree, const Eigen::Vector3d& query, int k, double bound_d2, Found* found) {
   constexpr int few = 200;
   if (k <= few) {
-    KNearest nearest(k, bound_d2, found);
+    FewNearest nearest(k, bound_d2, found);
     tree.search(query, nearest);
     return nearest.size();
   }

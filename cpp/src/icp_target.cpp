@@ -59,7 +59,7 @@ double median_spacing(const BlockTree<float>& tree) {
   std::vector<double> distances;
   for (std::int64_t slot = 0; slot < tree.num_points(); slot += step) {
     Found found[2];
-    KNearest nearest(2, std::numeric_limits<double>::infinity(), found);
+    FewNearest nearest(2, std::numeric_limits<double>::infinity(), found);
     tree.search(tree.position(static_cast<std::uint32_t>(slot)), nearest);
     if (nearest.size() == 2) distances.push_back(std::sqrt(found[1].d2));
   }
