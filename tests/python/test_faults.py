@@ -177,7 +177,7 @@ def test_files_that_may_not_grow(recording: Path, undisturbed: Any, tmp_path: Pa
 def test_a_disk_that_is_full(recording: Path, undisturbed: Any, tmp_path: Path) -> None:  # noqa: F811
     disk = tmp_path / "disk"
     disk.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=1536k", "tmpfs", str(disk)]
+    mount = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(disk)]
     try:
         mounted = subprocess.run(mount, capture_output=True, check=False).returncode == 0
     except OSError:
@@ -187,7 +187,7 @@ def test_a_disk_that_is_full(recording: Path, undisturbed: Any, tmp_path: Path) 
     try:
         ballast = disk / "ballast"
         messages = set()
-        for kilobytes in (1530, 1400, 1100, 800, 500):
+        for kilobytes in (3066, 2900, 2600, 2300, 2000, 1600):
             ballast.write_bytes(bytes(1024 * kilobytes))
             resumes = (disk / "o" / "unfinished" / "run.json").exists()
             words = ("--resume", disk / "o") if resumes else (recording, "-o", disk / "o")
@@ -207,7 +207,8 @@ def test_a_disk_that_is_full(recording: Path, undisturbed: Any, tmp_path: Path) 
                 if (disk / "o" / "unfinished").exists()
                 else (recording, "-o", disk / "o")
             )
-            assert command("reconstruct", *words)[0] == 0
+            code, _, err = command("reconstruct", *words)
+            assert code == 0, err
         assert results(disk / "o") == undisturbed
     finally:
         subprocess.run(["umount", str(disk)], check=True)

@@ -162,17 +162,16 @@ class Unfinished:
 def read_asked(out: Path) -> dict[str, Any]:
     """Return what ``OUT/unfinished/run.json`` says, or say that there is nothing to resume."""
     from nacre.errors import FileFormatError
+    from nacre.io.json_files import read_json
 
     path = out / "unfinished" / "run.json"
     try:
-        asked = json.loads(path.read_bytes())
+        asked = read_json(path)
     except FileNotFoundError:
         if (out / "report.json").exists():
             raise CommandError(f"{out} holds a run that is finished: there is nothing to resume", 2) from None
         what = f"{out} holds no unfinished run" if out.is_dir() else f"there is no folder {out}"
         raise CommandError(f"{what}; give the folder that nacre reconstruct wrote to (its -o)", 2) from None
-    except (ValueError, RecursionError) as error:
-        raise FileFormatError(path, f"not JSON: {error}") from None
     if not isinstance(asked, dict) or asked.get("format") != _FORMAT:
         raise FileFormatError(
             path, "it was written by another version of nacre; run it again without --resume"
