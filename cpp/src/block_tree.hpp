@@ -40,24 +40,14 @@ inline double squared_bound(double distance) {
   return square;
 }
 
-// The k nearest within a distance, in the caller's memory.
-class KNearest {
+// The k nearest within a distance, in the caller's memory: kept sorted, for few.
+class FewNearest {
  public:
-  KNearest(int k, double bound_d2, Found* found)
+  static constexpr std::int64_t room(int k) { return k; }
+  FewNearest(int k, double bound_d2, Found* found)
       : bound_{bound_d2, no_id, no_id}, begin_(found), end_(found), full_(found + k) {}
   int num_wanted() const { return static_cast<int>(full_ - begin_); }
-  int size() const { return static_cast<int>(end_ - begin_); }
   const Found& bound() const { return bound_; }
-
- protected:
-  Found bound_;
-  Found *begin_, *end_, *full_;
-};
-
-// Kept sorted, for few.
-class FewNearest : public KNearest {
- public:
-  using KNearest::KNearest;
   void add(const Found& point) {
     if (!(point < bound_)) return;
     if (end_ != full_) ++end_;
@@ -66,23 +56,42 @@ class FewNearest : public KNearest {
     *place = point;
     if (end_ == full_) bound_ = end_[-1];
   }
+  int finish() { return static_cast<int>(end_ - begin_); }
+
+ private:
+  Found bound_;
+  Found *begin_, *end_, *full_;
 };
 
-// Kept as a heap, for many, where making room in a sorted row takes longer; sorted by sort().
-class ManyNearest : public KNearest {
+// The same for many, for which making room in a sorted row takes longer: unsorted, and of twice as many the nearer half
+// kept.
+class ManyNearest {
  public:
-  using KNearest::KNearest;
+  static constexpr std::int64_t room(int k) { return 2 * std::int64_t{k}; }
+  ManyNearest(int k, double bound_d2, Found* found)
+      : bound_{bound_d2, no_id, no_id}, begin_(found), end_(found), wanted_(found + k), full_(found + room(k)) {}
+  int num_wanted() const { return static_cast<int>(wanted_ - begin_); }
+  const Found& bound() const { return bound_; }
   void add(const Found& point) {
     if (!(point < bound_)) return;
-    if (end_ == full_) {
-      std::pop_heap(begin_, end_);
-      --end_;
-    }
     *end_++ = point;
-    std::push_heap(begin_, end_);
-    if (end_ == full_) bound_ = *begin_;
+    if (end_ == full_) keep_nearest();
   }
-  void sort() { std::sort_heap(begin_, end_); }
+  int finish() {
+    if (end_ > wanted_) keep_nearest();
+    std::sort(begin_, end_);
+    return static_cast<int>(end_ - begin_);
+  }
+
+ private:
+  void keep_nearest() {
+    std::nth_element(begin_, wanted_ - 1, end_);
+    end_ = wanted_;
+    bound_ = end_[-1];
+  }
+
+  Found bound_;
+  Found *begin_, *end_, *wanted_, *full_;
 };
 
 // Everything within a distance, unsorted.
@@ -160,7 +169,8 @@ void BlockTree<T>::search(const Eigen::Vector3d& query, Results& results) const 
   if (num_points_ == 0 || !query.allFinite()) return;
   Blocks seen = {0, 0};
   if (results.num_wanted() > 0) {
-    if (search_within_bound(query, 64, seen, results)) return;
+    const int few = 4 * std::clamp(results.num_wanted(), 16, simd::most_near_points / 4);
+    if (search_within_bound(query, few, seen, results)) return;
     seen = close_blocks(query, results.num_wanted());
     const std::int64_t end = std::min(num_points_, std::int64_t{seen.end} * block_points);
     for (std::int64_t slot = std::int64_t{seen.begin} * block_points; slot < end; ++slot) {
@@ -278,19 +288,23 @@ void BlockTree<T>::search_nearest_first(const Eigen::Vector3d& query, Blocks see
   }
 }
 
+constexpr int few_neighbors = 32;
+
+// How many places find_nearest() needs.
+inline std::int64_t room_for_nearest(std::int64_t num_points, int k) {
+  const auto most = static_cast<int>(std::min<std::int64_t>(k, num_points));
+  return most <= few_neighbors ? FewNearest::room(most) : ManyNearest::room(most);
+}
+
 // Writes the k nearest within a distance, sorted; returns how many there are.
 template <class T>
 int find_nearest(const BlockTree<T>& tree, const Eigen::Vector3d& query, int k, double bound_d2, Found* found) {
-  constexpr int few = 200;
-  if (k <= few) {
-    FewNearest nearest(k, bound_d2, found);
+  const auto find = [&](auto nearest) {
     tree.search(query, nearest);
-    return nearest.size();
-  }
-  ManyNearest nearest(k, bound_d2, found);
-  tree.search(query, nearest);
-  nearest.sort();
-  return nearest.size();
+    return nearest.finish();
+  };
+  const auto most = static_cast<int>(std::min<std::int64_t>(k, tree.num_points()));
+  return most <= few_neighbors ? find(FewNearest(most, bound_d2, found)) : find(ManyNearest(most, bound_d2, found));
 }
 
 }  // namespace nacre

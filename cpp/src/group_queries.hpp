@@ -59,11 +59,13 @@ class GroupQueries {
         task_(task),
         // Whatever is within the largest distance is within this radius, in spite of rounding.
         largest2_(1.0001 * task.max_distance2 + std::numeric_limits<double>::min()),
-        found_(static_cast<std::size_t>(task.k)) {}
+        found_(static_cast<std::size_t>(room_for_nearest(tree.num_points(), task.k))) {}
 
   void operator()(simd::QueryGroup& group) {
     if (task_.k > simd::most_group_neighbors || task_.k > tree_.num_points()) {
+      farthest2_ = 0;
       for (int i = 0; i < group.size; ++i) answer_alone(group, i);
+      last2_ = farthest2_;
       return;
     }
     if (!(last2_ > 0) && group.size > 0) {
@@ -108,7 +110,11 @@ class GroupQueries {
 
   void answer_alone(const simd::QueryGroup& group, int i) {
     const Eigen::Vector3d query(group.p[0][i], group.p[1][i], group.p[2][i]);
-    const int count = find_nearest(tree_, query, task_.k, task_.max_distance2, found_.data());
+    const double likely2 = std::min(1.3 * std::max(last2_, farthest2_), task_.max_distance2);
+    int count = find_nearest(tree_, query, task_.k, likely2, found_.data());
+    if (count < task_.k && likely2 < task_.max_distance2) {
+      count = find_nearest(tree_, query, task_.k, task_.max_distance2, found_.data());
+    }
     if (count == task_.k) farthest2_ = std::max(farthest2_, found_[static_cast<std::size_t>(count) - 1].d2);
     write_answer(task_, group.row[i], found_.data(), count);
   }

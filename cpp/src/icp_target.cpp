@@ -61,7 +61,7 @@ double median_spacing(const BlockTree<float>& tree) {
     Found found[2];
     FewNearest nearest(2, std::numeric_limits<double>::infinity(), found);
     tree.search(tree.position(static_cast<std::uint32_t>(slot)), nearest);
-    if (nearest.size() == 2) distances.push_back(std::sqrt(found[1].d2));
+    if (nearest.finish() == 2) distances.push_back(std::sqrt(found[1].d2));
   }
   return distances.empty() ? 0.0 : median_of(std::move(distances));
 }

@@ -206,10 +206,10 @@ int KdTree::nearest(const Eigen::Vector3d& query, int k, double max_distance, st
                     double* squared_distances) const {
   require(k >= 1, "k", "at least 1", k);
   require_distance("max_distance", max_distance);
-  constexpr int small_k = 32;
-  std::array<Found, small_k> on_stack;
-  std::vector<Found> on_heap(k > small_k ? static_cast<std::size_t>(k) : 0);
-  Found* found = k > small_k ? on_heap.data() : on_stack.data();
+  const std::int64_t room = room_for_nearest(impl_->size, k);
+  std::array<Found, few_neighbors> on_stack;
+  std::vector<Found> on_heap(room > few_neighbors ? static_cast<std::size_t>(room) : 0);
+  Found* found = room > few_neighbors ? on_heap.data() : on_stack.data();
   const double bound = squared_bound(max_distance);
   const int count =
       std::visit([&](const auto& blocks) { return find_nearest(blocks, query, k, bound, found); }, impl_->tree);
