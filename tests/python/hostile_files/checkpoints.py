@@ -43,10 +43,10 @@ def run(asked: object, journal: bytes = b"") -> dict[str, bytes]:
 
 
 RUNS = {
-    "run empty": (run(b""), r"run\.json"),
+    "run empty": (run(b""), r"run\.json, line 1: not a JSON file"),
     "run nul bytes": (run(bytes(50)), r"run\.json"),
     "run a list": (run([]), r"run\.json"),
-    "run nested deep": (run(b"[" * 100_000), r"run\.json"),
+    "run nested deep": (run(b"[" * 100_000), r"run\.json: .*nested"),
     "run of another format": (run({**GOOD_RUN, "format": 9}), r"run\.json: .*another version"),
     "run without options": (run({"format": 1}), r"run\.json: .*options"),
     "run whose options are a text": (run({"format": 1, "options": "all"}), r"run\.json: .*options"),
