@@ -82,7 +82,6 @@ class Reconstruction(Checkpointed):
         self.evaluation: dict[str, Result] = {}
         self.cancelled = False
         self.depth_calibration: DepthCalibration | None = None
-        self._kept: dict[str, SequenceFrame] = {}  # the first frame of each status
         self._retry: _Retry | None = None
 
     def __repr__(self) -> str:
@@ -256,7 +255,6 @@ class Reconstruction(Checkpointed):
         self._tell(index, report)
         if report.corrects_earlier:
             self._take_corrected_poses()
-        self._kept.setdefault(report.status, frame)
         return FrameRecord(index, frame.timestamp, report.status, report.reason, report, frame.truth)
 
     def _tell(self, index: int, report: FrameReport) -> None:

@@ -107,12 +107,10 @@ def _depth_examples(run: Reconstruction) -> list[DepthExample]:
         frame = next((frame for frame in run.frames if frame.status == status), None)
         if frame is None or frame.report is None:
             continue
-        given = run._kept.get(frame.status)
-        if given is None or given.index != frame.index:
-            try:
-                given = run.sequence[frame.index]
-            except (FileFormatError, OSError, LookupError):
-                continue
+        try:
+            given = run.sequence[frame.index]
+        except (FileFormatError, OSError, LookupError):
+            continue
         labels = label_pixels(given.depth, run.model.camera, run.model.parameters.depth, mask=given.mask)
         reasons = np.where(labels > 1, labels - 1, 0)
         after = np.where(labels == 0, given.depth, np.nan)
