@@ -20,7 +20,7 @@ from nacre.reconstruction import Reconstruction
 
 pytest.importorskip("typer")
 from nacre.cli import main
-from nacre.cli.journal import read_journal
+from nacre.cli.journal import _line, read_journal
 from nacre.cli.unfinished import Stage, Unfinished
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -228,6 +228,14 @@ class TestRefused:
         data[len(data) // 2] ^= 4
         checkpoint.write_bytes(data)
         assert f"{checkpoint}, byte 40: it is damaged" in self.fails(1, "--resume", killed[1])
+
+    def test_a_journal_that_names_a_frame_of_no_recording(self, recording: Path, tmp_path: Path) -> None:
+        killed_after(3, "reconstruct", recording, "-o", tmp_path / "o", "--realtime")
+        journal = tmp_path / "o" / "unfinished" / "journal.txt"
+        with journal.open("ab") as stream:
+            stream.write(_line([7, None, "LOST", None]))
+        message = f"{journal}: frame 7 is none of the recording's 7"
+        assert message in self.fails(1, "--resume", tmp_path / "o")
 
     def test_a_run_file_that_is_none(self, killed: tuple[Path, Path]) -> None:
         asked = killed[1] / "unfinished" / "run.json"
