@@ -243,6 +243,20 @@ TEST_CASE("a point at exactly the distance is found") {
   CHECK(tree.query_radius(Points::Zero(1, 3), 9.0).indices == std::vector<std::int64_t>{0, 1});
 }
 
+TEST_CASE("a point whose distance rounds to the radius is found, though its square is above the radius's") {
+  Points point(1, 3);
+  point << 0.25F, 0, 0;
+  const Eigen::Vector3d query(0, 16777216, 0);
+  const KdTree tree(point);
+  std::int64_t index = -1;
+  double d2 = -1;
+  CHECK(tree.nearest(query, 1, query.y(), &index, &d2) == 1);
+  CHECK(d2 > query.squaredNorm());
+  const Points queries = query.transpose().cast<float>();
+  CHECK(tree.query(queries, 1, query.y()).indices(0, 0) == 0);
+  CHECK(tree.query_radius(queries, query.y()).distances == std::vector<double>{query.y()});
+}
+
 TEST_CASE("the same bits for any number of threads") {
   const Points points = random_points(30000, 14).cast<float>();
   const KdTree one(points, 1), four(points, 4);

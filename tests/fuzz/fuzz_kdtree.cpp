@@ -1,5 +1,6 @@
 // Neighbours of any points, against comparing all with all.
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "bytes.hpp"
@@ -17,7 +18,7 @@ Found compare_all(const Matrix& points, const Eigen::Vector3d& query, double max
     if (!point.allFinite() || !query.allFinite()) continue;
     const Eigen::Vector3d d = point - query;
     const double squared = d.x() * d.x() + d.y() * d.y() + d.z() * d.z();
-    if (squared <= max_distance * max_distance) found.emplace_back(squared, i);
+    if (std::sqrt(squared) <= max_distance) found.emplace_back(squared, i);
   }
   std::sort(found.begin(), found.end());
   return found;
