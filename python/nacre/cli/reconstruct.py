@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -153,13 +153,15 @@ def reconstruct(
     that was killed, to the same model. OUT/unfinished is there as long as a run is not finished.
     """
     terminal = Terminal(json, quiet, verbose)
-    with interruptible() as stop:
+    with interruptible() as stop, ExitStack() as ends:
         if resume is not None:
-            run = _resumed(context, resume, checkpoint_every)
+            unfinished = ends.enter_context(closing(Unfinished(resume, checkpoint_every)))
+            run = _resumed(context, unfinished)
         else:
             if source is None or out is None:
                 missing = "argument 'SOURCE'" if source is None else "option '--out' / '-o'"
                 raise CommandError(f"missing {missing} (see nacre reconstruct --help)", 2)
+            unfinished = ends.enter_context(closing(Unfinished(out, checkpoint_every)))
             more: dict[str, Any] = {
                 "depth.min_depth": min_depth,
                 "depth.max_depth": max_depth,
@@ -186,19 +188,17 @@ def reconstruct(
                 preset=preset_name,
                 is_camera=is_camera(source),
             )
-            run = _begun(terminal, asked, out, parameters, checkpoint_every)
-        with closing(run.unfinished):
-            carry_out(terminal, run, stop, port if view else None)
+            run = _begun(terminal, asked, unfinished, parameters)
+        carry_out(terminal, run, stop, port if view else None)
 
 
 def _text(path: Path | None) -> str | None:
     return None if path is None else str(path)
 
 
-def _begun(
-    terminal: Terminal, asked: Asked, out: Path, parameters: ModelParameters, checkpoint_every: int | None
-) -> Run:
+def _begun(terminal: Terminal, asked: Asked, unfinished: Unfinished, parameters: ModelParameters) -> Run:
     """Open what was asked for, and note it in ``OUT/unfinished``."""
+    out = unfinished.out
     feed: LiveFeed | None = None
     indices: range | None = None
     if asked.is_camera:
@@ -226,10 +226,10 @@ def _begun(
 
     done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
     writable_folder(out)
+    unfinished.hold()
     remove_leftovers(out)
     whole = feed is None and shows_one_scene(sequence.camera, parameters)
     calibrates = asked.calibrate and whole and asked.preset != "paper"
-    unfinished = Unfinished(out, checkpoint_every)
     if unfinished.checkpoint.exists():
         terminal.say(
             f"{out} held an unfinished run, which --resume would have gone on with: it is begun again"
@@ -240,16 +240,18 @@ def _begun(
     return Run(asked, out, done, sequence, unfinished, words, indices, feed)
 
 
-def _resumed(context: typer.Context, out: Path, checkpoint_every: int | None) -> Run:
+def _resumed(context: typer.Context, unfinished: Unfinished) -> Run:
     """Open what a run was asked for that was stopped or killed, and load what it had."""
+    out = unfinished.out
     allowed = ("resume", "checkpoint_every", "view", "port", "json", "quiet", "verbose")
     for name in context.params:
         if name not in allowed and str(context.get_parameter_source(name)).endswith("COMMANDLINE"):
             option = "SOURCE" if name == "source" else "--" + name.replace("_", "-")
             raise CommandError(f"--resume takes everything from {out / 'unfinished'}: leave out {option}", 2)
+    if out.is_dir():
+        unfinished.hold()
     document = read_asked(out)
     asked, folder = asked_before(document, out / "unfinished" / "run.json")
-    unfinished = Unfinished(out, checkpoint_every)
     if asked.is_camera:
         from nacre.datasets.growing import mend
 

@@ -74,6 +74,7 @@ class Unfinished:
         self.stage = Stage()
         self._every = every
         self._journal: Journal | None = None
+        self._lock: int | None = None
         self._num_since = 0
         self._next = time.monotonic() + _LEAST_SECONDS
 
@@ -82,23 +83,30 @@ class Unfinished:
         """The file of the newest checkpoint."""
         return self.folder / "checkpoint"
 
+    def hold(self) -> None:
+        """Keep other processes from writing to the folder of the results until this is closed."""
+        from nacre.io.folder_lock import lock_folder
+
+        try:
+            self._lock = lock_folder(self.out)
+        except BlockingIOError:
+            raise CommandError(
+                f"another nacre reconstruct is writing to {self.out}: wait until it has ended; "
+                "a new run can go to another folder (-o)",
+                2,
+            ) from None
+
     def begin(self, done: Reconstruction, asked: Mapping[str, Any]) -> None:
         """Begin a new run; what was left of another goes."""
         from nacre.io.atomic import atomic_writer
 
-        self.remove()
+        self._clear()
         self.folder.mkdir(exist_ok=True)
         self._journal = Journal(self.folder / "journal.txt")
-        try:
-            self.save(done)
-            data = json.dumps({"format": _FORMAT, **asked}, indent=2, default=str)
-            with atomic_writer(
-                self.folder / "run.json"
-            ) as stream:  # the last: from here on it can be resumed
-                stream.write(data.encode() + b"\n")
-        except BaseException:
-            self.close()
-            raise
+        self.save(done)
+        data = json.dumps({"format": _FORMAT, **asked}, indent=2, default=str)
+        with atomic_writer(self.folder / "run.json") as stream:  # the last: from here on it can be resumed
+            stream.write(data.encode() + b"\n")
 
     def resume(self, sequence: Sequence, compare: bool) -> Reconstruction:
         """Return the run as it was at the newest checkpoint; what is done again may be compared."""
@@ -142,14 +150,24 @@ class Unfinished:
         self._num_since = 0
 
     def close(self) -> None:
-        """Close the journal."""
+        """Close the journal, and let others write to the folder of the results."""
+        self._close_journal()
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def remove(self) -> None:
+        """Remove the folder: the run is finished."""
+        self._close_journal()
+        self._clear()
+        self.close()
+
+    def _close_journal(self) -> None:
         if self._journal is not None:
             self._journal.close()
             self._journal = None
 
-    def remove(self) -> None:
-        """Remove the folder: the run is finished."""
-        self.close()
+    def _clear(self) -> None:
         from nacre.io.atomic import remove_leftovers
 
         remove_leftovers(self.folder)
