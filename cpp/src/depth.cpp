@@ -221,7 +221,8 @@ Points back_project(const DepthRef& depth, const Camera& camera, int num_threads
   Points points(first.back(), 3);
   const auto gather = simd::gather_points();
   parallel_for(height, block_size, num_threads, [&](std::int64_t v) {
-    gather(&depth.coeffRef(v, 0), ray_row(v), camera.width(), points.data() + 3 * first[static_cast<std::size_t>(v)]);
+    const std::int64_t begin = first[static_cast<std::size_t>(v)], end = first[static_cast<std::size_t>(v) + 1];
+    gather(&depth.coeffRef(v, 0), ray_row(v), camera.width(), points.data() + 3 * begin, static_cast<int>(end - begin));
   });
   return points;
 }

@@ -5,6 +5,10 @@ namespace {
 
 using nacre::ConsolidateOptions;
 
+// Points are gone over more than once, and another Python thread may write to their array meanwhile.
+template <class Cloud>
+using Snapshot = typename Cloud::PlainObject;
+
 template <class T>
 py::array_t<T> to_array(std::vector<T>&& values) {
   auto* kept = new std::vector<T>(std::move(values));
@@ -25,7 +29,8 @@ py::tuple consolidate(const Cloud& points, ConsolidateOptions options, const nac
   decltype(nacre::consolidate(points, options, attributes)) result;
   {
     const Released unlocked;
-    result = nacre::consolidate(points, options, attributes);
+    const Snapshot<Cloud> points_now = points;
+    result = nacre::consolidate(Cloud(points_now), options, attributes);
   }
   return py::make_tuple(std::move(result.points), std::move(result.attributes), to_array(std::move(result.sources)),
                         result.iterations);
@@ -34,7 +39,8 @@ py::tuple consolidate(const Cloud& points, ConsolidateOptions options, const nac
 template <class Cloud>
 auto project_samples(const Cloud& samples, const Cloud& points, const ConsolidateOptions& options,
                      const nacre::ProjectionHints& hints) {
-  return nacre::project_samples(samples, points, options, hints);
+  const Snapshot<Cloud> samples_now = samples, points_now = points;
+  return nacre::project_samples(Cloud(samples_now), Cloud(points_now), options, hints);
 }
 
 }  // namespace

@@ -239,6 +239,25 @@ TEST_CASE("raw values become metres") {
   }
 }
 
+TEST_CASE("as many points are written as were counted, whatever has become of the image") {
+  for (const int w : widths) {
+    const Camera camera = cameras(w).front();
+    const simd::RayRow rays = camera.ray_table().row(0);
+    const std::vector<float> full(static_cast<std::size_t>(w), 1.0F), empty(full.size(), NAN);
+    for (const Kernels& kernels : all_kernels()) {
+      CAPTURE(kernels.name);
+      for (const int count : {0, 1, w / 2, w - 1}) {
+        std::vector<float> points(static_cast<std::size_t>(3 * w + 3), 7.0F);
+        kernels.gather_points(full.data(), rays, w, points.data(), count);
+        for (int u = 0; u < count; ++u) REQUIRE(points[static_cast<std::size_t>(3 * u + 2)] == rays.z[u]);
+        for (std::size_t i = 3 * static_cast<std::size_t>(count); i < points.size(); ++i) REQUIRE(points[i] == 7.0F);
+        kernels.gather_points(empty.data(), rays, w, points.data(), count);
+        for (std::size_t i = 0; i < 3 * static_cast<std::size_t>(count); ++i) REQUIRE(std::isnan(points[i]));
+      }
+    }
+  }
+}
+
 TEST_CASE("rows become points") {
   for (const int w : widths) {
     for (const Camera& camera : cameras(w)) {
@@ -254,7 +273,7 @@ TEST_CASE("rows become points") {
           kernels.fill_planar_row(&depth(v, 0), z_of, is_inverse, w, values.data());
           kernels.fill_point_row(&depth(v, 0), rays, {0.001F, 0.002F, 0.4F}, w, points.data(), sigma.data());
           const int count = kernels.count_points(&depth(v, 0), rays, w);
-          kernels.gather_points(&depth(v, 0), rays, w, gathered.data());
+          kernels.gather_points(&depth(v, 0), rays, w, gathered.data(), count);
           int next = 0;
           for (int u = 0; u < w; ++u) {
             const auto i = static_cast<std::size_t>(u);

@@ -80,11 +80,12 @@ int count_points(const float* depth, const RayRow& rays, int width) {
   return count;
 }
 
-void gather_points(const float* depth, const RayRow& rays, int width, float* points) {
+void gather_points(const float* depth, const RayRow& rays, int width, float* points, int count) {
+  float* const end = points + 3 * static_cast<size_t>(count);
   for (int u = 0; u < width; u += lanes) {
     const Mask seen = is_seen(depth, rays, u, width);
     const F32 z = load_first(depth + u, width - u);
-    if (all(seen)) {
+    if (all(seen) && end - points >= 3 * lanes) {
       store_points(rays, u, z, points);
       points += 3 * lanes;
       continue;
@@ -94,11 +95,12 @@ void gather_points(const float* depth, const RayRow& rays, int width, float* poi
     store_points(rays, u, z, some);
     const unsigned seen_bits = bits(seen);
     for (int i = 0; i < lanes; ++i) {
-      if ((seen_bits >> i & 1U) == 0) continue;
+      if ((seen_bits >> i & 1U) == 0 || points == end) continue;
       memcpy(points, some + 3 * i, 3 * sizeof(float));
       points += 3;
     }
   }
+  while (points != end) *points++ = NAN;
 }
 
 }  // namespace nacre::simd::NACRE_ISA

@@ -27,10 +27,11 @@ using FillPointRow = void(const float* depth, const RayRow& rays, const SigmaCur
                           float* sigma);
 NACRE_DECLARE_KERNEL(FillPointRow, fill_point_row)
 
-// The pixels that hold a measurement and see something: how many, and their points, three floats each.
+// The pixels that hold a measurement and see something: how many, and their points, three floats each. `count` of them
+// are written whatever has become of the image since they were counted: another thread may have written to it.
 using CountPoints = int(const float* depth, const RayRow& rays, int width);
 NACRE_DECLARE_KERNEL(CountPoints, count_points)
-using GatherPoints = void(const float* depth, const RayRow& rays, int width, float* points);
+using GatherPoints = void(const float* depth, const RayRow& rays, int width, float* points, int count);
 NACRE_DECLARE_KERNEL(GatherPoints, gather_points)
 
 }  // namespace nacre::simd
