@@ -42,7 +42,7 @@ class FileFormatError(ValueError):
     def __str__(self) -> str:
         place = f", line {self.line}" if self.line is not None else ""
         place += f", byte {self.offset}" if self.offset is not None else ""
-        return f"{self.path}{place}: {self.reason}"
+        return printable(f"{self.path}{place}: {self.reason}")
 
 
 class UnknownRecordingError(FileFormatError):
@@ -56,6 +56,11 @@ _repr.maxstring = _repr.maxother = 60
 
 class CameraError(RuntimeError):
     """A camera that is not there, or that gives no more frames; the message says what to do."""
+
+
+def printable(text: str) -> str:
+    """Return text that any UTF-8 writer takes: what is no text in a file's name is told by its number."""
+    return text.encode(errors="backslashreplace").decode()
 
 
 def shown(value: object) -> str:

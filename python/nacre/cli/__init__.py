@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import sys
 from collections.abc import Sequence
 
@@ -16,4 +17,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         sys.exit(2)
     from nacre.cli.app import run
 
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(
+            stream, io.TextIOWrapper
+        ):  # of what a terminal cannot write, and names that are no text: \xb0
+            stream.reconfigure(errors="backslashreplace")
     sys.exit(run(arguments))

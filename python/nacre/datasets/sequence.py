@@ -21,7 +21,7 @@ from nacre._core import Camera
 from nacre.datasets.doubt import doubt_about
 from nacre.datasets.listing import files, pair
 from nacre.depth_calibration import DepthCalibration
-from nacre.errors import FileFormatError
+from nacre.errors import FileFormatError, printable
 from nacre.io.images import ATTRIBUTE_SUFFIXES, COLOR_SUFFIXES, read_attribute, read_color, read_depth
 from nacre.trajectory import Trajectory
 from nacre.values import Value
@@ -141,7 +141,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         name: str | None = None,
     ) -> None:
         self.path = path
-        self.name = name if name is not None else path.resolve().name
+        self.name = printable(name if name is not None else path.resolve().name)
         self.format = format
         self.camera = camera
         self.depth_scale = depth_scale
@@ -215,7 +215,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
                     found = path.stat()
                 except OSError:
                     found = self.path.stat()
-                files.update(f"{path.name} {found.st_size}\n".encode())
+                files.update(os.fsencode(f"{path.name} {found.st_size}\n"))
                 times.update(f"{found.st_mtime_ns}\n".encode())
         return {"files": files.hexdigest(), "times": times.hexdigest()}
 

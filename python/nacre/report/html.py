@@ -10,6 +10,7 @@ from html import escape
 from pathlib import Path
 
 from nacre import __version__
+from nacre.errors import printable
 from nacre.io.atomic import atomic_writer
 from nacre.report.charts import status_strip
 from nacre.report.data import FrameEntry, ReportData
@@ -62,7 +63,7 @@ def render_page(data: ReportData) -> str:
     ]
     body = "\n".join(f"<section>{section}</section>" for section in sections if section)
     style = Path(__file__).with_name("style.css").read_text(encoding="utf-8")
-    return (
+    return printable(
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(data.title)}</title>\n<style>\n{style}</style>\n</head>\n<body>\n<main>\n"

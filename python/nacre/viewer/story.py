@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre.errors import printable
 from nacre.frame_record import FrameRecord
 from nacre.model import Model
 from nacre.report.text import count, quantity
@@ -160,7 +161,7 @@ class Story:
     ) -> None:
         if max_snapshots < 2:
             raise ValueError(f"max_snapshots must be at least 2, got {max_snapshots}")
-        self.title = title
+        self.title = printable(title)
         self.camera = camera
         self.depth_of = depth_of
         self.moments: list[Moment] = []

@@ -1,10 +1,13 @@
 """The program: its entry, its help, and how it fails."""
 
 import logging
+import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import fails, run
 
@@ -74,3 +77,35 @@ def test_it_leaves_the_log_as_it_was(recording):
     logger = logging.getLogger("nacre")
     assert (logger.level, logger.propagate) == (logging.NOTSET, True)
     assert [type(handler) for handler in logger.handlers] == [logging.NullHandler]
+
+
+def test_a_name_that_is_no_text_and_a_terminal_without_letters(recording, tmp_path):
+    source, out = (tmp_path / os.fsdecode(name) for name in (b"r\xff", b"o\xff"))
+    try:
+        shutil.copytree(recording, source)
+    except OSError:
+        pytest.skip("file names here are text")
+    done = subprocess.run(
+        [sys.executable, "-c", "from nacre.cli import main; main()", "reconstruct", source, "-o", out],
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "PYTHONIOENCODING": "ascii"},
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("r\\udcff: 4 of 4 frames")
+    assert "\\xb0 RMS" in done.stdout  # a degree
+    assert "<h1>r\\udcff" in (out / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_recording_has_a_name_that_can_be_written(tmp_path):
+    folder = tmp_path / os.fsdecode(b"r\xff")
+    try:
+        nacre.write_recording(folder, nacre.Camera(4, 3, 4, 4, 1.5, 1), [np.ones((3, 4))], depth_scale=1000)
+    except OSError:
+        pytest.skip("file names here are text")
+    assert nacre.open_sequence(folder).name == "r\\udcff"
+    (folder / "camera.json").write_text("{")
+    with pytest.raises(nacre.FileFormatError, match=r"r\\udcff/camera.json") as raised:
+        nacre.open_sequence(folder)
+    assert raised.value.path == folder / "camera.json"
