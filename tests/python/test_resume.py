@@ -146,6 +146,39 @@ class TestKilled:
             assert command("reconstruct", "--resume", tmp_path / name)[0] == 0
             assert results(tmp_path / name) == undisturbed
 
+    @pytest.mark.parametrize(
+        ("error", "told", "where"),
+        [
+            (MemoryError("std::bad_alloc"), "not enough memory: std::bad_alloc", "there is more memory"),
+            (
+                OSError(errno.EIO, "Input/output error", "x"),
+                "input/output error: x",
+                "files can be written again",
+            ),
+        ],
+    )
+    @pytest.mark.parametrize("name", ["write_points", "Model.add_frame"])
+    def test_it_goes_on_where_there_is_what_it_lacked(
+        self,
+        recording: Path,
+        undisturbed: Any,
+        tmp_path: Path,
+        name: str,
+        error: Exception,
+        told: str,
+        where: str,
+    ) -> None:
+        def fail(*_: Any, **__: Any) -> None:
+            raise error
+
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(f"nacre.{name}", fail)
+            code, out, err = command("reconstruct", recording, "-o", tmp_path / "o")
+        assert (code, err) == (1, f"error: {told}\n")
+        assert out.endswith(f"nacre reconstruct --resume {tmp_path / 'o'} goes on where {where}\n")
+        assert command("reconstruct", "--resume", tmp_path / "o")[0] == 0
+        assert results(tmp_path / "o") == undisturbed
+
     def test_a_torn_line_of_the_journal_is_the_frame_in_flight(
         self, recording: Path, undisturbed: Any, tmp_path: Path
     ) -> None:

@@ -140,6 +140,8 @@ def explain(error: Exception) -> tuple[str, int]:
             PermissionError,
         )
         return text, 2 if isinstance(error, wrong_usage) else 1
+    if isinstance(error, MemoryError):
+        return f"not enough memory: {error}".removesuffix(": "), 1
     if isinstance(error, (ImportError, ValueError, TypeError)):
         return str(error), 2
     return f"{type(error).__name__}: {error} (this should not happen; -v -v shows where)", 1

@@ -57,19 +57,20 @@ def carry_out(terminal: Terminal, run: Run, stop: Interruption, port: int | None
         terminal.say(f"the model is at {live.viewer.url}")
     try:
         done = _run_all(terminal, run, stop, live)
+        if not stop.wanted:
+            with suppress(Stopped), stop.at_once():
+                report = _write(run, done, stop)
+        if stop.wanted:
+            _save(terminal, run, done, stop)
+            raise typer.Exit(stop.exit_code)
     except CommandError:
         if all(frame.report is None for frame in run.done.frames):
             run.unfinished.remove()
         raise
-    except OSError:
-        terminal.say(f"nacre reconstruct --resume {run.out} goes on where files can be written again")
+    except (OSError, MemoryError) as error:
+        what = "files can be written again" if isinstance(error, OSError) else "there is more memory"
+        terminal.say(f"nacre reconstruct --resume {run.out} goes on where {what}")
         raise
-    if not stop.wanted:
-        with suppress(Stopped), stop.at_once():
-            report = _write(run, done, stop)
-    if stop.wanted:
-        _save(terminal, run, done, stop)
-        raise typer.Exit(stop.exit_code)
     run.unfinished.remove()
     if terminal.json:
         print(to_json(report))
