@@ -14,6 +14,7 @@ from nacre.arrays import FARTHEST
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe
 from nacre.datasets.sequence import FrameSource, Sequence
+from nacre.datasets.turns import Turns
 from nacre.errors import FileFormatError, shown
 from nacre.io.cameras import check_lens
 from nacre.io.image_limits import check_lzfse
@@ -156,12 +157,11 @@ class _Archive(_Files):
     """The files of an archive; they are read in it, and nothing is unpacked to the disk."""
 
     def __init__(self, path: Path) -> None:
-        import zipfile
-
         self.path = path
+        self._turns = Turns()
         require_regular(path)
         try:
-            self._zip = zipfile.ZipFile(path)
+            self._open()
             self.names = [info.filename for info in self._zip.infolist() if not info.is_dir()]
         except Exception as error:  # zipfile has several, and lets through what damaged names and sizes cause
             raise FileFormatError(path, f"not a whole .r3d archive: {error}") from error
@@ -169,6 +169,11 @@ class _Archive(_Files):
             parts = PurePosixPath(name.replace("\\", "/")).parts
             if ".." in parts or parts[:1] == ("/",) or re.match(r"[A-Za-z]:", name):
                 raise FileFormatError(path, f"refused: the name {name!r} leads out of the archive")
+
+    def _open(self) -> None:
+        import zipfile
+
+        self._zip = zipfile.ZipFile(self.path)
 
     def read(self, name: str, most: int) -> bytes:
         info = self._zip.getinfo(name)
@@ -183,7 +188,7 @@ class _Archive(_Files):
             reason = f"refused: {info.file_size} bytes from {info.compress_size}"
             raise FileFormatError(self.path / name, reason)
         try:
-            with self._zip.open(info) as stream:
+            with self._turns.take(self._open), self._zip.open(info) as stream:
                 return stream.read(info.file_size)  # no more, whatever there is
         except Exception as error:  # zipfile's, and those of its decompressors
             raise FileFormatError(self.path / name, f"damaged in the archive: {error}") from error

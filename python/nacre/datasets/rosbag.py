@@ -5,8 +5,8 @@ from __future__ import annotations
 import logging
 import re
 import weakref
-from collections.abc import Iterator
-from contextlib import suppress
+from collections.abc import Generator
+from contextlib import closing, suppress
 from itertools import accumulate
 from pathlib import Path
 from typing import Any
@@ -31,6 +31,7 @@ from nacre.datasets.ros_messages import (
     without_tail,
 )
 from nacre.datasets.sequence import FrameSource, Sequence
+from nacre.datasets.turns import Turns
 from nacre.errors import FileFormatError
 from nacre.io.cameras import check_lens
 from nacre.io.images import decode_color
@@ -93,27 +94,11 @@ class _Bag:
     """An open recording; images are read when they are asked for."""
 
     def __init__(self, path: Path, depth_scale: float | None) -> None:
-        try:
-            from rosbags.highlevel import AnyReader
-            from rosbags.typesys import Stores, get_typestore
-        except ImportError as error:
-            raise ImportError(_MISSING) from error
         self.path = path
         self._topics: dict[Path, str] = {}  # by where their images are named; some do not begin with a slash
+        self._turns = Turns()
         _check_metadata(path)
-        try:
-            self._reader = AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
-            self._reader.open()
-            if not all(
-                isinstance(name, str) for c in self._reader.connections for name in (c.topic, c.msgtype)
-            ):
-                raise ValueError("a topic has no name")
-        except Exception as error:  # rosbags has several, and lets through what damaged files cause
-            hint = ""
-            if path.suffix == ".mcap" and path.stat().st_size:
-                hint = f" (ROS 2 is read; what was cut short: mcap recover {path.name} -o whole.mcap)"
-            raise FileFormatError(path, f"not a whole ROS recording: {error}{hint}") from error
-        weakref.finalize(self, self._reader.close)
+        self._open()
         topics = [c.topic for c in self._reader.connections if c.msgtype in _IMAGES]
         sure = [topic for topic in topics if re.search("confidence", topic, re.IGNORECASE)]
         depth = [t for t in topics if re.search("depth", t, re.IGNORECASE) and t not in sure]
@@ -132,6 +117,26 @@ class _Bag:
         ]
         self.times = [time for _, time, _ in self._messages(self.depth_topic)]
         self.depth_scale = depth_scale if depth_scale is not None else self._depth_scale()
+
+    def _open(self) -> None:
+        try:
+            from rosbags.highlevel import AnyReader
+            from rosbags.typesys import Stores, get_typestore
+        except ImportError as error:
+            raise ImportError(_MISSING) from error
+        try:
+            self._reader = AnyReader([self.path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+            self._reader.open()
+            if not all(
+                isinstance(name, str) for c in self._reader.connections for name in (c.topic, c.msgtype)
+            ):
+                raise ValueError("a topic has no name")
+        except Exception as error:  # rosbags has several, and lets through what damaged files cause
+            hint = ""
+            if self.path.suffix == ".mcap" and self.path.stat().st_size:
+                hint = f" (ROS 2 is read; what was cut short: mcap recover {self.path.name} -o whole.mcap)"
+            raise FileFormatError(self.path, f"not a whole ROS recording: {error}{hint}") from error
+        weakref.finalize(self, self._reader.close)
 
     def camera(self) -> Camera:
         """Return the camera of the depth images."""
@@ -250,11 +255,13 @@ class _Bag:
                         return round(scale, 3)
         return 1000.0
 
-    def _messages(self, topic: str, time: int | None = None) -> Iterator[tuple[Any, int, bytes]]:
+    def _messages(self, topic: str, time: int | None = None) -> Generator[tuple[Any, int, bytes], None, None]:
         connections = [c for c in self._reader.connections if c.topic == topic and c.msgtype in _IMAGES]
         return self._read(connections, time, None if time is None else time + 1)
 
-    def _read(self, connections: list[Any], *times: int | None) -> Iterator[tuple[Any, int, bytes]]:
+    def _read(
+        self, connections: list[Any], *times: int | None
+    ) -> Generator[tuple[Any, int, bytes], None, None]:
         try:
             for message in self._reader.messages(connections, *times):
                 if message[0] not in connections:
@@ -264,9 +271,14 @@ class _Bag:
             raise FileFormatError(self.path, f"damaged in {connections[0].topic}: {error}") from error
 
     def _message(self, place: Path) -> Any:
-        for connection, _, data in self._messages(self._topics[place.parent], int(place.name)):
-            return self._decoded(connection, data, place)
-        raise FileFormatError(place, "the message is missing")
+        with (
+            self._turns.take(self._open),
+            closing(self._messages(self._topics[place.parent], int(place.name))) as found,
+        ):
+            message = next(found, None)
+        if message is None:
+            raise FileFormatError(place, "the message is missing")
+        return self._decoded(message[0], message[2], place)
 
     def _decoded(self, connection: Any, data: bytes, place: Path) -> Any:
         if connection.msgtype == IMAGE and not self._reader.is2:
