@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import Any
 
@@ -13,8 +14,8 @@ from nacre._core import Camera
 from nacre.arrays import FARTHEST
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe
+from nacre.datasets.open_file import OpenFile
 from nacre.datasets.sequence import FrameSource, Sequence
-from nacre.datasets.turns import Turns
 from nacre.errors import FileFormatError, shown
 from nacre.io.cameras import check_lens
 from nacre.io.image_limits import check_lzfse
@@ -84,16 +85,17 @@ def read(path: Path, given: Given) -> Sequence:
         )
         for index, (number, name) in enumerate(sorted(depth.items()))
     ]
+    images = _Images(files, (width, height), given.scale_or(1.0))
     return Sequence(
         path,
         format=FORMAT,
         camera=given.camera or told.camera(width, height),
-        depth_scale=given.scale_or(1.0),
+        depth_scale=images.depth_scale,
         sources=sources,
         estimate=told.trajectory(sorted(depth)),
-        load_depth=lambda place: files.depth(files.name_of(place), (width, height)) / given.scale_or(1.0),
-        load_color=lambda place: files.color(files.name_of(place), (width, height)),
-        load_mask=lambda place: files.plane(files.name_of(place), np.uint8, (width, height)) > 0,
+        load_depth=images.depth,
+        load_color=images.color,
+        load_mask=images.is_sure,
     )
 
 
@@ -153,16 +155,15 @@ class _Files:
         return decode_color(self.read(name, 1 << 26), self.path / name, size)
 
 
-class _Archive(_Files):
+class _Archive(OpenFile, _Files):
     """The files of an archive; they are read in it, and nothing is unpacked to the disk."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._turns = Turns()
         require_regular(path)
         try:
-            self._open()
-            self.names = [info.filename for info in self._zip.infolist() if not info.is_dir()]
+            super().__init__()
+            self.names = [info.filename for info in self._file.infolist() if not info.is_dir()]
         except Exception as error:  # zipfile has several, and lets through what damaged names and sizes cause
             raise FileFormatError(path, f"not a whole .r3d archive: {error}") from error
         for name in self.names:
@@ -170,13 +171,13 @@ class _Archive(_Files):
             if ".." in parts or parts[:1] == ("/",) or re.match(r"[A-Za-z]:", name):
                 raise FileFormatError(path, f"refused: the name {name!r} leads out of the archive")
 
-    def _open(self) -> None:
+    def _open(self) -> Any:
         import zipfile
 
-        self._zip = zipfile.ZipFile(self.path)
+        return zipfile.ZipFile(self.path)
 
     def read(self, name: str, most: int) -> bytes:
-        info = self._zip.getinfo(name)
+        info = self._file.getinfo(name)
         if info.file_size > most:
             reason = f"larger than what it can hold: {info.file_size} bytes, more than {most}"
             raise FileFormatError(self.path / name, reason)
@@ -188,10 +189,32 @@ class _Archive(_Files):
             reason = f"refused: {info.file_size} bytes from {info.compress_size}"
             raise FileFormatError(self.path / name, reason)
         try:
-            with self._turns.take(self._open), self._zip.open(info) as stream:
-                return stream.read(info.file_size)  # no more, whatever there is
+            with self._turn() as archive, archive.open(info) as stream:
+                data: bytes = stream.read(info.file_size)  # no more, whatever there is
+                return data
         except Exception as error:  # zipfile's, and those of its decompressors
             raise FileFormatError(self.path / name, f"damaged in the archive: {error}") from error
+
+
+@dataclass(frozen=True)
+class _Images:
+    """The images of a recording, all brought to one size (width, height)."""
+
+    files: _Files
+    size: tuple[int, int]
+    depth_scale: float
+
+    def depth(self, place: Path) -> npt.NDArray[np.float32]:
+        """Read a depth image [m]."""
+        return self.files.depth(self.files.name_of(place), self.size) / np.float32(self.depth_scale)
+
+    def color(self, place: Path) -> npt.NDArray[np.uint8]:
+        """Read a colour image."""
+        return self.files.color(self.files.name_of(place), self.size)
+
+    def is_sure(self, place: Path) -> npt.NDArray[np.bool_]:
+        """Read where a pixel's confidence is not the lowest."""
+        return self.files.plane(self.files.name_of(place), np.uint8, self.size) > 0
 
 
 class _Metadata:

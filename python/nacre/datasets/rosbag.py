@@ -17,6 +17,7 @@ import numpy.typing as npt
 from nacre._core import Camera
 from nacre.datasets.given import Given
 from nacre.datasets.listing import describe
+from nacre.datasets.open_file import OpenFile
 from nacre.datasets.ros_messages import (
     CAMERA_INFO,
     CHANNELS,
@@ -31,7 +32,6 @@ from nacre.datasets.ros_messages import (
     without_tail,
 )
 from nacre.datasets.sequence import FrameSource, Sequence
-from nacre.datasets.turns import Turns
 from nacre.errors import FileFormatError
 from nacre.io.cameras import check_lens
 from nacre.io.images import decode_color
@@ -90,16 +90,15 @@ def read(path: Path, given: Given) -> Sequence:
     )
 
 
-class _Bag:
+class _Bag(OpenFile):
     """An open recording; images are read when they are asked for."""
 
     def __init__(self, path: Path, depth_scale: float | None) -> None:
         self.path = path
         self._topics: dict[Path, str] = {}  # by where their images are named; some do not begin with a slash
-        self._turns = Turns()
         _check_metadata(path)
-        self._open()
-        topics = [c.topic for c in self._reader.connections if c.msgtype in _IMAGES]
+        super().__init__()
+        topics = [c.topic for c in self._file.connections if c.msgtype in _IMAGES]
         sure = [topic for topic in topics if re.search("confidence", topic, re.IGNORECASE)]
         depth = [t for t in topics if re.search("depth", t, re.IGNORECASE) and t not in sure]
         if not depth:
@@ -118,29 +117,28 @@ class _Bag:
         self.times = [time for _, time, _ in self._messages(self.depth_topic)]
         self.depth_scale = depth_scale if depth_scale is not None else self._depth_scale()
 
-    def _open(self) -> None:
+    def _open(self) -> Any:
         try:
             from rosbags.highlevel import AnyReader
             from rosbags.typesys import Stores, get_typestore
         except ImportError as error:
             raise ImportError(_MISSING) from error
         try:
-            self._reader = AnyReader([self.path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
-            self._reader.open()
-            if not all(
-                isinstance(name, str) for c in self._reader.connections for name in (c.topic, c.msgtype)
-            ):
+            reader = AnyReader([self.path], default_typestore=get_typestore(Stores.ROS2_HUMBLE))
+            reader.open()
+            if not all(isinstance(name, str) for c in reader.connections for name in (c.topic, c.msgtype)):
                 raise ValueError("a topic has no name")
         except Exception as error:  # rosbags has several, and lets through what damaged files cause
             hint = ""
             if self.path.suffix == ".mcap" and self.path.stat().st_size:
                 hint = f" (ROS 2 is read; what was cut short: mcap recover {self.path.name} -o whole.mcap)"
             raise FileFormatError(self.path, f"not a whole ROS recording: {error}{hint}") from error
-        weakref.finalize(self, self._reader.close)
+        weakref.finalize(self, reader.close)
+        return reader
 
     def camera(self) -> Camera:
         """Return the camera of the depth images."""
-        near = [c for c in self._reader.connections if c.msgtype == CAMERA_INFO]
+        near = [c for c in self._file.connections if c.msgtype == CAMERA_INFO]
         if not near:
             raise FileFormatError(self.path, "no camera_info; give the camera")
         chosen = max(near, key=lambda c: _common(c.topic, self.depth_topic))
@@ -164,7 +162,7 @@ class _Bag:
         for image in (topic, self.depth_topic):
             own = [
                 c
-                for c in self._reader.connections
+                for c in self._file.connections
                 if c.msgtype == CAMERA_INFO
                 and image.startswith(c.topic.rpartition("/")[0].removesuffix("/info") + "/")
             ]
@@ -244,7 +242,7 @@ class _Bag:
         return np.asarray(pixels(message, place) > 0, np.bool_)
 
     def _depth_scale(self) -> float:
-        for connection in self._reader.connections:
+        for connection in self._file.connections:
             if connection.topic.endswith("option/Depth_Units/value"):
                 message = self._first(connection)
                 with suppress(
@@ -256,14 +254,14 @@ class _Bag:
         return 1000.0
 
     def _messages(self, topic: str, time: int | None = None) -> Generator[tuple[Any, int, bytes], None, None]:
-        connections = [c for c in self._reader.connections if c.topic == topic and c.msgtype in _IMAGES]
+        connections = [c for c in self._file.connections if c.topic == topic and c.msgtype in _IMAGES]
         return self._read(connections, time, None if time is None else time + 1)
 
     def _read(
         self, connections: list[Any], *times: int | None
     ) -> Generator[tuple[Any, int, bytes], None, None]:
         try:
-            for message in self._reader.messages(connections, *times):
+            for message in self._file.messages(connections, *times):
                 if message[0] not in connections:
                     raise ValueError(f"a message of {message[0].topic} in its index")
                 yield message
@@ -272,7 +270,7 @@ class _Bag:
 
     def _message(self, place: Path) -> Any:
         with (
-            self._turns.take(self._open),
+            self._turn(),
             closing(self._messages(self._topics[place.parent], int(place.name))) as found,
         ):
             message = next(found, None)
@@ -281,10 +279,10 @@ class _Bag:
         return self._decoded(message[0], message[2], place)
 
     def _decoded(self, connection: Any, data: bytes, place: Path) -> Any:
-        if connection.msgtype == IMAGE and not self._reader.is2:
+        if connection.msgtype == IMAGE and not self._file.is2:
             data = without_tail(data)
         try:
-            message = self._reader.deserialize(data, connection.msgtype)
+            message = self._file.deserialize(data, connection.msgtype)
         except Exception as error:  # rosbags' own, and whatever damaged lengths cause
             raise FileFormatError(place, f"the message is damaged: {error!r}") from error
         check_fields(message, connection.msgtype, place)

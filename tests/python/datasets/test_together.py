@@ -1,10 +1,12 @@
-"""Recordings that stay open, read by threads and by forked processes at once: each gets its frames."""
+"""Recordings that stay open, read by threads, forked processes and copies at once: each gets its frames."""
 
+import copy
 import os
+import pickle
 import sys
 import threading
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +18,7 @@ pytest.importorskip("PIL")
 pytest.importorskip("rosbags")
 pytest.importorskip("liblzfse")
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from recording_folders import write_icl_nuim, write_plain, write_redwood, write_seven_scenes, write_tum
 from ros_recorder import Recorder
 from rosbags.rosbag2 import StoragePlugin
 from test_record3d import contents, packed
@@ -97,3 +100,16 @@ def test_forked_processes(sequence: nacre.datasets.Sequence) -> None:
         children.append(child)
     read_all(sequence, 4, expected)
     assert [os.waitpid(child, 0)[1] for child in children] == [0, 0, 0, 0]
+
+
+FOLDERS = (write_tum, write_redwood, write_seven_scenes, write_icl_nuim, write_plain)
+
+
+@pytest.mark.parametrize("write", [*WRITERS.values(), *FOLDERS])
+def test_copies(write: Callable[[Path], Path], tmp_path: Path) -> None:
+    folder = tmp_path / "recording"
+    folder.mkdir()
+    sequence = nacre.open_sequence(write(folder))
+    for other in (pickle.loads(pickle.dumps(sequence)), copy.deepcopy(sequence)):
+        for one, same in zip(sequence, other, strict=True):
+            assert one.depth.tobytes() == same.depth.tobytes()
