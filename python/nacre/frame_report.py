@@ -119,7 +119,7 @@ class FrameReports(Sequence[FrameReport]):
     pickled, they become a tuple.
     """
 
-    def __init__(self, core: Any, lock: threading.Lock, count: int) -> None:
+    def __init__(self, core: Any, lock: threading.RLock, count: int) -> None:
         self._core = core
         self._lock = lock
         self._count = count

@@ -208,7 +208,7 @@ class Model(ExchangeablePoints, Checkpointed):
         self.parameters = replace(parameters, depth=parameters.depth.for_camera(camera))
         self._depth_scale = as_scale("depth_scale", depth_scale)
         self._core = _core.Model(camera, to_core(self.parameters, _core.ModelOptions()))
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()  # the handler of a signal may come into a call
 
     def add_frame(
         self,

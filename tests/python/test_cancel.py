@@ -8,6 +8,7 @@ import textwrap
 import threading
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -106,6 +107,34 @@ def test_a_frame_is_always_folded_in_as_a_whole() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60
     )
     assert done.stdout.split() == ["True", "True"], done.stderr
+
+
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no signals of this kind")
+def test_the_handler_of_a_signal_may_use_the_model(tmp_path: Path) -> None:
+    """It comes between the steps of whatever call is going on, and waiting for that one would be for ever."""
+    program = f"""
+        import signal
+        import nacre
+        mesh = nacre.built_in_object()
+        camera = nacre.default_camera(mesh, "pinhole")
+        image = mesh.simulate_depth(camera, nacre.turntable_poses(mesh, 1, camera=camera)[0])
+        model, saved = nacre.Model(camera), []
+        def save(number, frame):
+            model.save({str(tmp_path / "model")!r})
+            saved.append((len(model.frames), len(model.points)))
+        signal.signal(signal.SIGALRM, save)
+        signal.setitimer(signal.ITIMER_REAL, 0.1, 0.1)
+        while len(saved) < 10:
+            model.add_frame(image)
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        model = nacre.Model.load({str(tmp_path / "model")!r})
+        print((len(model.frames), len(model.points)) == saved[-1])
+    """
+    code = textwrap.dedent(program)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60
+    )
+    assert done.stdout == "True\n", done.stderr
 
 
 class TestConsolidate:
