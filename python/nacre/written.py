@@ -94,7 +94,9 @@ class Written:
 
 def _wrong_in_report(report: dict[str, Any]) -> str | None:
     """Say what is not as nacre reconstruct writes it, apart from the frames."""
-    recording = report.get("recording")
+    title, recording = report.get("title"), report.get("recording")
+    if title is not None and not isinstance(title, str):
+        return f"title must be a text, got {shown(title)}"
     if recording is not None and not isinstance(recording, dict):
         return f"recording must be an object, got {shown(recording)}"
     for name in ("path", "format"):

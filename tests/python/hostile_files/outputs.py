@@ -57,6 +57,7 @@ REPORTS = {
     "truth of zeros": (frames({"truth": [[0] * 4] * 4}), r"frames\[0\].*truth"),
     "camera a list": (report(recording={"camera": [1]}), r"report\.json: a camera file must hold"),
     "camera of width 0": (report(recording={"camera": {**PINHOLE, "width": 0}}), r"report\.json: .*width"),
+    "title an object": (report(title={"path": "a"}), r"report\.json: .*title must be a text"),
     "recording a text": (report(recording="here"), r"report\.json: .*recording"),
     "recording path a number": (report(recording={"path": 5}), r"report\.json: .*recording"),
     "recording path with nul": (report(recording={"path": "a\0b"}), r"report\.json: .*recording"),
