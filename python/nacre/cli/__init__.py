@@ -18,8 +18,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     from nacre.cli.app import run
 
     for stream in (sys.stdout, sys.stderr):
-        if isinstance(
-            stream, io.TextIOWrapper
-        ):  # of what a terminal cannot write, and names that are no text: \xb0
+        # A letter that a terminal lacks, and a file's name that is no text, are shown by their numbers.
+        if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
     sys.exit(run(arguments))

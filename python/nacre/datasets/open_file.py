@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
 
-class OpenFile:
+class OpenFile(ABC):
     """
     Base of what reads from an open file, ``_file``: a forked process and a copy open it again.
 
@@ -19,9 +20,9 @@ class OpenFile:
     def __init__(self) -> None:
         self._begin()
 
+    @abstractmethod
     def _open(self) -> Any:
         """Return the open file."""
-        raise NotImplementedError
 
     def _begin(self) -> None:
         self._lock = threading.Lock()

@@ -34,9 +34,10 @@ def lock_folder(path: str | os.PathLike[str]) -> int | None:
     descriptor = os.open(path, os.O_RDONLY)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BaseException as error:
+    except BlockingIOError:
         os.close(descriptor)
-        if isinstance(error, OSError) and not isinstance(error, BlockingIOError):
-            return None
         raise
+    except OSError:
+        os.close(descriptor)
+        return None
     return descriptor

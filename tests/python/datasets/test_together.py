@@ -85,10 +85,8 @@ def test_forked_processes(sequence: nacre.datasets.Sequence) -> None:
     expected = [frame.depth.tobytes() for frame in sequence]
     children = []
     for seed in range(4):
-        with warnings.catch_warnings():
-            warnings.simplefilter(
-                "ignore", DeprecationWarning
-            )  # of threads, which these children do not need
+        with warnings.catch_warnings():  # newer Pythons warn of fork with threads
+            warnings.simplefilter("ignore", DeprecationWarning)
             child = os.fork()
         if child == 0:
             code = 1
