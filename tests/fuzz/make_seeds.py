@@ -21,11 +21,13 @@ def main(folder: Path) -> None:
         largest = (64, 200, 256)[number % 3]
         seed = bytes(chance.randrange(largest) for _ in range(32 << number % 5))
         (folder / "any" / f"{number:02d}").write_bytes(seed)
-    # Once around each scene, with a focal length that is right and with one that is not.
-    for scene, focal in itertools.product(range(6), (0, 40)):
-        size, step, noise, mixing, color, options, frames = scene % 3, 80, 20, 0, 200 * (focal > 0), 0, 40
+    # A few frames of each scene, and once around those that have enough shape, each with a focal length
+    # that is right and with one that is not.
+    walks = [*itertools.product(range(6), (0, 40), (4,)), *itertools.product(range(3), (0, 40), (17,))]
+    for scene, focal, frames in walks:
+        size, step, noise, mixing, color, options = 0, 152, 20, 0, 200 * (focal > 0), 0
         seed = bytes((scene, size, focal, step, noise, mixing, color, options, frames)) + bytes(2 * frames)
-        (folder / "recording" / f"{scene}-{focal}").write_bytes(seed)
+        (folder / "recording" / f"{scene}-{focal}-{frames}").write_bytes(seed)
 
 
 if __name__ == "__main__":
