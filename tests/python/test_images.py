@@ -1,5 +1,6 @@
 """Depth and colour images: what is stored comes back, and what is damaged is named."""
 
+import os
 import sys
 import tracemalloc
 import zlib
@@ -74,6 +75,19 @@ def test_depth_exr(tmp_path, channel):
     (tmp_path / "b.exr").write_bytes((tmp_path / "a.exr").read_bytes()[:100])
     with pytest.raises(FileFormatError, match=r"b\.exr"):
         read_depth(tmp_path / "b.exr")
+
+
+def test_an_exr_image_may_lie_in_a_folder_whose_name_is_no_text(tmp_path):
+    exr = pytest.importorskip("OpenEXR")
+    folder = tmp_path / os.fsdecode(b"r\xff")
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("file names here are text")
+    depth = np.linspace(0.5, 3, 12, dtype=np.float32).reshape(3, 4)
+    exr.File({}, {"Z": depth}).write(str(tmp_path / "a.exr"))
+    (tmp_path / "a.exr").rename(folder / "a.exr")
+    np.testing.assert_array_equal(read_depth(folder / "a.exr"), depth)
 
 
 def test_color_comes_back(tmp_path):

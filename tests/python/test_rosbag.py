@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import struct
 from pathlib import Path
 
@@ -64,6 +65,21 @@ def test_topics_need_not_begin_with_a_slash(name: str, version: int, tmp_path: P
         np.testing.assert_allclose(frame.depth[2:], 0.7 + 0.001 * i, rtol=1e-6)
         np.testing.assert_array_equal(frame.color, color_image(i))
     assert len(sequence) == FRAMES
+
+
+@pytest.mark.parametrize("storage", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
+def test_a_folder_whose_name_is_no_text(storage: StoragePlugin, tmp_path: Path) -> None:
+    folder = tmp_path / os.fsdecode(b"r\xff")
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("file names here are text")
+    recording = record(tmp_path / "two", 2, storage).rename(folder / "two")
+    if storage == StoragePlugin.SQLITE3:
+        with pytest.raises(nacre.FileFormatError, match="SQLite opens no file whose path is not UTF-8"):
+            nacre.open_sequence(recording)
+    else:
+        assert len(nacre.open_sequence(recording)) == FRAMES
 
 
 @pytest.mark.parametrize(("name", "version"), [("a.bag", 1), ("two", 2)])

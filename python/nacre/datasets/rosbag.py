@@ -129,6 +129,9 @@ class _Bag(OpenFile):
             if not all(isinstance(name, str) for c in reader.connections for name in (c.topic, c.msgtype)):
                 raise ValueError("a topic has no name")
         except Exception as error:  # rosbags has several, and lets through what damaged files cause
+            if isinstance(error, UnicodeEncodeError) and str(self.path) in error.object:
+                reason = "SQLite opens no file whose path is not UTF-8: rename it, or the folder it is in"
+                raise FileFormatError(self.path, reason) from error
             hint = ""
             if self.path.suffix == ".mcap" and self.path.stat().st_size:
                 hint = f" (ROS 2 is read; what was cut short: mcap recover {self.path.name} -o whole.mcap)"

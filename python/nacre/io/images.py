@@ -256,9 +256,10 @@ def _read_exr(path: Path) -> npt.NDArray[Any]:
         import OpenEXR  # type: ignore[import-not-found, unused-ignore]
     except ImportError as error:
         raise ImportError('EXR images need OpenEXR: pip install "nacre[exr]"', name="OpenEXR") from error
-    check_exr(path, read_file(path))
+    data = read_file(path)
+    check_exr(path, data)
     try:
-        with OpenEXR.File(str(path), separate_channels=True) as image:
+        with OpenEXR.File(BytesIO(data), separate_channels=True) as image:
             channels = {name: np.array(channel.pixels) for name, channel in image.channels().items()}
     except MemoryError:
         raise
