@@ -26,7 +26,7 @@ from soak import memory
 
 import nacre
 
-MOST_GROWTH = 3e6  # [bytes]: what the allocator's arenas vary by
+MOST_GROWTH = 1e6  # [bytes]: what the allocator's arenas vary by
 FOLDERS = [str(Path(__file__).resolve().parent), str(Path(str(nacre.__file__)).parents[1])]
 MOST_LOST = 0.05  # of a thread's ticks
 

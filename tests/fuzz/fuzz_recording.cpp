@@ -132,16 +132,16 @@ NACRE_FUZZ_TARGET(bytes) {
   const bool has_colors = bytes.byte() >= 128;
 
   ModelOptions options;
-  options.registration.max_samples = 300;
+  options.registration.max_samples = 1000;
   if (bytes.byte() >= 192) options = nacre_fuzz::model_options(bytes);
   options.region.object = scene.is_object;
   options.num_threads = 1;
   Model model(camera, options);
   double angle = 0.0, farther = 0.0;
   // Frames that are not tracked take ten times as long.
-  const int num_frames = 1 + bytes.byte() % 32;
+  const int num_frames = 1 + bytes.byte() % 80;
   int num_hard = 0;
-  for (int index = 0; index < num_frames && num_hard < 4; ++index) {
+  for (int index = 0; index < num_frames && num_hard < 8; ++index) {
     const Event event = bytes.byte() < 160 ? Event::none : bytes.one_of<Event>(10);
     const Pose pose = scene.camera(angle, farther);
     simulation.seed = static_cast<std::uint64_t>(index);
