@@ -99,3 +99,17 @@ def test_the_load_program_tells_a_slower_model_from_a_slower_machine() -> None:
 def test_models_come_and_go_and_others_live_beside_them() -> None:
     said = run("life.py", "--cycles", "60", "--seconds", "2", "--busy")
     assert "two models in two threads have the bits of each alone: True" in said
+
+
+def test_thirty_two_bytes_that_a_model_leaves_are_found() -> None:
+    """The least that the allocator gives."""
+    code = """
+    import sys
+    sys.path.insert(0, sys.argv[1])
+    from life import MOST_LEFT, growth_in_fresh_process
+    leak = "grown = life.grown; life.grown = lambda scene: (grown(scene), life.ctypes.CDLL(None).malloc(1))"
+    left, _ = growth_in_fresh_process(60, leak)
+    assert left > MOST_LEFT, left
+    """
+    command = [sys.executable, "-c", "\n".join(line.strip() for line in code.splitlines()), str(BENCHMARKS)]
+    subprocess.run(command, check=True)
