@@ -1,10 +1,11 @@
 #include "color_registration.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "directions.hpp"
 #include "parallel.hpp"
+#include "rigid_motion.hpp"
 #include "robust.hpp"
 
 namespace nacre {
@@ -169,15 +170,13 @@ class ColorSearch {
       weight += pair.weight;
     }
     hessian.diagonal().array() += 1e-6 * hessian.trace() + 1e-9 * weight;
-    Vector6 twist = open * hessian.ldlt().solve(gradient);
+    Vector6 twist = open * solve_normal_equations(hessian, gradient);
     const double longest = 4.0 * target_.spacing(), length = twist.norm();
     if (length > longest) twist *= longest / length;
-    Pose motion = Pose::Identity();
-    const Eigen::Vector3d turn = twist.head<3>() / extent;
-    if (turn.norm() > 0.0) motion.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
-    motion.translation() = result.center - motion.linear() * result.center + Eigen::Vector3d(twist.tail<3>());
-    result.target_from_source = motion * result.target_from_source;
-    return twist.norm();
+    const double size = twist.norm();
+    twist.head<3>() /= extent;
+    result.target_from_source = motion_about(result.center, twist) * result.target_from_source;
+    return size;
   }
 
   const IcpTarget& target_;
@@ -215,19 +214,19 @@ IcpResult determine_by_color(const IcpTarget& target, const IcpSource& source, c
     if (pairs.size() < ColorSearch::fewest || !still_fits || search.correlation() < least_correlation) return geometric;
     const Basis open = found.weak_directions;
     if (open.cols() == 0) return found;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(search.agreed_information(pairs, open, distance_noise));
-    const Eigen::Index num_weak = (eigen.eigenvalues().array() < options.weak_threshold).count();
-    if (num_weak == open.cols()) return geometric;
-    known = open * eigen.eigenvectors().rightCols(open.cols() - num_weak);
+    const Directions directions =
+        split_directions(search.agreed_information(pairs, open, distance_noise), options.weak_threshold);
+    if (directions.sure.cols() == 0) return geometric;
+    known = open * directions.sure;
     result = found;
-    result.weak_directions = open * eigen.eigenvectors().leftCols(num_weak);
+    result.weak_directions = open * directions.weak;
     const double extent = ColorSearch::extent_of(pairs);
     for (const ColorPair& pair : pairs) {
       Vector6 row = known * (known.transpose() * ColorSearch::row_of(pair.lever, pair.target_gradient, extent));
       row.head<3>() *= extent;
       result.information += pair.weight / (search.noise() * search.noise()) * row * row.transpose();
     }
-    if (num_weak == 0) break;
+    if (directions.weak.cols() == 0) break;
   }
   return result;
 }

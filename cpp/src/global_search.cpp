@@ -5,6 +5,7 @@
 #include <numeric>
 
 #include "parallel.hpp"
+#include "rigid_motion.hpp"
 #include "rotation_grid.hpp"
 
 namespace nacre {
@@ -135,8 +136,7 @@ void GlobalSearch::weigh(SearchCandidate& candidate, bool with_few, double toler
 }
 
 bool GlobalSearch::is_same(const Pose& a, const Pose& b) const {
-  return Eigen::AngleAxisd(a.linear().transpose() * b.linear()).angle() < same_turn &&
-         (a * source_.middle - b * source_.middle).norm() < same_shift * size_;
+  return angle_between(a, b) < same_turn && (a * source_.middle - b * source_.middle).norm() < same_shift * size_;
 }
 
 std::vector<SearchCandidate> GlobalSearch::best_different(std::vector<SearchCandidate> candidates,

@@ -4,8 +4,10 @@
 #include <Eigen/SVD>
 #include <cmath>
 
+#include "directions.hpp"
 #include "normal_equations.hpp"
 #include "parallel.hpp"
+#include "rigid_motion.hpp"
 
 namespace nacre {
 namespace {
@@ -51,15 +53,8 @@ Moments sum_moments(const std::vector<Pair>& pairs, Metric metric, const Eigen::
   });
 }
 
-// Rodrigues' formula.
-Eigen::Matrix3d rotation(const Eigen::Vector3d& axis, double angle) {
-  const double length = axis.norm();
-  if (!(length > 0.0)) return Eigen::Matrix3d::Identity();
-  return Eigen::AngleAxisd(angle, axis / length).toRotationMatrix();
-}
-
-Pose motion_about(const Eigen::Vector3d& from_center, const Eigen::Matrix3d& rotation,
-                  const Eigen::Vector3d& to_center) {
+Pose motion_from_to(const Eigen::Vector3d& from_center, const Eigen::Matrix3d& rotation,
+                    const Eigen::Vector3d& to_center) {
   Pose motion = Pose::Identity();
   motion.linear() = rotation;
   motion.translation() = to_center - rotation * from_center;
@@ -125,7 +120,7 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   Matrix6 damped = equations.hessian;
   damped.diagonal().array() += damping * sums.weight;
   const Vector6 solution =
-      sure * (sure.transpose() * damped * sure).ldlt().solve(sure.transpose() * equations.gradient);
+      sure * solve_normal_equations(sure.transpose() * damped * sure, sure.transpose() * equations.gradient);
   step.reduction = solution.dot(equations.hessian * solution);
   Vector6 scale;
   scale << extent, extent, extent, 1.0, 1.0, 1.0;
@@ -135,15 +130,15 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
 
   const Eigen::Vector3d rotation_vector = solution.head<3>() / extent, translation = solution.tail<3>();
   if (metric == Metric::point_to_point && num_weak == 0) {
-    step.motion = motion_about(p_mean, closest_rotation(equations.covariance), q_mean);
+    step.motion = motion_from_to(p_mean, closest_rotation(equations.covariance), q_mean);
   } else if (metric == Metric::symmetric && num_weak == 0) {
     // Rusinkiewicz 2019, section 3: half the rotation, the translation t cos(theta), half the rotation.
     const double half_angle = std::atan(0.5 * rotation_vector.norm());
     const Eigen::Matrix3d half = rotation(rotation_vector, half_angle);
     const Eigen::Vector3d shift = translation - (q_mean - p_mean);
-    step.motion = motion_about(p_mean, half * half, q_mean + half * shift * std::cos(half_angle));
+    step.motion = motion_from_to(p_mean, half * half, q_mean + half * shift * std::cos(half_angle));
   } else {
-    step.motion = motion_about(p_mean, rotation(rotation_vector, rotation_vector.norm()), p_mean + translation);
+    step.motion = motion_from_to(p_mean, rotation(rotation_vector, rotation_vector.norm()), p_mean + translation);
   }
   const double angle = Eigen::AngleAxisd(step.motion.linear()).angle();
   step.size = (step.motion * p_mean - p_mean).norm() + angle * extent;

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "model_view.hpp"
+#include "rigid_motion.hpp"
 #include "robust.hpp"
 
 namespace nacre {
@@ -23,7 +24,7 @@ double median_depth(const Points& points) {
 
 double view_distance(const Pose& a, const Pose& b, double depth) {
   constexpr double turn = 0.2, part_of_depth = 0.15;
-  const double angle = Eigen::AngleAxisd(a.linear().transpose() * b.linear()).angle();
+  const double angle = angle_between(a, b);
   return std::max(angle / turn, (a.translation() - b.translation()).norm() / (part_of_depth * depth));
 }
 

@@ -188,17 +188,15 @@ TrackingResult Model::Impl::locate(const FrameExtras& extras, const RegionReport
 bool Model::Impl::jumped() const {
   constexpr double largest_turn = 0.7;
   if (history.num_registered() < 2) return false;
-  const Pose motion = history.registered_pose(1).inverse() * history.registered_pose(0);
-  return Eigen::AngleAxisd(motion.linear()).angle() > largest_turn;
+  return angle_between(history.registered_pose(1), history.registered_pose(0)) > largest_turn;
 }
 
 std::vector<Pose> Model::Impl::guesses(const FrameExtras& extras) const {
   if (extras.guess) return {*extras.guess};
   const Pose last = history.registered_pose(0);
   if (!options.predict_motion || history.num_registered() < 2 || was_lost() || jumped()) return {last};
-  Pose predicted = last * (history.registered_pose(1).inverse() * last);
-  predicted.linear() = Eigen::Quaterniond(predicted.linear()).normalized().toRotationMatrix();
-  return {predicted, last};
+  const Pose predicted = last * (history.registered_pose(1).inverse() * last);
+  return {orthonormal(predicted), last};
 }
 
 // Some of the newest poses from which the camera looked in different directions.
@@ -208,9 +206,8 @@ static std::vector<Pose> key_poses(const FrameHistory& history) {
   std::vector<Pose> chosen;
   for (std::size_t age = 0; age < history.num_registered() && chosen.size() < most; ++age) {
     const Pose pose = history.registered_pose(age);
-    const bool is_new = std::all_of(chosen.begin(), chosen.end(), [&](const Pose& other) {
-      return Eigen::AngleAxisd(other.linear().transpose() * pose.linear()).angle() > least_angle;
-    });
+    const bool is_new = std::all_of(chosen.begin(), chosen.end(),
+                                    [&](const Pose& other) { return angle_between(other, pose) > least_angle; });
     if (is_new) chosen.push_back(pose);
   }
   return chosen;
@@ -247,7 +244,7 @@ void Model::Impl::keep_view(const FrameReport& report) {
   constexpr double least_angle = 0.35;
   const Pose& pose = report.world_from_camera;
   const bool is_new = std::all_of(views.begin(), views.end(), [&](const ObjectView& view) {
-    return Eigen::AngleAxisd(view.world_from_camera.linear().transpose() * pose.linear()).angle() > least_angle;
+    return angle_between(view.world_from_camera, pose) > least_angle;
   });
   if (!options.relocalise || views.size() >= most_views || !is_new) return;
   std::optional<ObjectView> view = view_of_object(report.region);
@@ -275,7 +272,7 @@ void Model::Impl::adjust(FrameReport& report) {
     std::size_t nearest = 0;
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t k = 0; k < views.size(); ++k) {
-      const double angle = Eigen::AngleAxisd(views[k].world_from_camera.linear().transpose() * pose.linear()).angle();
+      const double angle = angle_between(views[k].world_from_camera, pose);
       if (angle >= least) continue;
       least = angle;
       nearest = k;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "outline_match.hpp"
+#include "rigid_motion.hpp"
 #include "robust.hpp"
 
 namespace nacre {
@@ -18,15 +19,6 @@ constexpr double point_sigma = 0.5;     // [pixels]
 constexpr double shift_sigma = 0.5;     // [pixels], of an outline as a whole: mixed pixels differ with the slant
 constexpr double points_for_one = 4.0;  // neighbours on an outline err together
 constexpr double pairs_for_one = 30.0;  // so do pairs of surface points
-
-// The pose moved by a twist (rotation, translation) about a center.
-Pose moved_by(const Vector6& twist, const Eigen::Vector3d& center, const Pose& pose) {
-  Pose motion = Pose::Identity();
-  const double angle = twist.head<3>().norm();
-  if (angle > 0.0) motion.linear() = Eigen::AngleAxisd(angle, twist.head<3>() / angle).toRotationMatrix();
-  motion.translation() = center - motion.linear() * center + Eigen::Vector3d(twist.tail<3>());
-  return motion * pose;
-}
 
 // What outlines say of a twist.
 struct OutlineEquations {
@@ -82,7 +74,7 @@ void refine_by_outlines(IcpResult& result, const std::vector<OutlinePoint>& outl
   Vector6 twist = Vector6::Zero();
   OutlineEquations equations;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
-    const std::vector<OutlinePoint> edges = moved(outline, moved_by(twist, result.center, start));
+    const std::vector<OutlinePoint> edges = moved(outline, motion_about(result.center, twist) * start);
     equations = equations_of(edges, earlier, result.center, pixel, num_threads);
     const double mean_square = equations.squares / static_cast<double>(equations.count);
     const bool lie_on_each_other = std::sqrt(mean_square) <= largest_rms * pixel || iteration == 0;
@@ -92,7 +84,7 @@ void refine_by_outlines(IcpResult& result, const std::vector<OutlinePoint>& outl
     twist += step;
     if (step.head<3>().norm() < 1e-5 && step.tail<3>().norm() < 1e-3 * pixel) break;
   }
-  result.target_from_source = moved_by(twist, result.center, start);
+  result.target_from_source = motion_about(result.center, twist) * start;
   result.information += pairs_for_one * equations.hessian;
 }
 

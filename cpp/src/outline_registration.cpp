@@ -1,10 +1,11 @@
 #include "outline_registration.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
+#include "directions.hpp"
 #include "outline_match.hpp"
+#include "rigid_motion.hpp"
 #include "robust.hpp"
 
 namespace nacre {
@@ -171,12 +172,9 @@ class EdgeSearch {
       weight += pair.weight;
     }
     hessian.diagonal().array() += 1e-3 * weight;
-    const Vector6 twist = open * hessian.ldlt().solve(gradient);
-    Pose motion = Pose::Identity();
-    const Eigen::Vector3d turn = twist.head<3>() / extent_;
-    if (turn.norm() > 0.0) motion.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
-    motion.translation() = result.center - motion.linear() * result.center + Eigen::Vector3d(twist.tail<3>());
-    result.target_from_source = motion * result.target_from_source;
+    Vector6 twist = open * solve_normal_equations(hessian, gradient);
+    twist.head<3>() /= extent_;
+    result.target_from_source = motion_about(result.center, twist) * result.target_from_source;
   }
 
   const IcpTarget& target_;
@@ -215,20 +213,19 @@ IcpResult determine_by_outline(const IcpTarget& target, const IcpSource& source,
     const Basis open = is_shaped ? geometric.weak_directions : found.weak_directions;
     double weight = 0.0;
     for (const EdgePair& pair : pairs) weight += pair.weight;
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(search.agreed_information(pairs, open));
     const double least = std::max(search.least_known(), least_information * weight);
-    const Eigen::Index num_weak = (eigen.eigenvalues().array() < least).count();
-    if (is_shaped) return num_weak == 0 ? found : geometric;
-    if (num_weak == open.cols()) return geometric;
-    known = open * eigen.eigenvectors().rightCols(open.cols() - num_weak);
+    const Directions directions = split_directions(search.agreed_information(pairs, open), least);
+    if (is_shaped) return directions.weak.cols() == 0 ? found : geometric;
+    if (directions.sure.cols() == 0) return geometric;
+    known = open * directions.sure;
     result = found;
-    result.weak_directions = open * eigen.eigenvectors().leftCols(num_weak);
+    result.weak_directions = open * directions.weak;
     for (const EdgePair& pair : pairs) {
       Vector6 row = known * (known.transpose() * search.row_of(pair.lever, pair.target_outward));
       row.head<3>() *= search.extent();
       result.information += pair.weight / (search.noise() * search.noise()) * row * row.transpose();
     }
-    if (num_weak == 0) break;
+    if (directions.weak.cols() == 0) break;
   }
   return result;
 }

@@ -148,7 +148,7 @@ class Search {
       const Pose& pose = candidate.alignment.target_from_source;
       const auto is_known = [&](const Candidate& other) {
         const Pose& other_pose = other.alignment.target_from_source;
-        return Eigen::AngleAxisd(pose.linear().transpose() * other_pose.linear()).angle() < same_turn &&
+        return angle_between(pose, other_pose) < same_turn &&
                (pose * middle - other_pose * middle).norm() < same_shift * frame_.size;
       };
       if (std::none_of(kept.begin(), kept.end(), is_known)) kept.push_back(candidate);

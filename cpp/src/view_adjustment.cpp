@@ -1,10 +1,11 @@
 #include "view_adjustment.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <memory>
 
+#include "directions.hpp"
 #include "icp_target.hpp"
 #include "normal_equations.hpp"
 #include "parallel.hpp"
@@ -14,6 +15,7 @@
 namespace nacre {
 namespace {
 
+constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr int num_iterations = 12;
 constexpr Eigen::Index num_samples = 800;
 constexpr double cos_angle = 0.7;                                 // between normals that match
@@ -88,12 +90,10 @@ struct JointEquations {
   Eigen::VectorXd solve(Eigen::Index count, double weak_threshold) {
     hessian.diagonal().array() += 1e-6 * hessian.trace() / static_cast<double>(hessian.rows());
     const Eigen::Index rest = hessian.rows() / count * (count - 1);
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen((hessian - chance).bottomRightCorner(rest, rest));
-    const double least = weak_threshold * agreement / static_cast<double>(count);
-    const Eigen::Index num_weak = weak_threshold > 0.0 ? (eigen.eigenvalues().array() < least).count() : 0;
-    const Eigen::MatrixXd sure = eigen.eigenvectors().rightCols(rest - num_weak);
+    const double least = weak_threshold > 0.0 ? weak_threshold * agreement / static_cast<double>(count) : -infinity;
+    const Eigen::MatrixXd sure = split_directions((hessian - chance).bottomRightCorner(rest, rest), least).sure;
     const Eigen::MatrixXd matrix = sure.transpose() * hessian.bottomRightCorner(rest, rest) * sure;
-    return sure * matrix.ldlt().solve(sure.transpose() * gradient.tail(rest));
+    return sure * solve_normal_equations(matrix, sure.transpose() * gradient.tail(rest));
   }
 
  private:
