@@ -92,12 +92,12 @@ def cmake(eigen_prefix: Path | None) -> Callable[..., str]:
     return lambda *arguments, **options: run_program(program, *arguments, **options, **environment)
 
 
-def build_library(cmake: Callable[..., str], name: str, *definitions: str) -> Path:
-    """Configure and build the repository's C++ part in ``build/NAME`` and return that folder."""
+def build_project(cmake: Callable[..., str], source: Path, name: str, *definitions: str) -> Path:
+    """Configure and build a CMake project in ``build/NAME`` and return that folder."""
     folder = ROOT / "build" / name
     strict = "ON" if os.environ.get("CI") else "OFF"  # a stranger's newer compiler may know newer warnings
     # Fresh: the folder may remember the tools of an environment that is gone. What is compiled stays.
-    cmake("--fresh", "-S", ROOT, "-B", folder, f"-DNACRE_WARNINGS_AS_ERRORS={strict}", *definitions)
+    cmake("--fresh", "-S", source, "-B", folder, f"-DNACRE_WARNINGS_AS_ERRORS={strict}", *definitions)
     cmake("--build", folder)
     return folder
 
@@ -105,12 +105,13 @@ def build_library(cmake: Callable[..., str], name: str, *definitions: str) -> Pa
 @pytest.fixture(scope="session")
 def static_build(cmake: Callable[..., str]) -> Path:
     """Build the static library, the C++ tests and the examples."""
-    return build_library(
-        cmake, "test-static", "-DBUILD_SHARED_LIBS=OFF", "-DNACRE_BUILD_TESTS=ON", "-DNACRE_BUILD_EXAMPLES=ON"
-    )
+    programs = ("-DNACRE_BUILD_TESTS=ON", "-DNACRE_BUILD_EXAMPLES=ON")
+    return build_project(cmake, ROOT, "test-static", "-DBUILD_SHARED_LIBS=OFF", *programs)
 
 
 @pytest.fixture(scope="session")
 def shared_build(cmake: Callable[..., str]) -> Path:
-    """Build the shared library alone."""
-    return build_library(cmake, "test-shared", "-DBUILD_SHARED_LIBS=ON")
+    """Build the shared library as part of a stranger's project, which installs it, too."""
+    source = ROOT / "tests" / "consumer" / "add_subdirectory"
+    definitions = ("-DCMAKE_BUILD_TYPE=Release", "-DBUILD_SHARED_LIBS=ON", "-DNACRE_INSTALL=ON")
+    return build_project(cmake, source, "test-shared", *definitions)
