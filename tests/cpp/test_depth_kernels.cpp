@@ -1,5 +1,4 @@
 // The kernels of the depth images: every instruction set of this processor against plain loops.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <algorithm>
 #include <array>
 #include <cstring>

@@ -1,5 +1,4 @@
 // What a cleaned depth image becomes: its noise, its points and their normals.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <algorithm>
 
 #include "depth_images.hpp"

@@ -1,5 +1,4 @@
 // Models that come and go. Under the address sanitizer the end of the program tells of what they left (LeakSanitizer).
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <utility>
 
 #include "doctest/doctest.h"

@@ -1,5 +1,4 @@
 // The kernel of the normals: every instruction set of this processor against a plain fit.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <algorithm>
 #include <cstring>
 #include <vector>

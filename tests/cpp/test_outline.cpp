@@ -1,5 +1,4 @@
 // Where flat surfaces end: found in depth images, and what they tell of a pose that shape leaves open.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstring>

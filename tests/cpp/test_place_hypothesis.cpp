@@ -1,4 +1,3 @@
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include "clouds.hpp"
 #include "doctest/doctest.h"
 #include "place_hypothesis.hpp"

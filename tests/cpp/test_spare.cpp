@@ -1,5 +1,4 @@
 // Marked pixels that lie on a surface beside them: every instruction set of this processor against plain least squares.
-#define DOCTEST_CONFIG_IMPLEMENT_WITH_MAIN
 #include <Eigen/Dense>
 #include <array>
 #include <limits>
