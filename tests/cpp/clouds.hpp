@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
+#include "base/random.hpp"
 #include "nacre/types.hpp"
-#include "random.hpp"
 
 struct OrientedCloud {
   nacre::Points points, normals;

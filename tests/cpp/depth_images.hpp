@@ -9,8 +9,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "base/random.hpp"
 #include "nacre/depth.hpp"
-#include "random.hpp"
 
 namespace nacre_test {
 

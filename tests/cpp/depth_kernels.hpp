@@ -5,11 +5,11 @@
 #include <vector>
 
 #include "depth_images.hpp"
-#include "simd/edge_row.hpp"
-#include "simd/keep_row.hpp"
-#include "simd/normal_row.hpp"
-#include "simd/point_row.hpp"
-#include "simd/window_row.hpp"
+#include "simd/depth_edges.hpp"
+#include "simd/depth_keep.hpp"
+#include "simd/depth_normals.hpp"
+#include "simd/depth_points.hpp"
+#include "simd/depth_windows.hpp"
 
 namespace nacre_test {
 

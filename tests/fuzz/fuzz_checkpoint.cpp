@@ -1,8 +1,8 @@
 // Saved models whose bytes were changed by somebody who knows the checksum.
 #include <string>
 
+#include "base/random.hpp"
 #include "options.hpp"
-#include "random.hpp"
 
 namespace {
 

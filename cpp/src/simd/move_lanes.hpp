@@ -1,7 +1,7 @@
 // Moving lanes about: closing gaps, turning rows into columns.
 #pragma once
 
-#include "vec.hpp"
+#include "simd/vec.hpp"
 
 namespace nacre::simd::NACRE_ISA {
 

@@ -1,7 +1,7 @@
 // One pass over coordinates that lie point after point; the compiler makes vectors of it. About 2 ns a point.
-#include "projection.hpp"
+#include "simd/projection.hpp"
 
-#include "vec.hpp"
+#include "simd/vec.hpp"
 
 namespace nacre::simd::NACRE_ISA {
 namespace {

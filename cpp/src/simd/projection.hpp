@@ -3,7 +3,7 @@
 
 #include <stdint.h>
 
-#include "isa.hpp"
+#include "simd/isa.hpp"
 
 namespace nacre::simd {
 

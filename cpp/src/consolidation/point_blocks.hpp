@@ -1,0 +1,58 @@
+// Points in blocks of 16 that lie close together, under a tree of boxes: the layout of the pair kernels.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "consolidation/cell_order.hpp"
+#include "simd/wlop_pair_sums.hpp"
+
+namespace nacre {
+
+// Where points lie in the kernels' unit of length: (point - center) scale.
+struct Scaling {
+  Eigen::Vector3d center;
+  double scale;
+};
+
+class PointBlocks {
+ public:
+  static constexpr std::int64_t size = simd::block_size;
+
+  // Blocks of points in their order; a block never spans two cubes of it. Defined for Points and PointsDouble.
+  template <class Cloud>
+  PointBlocks(const Cloud& points, CellOrder order, const Scaling& scaling, int num_threads);
+
+  std::int64_t num_points() const { return static_cast<std::int64_t>(rows_.size()); }
+  std::int64_t row(std::int64_t i) const { return rows_[static_cast<std::size_t>(i)]; }  // of the cloud
+
+  // Block b has the points begin(b) to end(b) - 1.
+  std::int64_t num_blocks() const { return static_cast<std::int64_t>(starts_.size()) - 1; }
+  std::int64_t begin(std::int64_t block) const { return starts_[static_cast<std::size_t>(block)]; }
+  std::int64_t end(std::int64_t block) const { return starts_[static_cast<std::size_t>(block) + 1]; }
+
+  // Coordinates relative to the origin of the block.
+  std::vector<float>& axis(int axis) { return axes_[axis]; }
+  const std::vector<float>& axis(int axis) const { return axes_[axis]; }
+  // After the coordinates have changed.
+  void refit(int num_threads);
+
+  // Values a point must be readable as far, for the kernels.
+  std::int64_t num_readable() const { return num_points() + size - 1; }
+
+  simd::PairPoints view(const float* mass) const;
+  simd::PairTargets block(std::int64_t block) const;
+
+ private:
+  void fit_node(std::int64_t node);
+  void fit_upper_levels();
+
+  std::vector<std::uint32_t> rows_;
+  std::vector<std::int32_t> starts_;
+  std::vector<float> axes_[3];
+  std::vector<double> origins_;
+  std::vector<float> halves_;
+  std::vector<std::vector<float>> levels_;  // nodes of the box tree, level 0 first
+};
+
+}  // namespace nacre

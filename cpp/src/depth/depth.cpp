@@ -1,0 +1,230 @@
+#include "nacre/depth.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/check.hpp"
+#include "base/parallel.hpp"
+#include "base/statistics.hpp"
+#include "camera/ray_table.hpp"
+#include "depth/cleaning.hpp"
+#include "depth/inverse_depth_image.hpp"
+#include "simd/depth_edges.hpp"
+#include "simd/depth_keep.hpp"
+#include "simd/depth_points.hpp"
+
+namespace nacre {
+namespace {
+
+// A wrong depth_scale shows as a median depth that no depth camera measures. A sample of the pixels tells enough.
+void require_plausible_median(const DepthRef& depth) {
+  constexpr float nearest = 0.05F, farthest = 50.0F;
+  constexpr std::int64_t max_sample = 1 << 13;
+  const std::int64_t stride = std::max<std::int64_t>(1, depth.size() / max_sample);
+  std::vector<float> sample;
+  sample.reserve(static_cast<std::size_t>(depth.size() / stride + 1));
+  std::size_t num_near = 0, num_far = 0;
+  for (std::int64_t i = 0, v = 0, u = 0; i < depth.size(); i += stride, u += stride) {
+    for (; u >= depth.cols(); u -= depth.cols()) ++v;
+    const float z = depth(v, u);
+    if (!is_measurement(z)) continue;
+    sample.push_back(z);
+    num_near += z < nearest;
+    num_far += z > farthest;
+  }
+  const std::size_t half = sample.size() / 2;
+  if (sample.empty() || (num_near <= half && num_far < sample.size() - half)) return;
+  std::ostringstream message;
+  message << "depth must be in metres with a median of 0.05 to 50 m, got a median of " << median_of(std::move(sample))
+          << " m: check depth_scale, the stored units per metre (1000 for millimetres, 5000 for TUM RGB-D)";
+  throw std::invalid_argument(message.str());
+}
+
+ByteImage mark_edges(const DepthRef& depth, const PlanarImage& image, const WindowFits& fits, const NoiseModel& noise,
+                     const DepthOptions& options, int num_threads) {
+  switch (options.edge_test) {
+    case EdgeTest::gradient:
+      return mark_gradient_edges(depth, options, num_threads);
+    case EdgeTest::inverse_depth:
+      return mark_planar_edges(image, fits, noise, options, num_threads);
+    case EdgeTest::none:
+      break;
+  }
+  ByteImage none(image.width(), image.height());
+  std::fill(none.row(0), none.row(image.height()), std::uint8_t{0});
+  return none;
+}
+
+// The nearest floats that are not beyond a limit.
+float round_up(double limit) {
+  const auto rounded = static_cast<float>(limit);
+  return rounded < limit ? std::nextafter(rounded, std::numeric_limits<float>::infinity()) : rounded;
+}
+float round_down(double limit) {
+  const auto rounded = static_cast<float>(limit);
+  return rounded > limit ? std::nextafter(rounded, 0.0F) : rounded;
+}
+
+// The pixels that hold a measurement within range and mask and bear no mark.
+ByteImage keep_pixels(const DepthRef& depth, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
+                      const ByteImage& marks, int num_threads, DepthReport& report) {
+  const int width = camera.width(), height = camera.height();
+  const float min_depth = round_up(options.min_depth), max_depth = round_down(options.max_depth);
+  ByteImage keep(width, height);
+  std::vector<simd::KeepCounts> counts(static_cast<std::size_t>(height));
+  const auto keep_row = simd::keep_pixels();
+  parallel_for(height, rows_per_block(width), num_threads, [&](std::int64_t v) {
+    counts[static_cast<std::size_t>(v)] =
+        keep_row({&depth.coeffRef(v, 0), camera.ray_table().row(static_cast<int>(v)).x,
+                  mask.size() > 0 ? &mask.coeffRef(v, 0) : nullptr, marks.row(v), min_depth, max_depth, width},
+                 keep.row(v));
+  });
+  for (const simd::KeepCounts& row : counts) {
+    report.num_invalid += row.num_invalid;
+    report.num_out_of_range += row.num_out_of_range;
+    report.num_masked += row.num_masked;
+    report.num_edge += row.num_edge;
+    report.num_slanted += row.num_slanted;
+  }
+  return keep;
+}
+
+// The reasons of keep_pixels, pixel by pixel; what went later was isolated.
+MaskImage label(const DepthRef& depth, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
+                const ByteImage& marks, const ByteImage& keep, int num_threads) {
+  const float min_depth = round_up(options.min_depth), max_depth = round_down(options.max_depth);
+  const auto reason = [&](int u, int v, const float* direction_x) {
+    const float z = depth(v, u);
+    if (!is_measurement(z) || std::isnan(direction_x[u])) return PixelLabel::invalid;
+    if (z < min_depth || z > max_depth) return PixelLabel::out_of_range;
+    if (mask.size() > 0 && mask(v, u) == 0) return PixelLabel::masked;
+    if ((marks.row(v)[u] & simd::edge_mark) != 0) return PixelLabel::edge;
+    if ((marks.row(v)[u] & simd::slanted_mark) != 0) return PixelLabel::slanted;
+    return keep.row(v)[u] != 0 ? PixelLabel::kept : PixelLabel::isolated;
+  };
+  MaskImage labels(depth.rows(), depth.cols());
+  parallel_for(depth.rows(), rows_per_block(depth.cols()), num_threads, [&](std::int64_t row) {
+    const int v = static_cast<int>(row);
+    const float* const direction_x = camera.ray_table().row(v).x;
+    for (int u = 0; u < camera.width(); ++u) labels(v, u) = static_cast<std::uint8_t>(reason(u, v, direction_x));
+  });
+  return labels;
+}
+
+}  // namespace
+
+void DepthOptions::check() const {
+  require(min_depth >= 0.0 && std::isfinite(min_depth), "min_depth", "a finite number of metres, at least 0",
+          min_depth);
+  require(max_depth > min_depth, "max_depth", "greater than min_depth", max_depth);
+  require(gradient_threshold > 0.0, "gradient_threshold", "a positive depth step in metres", gradient_threshold);
+  require(edge_dilation >= 0 && edge_dilation <= 100, "edge_dilation", "0 to 100 pixels", edge_dilation);
+  require(edge_sigmas > 0.0, "edge_sigmas", "a positive number of standard deviations", edge_sigmas);
+  require(edge_reprieve >= 0.0, "edge_reprieve", "a number of standard deviations, at least 0", edge_reprieve);
+  require(max_slant > 0.0 && max_slant < 1.5707963, "max_slant", "an angle between 0 and pi / 2", max_slant);
+  require(max_missing >= 0.0 && max_missing <= 1.0, "max_missing", "a part between 0 and 1", max_missing);
+  require(min_component >= 0, "min_component", "a number of pixels, at least 0", min_component);
+  if (noise) noise->check();
+}
+
+void NoiseModel::check() const {
+  require(std::isfinite(constant) && constant >= 0.0, "noise.constant", "a finite number of metres, at least 0",
+          constant);
+  require(std::isfinite(quadratic) && quadratic >= 0.0, "noise.quadratic", "finite, at least 0", quadratic);
+  require(std::isfinite(offset), "noise.offset", "finite", offset);
+  require(shared >= 0.0 && shared < 1.0, "noise.shared", "a part from 0 to below 1", shared);
+}
+
+DepthImage depth_from_raw(
+    const Eigen::Ref<const Eigen::Array<std::uint16_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>& raw,
+    double depth_scale) {
+  require(std::isfinite(depth_scale) && depth_scale > 0.0, "depth_scale", "a positive number of stored units per metre",
+          depth_scale);
+  DepthImage depth(raw.rows(), raw.cols());
+  if (raw.size() == 0) return depth;
+  const auto fill_row = simd::fill_depth_row();
+  for (Eigen::Index v = 0; v < raw.rows(); ++v) {
+    fill_row(&raw.coeffRef(v, 0), static_cast<float>(depth_scale), static_cast<int>(raw.cols()), &depth(v, 0));
+  }
+  return depth;
+}
+
+DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const DepthOptions& options,
+                            const MaskRef& mask, DepthReport* report, int num_threads) {
+  return clean_depth(depth, camera, options, mask, nullptr, report, nullptr, num_threads);
+}
+
+DepthImage clean_depth(const DepthRef& depth, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
+                       NoiseCalibration* calibration, DepthReport* report, MaskImage* labels, int num_threads) {
+  options.check();
+  require_camera_size("depth", depth.rows(), depth.cols(), camera);
+  if (mask.size() > 0) require_camera_size("mask", mask.rows(), mask.cols(), camera);
+  require_plausible_median(depth);
+
+  // The tests see every measurement, so that range and mask do not make edges where there are none.
+  const PlanarImage image(depth, camera, num_threads);
+  const WindowFits fits = fit_windows(image, camera, num_threads);
+  if (calibration != nullptr && !options.noise) calibration->add(image, fits, num_threads);
+  const NoiseModel noise = options.noise            ? *options.noise
+                           : calibration != nullptr ? calibration->model()
+                                                    : estimate_noise(fits, camera, num_threads);
+  const ByteImage first_marks = mark_edges(depth, image, fits, noise, options, num_threads);
+  ByteImage marks = dilated(first_marks, options.edge_dilation, num_threads);
+  if (options.edge_test == EdgeTest::inverse_depth) {
+    spare_planar(image, first_marks, noise, options, num_threads, marks);
+  }
+
+  DepthReport counts;
+  ByteImage keep = keep_pixels(depth, camera, options, mask, marks, num_threads, counts);
+  drop_lonely(options.max_missing, num_threads, keep);
+  drop_specks(image, noise, options, num_threads, keep);
+
+  DepthImage clean(depth.rows(), depth.cols());
+  const auto select_row = simd::select_kept();
+  counts.num_kept = block_reduce(clean.rows(), rows_per_block(clean.cols()), num_threads, std::int64_t{0},
+                                 [&](std::int64_t begin, std::int64_t end) {
+                                   std::int64_t count = 0;
+                                   for (std::int64_t v = begin; v < end; ++v) {
+                                     count +=
+                                         select_row(&depth.coeffRef(v, 0), keep.row(v), camera.width(), &clean(v, 0));
+                                   }
+                                   return count;
+                                 });
+  counts.num_pixels = counts.num_isolated = depth.size();
+  for (const std::int64_t others : {counts.num_invalid, counts.num_out_of_range, counts.num_masked, counts.num_edge,
+                                    counts.num_slanted, counts.num_kept}) {
+    counts.num_isolated -= others;
+  }
+  if (report != nullptr) *report = counts;
+  if (labels != nullptr) *labels = label(depth, camera, options, mask, marks, keep, num_threads);
+  return clean;
+}
+
+MaskImage label_pixels(const DepthRef& depth, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
+                       int num_threads) {
+  MaskImage labels;
+  clean_depth(depth, camera, options, mask, nullptr, nullptr, &labels, num_threads);
+  return labels;
+}
+
+Points back_project(const DepthRef& depth, const Camera& camera, int num_threads) {
+  require_camera_size("depth", depth.rows(), depth.cols(), camera);
+  const std::int64_t height = camera.height(), block_size = rows_per_block(camera.width());
+  const auto ray_row = [&](std::int64_t v) { return camera.ray_table().row(static_cast<int>(v)); };
+  std::vector<std::int64_t> first(static_cast<std::size_t>(height) + 1);
+  const auto count = simd::count_points();
+  parallel_for(height, block_size, num_threads, [&](std::int64_t v) {
+    first[static_cast<std::size_t>(v) + 1] = count(&depth.coeffRef(v, 0), ray_row(v), camera.width());
+  });
+  std::partial_sum(first.begin(), first.end(), first.begin());
+  Points points(first.back(), 3);
+  const auto gather = simd::gather_points();
+  parallel_for(height, block_size, num_threads, [&](std::int64_t v) {
+    const std::int64_t begin = first[static_cast<std::size_t>(v)], end = first[static_cast<std::size_t>(v) + 1];
+    gather(&depth.coeffRef(v, 0), ray_row(v), camera.width(), points.data() + 3 * begin, static_cast<int>(end - begin));
+  });
+  return points;
+}
+
+}  // namespace nacre

@@ -1,0 +1,104 @@
+// The noise of a sensor, pooled over the images of a recording.
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "depth/window_fits.hpp"
+#include "nacre/depth.hpp"
+
+namespace nacre {
+namespace {
+
+constexpr double kMostFrames = 100.0;      // a frame counts at least so much, so that drift is followed
+constexpr std::size_t kLeastWindows = 40;  // of a frame at some depth
+constexpr double kPriorWeight = 0.01;      // of the prior's curve against all that was measured
+constexpr double kNearest = 0.25, kBinsPerOctave = 3.0;
+
+// c and q, not negative, of c + q s_i = 1 in the sense of weighted least squares, drawn to (c0, q0).
+struct CurveFit {
+  double cc = 0.0, cq = 0.0, qq = 0.0, c = 0.0, q = 0.0, weight = 0.0;
+
+  void add(double per_c, double per_q, double w) {
+    cc += w * per_c * per_c;
+    cq += w * per_c * per_q;
+    qq += w * per_q * per_q;
+    c += w * per_c;
+    q += w * per_q;
+    weight += w;
+  }
+
+  std::pair<double, double> solve() const {
+    const double determinant = cc * qq - cq * cq;
+    const double constant = (c * qq - q * cq) / determinant, quadratic = (q * cc - c * cq) / determinant;
+    if (constant < 0.0) return {0.0, q / qq};
+    if (quadratic < 0.0) return {c / cc, 0.0};
+    return {constant, quadratic};
+  }
+};
+
+}  // namespace
+
+NoiseCalibration::NoiseCalibration(const Camera& camera) : camera_(camera) {}
+
+void NoiseCalibration::add(const DepthRef& depth, int num_threads) {
+  const PlanarImage image(depth, camera_, num_threads);
+  add(image, fit_windows(image, camera_, num_threads), num_threads);
+}
+
+void NoiseCalibration::add(const PlanarImage& image, const WindowFits& fits, int num_threads) {
+  const std::optional<NoiseScale> scale = measure_noise(fits, num_threads);
+  if (!scale) return;
+  const auto pool = [](Mean& mean, double value) {
+    mean.count = std::min(mean.count + 1.0, kMostFrames);
+    mean.value += (value - mean.value) / mean.count;
+  };
+  pool(local_, std::log(scale->local));
+  pool(total_, std::log(scale->total));
+  if (camera_.model() != Camera::Model::pinhole) return;
+
+  std::array<std::vector<float>, num_bins> residuals;
+  for (int row = 0; row < fits.rows; ++row) {
+    const float* const values = image.row(WindowFits::centre(row));
+    for (int column = 0; column < fits.cols; ++column) {
+      const float residual = fits.residual[static_cast<std::size_t>(row * fits.cols + column)];
+      if (!(residual >= 0.0F)) continue;
+      const double z = 1.0 / static_cast<double>(values[WindowFits::centre(column)]);
+      const double bin = std::floor(kBinsPerOctave * std::log2(z / kNearest));
+      if (bin < 0.0 || bin >= static_cast<double>(num_bins)) continue;
+      residuals[static_cast<std::size_t>(bin)].push_back(residual);
+    }
+  }
+  for (std::size_t bin = 0; bin < num_bins; ++bin) {
+    if (residuals[bin].size() < kLeastWindows) continue;
+    const double typical = quantile(residuals[bin], 0.4);
+    if (typical > 0.0) pool(bins_[bin], std::log(typical));
+  }
+  pool(fitted_, std::log(std::max(quantile(fits.residual, 0.4), 1e-6)));
+}
+
+NoiseModel NoiseCalibration::model() const {
+  if (local_.count == 0.0) return estimate_noise(WindowFits{}, camera_, 1);
+  NoiseModel model = scaled_prior(camera_, {std::exp(local_.value), std::exp(total_.value)});
+  if (camera_.model() != Camera::Model::pinhole) return model;
+
+  // The curve's shape, where the recording shows several depths: relative to what the fits leave over on the whole.
+  const NoiseModel prior = sensor_prior(camera_);
+  CurveFit fit;
+  for (std::size_t bin = 0; bin < num_bins; ++bin) {
+    if (bins_[bin].count == 0.0) continue;
+    const double z = kNearest * std::exp2((static_cast<double>(bin) + 0.5) / kBinsPerOctave);
+    const double sigma = prior.sigma(z) * std::exp(bins_[bin].value - fitted_.value);
+    fit.add(1.0 / sigma, (z - prior.offset) * (z - prior.offset) / sigma, bins_[bin].count);
+  }
+  if (fit.weight == 0.0) return model;
+  const double weight = kPriorWeight * fit.weight;
+  fit.add(1.0 / prior.constant, 0.0, weight);
+  fit.add(0.0, 1.0 / prior.quadratic, weight);
+  const auto [constant, quadratic] = fit.solve();
+  const double scale = std::exp(total_.value);
+  model.constant = scale * constant;
+  model.quadratic = scale * quadratic;
+  return model;
+}
+
+}  // namespace nacre

@@ -1,0 +1,90 @@
+#include "fusion/deformation.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.hpp"
+#include "spatial/hash_grid.hpp"
+
+namespace nacre {
+
+void move_points(PointModel& model, const std::vector<Pose>& corrections, int num_threads) {
+  std::vector<Eigen::Isometry3f> motions;
+  motions.reserve(corrections.size());
+  for (const Pose& correction : corrections) motions.emplace_back(correction.cast<float>());
+  parallel_for(model.size(), 4096, num_threads, [&](std::int64_t k) {
+    const auto i = static_cast<std::size_t>(k);
+    const Eigen::Isometry3f& motion = motions[static_cast<std::size_t>(model.last_seen[i])];
+    model.points[i] = motion * model.points[i];
+    model.normals[i] = (motion.linear() * model.normals[i]).normalized();
+  });
+}
+
+void merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
+                  const std::function<double(const Eigen::Vector3f&)>& spacing_of) {
+  constexpr float least_cosine = 0.5F;
+  constexpr double thickness = 2.75;  // of the layers, in spacings
+  std::vector<std::size_t> old;
+  std::vector<std::uint8_t> flags(model.points.size(), 1);
+  for (std::size_t i = 0; i < model.points.size(); ++i) {
+    if (model.last_seen[i] < oldest_frame) old.push_back(i);
+  }
+  constexpr int num_levels = 4;  // of spacing, each twice the one before
+  std::vector<PointGrid> grids;
+  for (int level = 0; level < num_levels; ++level) {
+    grids.emplace_back(std::ldexp(spacing, level) * std::hypot(1.0, thickness), old.size());
+    for (const std::size_t i : old) grids.back().add(model.points[i]);
+  }
+
+  std::size_t next_old = 0;
+  for (std::size_t i = 0; i < model.points.size(); ++i) {
+    if (next_old < old.size() && old[next_old] == i) {
+      ++next_old;
+      continue;
+    }
+    int level = 0;
+    const double wanted = spacing_of(model.points[i]);
+    while (level + 1 < num_levels && std::ldexp(spacing, level) < wanted) ++level;
+    const double between = std::clamp(wanted, spacing, std::ldexp(spacing, level));
+    const auto reach = static_cast<float>(between), across = static_cast<float>(thickness * between);
+    // The nearest along the surface, the older of two as near.
+    std::size_t best = 0;
+    float least = reach * reach;
+    grids[static_cast<std::size_t>(level)].any_near(model.points[i], [&](std::int32_t k) {
+      const std::size_t j = old[static_cast<std::size_t>(k)];
+      const Eigen::Vector3f difference = model.points[i] - model.points[j];
+      const float offset = difference.dot(model.normals[j]);
+      const float along = difference.squaredNorm() - offset * offset;
+      if (std::abs(offset) < across && (along < least || (along == least && j < best)) &&
+          model.normals[i].dot(model.normals[j]) > least_cosine) {
+        least = along;
+        best = j;
+      }
+      return false;
+    });
+    if (!(least < reach * reach)) continue;
+    flags[i] = 0;
+    const float gain = model.confidence[i] / (model.confidence[i] + model.confidence[best]);
+    model.points[best] += gain * (model.points[i] - model.points[best]).dot(model.normals[best]) * model.normals[best];
+    model.normals[best] = (model.normals[best] + gain * (model.normals[i] - model.normals[best])).normalized();
+    if (!model.colors.empty() && model.colors[i].allFinite()) {
+      Eigen::Vector3f& color = model.colors[best];
+      color = color.allFinite() ? Eigen::Vector3f(color + gain * (model.colors[i] - color)) : model.colors[i];
+    }
+    for (PointAttribute& attribute : model.attributes) {
+      const auto channels = static_cast<std::size_t>(attribute.num_channels);
+      for (std::size_t c = 0; c < channels; ++c) {
+        float& value = attribute.values[best * channels + c];
+        const float other = attribute.values[i * channels + c];
+        if (std::isfinite(other)) value = std::isfinite(value) ? value + gain * (other - value) : other;
+      }
+    }
+    model.confidence[best] += model.confidence[i];
+    model.sightings[best] = static_cast<std::uint8_t>(std::min(255, model.sightings[best] + model.sightings[i]));
+    model.last_seen[best] = std::max(model.last_seen[best], model.last_seen[i]);
+  }
+  for (const std::size_t i : old) model.violations[i] = 0;
+  model.keep(flags);
+}
+
+}  // namespace nacre

@@ -1,0 +1,52 @@
+#include "loops/key_frames.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/se3.hpp"
+#include "base/statistics.hpp"
+#include "camera/point_projection.hpp"
+
+namespace nacre {
+
+FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
+  constexpr int most_points = 3000;
+  ModelOptions fewer = options;
+  fewer.registration.max_samples = most_points;
+  FrameCloud cloud{sample_frame(frame, observer, fewer), 0.0};
+  cloud.depth = median_depth(cloud.points);
+  return cloud;
+}
+
+double median_depth(const Points& points) {
+  return points.rows() > 0 ? static_cast<double>(median_of(points.col(2))) : 1.0;
+}
+
+double view_distance(const Pose& a, const Pose& b, double depth) {
+  constexpr double turn = 0.2, part_of_depth = 0.15;
+  const double angle = angle_between(a, b);
+  return std::max(angle / turn, (a.translation() - b.translation()).norm() / (part_of_depth * depth));
+}
+
+CloudInView look_for(const FrameCloud& cloud, const Pose& camera_from_cloud, const Frame& frame, const Camera& camera,
+                     double margin) {
+  const ModelView view(camera, camera_from_cloud.inverse());
+  std::int64_t seen = 0, through = 0;
+  ModelView::Block block;
+  for (Eigen::Index begin = 0; begin < cloud.points.rows(); begin += ModelView::capacity) {
+    const auto count = static_cast<int>(std::min<Eigen::Index>(ModelView::capacity, cloud.points.rows() - begin));
+    view.project(cloud.points.data() + 3 * begin, cloud.normals.data() + 3 * begin, count, block);
+    for (int i = 0; i < count; ++i) {
+      if (!block.inside[i] || !(block.facing[i] > 0.2F)) continue;
+      const float behind = frame.points(block.pixel[i], 2) - block.z[i];
+      const float tolerance =
+          std::max(static_cast<float>(margin) * block.z[i], 4.0F * frame.sigma[block.pixel[i]]) / block.facing[i];
+      if (!std::isfinite(behind) || behind < -tolerance) continue;
+      ++(behind > tolerance ? through : seen);
+    }
+  }
+  const double all = static_cast<double>(std::max<Eigen::Index>(1, cloud.points.rows()));
+  return {static_cast<double>(seen) / all, static_cast<double>(through) / all};
+}
+
+}  // namespace nacre

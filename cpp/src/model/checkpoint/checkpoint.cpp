@@ -1,0 +1,343 @@
+// A model as bytes, and back: a header (magic, format, nacre's version, length, checksum), then the state.
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "base/random.hpp"
+#include "model/checkpoint/state.hpp"
+#include "model/model_impl.hpp"
+#include "nacre/version.hpp"
+
+namespace nacre {
+namespace {
+
+constexpr char magic[] = {'n', 'a', 'c', 'r', 'e', 'm', 'd', 'l'};
+constexpr std::size_t version_at = 12, length_at = 32, checksum_at = 40, header_size = 48;
+
+std::uint64_t checksum_of(std::string_view bytes) {
+  std::uint64_t sum = bytes.size();
+  for (std::size_t i = 0; i < bytes.size(); i += sizeof(std::uint64_t)) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, bytes.data() + i, std::min(sizeof(word), bytes.size() - i));
+    sum = mix64(sum ^ word);
+  }
+  return sum;
+}
+
+template <class Number>
+Number number_at(std::string_view bytes, std::size_t offset) {
+  Number number;
+  std::memcpy(&number, bytes.data() + offset, sizeof(number));
+  return number;
+}
+
+template <class Number>
+void set_number(std::string& bytes, std::size_t offset, Number number) {
+  std::memcpy(bytes.data() + offset, &number, sizeof(number));
+}
+
+std::string sealed(std::string bytes) {
+  std::copy(std::begin(magic), std::end(magic), bytes.begin());
+  set_number(bytes, sizeof(magic), checkpoint_format);
+  const std::string version = NACRE_VERSION;
+  version.copy(bytes.data() + version_at, length_at - version_at - 1);
+  set_number(bytes, length_at, static_cast<std::uint64_t>(bytes.size()));
+  set_number(bytes, checksum_at, checksum_of(std::string_view(bytes).substr(header_size)));
+  return bytes;
+}
+
+void check_seal(std::string_view bytes) {
+  if (bytes.size() < header_size || !std::equal(std::begin(magic), std::end(magic), bytes.begin())) {
+    throw CheckpointError("it is no model that nacre saved", 0);
+  }
+  const auto format = number_at<std::uint32_t>(bytes, sizeof(magic));
+  if (format != checkpoint_format) {
+    std::string writer(bytes.substr(version_at, length_at - version_at));
+    writer = writer.substr(0, writer.find('\0'));
+    writer.erase(std::remove_if(writer.begin(), writer.end(), [](char c) { return c < ' ' || c > '~'; }), writer.end());
+    std::ostringstream reason;
+    reason << "it has checkpoint format " << format << " (nacre " << writer << " wrote it), and nacre " << NACRE_VERSION
+           << " reads format " << checkpoint_format << ": use that version, or run the recording again";
+    throw CheckpointError(reason.str(), sizeof(magic));
+  }
+  const auto length = number_at<std::uint64_t>(bytes, length_at);
+  if (length != bytes.size()) {
+    std::ostringstream reason;
+    if (length > bytes.size()) {
+      reason << "it has " << bytes.size() << " of its " << length << " bytes: it was not written or copied to the end";
+    } else {
+      reason << "it has " << bytes.size() << " bytes and says that they are " << length << ": it is damaged";
+    }
+    throw CheckpointError(reason.str(), static_cast<std::int64_t>(std::min<std::uint64_t>(length, bytes.size())));
+  }
+  if (number_at<std::uint64_t>(bytes, checksum_at) != checksum_of(bytes.substr(header_size))) {
+    throw CheckpointError("it is damaged: its checksum does not fit", checksum_at);
+  }
+}
+
+struct CameraFields {
+  Camera::Model model = Camera::Model::pinhole;
+  DepthKind depth_kind = DepthKind::z;
+  int width = 0, height = 0;
+  double fx = 0, fy = 0, cx = 0, cy = 0, pixel_size = 0;
+  Camera::Distortion distortion{};
+
+  std::int64_t num_pixels() const { return static_cast<std::int64_t>(width) * height; }
+  // Whether its rays take memory for every pixel.
+  bool has_table() const { return distortion != Camera::Distortion{} || depth_kind == DepthKind::radial; }
+  Camera camera() const {
+    if (model == Camera::Model::orthographic) return Camera::orthographic(width, height, pixel_size);
+    return Camera::pinhole(width, height, fx, fy, cx, cy, distortion, depth_kind);
+  }
+};
+
+CameraFields fields_of(const Camera& camera) {
+  return {camera.model(), camera.depth_kind(), camera.width(), camera.height(),     camera.fx(),
+          camera.fy(),    camera.cx(),         camera.cy(),    camera.pixel_size(), camera.distortion()};
+}
+
+template <class Archive>
+void exchange(Archive& archive, CameraFields& fields) {
+  archive.choice(fields.model, Camera::Model::orthographic);
+  archive.choice(fields.depth_kind, DepthKind::radial);
+  archive(fields.width, fields.height, fields.fx, fields.fy, fields.cx, fields.cy, fields.pixel_size,
+          fields.distortion);
+}
+
+// What of a model is neither given nor of the newest frame alone.
+template <class Archive, class Impl>
+void exchange_state(Archive& archive, Impl& state) {
+  archive(state.options.fusion.reference_sigma, state.region, state.calibration, state.cloud, state.loops,
+          state.history, state.before, state.hypothesis, state.views, state.spacing, state.num_lost);
+}
+
+// Space that the table of rays may take before a frame was folded in: see load.
+template <class Impl>
+std::string filler_of(const CameraFields& camera, const Impl& state) {
+  constexpr std::size_t bytes_per_pixel = 8;
+  const bool is_needed = camera.has_table() && state.before.depth.size() == 0;
+  return std::string(is_needed ? bytes_per_pixel * static_cast<std::size_t>(camera.num_pixels()) : 0, '\0');
+}
+
+template <class Number>
+bool is_within(Number number, std::size_t count) {
+  return number >= 0 && static_cast<std::uint64_t>(number) < count;
+}
+
+template <class T, class Test>
+bool are_all(const std::vector<T>& values, Test&& test) {
+  return std::all_of(values.begin(), values.end(), test);
+}
+
+bool is_place(const Eigen::Vector3f& point) {
+  return (point.array().abs() < static_cast<float>(4.0 * farthest_place)).all();  // of a camera, and, turned, from it
+}
+
+bool is_unit(const Eigen::Vector3f& normal) { return std::abs(normal.squaredNorm() - 1.0F) < 0.01F; }
+
+bool is_sound(const PointModel& cloud, std::size_t num_frames) {
+  const std::size_t count = cloud.points.size();
+  if (cloud.normals.size() != count || (!cloud.colors.empty() && cloud.colors.size() != count) ||
+      cloud.confidence.size() != count || cloud.last_seen.size() != count || cloud.sightings.size() != count ||
+      cloud.violations.size() != count) {
+    return false;
+  }
+  for (const PointAttribute& attribute : cloud.attributes) {
+    if (attribute.num_channels < 1 || attribute.values.size() % static_cast<std::size_t>(attribute.num_channels) != 0 ||
+        attribute.values.size() / static_cast<std::size_t>(attribute.num_channels) != count) {
+      return false;
+    }
+  }
+  const auto is_count = [](auto number) { return number >= 0 && std::isfinite(static_cast<float>(number)); };
+  return are_all(cloud.points, is_place) && are_all(cloud.normals, is_unit) && are_all(cloud.confidence, is_count) &&
+         are_all(cloud.sightings, is_count) && are_all(cloud.violations, is_count) &&
+         are_all(cloud.last_seen, [&](std::int32_t frame) { return is_within(frame, num_frames); });
+}
+
+// Whether all numbers are counts, of at most so many.
+template <class... Counts>
+bool are_counts(std::int64_t most, Counts... numbers) {
+  return (... && (numbers >= 0 && numbers <= most));
+}
+
+bool is_sound(const DepthReport& depth, std::int64_t num_pixels) {
+  std::int64_t left = num_pixels;  // each pixel is counted once; no sum of numbers that are made up may overflow
+  for (const std::int64_t count : {depth.num_invalid, depth.num_out_of_range, depth.num_masked, depth.num_edge,
+                                   depth.num_slanted, depth.num_isolated, depth.num_kept}) {
+    if (!are_counts(left, count)) return false;
+    left -= count;
+  }
+  return depth.num_pixels == num_pixels && left == 0;
+}
+
+bool is_sound(const RegionReport& region, std::int64_t num_kept) {
+  return are_counts(num_kept, region.num_inside, region.num_outside) &&
+         region.num_inside <= num_kept - region.num_outside && region.support >= -1 &&
+         region.support < static_cast<int>(region.planes.size());
+}
+
+bool is_sound(const FrameReport& report, std::int64_t num_pixels, std::int64_t max_points) {
+  return is_rigid(report.world_from_camera) && is_sound(report.depth, num_pixels) &&
+         is_sound(report.region, report.depth.num_kept) &&
+         are_counts(report.region.num_inside, report.num_inliers, report.fusion.num_inserted) &&
+         are_counts(max_points, report.num_points, report.fusion.num_updated) &&
+         are_counts(max_points + report.fusion.num_inserted, report.fusion.num_removed) &&
+         (!report.loop_frame || is_within(*report.loop_frame, static_cast<std::size_t>(report.index)));
+}
+
+bool is_image(const MaskImage& image, const Camera& camera) {
+  return image.rows() == camera.height() && image.cols() == camera.width();
+}
+
+bool is_sound(const ObjectView& view, const Camera& camera, std::size_t num_frames) {
+  return is_within(view.frame, num_frames) && view.points.rows() > 0 && view.normals.rows() == view.points.rows() &&
+         view.depth.size() == static_cast<Eigen::Index>(camera.width()) * camera.height() &&
+         is_image(view.region, camera);
+}
+
+}  // namespace
+
+bool PrivateState::is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options) {
+  const std::int64_t num_pixels = static_cast<std::int64_t>(camera.width()) * camera.height();
+  const std::size_t num_frames = history.size();
+  for (const FrameHistory::Chunk& chunk : history.chunks_) {
+    const bool is_last = &chunk == &history.chunks_.back();
+    if (chunk.ends.empty() || chunk.ends.size() > FrameHistory::per_chunk ||
+        (!is_last && chunk.ends.size() < FrameHistory::per_chunk) || chunk.poses.size() != chunk.ends.size() ||
+        chunk.ends.back() != chunk.bytes.size() || !std::is_sorted(chunk.ends.begin(), chunk.ends.end())) {
+      return false;
+    }
+  }
+  std::vector<std::int32_t> registered;
+  try {
+    for (std::size_t i = 0; i < num_frames; ++i) {
+      const FrameReport report = history[i];
+      if (!nacre::is_sound(report, num_pixels, options.max_points)) return false;
+      if (report.status != FrameStatus::lost) registered.push_back(static_cast<std::int32_t>(i));
+    }
+  } catch (const CheckpointError&) {  // whose place is none in the file
+    return false;
+  }
+  return registered == history.registered_;
+}
+
+bool PrivateState::is_sound(const PoseGraph& graph) {
+  const std::size_t count = graph.poses_.size();
+  if (graph.unknowns_.size() != count) return false;
+  int next = 0;
+  for (const int unknown : graph.unknowns_) {
+    if (unknown != -1 && unknown != next) return false;
+    if (unknown != -1) next += 6;
+  }
+  return graph.num_unknowns_ == next &&
+         std::all_of(graph.edges_.begin(), graph.edges_.end(),
+                     [&](const PoseEdge& edge) { return is_within(edge.from, count) && is_within(edge.to, count); });
+}
+
+bool PrivateState::is_sound(const LoopClosure& loops, std::size_t num_frames) {
+  const std::size_t count = loops.key_frames_.size();
+  if (!is_sound(loops.graph_) || loops.graph_.poses_.size() != count || loops.seen_with_.size() != count) return false;
+  for (const KeyFrame& key_frame : loops.key_frames_) {
+    const FrameCloud& cloud = key_frame.cloud;
+    const Eigen::Index rows = cloud.points.rows();
+    if (!is_within(key_frame.frame, num_frames) || cloud.normals.rows() != rows || cloud.noise.rows() != rows ||
+        cloud.sigma.rows() != rows) {
+      return false;
+    }
+  }
+  for (const std::vector<int>& others : loops.seen_with_) {
+    if (!std::all_of(others.begin(), others.end(), [&](int other) { return is_within(other, count); })) return false;
+  }
+  std::int32_t last = -1;
+  for (const LoopClosure::Stop& stop : loops.stops_) {
+    if (!is_within(stop.key_frame, count) || !is_within(stop.frame, num_frames) || stop.frame <= last) return false;
+    last = stop.frame;
+  }
+  if (loops.stops_.empty() != loops.key_frames_.empty()) return false;
+  const auto& pending = loops.pending_;
+  return !pending || (is_within(pending->key_frame, count) && is_within(pending->node, count) &&
+                      is_within(pending->stop, loops.stops_.size() + 1));
+}
+
+bool PrivateState::is_sound(const PlaceHypothesis& hypothesis) {
+  return !hypothesis.before_ || hypothesis.before_->normals.rows() == 0 ||
+         hypothesis.before_->normals.rows() == hypothesis.before_->points.rows();
+}
+
+bool PrivateState::is_sound(const NoiseCalibration& calibration) {
+  const auto is_mean = [](const NoiseCalibration::Mean& mean) {
+    return std::isfinite(mean.value) && std::isfinite(mean.count) && mean.count >= 0.0;
+  };
+  return is_mean(calibration.local_) && is_mean(calibration.total_) && is_mean(calibration.fitted_) &&
+         std::all_of(calibration.bins_.begin(), calibration.bins_.end(), is_mean);
+}
+
+std::string Model::save(const std::string& note) const {
+  std::string bytes(header_size, '\0'), kept = note;
+  StateWriter archive(bytes);
+  CameraFields camera = fields_of(impl_->camera);
+  exchange(archive, camera);
+  std::string filler = filler_of(camera, *impl_);
+  archive(impl_->given, filler);
+  exchange_state(archive, *impl_);
+  archive(kept);
+  return sealed(std::move(bytes));
+}
+
+Model Model::load(std::string_view bytes, std::string* note) {
+  check_seal(bytes);
+  StateReader archive(bytes, header_size);
+  CameraFields camera;
+  ModelOptions given;
+  std::string filler, kept;
+  exchange(archive, camera);
+  // Of a camera whose size is made up, the rays would take more memory than there is.
+  archive.require(!camera.has_table() || (camera.width > 0 && camera.height > 0 &&
+                                          static_cast<std::size_t>(camera.num_pixels()) <= archive.left() / 8),
+                  "the camera is larger than what is left");
+  archive(given, filler);
+  std::unique_ptr<Impl> impl;
+  try {
+    impl = std::make_unique<Impl>(camera.camera(), given);
+  } catch (const std::invalid_argument& error) {
+    archive.fail(error.what());
+  }
+  Impl& state = *impl;
+  exchange_state(archive, state);
+  archive(kept);
+  archive.require_end();
+
+  archive.require(PrivateState::is_sound(state.history, state.camera, given),
+                  "the report of a frame contradicts itself, the camera or the options");
+  const std::size_t num_frames = state.history.size();
+  const Eigen::Index num_pixels = camera.num_pixels();
+  const auto is_pixels = [&](const Values& values) { return values.size() == num_pixels; };
+  const Sight& before = state.before;
+  const bool is_first = state.cloud.size() == 0 && before.depth.size() == 0;
+  archive.require(filler == filler_of(camera, state), "its length does not fit the camera");
+  archive.require(state.region.size() == 0 || is_image(state.region, state.camera), "the region has another size");
+  archive.require(is_sound(state.cloud, num_frames), "the points are not all there, or no surface");
+  archive.require(is_first || (is_pixels(before.depth) && is_pixels(before.sigma) && is_pixels(before.measured)),
+                  "the newest view has another size than the camera");
+  archive.require(is_first || state.history.num_registered() > 0, "the poses are missing");
+  archive.require(num_frames == 0 || state.history.back().num_points == state.cloud.size(),
+                  "the newest report has another number of points");
+  archive.require(is_within(state.num_lost, num_frames + 1), "more frames are lost than there are");
+  const bool is_spaced = state.spacing > 0.0 || state.cloud.size() == 0;
+  archive.require(is_spaced && state.spacing >= given.spacing && state.spacing < farthest_place,
+                  "the spacing is not a distance between the points");
+  for (const ObjectView& view : state.views) {
+    archive.require(is_sound(view, state.camera, num_frames), "a view of the object contradicts the camera");
+  }
+  archive.require(PrivateState::is_sound(state.loops, num_frames), "the key frames contradict each other");
+  archive.require(PrivateState::is_sound(state.hypothesis), "the place that is followed contradicts itself");
+  archive.require(PrivateState::is_sound(state.calibration), "the noise is not finite");
+  if (note != nullptr) *note = std::move(kept);
+  return Model(std::move(impl));
+}
+
+CheckpointError::CheckpointError(const std::string& reason, std::int64_t offset)
+    : std::runtime_error(reason), offset_(offset) {}
+CheckpointError::~CheckpointError() = default;
+
+}  // namespace nacre

@@ -1,0 +1,56 @@
+// All that a model knows.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "fusion/observer.hpp"
+#include "loops/loop_closure.hpp"
+#include "model/frame_history.hpp"
+#include "nacre/model.hpp"
+#include "tracking/acceptance.hpp"
+#include "tracking/object_view.hpp"
+#include "tracking/relocalisation_filter.hpp"
+#include "tracking/tracking.hpp"
+
+namespace nacre {
+
+struct Model::Impl {
+  Camera camera;
+  ModelOptions given;    // options as given
+  ModelOptions options;  // what the first frame decides is filled in
+  Frame frame;           // the newest; its memory and the observer's are used again for the next
+  SurfaceObserver observer{camera, options.fusion};
+  MaskImage region;  // of the newest frame; empty where nothing is left out
+  NoiseCalibration calibration{camera};
+  PointModel cloud;
+  LoopClosure loops{camera, options};
+  FrameHistory history;
+  Sight now;                          // of the newest, from the origin: where the camera is, is to be found
+  std::vector<OutlinePoint> outline;  // of the newest
+  Sight before;                       // of the newest frame that was folded in
+  PlaceHypothesis hypothesis;         // while the camera is lost
+  std::vector<ObjectView> views;      // of an object that stands on a plane, from different directions
+  double spacing = 0.0;
+  std::int64_t num_lost = 0;  // frames in a row, up to the newest
+
+  bool was_lost() const { return num_lost > 0; }
+  bool jumped() const;
+
+  Impl(const Camera& camera_in, const ModelOptions& options_in);
+
+  FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
+  NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
+  void keep_region(FrameReport& report);
+  TrackingResult locate(const FrameExtras& extras, const RegionReport& region);
+  std::vector<Pose> guesses(const FrameExtras& extras) const;
+  WhereElse elsewhere(const RegionReport& region) const;
+  std::optional<ObjectView> view_of_object(const RegionReport& region) const;
+  void keep_view(const FrameReport& report);
+  void adjust(FrameReport& report);
+  bool keeps_key_frames() const { return options.loop_closure && options.fold_in == FoldIn::fuse; }
+  void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
+  void fold_in(const FrameExtras& extras, FrameReport& report);
+};
+
+}  // namespace nacre

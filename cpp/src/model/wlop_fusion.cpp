@@ -1,0 +1,153 @@
+#include "model/wlop_fusion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.hpp"
+#include "base/random.hpp"
+#include "nacre/kdtree.hpp"
+#include "spatial/hash_grid.hpp"
+
+namespace nacre {
+namespace {
+
+PointsRef as_matrix(const std::vector<Eigen::Vector3f>& points) {
+  return Eigen::Map<const Points>(points.empty() ? nullptr : points.front().data(),
+                                  static_cast<Eigen::Index>(points.size()), 3);
+}
+
+PointModel to_world(const Frame& frame, const Pose& world_from_camera, std::int32_t frame_index) {
+  const Eigen::Isometry3f transform(world_from_camera.cast<float>());
+  PointModel result;
+  for (const std::int32_t row : frame.valid) {
+    // Single precision cannot tell the normal of what is extremely near or far.
+    if (!(std::abs(frame.normals.row(row).squaredNorm() - 1.0F) < 0.01F)) continue;
+    result.points.emplace_back(transform * Eigen::Vector3f(frame.points.row(row).transpose()));
+    result.normals.emplace_back(transform.linear() * frame.normals.row(row).transpose());
+  }
+  result.confidence.assign(result.points.size(), 1.0F);
+  result.last_seen.assign(result.points.size(), frame_index);
+  result.sightings.assign(result.points.size(), 1);
+  result.violations.assign(result.points.size(), 0);
+  return result;
+}
+
+// `count` points of a cloud, chosen by random numbers that depend on the seed and the point's number only.
+PointModel choose(const PointModel& cloud, double count, std::uint64_t seed) {
+  std::vector<std::pair<std::uint64_t, std::size_t>> keyed;
+  for (std::size_t i = 0; i < cloud.points.size(); ++i) keyed.emplace_back(random_bits(seed, i), i);
+  std::sort(keyed.begin(), keyed.end());
+  std::vector<std::uint8_t> flags(cloud.points.size(), 0);
+  const auto wanted = std::min(keyed.size(), static_cast<std::size_t>(std::lround(std::max(0.0, count))));
+  for (std::size_t k = 0; k < wanted; ++k) flags[keyed[k].second] = 1;
+  PointModel chosen = cloud;
+  chosen.keep(flags);
+  return chosen;
+}
+
+template <class Value>
+void append(std::vector<Value>& values, const std::vector<Value>& more) {
+  values.insert(values.end(), more.begin(), more.end());
+}
+
+void append(PointModel& model, const PointModel& more) {
+  append(model.points, more.points);
+  append(model.normals, more.normals);
+  append(model.confidence, more.confidence);
+  append(model.last_seen, more.last_seen);
+  append(model.sightings, more.sightings);
+  append(model.violations, more.violations);
+}
+
+// The paper's samples: most of the model, and new points in proportion to it; half of the first frame.
+PointModel paper_samples(const PointModel& model, const PointModel& fresh, const ModelOptions& options,
+                         std::uint64_t seed) {
+  PointModel samples;
+  if (model.size() == 0) {
+    samples = choose(fresh, options.first_fraction * static_cast<double>(fresh.size()), seed);
+  } else {
+    samples = choose(model, options.kept_fraction * static_cast<double>(model.size()), seed);
+    append(samples, choose(fresh, options.new_fraction * static_cast<double>(model.size()), seed + 1));
+  }
+  return samples.size() > options.max_points ? choose(samples, options.max_points, seed + 2) : samples;
+}
+
+// The repaired samples: the whole model, and the new points that it does not cover.
+PointModel covering_samples(const PointModel& model, const PointModel& fresh, const ModelOptions& options,
+                            double spacing) {
+  PointModel samples = model;
+  PointGrid grid(spacing, model.points.size() + fresh.points.size());
+  for (const Eigen::Vector3f& point : model.points) grid.add(point);
+  std::vector<std::uint8_t> flags(fresh.points.size(), 0);
+  std::vector<Eigen::Vector3f> known = model.points;
+  for (std::size_t i = 0; i < fresh.points.size() && static_cast<int>(known.size()) < options.max_points; ++i) {
+    const bool is_known = grid.any_near(fresh.points[i], [&](std::int32_t k) {
+      return (known[static_cast<std::size_t>(k)] - fresh.points[i]).norm() < static_cast<float>(spacing);
+    });
+    if (is_known) continue;
+    flags[i] = 1;
+    grid.add(fresh.points[i]);
+    known.push_back(fresh.points[i]);
+  }
+  PointModel chosen = fresh;
+  chosen.keep(flags);
+  append(samples, chosen);
+  return samples;
+}
+
+}  // namespace
+
+void consolidate_frame(PointModel& model, const Frame& frame, const Pose& world_from_camera,
+                       const ModelOptions& options, double spacing, std::int32_t frame_index) {
+  const bool literal = options.fold_in == FoldIn::wlop;
+  const PointModel fresh = to_world(frame, world_from_camera, frame_index);
+  const std::uint64_t seed = mix64(options.consolidation.seed) + 16 * static_cast<std::uint64_t>(frame_index);
+  PointModel samples =
+      literal ? paper_samples(model, fresh, options, seed) : covering_samples(model, fresh, options, spacing);
+  PointModel points = model;
+  append(points, fresh);
+
+  // Which samples does the frame observe?
+  const KdTree tree(as_matrix(fresh.points), options.num_threads);
+  std::vector<std::uint8_t> unseen(samples.points.size(), 0);
+  parallel_for(samples.size(), 256, options.num_threads, [&](std::int64_t i) {
+    std::int64_t index = 0;
+    double squared_distance = 0.0;
+    const auto k = static_cast<std::size_t>(i);
+    const Eigen::Vector3d point = samples.points[k].cast<double>();
+    const int found = tree.nearest(point, 1, options.consolidation.radius, &index, &squared_distance);
+    // Of a thin sheet, the frame observes one side.
+    unseen[k] = found == 0 || fresh.normals[static_cast<std::size_t>(index)].dot(samples.normals[k]) < 0.0F ? 1 : 0;
+  });
+
+  ConsolidateOptions consolidation = options.consolidation;
+  consolidation.method = literal ? ConsolidationMethod::wlop : ConsolidationMethod::wlop_plus;
+  Points moved;
+  if (literal) {
+    moved = project_samples(as_matrix(samples.points), as_matrix(points.points), consolidation);
+  } else {
+    ProjectionHints hints;
+    hints.point_weights = Eigen::Map<const Values>(points.confidence.data(), points.size());
+    hints.sample_normals = as_matrix(samples.normals);
+    hints.frozen = unseen;
+    moved = project_samples(as_matrix(samples.points), as_matrix(points.points), consolidation, hints);
+  }
+  for (std::size_t i = 0; i < samples.points.size(); ++i) {
+    samples.points[i] = moved.row(static_cast<Eigen::Index>(i)).transpose();
+    if (unseen[i]) continue;
+    samples.confidence[i] += 1.0F;
+    samples.last_seen[i] = frame_index;
+  }
+  model = std::move(samples);
+}
+
+void renew_normals(PointModel& model, const ModelOptions& options) {
+  const Points normals = estimate_normals(as_matrix(model.points), options.normals);
+  for (std::size_t i = 0; i < model.normals.size(); ++i) {
+    const Eigen::Vector3f normal = normals.row(static_cast<Eigen::Index>(i)).transpose();
+    if (!normal.allFinite()) continue;
+    model.normals[i] = normal.dot(model.normals[i]) < 0.0F ? Eigen::Vector3f(-normal) : normal;
+  }
+}
+
+}  // namespace nacre

@@ -1,0 +1,103 @@
+#include "outlines/match.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "base/parallel.hpp"
+#include "base/statistics.hpp"
+
+namespace nacre {
+namespace {
+
+constexpr double cos_alike = 0.75;      // of the largest angle between matched outlines, and their surfaces
+constexpr double least_facing = 0.5;    // cosine between a normal and the direction to the camera
+constexpr double look_within = 3.0;     // [pixels]: nearer to an edge, pixels see both of its sides
+constexpr double look_beyond = 5.0;     // [pixels]
+constexpr double least_distance = 2.0;  // of a surface from another [pixels]
+
+// How far before a point of a surface a camera saw something, along its normal [m], averaged over the pixels around;
+// NaN where it saw nothing, none outside of the image. All in the camera frame.
+std::optional<double> distance_before(const Sight& sight, const Camera& camera, const Eigen::Vector3d& point,
+                                      const Eigen::Vector3d& normal) {
+  const Eigen::Vector2d pixel = camera.project(point);
+  if (!(pixel.x() > 1.0 && pixel.y() > 1.0 && pixel.x() < camera.width() - 2 && pixel.y() < camera.height() - 2)) {
+    return std::nullopt;
+  }
+  const int u = static_cast<int>(std::lround(pixel.x())), v = static_cast<int>(std::lround(pixel.y()));
+  double sum = 0.0;
+  int count = 0;
+  for (int y = v - 1; y <= v + 1; ++y) {
+    for (int x = u - 1; x <= u + 1; ++x) {
+      const double z = static_cast<double>(sight.depth[y * camera.width() + x]);
+      if (!std::isfinite(z)) continue;
+      sum += (unproject(camera, x, y, z) - point).dot(normal);
+      ++count;
+    }
+  }
+  return sum / count;
+}
+
+bool is_contradicted(const OutlinePoint& edge, const Sight& sight, const Camera& camera, double pixel, double noise) {
+  const bool is_orthographic = camera.model() == Camera::Model::orthographic;
+  const Eigen::Vector3d sight_line = is_orthographic ? Eigen::Vector3d::UnitZ() : edge.point.normalized();
+  if (!(-edge.normal.dot(sight_line) > least_facing)) return false;
+  const double tolerance = least_distance * pixel + noise;
+  const auto here = distance_before(sight, camera, edge.point - look_within * pixel * edge.outward, edge.normal);
+  if (!here) return false;
+  if (!(*here > -tolerance)) return true;
+  const auto beyond = distance_before(sight, camera, edge.point + look_beyond * pixel * edge.outward, edge.normal);
+  return beyond && std::abs(*beyond) < tolerance;
+}
+
+}  // namespace
+
+std::vector<OutlinePoint> moved(std::vector<OutlinePoint> outline, const Pose& pose) {
+  for (OutlinePoint& edge : outline) {
+    edge = {pose * edge.point, pose.linear() * edge.normal, pose.linear() * edge.outward, edge.pixel};
+  }
+  return outline;
+}
+
+double median_pixel(const std::vector<OutlinePoint>& outline) {
+  std::vector<double> pixels;
+  pixels.reserve(outline.size());
+  for (const OutlinePoint& edge : outline) pixels.push_back(edge.pixel);
+  return median_of(std::move(pixels));
+}
+
+std::vector<int> nearest_edges(const std::vector<OutlinePoint>& outline, const std::vector<OutlinePoint>& others,
+                               double gate, int num_threads) {
+  std::vector<int> nearest(outline.size(), -1);
+  parallel_for(static_cast<std::int64_t>(outline.size()), 32, num_threads, [&](std::int64_t row) {
+    const auto i = static_cast<std::size_t>(row);
+    const OutlinePoint& edge = outline[i];
+    double least = gate * gate;
+    for (std::size_t k = 0; k < others.size(); ++k) {
+      const double squared = (others[k].point - edge.point).squaredNorm();
+      if (!(squared < least) || others[k].outward.dot(edge.outward) < cos_alike ||
+          others[k].normal.dot(edge.normal) < cos_alike) {
+        continue;
+      }
+      least = squared;
+      nearest[i] = static_cast<int>(k);
+    }
+  });
+  return nearest;
+}
+
+double agreement_of(const std::vector<OutlinePoint>& outline, const std::vector<int>& matches, const Sight& sight,
+                    const Camera& camera, double pixel, double noise) {
+  const std::vector<OutlinePoint> seen = moved(outline, sight.world_from_camera.inverse());
+  std::size_t agree = 0, contradicted = 0;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    if (matches[i] >= 0) {
+      ++agree;
+    } else if (is_contradicted(seen[i], sight, camera, pixel, noise)) {
+      ++contradicted;
+    }
+  }
+  return agree > 0 ? static_cast<double>(agree) / static_cast<double>(agree + contradicted) : 0.0;
+}
+
+}  // namespace nacre

@@ -1,0 +1,97 @@
+#include "region/coarse_frame.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace nacre {
+namespace {
+
+constexpr int border = 1;         // of the image [cells]
+constexpr float steepest = 3.0F;  // tangent of the slant at which neighbouring cells still hold together
+constexpr int link_reach = 3;     // [cells]; noisy edges between are missing
+constexpr int most_steps = 2;     // that the distance between linked cells may grow with
+
+}  // namespace
+
+CoarseFrame::CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef& mask) {
+  while ((frame.width / step) * (frame.height / step) > most_cells && step < largest_step) ++step;
+  width = (frame.width + step - 1) / step;
+  height = (frame.height + step - 1) / step;
+  cells.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      Cell& cell = cells[static_cast<std::size_t>(y * width + x)];
+      // The pixel nearest to the middle, one with a normal before all without.
+      int best = std::numeric_limits<int>::max();
+      for (int v = y * step; v < std::min(frame.height, (y + 1) * step); ++v) {
+        for (int u = x * step; u < std::min(frame.width, (x + 1) * step); ++u) {
+          const int row = v * frame.width + u;
+          if (!(frame.points(row, 2) > 0.0F) || (mask.size() > 0 && mask(v, u) == 0)) continue;
+          const int du = 2 * (u - x * step) - step + 1, dv = 2 * (v - y * step) - step + 1;
+          const int rank = du * du + dv * dv + (std::isfinite(frame.normals(row, 0)) ? 0 : 8 * step * step);
+          if (rank >= best) continue;
+          best = rank;
+          cell.pixel = row;
+        }
+      }
+      if (!cell.has_point()) continue;
+      cell.point = frame.points.row(cell.pixel).transpose();
+      const Eigen::Vector3f normal = frame.normals.row(cell.pixel).transpose();
+      if (normal.allFinite()) cell.normal = normal;
+      const float sigma = frame.sigma[cell.pixel];
+      cell.sigma = std::isfinite(sigma) ? sigma : 0.0F;
+      cell.footprint = static_cast<float>(step * camera.footprint(cell.point.z()));
+    }
+  }
+}
+
+bool are_linked(const Cell& a, const Cell& b, int steps, float link) {
+  const float reach =
+      link > 0.0F ? link
+                  : steepest * static_cast<float>(std::min(steps, most_steps)) * std::min(a.footprint, b.footprint);
+  return (a.point - b.point).squaredNorm() < reach * reach;
+}
+
+std::vector<std::int32_t> border_cells(const CoarseFrame& frame, const std::vector<std::int32_t>& group,
+                                       std::size_t num_groups) {
+  std::vector<std::int32_t> count(num_groups, 0);
+  const auto visit = [&](int u, int v) {
+    // Cleaning leaves little at the very border.
+    const int x = std::clamp(u, border, frame.width - 1 - border), y = std::clamp(v, border, frame.height - 1 - border);
+    const std::int32_t number = group[static_cast<std::size_t>(y * frame.width + x)];
+    if (number >= 0) ++count[static_cast<std::size_t>(number)];
+  };
+  if (std::min(frame.width, frame.height) <= 2 * border) return count;
+  for (int u = 0; u < frame.width; ++u) visit(u, 0), visit(u, frame.height - 1);
+  for (int v = 1; v + 1 < frame.height; ++v) visit(0, v), visit(frame.width - 1, v);
+  return count;
+}
+
+CellGroups connect(const CoarseFrame& frame, const std::vector<std::uint8_t>& side, float link) {
+  CellGroups groups;
+  groups.group.assign(side.size(), -1);
+  std::vector<int> open;
+  for (int start = 0; start < frame.size(); ++start) {
+    const auto first = static_cast<std::size_t>(start);
+    if (side[first] == 0 || groups.group[first] >= 0 || !frame[start].has_point()) continue;
+    const auto number = static_cast<std::int32_t>(groups.size.size());
+    groups.size.push_back(0);
+    groups.group[first] = number;
+    open.assign(1, start);
+    while (!open.empty()) {
+      const int i = open.back();
+      open.pop_back();
+      ++groups.size.back();
+      frame.for_neighbours(i, link_reach, [&](int j, int steps) {
+        const auto k = static_cast<std::size_t>(j);
+        if (side[k] != side[first] || groups.group[k] >= 0 || !are_linked(frame[i], frame[j], steps, link)) return;
+        groups.group[k] = number;
+        open.push_back(j);
+      });
+    }
+  }
+  return groups;
+}
+
+}  // namespace nacre

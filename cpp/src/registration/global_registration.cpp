@@ -1,0 +1,94 @@
+#include "nacre/global_registration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/check.hpp"
+#include "registration/global_search.hpp"
+
+namespace nacre {
+namespace {
+
+double consistency_of(const Evidence& evidence, bool outlines) {
+  const double judged = evidence.agree + evidence.against(outlines);
+  return judged > 0.0 ? evidence.agree / judged : 0.0;
+}
+
+}  // namespace
+
+const char* to_string(GlobalAlignStatus status) {
+  switch (status) {
+    case GlobalAlignStatus::found:
+      return "found";
+    case GlobalAlignStatus::ambiguous:
+      return "ambiguous";
+    case GlobalAlignStatus::not_found:
+      return "not_found";
+    default:
+      return "too_few_points";
+  }
+}
+
+void GlobalAlignOptions::check() const {
+  require(num_rotations >= 1, "num_rotations", "at least 1", num_rotations);
+  require(num_candidates >= 2, "num_candidates", "at least 2", num_candidates);
+  require(tolerance >= 0.0 && std::isfinite(tolerance), "tolerance", "0 (automatic) or a positive distance in metres",
+          tolerance);
+  require(max_angle > 0.0, "max_angle", "a positive angle in radians", max_angle);
+  require(min_overlap >= 0.0 && min_overlap <= 1.0, "min_overlap", "in [0, 1]", min_overlap);
+  require(min_consistency >= 0.0 && min_consistency <= 1.0, "min_consistency", "in [0, 1]", min_consistency);
+  require(max_residual > 0.0, "max_residual", "positive", max_residual);
+  require(max_rivalry >= 0.0 && max_rivalry <= 1.0, "max_rivalry", "in [0, 1]", max_rivalry);
+  require(max_points >= 0, "max_points", "0 (no limit) or more", max_points);
+  require(max_samples >= 1, "max_samples", "at least 1", max_samples);
+  require(coarse_samples >= 1, "coarse_samples", "at least 1", coarse_samples);
+  require(num_threads >= 0, "num_threads", "0 (all) or more", num_threads);
+}
+
+GlobalCloud::GlobalCloud(const PointsRef& points_in, const PointsRef& normals_in,
+                         const std::optional<Eigen::Vector3d>& viewpoint_in)
+    : points(points_in), normals(normals_in), viewpoint(viewpoint_in) {
+  require(normals.rows() == 0 || normals.rows() == points.rows(), "normals", "one row per point", normals.rows());
+  if (viewpoint) require(viewpoint->allFinite(), "viewpoint", "finite", viewpoint->transpose());
+}
+
+// A motion whose residuals are too large for the tolerance is no rival, however much is within it.
+Verdict judge(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options, double tolerance) {
+  const double largest = options.max_residual * tolerance;
+  const auto is_close = [&](const SearchCandidate& candidate) { return candidate.alignment.rmse <= largest; };
+  const auto found = std::find_if(candidates.begin(), candidates.end(), is_close);
+  const SearchCandidate& best = found != candidates.end() ? *found : candidates.front();
+  Verdict verdict{GlobalAlignStatus::not_found, best, std::max(best.forward.agree, best.backward.agree), 0.0, 0.0};
+  verdict.consistency =
+      std::min(consistency_of(best.forward, options.outlines), consistency_of(best.backward, options.outlines));
+  if (found == candidates.end()) return verdict;
+  const auto rival = std::find_if(found + 1, candidates.end(), is_close);
+  if (rival != candidates.end() && best.score > 0.0) verdict.rivalry = std::max(0.0, rival->score / best.score);
+  if (!(best.score > 0.0) || verdict.overlap < options.min_overlap || verdict.consistency < options.min_consistency) {
+    return verdict;
+  }
+  const bool is_unique = verdict.rivalry <= options.max_rivalry && best.alignment.weak_directions.cols() == 0;
+  verdict.status = is_unique ? GlobalAlignStatus::found : GlobalAlignStatus::ambiguous;
+  return verdict;
+}
+
+GlobalAlignResult align_global(const GlobalCloud& source_cloud, const GlobalCloud& target_cloud,
+                               const GlobalAlignOptions& options) {
+  options.check();
+  GlobalAlignResult result;
+  result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
+  const SearchSide source(source_cloud, options, true), target(target_cloud, options, true);
+  if (!is_enough(source) || !is_enough(target)) return result;
+  const GlobalSearch search(source, target, options);
+  const Verdict verdict = judge(search.run(), options, search.tolerance());
+  result.status = verdict.status;
+  result.alignment = verdict.best.alignment;
+  result.overlap = verdict.overlap;
+  result.consistency = verdict.consistency;
+  result.rivalry = verdict.rivalry;
+  result.tolerance = search.tolerance();
+  return result;
+}
+
+}  // namespace nacre

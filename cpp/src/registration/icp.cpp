@@ -1,0 +1,261 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "base/check.hpp"
+#include "base/pose_check.hpp"
+#include "base/statistics.hpp"
+#include "nacre/registration.hpp"
+#include "registration/color.hpp"
+#include "registration/correspondences.hpp"
+#include "registration/scale_check.hpp"
+
+namespace nacre {
+namespace {
+
+template <class Value>
+double median_of(const std::vector<Pair>& pairs, Value&& value) {
+  constexpr std::size_t num_probes = 1000;  // enough for a scale
+  const std::size_t step = (pairs.size() + num_probes - 1) / num_probes;
+  std::vector<double> values;
+  values.reserve(num_probes);
+  for (std::size_t i = 0; i < pairs.size(); i += step) values.push_back(value(pairs[i]));
+  return nacre::median_of(std::move(values));
+}
+
+// Weights relative to the median pair; with `robust` also robust ones of the whitened residuals, whose scale is their
+// median absolute value but at least `floor` [m]. Returns that scale [m].
+double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double floor) {
+  const double median_weight = median_of(pairs, [](const Pair& pair) { return pair.weight; });
+  for (Pair& pair : pairs) pair.weight /= median_weight;
+  const auto whitened = [&](const Pair& pair) { return std::abs(residual(pair, metric)) * std::sqrt(pair.weight); };
+  const double scale = std::max(floor, mad_to_sigma * median_of(pairs, whitened));
+  if (robust) {
+    for (Pair& pair : pairs) {
+      const double agreement = robust_weight(whitened(pair), scale);
+      pair.agreement *= agreement;
+      pair.weight *= agreement;
+    }
+  }
+  return scale;
+}
+
+// How many points and which gate an iteration uses. The gate starts wide and shrinks to the accuracy of the data, with
+// few points; then it stays, and the points become more until the pose is at rest.
+class Schedule {
+ public:
+  Schedule(const IcpTarget& target, const IcpSource& source, const AlignOptions& options)
+      : options_(options), source_(source) {
+    first_ = options.max_distance > 0.0 ? options.max_distance : 0.25 * target.diameter();
+    smallest_ = options.final_distance > 0.0 ? options.final_distance : 2.5 * target.spacing();
+    set_level(0);
+    update_gate(0.0);
+  }
+
+  const Gate& gate() const { return gate_; }
+  std::int64_t num_samples() const { return source_.levels[level_]; }
+
+  // After a step that was small, or not: returns false when the pose is at rest with the last gate and all points.
+  bool advance(bool at_rest, double residual_scale) {
+    ++iteration_;
+    ++iterations_at_level_;
+    const bool shrinking = !at_smallest_;
+    update_gate(residual_scale);
+    if (shrinking) return true;
+    const bool is_last = level_ + 1 == source_.levels.size();
+    if (at_rest && is_last) return false;
+    if (!is_last && (at_rest || iterations_at_level_ >= 8)) set_level(level_ + 1);
+    return true;
+  }
+
+  // The last gate with all points, to judge the final pose.
+  void finish() { set_level(source_.levels.size() - 1); }
+
+ private:
+  void set_level(std::size_t level) {
+    while (level + 1 < source_.levels.size() && source_.levels[level + 1] == source_.levels[level]) ++level;
+    level_ = level;
+    iterations_at_level_ = 0;
+  }
+
+  void update_gate(double residual_scale) {
+    const double smallest = std::min(
+        first_, options_.final_distance > 0.0 ? options_.final_distance : std::max(smallest_, 4.0 * residual_scale));
+    const double decayed = first_ * std::pow(options_.gate_decay, iteration_);
+    gate_.distance = std::max(smallest, decayed);
+    at_smallest_ = options_.gate_decay >= 1.0 || decayed <= smallest;
+    gate_.is_smallest = at_smallest_;
+    // Normals of a source that is still far off may differ by a third more.
+    const double widening = options_.gate_decay < 1.0 ? gate_.distance / first_ / 3.0 : 0.0;
+    const double angle = options_.max_angle * (1.0 + widening);
+    gate_.cos_angle = angle < 3.14159 ? std::cos(angle) : -2.0;  // every angle passes, rounding or not
+  }
+
+  const AlignOptions& options_;
+  const IcpSource& source_;
+  std::size_t level_ = 0;
+  int iteration_ = 0, iterations_at_level_ = 0;
+  double first_ = 0.0, smallest_ = 0.0;
+  bool at_smallest_ = false;
+  Gate gate_{};
+};
+
+double rmse_of(const std::vector<Pair>& pairs, Metric metric) {
+  double squares = 0.0;
+  for (const Pair& pair : pairs) squares += residual(pair, metric) * residual(pair, metric);
+  return std::sqrt(squares / static_cast<double>(pairs.size()));
+}
+
+double residual_ratio_of(const std::vector<Pair>& pairs, Metric metric) {
+  double squares = 0.0;
+  for (const Pair& pair : pairs) {
+    const double ratio = residual(pair, metric) / pair.largest_residual;
+    squares += ratio * ratio;
+  }
+  return std::sqrt(squares / static_cast<double>(pairs.size()));
+}
+
+// Of pairs in the order of space. Noise is independent from one to the next; the error of a surface that is bent
+// another way is not: what neighbours lie off by on average, in units of what noise and the model's resolution explain.
+double misfit_of(const std::vector<Pair>& pairs, Metric metric) {
+  constexpr std::size_t neighbours = 32;
+  constexpr double resolution = 0.06;  // of the largest residual
+  double sum = 0.0, count = 0.0;
+  for (std::size_t first = 0; first + neighbours <= pairs.size(); first += neighbours) {
+    double offset = 0.0, variance = 0.0;
+    for (std::size_t i = first; i < first + neighbours; ++i) {
+      const double coarse = resolution * pairs[i].largest_residual;
+      offset += residual(pairs[i], metric);
+      variance += pairs[i].agreement / pairs[i].weight + coarse * coarse;
+    }
+    sum += offset * offset / (static_cast<double>(neighbours) * variance);
+    count += 1.0;
+  }
+  return count > 0.0 ? std::sqrt(sum / count) : 0.0;
+}
+
+std::size_t least_pairs(std::int64_t num_samples) {
+  return static_cast<std::size_t>(std::max<std::int64_t>(6, num_samples / 100));
+}
+
+// hold_weak: whether directions that the pairs do not determine stay as they are in each step.
+IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
+                  bool hold_weak) {
+  IcpResult result;
+  result.target_from_source = initial;
+  result.rmse = std::numeric_limits<double>::quiet_NaN();
+
+  Schedule schedule(target, source, options);
+  std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
+  const double resolution = std::max(1e-3 * target.spacing(), 1e-9);
+  Pose pose = initial, best_pose = initial;
+  double best_rmse = std::numeric_limits<double>::infinity();
+  bool at_rest = false;
+
+  for (int iteration = 0; iteration < options.max_iterations && !at_rest; ++iteration) {
+    std::vector<Pair> pairs = target.match(source, schedule.num_samples(), pose, schedule.gate(), nearest);
+    if (pairs.size() < least_pairs(schedule.num_samples())) return result;
+    const double scale = weight_pairs(pairs, options.method, options.robust, resolution);
+    const double weak_threshold = hold_weak ? options.weak_threshold : 0.0;
+    const IcpStep step = solve_step(pairs, options.method, weak_threshold, options.num_threads);
+    if (step.rmse < best_rmse) {
+      best_rmse = step.rmse;
+      best_pose = pose;
+    }
+    pose = step.motion * pose;
+    result.iterations = iteration + 1;
+    // At rest where the step is a fifth of what the residuals' noise leaves uncertain in each of six unknowns.
+    const bool is_small = step.size < resolution || step.reduction < 6.0 * 0.04 * scale * scale;
+    at_rest = !schedule.advance(is_small, scale);
+  }
+
+  schedule.finish();
+  std::vector<Pair> pairs = target.match(source, schedule.num_samples(), pose, schedule.gate(), nearest);
+  if (options.keep_best && !(rmse_of(pairs, options.method) <= best_rmse)) {
+    pose = best_pose;
+    pairs = target.match(source, schedule.num_samples(), pose, schedule.gate(), nearest);
+  }
+  if (pairs.size() < least_pairs(schedule.num_samples())) return result;
+  result.misfit = misfit_of(pairs, options.method);
+  weight_pairs(pairs, options.method, options.robust, resolution);
+  const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);
+  result.size_difference = size_difference(pairs, options.method);
+  result.target_from_source = pose;
+  result.status = at_rest ? AlignStatus::converged : AlignStatus::max_iterations;
+  result.num_inliers = static_cast<int>(pairs.size());
+  result.overlap = static_cast<double>(pairs.size()) / static_cast<double>(schedule.num_samples());
+  result.rmse = last.rmse;
+  result.residual_ratio = residual_ratio_of(pairs, options.method);
+  result.normal_information = normal_information(pairs, options.method);
+  result.center = last.center;
+  const double variance = std::max(last.variance, resolution * resolution);
+  result.information = last.hessian / variance;
+  result.shape_information = last.shape / variance;
+  result.weak_directions = last.weak_directions;
+  return result;
+}
+
+}  // namespace
+
+const char* to_string(AlignStatus status) {
+  switch (status) {
+    case AlignStatus::converged:
+      return "converged";
+    case AlignStatus::max_iterations:
+      return "max_iterations";
+    default:
+      return "too_few_pairs";
+  }
+}
+
+void AlignOptions::check() const {
+  require(max_iterations >= 1, "max_iterations", "at least 1", max_iterations);
+  require(max_distance >= 0.0 && std::isfinite(max_distance), "max_distance",
+          "0 (automatic) or a positive distance in metres", max_distance);
+  require(final_distance >= 0.0 && std::isfinite(final_distance), "final_distance",
+          "0 (automatic) or a positive distance in metres", final_distance);
+  require(gate_decay > 0.0 && gate_decay <= 1.0, "gate_decay", "in (0, 1]", gate_decay);
+  require(max_angle > 0.0, "max_angle", "a positive angle in radians", max_angle);
+  require(sample_fraction > 0.0 && sample_fraction <= 1.0, "sample_fraction", "in (0, 1]", sample_fraction);
+  require(max_points >= 0, "max_points", "0 (no limit) or more", max_points);
+  require(max_samples >= 0, "max_samples", "0 (no limit) or more", max_samples);
+  require(coarse_samples >= 0, "coarse_samples", "0 (no limit) or more", coarse_samples);
+  require(weak_threshold >= 0.0, "weak_threshold", "at least 0", weak_threshold);
+  require(num_threads >= 0, "num_threads", "0 (all) or more", num_threads);
+}
+
+AlignCloud::AlignCloud(const PointsRef& points_in, const PointsRef& normals_in, const ValuesRef& sigma_in,
+                       const ValuesRef& brightness_in)
+    : points(points_in), normals(normals_in), sigma(sigma_in), brightness(brightness_in) {
+  require(normals.rows() == 0 || normals.rows() == points.rows(), "normals", "one row per point", normals.rows());
+  require(sigma.size() == 0 || sigma.size() == points.rows(), "sigma", "one value per point", sigma.size());
+  require(brightness.size() == 0 || brightness.size() == points.rows(), "brightness", "one value per point",
+          brightness.size());
+}
+
+IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options) {
+  // What pairs know of a direction shows at the end only: while source and target are apart their normals disagree.
+  IcpResult free = iterate(target, source, initial, options, false);
+  if (free.status != AlignStatus::too_few_pairs && free.weak_directions.cols() == 0) return free;
+  return iterate(target, source, initial, options, true);
+}
+
+IcpResult align_held(const IcpTarget& target, const IcpSource& source, const Pose& initial,
+                     const AlignOptions& options) {
+  return iterate(target, source, initial, options, true);
+}
+
+AlignResult align(const AlignCloud& source, const AlignCloud& target, const Pose& initial,
+                  const AlignOptions& options) {
+  options.check();
+  require_rigid(initial, "initial");
+  const IcpTarget prepared_target(target, options);
+  const IcpSource prepared_source(source, options);
+  IcpResult result = align_to(prepared_target, prepared_source, initial, options);
+  const bool has_colors = source.brightness.size() > 0 && target.brightness.size() > 0;
+  if (result.weak_directions.cols() == 0 || !has_colors) return result;
+  return determine_by_color(prepared_target, prepared_source, BrightCloud(target.points, target.brightness),
+                            BrightCloud(source.points, source.brightness), result, options);
+}
+
+}  // namespace nacre

@@ -1,0 +1,96 @@
+#include "registration/scale_check.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+namespace nacre {
+namespace {
+
+constexpr std::size_t neighbours = 32;
+constexpr std::size_t least_rows = 16;  // for seven unknowns
+constexpr double damping = 1e-9;        // of the mean information, so that there always is a solution
+
+// Weighted sums over neighbouring pairs.
+struct Row {
+  Vector6 pose = Vector6::Zero();  // rotation in units of the extent, translation
+  double size = 0.0;               // a factor, in these units
+  double right_side = 0.0;         // [m]
+  double weight = 0.0;
+  double noise = 0.0;  // squares of the single weighted residuals [m^2]
+
+  void add(double w, const Eigen::Vector3d& p, const Eigen::Vector3d& difference, const Eigen::Vector3d& normal) {
+    const double r = difference.dot(normal);
+    pose.head<3>() += w * p.cross(normal);
+    pose.tail<3>() += w * normal;
+    size += w * p.dot(normal);
+    right_side += w * r;
+    weight += w;
+    noise += w * w * r * r;
+  }
+};
+
+std::vector<Row> sum_neighbours(const std::vector<Pair>& pairs, Metric metric, const Eigen::Vector3d& center,
+                                double extent) {
+  std::vector<Row> rows((pairs.size() + neighbours - 1) / neighbours);
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const Pair& pair = pairs[i];
+    const Eigen::Vector3d p = (pair.p - center) / extent, difference = pair.q - pair.p;
+    Row& row = rows[i / neighbours];
+    if (metric == Metric::point_to_point) {
+      for (int axis = 0; axis < 3; ++axis) row.add(pair.weight, p, difference, Eigen::Vector3d::Unit(axis));
+    } else {
+      row.add(pair.weight, p, difference, pair.normal);
+    }
+  }
+  rows.erase(std::remove_if(rows.begin(), rows.end(), [](const Row& row) { return !(row.weight > 0.0); }), rows.end());
+  return rows;
+}
+
+}  // namespace
+
+SizeDifference size_difference(const std::vector<Pair>& pairs, Metric metric) {
+  double weight = 0.0, extent = 0.0;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  for (const Pair& pair : pairs) {
+    weight += pair.weight;
+    center += pair.weight * pair.p;
+  }
+  if (!(weight > 0.0)) return {};
+  center /= weight;
+  for (const Pair& pair : pairs) extent += pair.weight * (pair.p - center).squaredNorm();
+  extent = std::sqrt(std::max(extent / weight, 1e-24));
+
+  const std::vector<Row> rows = sum_neighbours(pairs, metric, center, extent);
+  if (rows.size() < least_rows) return {};
+  Matrix6 hessian = Matrix6::Identity() * damping * weight;
+  Vector6 mixed = Vector6::Zero(), gradient = Vector6::Zero();
+  for (const Row& row : rows) {
+    hessian.noalias() += row.pose * row.pose.transpose() / row.weight;
+    mixed += row.size / row.weight * row.pose;
+    gradient += row.right_side / row.weight * row.pose;
+  }
+  const Eigen::LDLT<Matrix6> solver(hessian);
+  const Vector6 by_pose = solver.solve(mixed), motion = solver.solve(gradient);
+
+  // What the motion cannot do: the rest of the column, on which the rest of the right side is regressed.
+  const auto rest = [&](const Row& row) { return row.size - row.pose.dot(by_pose); };
+  double information = damping * weight, slope = 0.0, noise = 0.0;
+  for (const Row& row : rows) {
+    information += rest(row) * rest(row) / row.weight;
+    slope += rest(row) * (row.right_side - row.pose.dot(motion)) / row.weight;
+    noise += row.noise / row.weight;
+  }
+  const double size = slope / information;
+  double variance = 0.0;  // heteroscedastic, White 1980
+  for (const Row& row : rows) {
+    const double residual = row.right_side - row.pose.dot(motion) - size * rest(row);
+    variance += std::pow(rest(row) * residual / row.weight, 2);
+  }
+  const auto count = static_cast<double>(rows.size());
+  const double sigma = std::sqrt(variance * count / (count - 7.0)) / information;
+  const double bias = noise / (extent * information);  // at most, by noise that is in the column
+  return {size / extent, std::hypot(sigma, bias) / extent};
+}
+
+}  // namespace nacre

@@ -1,0 +1,35 @@
+// The edge tests of a row of the planar image.
+#pragma once
+
+#include <stdint.h>
+
+#include "simd/depth_row.hpp"
+#include "simd/isa.hpp"
+
+namespace nacre::simd {
+
+constexpr uint8_t edge_mark = 1, slanted_mark = 2;
+
+// Limits of second differences (bend) and first differences (step) between neighbours, given the value; lateral: per
+// slope of the surface.
+struct EdgeLimits {
+  Quadratic bend_noise, bend_crease, step_noise, step_slant;
+  float bend_lateral, step_lateral;
+};
+
+// Marks pixels where a second difference in one of the four directions through the pixel exceeds its limit; at a rim
+// the pixel is held against the plane through its two inner neighbours. And pixels where both first differences do, or
+// the slope of the surface as a whole. `slope`: the surface's change per pixel, readable 15 beyond the row's end.
+using MarkEdges = void(const PlanarRow& row, const EdgeLimits& limits, const float* slope, uint8_t* marks);
+NACRE_DECLARE_KERNEL(MarkEdges, mark_edges)
+
+// Marks pixels where the gradient of the depth, by Sobel's 3 x 3 operator, exceeds a limit (squared, of 8 times the
+// gradient) or is unknown (NaN). Rows are readable one pixel to the left and 16 beyond their end.
+struct DepthRows {
+  const float *above, *here, *below;
+  int width;
+};
+using MarkGradients = void(const DepthRows& rows, float squared_limit, uint8_t* marks);
+NACRE_DECLARE_KERNEL(MarkGradients, mark_gradients)
+
+}  // namespace nacre::simd

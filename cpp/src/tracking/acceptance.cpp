@@ -1,0 +1,120 @@
+#include "tracking/acceptance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+
+#include "base/parallel.hpp"
+#include "camera/point_projection.hpp"
+#include "tracking/frame_samples.hpp"
+
+namespace nacre {
+namespace {
+
+struct Counts {
+  std::int64_t agree = 0, violated = 0;
+  Counts& operator+=(const Counts& other) {
+    agree += other.agree;
+    violated += other.violated;
+    return *this;
+  }
+};
+
+// What is asked of a registration. Far from all guesses there are many places, and some resemble: boxes' corners fit
+// corners, and of unrelated round shapes that match the misfit is 0.54 and more.
+struct Demands {
+  double evidence;           // times min_evidence
+  double consistency_power;  // in the evidence
+  double largest_misfit;     // that does not lower the evidence
+  double size_sigma;         // largest standard deviation of a size that counts
+  double size_certainty;     // standard deviations by which a size must differ to be another
+};
+
+Demands demands_on(Expectation expectation) {
+  switch (expectation) {
+    case Expectation::expected:
+      return {1.0, 4.0, 1.0, 0.005, 5.0};
+    case Expectation::near_lost:
+      return {1.2, 4.0, 1.0, 0.005, 5.0};
+    default:
+      return {1.2, 8.0, 0.5, std::numeric_limits<double>::infinity(), 3.0};
+  }
+}
+
+}  // namespace
+
+double consistency_of(const PointsRef& points, const PointsRef& normals, const Sight& sight,
+                      const Pose& world_from_camera, const Camera& camera, double spacing, int num_threads) {
+  constexpr std::int64_t block_size = ModelView::capacity, least_judged = 20;
+  const ModelView model_view(camera, world_from_camera);
+  const Counts counts =
+      block_reduce(points.rows(), block_size, num_threads, Counts{}, [&](std::int64_t begin, std::int64_t end) {
+        ModelView::Block block;
+        model_view.project(points.data() + 3 * begin, normals.data() + 3 * begin, static_cast<int>(end - begin), block);
+        Counts sum;
+        for (int i = 0; i < static_cast<int>(end - begin); ++i) {
+          if (!block.inside[i] || !(block.facing[i] > 0.3F)) continue;
+          const std::int32_t pixel = block.pixel[i];
+          const float behind = sight.depth[pixel] - block.z[i];
+          if (!std::isfinite(behind)) continue;
+          const float error = std::hypot(4.0F * sight.sigma[pixel], 2.0F * systematic_error(sight.depth[pixel]));
+          const float tolerance = std::max(3.0F * static_cast<float>(spacing), error) / block.facing[i];
+          if (behind > tolerance) {
+            ++sum.violated;
+          } else if (behind > -tolerance) {
+            ++sum.agree;
+          }
+        }
+        return sum;
+      });
+  const std::int64_t judged = counts.agree + counts.violated;
+  return judged >= least_judged ? static_cast<double>(counts.agree) / static_cast<double>(judged)
+                                : std::numeric_limits<double>::quiet_NaN();
+}
+
+void judge(TrackingResult& result, const ModelOptions& options) {
+  constexpr double chance = 0.58;  // the rms of a uniform distribution, 1 / sqrt(3)
+  constexpr double plane_information = 0.1, plane_evidence = 4.0;
+  constexpr double beyond_doubt = 2.0;  // times min_evidence
+  constexpr double least_ratio = 0.01;  // data without noise is no more certain
+  constexpr double other_size = 0.025;  // relative; of right registrations of real depth 0.015 at most
+  std::ostringstream reason;
+  reason.precision(3);
+  result.status = FrameStatus::lost;
+  const IcpResult& alignment = result.alignment;
+  const Demands demands = demands_on(result.expectation);
+  const double overlap = alignment.overlap;
+  const double ratio = std::max(least_ratio, alignment.residual_ratio);
+  const double bent = std::max(1.0, alignment.misfit / demands.largest_misfit);
+  const double per_match = std::max(0.0, std::log(chance / ratio)) / (bent * bent);
+  result.evidence = overlap * overlap * std::pow(result.consistency, demands.consistency_power) * per_match;
+  result.recognition =
+      overlap * std::pow(result.consistency, 12) * per_match / (bent * bent) * alignment.normal_information;
+  const bool is_plane = alignment.normal_information < plane_information;
+  const bool is_doubtful_plane = is_plane && result.expectation == Expectation::unexpected;
+  const double least = options.min_evidence * (is_doubtful_plane ? plane_evidence : demands.evidence);
+  const auto [size, size_sigma] = alignment.size_difference;
+  const bool is_other_size =
+      size_sigma <= demands.size_sigma && std::abs(size) > std::max(other_size, demands.size_certainty * size_sigma);
+  if (alignment.status == AlignStatus::too_few_pairs) {
+    result.evidence = result.recognition = 0.0;
+    reason << "too few points of the frame match the model";
+  } else if (options.verify && is_other_size) {
+    result.recognition = 0.0;
+    reason << "the frame is " << 1.0 / (1.0 + size) << " times as large as the part of the model that it fits";
+  } else if (options.verify && !(result.evidence >= least)) {
+    reason << "evidence " << result.evidence << " is below " << least << ": overlap " << overlap << ", consistency "
+           << result.consistency << ", residuals " << ratio << " of the largest that match";
+    if (bent > 1.0) reason << ", bent " << bent << " times as much as true matches may be";
+  } else if (options.verify && alignment.weak_directions.cols() > 0) {
+    result.status = FrameStatus::weak;
+    reason << alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
+  } else {
+    result.status = FrameStatus::tracked;
+    result.is_beyond_doubt = options.verify && result.evidence >= beyond_doubt * options.min_evidence;
+  }
+  result.reason = reason.str();
+}
+
+}  // namespace nacre

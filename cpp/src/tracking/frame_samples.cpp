@@ -1,0 +1,66 @@
+#include "tracking/frame_samples.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.hpp"
+#include "base/random.hpp"
+
+namespace nacre {
+
+// Depth cameras are also systematically wrong, the more the farther they see, which averaging does not remove
+// (Teichman, Miller and Thrun 2013). The form and the figure are what tracked best on recordings of structured light in
+// rooms.
+float systematic_error(float z) {
+  constexpr float growth = 0.0015F;  // [1/m^2]
+  return growth * z * z * z;
+}
+
+FrameSamples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
+  const std::int64_t count =
+      options.registration.max_samples > 0
+          ? std::min<std::int64_t>(options.registration.max_samples, static_cast<std::int64_t>(frame.valid.size()))
+          : static_cast<std::int64_t>(frame.valid.size());
+  FrameSamples samples{Points(count, 3), Points(count, 3), Values(count), Values(count)};
+  const double stride = static_cast<double>(frame.valid.size()) / static_cast<double>(std::max<std::int64_t>(count, 1));
+  parallel_blocks(count, ObservationBlock::capacity, options.num_threads, [&](auto, auto begin, auto end) {
+    ObservationBlock block;
+    for (std::int64_t i = begin; i < end; ++i) {
+      // One of every `stride` pixels.
+      const double place =
+          (static_cast<double>(i) + random_uniform(options.registration.seed, static_cast<std::uint64_t>(i))) * stride;
+      const std::int32_t row = frame.valid[std::min(frame.valid.size() - 1, static_cast<std::size_t>(place))];
+      samples.points.row(i) = frame.points.row(row);
+      samples.normals.row(i) = frame.normals.row(row);
+      samples.noise[i] = frame.sigma[row];
+      samples.sigma[i] = std::hypot(frame.sigma[row], systematic_error(frame.points(row, 2)));
+      observer.add(block, samples.points.row(i).transpose(), samples.normals.row(i).transpose(), row, frame.sigma[row]);
+    }
+    if (!options.denoise_samples) return;
+    observer.observe(block);
+    for (std::int64_t i = begin; i < end; ++i) {
+      const Observation seen = block[static_cast<int>(i - begin)];
+      if (!(seen.weight > 0.0F)) continue;
+      samples.points.row(i) += seen.offset * block.ray(static_cast<int>(i - begin)).transpose();
+      samples.normals.row(i) = seen.normal.normalized().transpose();
+    }
+  });
+  return samples;
+}
+
+BrightCloud bright_cloud(const Frame& frame, const SurfaceObserver& observer) {
+  constexpr std::size_t most = 100000;
+  const std::size_t step = std::max<std::size_t>(1, (frame.valid.size() + most - 1) / most);
+  const auto count = static_cast<Eigen::Index>(frame.valid.size() / step);
+  Points points(count, 3);
+  Values brightness(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const std::size_t place = static_cast<std::size_t>(i) * step;
+    const std::int32_t row = frame.valid[place + random_bits(0, place) % step];
+    points.row(i) = frame.points.row(row);
+    brightness[i] = luma(observer.color(row % frame.width, row / frame.width));
+  }
+  return BrightCloud(points, brightness);
+}
+
+}  // namespace nacre

@@ -1,0 +1,97 @@
+#include "tracking/object_view.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "base/random.hpp"
+#include "base/statistics.hpp"
+#include "camera/point_projection.hpp"
+#include "region/support_planes.hpp"
+
+namespace nacre {
+namespace {
+
+constexpr Eigen::Index least_samples = 100;
+constexpr Eigen::Index most_samples = 2000;
+constexpr double largest_part = 0.03;  // of the object's size, that the tolerance may be
+constexpr double body_depth = 0.9;     // from the middle of what is seen to that of the body, in radii of what is seen
+constexpr float least_cosine_to_camera = 0.3F;  // cosine
+
+}  // namespace
+
+std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& region, const SupportPlane& support,
+                                      const FrameSamples& samples, std::uint64_t seed) {
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < samples.points.rows(); ++i) {
+    if (samples.points.row(i).allFinite() && samples.normals.row(i).allFinite()) rows.push_back(i);
+  }
+  if (static_cast<Eigen::Index>(rows.size()) < least_samples) return std::nullopt;
+  for (std::size_t i = rows.size(); i > 1; --i) std::swap(rows[i - 1], rows[random_bits(seed, i) % i]);
+  rows.resize(std::min(rows.size(), static_cast<std::size_t>(most_samples)));
+
+  ObjectView view;
+  const auto count = static_cast<Eigen::Index>(rows.size());
+  view.points.resize(count, 3);
+  view.normals.resize(count, 3);
+  std::vector<float> errors(rows.size());
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Eigen::Index row = rows[static_cast<std::size_t>(i)];
+    view.points.row(i) = samples.points.row(row);
+    view.normals.row(i) = samples.normals.row(row);
+    errors[static_cast<std::size_t>(i)] =
+        std::hypot(3.0F * samples.noise[row], PlaneCut::bend * samples.points.row(row).norm());
+  }
+  view.size = static_cast<double>((view.points.colwise().maxCoeff() - view.points.colwise().minCoeff()).norm());
+  view.tolerance = std::min(static_cast<double>(median_of(std::move(errors))), largest_part * view.size);
+  view.depth = frame.points.col(2);
+  view.region = region;
+  view.support = support;
+  return view;
+}
+
+Pose ObjectView::foot() const {
+  const Eigen::Vector3d middle = points.colwise().mean().transpose().cast<double>();
+  Pose camera_from_foot = Pose::Identity();
+  const Eigen::Vector3d x = support.normal.unitOrthogonal();
+  camera_from_foot.linear() << x, support.normal.cross(x), support.normal;
+  camera_from_foot.translation() = middle - (support.normal.dot(middle) - support.offset) * support.normal;
+  return camera_from_foot;
+}
+
+Eigen::Vector3d ObjectView::body() const {
+  Eigen::Vector3d middle = points.colwise().mean().transpose().cast<double>();
+  const Eigen::Vector3d level = middle - support.normal.dot(middle) * support.normal;
+  if (!(level.norm() > 1e-6 * middle.norm())) return middle;
+  const Eigen::Vector3d away = level.normalized(), side = support.normal.cross(away);
+  const Eigen::VectorXd across = (points.cast<double>().rowwise() - middle.transpose()) * side;
+  return middle + body_depth * std::sqrt(across.squaredNorm() / static_cast<double>(across.size())) * away;
+}
+
+ViewEvidence look_at(const ObjectView& moved, const ObjectView& seen, const Pose& seen_from_moved, const Camera& camera,
+                     Eigen::Index count) {
+  count = std::min(count, moved.points.rows());
+  const ModelView view(camera, seen_from_moved.inverse());
+  const auto tolerance = static_cast<float>(std::max(moved.tolerance, seen.tolerance));
+  ModelView::Block block;
+  float agree = 0.0F, through = 0.0F, hidden = 0.0F;
+  for (Eigen::Index begin = 0; begin < count; begin += ModelView::capacity) {
+    const auto size = static_cast<int>(std::min<Eigen::Index>(ModelView::capacity, count - begin));
+    view.project(moved.points.data() + 3 * begin, moved.normals.data() + 3 * begin, size, block);
+    for (int i = 0; i < size; ++i) {
+      if (!block.inside[i]) continue;
+      const float behind = seen.depth[block.pixel[i]] - block.z[i];
+      if (!std::isfinite(behind)) continue;
+      const float margin = 2.0F * tolerance / std::max(block.facing[i], least_cosine_to_camera);
+      if (behind > margin) through += 1.0F;
+      if (!(block.facing[i] > least_cosine_to_camera) || seen.region.data()[block.pixel[i]] == 0) continue;
+      if (behind < -margin) hidden += 1.0F;
+      const float ratio = behind * block.facing[i] / tolerance;
+      agree += std::max(0.0F, 1.0F - ratio * ratio);
+    }
+  }
+  const auto all = static_cast<double>(std::max<Eigen::Index>(count, 1));
+  return {static_cast<double>(agree) / all, static_cast<double>(through) / all, static_cast<double>(hidden) / all};
+}
+
+}  // namespace nacre

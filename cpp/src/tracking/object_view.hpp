@@ -1,0 +1,42 @@
+// An object that stands on a plane, as one camera saw it, and what two such views say about each other.
+#pragma once
+
+#include <optional>
+
+#include "nacre/region.hpp"
+#include "tracking/frame_samples.hpp"
+
+namespace nacre {
+
+struct ObjectView {
+  std::int32_t frame = 0;  // its number
+  Pose world_from_camera = Pose::Identity();
+  Points points, normals;  // samples of the object in random order, camera frame
+  Values depth;            // of each pixel, beside the object too [m]
+  MaskImage region;        // the object's pixels
+  SupportPlane support;    // camera frame
+  double tolerance = 0.0;  // [m]; to which two views of a surface agree
+  double size = 0.0;       // of the bounding box of what is seen [m]
+
+  // The camera from a frame in the plane: z is its normal, the origin below the middle of what is seen.
+  Pose foot() const;
+  Eigen::Vector3d body() const;  // about the middle of the object, of which the view shows the front, camera frame
+};
+
+// None where the object is too small. The samples are some of the frame's.
+std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& region, const SupportPlane& support,
+                                      const FrameSamples& samples, std::uint64_t seed);
+
+// Of the samples of one view, parts.
+struct ViewEvidence {
+  double agree = 0.0;    // the other camera measured the object there; less for one that is less close
+  double through = 0.0;  // it sees through them
+  double hidden = 0.0;   // they face it, but it saw another part of the object before them
+  double score() const { return agree - 3.0 * through - 0.5 * hidden; }
+};
+
+// What `seen` says about the first `count` samples of `moved`.
+ViewEvidence look_at(const ObjectView& moved, const ObjectView& seen, const Pose& seen_from_moved, const Camera& camera,
+                     Eigen::Index count);
+
+}  // namespace nacre

@@ -1,0 +1,25 @@
+// Where is the camera that sees an object on a plane, when the object may have turned by any angle? Plane and normal
+// are seen in every view: of the six unknowns three are left, the angle and the place on the plane.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "nacre/fusion.hpp"
+#include "registration/correspondences.hpp"
+#include "tracking/object_view.hpp"
+
+namespace nacre {
+
+struct PlaneFit {
+  IcpResult alignment;       // world_from_camera as target_from_source
+  double score = 0.0;        // of all views
+  double overlap = 0.0;      // with the view that agrees most
+  double consistency = 0.0;  // with the views: what agrees, of that and what they see through
+};
+
+// The best motion that keeps the plane: none where the frame fits nowhere, or in several places about as well.
+std::optional<PlaneFit> fit_on_plane(const PointModel& model, const std::vector<ObjectView>& views,
+                                     const ObjectView& frame, const Camera& camera, const AlignOptions& options);
+
+}  // namespace nacre
