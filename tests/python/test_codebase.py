@@ -13,19 +13,39 @@ import nacre
 
 ROOT = Path(__file__).resolve().parents[2]
 
-# The public headers from the bottom up: an include may only point to a lower line.
-LAYERS = [
-    ["version", "system", "cancel", "checkpoint", "types"],
-    ["camera"],
-    ["kdtree", "mesh"],
-    ["normals", "depth"],
-    ["registration", "consolidation", "fusion", "region", "simulation"],
-    ["global_registration"],
-    ["model"],
+# The folder of cpp/src that a public header belongs to.
+PUBLIC = {
+    "base": ["cancel", "checkpoint", "system", "types", "version"],
+    "spatial": ["kdtree", "normals"],
+    "mesh": ["mesh"],
+    "camera": ["camera"],
+    "depth": ["depth"],
+    "simulation": ["simulation"],
+    "region": ["region"],
+    "registration": ["global_registration", "registration"],
+    "consolidation": ["consolidation"],
+    "fusion": ["fusion"],
+    "tracking": ["frame_status", "tracking_options"],
+    "model": ["frame_report", "model", "model_options"],
+}
+# The folders of cpp/src from the bottom up: an include may only point to an earlier one.
+ORDER = [
+    "simd",
+    "base",
+    "spatial",
+    "mesh",
+    "camera",
+    "depth",
+    "simulation",
+    "region",
+    "registration",
+    "outlines",
 ]
-RANK = {name: rank for rank, names in enumerate(LAYERS) for name in names}
+ORDER += ["consolidation", "fusion", "tracking", "loops", "model"]
+FOLDER = {name: folder for folder, names in PUBLIC.items() for name in names}
 HEADERS = sorted((ROOT / "cpp" / "include" / "nacre").glob("*.hpp"))
-SOURCES = sorted((ROOT / "cpp" / "src").rglob("*.[ch]pp"))
+CPP = ROOT / "cpp" / "src"
+SOURCES = sorted(CPP.rglob("*.[ch]pp"))
 FOLDERS = ("cpp", "python", "tests", "examples", "benchmarks", "docs", "third_party", ".ci", ".github")
 CODE = {".py", ".pyi", ".cpp", ".hpp", ".cmake", ".txt", ".toml", ".yml", ".yaml", ".json", ".in", ".sh", ""}
 TEXT = CODE | {".md"}
@@ -61,28 +81,55 @@ def includes(path: Path) -> list[str]:
     return re.findall(r'^\s*#\s*include\s+[<"]([^>"]+)[>"]', path.read_text(encoding="utf-8"), re.MULTILINE)
 
 
-def reachable(path: Path, seen: set[Path]) -> set[Path]:
-    """Collect the files of the library that a file includes, directly or not."""
-    for name in includes(path):
-        candidates = (ROOT / "cpp" / "include" / name, ROOT / "cpp" / "src" / name, path.parent / name)
-        for file in (candidate.resolve() for candidate in candidates if candidate.is_file()):
-            if file not in seen:
-                seen.add(file)
-                reachable(file, seen)
-    return seen
+def included(path: Path) -> list[Path]:
+    """List the files of the library that a C++ file includes."""
+    found = [folder / name for name in includes(path) for folder in (HEADERS[0].parents[1], CPP)]
+    return [file for file in found if file.is_file()]
 
 
-def test_every_public_header_has_its_layer() -> None:
-    assert sorted(path.stem for path in HEADERS) == sorted(RANK)
+def folder_of(path: Path) -> str:
+    """Return the folder of cpp/src that a file belongs to."""
+    return FOLDER[path.stem] if path in HEADERS else path.relative_to(CPP).parts[0]
 
 
-@pytest.mark.parametrize("name", RANK)
-def test_includes_point_down(name: str) -> None:
-    for path in (ROOT / "cpp" / "include" / "nacre" / f"{name}.hpp", ROOT / "cpp" / "src" / f"{name}.cpp"):
-        if not path.exists():
-            continue
-        public = {file.stem for file in reachable(path, set()) if file.parent.name == "nacre"} - {name}
-        assert {other for other in public if RANK[other] >= RANK[name]} == set()
+def module_of(path: Path) -> tuple[str, str]:
+    """Return what names a header and its source as one."""
+    return folder_of(path), path.stem
+
+
+def circles(graph: dict[tuple[str, str], set[tuple[str, str]]]) -> set[tuple[str, str]]:
+    """Return the modules that are left when those that need none of the rest go, again and again."""
+    left = dict(graph)
+    while free := [name for name, needed in left.items() if needed.isdisjoint(left)]:
+        for name in free:
+            del left[name]
+    return set(left)
+
+
+def test_every_public_header_has_its_folder() -> None:
+    assert sorted(path.stem for path in HEADERS) == sorted(FOLDER)
+    assert {path.relative_to(CPP).parts[0] for path in SOURCES} == set(ORDER)
+
+
+@pytest.mark.parametrize("folder", ORDER)
+def test_includes_point_to_earlier_folders(folder: str) -> None:
+    for path in (path for path in [*HEADERS, *SOURCES] if folder_of(path) == folder):
+        later = {folder_of(file) for file in included(path)} - set(ORDER[: ORDER.index(folder) + 1])
+        assert later == set(), path
+
+
+def test_no_modules_include_each_other_in_a_circle() -> None:
+    graph: dict[tuple[str, str], set[tuple[str, str]]] = {}
+    for path in [*HEADERS, *SOURCES]:
+        needed = {module_of(file) for file in included(path)} - {module_of(path)}
+        graph.setdefault(module_of(path), set()).update(needed)
+    assert circles(graph) == set()
+    assert circles({("a", "a"): {("b", "b")}, ("b", "b"): {("a", "a")}, ("c", "c"): set()}) != set()
+
+
+def test_the_tests_of_a_folder_are_in_a_folder_of_its_name() -> None:
+    tests = (ROOT / "tests" / "cpp").rglob("test_*.cpp")
+    assert {path.parent.name for path in tests} <= set(ORDER)
 
 
 @pytest.mark.parametrize("path", HEADERS, ids=lambda path: path.stem)
@@ -105,9 +152,8 @@ def test_only_the_bindings_know_pybind11() -> None:
 
 
 def test_the_bindings_include_public_headers_only() -> None:
-    private = {path.name for path in SOURCES}
     for path in files("python", suffixes={".cpp", ".hpp"}):
-        assert private.isdisjoint(Path(name).name for name in includes(path)), path.name
+        assert set(included(path)) <= set(HEADERS), path.name
 
 
 def test_only_the_facade_touches_the_extension_module() -> None:

@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <vector>
 
-#include "nacre/camera.hpp"
 #include "simd/depth_rays.hpp"
 
 namespace nacre {

@@ -1,9 +1,10 @@
 // Which pixels at the edges of a depth image are noise.
+#include "depth/edges.hpp"
+
 #include <algorithm>
 #include <cmath>
 
 #include "base/parallel.hpp"
-#include "depth/cleaning.hpp"
 #include "simd/depth_edges.hpp"
 #include "simd/depth_planar_edges.hpp"
 

@@ -1,11 +1,12 @@
 // Pixels of a cleaned depth image that too few others support.
+#include "depth/speckles.hpp"
+
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <vector>
 
 #include "base/parallel.hpp"
-#include "depth/cleaning.hpp"
 #include "simd/depth_keep.hpp"
 
 #ifdef _MSC_VER

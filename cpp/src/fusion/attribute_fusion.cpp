@@ -7,7 +7,7 @@
 #include "base/check.hpp"
 #include "base/parallel.hpp"
 #include "camera/point_projection.hpp"
-#include "fusion/fusion_step.hpp"
+#include "fusion/observable.hpp"
 
 namespace nacre {
 namespace {

@@ -3,29 +3,17 @@
 #include <algorithm>
 #include <cmath>
 
-#include "base/se3.hpp"
-#include "base/statistics.hpp"
 #include "camera/point_projection.hpp"
 
 namespace nacre {
 
-FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
+FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, const TrackingOptions& options) {
   constexpr int most_points = 3000;
-  ModelOptions fewer = options;
+  TrackingOptions fewer = options;
   fewer.registration.max_samples = most_points;
   FrameCloud cloud{sample_frame(frame, observer, fewer), 0.0};
   cloud.depth = median_depth(cloud.points);
   return cloud;
-}
-
-double median_depth(const Points& points) {
-  return points.rows() > 0 ? static_cast<double>(median_of(points.col(2))) : 1.0;
-}
-
-double view_distance(const Pose& a, const Pose& b, double depth) {
-  constexpr double turn = 0.2, part_of_depth = 0.15;
-  const double angle = angle_between(a, b);
-  return std::max(angle / turn, (a.translation() - b.translation()).norm() / (part_of_depth * depth));
 }
 
 CloudInView look_for(const FrameCloud& cloud, const Pose& camera_from_cloud, const Frame& frame, const Camera& camera,

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 
+#include "camera/view_distance.hpp"
 #include "outlines/occluding_edges.hpp"
 #include "tracking/frame_samples.hpp"
 
@@ -11,7 +12,7 @@ namespace nacre {
 struct FrameCloud : FrameSamples {
   double depth;  // the median [m]
 };
-FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options);
+FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, const TrackingOptions& options);
 
 struct KeyFrame {
   std::int32_t frame;  // its number
@@ -19,12 +20,6 @@ struct KeyFrame {
   std::vector<OutlinePoint> outline;  // camera frame
   int last_seen;  // the last stop of the camera where its surface was in view and known to be in place
 };
-
-// Of points in the camera frame [m]; 1 where there are none.
-double median_depth(const Points& points);
-
-// How far apart two views are of a surface at a depth [m]: 1 turns the camera by 0.2 rad, or moves it by 0.15 depths.
-double view_distance(const Pose& a, const Pose& b, double depth);
 
 // What a frame says about points whose place is known about.
 struct CloudInView {

@@ -6,7 +6,7 @@
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
 #include "outlines/match.hpp"
-#include "registration/correspondences.hpp"
+#include "registration/icp.hpp"
 #include "registration/multiview.hpp"
 
 namespace nacre {

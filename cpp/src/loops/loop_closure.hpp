@@ -7,8 +7,7 @@
 
 #include "loops/key_frames.hpp"
 #include "loops/pose_graph.hpp"
-#include "nacre/model.hpp"
-#include "registration/correspondences.hpp"
+#include "registration/icp.hpp"
 
 namespace nacre {
 
@@ -33,7 +32,7 @@ struct LoopReport {
 
 class LoopClosure {
  public:
-  LoopClosure(const Camera& camera, const ModelOptions& options) : camera_(camera), options_(options) {}
+  LoopClosure(const Camera& camera, const TrackingOptions& options) : camera_(camera), options_(options) {}
 
   LoopReport add_frame(const LoopFrame& now);
   // The frames have moved, each by its motion.
@@ -76,7 +75,7 @@ class LoopClosure {
   std::vector<Pose> corrections(const std::vector<Pose>& before, std::int32_t num_frames) const;
 
   const Camera& camera_;
-  const ModelOptions& options_;
+  const TrackingOptions& options_;
   std::vector<KeyFrame> key_frames_;         // nodes of the graph
   std::vector<std::vector<int>> seen_with_;  // the earlier key frames in view when one was made, and the later ones
   PoseGraph graph_;

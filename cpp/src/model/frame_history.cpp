@@ -1,6 +1,6 @@
 #include "model/frame_history.hpp"
 
-#include "model/checkpoint/state.hpp"
+#include "model/checkpoint/fields.hpp"
 
 namespace nacre {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "nacre/model.hpp"
+#include "nacre/frame_report.hpp"
 
 namespace nacre {
 

@@ -1,6 +1,6 @@
 #include "base/check.hpp"
 #include "base/pose_check.hpp"
-#include "nacre/model.hpp"
+#include "nacre/model_options.hpp"
 
 namespace nacre {
 

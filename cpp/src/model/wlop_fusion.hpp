@@ -1,7 +1,7 @@
 // The paper's way to fold a frame into the model: WLOP of the model's and the frame's points.
 #pragma once
 
-#include "nacre/model.hpp"
+#include "nacre/model_options.hpp"
 
 namespace nacre {
 

@@ -18,7 +18,7 @@ constexpr double least_distance = 2.0;  // of a surface from another [pixels]
 
 // How far before a point of a surface a camera saw something, along its normal [m], averaged over the pixels around;
 // NaN where it saw nothing, none outside of the image. All in the camera frame.
-std::optional<double> distance_before(const Sight& sight, const Camera& camera, const Eigen::Vector3d& point,
+std::optional<double> distance_before(const DepthView& sight, const Camera& camera, const Eigen::Vector3d& point,
                                       const Eigen::Vector3d& normal) {
   const Eigen::Vector2d pixel = camera.project(point);
   if (!(pixel.x() > 1.0 && pixel.y() > 1.0 && pixel.x() < camera.width() - 2 && pixel.y() < camera.height() - 2)) {
@@ -38,7 +38,8 @@ std::optional<double> distance_before(const Sight& sight, const Camera& camera, 
   return sum / count;
 }
 
-bool is_contradicted(const OutlinePoint& edge, const Sight& sight, const Camera& camera, double pixel, double noise) {
+bool is_contradicted(const OutlinePoint& edge, const DepthView& sight, const Camera& camera, double pixel,
+                     double noise) {
   const bool is_orthographic = camera.model() == Camera::Model::orthographic;
   const Eigen::Vector3d sight_line = is_orthographic ? Eigen::Vector3d::UnitZ() : edge.point.normalized();
   if (!(-edge.normal.dot(sight_line) > least_facing)) return false;
@@ -86,7 +87,7 @@ std::vector<int> nearest_edges(const std::vector<OutlinePoint>& outline, const s
   return nearest;
 }
 
-double agreement_of(const std::vector<OutlinePoint>& outline, const std::vector<int>& matches, const Sight& sight,
+double agreement_of(const std::vector<OutlinePoint>& outline, const std::vector<int>& matches, const DepthView& sight,
                     const Camera& camera, double pixel, double noise) {
   const std::vector<OutlinePoint> seen = moved(outline, sight.world_from_camera.inverse());
   std::size_t agree = 0, contradicted = 0;

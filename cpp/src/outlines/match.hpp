@@ -19,7 +19,7 @@ std::vector<int> nearest_edges(const std::vector<OutlinePoint>& outline, const s
 // The part of an outline (world frame) with a match, without the points of which a sight does not say that the surface
 // ends elsewhere: there it saw something farther, or nothing, before the outline, or that the surface goes on beyond. A
 // surface that bends away, or is hidden, contradicts nothing. `pixel` and `noise` are those of the sight [m].
-double agreement_of(const std::vector<OutlinePoint>& outline, const std::vector<int>& matches, const Sight& sight,
+double agreement_of(const std::vector<OutlinePoint>& outline, const std::vector<int>& matches, const DepthView& sight,
                     const Camera& camera, double pixel, double noise);
 
 }  // namespace nacre

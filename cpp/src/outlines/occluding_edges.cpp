@@ -23,7 +23,7 @@ constexpr double most_off = 4.0;  // of a pixel from its surface, in standard de
 
 class OutlineSearch {
  public:
-  OutlineSearch(const Sight& sight, const Camera& camera)
+  OutlineSearch(const DepthView& sight, const Camera& camera)
       : sight_(sight),
         camera_(camera),
         measured_(sight.measured.size() > 0 ? sight.measured : sight.depth),
@@ -149,7 +149,7 @@ class OutlineSearch {
            6.0 * static_cast<double>(sight_.sigma[v * width_ + u]);
   }
 
-  const Sight& sight_;
+  const DepthView& sight_;
   const Camera& camera_;
   const Values& measured_;
   int width_, height_;
@@ -180,7 +180,8 @@ Eigen::Vector3d unproject(const Camera& camera, int u, int v, double z) {
           static_cast<double>(ray.origin_y) + scale * static_cast<double>(ray.direction_y), z};
 }
 
-std::vector<OutlinePoint> find_outline(const Sight& sight, const Camera& camera, std::size_t most, int num_threads) {
+std::vector<OutlinePoint> find_outline(const DepthView& sight, const Camera& camera, std::size_t most,
+                                       int num_threads) {
   std::vector<OutlinePoint> outline;
   if (sight.depth.size() == 0) return outline;
   const OutlineSearch search(sight, camera);

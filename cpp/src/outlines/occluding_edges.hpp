@@ -3,8 +3,8 @@
 
 #include <vector>
 
+#include "depth/depth_view.hpp"
 #include "nacre/camera.hpp"
-#include "tracking/acceptance.hpp"
 
 namespace nacre {
 
@@ -19,7 +19,7 @@ struct OutlinePoint {
 // nothing or something farther behind. Not where the image ends, not where something nearer begins, and not where a
 // surface bends away, since there the outline moves with the camera (Choi, Trevor and Christensen 2013 call the first
 // kind occluding edges). At most `most` of them.
-std::vector<OutlinePoint> find_outline(const Sight& sight, const Camera& camera, std::size_t most, int num_threads);
+std::vector<OutlinePoint> find_outline(const DepthView& sight, const Camera& camera, std::size_t most, int num_threads);
 
 // Whether the image ends before the surfaces do: on more than a tenth of its border.
 bool is_cut_off(const Values& depth, const Camera& camera);

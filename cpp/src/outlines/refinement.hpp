@@ -2,7 +2,7 @@
 #pragma once
 
 #include "outlines/occluding_edges.hpp"
-#include "registration/correspondences.hpp"
+#include "registration/icp.hpp"
 
 namespace nacre {
 

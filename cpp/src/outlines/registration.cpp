@@ -126,8 +126,8 @@ class EdgeSearch {
     const double ratio = std::sqrt(squares / static_cast<double>(pairs.size())) / smallest_gate();
     if (!(ratio < largest_ratio)) return 0.0;
     const std::vector<OutlinePoint> edges = moved(outlines_.source, pose);
-    const Sight now{outlines_.depth, Values(), pose};
-    const auto part = [&](const auto& outline, const auto& others, const Sight& sight) {
+    const DepthView now{outlines_.depth, Values(), pose};
+    const auto part = [&](const auto& outline, const auto& others, const DepthView& sight) {
       const std::vector<int> matches = nearest_edges(outline, others, smallest_gate(), options_.num_threads);
       return agreement_of(outline, matches, sight, outlines_.camera, pixel_, outlines_.noise);
     };

@@ -2,14 +2,14 @@
 #pragma once
 
 #include "outlines/occluding_edges.hpp"
-#include "registration/correspondences.hpp"
+#include "registration/icp.hpp"
 
 namespace nacre {
 
 // What two cameras saw, with the outlines that they saw, each in its camera's frame.
 struct OutlinePair {
   const Camera& camera;
-  const Sight& before;
+  const DepthView& before;
   std::vector<OutlinePoint> target, source;
   const Values& depth;  // of each pixel of the source [m]
   double noise;         // of a pixel [m]

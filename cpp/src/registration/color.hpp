@@ -2,7 +2,7 @@
 #pragma once
 
 #include "registration/color_field.hpp"
-#include "registration/correspondences.hpp"
+#include "registration/icp.hpp"
 
 namespace nacre {
 

@@ -2,12 +2,10 @@
 #pragma once
 
 #include <array>
-#include <limits>
 #include <vector>
 
 #include "nacre/registration.hpp"
 #include "registration/icp_step.hpp"
-#include "registration/scale_check.hpp"
 #include "spatial/nearest_batch.hpp"
 
 namespace nacre {
@@ -61,18 +59,5 @@ class IcpTarget {
   BlockTree<float> tree_;
   double diameter_ = 0.0, spacing_ = 0.0;
 };
-
-struct IcpResult : AlignResult {
-  double residual_ratio = std::numeric_limits<double>::quiet_NaN();  // residuals to the largest they may be, rms
-  Matrix6 shape_information = Matrix6::Zero();                       // the part of it on which normals agree
-  double normal_information = 0.0;                                   // see normal_information
-  double misfit = 0.0;  // what neighbouring residuals have in common, by what noise and resolution explain, rms
-  SizeDifference size_difference;  // by which the source would have to grow to fit better
-};
-
-// align with a prepared target. Held: directions that the pairs do not determine stay as they are in every step.
-IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options);
-IcpResult align_held(const IcpTarget& target, const IcpSource& source, const Pose& initial,
-                     const AlignOptions& options);
 
 }  // namespace nacre

@@ -6,6 +6,7 @@
 
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
+#include "registration/icp.hpp"
 #include "registration/rotation_grid.hpp"
 
 namespace nacre {

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "registration/icp_step.hpp"
+#include "registration/pair.hpp"
 
 namespace nacre {
 

@@ -1,7 +1,7 @@
 // ICP of a cloud that may only turn about a plane's normal and move along the plane.
 #pragma once
 
-#include "registration/correspondences.hpp"
+#include "registration/icp.hpp"
 #include "registration/motion_basis.hpp"
 
 namespace nacre {

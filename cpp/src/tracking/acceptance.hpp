@@ -5,8 +5,10 @@
 #include <limits>
 #include <string>
 
-#include "nacre/model.hpp"
-#include "registration/correspondences.hpp"
+#include "depth/depth_view.hpp"
+#include "nacre/frame_status.hpp"
+#include "nacre/tracking_options.hpp"
+#include "registration/icp.hpp"
 
 namespace nacre {
 
@@ -36,19 +38,6 @@ struct TrackingResult {
   double rank() const { return status == FrameStatus::lost ? recognition : 1000.0 + evidence; }
 };
 
-// What a camera saw from one place.
-struct Sight {
-  Values depth, sigma;  // of each pixel [m], NaN where nothing was measured
-  Pose world_from_camera = Pose::Identity();
-  Values measured = {};  // the depth before it was cleaned, 0 or NaN for none; empty: the same
-};
-
-// Of oriented points that face a camera at a pose and project onto a pixel that it measured: the part that agrees with
-// it, among those that agree and those that the camera sees through. Points behind the measured surface are hidden, not
-// wrong. NaN where too few of the points can be judged.
-double consistency_of(const PointsRef& points, const PointsRef& normals, const Sight& sight,
-                      const Pose& world_from_camera, const Camera& camera, double spacing, int num_threads);
-
 // Fills in evidence, recognition, status, reason and is_beyond_doubt. The evidence is what the matches tell against
 // chance: for each a residual that is small among those that would have matched, ln(0.58 / ratio), where chance gives a
 // ratio of 0.58; times overlap^2, since any two surfaces touch somewhere, and consistency^4, since true ones contradict
@@ -63,6 +52,6 @@ double consistency_of(const PointsRef& points, const PointsRef& normals, const S
 //
 // A frame that is larger or smaller than what it fits, beyond doubt, is lost: its depth is wrong, or it is another
 // thing.
-void judge(TrackingResult& result, const ModelOptions& options);
+void judge(TrackingResult& result, const TrackingOptions& options);
 
 }  // namespace nacre

@@ -5,18 +5,11 @@
 
 #include "base/parallel.hpp"
 #include "base/random.hpp"
+#include "depth/systematic_error.hpp"
 
 namespace nacre {
 
-// Depth cameras are also systematically wrong, the more the farther they see, which averaging does not remove
-// (Teichman, Miller and Thrun 2013). The form and the figure are what tracked best on recordings of structured light in
-// rooms.
-float systematic_error(float z) {
-  constexpr float growth = 0.0015F;  // [1/m^2]
-  return growth * z * z * z;
-}
-
-FrameSamples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options) {
+FrameSamples sample_frame(const Frame& frame, const SurfaceObserver& observer, const TrackingOptions& options) {
   const std::int64_t count =
       options.registration.max_samples > 0
           ? std::min<std::int64_t>(options.registration.max_samples, static_cast<std::int64_t>(frame.valid.size()))

@@ -2,13 +2,10 @@
 #pragma once
 
 #include "fusion/observer.hpp"
-#include "nacre/model.hpp"
+#include "nacre/tracking_options.hpp"
 #include "registration/color.hpp"
 
 namespace nacre {
-
-// What a depth camera is wrong by beyond its noise, so that no averaging removes it: a standard deviation [m].
-float systematic_error(float z);
 
 // Denoised points of a frame, spread over it at random: noise would shift the matches on curved surfaces.
 struct FrameSamples {
@@ -18,7 +15,7 @@ struct FrameSamples {
 };
 
 // options.registration.max_samples of them, or as many as the frame has.
-FrameSamples sample_frame(const Frame& frame, const SurfaceObserver& observer, const ModelOptions& options);
+FrameSamples sample_frame(const Frame& frame, const SurfaceObserver& observer, const TrackingOptions& options);
 
 // The frame's pixels with their brightness: where there are many, some at random. The observer has colours.
 BrightCloud bright_cloud(const Frame& frame, const SurfaceObserver& observer);

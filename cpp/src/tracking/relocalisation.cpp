@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "registration/global_search.hpp"
+#include "registration/icp.hpp"
 
 namespace nacre {
 namespace {

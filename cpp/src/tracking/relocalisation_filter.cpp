@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "base/statistics.hpp"
-#include "loops/key_frames.hpp"
+#include "camera/view_distance.hpp"
 
 namespace nacre {
 namespace {

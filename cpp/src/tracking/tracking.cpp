@@ -8,11 +8,11 @@
 #include "base/statistics.hpp"
 #include "camera/point_projection.hpp"
 #include "camera/point_spacing.hpp"
+#include "camera/view_distance.hpp"
 #include "fusion/observer.hpp"
-#include "loops/key_frames.hpp"
 #include "outlines/registration.hpp"
 #include "registration/color.hpp"
-#include "registration/correspondences.hpp"
+#include "registration/icp.hpp"
 #include "tracking/acceptance.hpp"
 #include "tracking/frame_samples.hpp"
 #include "tracking/relocalisation.hpp"
@@ -87,11 +87,11 @@ struct Search {
   const Frame& frame;
   const Camera& camera;
   const SurfaceObserver& observer;
-  const ModelOptions& options;
+  const TrackingOptions& options;
   IcpSource source;
-  const Values& noise;  // of the sampled points [m]
-  const Sight& now;     // from the origin: where the camera is, is to be found
-  const Sight& before;
+  const Values& noise;   // of the sampled points [m]
+  const DepthView& now;  // from the origin: where the camera is, is to be found
+  const DepthView& before;
   double spacing;             // of the model [m]
   double depth;               // of the sampled points, the median [m]
   std::int32_t oldest_frame;  // see track
@@ -214,9 +214,9 @@ TrackingResult on_plane(const PlaneFit& fit) {
 }  // namespace
 
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const Sight& now, std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost,
-                     const Sight& before, PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing,
-                     const ModelOptions& options) {
+                     const DepthView& now, std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost,
+                     const DepthView& before, PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing,
+                     const TrackingOptions& options) {
   const FrameSamples samples = sample_frame(frame, observer, options);
   Search search{model,
                 frame,

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "fusion/observer.hpp"
-#include "nacre/model.hpp"
+#include "nacre/fusion.hpp"
 #include "tracking/acceptance.hpp"
 #include "tracking/object_view.hpp"
 #include "tracking/relocalisation_filter.hpp"
@@ -25,8 +25,8 @@ struct WhereElse {
 // oldest_frame may have drifted away: they are left out, except by the search. Where no single registration is
 // convincing, `hypothesis` may become so over several frames.
 TrackingResult track(const PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                     const Sight& now, std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost,
-                     const Sight& before, PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing,
-                     const ModelOptions& options);
+                     const DepthView& now, std::vector<Pose> guesses, const WhereElse& elsewhere, bool was_lost,
+                     const DepthView& before, PlaceHypothesis& hypothesis, std::int32_t oldest_frame, double spacing,
+                     const TrackingOptions& options);
 
 }  // namespace nacre

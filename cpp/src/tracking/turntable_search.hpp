@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "nacre/fusion.hpp"
-#include "registration/correspondences.hpp"
+#include "registration/icp.hpp"
 #include "tracking/object_view.hpp"
 
 namespace nacre {

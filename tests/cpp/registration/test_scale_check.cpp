@@ -1,6 +1,6 @@
 #include "clouds.hpp"
 #include "doctest/doctest.h"
-#include "registration/correspondences.hpp"
+#include "registration/icp.hpp"
 #include "registration/scale_check.hpp"
 
 using namespace nacre;

@@ -1,11 +1,12 @@
 // A model as bytes, and back: a header (magic, format, nacre's version, length, checksum), then the state.
+#include "model/checkpoint/checkpoint.hpp"
+
 #include <algorithm>
 #include <cmath>
 #include <sstream>
 
 #include "base/random.hpp"
 #include "model/checkpoint/state.hpp"
-#include "model/model_impl.hpp"
 #include "nacre/version.hpp"
 
 namespace nacre {
@@ -105,15 +106,14 @@ void exchange(Archive& archive, CameraFields& fields) {
 }
 
 // What of a model is neither given nor of the newest frame alone.
-template <class Archive, class Impl>
-void exchange_state(Archive& archive, Impl& state) {
+template <class Archive>
+void exchange_state(Archive& archive, Pipeline& state) {
   archive(state.options.fusion.reference_sigma, state.region, state.calibration, state.cloud, state.loops,
           state.history, state.before, state.hypothesis, state.views, state.spacing, state.num_lost);
 }
 
 // Space that the table of rays may take before a frame was folded in: see load.
-template <class Impl>
-std::string filler_of(const CameraFields& camera, const Impl& state) {
+std::string filler_of(const CameraFields& camera, const Pipeline& state) {
   constexpr std::size_t bytes_per_pixel = 8;
   const bool is_needed = camera.has_table() && state.before.depth.size() == 0;
   return std::string(is_needed ? bytes_per_pixel * static_cast<std::size_t>(camera.num_pixels()) : 0, '\0');
@@ -272,19 +272,19 @@ bool PrivateState::is_sound(const NoiseCalibration& calibration) {
          std::all_of(calibration.bins_.begin(), calibration.bins_.end(), is_mean);
 }
 
-std::string Model::save(const std::string& note) const {
+std::string save_checkpoint(Pipeline& pipeline, const std::string& note) {
   std::string bytes(header_size, '\0'), kept = note;
   StateWriter archive(bytes);
-  CameraFields camera = fields_of(impl_->camera);
+  CameraFields camera = fields_of(pipeline.camera);
   exchange(archive, camera);
-  std::string filler = filler_of(camera, *impl_);
-  archive(impl_->given, filler);
-  exchange_state(archive, *impl_);
+  std::string filler = filler_of(camera, pipeline);
+  archive(pipeline.given, filler);
+  exchange_state(archive, pipeline);
   archive(kept);
   return sealed(std::move(bytes));
 }
 
-Model Model::load(std::string_view bytes, std::string* note) {
+std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* note) {
   check_seal(bytes);
   StateReader archive(bytes, header_size);
   CameraFields camera;
@@ -296,13 +296,13 @@ Model Model::load(std::string_view bytes, std::string* note) {
                                           static_cast<std::size_t>(camera.num_pixels()) <= archive.left() / 8),
                   "the camera is larger than what is left");
   archive(given, filler);
-  std::unique_ptr<Impl> impl;
+  std::unique_ptr<Pipeline> pipeline;
   try {
-    impl = std::make_unique<Impl>(camera.camera(), given);
+    pipeline = std::make_unique<Pipeline>(camera.camera(), given);
   } catch (const std::invalid_argument& error) {
     archive.fail(error.what());
   }
-  Impl& state = *impl;
+  Pipeline& state = *pipeline;
   exchange_state(archive, state);
   archive(kept);
   archive.require_end();
@@ -312,7 +312,7 @@ Model Model::load(std::string_view bytes, std::string* note) {
   const std::size_t num_frames = state.history.size();
   const Eigen::Index num_pixels = camera.num_pixels();
   const auto is_pixels = [&](const Values& values) { return values.size() == num_pixels; };
-  const Sight& before = state.before;
+  const DepthView& before = state.before;
   const bool is_first = state.cloud.size() == 0 && before.depth.size() == 0;
   archive.require(filler == filler_of(camera, state), "its length does not fit the camera");
   archive.require(state.region.size() == 0 || is_image(state.region, state.camera), "the region has another size");
@@ -333,7 +333,7 @@ Model Model::load(std::string_view bytes, std::string* note) {
   archive.require(PrivateState::is_sound(state.hypothesis), "the place that is followed contradicts itself");
   archive.require(PrivateState::is_sound(state.calibration), "the noise is not finite");
   if (note != nullptr) *note = std::move(kept);
-  return Model(std::move(impl));
+  return pipeline;
 }
 
 CheckpointError::CheckpointError(const std::string& reason, std::int64_t offset)

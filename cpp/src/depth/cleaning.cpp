@@ -1,18 +1,21 @@
-#include "nacre/depth.hpp"
+#include "depth/cleaning.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <limits>
+#include <sstream>
 
 #include "base/check.hpp"
 #include "base/parallel.hpp"
 #include "base/statistics.hpp"
 #include "camera/ray_table.hpp"
 #include "depth/cleaning.hpp"
+#include "depth/edges.hpp"
 #include "depth/inverse_depth_image.hpp"
+#include "depth/speckles.hpp"
+#include "depth/window_fits.hpp"
 #include "simd/depth_edges.hpp"
 #include "simd/depth_keep.hpp"
-#include "simd/depth_points.hpp"
 
 namespace nacre {
 namespace {
@@ -128,28 +131,6 @@ void DepthOptions::check() const {
   if (noise) noise->check();
 }
 
-void NoiseModel::check() const {
-  require(std::isfinite(constant) && constant >= 0.0, "noise.constant", "a finite number of metres, at least 0",
-          constant);
-  require(std::isfinite(quadratic) && quadratic >= 0.0, "noise.quadratic", "finite, at least 0", quadratic);
-  require(std::isfinite(offset), "noise.offset", "finite", offset);
-  require(shared >= 0.0 && shared < 1.0, "noise.shared", "a part from 0 to below 1", shared);
-}
-
-DepthImage depth_from_raw(
-    const Eigen::Ref<const Eigen::Array<std::uint16_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>& raw,
-    double depth_scale) {
-  require(std::isfinite(depth_scale) && depth_scale > 0.0, "depth_scale", "a positive number of stored units per metre",
-          depth_scale);
-  DepthImage depth(raw.rows(), raw.cols());
-  if (raw.size() == 0) return depth;
-  const auto fill_row = simd::fill_depth_row();
-  for (Eigen::Index v = 0; v < raw.rows(); ++v) {
-    fill_row(&raw.coeffRef(v, 0), static_cast<float>(depth_scale), static_cast<int>(raw.cols()), &depth(v, 0));
-  }
-  return depth;
-}
-
 DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const DepthOptions& options,
                             const MaskRef& mask, DepthReport* report, int num_threads) {
   return clean_depth(depth, camera, options, mask, nullptr, report, nullptr, num_threads);
@@ -206,25 +187,6 @@ MaskImage label_pixels(const DepthRef& depth, const Camera& camera, const DepthO
   MaskImage labels;
   clean_depth(depth, camera, options, mask, nullptr, nullptr, &labels, num_threads);
   return labels;
-}
-
-Points back_project(const DepthRef& depth, const Camera& camera, int num_threads) {
-  require_camera_size("depth", depth.rows(), depth.cols(), camera);
-  const std::int64_t height = camera.height(), block_size = rows_per_block(camera.width());
-  const auto ray_row = [&](std::int64_t v) { return camera.ray_table().row(static_cast<int>(v)); };
-  std::vector<std::int64_t> first(static_cast<std::size_t>(height) + 1);
-  const auto count = simd::count_points();
-  parallel_for(height, block_size, num_threads, [&](std::int64_t v) {
-    first[static_cast<std::size_t>(v) + 1] = count(&depth.coeffRef(v, 0), ray_row(v), camera.width());
-  });
-  std::partial_sum(first.begin(), first.end(), first.begin());
-  Points points(first.back(), 3);
-  const auto gather = simd::gather_points();
-  parallel_for(height, block_size, num_threads, [&](std::int64_t v) {
-    const std::int64_t begin = first[static_cast<std::size_t>(v)], end = first[static_cast<std::size_t>(v) + 1];
-    gather(&depth.coeffRef(v, 0), ray_row(v), camera.width(), points.data() + 3 * begin, static_cast<int>(end - begin));
-  });
-  return points;
 }
 
 }  // namespace nacre

@@ -1,4 +1,4 @@
-#include "nacre/fusion.hpp"
+#include "fusion/fuse.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include "camera/point_projection.hpp"
 #include "camera/point_spacing.hpp"
 #include "fusion/attribute_fusion.hpp"
-#include "fusion/fusion_step.hpp"
+#include "fusion/observable.hpp"
 #include "fusion/pixel_index.hpp"
 #include "spatial/hash_grid.hpp"
 

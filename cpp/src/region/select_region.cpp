@@ -1,5 +1,3 @@
-#include "nacre/region.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -9,6 +7,7 @@
 #include "base/check.hpp"
 #include "base/parallel.hpp"
 #include "depth/inverse_depth_image.hpp"
+#include "nacre/region.hpp"
 #include "region/coarse_frame.hpp"
 #include "region/support_planes.hpp"
 

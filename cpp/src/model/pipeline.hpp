@@ -1,4 +1,4 @@
-// All that a model knows.
+// The loop, and all that it knows between frames.
 #pragma once
 
 #include <optional>
@@ -7,7 +7,8 @@
 #include "fusion/observer.hpp"
 #include "loops/loop_closure.hpp"
 #include "model/frame_history.hpp"
-#include "nacre/model.hpp"
+#include "nacre/frame_report.hpp"
+#include "nacre/model_options.hpp"
 #include "tracking/acceptance.hpp"
 #include "tracking/object_view.hpp"
 #include "tracking/relocalisation_filter.hpp"
@@ -15,7 +16,7 @@
 
 namespace nacre {
 
-struct Model::Impl {
+struct Pipeline {
   Camera camera;
   ModelOptions given;    // options as given
   ModelOptions options;  // what the first frame decides is filled in
@@ -26,9 +27,9 @@ struct Model::Impl {
   PointModel cloud;
   LoopClosure loops{camera, options};
   FrameHistory history;
-  Sight now;                          // of the newest, from the origin: where the camera is, is to be found
+  DepthView now;                      // of the newest, from the origin: where the camera is, is to be found
   std::vector<OutlinePoint> outline;  // of the newest
-  Sight before;                       // of the newest frame that was folded in
+  DepthView before;                   // of the newest frame that was folded in
   PlaceHypothesis hypothesis;         // while the camera is lost
   std::vector<ObjectView> views;      // of an object that stands on a plane, from different directions
   double spacing = 0.0;
@@ -37,7 +38,7 @@ struct Model::Impl {
   bool was_lost() const { return num_lost > 0; }
   bool jumped() const;
 
-  Impl(const Camera& camera_in, const ModelOptions& options_in);
+  Pipeline(const Camera& camera_in, const ModelOptions& options_in);
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
   NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }

@@ -1,10 +1,9 @@
-#include "nacre/global_registration.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "base/check.hpp"
+#include "nacre/global_registration.hpp"
 #include "registration/global_search.hpp"
 
 namespace nacre {

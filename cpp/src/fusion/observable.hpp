@@ -1,8 +1,7 @@
-// Fusion with an observer that others use too.
+// Which points of the model a frame may observe.
 #pragma once
 
 #include <cmath>
-#include <vector>
 
 #include "camera/point_projection.hpp"
 #include "fusion/observer.hpp"
@@ -24,11 +23,5 @@ inline bool is_observable(const ModelView::Block& points, int j, const Frame& fr
   const float sigma = sigma_at(frame, points.pixel[j]);
   return observer.may_observe(points.point(j), points.pixel[j], sigma, least_weight * observer.frontal_weight(sigma));
 }
-
-// fuse() with the observer of the frame. Colours are the observer's.
-FusionReport fuse_observed(PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                           const Pose& world_from_camera, double spacing, std::int32_t frame_index,
-                           const FusionOptions& options, int num_threads,
-                           const std::vector<FrameAttribute>& attributes = {});
 
 }  // namespace nacre

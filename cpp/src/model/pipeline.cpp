@@ -1,0 +1,326 @@
+#include "model/pipeline.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include "base/check.hpp"
+#include "base/pose_check.hpp"
+#include "base/se3.hpp"
+#include "camera/point_spacing.hpp"
+#include "depth/cleaning.hpp"
+#include "fusion/attribute_fusion.hpp"
+#include "fusion/deformation.hpp"
+#include "fusion/fuse.hpp"
+#include "model/wlop_fusion.hpp"
+#include "outlines/refinement.hpp"
+#include "registration/multiview.hpp"
+
+namespace nacre {
+namespace {
+
+constexpr std::size_t least_pixels = 100;  // a frame with fewer valid pixels cannot be registered
+constexpr double coarsening = 1.25;        // of the spacing, when the model reaches its largest size
+
+// Milliseconds since the last call.
+class StopWatch {
+ public:
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    const double milliseconds = std::chrono::duration<double, std::milli>(now - last_).count();
+    last_ = now;
+    return milliseconds;
+  }
+
+ private:
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+// Twice the size of a pixel on the nearer surfaces (the lower quartile of depth).
+double spacing_for(const Frame& frame, const Camera& camera) {
+  std::vector<float> z;
+  z.reserve(frame.valid.size());
+  for (const std::int32_t row : frame.valid) z.push_back(frame.points(row, 2));
+  const auto quartile = z.begin() + static_cast<std::ptrdiff_t>(z.size() / 4);
+  std::nth_element(z.begin(), quartile, z.end());
+  return 2.0 * camera.footprint(*quartile);
+}
+
+void check_extras(const Camera& camera, const FrameExtras& extras, const PointModel& model) {
+  const Eigen::Index pixels = static_cast<Eigen::Index>(camera.width()) * camera.height();
+  require(extras.colors.rows() == 0 || extras.colors.rows() == pixels, "colors", "one row per pixel",
+          extras.colors.rows());
+  check_attributes(extras.attributes, camera, model);
+  require(!extras.keep_guess || extras.guess.has_value(), "keep_guess", "used with a guess", "no guess");
+  if (extras.guess) require_rigid(*extras.guess, "guess");
+}
+
+}  // namespace
+
+Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in)
+    : camera(camera_in), given(options_in), options(options_in) {
+  options.check();
+  options.registration.num_threads = options.num_threads;
+  options.consolidation.num_threads = options.num_threads;
+  options.normals.num_threads = options.num_threads;
+  spacing = options.spacing;
+}
+
+// The loop: clean the image, make points of it, keep those of interest, register them to the model, correct the model
+// where a loop closes, fold the points in, renew the normals.
+FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras) {
+  check_extras(camera, extras, cloud);
+  StopWatch total, watch;
+  FrameReport report;
+  report.index = static_cast<std::int64_t>(history.size());
+  report.timestamp = extras.timestamp;
+
+  const DepthImage clean =
+      clean_depth(depth, camera, options.depth, extras.mask, &calibration, &report.depth, nullptr, options.num_threads);
+  report.milliseconds.preprocess = watch.lap();
+
+  now.measured.resize(depth.size());
+  Eigen::Map<DepthImage>(now.measured.data(), depth.rows(), depth.cols()) = depth;
+  make_frame(clean, camera, noise(), options.num_threads, frame);
+  report.milliseconds.back_project = watch.lap();
+
+  keep_region(report);
+  report.milliseconds.region = watch.lap();
+
+  if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
+  const ColorsRef colors(extras.colors);
+  observer.look_at(frame, colors, options.num_threads);
+  report.milliseconds.back_project += watch.lap();
+
+  now.depth = frame.points.col(2);
+  now.sigma = frame.sigma;
+  const TrackingResult tracking = locate(extras, report.region);
+  report.status = tracking.status;
+  report.reason = tracking.reason;
+  report.world_from_camera = tracking.alignment.target_from_source;
+  report.num_inliers = tracking.alignment.num_inliers;
+  report.overlap = tracking.alignment.overlap;
+  report.consistency = tracking.consistency;
+  report.evidence = tracking.evidence;
+  report.rmse = tracking.alignment.rmse;
+  report.information = tracking.alignment.information;
+  report.weak_directions = tracking.alignment.weak_directions;
+  report.milliseconds.registration = watch.lap();
+
+  if (report.status == FrameStatus::lost) {
+    report.world_from_camera = history.num_registered() == 0 ? Pose::Identity() : history.registered_pose(0);
+  } else {
+    hypothesis.forget();
+    if (keeps_key_frames()) close_loops(report, tracking, extras.keep_guess);
+    report.milliseconds.loop_closure = watch.lap();
+    if (report.status == FrameStatus::tracked) {
+      if (was_lost()) report.status = FrameStatus::relocalised;
+      keep_view(report);
+      if (tracking.is_on_plane) adjust(report);
+      fold_in(extras, report);
+      std::swap(before, now);
+      before.world_from_camera = report.world_from_camera;
+      now.world_from_camera = Pose::Identity();
+    }
+  }
+  num_lost = report.status == FrameStatus::lost && history.num_registered() > 0 ? num_lost + 1 : 0;
+  report.milliseconds.fold_in = watch.lap() - report.milliseconds.normals;
+  report.num_points = cloud.size();
+  report.spacing = spacing;
+  report.milliseconds.total = total.lap();
+  history.add(report);
+  return history.back();
+}
+
+void Pipeline::keep_region(FrameReport& report) {
+  report.region.num_inside = report.depth.num_kept;
+  if (!options.region.is_limited()) return;
+  MaskImage found = select_region(frame, camera, options.region, region, &report.region, options.num_threads);
+  nacre::keep_region(found, frame);
+  if (report.region.num_inside > 0) region = std::move(found);
+}
+
+TrackingResult Pipeline::locate(const FrameExtras& extras, const RegionReport& region_report) {
+  constexpr std::size_t most_outline_points = 800;
+  TrackingResult result;
+  result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
+  outline.clear();
+  if (frame.valid.size() < least_pixels) {
+    const std::string count = "only " + std::to_string(frame.valid.size()) + " pixels of the frame are usable";
+    result.reason = region_report.reason.empty() ? count : region_report.reason;
+    return result;
+  }
+  if (keeps_key_frames()) outline = find_outline(now, camera, most_outline_points, options.num_threads);
+  if (cloud.size() == 0 || extras.keep_guess) {
+    result.status = FrameStatus::tracked;
+    result.alignment.target_from_source = extras.guess.value_or(Pose::Identity());
+    result.alignment.rmse = 0.0;
+    result.alignment.overlap = result.consistency = 1.0;
+    return result;
+  }
+  result = track(cloud, frame, camera, observer, now, guesses(extras), elsewhere(region_report), was_lost() || jumped(),
+                 before, hypothesis, options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
+  const bool is_determined = result.status == FrameStatus::tracked && result.alignment.weak_directions.cols() == 0;
+  if (is_determined && !result.is_on_plane) {
+    refine_by_outlines(result.alignment, outline, loops.outlines_near(result.alignment.target_from_source),
+                       options.num_threads);
+  }
+  return result;
+}
+
+// Whether the camera's last motion was none that goes on: views far apart, in any order.
+bool Pipeline::jumped() const {
+  constexpr double largest_turn = 0.7;
+  if (history.num_registered() < 2) return false;
+  return angle_between(history.registered_pose(1), history.registered_pose(0)) > largest_turn;
+}
+
+std::vector<Pose> Pipeline::guesses(const FrameExtras& extras) const {
+  if (extras.guess) return {*extras.guess};
+  const Pose last = history.registered_pose(0);
+  if (!options.predict_motion || history.num_registered() < 2 || was_lost() || jumped()) return {last};
+  const Pose predicted = last * (history.registered_pose(1).inverse() * last);
+  return {orthonormal(predicted), last};
+}
+
+// Some of the newest poses from which the camera looked in different directions.
+static std::vector<Pose> key_poses(const FrameHistory& history) {
+  constexpr std::size_t most = 8;
+  constexpr double least_angle = 0.35;
+  std::vector<Pose> chosen;
+  for (std::size_t age = 0; age < history.num_registered() && chosen.size() < most; ++age) {
+    const Pose pose = history.registered_pose(age);
+    const bool is_new = std::all_of(chosen.begin(), chosen.end(),
+                                    [&](const Pose& other) { return angle_between(other, pose) > least_angle; });
+    if (is_new) chosen.push_back(pose);
+  }
+  return chosen;
+}
+
+// Around some poses; and everywhere, but not at every frame where that has been to no avail.
+WhereElse Pipeline::elsewhere(const RegionReport& region_report) const {
+  constexpr std::int64_t patience = 8;
+  WhereElse where;
+  if (!options.relocalise) return where;
+  where.views = &views;
+  where.view_of_frame = [&] { return view_of_object(region_report); };
+  where.key_poses = [this] { return key_poses(history); };
+  where.everywhere = num_lost < patience || num_lost % patience == 0;
+  return where;
+}
+
+// Moves the pose of a frame, and turns with it what is told about the pose's uncertainty.
+static void correct(FrameReport& report, const Pose& correction) {
+  report.world_from_camera = correction * report.world_from_camera;
+  turn_uncertainty(report, correction.linear());
+}
+
+// Of the newest frame, where it shows an object that stands on a plane.
+std::optional<ObjectView> Pipeline::view_of_object(const RegionReport& report) const {
+  if (report.support < 0) return std::nullopt;
+  return object_view(frame, region, report.planes[static_cast<std::size_t>(report.support)],
+                     sample_frame(frame, observer, options), options.registration.seed);
+}
+
+// Views from different directions, for the search on the plane.
+void Pipeline::keep_view(const FrameReport& report) {
+  constexpr std::size_t most_views = 24;
+  constexpr double least_angle = 0.35;
+  const Pose& pose = report.world_from_camera;
+  const bool is_new = std::all_of(views.begin(), views.end(), [&](const ObjectView& view) {
+    return angle_between(view.world_from_camera, pose) > least_angle;
+  });
+  if (!options.relocalise || views.size() >= most_views || !is_new) return;
+  std::optional<ObjectView> view = view_of_object(report.region);
+  if (!view) return;
+  view->frame = static_cast<std::int32_t>(report.index);
+  view->world_from_camera = pose;
+  views.push_back(std::move(*view));
+}
+
+// Views far apart see little of the same surface: all of them together determine the newest, and each other.
+void Pipeline::adjust(FrameReport& report) {
+  if (views.empty() || views.back().frame != report.index) return;
+  std::vector<AdjustableView> adjustable;
+  double tolerance = 0.0;
+  for (const ObjectView& view : views) {
+    adjustable.push_back({view.world_from_camera, view.points, view.normals});
+    tolerance = std::max(tolerance, view.tolerance);
+  }
+  const ObjectView& first = views.front();
+  const MotionBasis motions = MotionBasis::on_plane(first.world_from_camera.linear() * first.support.normal,
+                                                    first.world_from_camera * first.body());
+  const std::vector<Pose> adjusted = adjust_views(adjustable, motions, tolerance, 0.0, options.num_threads);
+  // Each frame moves with the view that it is nearest to.
+  const auto motion_of = [&](const Pose& pose) {
+    std::size_t nearest = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t k = 0; k < views.size(); ++k) {
+      const double angle = angle_between(views[k].world_from_camera, pose);
+      if (angle >= least) continue;
+      least = angle;
+      nearest = k;
+    }
+    return orthonormal(adjusted[nearest] * views[nearest].world_from_camera.inverse());
+  };
+  report.corrects_earlier = true;
+  std::vector<Pose> corrections;
+  for (std::size_t i = 0; i < history.size(); ++i) corrections.push_back(motion_of(history.pose(i)));
+  history.move(corrections);
+  corrections.push_back(motion_of(report.world_from_camera));
+  correct(report, corrections.back());
+  move_points(cloud, corrections, options.num_threads);
+  if (keeps_key_frames()) loops.move(corrections);
+  for (std::size_t k = 0; k < views.size(); ++k) views[k].world_from_camera = adjusted[k];
+}
+
+void Pipeline::close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given) {
+  const std::int32_t oldest_frame = loops.oldest_frame();
+  const LoopReport loop =
+      loops.add_frame({static_cast<std::int32_t>(report.index), frame, observer, outline, tracking.alignment, spacing,
+                       is_given, was_lost() || tracking.is_to_whole_model});
+  if (loop.corrections.empty()) return;
+  report.loop_frame = loop.frame;
+  report.loop_distance = loop.distance;
+  report.corrects_earlier = true;
+  if (report.status == FrameStatus::weak) {  // what it saw before determines its pose
+    report.status = FrameStatus::tracked;
+    report.reason.clear();
+    report.weak_directions.resize(6, 0);
+  }
+  move_points(cloud, loop.corrections, options.num_threads);
+  correct(report, loop.corrections.back());
+  const double noise = static_cast<double>(median_sigma(frame));
+  merge_layers(cloud, oldest_frame, spacing, [&](const Eigen::Vector3f& point) {
+    const double distance = (point.cast<double>() - report.world_from_camera.translation()).norm();
+    const double farther = camera.model() == Camera::Model::pinhole ? distance / loop.depth : 1.0;
+    const double sigma = noise * farther * farther;  // noise grows with the square
+    return spacing_at(static_cast<float>(distance), static_cast<float>(sigma), camera, spacing);
+  });
+  history.move(loop.corrections);
+  for (ObjectView& view : views) {
+    view.world_from_camera = loop.corrections[static_cast<std::size_t>(view.frame)] * view.world_from_camera;
+  }
+}
+
+void Pipeline::fold_in(const FrameExtras& extras, FrameReport& report) {
+  StopWatch watch;
+  if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
+  const auto index = static_cast<std::int32_t>(report.index);
+  if (options.fold_in != FoldIn::fuse) {
+    consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
+    watch.lap();
+    renew_normals(cloud, options);
+    report.milliseconds.normals = watch.lap();
+    return;
+  }
+  report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing, index,
+                                options.fusion, options.num_threads, extras.attributes);
+  while (cloud.size() > options.max_points) {
+    spacing *= coarsening;
+    thin(cloud, spacing);
+  }
+}
+
+}  // namespace nacre
