@@ -115,6 +115,14 @@ WindowFits fit_windows(const PlanarImage& image, const Camera& camera, int num_t
   return fits;
 }
 
+void NoiseModel::check() const {
+  require(std::isfinite(constant) && constant >= 0.0, "noise.constant", "a finite number of metres, at least 0",
+          constant);
+  require(std::isfinite(quadratic) && quadratic >= 0.0, "noise.quadratic", "finite, at least 0", quadratic);
+  require(std::isfinite(offset), "noise.offset", "finite", offset);
+  require(shared >= 0.0 && shared < 1.0, "noise.shared", "a part from 0 to below 1", shared);
+}
+
 NoiseModel NoiseModel::local() const {
   const double part = std::sqrt(1.0 - shared * (1.0 - kSmoothLeft));
   return {part * constant, part * quadratic, offset, 0.0};
