@@ -25,7 +25,7 @@ PUBLIC = {
     "registration": ["global_registration", "registration"],
     "consolidation": ["consolidation"],
     "fusion": ["fusion"],
-    "tracking": ["frame_status", "tracking_options"],
+    "tracking": ["tracking_options", "tracking_report"],
     "model": ["frame_report", "model", "model_options"],
 }
 # The folders of cpp/src from the bottom up: an include may only point to an earlier one.

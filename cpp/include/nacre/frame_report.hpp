@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "nacre/depth.hpp"
-#include "nacre/frame_status.hpp"
 #include "nacre/fusion.hpp"
 #include "nacre/region.hpp"
+#include "nacre/tracking_report.hpp"
 #include "nacre/types.hpp"
 
 namespace nacre {
@@ -32,27 +32,13 @@ struct StepTimes {
          total = 0;
 };
 
-/// What became of one frame. What comes of a registration is in single precision, but for the pose.
-struct FrameReport {
+/// What became of one frame.
+struct FrameReport : TrackingReport {
   std::int64_t index = 0;
-  std::optional<double> timestamp;  ///< [s], as given
-  FrameStatus status = FrameStatus::lost;
-  std::string reason;                         ///< why the frame is weak or lost; empty otherwise
-  Pose world_from_camera = Pose::Identity();  ///< of a lost frame: the last known pose
-  int num_inliers = 0;
-  double overlap = 0.0;                   ///< part of the frame that matches the model
-  double consistency = 0.0;               ///< part of the model's points in view that the frame does not see through,
-                                          ///< and of the frame's that the camera did not see through before
-  double evidence = 0.0;                  ///< that the registration is right, against chance: what the residuals tell a
-                                          ///< match, times overlap^2 consistency^4 (^8 far from all guesses), less
-                                          ///< where residuals of neighbours agree beyond noise; of an object that was
-                                          ///< found turned on its supporting plane: what agrees less what contradicts
-  double rmse = 0.0;                      ///< of the inliers, along the normals [m]
-  Matrix6 information = Matrix6::Zero();  ///< see AlignResult
-  Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult
-  std::optional<std::int64_t> loop_frame;                    ///< the earlier frame that this one closed a loop with
-  double loop_distance = 0.0;                                ///< between the surfaces that the two saw, before [m]
-  bool corrects_earlier = false;                             ///< whether it changed poses of earlier frames
+  std::optional<double> timestamp;         ///< [s], as given
+  std::optional<std::int64_t> loop_frame;  ///< the earlier frame that this one closed a loop with
+  double loop_distance = 0.0;              ///< between the surfaces that the two saw, before [m]
+  bool corrects_earlier = false;           ///< whether it changed poses of earlier frames
   DepthReport depth;
   RegionReport region;
   FusionReport fusion;

@@ -13,9 +13,9 @@
 #include "fusion/attribute_fusion.hpp"
 #include "fusion/deformation.hpp"
 #include "fusion/fuse.hpp"
+#include "model/object_views.hpp"
 #include "model/wlop_fusion.hpp"
 #include "outlines/refinement.hpp"
-#include "registration/multiview.hpp"
 
 namespace nacre {
 namespace {
@@ -23,18 +23,19 @@ namespace {
 constexpr std::size_t least_pixels = 100;  // a frame with fewer valid pixels cannot be registered
 constexpr double coarsening = 1.25;        // of the spacing, when the model reaches its largest size
 
-// Milliseconds since the last call.
-class StopWatch {
+// Adds the milliseconds of its own life to a step's.
+class Stopwatch {
  public:
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    const double milliseconds = std::chrono::duration<double, std::milli>(now - last_).count();
-    last_ = now;
-    return milliseconds;
+  explicit Stopwatch(double& milliseconds) : milliseconds_(milliseconds) {}
+  ~Stopwatch() {
+    milliseconds_ += std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start_).count();
   }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
 
  private:
-  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  double& milliseconds_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
 // Twice the size of a pixel on the nearer surfaces (the lower quartile of depth).
@@ -67,73 +68,50 @@ Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in)
   spacing = options.spacing;
 }
 
-// The loop: clean the image, make points of it, keep those of interest, register them to the model, correct the model
-// where a loop closes, fold the points in, renew the normals.
 FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras) {
   check_extras(camera, extras, cloud);
-  StopWatch total, watch;
   FrameReport report;
   report.index = static_cast<std::int64_t>(history.size());
   report.timestamp = extras.timestamp;
-
-  const DepthImage clean =
-      clean_depth(depth, camera, options.depth, extras.mask, &calibration, &report.depth, nullptr, options.num_threads);
-  report.milliseconds.preprocess = watch.lap();
-
-  now.measured.resize(depth.size());
-  Eigen::Map<DepthImage>(now.measured.data(), depth.rows(), depth.cols()) = depth;
-  make_frame(clean, camera, noise(), options.num_threads, frame);
-  report.milliseconds.back_project = watch.lap();
-
-  keep_region(report);
-  report.milliseconds.region = watch.lap();
-
-  if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
-  const ColorsRef colors(extras.colors);
-  observer.look_at(frame, colors, options.num_threads);
-  report.milliseconds.back_project += watch.lap();
-
-  now.depth = frame.points.col(2);
-  now.sigma = frame.sigma;
-  const TrackingResult tracking = locate(extras, report.region);
-  report.status = tracking.status;
-  report.reason = tracking.reason;
-  report.world_from_camera = tracking.alignment.target_from_source;
-  report.num_inliers = tracking.alignment.num_inliers;
-  report.overlap = tracking.alignment.overlap;
-  report.consistency = tracking.consistency;
-  report.evidence = tracking.evidence;
-  report.rmse = tracking.alignment.rmse;
-  report.information = tracking.alignment.information;
-  report.weak_directions = tracking.alignment.weak_directions;
-  report.milliseconds.registration = watch.lap();
-
-  if (report.status == FrameStatus::lost) {
-    report.world_from_camera = history.num_registered() == 0 ? Pose::Identity() : history.registered_pose(0);
-  } else {
-    hypothesis.forget();
-    if (keeps_key_frames()) close_loops(report, tracking, extras.keep_guess);
-    report.milliseconds.loop_closure = watch.lap();
+  {
+    const Stopwatch total(report.milliseconds.total);
+    const DepthImage clean = preprocess(depth, extras.mask, report);
+    organise(depth, clean, report);
+    keep_region(report);
+    observe(extras.colors, report);
+    const TrackingResult tracking = locate(extras, report);
+    if (report.status != FrameStatus::lost) close_loops(tracking, extras.keep_guess, report);
     if (report.status == FrameStatus::tracked) {
       if (was_lost()) report.status = FrameStatus::relocalised;
-      keep_view(report);
-      if (tracking.is_on_plane) adjust(report);
+      if (options.relocalise) keep_view(report);
+      if (tracking.is_on_plane) adjust_views(report);
       fold_in(extras, report);
-      std::swap(before, now);
-      before.world_from_camera = report.world_from_camera;
-      now.world_from_camera = Pose::Identity();
+      remember_view(report);
     }
+    num_lost = report.status == FrameStatus::lost && history.num_registered() > 0 ? num_lost + 1 : 0;
+    report.num_points = cloud.size();
+    report.spacing = spacing;
   }
-  num_lost = report.status == FrameStatus::lost && history.num_registered() > 0 ? num_lost + 1 : 0;
-  report.milliseconds.fold_in = watch.lap() - report.milliseconds.normals;
-  report.num_points = cloud.size();
-  report.spacing = spacing;
-  report.milliseconds.total = total.lap();
   history.add(report);
   return history.back();
 }
 
+// Without what is noise at depth edges. The noise is measured from all images so far.
+DepthImage Pipeline::preprocess(const DepthRef& depth, const MaskRef& mask, FrameReport& report) {
+  const Stopwatch watch(report.milliseconds.preprocess);
+  return clean_depth(depth, camera, options.depth, mask, &calibration, &report.depth, nullptr, options.num_threads);
+}
+
+// Points and normals.
+void Pipeline::organise(const DepthRef& depth, const DepthImage& clean, FrameReport& report) {
+  const Stopwatch watch(report.milliseconds.back_project);
+  now.measured.resize(depth.size());
+  Eigen::Map<DepthImage>(now.measured.data(), depth.rows(), depth.cols()) = depth;
+  make_frame(clean, camera, noise(), options.num_threads, frame);
+}
+
 void Pipeline::keep_region(FrameReport& report) {
+  const Stopwatch watch(report.milliseconds.region);
   report.region.num_inside = report.depth.num_kept;
   if (!options.region.is_limited()) return;
   MaskImage found = select_region(frame, camera, options.region, region, &report.region, options.num_threads);
@@ -141,7 +119,29 @@ void Pipeline::keep_region(FrameReport& report) {
   if (report.region.num_inside > 0) region = std::move(found);
 }
 
-TrackingResult Pipeline::locate(const FrameExtras& extras, const RegionReport& region_report) {
+// Makes the frame ready to be asked about points.
+void Pipeline::observe(const ColorsRef& colors, FrameReport& report) {
+  const Stopwatch watch(report.milliseconds.back_project);
+  if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
+  observer.look_at(frame, colors, options.num_threads);
+  now.depth = frame.points.col(2);
+  now.sigma = frame.sigma;
+}
+
+// Where the camera is. A lost one is reported where it was last.
+TrackingResult Pipeline::locate(const FrameExtras& extras, FrameReport& report) {
+  const Stopwatch watch(report.milliseconds.registration);
+  TrackingResult tracking = register_frame(extras, report.region);
+  static_cast<TrackingReport&>(report) = tracking.report();
+  if (report.status == FrameStatus::lost) {
+    report.world_from_camera = history.num_registered() == 0 ? Pose::Identity() : history.registered_pose(0);
+  } else {
+    hypothesis.forget();
+  }
+  return tracking;
+}
+
+TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionReport& region_report) {
   constexpr std::size_t most_outline_points = 800;
   TrackingResult result;
   result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
@@ -210,12 +210,6 @@ WhereElse Pipeline::elsewhere(const RegionReport& region_report) const {
   return where;
 }
 
-// Moves the pose of a frame, and turns with it what is told about the pose's uncertainty.
-static void correct(FrameReport& report, const Pose& correction) {
-  report.world_from_camera = correction * report.world_from_camera;
-  turn_uncertainty(report, correction.linear());
-}
-
 // Of the newest frame, where it shows an object that stands on a plane.
 std::optional<ObjectView> Pipeline::view_of_object(const RegionReport& report) const {
   if (report.support < 0) return std::nullopt;
@@ -223,59 +217,39 @@ std::optional<ObjectView> Pipeline::view_of_object(const RegionReport& report) c
                      sample_frame(frame, observer, options), options.registration.seed);
 }
 
-// Views from different directions, for the search on the plane.
 void Pipeline::keep_view(const FrameReport& report) {
-  constexpr std::size_t most_views = 24;
-  constexpr double least_angle = 0.35;
-  const Pose& pose = report.world_from_camera;
-  const bool is_new = std::all_of(views.begin(), views.end(), [&](const ObjectView& view) {
-    return angle_between(view.world_from_camera, pose) > least_angle;
-  });
-  if (!options.relocalise || views.size() >= most_views || !is_new) return;
+  if (!is_new_direction(views, report.world_from_camera)) return;
   std::optional<ObjectView> view = view_of_object(report.region);
   if (!view) return;
   view->frame = static_cast<std::int32_t>(report.index);
-  view->world_from_camera = pose;
+  view->world_from_camera = report.world_from_camera;
   views.push_back(std::move(*view));
 }
 
 // Views far apart see little of the same surface: all of them together determine the newest, and each other.
-void Pipeline::adjust(FrameReport& report) {
+void Pipeline::adjust_views(FrameReport& report) {
   if (views.empty() || views.back().frame != report.index) return;
-  std::vector<AdjustableView> adjustable;
-  double tolerance = 0.0;
-  for (const ObjectView& view : views) {
-    adjustable.push_back({view.world_from_camera, view.points, view.normals});
-    tolerance = std::max(tolerance, view.tolerance);
-  }
-  const ObjectView& first = views.front();
-  const MotionBasis motions = MotionBasis::on_plane(first.world_from_camera.linear() * first.support.normal,
-                                                    first.world_from_camera * first.body());
-  const std::vector<Pose> adjusted = adjust_views(adjustable, motions, tolerance, 0.0, options.num_threads);
-  // Each frame moves with the view that it is nearest to.
-  const auto motion_of = [&](const Pose& pose) {
-    std::size_t nearest = 0;
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t k = 0; k < views.size(); ++k) {
-      const double angle = angle_between(views[k].world_from_camera, pose);
-      if (angle >= least) continue;
-      least = angle;
-      nearest = k;
-    }
-    return orthonormal(adjusted[nearest] * views[nearest].world_from_camera.inverse());
-  };
-  report.corrects_earlier = true;
-  std::vector<Pose> corrections;
-  for (std::size_t i = 0; i < history.size(); ++i) corrections.push_back(motion_of(history.pose(i)));
-  history.move(corrections);
-  corrections.push_back(motion_of(report.world_from_camera));
-  correct(report, corrections.back());
-  move_points(cloud, corrections, options.num_threads);
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < history.size(); ++i) poses.push_back(history.pose(i));
+  poses.push_back(report.world_from_camera);
+  const std::vector<Pose> corrections = adjust(views, poses, options.num_threads);
+  move_all(corrections, report);
   if (keeps_key_frames()) loops.move(corrections);
-  for (std::size_t k = 0; k < views.size(); ++k) views[k].world_from_camera = adjusted[k];
 }
 
-void Pipeline::close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given) {
+// The poses of all frames, the newest included, and the model with them.
+void Pipeline::move_all(const std::vector<Pose>& corrections, FrameReport& report) {
+  report.corrects_earlier = true;
+  history.move(corrections);
+  move_points(cloud, corrections, options.num_threads);
+  report.world_from_camera = corrections.back() * report.world_from_camera;
+  turn_uncertainty(report, corrections.back().linear());
+}
+
+// Where the camera comes back to what it saw before, model and poses are corrected.
+void Pipeline::close_loops(const TrackingResult& tracking, bool is_given, FrameReport& report) {
+  const Stopwatch watch(report.milliseconds.loop_closure);
+  if (!keeps_key_frames()) return;
   const std::int32_t oldest_frame = loops.oldest_frame();
   const LoopReport loop =
       loops.add_frame({static_cast<std::int32_t>(report.index), frame, observer, outline, tracking.alignment, spacing,
@@ -283,14 +257,12 @@ void Pipeline::close_loops(FrameReport& report, const TrackingResult& tracking, 
   if (loop.corrections.empty()) return;
   report.loop_frame = loop.frame;
   report.loop_distance = loop.distance;
-  report.corrects_earlier = true;
   if (report.status == FrameStatus::weak) {  // what it saw before determines its pose
     report.status = FrameStatus::tracked;
     report.reason.clear();
     report.weak_directions.resize(6, 0);
   }
-  move_points(cloud, loop.corrections, options.num_threads);
-  correct(report, loop.corrections.back());
+  move_all(loop.corrections, report);
   const double noise = static_cast<double>(median_sigma(frame));
   merge_layers(cloud, oldest_frame, spacing, [&](const Eigen::Vector3f& point) {
     const double distance = (point.cast<double>() - report.world_from_camera.translation()).norm();
@@ -298,29 +270,38 @@ void Pipeline::close_loops(FrameReport& report, const TrackingResult& tracking, 
     const double sigma = noise * farther * farther;  // noise grows with the square
     return spacing_at(static_cast<float>(distance), static_cast<float>(sigma), camera, spacing);
   });
-  history.move(loop.corrections);
   for (ObjectView& view : views) {
     view.world_from_camera = loop.corrections[static_cast<std::size_t>(view.frame)] * view.world_from_camera;
   }
 }
 
+// The frame becomes part of the model.
 void Pipeline::fold_in(const FrameExtras& extras, FrameReport& report) {
-  StopWatch watch;
-  if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
   const auto index = static_cast<std::int32_t>(report.index);
-  if (options.fold_in != FoldIn::fuse) {
-    consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
-    watch.lap();
-    renew_normals(cloud, options);
-    report.milliseconds.normals = watch.lap();
-    return;
+  {
+    const Stopwatch watch(report.milliseconds.fold_in);
+    if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
+    if (options.fold_in == FoldIn::fuse) {
+      report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing, index,
+                                    options.fusion, options.num_threads, extras.attributes);
+    } else {
+      consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
+    }
+    while (options.fold_in == FoldIn::fuse && cloud.size() > options.max_points) {
+      spacing *= coarsening;
+      thin(cloud, spacing);
+    }
   }
-  report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing, index,
-                                options.fusion, options.num_threads, extras.attributes);
-  while (cloud.size() > options.max_points) {
-    spacing *= coarsening;
-    thin(cloud, spacing);
-  }
+  if (options.fold_in == FoldIn::fuse) return;
+  const Stopwatch watch(report.milliseconds.normals);
+  renew_normals(cloud, options);
+}
+
+// What the camera saw is what the next frame is held against.
+void Pipeline::remember_view(const FrameReport& report) {
+  std::swap(before, now);
+  before.world_from_camera = report.world_from_camera;
+  now.world_from_camera = Pose::Identity();
 }
 
 }  // namespace nacre

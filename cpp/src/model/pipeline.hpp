@@ -35,23 +35,33 @@ struct Pipeline {
   double spacing = 0.0;
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
 
-  bool was_lost() const { return num_lost > 0; }
-  bool jumped() const;
-
   Pipeline(const Camera& camera_in, const ModelOptions& options_in);
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
   NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
+
+ private:
+  // The steps of the loop, in their order.
+  DepthImage preprocess(const DepthRef& depth, const MaskRef& mask, FrameReport& report);
+  void organise(const DepthRef& depth, const DepthImage& clean, FrameReport& report);
   void keep_region(FrameReport& report);
-  TrackingResult locate(const FrameExtras& extras, const RegionReport& region);
-  std::vector<Pose> guesses(const FrameExtras& extras) const;
-  WhereElse elsewhere(const RegionReport& region) const;
-  std::optional<ObjectView> view_of_object(const RegionReport& region) const;
+  void observe(const ColorsRef& colors, FrameReport& report);
+  TrackingResult locate(const FrameExtras& extras, FrameReport& report);
+  void close_loops(const TrackingResult& tracking, bool is_given, FrameReport& report);
   void keep_view(const FrameReport& report);
-  void adjust(FrameReport& report);
-  bool keeps_key_frames() const { return options.loop_closure && options.fold_in == FoldIn::fuse; }
-  void close_loops(FrameReport& report, const TrackingResult& tracking, bool is_given);
+  void adjust_views(FrameReport& report);
   void fold_in(const FrameExtras& extras, FrameReport& report);
+  void remember_view(const FrameReport& report);
+
+  // What they need.
+  bool was_lost() const { return num_lost > 0; }
+  bool jumped() const;
+  bool keeps_key_frames() const { return options.loop_closure && options.fold_in == FoldIn::fuse; }
+  TrackingResult register_frame(const FrameExtras& extras, const RegionReport& region_report);
+  std::vector<Pose> guesses(const FrameExtras& extras) const;
+  WhereElse elsewhere(const RegionReport& region_report) const;
+  std::optional<ObjectView> view_of_object(const RegionReport& region_report) const;
+  void move_all(const std::vector<Pose>& corrections, FrameReport& report);
 };
 
 }  // namespace nacre

@@ -31,6 +31,12 @@ Demands demands_on(Expectation expectation) {
 
 }  // namespace
 
+TrackingReport TrackingResult::report() const {
+  return {
+      status,   reason,         alignment.target_from_source, alignment.num_inliers,    alignment.overlap, consistency,
+      evidence, alignment.rmse, alignment.information,        alignment.weak_directions};
+}
+
 void judge(TrackingResult& result, const TrackingOptions& options) {
   constexpr double chance = 0.58;  // the rms of a uniform distribution, 1 / sqrt(3)
   constexpr double plane_information = 0.1, plane_evidence = 4.0;

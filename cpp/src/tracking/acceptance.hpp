@@ -6,8 +6,8 @@
 #include <string>
 
 #include "depth/depth_view.hpp"
-#include "nacre/frame_status.hpp"
 #include "nacre/tracking_options.hpp"
+#include "nacre/tracking_report.hpp"
 #include "registration/icp.hpp"
 
 namespace nacre {
@@ -33,6 +33,8 @@ struct TrackingResult {
   bool is_beyond_doubt = false;
   bool is_to_whole_model = false;  // older points included
   bool is_on_plane = false;        // found by the search on the plane
+
+  TrackingReport report() const;
 
   // A frame that is not lost before one that is.
   double rank() const { return status == FrameStatus::lost ? recognition : 1000.0 + evidence; }

@@ -1,4 +1,4 @@
-#include "nacre/frame_status.hpp"
+#include "nacre/tracking_report.hpp"
 
 namespace nacre {
 
