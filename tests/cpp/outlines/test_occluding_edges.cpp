@@ -73,10 +73,10 @@ double angle_of(const Pose& pose) { return Eigen::AngleAxisd(pose.linear()).angl
 
 std::vector<OutlinePoint> outline_of(const Shape& shape) {
   const DepthImage depth = view(shape, Pose::Identity(), 1);
-  Sight sight;
-  sight.depth = Eigen::Map<const Values>(depth.data(), depth.size());
-  sight.sigma = Values::Constant(depth.size(), static_cast<float>(noise));
-  return find_outline(sight, camera, 100000, 1);
+  DepthView view;
+  view.depth = Eigen::Map<const Values>(depth.data(), depth.size());
+  view.sigma = Values::Constant(depth.size(), static_cast<float>(noise));
+  return find_outline(view, camera, 100000, 1);
 }
 
 // Pairs of surface points have found the origin; of a turn about the viewing axis they know little.
@@ -124,15 +124,15 @@ TEST_CASE("an outline lies between what was kept and what is beyond, however muc
       if (u < left + removed || u > right - removed) clean(v, u) = missing;
     }
   }
-  Sight sight;
-  sight.depth = Eigen::Map<const Values>(clean.data(), clean.size());
-  sight.sigma = Values::Constant(clean.size(), static_cast<float>(noise));
+  DepthView view;
+  view.depth = Eigen::Map<const Values>(clean.data(), clean.size());
+  view.sigma = Values::Constant(clean.size(), static_cast<float>(noise));
   for (const bool knows_measured : {false, true}) {
     CAPTURE(knows_measured);
-    if (knows_measured) sight.measured = Eigen::Map<const Values>(measured.data(), measured.size());
+    if (knows_measured) view.measured = Eigen::Map<const Values>(measured.data(), measured.size());
     double sum = 0.0;
     int count = 0;
-    for (const OutlinePoint& edge : find_outline(sight, camera, 100000, 1)) {
+    for (const OutlinePoint& edge : find_outline(view, camera, 100000, 1)) {
       if (std::abs(edge.point.y()) > 0.06) continue;
       sum += std::abs(edge.point.x()) - 0.08;
       ++count;
