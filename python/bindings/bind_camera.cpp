@@ -119,7 +119,7 @@ std::string repr(const Camera& camera) {
 
 py::array_t<double> project(const Camera& camera, const PointArray& given) {
   const py::array_t<double, py::array::c_style | py::array::forcecast> points(
-      py::module_::import("nacre.arrays").attr("as_real")("points", given));
+      py::module_::import("nacre._internal.arrays").attr("as_real")("points", given));
   if (points.ndim() != 2 || points.shape(1) != 3) {
     throw std::invalid_argument("points must have shape (N, 3), got " +
                                 py::repr(points.attr("shape")).cast<std::string>());

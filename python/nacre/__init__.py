@@ -28,13 +28,13 @@ if TYPE_CHECKING:
     from nacre.io.meshes import read_mesh, write_mesh
     from nacre.io.points import read_points, write_points
     from nacre.io.trajectories import read_trajectory, write_trajectory
+    from nacre.kdtree import KdTree, RadiusNeighbors
     from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
     from nacre.model import Model, ModelParameters
-    from nacre.neighbors import KdTree, RadiusNeighbors
     from nacre.noise import NoiseModel, calibrate_noise, estimate_noise
     from nacre.normals import estimate_normals
     from nacre.progress import Cancelled
-    from nacre.reconstructing import reconstruct
+    from nacre.reconstruction.reconstruct import reconstruct
     from nacre.region import RegionParameters, RegionReport, select_region
     from nacre.registration import AlignResult, RegistrationParameters, align
     from nacre.simulation import default_camera, simulate_depth, turntable_poses
@@ -125,11 +125,11 @@ _NAMES = {
     "trajectory": "Trajectory associate",
     "mesh": "ClosestPoints Mesh RayHits built_in_object",
     "model": "Model ModelParameters",
-    "neighbors": "KdTree RadiusNeighbors",
+    "kdtree": "KdTree RadiusNeighbors",
     "noise": "NoiseModel calibrate_noise estimate_noise",
     "normals": "estimate_normals",
     "progress": "Cancelled",
-    "reconstructing": "reconstruct",
+    "reconstruction.reconstruct": "reconstruct",
     "region": "RegionParameters RegionReport select_region",
     "registration": "AlignResult RegistrationParameters align",
     "simulation": "default_camera simulate_depth turntable_poses",

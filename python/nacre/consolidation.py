@@ -11,10 +11,18 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_count, as_length, as_matching_points, as_points, as_real, as_rows
-from nacre.parameters import as_choice
+from nacre._internal.arrays import (
+    FloatArray,
+    as_count,
+    as_length,
+    as_matching_points,
+    as_points,
+    as_real,
+    as_rows,
+)
+from nacre._internal.core_options import as_choice
+from nacre._internal.value_equality import Value
 from nacre.progress import as_progress
-from nacre.values import Value
 
 _METHODS = {
     "wlop": _core.ConsolidationMethod.wlop,
@@ -59,7 +67,7 @@ class Consolidated(Value):
         return f"Consolidated({len(self.points)} points {self.points.dtype}{carried}{ended})"
 
     def _repr_png_(self) -> bytes | None:
-        from nacre.inline_pictures import picture_of_points
+        from nacre.report.notebook_pictures import picture_of_points
 
         normals, colors = self.attributes.get("normals"), self.attributes.get("colors")
         return picture_of_points(self.points, normals, colors)

@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import as_camera, as_count, as_depth, as_flag, as_mask
+from nacre._internal.arrays import as_camera, as_count, as_depth, as_flag, as_mask
+from nacre._internal.core_options import to_core
 from nacre.noise import Noise, NoiseModel, NoiseName, as_noise, estimate_noise
-from nacre.parameters import to_core
 
 __all__ = [
     "PIXEL_LABELS",

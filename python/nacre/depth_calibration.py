@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
-from nacre.arrays import as_camera, as_depth, as_pose
+from nacre._internal.arrays import as_camera, as_depth, as_pose
 from nacre.depth import back_project, preprocess_depth
 
 _log = logging.getLogger(__name__)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 import numpy.typing as npt
 
+from nacre._internal.value_equality import Value
 from nacre.depth import DepthReport
 from nacre.region import RegionReport
-from nacre.values import Value
 
 if TYPE_CHECKING:
     import threading

@@ -8,10 +8,11 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from nacre import _core, arrays
+from nacre import _core
+from nacre._internal import arrays
+from nacre._internal.core_options import to_core
+from nacre._internal.value_equality import Value
 from nacre.noise import NoiseModel, NoiseName, as_noise
-from nacre.parameters import to_core
-from nacre.values import Value
 
 _FARTHEST = 1e150  # [m]: beyond it squared distances overflow
 

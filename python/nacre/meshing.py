@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_points
+from nacre._internal.arrays import as_points
+from nacre.kdtree import KdTree
 from nacre.mesh import Mesh
-from nacre.neighbors import KdTree
 
 Array = npt.NDArray[np.float64]
 

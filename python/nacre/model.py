@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._core import Camera
-from nacre.arrays import (
+from nacre._internal.arrays import (
     as_array,
     as_attributes,
     as_camera,
@@ -26,12 +26,12 @@ from nacre.arrays import (
     as_rows,
     as_scale,
 )
-from nacre.checkpoint import Checkpointed, checkpoint_of, read_checkpoint
+from nacre._internal.checkpoint import Checkpointed, checkpoint_of, read_checkpoint
+from nacre._internal.core_options import from_core, to_core, updated
+from nacre._internal.point_exchange import ExchangeablePoints
 from nacre.depth import DepthParameters
-from nacre.exchange import ExchangeablePoints
 from nacre.frame_report import FrameReport, FrameReports
 from nacre.noise import NoiseModel
-from nacre.parameters import from_core, to_core, updated
 from nacre.region import RegionParameters
 from nacre.registration import RegistrationParameters
 

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import as_camera, as_count, as_depth, as_number, as_real
-from nacre.parameters import to_core
+from nacre._internal.arrays import as_camera, as_count, as_depth, as_number, as_real
+from nacre._internal.core_options import to_core
 
 NoiseName = Literal["auto", "kinect", "stereo", "tof"]
 

@@ -7,7 +7,7 @@ import math
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_count, as_length, as_points, as_vector
+from nacre._internal.arrays import FloatArray, as_count, as_length, as_points, as_vector
 
 
 def estimate_normals(

@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import as_camera, as_count, as_depth, as_flag, as_mask
+from nacre._internal.arrays import as_camera, as_count, as_depth, as_flag, as_mask
+from nacre._internal.core_options import to_core, updated
+from nacre._internal.value_equality import Value
 from nacre.noise import Noise, as_noise
-from nacre.parameters import to_core, updated
-from nacre.values import Value
 
 Mask = npt.NDArray[np.bool_]
 

@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_points, as_pose, as_real, as_rows, as_unit_rows, localize
-from nacre.parameters import to_core
-from nacre.values import Value
+from nacre._internal.arrays import FloatArray, as_points, as_pose, as_real, as_rows, as_unit_rows, localize
+from nacre._internal.core_options import to_core
+from nacre._internal.value_equality import Value
 
 Method = Literal["point_to_point", "point_to_plane", "symmetric"]
 

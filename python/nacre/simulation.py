@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from nacre import arrays
 from nacre._core import Camera
+from nacre._internal import arrays
 from nacre.mesh import Mesh
 from nacre.noise import NoiseModel, NoiseName
 

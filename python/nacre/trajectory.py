@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_length, as_real, as_times
-from nacre.quaternions import matrix_from_quaternion, quaternion_from_matrix
-from nacre.values import Value
+from nacre._internal.arrays import as_length, as_real, as_times
+from nacre._internal.quaternions import matrix_from_quaternion, quaternion_from_matrix
+from nacre._internal.value_equality import Value
 
 Float64 = npt.NDArray[np.float64]
 

@@ -330,11 +330,11 @@ RECIPES: dict[str, Recipe] = {
     "nacre.model.ModelParameters.preset": Recipe(
         lambda preset: nacre.ModelParameters.preset(preset), {"preset": "paper"}
     ),
-    "nacre.neighbors.KdTree": Recipe(nacre.KdTree, {"points": bumpy(), "num_threads": 1}),
-    "nacre.neighbors.KdTree.query": Recipe(
+    "nacre.kdtree.KdTree": Recipe(nacre.KdTree, {"points": bumpy(), "num_threads": 1}),
+    "nacre.kdtree.KdTree.query": Recipe(
         tree().query, {"queries": bumpy(10), "k": 3, "max_distance": 0.1, "num_threads": 1}, _neighbors
     ),
-    "nacre.neighbors.KdTree.query_radius": Recipe(
+    "nacre.kdtree.KdTree.query_radius": Recipe(
         tree().query_radius, {"queries": bumpy(10), "radius": 0.1, "num_threads": 1}, _neighbors_within
     ),
     "nacre.noise.NoiseModel.kinect": Recipe(nacre.NoiseModel.kinect, {}, _is_noise),

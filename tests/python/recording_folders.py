@@ -4,8 +4,8 @@ import numpy as np
 
 import nacre
 from nacre import Camera
+from nacre._internal.quaternions import matrix_from_quaternion, quaternion_from_matrix
 from nacre.io.images import write_color_png, write_depth_png
-from nacre.quaternions import matrix_from_quaternion, quaternion_from_matrix
 
 WIDTH, HEIGHT = 640, 480
 SMALL = Camera(width=8, height=6, fx=10, fy=11, cx=3.5, cy=2.5)

@@ -141,7 +141,7 @@ FILES = {
     "nacre.model.Model.load",
     "nacre.io.cameras.read_camera", "nacre.io.meshes.read_mesh",
     "nacre.io.points.read_points", "nacre.io.trajectories.read_trajectory",
-    "nacre.reconstructing.reconstruct",
+    "nacre.reconstruction.reconstruct.reconstruct",
 }  # fmt: skip
 NOT_OF_ARRAYS = re.compile(r"\.(Sequence|Reconstruction)\.\w+$|\.NoiseModel\.to_core$")
 

@@ -9,8 +9,8 @@ import pytest
 
 import nacre
 from nacre.datasets.corrected import with_corrected_depth
-from nacre.depth_views import DepthViews
 from nacre.reconstruction import Reconstruction
+from nacre.reconstruction.calibration import DepthViews
 
 CAMERA = nacre.Camera(width=320, height=240, fx=260, fy=260, cx=159.5, cy=119.5)
 SIDE = ((np.arange(320) - 159.5) / 260)[None, :]

@@ -46,17 +46,17 @@ def write_color(path: Path) -> None:
     write_color_jpeg(path, np.zeros((20, 24, 3), np.uint8))
 
 
-def story() -> Any:
-    from nacre.viewer.story import Story
+def timeline() -> Any:
+    from nacre.viewer.timeline import Timeline
 
-    return Story("title", CAMERA, depth_of=lambda index: np.ones((20, 24), np.float32))
+    return Timeline("title", CAMERA, depth_of=lambda index: np.ones((20, 24), np.float32))
 
 
 def write_rerun(path: Path) -> None:
     pytest.importorskip("rerun")
     from nacre.viewer.rerun_file import export_rrd
 
-    export_rrd(story(), path)
+    export_rrd(timeline(), path)
 
 
 WRITERS: dict[str, tuple[str, Callable[[Path], object]]] = {

@@ -15,7 +15,7 @@ import pytest
 
 import nacre
 from nacre.cli import main
-from nacre.datasets.doubt import doubt_about
+from nacre.datasets.sanity_check import depth_oddity
 
 pytest.importorskip("typer")
 Image = pytest.importorskip("PIL.Image")
@@ -194,11 +194,11 @@ def test_a_mistake_is_answered_by_what_to_do(mistake: str, tmp_path: Path) -> No
 
 
 def test_saturated_depth_is_doubted() -> None:
-    assert doubt_about(metres()) is None
-    assert doubt_about(np.round(metres(), 3)) is None
+    assert depth_oddity(metres()) is None
+    assert depth_oddity(np.round(metres(), 3)) is None
     constant = np.where(metres() > 0.56, 4.095, np.nan).astype(np.float32)
-    assert "the same, 4.095 m" in str(doubt_about(constant))
-    assert "no pixel has a measurement" in str(doubt_about(np.full((4, 4), np.nan)))
+    assert "the same, 4.095 m" in str(depth_oddity(constant))
+    assert "no pixel has a measurement" in str(depth_oddity(np.full((4, 4), np.nan)))
 
 
 def test_parameters_and_choices_are_suggested_in_python_too() -> None:

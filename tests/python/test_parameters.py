@@ -8,9 +8,9 @@ import pytest
 
 import nacre
 from nacre import _core
+from nacre._internal.core_options import as_choice, from_core, to_core, updated
 from nacre.depth import NoiseModel
 from nacre.model import ConsolidationParameters, FusionParameters, NormalParameters
-from nacre.parameters import as_choice, from_core, to_core, updated
 
 MIRRORS: dict[type, Any] = {
     nacre.DepthParameters: _core.DepthOptions,

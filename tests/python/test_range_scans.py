@@ -5,7 +5,7 @@ import pytest
 
 import nacre
 from nacre import Camera, FileFormatError, open_sequence
-from nacre.quaternions import matrix_from_quaternion
+from nacre._internal.quaternions import matrix_from_quaternion
 
 
 def surface(x, y):

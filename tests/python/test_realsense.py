@@ -17,7 +17,7 @@ import pytest
 
 import nacre
 from nacre.datasets import LiveQueue, RealSense, realsense
-from nacre.viewer import written_story
+from nacre.viewer import read_timeline
 
 pytest.importorskip("PIL")
 HERE = Path(__file__).parent
@@ -268,7 +268,7 @@ class TestTheCommand:
         again = nacre.open_sequence(out / "recording")
         assert len(again) == report["num_frames"]
         assert again.has_timestamps
-        depth_of = written_story(out).depth_of
+        depth_of = read_timeline(out).depth_of
         assert depth_of is not None
         np.testing.assert_array_equal(depth_of(1), again[1].depth)
         np.testing.assert_allclose(again[1].timestamp - again[0].timestamp, 0.0333, atol=0.5)

@@ -12,15 +12,15 @@ import pytest
 import nacre
 import nacre.viewer
 from nacre.cli.app import run
-from nacre.viewer import Moment, Snapshot, Story, export_rrd
+from nacre.viewer import Moment, Snapshot, Timeline, export_rrd
 
 
-def story() -> Story:
+def timeline() -> Timeline:
     """Tell of three frames, the second of them lost."""
     camera = nacre.Camera(96, 72, 90, 90, 47.5, 35.5)
     y, x = np.mgrid[0:72, 0:96]
     depth = (0.7 + 0.03 * np.sin(x / 6) * np.cos(y / 7)).astype(np.float32)
-    told = Story("wave", camera, depth_of=lambda index: depth)
+    told = Timeline("wave", camera, depth_of=lambda index: depth)
     points = nacre.back_project(depth, camera).reshape(-1, 3)
     for i in range(3):
         pose = np.eye(4)
@@ -47,7 +47,7 @@ def test_rerun_reads_what_was_written(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     pytest.importorskip("rerun")
-    monkeypatch.setattr(nacre.viewer, "written_story", lambda folder: story())
+    monkeypatch.setattr(nacre.viewer, "read_timeline", lambda folder: timeline())
     file = tmp_path / "view.rrd"
     assert run(["view", str(tmp_path), "--rrd", str(file)]) == 0
     assert str(file) in capsys.readouterr().out
@@ -61,10 +61,10 @@ def test_rerun_reads_what_was_written(
 def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "rerun", None)
     with pytest.raises(ImportError, match=r'pip install "nacre\[rerun\]"'):
-        export_rrd(story(), tmp_path / "view.rrd")
+        export_rrd(timeline(), tmp_path / "view.rrd")
 
 
 def test_a_folder_that_is_missing(tmp_path: Path) -> None:
     pytest.importorskip("rerun")
     with pytest.raises(FileNotFoundError):
-        export_rrd(story(), tmp_path / "none" / "view.rrd")
+        export_rrd(timeline(), tmp_path / "none" / "view.rrd")

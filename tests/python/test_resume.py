@@ -379,7 +379,7 @@ class TestSignals:
 
 def test_a_camera_that_was_killed_leaves_a_whole_recording(tmp_path: Path) -> None:
     from nacre.datasets import SequenceFrame
-    from nacre.datasets.growing import GrowingRecording, mend
+    from nacre.datasets.recorder import GrowingRecording, mend
 
     camera = nacre.Camera(24, 20, 30.0, 30.0, 11.5, 9.5)
     growing = GrowingRecording(tmp_path, camera, 1000, "name")

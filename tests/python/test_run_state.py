@@ -11,7 +11,7 @@ import pytest
 
 from nacre.errors import FileFormatError
 from nacre.reconstruction import FrameRecord
-from nacre.run_state import calibration_from, record_from, record_state
+from nacre.reconstruction.saved_state import calibration_from, record_from, record_state
 
 TRUTH = np.eye(4)
 GOOD = record_state(FrameRecord(3, 0.1, "LOST", "nothing was seen", None, TRUTH))

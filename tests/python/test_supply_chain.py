@@ -144,14 +144,14 @@ def test_import_is_fast() -> None:
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="no /proc/net/tcp on this system")
 def test_the_viewer_listens_on_loopback_alone() -> None:
     pytest.importorskip("viser")
-    from nacre.viewer import Story, Viewer
+    from nacre.viewer import Timeline, Viewer
 
     def listening(file: str) -> set[tuple[str, int]]:
         rows = [line.split() for line in Path(file).read_text().splitlines()[1:]]
         ends = [row[1].split(":") for row in rows if row[3] == "0A"]
         return {(address, int(port, 16)) for address, port in ends}
 
-    viewer = Viewer(Story("title", None), port=8123)
+    viewer = Viewer(Timeline("title", None), port=8123)
     try:
         port = int(viewer.url.rpartition(":")[2])
         assert viewer.url == f"http://127.0.0.1:{port}"

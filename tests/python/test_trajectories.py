@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given
 
 from nacre import FileFormatError, Trajectory, associate, read_trajectory, write_trajectory
-from nacre.quaternions import matrix_from_quaternion, quaternion_from_matrix
+from nacre._internal.quaternions import matrix_from_quaternion, quaternion_from_matrix
 
 IDENTITY = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
 

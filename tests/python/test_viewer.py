@@ -49,52 +49,52 @@ def snapshot(n: int = 50) -> viewer.Snapshot:
 
 class TestStory:
     def test_snapshots_stay_few_and_evenly_spread(self) -> None:
-        story = viewer.Story("x", None, max_snapshots=8)
+        timeline = viewer.Timeline("x", None, max_snapshots=8)
         for i in range(100):
-            story.add(viewer.Moment(i, "TRACKED"))
-            story.set_snapshot(snapshot())
-        places = [place for place, _ in story.snapshots]
+            timeline.add(viewer.Moment(i, "TRACKED"))
+            timeline.set_snapshot(snapshot())
+        places = [place for place, _ in timeline.snapshots]
         assert len(places) <= 8
         assert places[-1] == 99
         assert places[0] == 0
-        assert story.snapshot_at(0) is story.snapshots[0][1]
-        assert story.snapshot_at(99) is story.snapshots[-1][1]
+        assert timeline.snapshot_at(0) is timeline.snapshots[0][1]
+        assert timeline.snapshot_at(99) is timeline.snapshots[-1][1]
 
     def test_older_states_keep_fewer_points(self) -> None:
-        story = viewer.Story("x", None, max_points=20)
+        timeline = viewer.Timeline("x", None, max_points=20)
         for i in range(3):
-            story.add(viewer.Moment(i, "TRACKED"))
-            story.set_snapshot(snapshot(50))
-        assert [len(cloud.points) for _, cloud in story.snapshots] == [17, 17, 50]
-        thin = story.snapshots[0][1]
+            timeline.add(viewer.Moment(i, "TRACKED"))
+            timeline.set_snapshot(snapshot(50))
+        assert [len(cloud.points) for _, cloud in timeline.snapshots] == [17, 17, 50]
+        thin = timeline.snapshots[0][1]
         assert thin.confidence is not None
         assert len(thin.normals) == len(thin.confidence) == 17
         assert thin.spacing == pytest.approx(0.1 * 3**0.5)
 
     def test_a_lost_frame_is_drawn_where_the_camera_was_last_known(self) -> None:
-        story = viewer.Story("x", None)
+        timeline = viewer.Timeline("x", None)
         pose = np.eye(4)
         pose[0, 3] = 2
-        story.add(viewer.Moment(0, "TRACKED", world_from_camera=pose))
-        story.add(viewer.Moment(1, "LOST"))
-        assert story.pose_at(1) is pose
+        timeline.add(viewer.Moment(0, "TRACKED", world_from_camera=pose))
+        timeline.add(viewer.Moment(1, "LOST"))
+        assert timeline.pose_at(1) is pose
 
     def test_too_few_snapshots_are_refused(self) -> None:
         with pytest.raises(ValueError, match="max_snapshots must be at least 2, got 1"):
-            viewer.Story("x", None, max_snapshots=1)
+            viewer.Timeline("x", None, max_snapshots=1)
 
     def test_what_was_written_is_told(self, out: Path) -> None:
-        story = viewer.written_story(out)
-        assert [moment.status for moment in story.moments].count("LOST") == 1
-        assert story.moments[3].reason
-        assert story.moments[0].figures["overlap"] == "100 %"
-        first, last = story.moments[0], story.moments[-1]
+        timeline = viewer.read_timeline(out)
+        assert [moment.status for moment in timeline.moments].count("LOST") == 1
+        assert timeline.moments[3].reason
+        assert timeline.moments[0].figures["overlap"] == "100 %"
+        first, last = timeline.moments[0], timeline.moments[-1]
         assert last.truth is not None
         assert last.world_from_camera is not None
         assert np.allclose(first.truth, np.eye(4))
         assert np.abs(last.truth - last.world_from_camera).max() < 0.01
-        assert story.depth_of is not None
-        assert story.depth_of(2).shape == (120, 160)
+        assert timeline.depth_of is not None
+        assert timeline.depth_of(2).shape == (120, 160)
 
 
 class TestColors:
@@ -152,26 +152,26 @@ def test_a_run_is_shown_while_it_grows(out: Path) -> None:
         for record in done.run():
             live.add(record)
             live.show()
-        first, last = (live.story.snapshots[i][1] for i in (0, -1))
+        first, last = (live.timeline.snapshots[i][1] for i in (0, -1))
         assert len(first.points) < len(last.points)
         live.begin_again(done)
-        assert live.story.moments == []
-        assert live.story.snapshot_at(0) is None
+        assert live.timeline.moments == []
+        assert live.timeline.snapshot_at(0) is None
         for record in done.frames:
             live.add(record)
             live.show()
         live.finish()
         assert live.viewer.place == FRAMES - 1
-        assert len(live.story.snapshots) == FRAMES
+        assert len(live.timeline.snapshots) == FRAMES
     finally:
         live.viewer.close()
 
 
 def test_what_a_frame_does_not_have_is_not_left_from_another(out: Path) -> None:
-    page = viewer.Viewer(viewer.written_story(out), port=0)
+    page = viewer.Viewer(viewer.read_timeline(out), port=0)
     try:
         assert "/path" in page._scene._drawn
-        page._scene.show_cameras(page.story, 0, 0.02)  # one camera makes no path
+        page._scene.show_cameras(page.timeline, 0, 0.02)  # one camera makes no path
         assert "/path" not in page._scene._drawn
         assert "/camera" in page._scene._drawn
     finally:
@@ -179,8 +179,8 @@ def test_what_a_frame_does_not_have_is_not_left_from_another(out: Path) -> None:
 
 
 def test_nothing_to_export_is_an_error(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match="story must hold a state of the model"):
-        viewer.export_html(viewer.Story("x", None), tmp_path / "x.html")
+    with pytest.raises(ValueError, match="timeline must hold a state of the model"):
+        viewer.export_html(viewer.Timeline("x", None), tmp_path / "x.html")
     assert not list(tmp_path.iterdir())
 
 
@@ -196,7 +196,7 @@ def bright_part(png: bytes) -> float:
 @needs_browser
 @pytest.mark.slow
 def test_a_browser_draws_the_model_and_a_control_is_obeyed(out: Path, tmp_path: Path) -> None:
-    page = viewer.Viewer(viewer.written_story(out), port=0)
+    page = viewer.Viewer(viewer.read_timeline(out), port=0)
     try:
         with Browser(tmp_path / "profile") as browser:
             browser.open(page.url)
@@ -220,7 +220,7 @@ def test_a_browser_draws_the_model_and_a_control_is_obeyed(out: Path, tmp_path: 
 @needs_browser
 @pytest.mark.slow
 def test_the_exported_page_opens_from_disk(out: Path, tmp_path: Path) -> None:
-    viewer.export_html(viewer.written_story(out), tmp_path / "view.html")
+    viewer.export_html(viewer.read_timeline(out), tmp_path / "view.html")
     text = (tmp_path / "view.html").read_text()
     assert "__VISER_EMBED_DATA__" in text
     with Browser(tmp_path / "profile") as browser:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from nacre import Camera, open_sequence, write_recording
-from nacre.quaternions import matrix_from_quaternion
+from nacre._internal.quaternions import matrix_from_quaternion
 
 SMALL = Camera(width=8, height=6, fx=10, fy=11, cx=3.5, cy=2.5)
 

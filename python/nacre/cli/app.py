@@ -20,8 +20,8 @@ from nacre.cli.evaluate import evaluate
 from nacre.cli.info import info
 from nacre.cli.mesh import mesh
 from nacre.cli.reconstruct import reconstruct
+from nacre.cli.signals import Stopped
 from nacre.cli.simulate import simulate
-from nacre.cli.stopping import Stopped
 from nacre.cli.terminal import CommandError, set_verbosity
 from nacre.cli.view import view
 from nacre.errors import CameraError, FileFormatError, meant

@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from nacre.cli.running import run_frames
-from nacre.cli.stopping import Interruption, Stopped
+from nacre.cli.signals import Interruption, Stopped
 from nacre.cli.terminal import Terminal
 from nacre.cli.unfinished import Unfinished
 
 if TYPE_CHECKING:
-    from nacre.frame_record import FrameRecord
     from nacre.reconstruction import Reconstruction
+    from nacre.reconstruction.frame_record import FrameRecord
     from nacre.viewer import LiveView
 
 
@@ -30,7 +30,7 @@ def run_staged(
     Where they show that its depth is wrong, they are run again with it corrected. ``live`` shows the run that
     is going on. Returns the given run, or the new one.
     """
-    from nacre.depth_views import DepthViews
+    from nacre.reconstruction.calibration import DepthViews
 
     stage = unfinished.stage
     watch = watching(done, unfinished, live)

@@ -72,8 +72,8 @@ def model_parameters(
     preset: Preset | None, config: Path | None, settings: Sequence[str] | None, **more: Any
 ) -> tuple[ModelParameters, str]:
     """Return the parameters and the preset's name; settings win over the file, and that over the preset."""
+    from nacre._internal.core_options import updated
     from nacre.model import ModelParameters
-    from nacre.parameters import updated
 
     document = dict(_read_toml(config)) if config is not None else {}
     name = document.pop("preset", "default")
@@ -93,8 +93,8 @@ def model_parameters(
 def _told_by_file(path: Path, document: Mapping[str, Any], parameters: ModelParameters) -> ModelParameters:
     """Return the parameters with the changes of a file, which must make a model."""
     from nacre import Camera
+    from nacre._internal.core_options import updated
     from nacre.model import Model
-    from nacre.parameters import updated
 
     try:
         changes = dict(_leaves(document))

@@ -10,9 +10,9 @@ from typing import Annotated, Any, overload
 import typer
 
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
-from nacre.cli.results import file_rows, trajectory_rows, write_results
+from nacre.cli.outputs import file_rows, trajectory_rows, write_results
 from nacre.cli.running import run_frames
-from nacre.cli.stopping import interruptible
+from nacre.cli.signals import interruptible
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
 
 

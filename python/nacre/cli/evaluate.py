@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from nacre import Mesh, Trajectory
     from nacre.evaluation import SurfaceSamples
     from nacre.evaluation.result import Result
-    from nacre.written import Written
+    from nacre.report.saved_run import SavedRun
 
     Matrix = npt.NDArray[np.float64]
 
@@ -89,27 +89,27 @@ def evaluate(
     if truth is not None and not truth.exists():
         raise CommandError(f"no such file or folder: {truth}", 2)
     is_surface = truth is not None and truth.suffix.lower() in MESH_SUFFIXES + POINT_SUFFIXES
-    written = None
+    saved = None
     if estimate.is_dir():
-        from nacre.written import Written
+        from nacre.report.saved_run import SavedRun
 
         if not (estimate / "report.json").is_file():
             raise CommandError(
                 f"{estimate}: no report.json; give the OUT folder of a reconstruction, or a file", 2
             )
-        written = Written(estimate)
-    if is_surface or (estimate.suffix.lower() in POINT_SUFFIXES and written is None):
+        saved = SavedRun(estimate)
+    if is_surface or (estimate.suffix.lower() in POINT_SUFFIXES and saved is None):
         if truth is None or not is_surface:
             raise CommandError(f"{estimate} is a model: a mesh or a point file must follow it", 2)
-        figures, rows = _surface(estimate, written, truth, tau, world_from_model, align, scale)
+        figures, rows = _surface(estimate, saved, truth, tau, world_from_model, align, scale)
     else:
-        figures, rows = _trajectory(estimate, written, truth, max_difference)
+        figures, rows = _trajectory(estimate, saved, truth, max_difference)
     terminal.answer(figures, rows)
 
 
 def _surface(
     estimate: Path,
-    written: Written | None,
+    saved: SavedRun | None,
     truth: Path,
     tau: list[float] | None,
     world_from_model: Path | None,
@@ -121,14 +121,14 @@ def _surface(
     import nacre
     from nacre.evaluation import sample_surface
 
-    cloud = nacre.read_points(estimate / "model.ply" if written else estimate)
+    cloud = nacre.read_points(estimate / "model.ply" if saved else estimate)
     if not np.isfinite(cloud.points).all(axis=1).any():
         raise CommandError(f"{estimate}: the model has no points")
     reference, reference_normals = read_surface(truth, scale)
     pose, how = np.eye(4), "the identity"
     if world_from_model is not None:
         pose, how = read_matrix(world_from_model), str(world_from_model)
-    elif written and (known := written.truth_from_world) is not None:
+    elif saved and (known := saved.truth_from_world) is not None:
         pose, how = known, "the first true pose in report.json"
     if align:
         pose = _aligned(cloud.points, cloud.normals, reference, reference_normals, pose)
@@ -137,8 +137,8 @@ def _surface(
     samples = seen = None
     figures: Figures = {"kind": "surface", "world_from_model": pose, "world_from_model_from": how}
     rows: Rows = [("model moved by", how)]
-    if written and isinstance(reference, nacre.Mesh):
-        seen = _seen(written, reference, samples := sample_surface(reference.vertices, reference.triangles))
+    if saved and isinstance(reference, nacre.Mesh):
+        seen = _seen(saved, reference, samples := sample_surface(reference.vertices, reference.triangles))
     results = evaluate_surface(
         points,
         normals,
@@ -151,11 +151,11 @@ def _surface(
     if seen is not None:
         figures["seen"] = float(seen.mean())
         rows.append(("surface that the cameras saw", f"{100 * figures['seen']:.1f} %; completeness is of it"))
-    if written and written.truths is not None:
+    if saved and saved.truths is not None:
         middle = (
             reference.bounds.mean(axis=0) if isinstance(reference, nacre.Mesh) else reference.mean(axis=0)
         )
-        _add(figures, rows, _frame_results(written, middle), written)
+        _add(figures, rows, _frame_results(saved, middle), saved)
     _add(figures, rows, results)
     if align:
         rows += [
@@ -165,15 +165,15 @@ def _surface(
     return figures, rows
 
 
-def _add(figures: Figures, rows: Rows, results: Mapping[str, Result], written: Written | None = None) -> None:
+def _add(figures: Figures, rows: Rows, results: Mapping[str, Result], saved: SavedRun | None = None) -> None:
     """Add results, and what became of the frames, to the figures and as rows for people."""
     from nacre.evaluation.result import result_dict
     from nacre.report.text import label, quantity
 
-    if written:
-        figures["frames"] = written.counts
+    if saved:
+        figures["frames"] = saved.counts
         rows += [("", ""), ("FRAMES", "")]
-        rows += [(label(name), quantity(number, "count")) for name, number in written.counts.items()]
+        rows += [(label(name), quantity(number, "count")) for name, number in saved.counts.items()]
     for name, result in results.items():
         figures[name] = result_dict(result)
         units = result.units()
@@ -189,20 +189,20 @@ def _add(figures: Figures, rows: Rows, results: Mapping[str, Result], written: W
                 figures[name][field] = result.as_dict()[field]
 
 
-def _seen(written: Written, mesh: Mesh, samples: SurfaceSamples) -> Any:
+def _seen(saved: SavedRun, mesh: Mesh, samples: SurfaceSamples) -> Any:
     """Return which samples the cameras saw from their true poses; None where that is not known."""
     from nacre.evaluation import seen_samples
 
-    if written.truths is None or written.camera is None:
+    if saved.truths is None or saved.camera is None:
         return None
-    return seen_samples(mesh, samples, written.camera, written.truths)
+    return seen_samples(mesh, samples, saved.camera, saved.truths)
 
 
-def _frame_results(written: Written, middle: Any) -> dict[str, Result]:
+def _frame_results(saved: SavedRun, middle: Any) -> dict[str, Result]:
     """Return the errors of the poses of a reconstruction whose recording had true ones."""
     from nacre.evaluation import absolute_trajectory_error, pose_error, relative_pose_error
 
-    poses, truths = written.poses, written.truths
+    poses, truths = saved.poses, saved.truths
     assert truths is not None
     return {
         "pose_error": pose_error(poses, truths, center=middle),
@@ -230,28 +230,28 @@ def _aligned(points: Any, normals: Any, reference: Any, reference_normals: Any, 
 
 
 def _trajectory(
-    estimate: Path, written: Written | None, truth: Path | None, max_difference: float
+    estimate: Path, saved: SavedRun | None, truth: Path | None, max_difference: float
 ) -> tuple[Figures, Rows]:
     import nacre
     from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 
     if truth is None:
-        if not written:
+        if not saved:
             raise CommandError(f"{estimate}: a true trajectory or a recording must follow it", 2)
-        if written.truths is None:
+        if saved.truths is None:
             raise CommandError(
                 f"{estimate}: its recording had no true poses; give a trajectory or a mesh after it", 2
             )
-        results = _frame_results(written, _middle(written))
+        results = _frame_results(saved, _middle(saved))
     else:
-        found = nacre.read_trajectory(estimate / "trajectory.txt" if written else estimate)
+        found = nacre.read_trajectory(estimate / "trajectory.txt" if saved else estimate)
         known = _true_trajectory(truth)
         options: dict[str, Any] = {
             "timestamps": found.timestamps,
             "truth_timestamps": known.timestamps,
             "max_time_difference": max_difference,
         }
-        num_frames = len(written.frames) if written else None
+        num_frames = len(saved.frames) if saved else None
         results = {
             "absolute_trajectory_error": absolute_trajectory_error(
                 found.poses, known.poses, num_frames=num_frames, **options
@@ -265,18 +265,18 @@ def _trajectory(
         )
     figures: Figures = {"kind": "trajectory"}
     rows: Rows = []
-    _add(figures, rows, results, written)
+    _add(figures, rows, results, saved)
     return figures, rows[1:]
 
 
-def _middle(written: Written) -> Any:
+def _middle(saved: SavedRun) -> Any:
     """Return the middle of the model in the frame of the true poses; the median, since rooms have corners."""
     import numpy as np
 
     import nacre
 
-    pose = written.truth_from_world
-    points = nacre.read_points(written.folder / "model.ply").points
+    pose = saved.truth_from_world
+    points = nacre.read_points(saved.folder / "model.ply").points
     if pose is None or not len(points):
         return np.zeros(3)
     return transformed(pose, np.median(points, axis=0, keepdims=True), None)[0][0]

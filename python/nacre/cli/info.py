@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from nacre.cli.feed import is_camera, open_camera
+from nacre.cli.live_feed import is_camera, open_camera
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
 from nacre.cli.surfaces import MESH_SUFFIXES, POINT_SUFFIXES, has_faces
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose

@@ -12,7 +12,7 @@ from nacre.cli.terminal import CommandError
 from nacre.errors import FileFormatError
 
 if TYPE_CHECKING:
-    from nacre.frame_record import FrameRecord
+    from nacre.reconstruction.frame_record import FrameRecord
 
 
 def _line(entry: list[Any]) -> bytes:

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nacre.cli.asked import Asked, asked_before, check_recording, describe
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
-from nacre.cli.feed import LiveFeed, camera_feed, is_camera, real_time_feed
+from nacre.cli.live_feed import LiveFeed, camera_feed, is_camera, real_time_feed
 from nacre.cli.run import Run, carry_out
+from nacre.cli.run_options import RunOptions, asked_before, check_recording, describe
+from nacre.cli.signals import interruptible
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
-from nacre.cli.stopping import interruptible
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_folder
 from nacre.cli.unfinished import Unfinished, read_asked
 from nacre.cli.view import PortOption
@@ -171,7 +171,7 @@ def reconstruct(
             more |= {f"region.{side}": value for side, value in zip(sides, box or (), strict=box is not None)}
             more["region.object"] = object or None
             parameters, preset_name = model_parameters(preset, config, settings, **more)
-            asked = Asked(
+            asked = RunOptions(
                 str(source),
                 format=format,
                 camera=_text(camera),
@@ -196,7 +196,7 @@ def _text(path: Path | None) -> str | None:
     return None if path is None else str(path)
 
 
-def _begun(terminal: Terminal, asked: Asked, unfinished: Unfinished, parameters: ModelParameters) -> Run:
+def _begun(terminal: Terminal, asked: RunOptions, unfinished: Unfinished, parameters: ModelParameters) -> Run:
     """Open what was asked for, and note it in ``OUT/unfinished``."""
     out = unfinished.out
     feed: LiveFeed | None = None
@@ -220,9 +220,9 @@ def _begun(terminal: Terminal, asked: Asked, unfinished: Unfinished, parameters:
         if asked.realtime:
             feed = real_time_feed(sequence, indices)
     import nacre
-    from nacre.depth_views import shows_one_scene
     from nacre.io.atomic import remove_leftovers
     from nacre.reconstruction import Reconstruction
+    from nacre.reconstruction.calibration import shows_one_scene
 
     done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
     writable_folder(out)
@@ -253,7 +253,7 @@ def _resumed(context: typer.Context, unfinished: Unfinished) -> Run:
     document = read_asked(out)
     asked, folder = asked_before(document, out / "unfinished" / "run.json")
     if asked.is_camera:
-        from nacre.datasets.growing import mend
+        from nacre.datasets.recorder import mend
 
         mend(out / "recording")
         sequence = open_source(out / "recording")

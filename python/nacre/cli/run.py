@@ -12,19 +12,19 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from nacre.cli.asked import Asked
 from nacre.cli.calibrating import run_staged, watching
-from nacre.cli.feed import LiveFeed
-from nacre.cli.results import file_rows, trajectory_rows, write_results
+from nacre.cli.live_feed import LiveFeed
+from nacre.cli.outputs import file_rows, trajectory_rows, write_results
+from nacre.cli.run_options import RunOptions
 from nacre.cli.running import retry_lost, run_frames
-from nacre.cli.stopping import Interruption, Stopped
+from nacre.cli.signals import Interruption, Stopped
 from nacre.cli.terminal import CommandError, Terminal, table, to_json
 from nacre.cli.unfinished import Unfinished
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
-    from nacre.frame_record import FrameRecord
     from nacre.reconstruction import Reconstruction
+    from nacre.reconstruction.frame_record import FrameRecord
     from nacre.viewer import LiveView
 
 
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 class Run:
     """A run that may have been begun before: frames come by their indices, or by themselves (feed)."""
 
-    asked: Asked
+    asked: RunOptions
     out: Path
     done: Reconstruction
     sequence: Sequence
@@ -111,7 +111,7 @@ def _run_feed(
     terminal: Terminal, run: Run, feed: LiveFeed, stop: Interruption, live: LiveView | None
 ) -> None:
     """Run the frames that come by themselves."""
-    from nacre.datasets.growing import GrowingRecording
+    from nacre.datasets.recorder import GrowingRecording
 
     tell = watching(run.done, run.unfinished, live)
 

@@ -6,12 +6,12 @@ import re
 from collections.abc import Callable, Iterable, Sized
 from typing import TYPE_CHECKING
 
-from nacre.cli.stopping import Interruption
+from nacre.cli.signals import Interruption
 from nacre.cli.terminal import CommandError, Terminal
 
 if TYPE_CHECKING:
-    from nacre.frame_record import FrameRecord
     from nacre.reconstruction import Reconstruction
+    from nacre.reconstruction.frame_record import FrameRecord
 
 
 def run_frames(

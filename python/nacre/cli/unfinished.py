@@ -16,8 +16,8 @@ from nacre.cli.terminal import CommandError
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
-    from nacre.frame_record import FrameRecord
     from nacre.reconstruction import Reconstruction
+    from nacre.reconstruction.frame_record import FrameRecord
 
 _FORMAT = 1
 _RARE = 50.0  # a checkpoint is written when so many times what the last one took has gone by: 2 % of the time
@@ -47,7 +47,7 @@ class Stage:
     @classmethod
     def of(cls, state: Any) -> Stage:
         """Return the stage that plain values tell."""
-        from nacre.arrays import as_count, as_vector
+        from nacre._internal.arrays import as_count, as_vector
 
         name, live = state["name"], state["live"]
         if name not in ("views", "frames") or not (live is None or isinstance(live, dict)):
@@ -110,7 +110,7 @@ class Unfinished:
 
     def resume(self, sequence: Sequence, compare: bool) -> Reconstruction:
         """Return the run as it was at the newest checkpoint; what is done again may be compared."""
-        from nacre.arrays import as_count
+        from nacre._internal.arrays import as_count
         from nacre.errors import FileFormatError
         from nacre.reconstruction import Reconstruction
 
@@ -201,7 +201,7 @@ def read_asked(out: Path) -> dict[str, Any]:
 
 def describe_unfinished(out: Path) -> tuple[dict[str, Any], list[tuple[str, str]]]:
     """Return what there is to tell of an unfinished run."""
-    from nacre.cli.asked import asked_before
+    from nacre.cli.run_options import asked_before
 
     source = asked_before(read_asked(out), out / "unfinished" / "run.json")[0].source
     entries, _ = read_journal(out / "unfinished" / "journal.txt")

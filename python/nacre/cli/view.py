@@ -40,19 +40,19 @@ def view(
     and --rrd the extra "rerun".
     """
     terminal = Terminal(False, quiet, verbose)
-    from nacre.viewer import Viewer, export_html, export_rrd, written_story
+    from nacre.viewer import Viewer, export_html, export_rrd, read_timeline
 
     written_file(folder, "report.json")
-    story = written_story(folder)
+    timeline = read_timeline(folder)
     if html is not None:
-        export_html(story, html)
+        export_html(timeline, html)
         terminal.say(table([("page", str(html))]))
     if rrd is not None:
-        export_rrd(story, rrd)
+        export_rrd(timeline, rrd)
         terminal.say(table([("Rerun", str(rrd))]))
     if html is not None or rrd is not None:
         return
-    viewer = Viewer(story, port=port)
+    viewer = Viewer(timeline, port=port)
     terminal.say(f"the model is at {viewer.url}; Ctrl-C ends it")
     viewer.wait()
     viewer.close()

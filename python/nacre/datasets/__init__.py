@@ -8,10 +8,10 @@ from nacre.datasets.plain import write_recording
 from nacre.datasets.sequence import Sequence, SequenceFrame
 
 if TYPE_CHECKING:
-    from nacre.datasets.growing import GrowingRecording
-    from nacre.datasets.live import LiveQueue
+    from nacre.datasets.live_queue import LiveQueue
     from nacre.datasets.real_time import in_real_time
     from nacre.datasets.realsense import RealSense
+    from nacre.datasets.recorder import GrowingRecording
 
 __all__ = [
     "GrowingRecording",
@@ -25,8 +25,8 @@ __all__ = [
 ]
 
 _LIVE = {
-    "GrowingRecording": "growing",
-    "LiveQueue": "live",
+    "GrowingRecording": "recorder",
+    "LiveQueue": "live_queue",
     "RealSense": "realsense",
     "in_real_time": "real_time",
 }

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
-from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files
+from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.cameras import check_lens
@@ -55,7 +55,7 @@ def missing(folder: Path) -> str | None:
     return None
 
 
-def read(path: Path, given: Given) -> Sequence:
+def read(path: Path, given: Overrides) -> Sequence:
     """
     Open the folder of a recording's images.
 

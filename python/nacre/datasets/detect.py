@@ -22,8 +22,8 @@ from nacre.datasets import (
     stray_scanner,
     tum,
 )
-from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files
+from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import Sequence, check_first_view
 from nacre.errors import UnknownRecordingError, meant
 from nacre.io.cameras import read_camera
@@ -35,7 +35,7 @@ class Reader(NamedTuple):
 
     layout: str
     recognise: Callable[[Path], bool]
-    read: Callable[[Path, Given], Sequence]
+    read: Callable[[Path, Overrides], Sequence]
 
 
 # The first that recognises a folder opens it.
@@ -111,7 +111,7 @@ def open_sequence(
     if isinstance(camera, (str, os.PathLike)):
         found = read_camera(camera)
         camera, depth_scale = found.camera, depth_scale if depth_scale is not None else found.depth_scale
-    given = Given(camera, depth_scale, max_difference)
+    given = Overrides(camera, depth_scale, max_difference)
     reader = _named(format) if format is not None else _recognised(folder, given)
     return check_first_view(reader.read(folder, given))
 
@@ -124,7 +124,7 @@ def _named(format: str) -> Reader:
     return READERS[key]
 
 
-def _recognised(path: Path, given: Given) -> Reader:
+def _recognised(path: Path, given: Overrides) -> Reader:
     if not path.is_dir():
         for module in (stanford, rosbag, record3d, azure_kinect):
             if module.recognise(path):
@@ -140,7 +140,7 @@ def _recognised(path: Path, given: Given) -> Reader:
     raise UnknownRecordingError(path, _explanation(path))
 
 
-def _needs_more(folder: Path, given: Given) -> bool:
+def _needs_more(folder: Path, given: Overrides) -> bool:
     return (given.camera is None or given.depth_scale is None) and _hint(folder) is not None
 
 

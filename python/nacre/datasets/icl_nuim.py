@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from nacre._core import Camera
-from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files, inside, pair, require_order
+from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.datasets.tum import lines_of, poses_at, time_of
 from nacre.errors import FileFormatError
@@ -40,7 +40,7 @@ def recognise(folder: Path) -> bool:
     return (folder / "associations.txt").is_file() and not (folder / "depth.txt").is_file()
 
 
-def read(folder: Path, given: Given) -> Sequence:
+def read(folder: Path, given: Overrides) -> Sequence:
     """Open a folder of this format."""
     if (folder / "associations.txt").is_file():
         views = _read_associations(folder / "associations.txt")

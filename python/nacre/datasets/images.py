@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files, pair
+from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.images import COLOR_SUFFIXES, DEPTH_SUFFIXES
@@ -19,7 +19,7 @@ def recognise(folder: Path) -> bool:
     return bool(_depth_images(folder))
 
 
-def read(folder: Path, given: Given) -> Sequence:
+def read(folder: Path, given: Overrides) -> Sequence:
     """Open a folder of this format."""
     depth = _depth_images(folder)
     if not depth:

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import arrays
 from nacre._core import Camera
-from nacre.datasets.given import Given
+from nacre._internal import arrays
 from nacre.datasets.listing import describe, files, require_order
+from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.datasets.tum import lines_of, read_truth, time_of
 from nacre.errors import FileFormatError
@@ -47,7 +47,7 @@ def recognise(folder: Path) -> bool:
     return (folder / "camera.json").is_file()
 
 
-def read(folder: Path, given: Given) -> Sequence:
+def read(folder: Path, given: Overrides) -> Sequence:
     """Open a folder of this format."""
     if (folder / "camera.json").is_file():
         given = given.filled_from(folder / "camera.json")

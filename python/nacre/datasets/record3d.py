@@ -11,10 +11,11 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
-from nacre.arrays import FARTHEST
-from nacre.datasets.given import Given
+from nacre._internal.arrays import FARTHEST
+from nacre._internal.quaternions import matrix_from_quaternion
 from nacre.datasets.listing import describe
 from nacre.datasets.open_file import OpenFile
+from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError, shown
 from nacre.io.cameras import check_lens
@@ -22,7 +23,6 @@ from nacre.io.image_limits import check_lzfse
 from nacre.io.images import decode_color, read_depth
 from nacre.io.json_files import parse_json
 from nacre.io.raw import read_file, require_regular
-from nacre.quaternions import matrix_from_quaternion
 from nacre.trajectory import Trajectory
 
 FORMAT = "record3d"
@@ -55,7 +55,7 @@ def missing(folder: Path) -> str | None:
     return None
 
 
-def read(path: Path, given: Given) -> Sequence:
+def read(path: Path, given: Overrides) -> Sequence:
     """
     Open a recording of Record3D.
 

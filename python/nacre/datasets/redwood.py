@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from nacre._core import Camera
-from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, files, pair
+from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.datasets.tum import poses_at
 from nacre.errors import FileFormatError
@@ -36,7 +36,7 @@ def recognise(folder: Path) -> bool:
     return has_color or any(folder.glob("*.log")) or _intrinsics(folder) is not None
 
 
-def read(folder: Path, given: Given) -> Sequence:
+def read(folder: Path, given: Overrides) -> Sequence:
     """Open a folder of this format."""
     depth = files(folder / "depth", DEPTH_SUFFIXES)
     if not depth:

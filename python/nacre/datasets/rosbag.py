@@ -15,9 +15,9 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
-from nacre.datasets.given import Given
 from nacre.datasets.listing import describe
 from nacre.datasets.open_file import OpenFile
+from nacre.datasets.overrides import Overrides
 from nacre.datasets.ros_messages import (
     CAMERA_INFO,
     CHANNELS,
@@ -59,7 +59,7 @@ def recognise(path: Path) -> bool:
     return (path / "metadata.yaml").is_file() and any(path.glob(pattern) for pattern in ("*.db3*", "*.mcap"))
 
 
-def read(path: Path, given: Given) -> Sequence:
+def read(path: Path, given: Overrides) -> Sequence:
     """
     Open a ROS recording.
 

@@ -16,15 +16,15 @@ from typing import Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from nacre import arrays
 from nacre._core import Camera
-from nacre.datasets.doubt import doubt_about
+from nacre._internal import arrays
+from nacre._internal.value_equality import Value
 from nacre.datasets.listing import files, pair
+from nacre.datasets.sanity_check import depth_oddity
 from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError, printable
 from nacre.io.images import ATTRIBUTE_SUFFIXES, COLOR_SUFFIXES, read_attribute, read_color, read_depth
 from nacre.trajectory import Trajectory
-from nacre.values import Value
 
 _log = logging.getLogger(__name__)
 
@@ -82,7 +82,7 @@ class SequenceFrame(Value):
         return f"SequenceFrame({', '.join(parts)})"
 
     def _repr_png_(self) -> bytes | None:
-        from nacre.inline_pictures import picture_of_depth
+        from nacre.report.notebook_pictures import picture_of_depth
 
         return picture_of_depth(self.depth)
 
@@ -372,7 +372,7 @@ def check_first_view(sequence: Sequence) -> Sequence:
             first_error = first_error or error
             continue
         check_size(source.depth, depth, sequence.camera)
-        doubt = doubt_about(depth)
+        doubt = depth_oddity(depth)
         if doubt is not None:
             _log.warning("%s: %s", source.depth, doubt)
         if source.color is None:

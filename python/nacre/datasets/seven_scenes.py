@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
-from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, natural_key
+from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.trajectories import read_trajectory
@@ -28,7 +28,7 @@ def recognise(folder: Path) -> bool:
     return any(folder.glob("frame-*.depth.png"))
 
 
-def read(folder: Path, given: Given) -> Sequence:
+def read(folder: Path, given: Overrides) -> Sequence:
     """Open a folder of this format."""
     depth = sorted(folder.glob("frame-*.depth.png"), key=natural_key)
     if not depth:

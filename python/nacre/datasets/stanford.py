@@ -18,14 +18,14 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
-from nacre.arrays import FARTHEST
-from nacre.datasets.given import Given
+from nacre._internal.arrays import FARTHEST
+from nacre._internal.quaternions import matrix_from_quaternion
 from nacre.datasets.listing import describe, files
+from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.ply import read_range_grid
 from nacre.io.raw import decode, read_file
-from nacre.quaternions import matrix_from_quaternion
 from nacre.trajectory import Trajectory
 
 FORMAT = "stanford"
@@ -68,7 +68,7 @@ def recognise(path: Path) -> bool:
     return any(_has_range_grid(candidate) for candidate in candidates)
 
 
-def read(path: Path, given: Given) -> Sequence:
+def read(path: Path, given: Overrides) -> Sequence:
     """Open a folder of range scans, or one scan. Reads every scan once to see how far they reach."""
     scans = files(path, (".ply",)) if path.is_dir() else [path]
     scans = [scan for scan in scans if _has_range_grid(scan)]

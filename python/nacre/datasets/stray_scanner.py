@@ -8,15 +8,15 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
-from nacre.arrays import FARTHEST
-from nacre.datasets.given import Given
+from nacre._internal.arrays import FARTHEST
+from nacre._internal.quaternions import matrix_from_quaternion
 from nacre.datasets.listing import describe, files, pair, require_order
+from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.cameras import check_lens
 from nacre.io.images import DEPTH_SUFFIXES, read_depth
 from nacre.io.raw import excerpt, number_of, read_text
-from nacre.quaternions import matrix_from_quaternion
 from nacre.trajectory import Trajectory
 
 FORMAT = "stray-scanner"
@@ -42,7 +42,7 @@ def missing(folder: Path) -> str | None:
     return None
 
 
-def read(folder: Path, given: Given) -> Sequence:
+def read(folder: Path, given: Overrides) -> Sequence:
     """
     Open a folder of this format.
 

@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
-from nacre.datasets.given import Given
 from nacre.datasets.listing import describe, inside, require_order
+from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.raw import excerpt, number_of, read_text
@@ -44,7 +44,7 @@ def recognise(folder: Path) -> bool:
     return (folder / "depth.txt").is_file()
 
 
-def read(folder: Path, given: Given) -> Sequence:
+def read(folder: Path, given: Overrides) -> Sequence:
     """Open a folder of this format."""
     if not recognise(folder):
         raise FileFormatError(folder, f"a TUM recording needs depth.txt; the folder holds {describe(folder)}")

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_poses, as_vector
+from nacre._internal.arrays import as_poses, as_vector
 from nacre.evaluation.result import Array, Count, Metres, Radians, Result
 from nacre.evaluation.trajectory import absolute_trajectory_error
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, TypeAlias, get_type_hints
 import numpy as np
 import numpy.typing as npt
 
-from nacre.values import Value, told
+from nacre._internal.value_equality import Value, short_repr
 
 Array: TypeAlias = npt.NDArray[np.float64]
 
@@ -49,7 +49,7 @@ class Result(Value):
     def __repr__(self) -> str:
         units = self.units()
         shown = (f.name for f in dataclasses.fields(self) if f.repr)  # type: ignore[arg-type]
-        words = (f"{name}={told(getattr(self, name))}" + _UNITS.get(units[name], "") for name in shown)
+        words = (f"{name}={short_repr(getattr(self, name))}" + _UNITS.get(units[name], "") for name in shown)
         return f"{type(self).__name__}({', '.join(words)})"
 
     def as_dict(self) -> dict[str, Any]:

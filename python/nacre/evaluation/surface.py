@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_array, as_count, as_matching_points, as_points, as_real
+from nacre._internal.arrays import as_array, as_count, as_matching_points, as_points, as_real
 from nacre.evaluation.result import Array, Count, ManyFractions, ManyMetres, Metres, Result
 from nacre.mesh import Mesh
 

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_count, as_length, as_number, as_poses, as_times, as_values
+from nacre._internal.arrays import as_count, as_length, as_number, as_poses, as_times, as_values
 from nacre.evaluation.result import Array, Count, Fraction, Metres, Radians, Result
 from nacre.trajectory import associate
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_points
+from nacre._internal.arrays import as_points
 from nacre.evaluation.result import Count, Fraction, Metres, Result
 
 

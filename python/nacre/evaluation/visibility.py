@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._core import Camera
-from nacre.arrays import as_camera, as_number, as_poses
+from nacre._internal.arrays import as_camera, as_number, as_poses
 from nacre.evaluation.surface import SurfaceSamples
 from nacre.mesh import Mesh
 

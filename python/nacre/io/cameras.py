@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from nacre._core import Camera
-from nacre.arrays import as_camera, as_scale
+from nacre._internal.arrays import as_camera, as_scale
 from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
 from nacre.io.image_limits import MAX_PIXELS

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import arrays
+from nacre._internal import arrays
+from nacre._internal.value_equality import Value
 from nacre.io.raw import MAX_COMMENTS
-from nacre.values import Value
 
 Columns = dict[str, npt.NDArray[Any]]
 
@@ -62,7 +62,7 @@ class Cloud(Value):
         return f"Cloud({', '.join(parts)})"
 
     def _repr_png_(self) -> bytes | None:
-        from nacre.inline_pictures import picture_of_points
+        from nacre.report.notebook_pictures import picture_of_points
 
         return picture_of_points(self.points, self.normals, self.colors)
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from nacre import arrays
+from nacre._internal import arrays
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Columns
 from nacre.io.ply import read_ply, write_ply

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import arrays
+from nacre._internal import arrays
 from nacre.errors import FileFormatError
 from nacre.io.cloud import (
     Cloud,

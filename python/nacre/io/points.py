@@ -9,7 +9,7 @@ from types import ModuleType
 
 import numpy.typing as npt
 
-from nacre.arrays import as_flag
+from nacre._internal.arrays import as_flag
 from nacre.io import pcd, ply
 from nacre.io.cloud import Cloud
 

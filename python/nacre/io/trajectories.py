@@ -12,11 +12,11 @@ from io import BytesIO
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import FARTHEST
+from nacre._internal.arrays import FARTHEST
+from nacre._internal.quaternions import matrix_from_quaternion, quaternion_from_matrix
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 from nacre.io.raw import excerpt, number_of, read_file, text_of
-from nacre.quaternions import matrix_from_quaternion, quaternion_from_matrix
 from nacre.trajectory import Trajectory
 
 Float64 = npt.NDArray[np.float64]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_points
+from nacre._internal.arrays import as_points
 from nacre.report.charts import length_unit, ticks
 from nacre.report.colormap import viridis
 from nacre.report.data import FrameEntry, ModelCloud

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_matching_points, as_points
+from nacre._internal.arrays import as_matching_points, as_points
 from nacre.report.splat import Canvas
 from nacre.report.view import View
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_points, as_pose
+from nacre._internal.arrays import as_points, as_pose
 
 Array = npt.NDArray[np.float64]
 Float32 = npt.NDArray[np.float32]

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from nacre.report.colormap import viridis
 from nacre.report.text import count, quantity
-from nacre.viewer.story import Snapshot
+from nacre.viewer.timeline import Snapshot
 
 STATUS_COLORS = {
     "TRACKED": (90, 150, 220),

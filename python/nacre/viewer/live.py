@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import time
 
-from nacre.frame_record import FrameRecord
 from nacre.reconstruction import Reconstruction
+from nacre.reconstruction.frame_record import FrameRecord
 from nacre.viewer.page import Viewer
-from nacre.viewer.story import Moment, Snapshot, Story
+from nacre.viewer.timeline import Moment, Snapshot, Timeline
 
 _SHARE = 5.0
 
@@ -30,18 +30,20 @@ class LiveView:
         self, done: Reconstruction, title: str, *, host: str = "127.0.0.1", port: int = 8080
     ) -> None:
         self._done = done
-        self.story = Story(title, done.model.camera, depth_of=lambda index: self._done.sequence[index].depth)
-        self.viewer = Viewer(self.story, host=host, port=port, parameters=done.model.parameters.depth)
+        self.timeline = Timeline(
+            title, done.model.camera, depth_of=lambda index: self._done.sequence[index].depth
+        )
+        self.viewer = Viewer(self.timeline, host=host, port=port, parameters=done.model.parameters.depth)
         self._next = 0.0
 
     def begin_again(self, done: Reconstruction) -> None:
         """Show another run from now on."""
         self._done = done
-        self.story.clear()
+        self.timeline.clear()
 
     def add(self, record: FrameRecord) -> None:
         """Note a frame; show it if there is time."""
-        self.story.add(Moment.of(record))
+        self.timeline.add(Moment.of(record))
         if time.monotonic() >= self._next:
             self.show()
 
@@ -49,12 +51,12 @@ class LiveView:
         """Show the newest frame and the model as it is now."""
         start = time.monotonic()
         if len(self._done.model):
-            self.story.set_snapshot(Snapshot.of(self._done.model))
+            self.timeline.set_snapshot(Snapshot.of(self._done.model))
         self.viewer.refresh()
         now = time.monotonic()
         self._next = now + _SHARE * (now - start)
 
     def finish(self) -> None:
         """Show the end: poses as loops have corrected them, frames that were found after all."""
-        self.story.moments[:] = [Moment.of(record) for record in self._done.frames]
+        self.timeline.moments[:] = [Moment.of(record) for record in self._done.frames]
         self.show()

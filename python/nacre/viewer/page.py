@@ -20,18 +20,18 @@ from nacre.io.atomic import atomic_writer
 from nacre.viewer.colors import STATUS_COLORS, color_kinds, color_range
 from nacre.viewer.depth_picture import depth_legend, depth_picture
 from nacre.viewer.scene import Scene, core, extent
-from nacre.viewer.story import Moment, Snapshot, Story
+from nacre.viewer.timeline import Moment, Snapshot, Timeline
 
 _MISSING = 'the viewer needs viser: pip install "nacre[view]"'
 
 
 class Viewer:
     """
-    Shows a story in the browser.
+    Shows a timeline in the browser.
 
     Parameters
     ----------
-    story : Story
+    timeline : Timeline
         May grow while it is shown; call :meth:`refresh` then.
     host, port : str, int
         Where to listen; another port is taken where this one is in use.
@@ -46,16 +46,16 @@ class Viewer:
 
     def __init__(
         self,
-        story: Story,
+        timeline: Timeline,
         *,
         host: str = "127.0.0.1",
         port: int = 8080,
         parameters: DepthParameters | None = None,
     ) -> None:
-        self.story = story
+        self.timeline = timeline
         self._parameters = parameters
         self._server = _server(host, port)
-        self._scene = Scene(self._server.scene, story.camera)
+        self._scene = Scene(self._server.scene, timeline.camera)
         self._lock = threading.RLock()
         self._size = 0.0
         self._shown: tuple[Snapshot, str, float] | None = None
@@ -70,19 +70,19 @@ class Viewer:
 
     @property
     def place(self) -> int:
-        """Which frame is shown, as a place in the story's list."""
-        return min(int(self._time.value), len(self.story.moments) - 1)
+        """Which frame is shown, as a place in the timeline's list."""
+        return min(int(self._time.value), len(self.timeline.moments) - 1)
 
     def refresh(self) -> None:
-        """Show what the story has gained; the newest frame, unless a person has chosen another one."""
+        """Show what the timeline has gained; the newest frame, unless a person has chosen another one."""
         with self._lock:
-            last = max(len(self.story.moments) - 1, 0)
+            last = max(len(self.timeline.moments) - 1, 0)
             self._time.max = max(last, 1)
             if self._follow.value and self._time.value != last:
                 self._is_moving = True
                 self._time.value = last
                 self._is_moving = False
-            self._strip.content = status_strip(self.story.moments)
+            self._strip.content = status_strip(self.timeline.moments)
             self._draw()
 
     def wait(self) -> None:
@@ -100,7 +100,7 @@ class Viewer:
         gui = self._server.gui
         gui.configure_theme(show_share_button=False, dark_mode=True)
         gui.main_panel.dock_right()
-        self._title = gui.add_markdown(f"## {self.story.title}")
+        self._title = gui.add_markdown(f"## {self.timeline.title}")
         self._summary = gui.add_markdown("")
         self._picture = gui.add_image(np.full((3, 4, 3), 24, np.uint8), label="Depth", format="png")
         gui.add_html(depth_legend())
@@ -121,23 +121,23 @@ class Viewer:
         if self._is_moving:
             return
         with self._lock:
-            self._follow.value = self.place == len(self.story.moments) - 1
+            self._follow.value = self.place == len(self.timeline.moments) - 1
             self._draw()
 
     def _draw(self) -> None:
         """Draw the frame that is chosen."""
-        if not self.story.moments:
+        if not self.timeline.moments:
             return
         place = self.place
-        moment = self.story.moments[place]
+        moment = self.timeline.moments[place]
         with self._server.atomic():
-            cloud = self.story.snapshot_at(place)
+            cloud = self.timeline.snapshot_at(place)
             if cloud is not None and len(cloud.points):
                 self._show_cloud(cloud)
             if self._size:
-                self._scene.show_cameras(self.story, place, 0.12 * self._size)
+                self._scene.show_cameras(self.timeline, place, 0.12 * self._size)
             self._figures.content = figures_table(moment)
-            self._summary.content = summary(self.story)
+            self._summary.content = summary(self.timeline)
             self._show_depth(moment)
 
     def _show_cloud(self, cloud: Snapshot) -> None:
@@ -157,23 +157,23 @@ class Viewer:
     def _show_depth(self, moment: Moment) -> None:
         depth = self._depth(moment)
         self._picture.visible = depth is not None
-        if depth is None or self.story.camera is None:
+        if depth is None or self.timeline.camera is None:
             return
-        self._picture.image = depth_picture(depth, self.story.camera, self._parameters)
+        self._picture.image = depth_picture(depth, self.timeline.camera, self._parameters)
         wanted = self._own_points.value and moment.world_from_camera is not None
         points = np.zeros((0, 3), np.float32)
         if wanted and moment.world_from_camera is not None:
-            clean = preprocess_depth(depth, self.story.camera)
+            clean = preprocess_depth(depth, self.timeline.camera)
             pose = moment.world_from_camera.astype(np.float32)
-            points = back_project(clean, self.story.camera) @ pose[:3, :3].T + pose[:3, 3]
+            points = back_project(clean, self.timeline.camera) @ pose[:3, :3].T + pose[:3, 3]
         spacing = self._shown[0].spacing if self._shown else 0.001
         self._scene.show_points(points, 0.6 * spacing, bool(len(points)))
 
     def _depth(self, moment: Moment) -> npt.NDArray[np.float32] | None:
-        if self.story.depth_of is None:
+        if self.timeline.depth_of is None:
             return None
         try:
-            return self.story.depth_of(moment.index)
+            return self.timeline.depth_of(moment.index)
         except (FileFormatError, OSError):
             return None
 
@@ -186,11 +186,11 @@ def look_at(camera: Any, cloud: Snapshot, size: float) -> None:
     camera.up = (0.0, -1.0, 0.0)
 
 
-def summary(story: Story) -> str:
+def summary(timeline: Timeline) -> str:
     """Return in a line how many frames there are of each status."""
-    counts = {status: sum(moment.status == status for moment in story.moments) for status in STATUS_COLORS}
+    counts = {status: sum(moment.status == status for moment in timeline.moments) for status in STATUS_COLORS}
     parts = [f"{number} {status}" for status, number in counts.items() if number]
-    return f"{len(story.moments)} frames: {', '.join(parts)}"
+    return f"{len(timeline.moments)} frames: {', '.join(parts)}"
 
 
 def color_bar(cloud: Snapshot, kind: str) -> str:
@@ -238,13 +238,13 @@ def status_strip(moments: list[Moment], width: int = 1000) -> str:
     )
 
 
-def export_html(story: Story, path: str | os.PathLike[str], *, seconds: float = 8.0) -> None:
+def export_html(timeline: Timeline, path: str | os.PathLike[str], *, seconds: float = 8.0) -> None:
     """
     Write a page that opens from disk: the model grows as it did, over some seconds.
 
     Parameters
     ----------
-    story : Story
+    timeline : Timeline
         At least one state of the model.
     path : path-like
         The file, usually ``view.html``; it appears when it is complete.
@@ -256,21 +256,21 @@ def export_html(story: Story, path: str | os.PathLike[str], *, seconds: float = 
     ImportError
         When viser is missing.
     ValueError
-        When the story has no model.
+        When the timeline has no model.
     """
-    states = story.snapshots
+    states = timeline.snapshots
     if not states:
-        raise ValueError("story must hold a state of the model to export, got none")
+        raise ValueError("timeline must hold a state of the model to export, got none")
     server = _server("127.0.0.1", 0)
     try:
         serializer = server.get_scene_serializer()
-        scene = Scene(server.scene, story.camera)
+        scene = Scene(server.scene, timeline.camera)
         last = states[-1][1]
         size, kind = extent(last), color_kinds(last)[0]
         look_at(server.initial_camera, last, size)
         for place, cloud in states:
             scene.show_cloud(cloud, kind if kind in color_kinds(cloud) else "shading")
-            scene.show_cameras(story, place, 0.12 * size)
+            scene.show_cameras(timeline, place, 0.12 * size)
             if len(states) > 1:
                 serializer.insert_sleep(seconds / len(states))
         page = serializer.as_html(dark_mode=True)

@@ -11,22 +11,22 @@ import numpy as np
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_path
 from nacre.viewer.colors import STATUS_COLORS, color_kinds, point_colors
-from nacre.viewer.story import Moment, Story
+from nacre.viewer.timeline import Moment, Timeline
 
 _MISSING = 'files for Rerun need rerun-sdk: pip install "nacre[rerun]"'
 _MOST_DEPTH_IMAGES = 100
 
 
-def export_rrd(story: Story, path: str | os.PathLike[str]) -> None:
+def export_rrd(timeline: Timeline, path: str | os.PathLike[str]) -> None:
     """
-    Write what a story tells for the Rerun viewer: ``rerun FILE`` opens it.
+    Write a timeline for the Rerun viewer: ``rerun FILE`` opens it.
 
     The world is nacre's: metres, x right, y down, z forward. Depth images, of at most 100 frames, are stored
     in millimetres.
 
     Parameters
     ----------
-    story : Story
+    timeline : Timeline
         What is told.
     path : path-like
         The file, usually ``view.rrd``.
@@ -44,32 +44,32 @@ def export_rrd(story: Story, path: str | os.PathLike[str]) -> None:
         raise ImportError(_MISSING) from error
     rr: Any = rerun
     with atomic_path(path) as temporary:
-        _write(rr, temporary, story)
+        _write(rr, temporary, timeline)
 
 
-def _write(rr: Any, path: Path, story: Story) -> None:
+def _write(rr: Any, path: Path, timeline: Timeline) -> None:
     recording = rr.RecordingStream("nacre")
     recording.save(str(path))
-    recording.send_recording_name(story.title)
+    recording.send_recording_name(timeline.title)
     recording.log("world", rr.ViewCoordinates.RDF, static=True)
-    for place, cloud in story.snapshots:
-        if len(story.snapshots) > 1:
-            recording.set_time("frame", sequence=story.moments[place].index)
+    for place, cloud in timeline.snapshots:
+        if len(timeline.snapshots) > 1:
+            recording.set_time("frame", sequence=timeline.moments[place].index)
         colors = point_colors(cloud, color_kinds(cloud)[0])
         points = rr.Points3D(cloud.points, colors=colors, radii=0.6 * cloud.spacing)
-        recording.log("world/model", points, static=len(story.snapshots) == 1)
-    step = -(-len(story.moments) // _MOST_DEPTH_IMAGES)
-    for place, moment in enumerate(story.moments):
+        recording.log("world/model", points, static=len(timeline.snapshots) == 1)
+    step = -(-len(timeline.moments) // _MOST_DEPTH_IMAGES)
+    for place, moment in enumerate(timeline.moments):
         recording.set_time("frame", sequence=moment.index)
-        _log_frame(rr, recording, story, moment, place % step == 0)
-    path_points = [m.world_from_camera[:3, 3] for m in story.moments if m.world_from_camera is not None]
+        _log_frame(rr, recording, timeline, moment, place % step == 0)
+    path_points = [m.world_from_camera[:3, 3] for m in timeline.moments if m.world_from_camera is not None]
     if len(path_points) > 1:
         recording.log("world/path", rr.LineStrips3D([np.array(path_points)]), static=True)
     recording.flush()
     recording.disconnect()
 
 
-def _log_frame(rr: Any, recording: Any, story: Story, moment: Moment, with_depth: bool) -> None:
+def _log_frame(rr: Any, recording: Any, timeline: Timeline, moment: Moment, with_depth: bool) -> None:
     """Log the camera of a frame, its depth image, its status and its figures."""
     level = rr.TextLogLevel.WARN if moment.status in ("LOST", "WEAK") else rr.TextLogLevel.INFO
     told = ", ".join(f"{name} {value}" for name, value in moment.figures.items())
@@ -81,7 +81,7 @@ def _log_frame(rr: Any, recording: Any, story: Story, moment: Moment, with_depth
             recording.log(f"world/{name}", rr.Clear(recursive=True))
             continue
         recording.log(f"world/{name}", rr.Transform3D(translation=pose[:3, 3], mat3x3=pose[:3, :3]))
-        camera = story.camera
+        camera = timeline.camera
         if camera is not None and camera.model == "pinhole":
             matrix = [[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]]
             pinhole = rr.Pinhole(
@@ -89,9 +89,9 @@ def _log_frame(rr: Any, recording: Any, story: Story, moment: Moment, with_depth
                 camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=0.1,
             )  # fmt: skip
             recording.log(f"world/{name}", pinhole)
-    if with_depth and story.depth_of is not None and moment.world_from_camera is not None:
+    if with_depth and timeline.depth_of is not None and moment.world_from_camera is not None:
         try:
-            depth = story.depth_of(moment.index)
+            depth = timeline.depth_of(moment.index)
         except (FileFormatError, OSError):
             return
         stored = np.rint(np.clip(np.nan_to_num(1000 * depth), 0, 65535)).astype(np.uint16)

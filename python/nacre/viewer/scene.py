@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from nacre import Camera
 from nacre.viewer.colors import STATUS_COLORS, point_colors
-from nacre.viewer.story import Moment, Snapshot, Story
+from nacre.viewer.timeline import Moment, Snapshot, Timeline
 
 Array = npt.NDArray[np.float64]
 
@@ -20,7 +20,7 @@ _MAX_FRUSTUMS = 24
 
 class Scene:
     """
-    Draws the states of a story.
+    Draws the states of a timeline.
 
     Parameters
     ----------
@@ -49,9 +49,9 @@ class Scene:
             precision="float32",
         )
 
-    def show_cameras(self, story: Story, place: int, size: float) -> None:
+    def show_cameras(self, timeline: Timeline, place: int, size: float) -> None:
         """Draw the path up to a frame, some of the cameras on it, the frame's own large, and the truth."""
-        moments = story.moments[: place + 1]
+        moments = timeline.moments[: place + 1]
         posed = [moment for moment in moments if moment.world_from_camera is not None]
         self._show_path("/path", posed, 2.5)
         chosen = posed[:: max(-(-len(posed) // _MAX_FRUSTUMS), 1)]
@@ -61,7 +61,7 @@ class Scene:
             [STATUS_COLORS[m.status] for m in chosen],
             1.5,
         )
-        pose = story.pose_at(place)
+        pose = timeline.pose_at(place)
         if moments and pose is not None:
             self._lines("/camera", [self._frustum(pose, size)], [STATUS_COLORS[moments[-1].status]], 3.0)
         truths = np.array([m.truth[:3, 3] for m in moments if m.truth is not None]).reshape(-1, 3)

@@ -85,9 +85,9 @@ def read_recording(path: Path) -> list[Any]:
 
 def read_output(path: Path) -> Any:
     """Read what a reconstruction wrote as the viewer does."""
-    from nacre.viewer.written import written_story
+    from nacre.viewer.saved_timeline import read_timeline
 
-    return written_story(path)
+    return read_timeline(path)
 
 
 def read_run(path: Path) -> Any:

@@ -9,7 +9,7 @@ import pytest
 from model_scenes import FLAT, Array, ball, flat_grid, relief, rms, state
 
 import nacre
-from nacre.parameters import updated
+from nacre._internal.core_options import updated
 
 ILLEGAL: dict[str, tuple[type[Exception], str, dict[str, Any]]] = {
     "transposed": (

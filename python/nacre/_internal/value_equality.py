@@ -25,10 +25,11 @@ class Value:
 
     def __repr__(self) -> str:
         shown = (field.name for field in dataclasses.fields(self) if field.repr)  # type: ignore[arg-type]
-        return f"{type(self).__name__}({', '.join(f'{name}={told(getattr(self, name))}' for name in shown)})"
+        words = (f"{name}={short_repr(getattr(self, name))}" for name in shown)
+        return f"{type(self).__name__}({', '.join(words)})"
 
 
-def told(value: Any) -> str:
+def short_repr(value: Any) -> str:
     """Return in a word what a field holds."""
     if isinstance(value, np.ndarray):
         return f"{value.dtype}{list(value.shape)}"

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from nacre._internal.value_equality import Value
 from nacre.errors import FileFormatError
 from nacre.frame_report import FrameReport
-from nacre.values import Value
 
 STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
 

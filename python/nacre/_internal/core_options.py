@@ -8,7 +8,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
 
-from nacre.arrays import as_number
+from nacre._internal.arrays import as_number
 from nacre.errors import meant
 
 Core = TypeVar("Core")

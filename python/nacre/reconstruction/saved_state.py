@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_count, as_length, as_number, as_vector
+from nacre._internal.arrays import as_count, as_length, as_number, as_vector
 from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
-from nacre.frame_record import FrameRecord
 from nacre.frame_report import FrameReport
+from nacre.reconstruction.frame_record import FrameRecord
 
 _STATUSES = {"TRACKED": ("TRACKED", "RELOCALISED")}  # of a report: those of a frame, which may be found later
 

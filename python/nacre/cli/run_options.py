@@ -20,7 +20,7 @@ _log = logging.getLogger(__name__)
 
 
 @dataclass
-class Asked:
+class RunOptions:
     """The options of ``nacre reconstruct`` but for those that the model keeps itself; paths as given."""
 
     source: str
@@ -84,20 +84,20 @@ class Asked:
         }
 
 
-def asked_before(document: Mapping[str, Any], path: Path) -> tuple[Asked, Path]:
+def asked_before(document: Mapping[str, Any], path: Path) -> tuple[RunOptions, Path]:
     """Return what ``run.json`` says, and the folder that paths begin at."""
     try:
         recording = document["recording"]
         if not (recording is None or (isinstance(recording, dict) and "files" in recording)):
             raise TypeError("recording must be an object with files")
-        return _checked(Asked(**document["options"])), Path(document["folder"])
+        return _checked(RunOptions(**document["options"])), Path(document["folder"])
     except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, f"it does not say what was asked for ({error})") from None
 
 
-def _checked(asked: Asked) -> Asked:
+def _checked(asked: RunOptions) -> RunOptions:
     """Return options that a file tells; a TypeError or a ValueError says what nobody can have asked for."""
-    from nacre.arrays import as_count, as_flag, as_scale
+    from nacre._internal.arrays import as_count, as_flag, as_scale
 
     for name in ("source", "preset", "format", "camera", "masks"):
         value = getattr(asked, name)

@@ -16,26 +16,24 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre.arrays import as_count, as_flag
-from nacre.checkpoint import Checkpointed
+from nacre._internal.arrays import as_count, as_flag
+from nacre._internal.checkpoint import Checkpointed
 from nacre.datasets.corrected import with_corrected_depth
 from nacre.datasets.sequence import SequenceFrame
 from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result
-from nacre.frame_record import STATUSES, FrameRecord
 from nacre.frame_report import FrameReport
 from nacre.model import Model
 from nacre.progress import as_progress
-from nacre.run_figures import run_dict, run_report
-from nacre.run_state import calibration_from, record_from, record_state
+from nacre.reconstruction.frame_record import STATUSES, FrameRecord
+from nacre.reconstruction.saved_state import calibration_from, record_from, record_state
+from nacre.report.run_figures import run_dict, run_report
 from nacre.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from nacre.report import ReportData
-
-__all__ = ["FrameRecord", "Reconstruction"]
 
 _log = logging.getLogger(__name__)
 

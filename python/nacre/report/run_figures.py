@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from nacre._core import __version__
+from nacre import __version__
 from nacre.depth import PIXEL_LABELS, label_pixels
 from nacre.errors import FileFormatError
 from nacre.evaluation.result import plain, result_dict
-from nacre.frame_figures import frame_dict, frame_entry
-from nacre.frame_record import STATUSES, FrameRecord
+from nacre.reconstruction.frame_record import STATUSES, FrameRecord
+from nacre.report.frame_figures import frame_dict, frame_entry
 
 if TYPE_CHECKING:
     from nacre.reconstruction import Reconstruction

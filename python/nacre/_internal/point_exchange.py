@@ -72,6 +72,6 @@ class ExchangeablePoints(ABC):
 
     def _repr_png_(self) -> bytes | None:
         """Return a picture of the points, which notebooks show in place of the words of ``repr``."""
-        from nacre.inline_pictures import picture_of_points
+        from nacre.report.notebook_pictures import picture_of_points
 
         return picture_of_points(self.points, self.normals, self.colors)

@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre.arrays import FloatArray, as_array, as_count, as_length, as_points
-from nacre.values import Value
+from nacre._internal.arrays import FloatArray, as_array, as_count, as_length, as_points
+from nacre._internal.value_equality import Value
 
 IndexArray = npt.NDArray[np.int64]
 

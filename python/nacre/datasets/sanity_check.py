@@ -10,7 +10,7 @@ import numpy.typing as npt
 _ONE_VALUE = 0.9  # of the measurements: sensors' noise, and a millimetre's steps, spread even a wall more
 
 
-def doubt_about(depth: npt.NDArray[np.floating[Any]]) -> str | None:
+def depth_oddity(depth: npt.NDArray[np.floating[Any]]) -> str | None:
     """Say what is strange about a depth image [m; NaN: no measurement], or None."""
     measured = depth[np.isfinite(depth)]
     if not len(measured):

@@ -12,8 +12,8 @@ import numpy.typing as npt
 
 from nacre import Camera
 from nacre.errors import printable
-from nacre.frame_record import FrameRecord
 from nacre.model import Model
+from nacre.reconstruction.frame_record import FrameRecord
 from nacre.report.text import count, quantity
 
 
@@ -127,7 +127,7 @@ def words(**figures: float | None) -> dict[str, str]:
     }
 
 
-class Story:
+class Timeline:
     """
     What a viewer tells.
 

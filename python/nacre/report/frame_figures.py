@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from nacre.frame_record import FrameRecord
     from nacre.frame_report import FrameReport
+    from nacre.reconstruction.frame_record import FrameRecord
     from nacre.report import FrameEntry
 
 

@@ -9,10 +9,10 @@ from typing import Any, cast
 from nacre._core import Camera
 from nacre.datasets import Sequence as Recording
 from nacre.datasets import SequenceFrame, open_sequence
-from nacre.depth_views import DepthViews, shows_one_scene
-from nacre.frame_record import FrameRecord
 from nacre.model import Model, ModelParameters, Preset
-from nacre.reconstruction import Reconstruction
+from nacre.reconstruction.calibration import DepthViews, shows_one_scene
+from nacre.reconstruction.frame_record import FrameRecord
+from nacre.reconstruction.reconstruction import Reconstruction
 
 
 def reconstruct(

@@ -1,4 +1,4 @@
-"""The story of what ``nacre reconstruct`` wrote."""
+"""The timeline of what ``nacre reconstruct`` wrote."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import numpy.typing as npt
 
 from nacre.errors import FileFormatError
 from nacre.io.points import read_points
-from nacre.viewer.story import Moment, Snapshot, Story, words
-from nacre.written import FIGURES, Written
+from nacre.report.saved_run import FIGURES, SavedRun
+from nacre.viewer.timeline import Moment, Snapshot, Timeline, words
 
 
-def written_story(folder: str | os.PathLike[str]) -> Story:
+def read_timeline(folder: str | os.PathLike[str]) -> Timeline:
     """
     Read what a reconstruction wrote.
 
@@ -31,12 +31,14 @@ def written_story(folder: str | os.PathLike[str]) -> Story:
     FileFormatError, OSError
         When a file is damaged or missing.
     """
-    out = Written(Path(folder))
-    story = Story(out.report.get("title") or Path(folder).name, out.camera, depth_of=_recorded_depth(out))
+    out = SavedRun(Path(folder))
+    timeline = Timeline(
+        out.report.get("title") or Path(folder).name, out.camera, depth_of=_recorded_depth(out)
+    )
     placed = out.truth_from_world
     world_from_truth = None if placed is None else np.asarray(np.linalg.inv(placed), np.float64)
     for frame in out.frames:
-        story.add(_moment(frame, world_from_truth))
+        timeline.add(_moment(frame, world_from_truth))
     model = read_points(Path(folder) / "model.ply")
     normals = model.normals
     if normals is None:
@@ -50,8 +52,8 @@ def written_story(folder: str | os.PathLike[str]) -> Story:
         attributes.get("confidence"),
         attributes.get("last_seen"),
     )
-    story.set_snapshot(cloud)
-    return story
+    timeline.set_snapshot(cloud)
+    return timeline
 
 
 def _moment(frame: dict[str, Any], world_from_truth: npt.NDArray[np.float64] | None) -> Moment:
@@ -68,7 +70,7 @@ def _moment(frame: dict[str, Any], world_from_truth: npt.NDArray[np.float64] | N
     )
 
 
-def _recorded_depth(out: Written) -> Any:
+def _recorded_depth(out: SavedRun) -> Any:
     """Return what reads a depth image of the recording, or None where the recording is gone."""
     recording = out.report.get("recording") or {}
     path = recording.get("path")

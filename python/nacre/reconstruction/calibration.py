@@ -18,11 +18,11 @@ from nacre.depth_calibration import (
     can_calibrate,
     turn_between,
 )
-from nacre.frame_record import FrameRecord
 from nacre.model import Model, ModelParameters
-from nacre.reconstruction import Reconstruction
+from nacre.reconstruction.frame_record import FrameRecord
+from nacre.reconstruction.reconstruction import Reconstruction
+from nacre.reconstruction.saved_state import pose_from
 from nacre.region import RegionParameters
-from nacre.run_state import pose_from
 
 
 def shows_one_scene(camera: Camera, parameters: ModelParameters) -> bool:

@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from nacre import _core
-from nacre.arrays import as_scale
+from nacre._internal.arrays import as_scale
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 from nacre.io.raw import read_file

@@ -11,19 +11,19 @@ from nacre.io.cameras import read_camera
 
 
 @dataclass(frozen=True)
-class Given:
+class Overrides:
     """The caller's arguments; None where nothing was said."""
 
     camera: Camera | None = None
     depth_scale: float | None = None
     max_difference: float = 0.02
 
-    def filled_from(self, camera_file: Path) -> Given:
+    def filled_from(self, camera_file: Path) -> Overrides:
         """Return the arguments with what is missing taken from a camera file."""
         if self.camera is not None and self.depth_scale is not None:
             return self
         found = read_camera(camera_file)
-        return Given(
+        return Overrides(
             self.camera if self.camera is not None else found.camera,
             self.depth_scale if self.depth_scale is not None else found.depth_scale,
             self.max_difference,

@@ -1,0 +1,6 @@
+"""Recordings run through models: one orchestration, which Python and the command line share."""
+
+from nacre.reconstruction.frame_record import FrameRecord
+from nacre.reconstruction.reconstruction import Reconstruction
+
+__all__ = ["FrameRecord", "Reconstruction"]
