@@ -35,7 +35,7 @@ from nacre.trajectory import Trajectory
 if TYPE_CHECKING:
     from nacre.report import ReportData
 
-_log = logging.getLogger(__name__)
+_log = logging.getLogger("nacre.reconstruction")
 
 _RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
 
