@@ -11,13 +11,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from killed_runs import command, plain_page, recording_with_gaps, results, undisturbed_results  # noqa: F401  fixtures
 
 import nacre
 from nacre.io import atomic
 from nacre.reconstruction import Reconstruction
-
-sys.path.insert(0, str(Path(__file__).parent))
-from test_resume import command, killed_after, plain_page, recording, results, undisturbed  # noqa: F401
 
 POINTS = np.random.default_rng(0).random((2000, 3))
 CAMERA = nacre.Camera(24, 20, 30.0, 30.0, 11.5, 9.5)
@@ -152,7 +150,7 @@ main()
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="RLIMIT_FSIZE is POSIX")
-def test_files_that_may_not_grow(recording: Path, undisturbed: Any, tmp_path: Path) -> None:  # noqa: F811
+def test_files_that_may_not_grow(recording: Path, undisturbed: Any, tmp_path: Path) -> None:
     """First the checkpoint is too large, then the journal, then the model; then nothing is."""
     out = tmp_path / "o"
     words: list[str] = ["reconstruct", str(recording), "-o", str(out), "--checkpoint-every", "2"]
@@ -174,7 +172,7 @@ def test_files_that_may_not_grow(recording: Path, undisturbed: Any, tmp_path: Pa
     assert results(out) == undisturbed
 
 
-def test_a_disk_that_is_full(recording: Path, undisturbed: Any, tmp_path: Path) -> None:  # noqa: F811
+def test_a_disk_that_is_full(recording: Path, undisturbed: Any, tmp_path: Path) -> None:
     disk = tmp_path / "disk"
     disk.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=3m", "tmpfs", str(disk)]

@@ -17,11 +17,10 @@ import nacre
 pytest.importorskip("PIL")
 pytest.importorskip("rosbags")
 pytest.importorskip("liblzfse")
-sys.path.insert(0, str(Path(__file__).parents[1]))
+from record3d_files import contents, packed
 from recording_folders import write_icl_nuim, write_plain, write_redwood, write_seven_scenes, write_tum
 from ros_recorder import Recorder
 from rosbags.rosbag2 import StoragePlugin
-from test_record3d import contents, packed
 
 FRAMES, ROUNDS = 20, 15
 

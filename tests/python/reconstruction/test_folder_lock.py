@@ -9,15 +9,14 @@ from typing import Any
 import pytest
 
 pytest.importorskip("typer")
-from nacre.cli.unfinished import Unfinished
+from killed_runs import command, killed_after, plain_page, recording_with_gaps, results, undisturbed_results  # noqa: F401  fixtures
 
-sys.path.insert(0, str(Path(__file__).parent))
-from test_resume import command, killed_after, plain_page, recording, results, undisturbed  # noqa: F401
+from nacre.cli.unfinished import Unfinished
 
 
 def test_the_second_is_refused_and_the_first_is_not_disturbed(
-    recording: Path,  # noqa: F811
-    undisturbed: Any,  # noqa: F811
+    recording: Path,
+    undisturbed: Any,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -42,7 +41,7 @@ def test_the_second_is_refused_and_the_first_is_not_disturbed(
     assert command("reconstruct", recording, "-o", out)[0] == 0
 
 
-def test_a_killed_one_holds_nothing(recording: Path, undisturbed: Any, tmp_path: Path) -> None:  # noqa: F811
+def test_a_killed_one_holds_nothing(recording: Path, undisturbed: Any, tmp_path: Path) -> None:
     killed_after(2, "reconstruct", recording, "-o", tmp_path / "o")
     code = """if True:
         import sys, time
@@ -61,8 +60,8 @@ def test_a_killed_one_holds_nothing(recording: Path, undisturbed: Any, tmp_path:
 
 
 def test_on_a_disk_without_locks_nothing_is_held(
-    recording: Path,  # noqa: F811
-    undisturbed: Any,  # noqa: F811
+    recording: Path,
+    undisturbed: Any,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

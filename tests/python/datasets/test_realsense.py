@@ -20,7 +20,7 @@ from nacre.datasets import LiveQueue, RealSense, realsense
 from nacre.viewer import read_timeline
 
 pytest.importorskip("PIL")
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 WIDTH, HEIGHT, FRAMES, SHIFT = 64, 48, 6, 0.1
 
 

@@ -106,7 +106,7 @@ def test_what_happens_is_logged(frames: list[nacre.SequenceFrame], caplog: pytes
 
 def test_reports_have_the_poses_that_later_views_of_an_object_adjusted() -> None:
     with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(Path(__file__).resolve().parents[2] / "examples" / "python")
+        patch.syspath_prepend(Path(__file__).resolve().parents[3] / "examples" / "python")
         from simulated import turntable
     done = nacre.reconstruct(list(turntable(6)), region={"object": True})
     expected = [done.model._core.report(i).world_from_camera for i in range(6)]

@@ -1,8 +1,6 @@
 """Runs that were killed or stopped: resumed they give the same bytes, or say what is wrong."""
 
-import contextlib
 import errno
-import io
 import json
 import shutil
 import signal
@@ -20,84 +18,21 @@ import nacre
 from nacre.reconstruction import Reconstruction
 
 pytest.importorskip("typer")
-from nacre.cli import main
-from nacre.cli.journal import _line, read_journal
-from nacre.cli.unfinished import Stage, Unfinished
-
-sys.path.insert(0, str(Path(__file__).parent))
 import test_depth_calibration as tilted
-from test_wide_views import view
+from killed_runs import (  # noqa: F401  fixtures
+    Killed,
+    command,
+    killed_after,
+    plain_page,
+    recording_with_gaps,
+    results,
+    undisturbed_results,
+)
+
+from nacre.cli.journal import _line, read_journal
+from nacre.cli.unfinished import Stage
 
 POSE = np.eye(4).ravel().tolist()
-
-
-class Killed(BaseException):
-    """Ends a process, as far as its files are concerned."""
-
-
-def command(*arguments: Any) -> tuple[int, str, str]:
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        try:
-            main([str(word) for word in arguments])
-        except SystemExit as stopped:
-            return int(stopped.code or 0), out.getvalue(), err.getvalue()
-    raise AssertionError("it did not exit")
-
-
-def killed_after(count: int, *arguments: Any) -> None:
-    """Run a command that ends when so many frames are done."""
-    whole, frames = Unfinished.add, iter(range(10_000))
-
-    def add(self: Unfinished, *more: Any) -> None:
-        whole(self, *more)
-        if next(frames) + 1 == count:
-            raise Killed
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Unfinished, "add", add)
-        with pytest.raises(Killed):
-            command(*arguments)
-
-
-def results(out: Path) -> tuple[bytes, bytes, Any]:
-    def without_times(value: Any) -> Any:
-        if isinstance(value, dict):
-            return {name: without_times(item) for name, item in value.items() if name != "milliseconds"}
-        return [without_times(item) for item in value] if isinstance(value, list) else value
-
-    report = json.loads((out / "report.json").read_text())
-    return (out / "model.ply").read_bytes(), (out / "trajectory.txt").read_bytes(), without_times(report)
-
-
-@pytest.fixture(autouse=True)
-def plain_page(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Its pictures take seconds."""
-    import nacre.report
-
-    monkeypatch.setattr(nacre.report, "render_page", lambda data: "<html></html>")
-
-
-@pytest.fixture(scope="module")
-def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Seven views: one sees nothing, and two come before what they can be registered to."""
-    folder = tmp_path_factory.mktemp("resume") / "recording"
-    degrees = (0, 180, 15, None, 30, 60, 120)
-    depth = [np.full_like(view(0), np.nan) if angle is None else view(angle) for angle in degrees]
-    nacre.write_recording(folder, nacre.default_camera(nacre.built_in_object()), depth, depth_scale=20000)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def undisturbed(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, bytes, Any]:
-    out = tmp_path_factory.mktemp("resume") / "out"
-    with pytest.MonkeyPatch.context() as patch:
-        import nacre.report
-
-        patch.setattr(nacre.report, "render_page", lambda data: "<html></html>")
-        assert command("reconstruct", recording, "-o", out)[0] == 0
-    assert not (out / "unfinished").exists()
-    return results(out)
 
 
 class TestKilled:
@@ -397,7 +332,7 @@ def test_a_camera_that_was_killed_leaves_a_whole_recording(tmp_path: Path) -> No
 
 @pytest.mark.slow
 def test_killed_at_random_moments() -> None:
-    script = Path(__file__).resolve().parents[2] / "benchmarks" / "kills.py"
+    script = Path(__file__).resolve().parents[3] / "benchmarks" / "kills.py"
     done = subprocess.run(
         [sys.executable, str(script), "--kills", "5", "--views", "12", "--plain-page"],
         capture_output=True, text=True, check=False,

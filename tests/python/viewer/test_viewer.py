@@ -15,7 +15,7 @@ import nacre
 from nacre.cli import main
 from nacre.reconstruction import Reconstruction
 
-sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1]))
 from browser import CHROMIUM, Browser
 
 viewer = pytest.importorskip("nacre.viewer")

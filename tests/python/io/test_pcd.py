@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import nacre
 from nacre.io import lzf
 
-DATA = Path(__file__).parents[3] / "shared" / "data"
+DATA = Path(__file__).parents[4] / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="no recordings in ../shared/data")
 
 XYZ = {"VERSION": "0.7", "FIELDS": "x y z", "SIZE": "4 4 4", "TYPE": "F F F", "COUNT": "1 1 1"}

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import nacre
 from nacre.io.meshes import read_mesh_arrays, write_mesh
 
-DATA = Path(__file__).parents[3] / "shared" / "data"
+DATA = Path(__file__).parents[4] / "shared" / "data"
 needs_data = pytest.mark.skipif(not DATA.is_dir(), reason="no recordings in ../shared/data")
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0.5], [0, 1, 0.5]])
