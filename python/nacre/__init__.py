@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from nacre.datasets import Sequence, SequenceFrame, open_sequence, write_recording
     from nacre.depth import (
         PIXEL_LABELS,
-        DepthParameters,
         DepthReport,
         back_project,
         depth_normals,
@@ -22,7 +21,7 @@ if TYPE_CHECKING:
     from nacre.depth_calibration import DepthCalibration, calibrate_depth
     from nacre.errors import CameraError, FileFormatError
     from nacre.frame_report import FrameReport
-    from nacre.global_registration import GlobalAlignResult, GlobalRegistrationParameters, align_global
+    from nacre.global_registration import GlobalAlignResult, align_global
     from nacre.io.cameras import CameraFile, read_camera, write_camera
     from nacre.io.cloud import Cloud
     from nacre.io.meshes import read_mesh, write_mesh
@@ -30,13 +29,20 @@ if TYPE_CHECKING:
     from nacre.io.trajectories import read_trajectory, write_trajectory
     from nacre.kdtree import KdTree, RadiusNeighbors
     from nacre.mesh import ClosestPoints, Mesh, RayHits, built_in_object
-    from nacre.model import Model, ModelParameters
+    from nacre.model import Model
     from nacre.noise import NoiseModel, calibrate_noise, estimate_noise
     from nacre.normals import estimate_normals
+    from nacre.parameters import (
+        DepthParameters,
+        GlobalRegistrationParameters,
+        ModelParameters,
+        RegionParameters,
+        RegistrationParameters,
+    )
     from nacre.progress import Cancelled
     from nacre.reconstruction.reconstruct import reconstruct
-    from nacre.region import RegionParameters, RegionReport, select_region
-    from nacre.registration import AlignResult, RegistrationParameters, align
+    from nacre.region import RegionReport, select_region
+    from nacre.registration import AlignResult, align
     from nacre.simulation import default_camera, simulate_depth, turntable_poses
     from nacre.system import default_threads, instruction_set
     from nacre.trajectory import Trajectory, associate
@@ -111,12 +117,11 @@ _NAMES = {
     "_core": "Camera __version__",
     "consolidation": "Consolidated consolidate project_samples",
     "datasets": "Sequence SequenceFrame open_sequence write_recording",
-    "depth": "PIXEL_LABELS DepthParameters DepthReport back_project depth_normals label_pixels "
-    "preprocess_depth",
+    "depth": "PIXEL_LABELS DepthReport back_project depth_normals label_pixels preprocess_depth",
     "depth_calibration": "DepthCalibration calibrate_depth",
     "errors": "CameraError FileFormatError",
     "frame_report": "FrameReport",
-    "global_registration": "GlobalAlignResult GlobalRegistrationParameters align_global",
+    "global_registration": "GlobalAlignResult align_global",
     "io.cameras": "CameraFile read_camera write_camera",
     "io.cloud": "Cloud",
     "io.meshes": "read_mesh write_mesh",
@@ -124,14 +129,16 @@ _NAMES = {
     "io.trajectories": "read_trajectory write_trajectory",
     "trajectory": "Trajectory associate",
     "mesh": "ClosestPoints Mesh RayHits built_in_object",
-    "model": "Model ModelParameters",
+    "model": "Model",
     "kdtree": "KdTree RadiusNeighbors",
     "noise": "NoiseModel calibrate_noise estimate_noise",
     "normals": "estimate_normals",
+    "parameters": "DepthParameters GlobalRegistrationParameters ModelParameters RegionParameters "
+    "RegistrationParameters",
     "progress": "Cancelled",
     "reconstruction.reconstruct": "reconstruct",
-    "region": "RegionParameters RegionReport select_region",
-    "registration": "AlignResult RegistrationParameters align",
+    "region": "RegionReport select_region",
+    "registration": "AlignResult align",
     "simulation": "default_camera simulate_depth turntable_poses",
     "system": "default_threads instruction_set",
 }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -12,11 +12,11 @@ import numpy.typing as npt
 from nacre import _core
 from nacre._internal.arrays import as_camera, as_count, as_depth, as_flag, as_mask
 from nacre._internal.core_options import to_core
-from nacre.noise import Noise, NoiseModel, NoiseName, as_noise, estimate_noise
+from nacre.noise import Noise, NoiseModel, as_noise, estimate_noise
+from nacre.parameters import DepthParameters, EdgeTest
 
 __all__ = [
     "PIXEL_LABELS",
-    "DepthParameters",
     "DepthReport",
     "Noise",
     "NoiseModel",
@@ -33,33 +33,6 @@ PIXEL_LABELS = ("kept", "invalid", "out_of_range", "masked", "edge", "slanted", 
 _FARTHEST = 1e15  # [m]: beyond it single precision cannot tell a normal
 
 DepthArray = npt.NDArray[np.float32]
-EdgeTest = Literal["inverse_depth", "gradient", "none"]
-
-
-@dataclass(frozen=True)
-class DepthParameters:
-    """
-    What :func:`preprocess_depth` removes; see there for each field.
-
-    Mirrors the C++ ``DepthOptions``; ``noise=None`` measures the noise: from the image itself, or from all
-    images of a model so far.
-    """
-
-    edge_test: EdgeTest = "inverse_depth"
-    min_depth: float = 0.0
-    max_depth: float = math.inf
-    gradient_threshold: float = 0.005
-    edge_dilation: int = 1
-    edge_sigmas: float = 4.0
-    edge_reprieve: float = 3.0
-    max_slant: float = 1.3962634
-    max_missing: float = 0.6
-    min_component: int = 20
-    noise: NoiseModel | NoiseName | None = None
-
-    def for_camera(self, camera: _core.Camera) -> DepthParameters:
-        """Return the same with the noise model of that camera, where only its kind is named."""
-        return replace(self, noise=as_noise("depth.noise", self.noise, as_camera("camera", camera)))
 
 
 @dataclass(frozen=True)

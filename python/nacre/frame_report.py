@@ -16,6 +16,8 @@ from nacre.region import RegionReport
 if TYPE_CHECKING:
     import threading
 
+STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FrameReport(Value):

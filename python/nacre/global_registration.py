@@ -12,26 +12,7 @@ from nacre import _core
 from nacre._internal.arrays import FloatArray, as_points, as_unit_rows, as_vector, localize
 from nacre._internal.core_options import to_core
 from nacre._internal.value_equality import Value
-
-
-@dataclass(frozen=True)
-class GlobalRegistrationParameters:
-    """How :func:`align_global` works; see there for each field. Mirrors the C++ ``GlobalAlignOptions``."""
-
-    num_rotations: int = 288
-    num_candidates: int = 16
-    tolerance: float = 0.0
-    max_angle: float = 0.5235988
-    outlines: bool = False
-    min_overlap: float = 0.15
-    min_consistency: float = 0.7
-    max_residual: float = 0.8
-    max_rivalry: float = 0.7
-    max_points: int = 10000
-    max_samples: int = 2000
-    coarse_samples: int = 250
-    seed: int = 0
-    num_threads: int = 0
+from nacre.parameters import GlobalRegistrationParameters
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
 from typing import Any, Literal, overload
 
@@ -14,30 +13,9 @@ from nacre._internal.arrays import as_camera, as_count, as_depth, as_flag, as_ma
 from nacre._internal.core_options import to_core, updated
 from nacre._internal.value_equality import Value
 from nacre.noise import Noise, as_noise
+from nacre.parameters import RegionParameters
 
 Mask = npt.NDArray[np.bool_]
-
-
-@dataclass(frozen=True)
-class RegionParameters:
-    """
-    The region of interest; see :func:`select_region` for each field.
-
-    Mirrors the C++ ``RegionOptions``; the defaults leave nothing out.
-    """
-
-    min_x: float = -math.inf
-    max_x: float = math.inf
-    min_y: float = -math.inf
-    max_y: float = math.inf
-    min_z: float = -math.inf
-    max_z: float = math.inf
-    object: bool = False
-    min_plane: float = 0.1
-    min_object: float = 0.003
-    plane_margin: float = 0.0
-    link_distance: float = 0.0
-    keep_fraction: float = 0.25
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -12,33 +12,7 @@ from nacre import _core
 from nacre._internal.arrays import FloatArray, as_points, as_pose, as_real, as_rows, as_unit_rows, localize
 from nacre._internal.core_options import to_core
 from nacre._internal.value_equality import Value
-
-Method = Literal["point_to_point", "point_to_plane", "symmetric"]
-
-
-@dataclass(frozen=True)
-class RegistrationParameters:
-    """
-    How :func:`align` works; see there for each field. Mirrors the C++ ``AlignOptions``.
-
-    ``num_threads`` of a model's registration follows the model's.
-    """
-
-    method: Method = "symmetric"
-    max_iterations: int = 40
-    max_distance: float = 0.0
-    final_distance: float = 0.0
-    gate_decay: float = 0.7
-    max_angle: float = 0.7853982
-    robust: bool = True
-    sample_fraction: float = 1.0
-    max_points: int = 10000
-    max_samples: int = 5000
-    coarse_samples: int = 600
-    keep_best: bool = False
-    weak_threshold: float = 0.002
-    seed: int = 0
-    num_threads: int = 0
+from nacre.parameters import Method, RegistrationParameters
 
 
 @dataclass(frozen=True, eq=False, repr=False)

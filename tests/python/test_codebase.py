@@ -1,5 +1,6 @@
 """The rules of the house, read from the source files themselves."""
 
+import ast
 import importlib.util
 import inspect
 import re
@@ -158,9 +159,40 @@ def test_the_bindings_include_public_headers_only() -> None:
 
 def test_only_the_facade_touches_the_extension_module() -> None:
     outside = files("examples", "benchmarks", "docs", suffixes={".py", ".md"})
-    for folder in ("cli", "report", "viewer"):
+    for folder in ROOMS[1:]:
         outside += files(f"python/nacre/{folder}", suffixes={".py"})
     assert lines_matching(r"\b_core\b", outside) == []
+
+
+# The Python package from the bottom up: the facade's modules, and the packages behind it. What functions and type
+# checkers import does not count.
+ROOMS = ["facade", "evaluation", "io", "datasets", "report", "reconstruction", "viewer", "cli"]
+
+
+def imported_modules(path: Path) -> set[str]:
+    """Collect the modules of the package that a file imports when it is imported itself."""
+    found: set[str] = set()
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("nacre."):
+            found.add(str(node.module))
+        elif isinstance(node, ast.ImportFrom) and node.module == "nacre":
+            found |= {f"nacre.{alias.name}" for alias in node.names}
+    return found
+
+
+def room(module: str) -> str:
+    """Return the folder of a module, or the facade: which all that is private in it belongs to."""
+    name = module.split(".")[1]
+    return name if name in ROOMS else "facade"
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "python" / "nacre").rglob("*.py")), ids=lambda path: path.stem
+)
+def test_python_modules_import_what_is_below_them(path: Path) -> None:
+    own = room(".".join(path.relative_to(ROOT / "python").with_suffix("").parts) + ".")
+    above = set(ROOMS[ROOMS.index(own) + 1 :])
+    assert {module for module in imported_modules(path) if room(module) in above} == set()
 
 
 def test_no_build_depends_on_the_machine() -> None:

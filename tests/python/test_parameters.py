@@ -10,7 +10,7 @@ import nacre
 from nacre import _core
 from nacre._internal.core_options import as_choice, from_core, to_core, updated
 from nacre.depth import NoiseModel
-from nacre.model import ConsolidationParameters, FusionParameters, NormalParameters
+from nacre.parameters import ConsolidationParameters, FusionParameters, NormalParameters
 
 MIRRORS: dict[type, Any] = {
     nacre.DepthParameters: _core.DepthOptions,

@@ -11,8 +11,6 @@ from typing import Any
 from nacre import _core
 from nacre._internal.arrays import as_scale
 from nacre.errors import FileFormatError
-from nacre.io.atomic import atomic_writer
-from nacre.io.raw import read_file
 
 
 class Checkpointed(ABC):
@@ -40,6 +38,8 @@ class Checkpointed(ABC):
         self._save(path)
 
     def _save(self, path: str | os.PathLike[str], **more: Any) -> None:
+        from nacre.io.atomic import atomic_writer
+
         data = self._checkpoint(**more)
         with atomic_writer(path) as stream:
             stream.write(data)
@@ -56,6 +56,8 @@ def checkpoint_of(core: _core.Model, depth_scale: float, more: Mapping[str, Any]
 
 def read_checkpoint(path: str | os.PathLike[str]) -> tuple[_core.Model, float, dict[str, Any]]:
     """Return the model, the scale of its depth images, and the rest of what was written beside it."""
+    from nacre.io.raw import read_file
+
     data = read_file(path)
     try:
         core, note = _core.Model.load(data)

@@ -16,7 +16,7 @@ from nacre.cli.terminal import CommandError
 from nacre.errors import FileFormatError, shown
 
 if TYPE_CHECKING:
-    from nacre.model import ModelParameters
+    from nacre.parameters import ModelParameters
 
 
 _MOST_BYTES = 1 << 16
@@ -51,7 +51,7 @@ ConfigOption = Annotated[
 
 def complete_parameter(incomplete: str) -> list[str]:
     """Return the parameters that begin so, for the shell."""
-    from nacre.model import ModelParameters
+    from nacre.parameters import ModelParameters
 
     names = (name for name, _ in _leaves(dataclasses.asdict(ModelParameters())))
     return [f"{name}=" for name in names if name.startswith(incomplete)]
@@ -73,7 +73,7 @@ def model_parameters(
 ) -> tuple[ModelParameters, str]:
     """Return the parameters and the preset's name; settings win over the file, and that over the preset."""
     from nacre._internal.core_options import updated
-    from nacre.model import ModelParameters
+    from nacre.parameters import ModelParameters
 
     document = dict(_read_toml(config)) if config is not None else {}
     name = document.pop("preset", "default")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre.datasets.listing import describe, files
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre.datasets import (
     azure_kinect,
     icl_nuim,

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre._internal import arrays
 from nacre.datasets.listing import describe, files, require_order
 from nacre.datasets.overrides import Overrides

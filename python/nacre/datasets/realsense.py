@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre.datasets.sequence import SequenceFrame
 from nacre.errors import CameraError, FileFormatError
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre.datasets import plain
 from nacre.datasets.sequence import FrameSource, Sequence, SequenceFrame
 from nacre.errors import CameraError

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre.datasets.listing import describe
 from nacre.datasets.open_file import OpenFile
 from nacre.datasets.overrides import Overrides

@@ -16,7 +16,7 @@ from typing import Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre._internal import arrays
 from nacre._internal.value_equality import Value
 from nacre.datasets.listing import files, pair

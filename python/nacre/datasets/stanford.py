@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre._internal.arrays import FARTHEST
 from nacre._internal.quaternions import matrix_from_quaternion
 from nacre.datasets.listing import describe, files

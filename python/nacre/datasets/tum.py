@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre.datasets.listing import describe, inside, require_order
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre._internal.arrays import as_camera, as_number, as_poses
 from nacre.evaluation.surface import SurfaceSamples
 from nacre.mesh import Mesh

@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre._internal.arrays import as_camera, as_scale
 from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 import numpy.typing as npt
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre.datasets.corrected import with_corrected_depth
 from nacre.datasets.sequence import SequenceFrame
 from nacre.depth_calibration import (
@@ -18,11 +18,11 @@ from nacre.depth_calibration import (
     can_calibrate,
     turn_between,
 )
-from nacre.model import Model, ModelParameters
+from nacre.model import Model
+from nacre.parameters import ModelParameters, RegionParameters
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.saved_state import pose_from
-from nacre.region import RegionParameters
 
 
 def shows_one_scene(camera: Camera, parameters: ModelParameters) -> bool:

@@ -11,8 +11,6 @@ from nacre._internal.value_equality import Value
 from nacre.errors import FileFormatError
 from nacre.frame_report import FrameReport
 
-STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FrameRecord(Value):

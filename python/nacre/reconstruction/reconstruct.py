@@ -6,10 +6,11 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any, cast
 
-from nacre._core import Camera
+from nacre import Camera
 from nacre.datasets import Sequence as Recording
 from nacre.datasets import SequenceFrame, open_sequence
-from nacre.model import Model, ModelParameters, Preset
+from nacre.model import Model
+from nacre.parameters import ModelParameters, Preset
 from nacre.reconstruction.calibration import DepthViews, shows_one_scene
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.reconstruction import Reconstruction

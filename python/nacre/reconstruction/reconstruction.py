@@ -24,10 +24,10 @@ from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result
-from nacre.frame_report import FrameReport
+from nacre.frame_report import STATUSES, FrameReport
 from nacre.model import Model
 from nacre.progress import as_progress
-from nacre.reconstruction.frame_record import STATUSES, FrameRecord
+from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.saved_state import calibration_from, record_from, record_state
 from nacre.report.run_figures import run_dict, run_report
 from nacre.trajectory import Trajectory

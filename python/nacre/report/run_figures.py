@@ -13,11 +13,11 @@ from nacre import __version__
 from nacre.depth import PIXEL_LABELS, label_pixels
 from nacre.errors import FileFormatError
 from nacre.evaluation.result import plain, result_dict
-from nacre.reconstruction.frame_record import STATUSES, FrameRecord
+from nacre.frame_report import STATUSES
 from nacre.report.frame_figures import frame_dict, frame_entry
 
 if TYPE_CHECKING:
-    from nacre.reconstruction import Reconstruction
+    from nacre.reconstruction import FrameRecord, Reconstruction
     from nacre.report import DepthExample, ReportData
 
 

@@ -81,7 +81,7 @@ class SavedRun:
     @property
     def counts(self) -> dict[str, int]:
         """How many frames there are, and how many of each status."""
-        from nacre.reconstruction.frame_record import STATUSES
+        from nacre.frame_report import STATUSES
 
         found = [frame.get("status") for frame in self.frames]
         return {"num_frames": len(found), **{f"num_{s.lower()}": found.count(s) for s in STATUSES}}
@@ -111,7 +111,7 @@ def _wrong_in_report(report: dict[str, Any]) -> str | None:
 
 def _wrong_in_frame(frame: Any) -> str | None:
     """Say what is not as nacre reconstruct writes a frame."""
-    from nacre.reconstruction.frame_record import STATUSES
+    from nacre.frame_report import STATUSES
 
     if not isinstance(frame, dict):
         return f" must be an object, got {shown(frame)}"

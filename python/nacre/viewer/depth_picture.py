@@ -6,7 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
-from nacre.depth import PIXEL_LABELS, DepthParameters, label_pixels
+from nacre.depth import PIXEL_LABELS, label_pixels
+from nacre.parameters import DepthParameters
 from nacre.report.colormap import CATEGORIES, category_rgb, viridis
 from nacre.report.depth_pictures import reason_color
 

@@ -14,9 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import back_project, preprocess_depth
-from nacre.depth import DepthParameters
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
+from nacre.parameters import DepthParameters
 from nacre.viewer.colors import STATUS_COLORS, color_kinds, color_range
 from nacre.viewer.depth_picture import depth_legend, depth_picture
 from nacre.viewer.scene import Scene, core, extent

@@ -1,0 +1,234 @@
+"""All parameters: frozen dataclasses, each the mirror of a C++ struct; a test compares the defaults."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from nacre import _core
+from nacre._internal.arrays import as_camera
+from nacre._internal.core_options import from_core
+from nacre.noise import NoiseModel, NoiseName, as_noise
+
+EdgeTest = Literal["inverse_depth", "gradient", "none"]
+Method = Literal["point_to_point", "point_to_plane", "symmetric"]
+Preset = Literal["default", "paper"]
+
+
+@dataclass(frozen=True)
+class DepthParameters:
+    """
+    What :func:`nacre.preprocess_depth` removes; see there for each field.
+
+    Mirrors the C++ ``DepthOptions``; ``noise=None`` measures the noise: from the image itself, or from all
+    images of a model so far.
+    """
+
+    edge_test: EdgeTest = "inverse_depth"
+    min_depth: float = 0.0
+    max_depth: float = math.inf
+    gradient_threshold: float = 0.005
+    edge_dilation: int = 1
+    edge_sigmas: float = 4.0
+    edge_reprieve: float = 3.0
+    max_slant: float = 1.3962634
+    max_missing: float = 0.6
+    min_component: int = 20
+    noise: NoiseModel | NoiseName | None = None
+
+    def for_camera(self, camera: _core.Camera) -> DepthParameters:
+        """Return the same with the noise model of that camera, where only its kind is named."""
+        return replace(self, noise=as_noise("depth.noise", self.noise, as_camera("camera", camera)))
+
+
+@dataclass(frozen=True)
+class RegionParameters:
+    """
+    The region of interest; see :func:`nacre.select_region` for each field.
+
+    Mirrors the C++ ``RegionOptions``; the defaults leave nothing out.
+    """
+
+    min_x: float = -math.inf
+    max_x: float = math.inf
+    min_y: float = -math.inf
+    max_y: float = math.inf
+    min_z: float = -math.inf
+    max_z: float = math.inf
+    object: bool = False
+    min_plane: float = 0.1
+    min_object: float = 0.003
+    plane_margin: float = 0.0
+    link_distance: float = 0.0
+    keep_fraction: float = 0.25
+
+
+@dataclass(frozen=True)
+class RegistrationParameters:
+    """
+    How :func:`nacre.align` works; see there for each field. Mirrors the C++ ``AlignOptions``.
+
+    ``num_threads`` of a model's registration follows the model's.
+    """
+
+    method: Method = "symmetric"
+    max_iterations: int = 40
+    max_distance: float = 0.0
+    final_distance: float = 0.0
+    gate_decay: float = 0.7
+    max_angle: float = 0.7853982
+    robust: bool = True
+    sample_fraction: float = 1.0
+    max_points: int = 10000
+    max_samples: int = 5000
+    coarse_samples: int = 600
+    keep_best: bool = False
+    weak_threshold: float = 0.002
+    seed: int = 0
+    num_threads: int = 0
+
+
+@dataclass(frozen=True)
+class GlobalRegistrationParameters:
+    """
+    How :func:`nacre.align_global` works; see there for each field.
+
+    Mirrors the C++ ``GlobalAlignOptions``.
+    """
+
+    num_rotations: int = 288
+    num_candidates: int = 16
+    tolerance: float = 0.0
+    max_angle: float = 0.5235988
+    outlines: bool = False
+    min_overlap: float = 0.15
+    min_consistency: float = 0.7
+    max_residual: float = 0.8
+    max_rivalry: float = 0.7
+    max_points: int = 10000
+    max_samples: int = 2000
+    coarse_samples: int = 250
+    seed: int = 0
+    num_threads: int = 0
+
+
+@dataclass(frozen=True)
+class FusionParameters:
+    """
+    How frames are fused into a model. Mirrors the C++ ``FusionOptions``.
+
+    Attributes
+    ----------
+    support : float
+        Observations farther from a model point do not move it [m]; 0: from noise and pixel size.
+    max_angle : float
+        Nor do those whose normal differs more [rad].
+    max_confidence : float
+        Bounds the confidence from above, so that new observations always count.
+    min_sightings : int
+        A point that fewer frames observed is not confirmed.
+    max_violations : int
+        A point that a camera saw through so often goes; an unconfirmed one also where cameras looked so often
+        and did not find it.
+    reference_sigma : float
+        Noise of an observation of weight 1 [m]; 0: the frame's median.
+    """
+
+    support: float = 0.0
+    max_angle: float = 1.0471976
+    max_confidence: float = 1e6
+    min_sightings: int = 3
+    max_violations: int = 3
+    reference_sigma: float = 0.0
+
+
+@dataclass(frozen=True)
+class ConsolidationParameters:
+    """How WLOP folds frames in; see :func:`nacre.consolidate`. Mirrors the C++ ``ConsolidateOptions``."""
+
+    method: Literal["wlop", "wlop+", "cgal"] = "wlop"
+    radius: float = 0.008
+    num_points: int = 2000
+    iterations: int = 10
+    mu: float = 0.4
+    theta: Literal["huang", "printed"] = "huang"
+    seed: int = 0
+    num_threads: int = 0
+
+
+@dataclass(frozen=True)
+class NormalParameters:
+    """How normals are estimated; see :func:`nacre.estimate_normals`. Mirrors the C++ ``NormalOptions``."""
+
+    k: int = 16
+    max_radius: float = float("inf")
+    num_threads: int = 0
+
+
+@dataclass(frozen=True)
+class ModelParameters:
+    """
+    All parameters of a model. Mirrors the C++ ``ModelOptions``.
+
+    Attributes
+    ----------
+    depth, region, registration, fusion, consolidation, normals
+        Of the steps of the loop. ``consolidation`` and ``normals`` (of the model) are used where ``fold_in``
+        is not "fuse".
+    fold_in : "fuse", "wlop" or "wlop+"
+        How a registered frame becomes part of the model: confidence-weighted fusion, the 2010 paper's WLOP of
+        model and new points, or WLOP repaired for incremental use.
+    spacing : float
+        Distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces. New
+        points are also at least a pixel and a half apart in the frame that brings them.
+    max_points : int
+        The model never grows beyond: its spacing is widened instead.
+    predict_motion : bool
+        Start also from the pose that continues the last motion.
+    relocalise : bool
+        Search where the guesses fail: for an object that turned by any angle on the plane on which it stands
+        (``region.object``), around earlier poses, then everywhere (some tenths of a second; not at every
+        frame where that has failed often).
+    loop_closure : bool
+        Where ``fold_in`` is "fuse": correct model and poses where the camera comes back to what it saw
+        before.
+    denoise_samples : bool
+        Register surface points averaged over their pixels, not single pixels.
+    verify : bool
+        Judge registrations by their evidence.
+    min_evidence : float
+        A frame with less is lost; see :class:`nacre.FrameReport`.
+    first_fraction, kept_fraction, new_fraction : float
+        WLOP: part of the first frame that becomes the model; part of the model that is kept at each frame;
+        new points, as a part of the model.
+    num_threads : int
+        0: all.
+    """
+
+    depth: DepthParameters = field(default_factory=DepthParameters)
+    region: RegionParameters = field(default_factory=RegionParameters)
+    registration: RegistrationParameters = field(default_factory=RegistrationParameters)
+    fold_in: Literal["fuse", "wlop", "wlop+"] = "fuse"
+    fusion: FusionParameters = field(default_factory=FusionParameters)
+    consolidation: ConsolidationParameters = field(default_factory=ConsolidationParameters)
+    normals: NormalParameters = field(default_factory=NormalParameters)
+    spacing: float = 0.0
+    max_points: int = 500000
+    predict_motion: bool = True
+    relocalise: bool = True
+    loop_closure: bool = True
+    denoise_samples: bool = True
+    verify: bool = True
+    min_evidence: float = 0.3
+    first_fraction: float = 0.5
+    kept_fraction: float = 0.9
+    new_fraction: float = 0.2
+    num_threads: int = 0
+
+    @classmethod
+    def preset(cls, name: Preset) -> ModelParameters:
+        """Return "default" (what measures best) or "paper" (every number of the 2010 paper)."""
+        if not isinstance(name, str):
+            raise TypeError(f"preset must be 'default' or 'paper', got {name!r}")
+        return from_core(cls, _core.ModelOptions.preset(name))
