@@ -39,8 +39,8 @@ MODELS: dict[str, dict[str, Any]] = {
         "max_points": 8000
     },  # a full turn with wrong focal length, so that a loop closes; lost frames; colours
     "object": {"region": {"object": True}},
-    "wlop": {"fold_in": "wlop", "max_points": 1000},
-    "wlop+": {"fold_in": "wlop+", "max_points": 1000},
+    "wlop": {"fusion_method": "wlop", "max_points": 1000},
+    "wlop+": {"fusion_method": "wlop+", "max_points": 1000},
     "recording": {},
 }
 # Environments of other processes; "processors" is how many the process may use.

@@ -216,7 +216,7 @@ def kidnap(count: int, seed: int) -> dict[str, Any]:
             metres, degrees = error(report, poses[0], pose)
             outcome = "lost" if not report.tracked else "right" if metres < 0.005 and degrees < 2 else "wrong"
             if outcome == "wrong" and report.status != "WEAK":
-                told["folded in wrongly"] += 1
+                told["fused wrongly"] += 1
         told[outcome] += 1
     return {"trials": count, **told}
 

@@ -4,7 +4,7 @@ Send random frames through models with random cameras and parameters, and check 
 
 Depth is all 0, the largest value, NaN, inf, one pixel, blocks, noise, any bits, planes, views of an object,
 whole or spoilt; sizes from 1x1 up, both camera models, distortion, colours, masks, attributes, guesses, and
-every way to fold in. Each frame must get a status, or a ValueError that is documented, after which nothing
+every way to fuse. Each frame must get a status, or a ValueError that is documented, after which nothing
 has changed; the model stays finite, with unit normals, and within its bound; saved and loaded it is the same.
 """
 
@@ -95,7 +95,7 @@ def _whole(low: int, high: int) -> Any:
 
 # What each parameter may be; a fifth of them is changed in half of the models.
 PARAMETERS: dict[str, Any] = {
-    "fold_in": _one_of("fuse", "wlop", "wlop+"),
+    "fusion_method": _one_of("fuse", "wlop", "wlop+"),
     "spacing": _one_of(0.0, 1e-30, 1e-6, 1e-4, 0.001, 0.003, 0.01, 0.1, 10.0, 1e6, 1e29),
     "max_points": _one_of(100, 101, 500, 2000, 2**31 - 1),
     "predict_motion": _one_of(True, False),
@@ -104,9 +104,9 @@ PARAMETERS: dict[str, Any] = {
     "denoise_samples": _one_of(True, False),
     "verify": _one_of(True, False),
     "min_evidence": _one_of(0.0, 0.1, 0.3, 3.0, math.inf),
-    "first_fraction": _one_of(1e-9, 0.01, 0.5, 1.0),
-    "kept_fraction": _one_of(1e-9, 0.1, 0.9, 1.0),
-    "new_fraction": _one_of(0.0, 1e-9, 0.2, 1.0),
+    "wlop.first_fraction": _one_of(1e-9, 0.01, 0.5, 1.0),
+    "wlop.kept_fraction": _one_of(1e-9, 0.1, 0.9, 1.0),
+    "wlop.new_fraction": _one_of(0.0, 1e-9, 0.2, 1.0),
     "num_threads": _one_of(1, 1, 2, 3, 7),
     "depth.edge_test": _one_of("inverse_depth", "gradient", "none"),
     "depth.min_depth": _one_of(0.0, 1e-30, 0.1, 0.3, 5.0),
@@ -114,7 +114,7 @@ PARAMETERS: dict[str, Any] = {
     "depth.gradient_threshold": _log(-6, 2),
     "depth.edge_dilation": _whole(0, 100),
     "depth.edge_sigmas": _log(-3, 3),
-    "depth.edge_reprieve": _one_of(0.0, 1.0, 3.0, 1e9),
+    "depth.planar_keep_sigmas": _one_of(0.0, 1.0, 3.0, 1e9),
     "depth.max_slant": _between(0.01, 1.57),
     "depth.max_missing": _one_of(0.0, 0.3, 0.6, 1.0),
     "depth.min_component": _one_of(0, 1, 20, 1000, 2**31 - 1),
@@ -124,10 +124,8 @@ PARAMETERS: dict[str, Any] = {
     "region.object": _one_of(True, False),
     "region.min_x": _one_of(-math.inf, -0.05, -1e30),
     "region.max_z": _one_of(math.inf, 0.5, 2.0),
-    "region.min_plane": _between(0.001, 1.0),
     "region.min_object": _between(0.0001, 1.0),
     "region.plane_margin": _one_of(0.0, 1e-9, 0.01, 1e9),
-    "region.link_distance": _one_of(0.0, 1e-9, 0.01, 1e9),
     "registration.method": _one_of("symmetric", "point_to_plane", "point_to_point"),
     "registration.max_iterations": _whole(1, 60),
     "registration.max_distance": _one_of(0.0, 1e-9, 0.01, 1e9),
@@ -142,19 +140,16 @@ PARAMETERS: dict[str, Any] = {
     "registration.keep_best": _one_of(True, False),
     "registration.weak_threshold": _one_of(0.0, 0.002, 0.5, 1e9),
     "registration.seed": _whole(0, 2**31 - 1),
-    "fusion.support": _one_of(0.0, 1e-9, 0.01, 1e9),
-    "fusion.max_angle": _one_of(1e-6, 1.0, 4.0),
     "fusion.max_confidence": _log(-6, 30),
-    "fusion.min_sightings": _whole(0, 255),
-    "fusion.max_violations": _whole(1, 255),
+    "fusion.min_observations": _whole(0, 255),
+    "fusion.max_free_space_violations": _whole(1, 255),
     "fusion.reference_sigma": _one_of(0.0, 1e-12, 0.001, 1e9),
-    "consolidation.method": _one_of("wlop", "wlop+", "cgal"),
-    "consolidation.radius": _one_of(1e-12, 1e-4, 0.008, 0.1, 1e12),
-    "consolidation.iterations": _whole(0, 12),
-    "consolidation.mu": _between(0.0, 0.5),
-    "consolidation.theta": _one_of("huang", "printed"),
-    "normals.k": _whole(3, 60),
-    "normals.max_radius": _one_of(1e-9, 0.008, 1.0, math.inf),
+    "wlop.radius": _one_of(1e-12, 1e-4, 0.008, 0.1, 1e12),
+    "wlop.iterations": _whole(0, 12),
+    "wlop.mu": _between(0.0, 0.5),
+    "wlop.theta": _one_of("huang", "printed"),
+    "wlop.normal_neighbors": _whole(3, 60),
+    "wlop.normal_radius": _one_of(1e-9, 0.008, 1.0, math.inf),
 }
 
 
@@ -162,7 +157,7 @@ def random_changes(rng: np.random.Generator) -> dict[str, Any]:
     """Return parameters to change."""
     if rng.random() < 0.5:
         return (
-            {"num_threads": 1, "fold_in": PARAMETERS["fold_in"](rng)}
+            {"num_threads": 1, "fusion_method": PARAMETERS["fusion_method"](rng)}
             if rng.random() < 0.4
             else {"num_threads": 1}
         )

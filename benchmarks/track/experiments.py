@@ -1,4 +1,4 @@
-"""Rows that are more than one recording: real scans in any order, fold-in forms, unrelated pairs."""
+"""Rows that are more than one recording: real scans in any order, ways of fusion, unrelated pairs."""
 
 from __future__ import annotations
 
@@ -75,8 +75,8 @@ def turntable_errors(report: dict[str, Any], order: tuple[str, ...]) -> Figures:
     return best
 
 
-def fold_in_forms(places: Places, row: Row) -> dict[str, Figures]:
-    """Fold the same frames in by fusion, WLOP, repaired WLOP, and consolidate all of them at once."""
+def fusion_methods(places: Places, row: Row) -> dict[str, Figures]:
+    """Fuse the same frames by confidence, WLOP, repaired WLOP, and consolidate all of them at once."""
     assert row.recording is not None
     assert row.mesh is not None
     recording, mesh = row.recording(places), row.mesh(places)
@@ -85,7 +85,7 @@ def fold_in_forms(places: Places, row: Row) -> dict[str, Figures]:
     folder.mkdir(parents=True, exist_ok=True)
     for form in ("fuse", "wlop", "wlop+"):
         out = folder / form.replace("+", "-plus")
-        settings = ["--set", f"fold_in={form}"]
+        settings = ["--set", f"fusion_method={form}"]
         if form != "fuse":  # its own number of points, for an even comparison
             settings += ["--set", f"max_points={results['fuse']['points']:.0f}"]
         processor = commands.reconstruct(recording, out, *settings)

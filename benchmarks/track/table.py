@@ -205,13 +205,13 @@ ROWS = [
         "A frame takes 260 bytes.",
     ),
     Row(
-        "fold-in",
-        "Bunny, 12 views every 30 degrees: how frames are folded in",
+        "fusion-methods",
+        "Bunny, 12 views every 30 degrees: how frames are fused",
         recording=simulated(
             "bunny12", bunny, *ORTHOGRAPHIC, "--noise", "0.0005", "--views", 12, "--step", 30, "--scale", 1.0
         ),
         mesh=bunny,
-        measure=experiments.fold_in_forms,
+        measure=experiments.fusion_methods,
     ),
 ]
 BY_NAME = {row.name: row for row in ROWS}

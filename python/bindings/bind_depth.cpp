@@ -53,7 +53,7 @@ void bind_depth(py::module_& m) {
       .def_readwrite("gradient_threshold", &DepthOptions::gradient_threshold)
       .def_readwrite("edge_dilation", &DepthOptions::edge_dilation)
       .def_readwrite("edge_sigmas", &DepthOptions::edge_sigmas)
-      .def_readwrite("edge_reprieve", &DepthOptions::edge_reprieve)
+      .def_readwrite("planar_keep_sigmas", &DepthOptions::planar_keep_sigmas)
       .def_readwrite("max_slant", &DepthOptions::max_slant)
       .def_readwrite("max_missing", &DepthOptions::max_missing)
       .def_readwrite("min_component", &DepthOptions::min_component)

@@ -39,7 +39,7 @@ py::dict milliseconds(const FrameReport& report) {
   result["region"] = times.region;
   result["registration"] = times.registration;
   result["loop_closure"] = times.loop_closure;
-  result["fold_in"] = times.fold_in;
+  result["fuse"] = times.fuse;
   result["normals"] = times.normals;
   result["total"] = times.total;
   return result;
@@ -61,19 +61,30 @@ FrameReport add_frame(Model& model, const DepthRef& depth, const MaskRef& mask, 
 }  // namespace
 
 void bind_model(py::module_& m) {
-  py::enum_<FoldIn>(m, "FoldIn")
-      .value("fuse", FoldIn::fuse)
-      .value("wlop", FoldIn::wlop)
-      .value("wlop_plus", FoldIn::wlop_plus);
+  py::enum_<FusionMethod>(m, "FusionMethod")
+      .value("fuse", FusionMethod::fuse)
+      .value("wlop", FusionMethod::wlop)
+      .value("wlop_plus", FusionMethod::wlop_plus);
 
   py::class_<FusionOptions>(m, "FusionOptions")
       .def(py::init<>())
-      .def_readwrite("support", &FusionOptions::support)
-      .def_readwrite("max_angle", &FusionOptions::max_angle)
       .def_readwrite("max_confidence", &FusionOptions::max_confidence)
-      .def_readwrite("min_sightings", &FusionOptions::min_sightings)
-      .def_readwrite("max_violations", &FusionOptions::max_violations)
+      .def_readwrite("min_observations", &FusionOptions::min_observations)
+      .def_readwrite("max_free_space_violations", &FusionOptions::max_free_space_violations)
       .def_readwrite("reference_sigma", &FusionOptions::reference_sigma);
+
+  py::class_<WlopOptions>(m, "WlopOptions")
+      .def(py::init<>())
+      .def_readwrite("radius", &WlopOptions::radius)
+      .def_readwrite("iterations", &WlopOptions::iterations)
+      .def_readwrite("mu", &WlopOptions::mu)
+      .def_readwrite("theta", &WlopOptions::theta)
+      .def_readwrite("first_fraction", &WlopOptions::first_fraction)
+      .def_readwrite("kept_fraction", &WlopOptions::kept_fraction)
+      .def_readwrite("new_fraction", &WlopOptions::new_fraction)
+      .def_readwrite("normal_neighbors", &WlopOptions::normal_neighbors)
+      .def_readwrite("normal_radius", &WlopOptions::normal_radius)
+      .def_readwrite("seed", &WlopOptions::seed);
 
   py::class_<ModelOptions>(m, "ModelOptions")
       .def(py::init<>())
@@ -81,10 +92,9 @@ void bind_model(py::module_& m) {
       .def_readwrite("depth", &ModelOptions::depth)
       .def_readwrite("region", &ModelOptions::region)
       .def_readwrite("registration", &ModelOptions::registration)
-      .def_readwrite("fold_in", &ModelOptions::fold_in)
+      .def_readwrite("fusion_method", &ModelOptions::fusion_method)
       .def_readwrite("fusion", &ModelOptions::fusion)
-      .def_readwrite("consolidation", &ModelOptions::consolidation)
-      .def_readwrite("normals", &ModelOptions::normals)
+      .def_readwrite("wlop", &ModelOptions::wlop)
       .def_readwrite("spacing", &ModelOptions::spacing)
       .def_readwrite("max_points", &ModelOptions::max_points)
       .def_readwrite("predict_motion", &ModelOptions::predict_motion)
@@ -93,9 +103,6 @@ void bind_model(py::module_& m) {
       .def_readwrite("denoise_samples", &ModelOptions::denoise_samples)
       .def_readwrite("verify", &ModelOptions::verify)
       .def_readwrite("min_evidence", &ModelOptions::min_evidence)
-      .def_readwrite("first_fraction", &ModelOptions::first_fraction)
-      .def_readwrite("kept_fraction", &ModelOptions::kept_fraction)
-      .def_readwrite("new_fraction", &ModelOptions::new_fraction)
       .def_readwrite("num_threads", &ModelOptions::num_threads);
 
   py::class_<PointModel>(m, "PointModel")
@@ -104,7 +111,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("colors", [](const PointModel& cloud) { return copy_rows(cloud.colors); })
       .def_property_readonly("attributes", &copy_attributes)
       .def_property_readonly("confidence", [](const PointModel& cloud) { return copy_values(cloud.confidence); })
-      .def_property_readonly("sightings", [](const PointModel& cloud) { return copy_values(cloud.sightings); })
+      .def_property_readonly("observations", [](const PointModel& cloud) { return copy_values(cloud.observations); })
       .def_property_readonly("last_seen", [](const PointModel& cloud) { return copy_values(cloud.last_seen); })
       .def("__len__", &PointModel::size);
 

@@ -33,11 +33,8 @@ void bind_region(py::module_& m) {
       .def_readwrite("min_z", &RegionOptions::min_z)
       .def_readwrite("max_z", &RegionOptions::max_z)
       .def_readwrite("object", &RegionOptions::object)
-      .def_readwrite("min_plane", &RegionOptions::min_plane)
       .def_readwrite("min_object", &RegionOptions::min_object)
-      .def_readwrite("plane_margin", &RegionOptions::plane_margin)
-      .def_readwrite("link_distance", &RegionOptions::link_distance)
-      .def_readwrite("keep_fraction", &RegionOptions::keep_fraction);
+      .def_readwrite("plane_margin", &RegionOptions::plane_margin);
   py::class_<RegionReport>(m, "RegionReport")
       .def_readonly("num_inside", &RegionReport::num_inside)
       .def_readonly("num_outside", &RegionReport::num_outside)

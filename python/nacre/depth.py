@@ -66,7 +66,7 @@ def preprocess_depth(
     gradient_threshold: float = ...,
     edge_dilation: int = ...,
     edge_sigmas: float = ...,
-    edge_reprieve: float = ...,
+    planar_keep_sigmas: float = ...,
     max_slant: float = ...,
     max_missing: float = ...,
     min_component: int = ...,
@@ -87,7 +87,7 @@ def preprocess_depth(
     gradient_threshold: float = ...,
     edge_dilation: int = ...,
     edge_sigmas: float = ...,
-    edge_reprieve: float = ...,
+    planar_keep_sigmas: float = ...,
     max_slant: float = ...,
     max_missing: float = ...,
     min_component: int = ...,
@@ -107,7 +107,7 @@ def preprocess_depth(
     gradient_threshold: float = 0.005,
     edge_dilation: int = 1,
     edge_sigmas: float = 4.0,
-    edge_reprieve: float = 3.0,
+    planar_keep_sigmas: float = 3.0,
     max_slant: float = 1.3962634,
     max_missing: float = 0.6,
     min_component: int = 20,
@@ -146,7 +146,7 @@ def preprocess_depth(
         Both tests: an edge grows by so many pixels.
     edge_sigmas : float
         Inverse-depth test: the threshold in standard deviations of the second difference.
-    edge_reprieve : float
+    planar_keep_sigmas : float
         Inverse-depth test: a pixel at an edge stays after all where it is no farther than so many standard
         deviations from the plane through the surface on one side of it, as no mixed pixel is; 0 for none.
     max_slant : float
@@ -154,7 +154,7 @@ def preprocess_depth(
     max_missing : float
         A pixel goes where more than this part of its 5 x 5 neighbours is missing.
     min_component : int
-        Connected specks of fewer pixels go.
+        Connected speckles of fewer pixels go.
     noise : NoiseModel, float, "kinect", "stereo", "tof", "auto" or None
         The noise of the depth; a number is a constant standard deviation [m]; a name is that of a kind of
         sensor (see :class:`NoiseModel`); None and "auto" measure it from the image.
@@ -185,7 +185,7 @@ def preprocess_depth(
         gradient_threshold=gradient_threshold,
         edge_dilation=edge_dilation,
         edge_sigmas=edge_sigmas,
-        edge_reprieve=edge_reprieve,
+        planar_keep_sigmas=planar_keep_sigmas,
         max_slant=max_slant,
         max_missing=max_missing,
         min_component=min_component,

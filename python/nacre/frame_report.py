@@ -31,8 +31,8 @@ class FrameReport(Value):
     timestamp : float or None
         As given [s].
     status : str
-        TRACKED: registered and folded in. WEAK: registered, but the data leaves a direction of the pose open;
-        not folded in. LOST: not registered, the model is as it was. RELOCALISED: registered again after being
+        TRACKED: registered and fused. WEAK: registered, but the data leaves a direction of the pose open;
+        not fused. LOST: not registered, the model is as it was. RELOCALISED: registered again after being
         lost.
     reason : str
         Why the frame is weak or lost; empty otherwise.

@@ -100,7 +100,7 @@ class Model(ExchangeablePoints, Checkpointed):
         keep_guess: bool = False,
     ) -> FrameReport:
         """
-        Clean a depth image, register it to the model and fold it in.
+        Clean a depth image, register it to the model and fuse it.
 
         Parameters
         ----------
@@ -116,7 +116,7 @@ class Model(ExchangeablePoints, Checkpointed):
             [s], kept in the report.
         attributes : mapping of str to (H, W) or (H, W, C) real, optional
             Anything else that pixels have (an intensity, a temperature, class probabilities), by name; NaN
-            is no value. Fused along with the points, as colours are, where ``fold_in`` is "fuse".
+            is no value. Fused along with the points, as colours are, where ``fusion_method`` is "fuse".
         guess : (4, 4), optional
             A pose (world_from_camera) to start the registration from, in place of the last one.
         keep_guess : bool

@@ -31,7 +31,7 @@ class DepthParameters:
     gradient_threshold: float = 0.005
     edge_dilation: int = 1
     edge_sigmas: float = 4.0
-    edge_reprieve: float = 3.0
+    planar_keep_sigmas: float = 3.0
     max_slant: float = 1.3962634
     max_missing: float = 0.6
     min_component: int = 20
@@ -57,20 +57,13 @@ class RegionParameters:
     min_z: float = -math.inf
     max_z: float = math.inf
     object: bool = False
-    min_plane: float = 0.1
     min_object: float = 0.003
     plane_margin: float = 0.0
-    link_distance: float = 0.0
-    keep_fraction: float = 0.25
 
 
 @dataclass(frozen=True)
 class RegistrationParameters:
-    """
-    How :func:`nacre.align` works; see there for each field. Mirrors the C++ ``AlignOptions``.
-
-    ``num_threads`` of a model's registration follows the model's.
-    """
+    """How :func:`nacre.align` works; see there for each field. Mirrors ``AlignOptions``, less its threads."""
 
     method: Method = "symmetric"
     max_iterations: int = 40
@@ -86,7 +79,6 @@ class RegistrationParameters:
     keep_best: bool = False
     weak_threshold: float = 0.002
     seed: int = 0
-    num_threads: int = 0
 
 
 @dataclass(frozen=True)
@@ -120,50 +112,62 @@ class FusionParameters:
 
     Attributes
     ----------
-    support : float
-        Observations farther from a model point do not move it [m]; 0: from noise and pixel size.
-    max_angle : float
-        Nor do those whose normal differs more [rad].
     max_confidence : float
         Bounds the confidence from above, so that new observations always count.
-    min_sightings : int
+    min_observations : int
         A point that fewer frames observed is not confirmed.
-    max_violations : int
+    max_free_space_violations : int
         A point that a camera saw through so often goes; an unconfirmed one also where cameras looked so often
         and did not find it.
     reference_sigma : float
         Noise of an observation of weight 1 [m]; 0: the frame's median.
     """
 
-    support: float = 0.0
-    max_angle: float = 1.0471976
     max_confidence: float = 1e6
-    min_sightings: int = 3
-    max_violations: int = 3
+    min_observations: int = 3
+    max_free_space_violations: int = 3
     reference_sigma: float = 0.0
 
 
 @dataclass(frozen=True)
-class ConsolidationParameters:
-    """How WLOP folds frames in; see :func:`nacre.consolidate`. Mirrors the C++ ``ConsolidateOptions``."""
+class WlopParameters:
+    """
+    How WLOP fuses frames; see :func:`nacre.consolidate`. Mirrors the C++ ``WlopOptions``.
 
-    method: Literal["wlop", "wlop+", "cgal"] = "wlop"
+    Attributes
+    ----------
+    radius : float
+        Support radius [m].
+    iterations : int
+        Of each frame.
+    mu : float
+        Weight of the repulsion, 0 to 0.5.
+    theta : "huang" or "printed"
+        The weight of a point by its distance.
+    first_fraction : float
+        "wlop": part of the first frame that becomes the model.
+    kept_fraction : float
+        "wlop": part of the model that is kept at each frame.
+    new_fraction : float
+        "wlop": new points, as a part of the model.
+    normal_neighbors : int
+        From which the normal of a point of the model is estimated, itself included.
+    normal_radius : float
+        How far away they may be [m].
+    seed : int
+        Of the choice of points.
+    """
+
     radius: float = 0.008
-    num_points: int = 2000
     iterations: int = 10
     mu: float = 0.4
     theta: Literal["huang", "printed"] = "huang"
+    first_fraction: float = 0.5
+    kept_fraction: float = 0.9
+    new_fraction: float = 0.2
+    normal_neighbors: int = 16
+    normal_radius: float = math.inf
     seed: int = 0
-    num_threads: int = 0
-
-
-@dataclass(frozen=True)
-class NormalParameters:
-    """How normals are estimated; see :func:`nacre.estimate_normals`. Mirrors the C++ ``NormalOptions``."""
-
-    k: int = 16
-    max_radius: float = float("inf")
-    num_threads: int = 0
 
 
 @dataclass(frozen=True)
@@ -173,10 +177,9 @@ class ModelParameters:
 
     Attributes
     ----------
-    depth, region, registration, fusion, consolidation, normals
-        Of the steps of the loop. ``consolidation`` and ``normals`` (of the model) are used where ``fold_in``
-        is not "fuse".
-    fold_in : "fuse", "wlop" or "wlop+"
+    depth, region, registration, fusion, wlop
+        Of the steps of the loop; ``fusion`` where ``fusion_method`` is "fuse", ``wlop`` where it is not.
+    fusion_method : "fuse", "wlop" or "wlop+"
         How a registered frame becomes part of the model: confidence-weighted fusion, the 2010 paper's WLOP of
         model and new points, or WLOP repaired for incremental use.
     spacing : float
@@ -191,7 +194,7 @@ class ModelParameters:
         (``region.object``), around earlier poses, then everywhere (some tenths of a second; not at every
         frame where that has failed often).
     loop_closure : bool
-        Where ``fold_in`` is "fuse": correct model and poses where the camera comes back to what it saw
+        Where ``fusion_method`` is "fuse": correct model and poses where the camera comes back to what it saw
         before.
     denoise_samples : bool
         Register surface points averaged over their pixels, not single pixels.
@@ -199,9 +202,6 @@ class ModelParameters:
         Judge registrations by their evidence.
     min_evidence : float
         A frame with less is lost; see :class:`nacre.FrameReport`.
-    first_fraction, kept_fraction, new_fraction : float
-        WLOP: part of the first frame that becomes the model; part of the model that is kept at each frame;
-        new points, as a part of the model.
     num_threads : int
         0: all.
     """
@@ -209,10 +209,9 @@ class ModelParameters:
     depth: DepthParameters = field(default_factory=DepthParameters)
     region: RegionParameters = field(default_factory=RegionParameters)
     registration: RegistrationParameters = field(default_factory=RegistrationParameters)
-    fold_in: Literal["fuse", "wlop", "wlop+"] = "fuse"
+    fusion_method: Literal["fuse", "wlop", "wlop+"] = "fuse"
     fusion: FusionParameters = field(default_factory=FusionParameters)
-    consolidation: ConsolidationParameters = field(default_factory=ConsolidationParameters)
-    normals: NormalParameters = field(default_factory=NormalParameters)
+    wlop: WlopParameters = field(default_factory=WlopParameters)
     spacing: float = 0.0
     max_points: int = 500000
     predict_motion: bool = True
@@ -221,9 +220,6 @@ class ModelParameters:
     denoise_samples: bool = True
     verify: bool = True
     min_evidence: float = 0.3
-    first_fraction: float = 0.5
-    kept_fraction: float = 0.9
-    new_fraction: float = 0.2
     num_threads: int = 0
 
     @classmethod

@@ -115,16 +115,10 @@ def select_region(
             a turning object; with ``object``, the thing within the box.
         object : bool
             Only the largest thing that stands on a plane.
-        min_plane : float
-            A supporting plane holds at least this part of the points.
         min_object : float
             Things of a smaller part of the image's pixels are none.
         plane_margin : float
             So near to a plane a point belongs to it [m]; 0: from the noise and the pixels.
-        link_distance : float
-            Across wider gaps a thing does not go on [m]; 0: from the pixels.
-        keep_fraction : float
-            A thing that shares such a part of its pixels with ``previous`` is the same.
 
     Returns
     -------

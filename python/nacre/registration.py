@@ -9,7 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre._internal.arrays import FloatArray, as_points, as_pose, as_real, as_rows, as_unit_rows, localize
+from nacre._internal.arrays import (
+    FloatArray,
+    as_count,
+    as_points,
+    as_pose,
+    as_real,
+    as_rows,
+    as_unit_rows,
+    localize,
+)
 from nacre._internal.core_options import to_core
 from nacre._internal.value_equality import Value
 from nacre.parameters import Method, RegistrationParameters
@@ -219,8 +228,9 @@ def align(
         keep_best=keep_best,
         weak_threshold=weak_threshold,
         seed=seed,
-        num_threads=num_threads,
     )
+    options = to_core(parameters, _core.AlignOptions())
+    options.num_threads = as_count("num_threads", num_threads)
     source_points, source_rows, source_values = _cloud("source", source, source_normals, source_sigma)
     target_points, target_rows, target_values = _cloud("target", target, target_normals, target_sigma)
     first = np.eye(4) if initial is None else as_pose("initial", initial)
@@ -236,7 +246,7 @@ def align(
         target_values,
         _brightness("target_colors", target_colors, len(target_points)),
         _shifted(first, source_origin, target_origin),
-        to_core(parameters, _core.AlignOptions()),
+        options,
     )
     return AlignResult(
         target_from_source=_shifted(result.target_from_source, -source_origin, -target_origin),

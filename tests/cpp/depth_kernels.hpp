@@ -22,7 +22,7 @@ struct Kernels {
   simd::MarkGradients* mark_gradients;
   simd::FitWindows* fit_windows;
   simd::KeepPixels* keep_pixels;
-  simd::DropLonely* drop_lonely;
+  simd::RemoveIsolated* remove_isolated;
   simd::SelectKept* select_kept;
   simd::LinkPixels* link_pixels;
   simd::FillDepthRow* fill_depth_row;
@@ -35,7 +35,7 @@ struct Kernels {
 #define KERNELS_OF(isa)                                                                                            \
   Kernels {                                                                                                        \
     #isa, simd::isa::fit_normals, simd::isa::mark_edges, simd::isa::mark_gradients, simd::isa::fit_windows,        \
-        simd::isa::keep_pixels, simd::isa::drop_lonely, simd::isa::select_kept, simd::isa::link_pixels,            \
+        simd::isa::keep_pixels, simd::isa::remove_isolated, simd::isa::select_kept, simd::isa::link_pixels,        \
         simd::isa::fill_depth_row, simd::isa::fill_planar_row, simd::isa::fill_point_row, simd::isa::count_points, \
         simd::isa::gather_points                                                                                   \
   }

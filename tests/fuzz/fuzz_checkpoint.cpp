@@ -110,7 +110,7 @@ void damage(nacre_fuzz::Bytes& choices, std::string& bytes) {
 bool is_quick(const ModelOptions& options) {
   const AlignOptions& registration = options.registration;
   return registration.max_iterations <= 100 && registration.max_samples <= 20000 &&
-         registration.coarse_samples <= 20000 && options.consolidation.iterations <= 20 && options.normals.k <= 100;
+         registration.coarse_samples <= 20000 && options.wlop.iterations <= 20 && options.wlop.normal_neighbors <= 100;
 }
 
 }  // namespace

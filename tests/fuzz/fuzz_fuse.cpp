@@ -1,4 +1,4 @@
-// Frames folded into a model, from anywhere.
+// Frames fused into a model, from anywhere.
 #include "options.hpp"
 
 NACRE_FUZZ_TARGET(bytes) {
@@ -23,7 +23,7 @@ NACRE_FUZZ_TARGET(bytes) {
     NACRE_HOLDS(report.num_updated >= 0 && report.num_inserted >= 0 && report.num_removed >= 0);
     const auto size = static_cast<std::size_t>(model.size());
     NACRE_HOLDS(model.normals.size() == size && model.confidence.size() == size && model.last_seen.size() == size);
-    NACRE_HOLDS(model.sightings.size() == size && model.violations.size() == size);
+    NACRE_HOLDS(model.observations.size() == size && model.free_space_violations.size() == size);
     NACRE_HOLDS(model.colors.empty() || model.colors.size() == size);
     for (const PointAttribute& attribute : model.attributes) {
       NACRE_HOLDS(attribute.values.size() == size * static_cast<std::size_t>(attribute.num_channels));

@@ -16,7 +16,8 @@ inline DepthOptions depth_options(Bytes& bytes) {
   DepthOptions options;
   bytes.change_to(options.edge_test, 3);
   bytes.change(options.min_depth), bytes.change(options.max_depth), bytes.change(options.gradient_threshold);
-  bytes.change(options.edge_dilation, -1, 100), bytes.change(options.edge_sigmas), bytes.change(options.edge_reprieve);
+  bytes.change(options.edge_dilation, -1, 100), bytes.change(options.edge_sigmas),
+      bytes.change(options.planar_keep_sigmas);
   bytes.change(options.max_slant), bytes.change(options.max_missing), bytes.change(options.min_component, -1, 3000);
   if (bytes.boolean()) options.noise = noise_model(bytes);
   return options;
@@ -26,8 +27,7 @@ inline RegionOptions region_options(Bytes& bytes) {
   RegionOptions options;
   bytes.change(options.min_x), bytes.change(options.max_x), bytes.change(options.min_y), bytes.change(options.max_y);
   bytes.change(options.min_z), bytes.change(options.max_z), bytes.change(options.object);
-  bytes.change(options.min_plane), bytes.change(options.min_object), bytes.change(options.plane_margin);
-  bytes.change(options.link_distance), bytes.change(options.keep_fraction);
+  bytes.change(options.min_object), bytes.change(options.plane_margin);
   return options;
 }
 
@@ -62,8 +62,19 @@ inline ConsolidateOptions consolidate_options(Bytes& bytes) {
 inline FusionOptions fusion_options(Bytes& bytes) {
   FusionOptions options;
   bytes.change(options.support), bytes.change(options.max_angle), bytes.change(options.max_confidence);
-  bytes.change(options.min_sightings, -1, 300), bytes.change(options.max_violations, -1, 300);
+  bytes.change(options.min_observations, -1, 300), bytes.change(options.max_free_space_violations, -1, 300);
   bytes.change(options.reference_sigma);
+  return options;
+}
+
+inline WlopOptions wlop_options(Bytes& bytes) {
+  WlopOptions options;
+  options.iterations = 3;
+  bytes.change_to(options.theta, 2);
+  bytes.change(options.radius), bytes.change(options.iterations, -1, 8), bytes.change(options.mu);
+  bytes.change(options.first_fraction), bytes.change(options.kept_fraction), bytes.change(options.new_fraction);
+  bytes.change(options.normal_neighbors, -1, 40), bytes.change(options.normal_radius);
+  options.seed = bytes.byte();
   return options;
 }
 
@@ -74,13 +85,12 @@ inline ModelOptions model_options(Bytes& bytes) {
     options.region = region_options(bytes);
     options.registration = align_options(bytes);
     options.fusion = fusion_options(bytes);
-    options.consolidation = consolidate_options(bytes);
+    options.wlop = wlop_options(bytes);
   }
-  bytes.change_to(options.fold_in, 3);
+  bytes.change_to(options.fusion_method, 3);
   bytes.change(options.region.object), bytes.change(options.spacing), bytes.change(options.max_points, -1, 400);
   bytes.change(options.predict_motion), bytes.change(options.relocalise), bytes.change(options.loop_closure);
   bytes.change(options.denoise_samples), bytes.change(options.verify), bytes.change(options.min_evidence);
-  bytes.change(options.first_fraction), bytes.change(options.kept_fraction), bytes.change(options.new_fraction);
   options.num_threads = bytes.threads();
   return options;
 }

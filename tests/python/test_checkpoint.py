@@ -75,7 +75,7 @@ SCENES: dict[str, Any] = {
     "colour": lambda: (CAMERA, in_colour(), {}),
     "full": lambda: (CAMERA, turning(), {"max_points": 3000}),
     "paper": lambda: (CAMERA, turning()[:4], {"preset": "paper"}),
-    "wlop+": lambda: (CAMERA, turning()[:4], {"fold_in": "wlop+"}),
+    "wlop+": lambda: (CAMERA, turning()[:4], {"fusion_method": "wlop+"}),
     "room": room,
     "object": on_a_table,
 }

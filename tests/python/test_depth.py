@@ -188,7 +188,7 @@ def test_gradient_test_against_brute_force(depth, threshold, dilation):
 
 @settings(max_examples=50)
 @given(hnp.arrays(bool, (9, 11), elements=st.booleans()), st.integers(1, 30))
-def test_specks_against_brute_force(mask, min_component):
+def test_speckles_against_brute_force(mask, min_component):
     camera = Camera(width=11, height=9, fx=20, fy=20, cx=5, cy=4)
     depth = np.where(mask, np.float32(1), np.nan)
     clean = nacre.preprocess_depth(
@@ -212,7 +212,7 @@ def test_specks_against_brute_force(mask, min_component):
 
 @settings(max_examples=50)
 @given(hnp.arrays(bool, (8, 9), elements=st.booleans()), st.floats(0, 1))
-def test_lonely_pixels_against_brute_force(mask, max_missing):
+def test_isolated_pixels_against_brute_force(mask, max_missing):
     camera = Camera(width=9, height=8, fx=20, fy=20, cx=4, cy=4)
     depth = np.where(mask, np.float32(1), np.nan)
     clean = nacre.preprocess_depth(depth, camera, edge_test="none", max_missing=max_missing, min_component=0)
@@ -335,7 +335,7 @@ GOOD = np.ones((HEIGHT, WIDTH))
         ),
         (GOOD, {"edge_dilation": -1}, "edge_dilation must be 0 to 100 pixels, got -1"),
         (GOOD, {"edge_sigmas": 0}, "edge_sigmas must be"),
-        (GOOD, {"edge_reprieve": -1}, "edge_reprieve must be"),
+        (GOOD, {"planar_keep_sigmas": -1}, "planar_keep_sigmas must be"),
         (GOOD, {"max_slant": 2}, "max_slant must be an angle between 0 and pi / 2, got 2"),
         (GOOD, {"max_missing": 2}, "max_missing must be a part between 0 and 1, got 2"),
         (GOOD, {"min_component": -1}, "min_component must be a number of pixels, at least 0, got -1"),

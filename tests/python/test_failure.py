@@ -1,4 +1,4 @@
-"""What frames that cannot be right do to state and model: reported, never folded in."""
+"""What frames that cannot be right do to state and model: reported, never fused."""
 
 from __future__ import annotations
 
@@ -211,12 +211,12 @@ def test_one_garbage_frame_among_many() -> None:
     assert told["outliers_with"] < told["outliers_without"] + 0.001
 
 
-@pytest.mark.parametrize("fold_in", ["fuse", "wlop", "wlop+"])
+@pytest.mark.parametrize("fusion_method", ["fuse", "wlop", "wlop+"])
 @pytest.mark.parametrize("value", [1e-30, 3e38])
-def test_absurd_depths_leave_no_points_without_a_normal(fold_in: str, value: float) -> None:
+def test_absurd_depths_leave_no_points_without_a_normal(fusion_method: str, value: float) -> None:
     depth = view(0).copy()
     depth[50:60, 70:80] = value
-    model = nacre.Model(CAMERA, fold_in=fold_in)
+    model = nacre.Model(CAMERA, fusion_method=fusion_method)
     assert model.add_frame(depth).status == "TRACKED"
     assert np.allclose(np.linalg.norm(model.normals, axis=1), 1, atol=1e-3)
     assert np.isfinite(model.points).all()
@@ -261,7 +261,7 @@ def test_the_measured_experiments() -> None:
 
     assert failures.recovery(4, 1)["right"] == 4
     told = failures.kidnap(2, 1)
-    assert "folded in wrongly" not in told
+    assert "fused wrongly" not in told
 
 
 @pytest.mark.slow

@@ -44,7 +44,7 @@ def camera() -> Any:
 
 
 def nacre(arrays: Arrays, threads: int, stage: str) -> Run:
-    """Remove mixed pixels, slanted ones and specks; fit planes to windows of the depth image."""
+    """Remove mixed pixels, slanted ones and speckles; fit planes to windows of the depth image."""
     from nacre import NoiseModel, back_project, depth_normals, preprocess_depth
 
     noise, view, depth = NoiseModel(constant=SIGMA), camera(), arrays["depth"]
@@ -207,7 +207,7 @@ WORKLOADS = [
         "clean",
         "cleaning",
         bound=Bound("4 B read and 4 B written", PIXELS * 8),
-        note="nacre removes mixed pixels at edges, slanted surfaces and specks, and smooths nothing; the "
+        note="nacre removes mixed pixels at edges, slanted surfaces and speckles, and smooths nothing; the "
         "others smooth (bilateral, 5 x 5), and remove nothing.",
     ),
     workload(

@@ -14,7 +14,7 @@ from suite.clouds import degrees_between
 from suite.registry import Arrays, Contender, Lap, Run, Workload
 
 FRAMES, MOST_FRAMES, FAR = 12, 60, 4.0
-STAGES = ("preprocess", "back_project", "registration", "fold_in", "normals")
+STAGES = ("preprocess", "back_project", "registration", "fuse", "normals")
 DATA = "NACRE_BENCHMARK_DATA"
 """The environment variable that names the folder of real recordings."""
 
@@ -128,7 +128,7 @@ def open3d(arrays: Arrays, threads: int, image_normals: bool) -> Run:
             lap("registration")
             model += cloud.transform(pose)
             model = model.voxel_down_sample(voxel)
-            lap("fold_in")
+            lap("fuse")
         tracked = np.ones(len(poses), bool)
         return {"poses": np.array(poses), "tracked": tracked, "points": np.asarray(model.points)}
 

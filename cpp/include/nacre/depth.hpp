@@ -57,11 +57,11 @@ struct DepthOptions {
   double gradient_threshold = 0.005;                           ///< gradient test: depth step across one pixel [m]
   int edge_dilation = 1;            ///< both tests: an edge grows by so many pixels to its 4 neighbours
   double edge_sigmas = 4.0;         ///< inverse-depth test: threshold in standard deviations of the second difference
-  double edge_reprieve = 3.0;       ///< inverse-depth test: a pixel at an edge stays after all where it is no farther
+  double planar_keep_sigmas = 3.0;  ///< inverse-depth test: a pixel at an edge stays after all where it is no farther
                                     ///< from the plane through the surface on one side of it, in standard deviations
   double max_slant = 1.3962634;     ///< inverse-depth test: steeper surfaces are removed [rad]; 80 degrees
   double max_missing = 0.6;         ///< a pixel goes where more than this part of its 5 x 5 neighbours is missing
-  int min_component = 20;           ///< connected specks of fewer pixels go
+  int min_component = 20;           ///< connected speckles of fewer pixels go
   std::optional<NoiseModel> noise;  ///< unset: measured from the image itself (estimate_noise); a Model measures it
                                     ///< from all images so far (NoiseCalibration)
 

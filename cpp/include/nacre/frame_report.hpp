@@ -19,7 +19,7 @@ class FrameHistory;
 /// What may come with a depth image.
 struct FrameExtras {
   Colors colors;                           ///< height * width rows, row by row; empty: none
-  std::vector<FrameAttribute> attributes;  ///< fused along with the points where fold_in is fuse
+  std::vector<FrameAttribute> attributes;  ///< fused along with the points where fusion_method is fuse
   MaskImage mask;                          ///< pixels of the object, see MaskImage
   std::optional<double> timestamp;         ///< [s]
   std::optional<Pose> guess;               ///< world_from_camera to start the registration from
@@ -28,7 +28,7 @@ struct FrameExtras {
 
 /// Wall time of each step of the loop [ms].
 struct StepTimes {
-  double preprocess = 0, back_project = 0, region = 0, registration = 0, loop_closure = 0, fold_in = 0, normals = 0,
+  double preprocess = 0, back_project = 0, region = 0, registration = 0, loop_closure = 0, fuse = 0, normals = 0,
          total = 0;
 };
 

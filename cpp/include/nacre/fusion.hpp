@@ -33,9 +33,10 @@ struct PointModel {
   std::vector<PointAttribute> attributes;  ///< those that any frame had, in the order in which they came
   std::vector<float> confidence;           ///< frontal observations that the point stands for
   std::vector<std::int32_t> last_seen;     ///< frame that last observed the point
-  std::vector<std::uint8_t> sightings;     ///< frames that observed the point, at most 255
-  std::vector<std::uint8_t> violations;    ///< how often a camera saw through the point since it was last observed;
-                                           ///< of a point with few sightings: how often one looked and did not find it
+  std::vector<std::uint8_t> observations;  ///< frames that observed the point, at most 255
+  std::vector<std::uint8_t>
+      free_space_violations;  ///< how often a camera saw through the point since it was last observed;
+                              ///< of a point with few observations: how often one looked and did not find it
 
   std::int64_t size() const { return static_cast<std::int64_t>(points.size()); }
   /// Keeps the points whose flag is not 0, in order.
@@ -45,11 +46,11 @@ struct PointModel {
 /// How fuse works.
 struct FusionOptions {
   double support = 0.0;  ///< observations farther from a model point do not move it [m]; 0: from noise and pixels
-  double max_angle = 1.0471976;  ///< nor do those whose normal differs more [rad]; 60 degrees
-  double max_confidence = 1e6;   ///< a lower bound on the weight of new observations, for objects that change
-  int min_sightings = 3;         ///< a point that fewer frames observed is not confirmed
-  int max_violations = 3;        ///< a point that was seen through so often goes; an unconfirmed one also where cameras
-                                 ///< looked so often and did not find it
+  double max_angle = 1.0471976;       ///< nor do those whose normal differs more [rad]; 60 degrees
+  double max_confidence = 1e6;        ///< a lower bound on the weight of new observations, for objects that change
+  int min_observations = 3;           ///< a point that fewer frames observed is not confirmed
+  int max_free_space_violations = 3;  ///< a point that was seen through so often goes; an unconfirmed one also where
+                                      ///< cameras looked so often and did not find it
 
   double reference_sigma = 0.0;  ///< noise of an observation of weight 1 [m]; 0: the frame's median
 
@@ -63,7 +64,7 @@ struct FusionReport {
   std::int64_t num_removed = 0;
 };
 
-/// Folds a frame in: model points that the camera observes move along their normals by the symmetric implicit
+/// Fuses a frame: model points that the camera observes move along their normals by the symmetric implicit
 /// moving-least-squares residual; surface that the model lacks is inserted at the given spacing, but no denser than a
 /// pixel and a half of the frame; points that the camera sees through, or that were never confirmed, are removed.
 /// colors is empty or has a row per pixel; the frame has the camera's size. Colours and attributes are averaged with

@@ -1,38 +1,51 @@
 /// The options of a model.
 #pragma once
 
+#include <cstdint>
+#include <limits>
 #include <string>
 
 #include "nacre/consolidation.hpp"
 #include "nacre/depth.hpp"
 #include "nacre/fusion.hpp"
-#include "nacre/normals.hpp"
 #include "nacre/region.hpp"
 #include "nacre/tracking_options.hpp"
 
 namespace nacre {
 
 /// How a registered frame becomes part of the model.
-enum class FoldIn {
+enum class FusionMethod {
   fuse,      ///< confidence-weighted fusion (fusion.hpp)
   wlop,      ///< the 2010 paper: WLOP of model and new points
   wlop_plus  ///< WLOP repaired for incremental use
+};
+
+/// How WLOP fuses frames, where fusion_method is not fuse; see consolidation.hpp and normals.hpp.
+struct WlopOptions {
+  double radius = 0.008;  ///< support radius [m]
+  int iterations = 10;
+  double mu = 0.4;  ///< weight of the repulsion, 0 to 0.5
+  Theta theta = Theta::huang;
+  double first_fraction = 0.5;  ///< wlop: part of the first frame that becomes the model
+  double kept_fraction = 0.9;   ///< wlop: part of the model that is kept at each frame
+  double new_fraction = 0.2;    ///< wlop: new points, as a part of the model
+  int normal_neighbors = 16;    ///< from which the normal of a point of the model is estimated, itself included
+  double normal_radius = std::numeric_limits<double>::infinity();  ///< and how far away they may be [m]
+  std::uint64_t seed = 0;                                          ///< of the choice of points
+
+  void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };
 
 /// All options of a model.
 struct ModelOptions : TrackingOptions {
   DepthOptions depth;
   RegionOptions region;
-  FoldIn fold_in = FoldIn::fuse;
+  FusionMethod fusion_method = FusionMethod::fuse;
   FusionOptions fusion;
-  ConsolidateOptions consolidation;  ///< its num_points is not used: see max_points
-  NormalOptions normals;             ///< of the model, where fold_in is not fuse
+  WlopOptions wlop;
   double spacing = 0.0;  ///< distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces;
                          ///< new points are also at least a pixel and a half of their frame apart
-  int max_points = 500000;      ///< the model never grows beyond: its spacing is widened instead
-  double first_fraction = 0.5;  ///< wlop: part of the first frame that becomes the model
-  double kept_fraction = 0.9;   ///< wlop: part of the model that is kept at each frame
-  double new_fraction = 0.2;    ///< wlop: new points, as a part of the model
+  int max_points = 500000;  ///< the model never grows beyond: its spacing is widened instead
 
   /// "default" (what measures best) or "paper" (every number of the 2010 paper); std::invalid_argument otherwise.
   static ModelOptions preset(const std::string& name);

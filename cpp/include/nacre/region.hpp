@@ -21,12 +21,9 @@ struct RegionOptions {
   double min_z = -std::numeric_limits<double>::infinity();
   double max_z = std::numeric_limits<double>::infinity();
 
-  bool object = false;          ///< only the largest thing that stands on a plane
-  double min_plane = 0.1;       ///< a supporting plane holds at least this part of the points
-  double min_object = 0.003;    ///< things of a smaller part of the image's pixels are none
-  double plane_margin = 0.0;    ///< so near to a plane a point belongs to it [m]; 0: from the noise and the pixels
-  double link_distance = 0.0;   ///< across wider gaps a thing does not go on [m]; 0: from the pixels
-  double keep_fraction = 0.25;  ///< a thing that shares such a part of its pixels with the last one is the same
+  bool object = false;        ///< only the largest thing that stands on a plane
+  double min_object = 0.003;  ///< things of a smaller part of the image's pixels are none
+  double plane_margin = 0.0;  ///< so near to a plane a point belongs to it [m]; 0: from the noise and the pixels
 
   bool has_box() const;     ///< whether any side of the box is finite
   bool is_limited() const;  ///< whether anything is left out at all

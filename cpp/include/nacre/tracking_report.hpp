@@ -9,10 +9,10 @@ namespace nacre {
 
 /// What became of a frame.
 enum class FrameStatus {
-  tracked,      ///< registered and folded in
-  weak,         ///< registered, but the data leaves a direction of the pose open: not folded in
+  tracked,      ///< registered and fused
+  weak,         ///< registered, but the data leaves a direction of the pose open: not fused
   lost,         ///< not registered: the model is as it was before
-  relocalised,  ///< registered again after being lost, and folded in
+  relocalised,  ///< registered again after being lost, and fused
 };
 const char* to_string(FrameStatus status);  ///< TRACKED, WEAK, LOST, RELOCALISED
 

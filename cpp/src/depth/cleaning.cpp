@@ -124,7 +124,8 @@ void DepthOptions::check() const {
   require(gradient_threshold > 0.0, "gradient_threshold", "a positive depth step in metres", gradient_threshold);
   require(edge_dilation >= 0 && edge_dilation <= 100, "edge_dilation", "0 to 100 pixels", edge_dilation);
   require(edge_sigmas > 0.0, "edge_sigmas", "a positive number of standard deviations", edge_sigmas);
-  require(edge_reprieve >= 0.0, "edge_reprieve", "a number of standard deviations, at least 0", edge_reprieve);
+  require(planar_keep_sigmas >= 0.0, "planar_keep_sigmas", "a number of standard deviations, at least 0",
+          planar_keep_sigmas);
   require(max_slant > 0.0 && max_slant < 1.5707963, "max_slant", "an angle between 0 and pi / 2", max_slant);
   require(max_missing >= 0.0 && max_missing <= 1.0, "max_missing", "a part between 0 and 1", max_missing);
   require(min_component >= 0, "min_component", "a number of pixels, at least 0", min_component);
@@ -153,13 +154,13 @@ DepthImage clean_depth(const DepthRef& depth, const Camera& camera, const DepthO
   const ByteImage first_marks = mark_edges(depth, image, fits, noise, options, num_threads);
   ByteImage marks = dilated(first_marks, options.edge_dilation, num_threads);
   if (options.edge_test == EdgeTest::inverse_depth) {
-    spare_planar(image, first_marks, noise, options, num_threads, marks);
+    keep_planar(image, first_marks, noise, options, num_threads, marks);
   }
 
   DepthReport counts;
   ByteImage keep = keep_pixels(depth, camera, options, mask, marks, num_threads, counts);
-  drop_lonely(options.max_missing, num_threads, keep);
-  drop_specks(image, noise, options, num_threads, keep);
+  remove_isolated(options.max_missing, num_threads, keep);
+  remove_speckles(image, noise, options, num_threads, keep);
 
   DepthImage clean(depth.rows(), depth.cols());
   const auto select_row = simd::select_kept();

@@ -139,21 +139,21 @@ ByteImage dilated(const ByteImage& first_marks, int radius, int num_threads) {
   return marks;
 }
 
-void spare_planar(const PlanarImage& image, const ByteImage& first_marks, const NoiseModel& noise,
-                  const DepthOptions& options, int num_threads, ByteImage& marks) {
-  if (!(options.edge_reprieve > 0.0)) return;
+void keep_planar(const PlanarImage& image, const ByteImage& first_marks, const NoiseModel& noise,
+                 const DepthOptions& options, int num_threads, ByteImage& marks) {
+  if (!(options.planar_keep_sigmas > 0.0)) return;
   static_assert(ByteImage::kBorder >= simd::side_depth && PlanarImage::kBorder >= simd::side_depth);
-  const simd::SpareRule rule = {image.sigma(noise.local()),
-                                image.unit_slope() * static_cast<float>(std::tan(options.max_slant)),
-                                static_cast<float>(options.edge_reprieve * options.edge_reprieve)};
-  const auto spare_pixels = simd::spare_pixels();
+  const simd::PlanarRule rule = {image.sigma(noise.local()),
+                                 image.unit_slope() * static_cast<float>(std::tan(options.max_slant)),
+                                 static_cast<float>(options.planar_keep_sigmas * options.planar_keep_sigmas)};
+  const auto keep_planar_pixels = simd::keep_planar_pixels();
   for (int step = 0; step <= options.edge_dilation; ++step) {
-    ByteImage spared(marks.width(), marks.height());
+    ByteImage left_marked(marks.width(), marks.height());
     parallel_for(marks.height(), rows_per_block(marks.width()), num_threads, [&](std::int64_t v) {
-      spare_pixels(image.planar_row(static_cast<int>(v)), rule, {marks.row(v), first_marks.row(v), marks.stride()},
-                   spared.row(v));
+      keep_planar_pixels(image.planar_row(static_cast<int>(v)), rule,
+                         {marks.row(v), first_marks.row(v), marks.stride()}, left_marked.row(v));
     });
-    marks = std::move(spared);
+    marks = std::move(left_marked);
   }
 }
 

@@ -23,7 +23,7 @@ ByteImage dilated(const ByteImage& marks, int radius, int num_threads);
 // Takes the marks from pixels that lie on the plane through the unmarked ones beside them, from these inwards: those
 // that the dilation marked, and one more, which the edge's second difference marked beside it. `first_marks` are those
 // before the dilation.
-void spare_planar(const PlanarImage& image, const ByteImage& first_marks, const NoiseModel& noise,
-                  const DepthOptions& options, int num_threads, ByteImage& marks);
+void keep_planar(const PlanarImage& image, const ByteImage& first_marks, const NoiseModel& noise,
+                 const DepthOptions& options, int num_threads, ByteImage& marks);
 
 }  // namespace nacre

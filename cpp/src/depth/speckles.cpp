@@ -146,7 +146,7 @@ std::uint8_t least_kept(int window, double max_missing) {
 
 }  // namespace
 
-void drop_lonely(double max_missing, int num_threads, ByteImage& keep) {
+void remove_isolated(double max_missing, int num_threads, ByteImage& keep) {
   constexpr int radius = 2, side = 2 * radius + 1;
   const int width = keep.width(), height = keep.height();
   const auto span = [](std::int64_t i, int size) {
@@ -162,7 +162,7 @@ void drop_lonely(double max_missing, int num_threads, ByteImage& keep) {
     }
   }
   ByteImage still_kept(width, height);
-  const auto drop_in_row = simd::drop_lonely();
+  const auto drop_in_row = simd::remove_isolated();
   parallel_for(height, rows_per_block(width), num_threads, [&](std::int64_t v) {
     drop_in_row(keep.row(v), keep.stride(), least[static_cast<std::size_t>(span(v, height))].data(), width,
                 still_kept.row(v));
@@ -170,8 +170,8 @@ void drop_lonely(double max_missing, int num_threads, ByteImage& keep) {
   keep = std::move(still_kept);
 }
 
-void drop_specks(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options, int num_threads,
-                 ByteImage& keep) {
+void remove_speckles(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options, int num_threads,
+                     ByteImage& keep) {
   if (options.min_component <= 1) return;
   const simd::LinkRule rule = {image.sigma(noise.local()) * (3.0F * std::sqrt(2.0F)),
                                image.unit_slope() * static_cast<float>(std::tan(options.max_slant))};

@@ -80,10 +80,11 @@ void merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
       }
     }
     model.confidence[best] += model.confidence[i];
-    model.sightings[best] = static_cast<std::uint8_t>(std::min(255, model.sightings[best] + model.sightings[i]));
+    model.observations[best] =
+        static_cast<std::uint8_t>(std::min(255, model.observations[best] + model.observations[i]));
     model.last_seen[best] = std::max(model.last_seen[best], model.last_seen[i]);
   }
-  for (const std::size_t i : old) model.violations[i] = 0;
+  for (const std::size_t i : old) model.free_space_violations[i] = 0;
   model.keep(flags);
 }
 

@@ -93,14 +93,14 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
         const auto first = static_cast<std::size_t>(begin);
         ModelView::Block points;
         view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin), points);
-        const auto note_violation = [&](int j, float sigma) {
+        const auto note_free_space_violation = [&](int j, float sigma) {
           const std::size_t i = first + static_cast<std::size_t>(j);
           const float margin = std::max(static_cast<float>(2.0 * spacing), 4.0F * sigma);
-          const bool is_confirmed = model.sightings[i] >= options.min_sightings;
+          const bool is_confirmed = model.observations[i] >= options.min_observations;
           const float behind = frame.points(points.pixel[j], 2) - points.z[j];
           const bool is_missed =
               is_confirmed ? observer.sees_through(points.point(j), points.pixel[j], margin) : behind > -margin;
-          if (is_missed) count_up(model.violations[i]);
+          if (is_missed) count_up(model.free_space_violations[i]);
         };
         ObservationBlock block;
         int seen[block_size];  // of the points
@@ -113,7 +113,7 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
           const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
           if (!observer.may_observe(points.point(j), points.pixel[j], sigma,
                                     least_weight * observer.frontal_weight(sigma))) {
-            note_violation(j, sigma);
+            note_free_space_violation(j, sigma);
             continue;
           }
           seen[block.size()] = j;
@@ -136,11 +136,11 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
             model.confidence[i] =
                 std::min(model.confidence[i] + observed.weight, static_cast<float>(options.max_confidence));
             model.last_seen[i] = frame_index;
-            count_up(model.sightings[i]);
-            model.violations[i] = 0;
+            count_up(model.observations[i]);
+            model.free_space_violations[i] = 0;
             covers[static_cast<std::size_t>(number)].push_back({i, points.pixel[j], block.cover(k)});
           } else {
-            note_violation(j, block.sigma(k));
+            note_free_space_violation(j, block.sigma(k));
           }
         }
       });
@@ -242,8 +242,8 @@ void insert(PointModel& model, const std::vector<NewPoint>& candidates, Known& k
     if (with_colors) model.colors.push_back(candidate.color);
     model.confidence.push_back(candidate.weight);
     model.last_seen.push_back(frame_index);
-    model.sightings.push_back(1);
-    model.violations.push_back(0);
+    model.observations.push_back(1);
+    model.free_space_violations.push_back(0);
     ++report.num_inserted;
   }
 }
@@ -251,7 +251,7 @@ void insert(PointModel& model, const std::vector<NewPoint>& candidates, Known& k
 void remove_violated(PointModel& model, const FusionOptions& options, FusionReport& report) {
   std::vector<std::uint8_t> flags(model.points.size(), 1);
   for (std::size_t i = 0; i < flags.size(); ++i) {
-    if (model.violations[i] < options.max_violations) continue;
+    if (model.free_space_violations[i] < options.max_free_space_violations) continue;
     flags[i] = 0;
     ++report.num_removed;
   }
@@ -281,16 +281,17 @@ void PointModel::keep(const std::vector<std::uint8_t>& flags) {
   }
   keep_flagged(confidence, flags);
   keep_flagged(last_seen, flags);
-  keep_flagged(sightings, flags);
-  keep_flagged(violations, flags);
+  keep_flagged(observations, flags);
+  keep_flagged(free_space_violations, flags);
 }
 
 void FusionOptions::check() const {
   require(support >= 0.0, "support", "0 (automatic) or a positive distance in metres", support);
   require(max_angle > 0.0, "max_angle", "a positive angle in radians", max_angle);
   require(max_confidence > 0.0, "max_confidence", "positive", max_confidence);
-  require(min_sightings >= 0 && min_sightings <= 255, "min_sightings", "0 to 255 frames", min_sightings);
-  require(max_violations >= 1 && max_violations <= 255, "max_violations", "1 to 255", max_violations);
+  require(min_observations >= 0 && min_observations <= 255, "min_observations", "0 to 255 frames", min_observations);
+  require(max_free_space_violations >= 1 && max_free_space_violations <= 255, "max_free_space_violations", "1 to 255",
+          max_free_space_violations);
   require(reference_sigma >= 0.0, "reference_sigma", "0 (automatic) or positive metres", reference_sigma);
 }
 

@@ -24,15 +24,15 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.registration.max_points = 0;
   options.registration.max_samples = 0;
   options.registration.weak_threshold = 0.0;
-  options.fold_in = FoldIn::wlop;
-  options.consolidation.radius = 0.008;
-  options.consolidation.mu = 0.4;
-  options.consolidation.iterations = 10;
-  options.normals.max_radius = 0.008;
+  options.fusion_method = FusionMethod::wlop;
+  options.wlop.radius = 0.008;
+  options.wlop.mu = 0.4;
+  options.wlop.iterations = 10;
+  options.wlop.normal_radius = 0.008;
+  options.wlop.first_fraction = 0.5;
+  options.wlop.kept_fraction = 0.9;
+  options.wlop.new_fraction = 0.2;
   options.max_points = 2000;
-  options.first_fraction = 0.5;
-  options.kept_fraction = 0.9;
-  options.new_fraction = 0.2;
   options.predict_motion = false;
   options.relocalise = false;
   options.denoise_samples = false;
@@ -41,21 +41,27 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   return options;
 }
 
+void WlopOptions::check() const {
+  require(radius >= 1e-12 && radius <= 1e12, "wlop.radius", "a length from 1e-12 to 1e12", radius);
+  require(iterations >= 0, "wlop.iterations", "at least 0", iterations);
+  require(mu >= 0.0 && mu <= 0.5, "wlop.mu", "0 to 0.5", mu);
+  require(first_fraction > 0.0 && first_fraction <= 1.0, "wlop.first_fraction", "in (0, 1]", first_fraction);
+  require(kept_fraction > 0.0 && kept_fraction <= 1.0, "wlop.kept_fraction", "in (0, 1]", kept_fraction);
+  require(new_fraction >= 0.0 && new_fraction <= 1.0, "wlop.new_fraction", "in [0, 1]", new_fraction);
+  require(normal_neighbors >= 3, "wlop.normal_neighbors", "at least 3", normal_neighbors);
+  require(normal_radius > 0.0, "wlop.normal_radius", "a positive distance in metres", normal_radius);
+}
+
 void ModelOptions::check() const {
   depth.check();
   region.check();
   registration.check();
   fusion.check();
-  consolidation.check();
-  require(normals.k >= 3, "normals.k", "at least 3", normals.k);
-  require(normals.max_radius > 0.0, "normals.max_radius", "a positive distance in metres", normals.max_radius);
+  wlop.check();
   require(spacing >= 0.0 && spacing < farthest_place, "spacing",
           "0 (automatic) or a positive distance in metres below 1e30", spacing);
   require(max_points >= 100, "max_points", "at least 100", max_points);
   require(min_evidence >= 0.0, "min_evidence", "0 or more", min_evidence);
-  require(first_fraction > 0.0 && first_fraction <= 1.0, "first_fraction", "in (0, 1]", first_fraction);
-  require(kept_fraction > 0.0 && kept_fraction <= 1.0, "kept_fraction", "in (0, 1]", kept_fraction);
-  require(new_fraction >= 0.0 && new_fraction <= 1.0, "new_fraction", "in [0, 1]", new_fraction);
   require(num_threads >= 0, "num_threads", "0 (all) or more", num_threads);
 }
 

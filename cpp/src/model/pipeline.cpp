@@ -63,8 +63,6 @@ Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in)
     : camera(camera_in), given(options_in), options(options_in) {
   options.check();
   options.registration.num_threads = options.num_threads;
-  options.consolidation.num_threads = options.num_threads;
-  options.normals.num_threads = options.num_threads;
   spacing = options.spacing;
 }
 
@@ -85,7 +83,7 @@ FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras
       if (was_lost()) report.status = FrameStatus::relocalised;
       if (options.relocalise) keep_view(report);
       if (tracking.is_on_plane) adjust_views(report);
-      fold_in(extras, report);
+      fuse_frame(extras, report);
       remember_view(report);
     }
     num_lost = report.status == FrameStatus::lost && history.num_registered() > 0 ? num_lost + 1 : 0;
@@ -276,23 +274,23 @@ void Pipeline::close_loops(const TrackingResult& tracking, bool is_given, FrameR
 }
 
 // The frame becomes part of the model.
-void Pipeline::fold_in(const FrameExtras& extras, FrameReport& report) {
+void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
   const auto index = static_cast<std::int32_t>(report.index);
   {
-    const Stopwatch watch(report.milliseconds.fold_in);
+    const Stopwatch watch(report.milliseconds.fuse);
     if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
-    if (options.fold_in == FoldIn::fuse) {
+    if (options.fusion_method == FusionMethod::fuse) {
       report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing, index,
                                     options.fusion, options.num_threads, extras.attributes);
     } else {
       consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
     }
-    while (options.fold_in == FoldIn::fuse && cloud.size() > options.max_points) {
+    while (options.fusion_method == FusionMethod::fuse && cloud.size() > options.max_points) {
       spacing *= coarsening;
       thin(cloud, spacing);
     }
   }
-  if (options.fold_in == FoldIn::fuse) return;
+  if (options.fusion_method == FusionMethod::fuse) return;
   const Stopwatch watch(report.milliseconds.normals);
   renew_normals(cloud, options);
 }

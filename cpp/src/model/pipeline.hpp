@@ -29,7 +29,7 @@ struct Pipeline {
   FrameHistory history;
   DepthView now;                      // of the newest, from the origin: where the camera is, is to be found
   std::vector<OutlinePoint> outline;  // of the newest
-  DepthView before;                   // of the newest frame that was folded in
+  DepthView before;                   // of the newest frame that was fused
   PlaceHypothesis hypothesis;         // while the camera is lost
   std::vector<ObjectView> views;      // of an object that stands on a plane, from different directions
   double spacing = 0.0;
@@ -50,13 +50,13 @@ struct Pipeline {
   void close_loops(const TrackingResult& tracking, bool is_given, FrameReport& report);
   void keep_view(const FrameReport& report);
   void adjust_views(FrameReport& report);
-  void fold_in(const FrameExtras& extras, FrameReport& report);
+  void fuse_frame(const FrameExtras& extras, FrameReport& report);
   void remember_view(const FrameReport& report);
 
   // What they need.
   bool was_lost() const { return num_lost > 0; }
   bool jumped() const;
-  bool keeps_key_frames() const { return options.loop_closure && options.fold_in == FoldIn::fuse; }
+  bool keeps_key_frames() const { return options.loop_closure && options.fusion_method == FusionMethod::fuse; }
   TrackingResult register_frame(const FrameExtras& extras, const RegionReport& region_report);
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   WhereElse elsewhere(const RegionReport& region_report) const;

@@ -6,6 +6,7 @@
 #include "base/parallel.hpp"
 #include "base/random.hpp"
 #include "nacre/kdtree.hpp"
+#include "nacre/normals.hpp"
 #include "spatial/hash_grid.hpp"
 
 namespace nacre {
@@ -27,8 +28,8 @@ PointModel to_world(const Frame& frame, const Pose& world_from_camera, std::int3
   }
   result.confidence.assign(result.points.size(), 1.0F);
   result.last_seen.assign(result.points.size(), frame_index);
-  result.sightings.assign(result.points.size(), 1);
-  result.violations.assign(result.points.size(), 0);
+  result.observations.assign(result.points.size(), 1);
+  result.free_space_violations.assign(result.points.size(), 0);
   return result;
 }
 
@@ -55,8 +56,8 @@ void append(PointModel& model, const PointModel& more) {
   append(model.normals, more.normals);
   append(model.confidence, more.confidence);
   append(model.last_seen, more.last_seen);
-  append(model.sightings, more.sightings);
-  append(model.violations, more.violations);
+  append(model.observations, more.observations);
+  append(model.free_space_violations, more.free_space_violations);
 }
 
 // The paper's samples: most of the model, and new points in proportion to it; half of the first frame.
@@ -64,10 +65,10 @@ PointModel paper_samples(const PointModel& model, const PointModel& fresh, const
                          std::uint64_t seed) {
   PointModel samples;
   if (model.size() == 0) {
-    samples = choose(fresh, options.first_fraction * static_cast<double>(fresh.size()), seed);
+    samples = choose(fresh, options.wlop.first_fraction * static_cast<double>(fresh.size()), seed);
   } else {
-    samples = choose(model, options.kept_fraction * static_cast<double>(model.size()), seed);
-    append(samples, choose(fresh, options.new_fraction * static_cast<double>(model.size()), seed + 1));
+    samples = choose(model, options.wlop.kept_fraction * static_cast<double>(model.size()), seed);
+    append(samples, choose(fresh, options.wlop.new_fraction * static_cast<double>(model.size()), seed + 1));
   }
   return samples.size() > options.max_points ? choose(samples, options.max_points, seed + 2) : samples;
 }
@@ -95,13 +96,25 @@ PointModel covering_samples(const PointModel& model, const PointModel& fresh, co
   return samples;
 }
 
+ConsolidateOptions consolidation_of(const ModelOptions& options) {
+  ConsolidateOptions consolidation;
+  const bool literal = options.fusion_method == FusionMethod::wlop;
+  consolidation.method = literal ? ConsolidationMethod::wlop : ConsolidationMethod::wlop_plus;
+  consolidation.radius = options.wlop.radius;
+  consolidation.iterations = options.wlop.iterations;
+  consolidation.mu = options.wlop.mu;
+  consolidation.theta = options.wlop.theta;
+  consolidation.num_threads = options.num_threads;
+  return consolidation;
+}
+
 }  // namespace
 
 void consolidate_frame(PointModel& model, const Frame& frame, const Pose& world_from_camera,
                        const ModelOptions& options, double spacing, std::int32_t frame_index) {
-  const bool literal = options.fold_in == FoldIn::wlop;
+  const bool literal = options.fusion_method == FusionMethod::wlop;
   const PointModel fresh = to_world(frame, world_from_camera, frame_index);
-  const std::uint64_t seed = mix64(options.consolidation.seed) + 16 * static_cast<std::uint64_t>(frame_index);
+  const std::uint64_t seed = mix64(options.wlop.seed) + 16 * static_cast<std::uint64_t>(frame_index);
   PointModel samples =
       literal ? paper_samples(model, fresh, options, seed) : covering_samples(model, fresh, options, spacing);
   PointModel points = model;
@@ -115,13 +128,12 @@ void consolidate_frame(PointModel& model, const Frame& frame, const Pose& world_
     double squared_distance = 0.0;
     const auto k = static_cast<std::size_t>(i);
     const Eigen::Vector3d point = samples.points[k].cast<double>();
-    const int found = tree.nearest(point, 1, options.consolidation.radius, &index, &squared_distance);
+    const int found = tree.nearest(point, 1, options.wlop.radius, &index, &squared_distance);
     // Of a thin sheet, the frame observes one side.
     unseen[k] = found == 0 || fresh.normals[static_cast<std::size_t>(index)].dot(samples.normals[k]) < 0.0F ? 1 : 0;
   });
 
-  ConsolidateOptions consolidation = options.consolidation;
-  consolidation.method = literal ? ConsolidationMethod::wlop : ConsolidationMethod::wlop_plus;
+  const ConsolidateOptions consolidation = consolidation_of(options);
   Points moved;
   if (literal) {
     moved = project_samples(as_matrix(samples.points), as_matrix(points.points), consolidation);
@@ -142,7 +154,8 @@ void consolidate_frame(PointModel& model, const Frame& frame, const Pose& world_
 }
 
 void renew_normals(PointModel& model, const ModelOptions& options) {
-  const Points normals = estimate_normals(as_matrix(model.points), options.normals);
+  const NormalOptions wanted = {options.wlop.normal_neighbors, options.wlop.normal_radius, options.num_threads};
+  const Points normals = estimate_normals(as_matrix(model.points), wanted);
   for (std::size_t i = 0; i < model.normals.size(); ++i) {
     const Eigen::Vector3f normal = normals.row(static_cast<Eigen::Index>(i)).transpose();
     if (!normal.allFinite()) continue;

@@ -46,10 +46,8 @@ CoarseFrame::CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef
   }
 }
 
-bool are_linked(const Cell& a, const Cell& b, int steps, float link) {
-  const float reach =
-      link > 0.0F ? link
-                  : steepest * static_cast<float>(std::min(steps, most_steps)) * std::min(a.footprint, b.footprint);
+bool are_linked(const Cell& a, const Cell& b, int steps) {
+  const float reach = steepest * static_cast<float>(std::min(steps, most_steps)) * std::min(a.footprint, b.footprint);
   return (a.point - b.point).squaredNorm() < reach * reach;
 }
 
@@ -68,7 +66,7 @@ std::vector<std::int32_t> border_cells(const CoarseFrame& frame, const std::vect
   return count;
 }
 
-CellGroups connect(const CoarseFrame& frame, const std::vector<std::uint8_t>& side, float link) {
+CellGroups connect(const CoarseFrame& frame, const std::vector<std::uint8_t>& side) {
   CellGroups groups;
   groups.group.assign(side.size(), -1);
   std::vector<int> open;
@@ -85,7 +83,7 @@ CellGroups connect(const CoarseFrame& frame, const std::vector<std::uint8_t>& si
       ++groups.size.back();
       frame.for_neighbours(i, link_reach, [&](int j, int steps) {
         const auto k = static_cast<std::size_t>(j);
-        if (side[k] != side[first] || groups.group[k] >= 0 || !are_linked(frame[i], frame[j], steps, link)) return;
+        if (side[k] != side[first] || groups.group[k] >= 0 || !are_linked(frame[i], frame[j], steps)) return;
         groups.group[k] = number;
         open.push_back(j);
       });

@@ -54,9 +54,9 @@ struct CellGroups {
   std::vector<std::int32_t> size;  // [cells]
 };
 
-// Cells of equal side (0: in no group) are connected where they are at most `link` apart; 0: so many cells' sides that
-// a surface slanted by 70 degrees holds together.
-CellGroups connect(const CoarseFrame& frame, const std::vector<std::uint8_t>& side, float link);
+// Cells of equal side (0: in no group) are connected where they are so near that a surface slanted by 70 degrees holds
+// together.
+CellGroups connect(const CoarseFrame& frame, const std::vector<std::uint8_t>& side);
 
 // How many cells of each group lie at the image's border.
 std::vector<std::int32_t> border_cells(const CoarseFrame& frame, const std::vector<std::int32_t>& group,
@@ -68,6 +68,6 @@ inline double cut_off(std::int32_t num_border, std::int32_t size) {
 }
 
 // Whether a surface may go from one cell to another that is so many steps away.
-bool are_linked(const Cell& a, const Cell& b, int steps, float link);
+bool are_linked(const Cell& a, const Cell& b, int steps);
 
 }  // namespace nacre

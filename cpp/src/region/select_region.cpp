@@ -14,8 +14,9 @@
 namespace nacre {
 namespace {
 
-constexpr int contact_reach = 12;   // [pixels] between a thing and the plane that it stands on
-constexpr int adoption_reach = 24;  // [pixels] between parts of a thing that hide what joins them
+constexpr double same_thing = 0.25;  // part of its pixels that a thing shares with the last one
+constexpr int contact_reach = 12;    // [pixels] between a thing and the plane that it stands on
+constexpr int adoption_reach = 24;   // [pixels] between parts of a thing that hide what joins them
 
 // The pixels with a point in the box.
 MaskImage box_mask(const Frame& frame, const RegionOptions& options) {
@@ -113,7 +114,7 @@ std::int32_t choose_group(const CoarseFrame& frame, const CellGroups& groups, co
   for (std::size_t g = 0; g < groups.size.size(); ++g) {
     if (eligible[g] == 0 || groups.size[g] < options.min_object * frame.size()) continue;
     const double smaller = static_cast<double>(std::min<std::int64_t>(groups.size[g], num_previous));
-    const bool is_known = shared[g] > 0 && static_cast<double>(shared[g]) >= options.keep_fraction * smaller;
+    const bool is_known = shared[g] > 0 && static_cast<double>(shared[g]) >= same_thing * smaller;
     const std::pair<std::int64_t, double> rank{is_known ? shared[g] : 0, sizes[g]};
     if (best >= 0 && rank <= best_rank) continue;
     best = static_cast<std::int32_t>(g);
@@ -149,8 +150,7 @@ void draw_group(const Frame& frame, const CoarseFrame& coarse, const Camera& cam
       for (int j = std::max(0, y - 1); j <= std::min(coarse.height - 1, y + 1) && flag == 0; ++j) {
         for (int i = std::max(0, x - 1); i <= std::min(coarse.width - 1, x + 1) && flag == 0; ++i) {
           const int k = j * coarse.width + i;
-          flag = groups.group[static_cast<std::size_t>(k)] == chosen &&
-                 are_linked(pixel, coarse[k], 1, static_cast<float>(options.link_distance));
+          flag = groups.group[static_cast<std::size_t>(k)] == chosen && are_linked(pixel, coarse[k], 1);
         }
       }
     }
@@ -184,7 +184,7 @@ void select_object(const Frame& frame, const Camera& camera, const RegionOptions
   std::vector<std::uint8_t> left(coarse.cells.size()), on_plane(coarse.cells.size(), 0);
   for (std::size_t i = 0; i < left.size(); ++i) left[i] = coarse.cells[i].has_point();
   report.planes = put_planes_aside(coarse, options, num_threads, left, on_plane);
-  CellGroups groups = connect(coarse, left, static_cast<float>(options.link_distance));
+  CellGroups groups = connect(coarse, left);
   std::vector<std::uint8_t> eligible(groups.size.size(), 1);
   if (!report.planes.empty()) {
     eligible = standing_groups(coarse, groups, on_plane);
@@ -215,13 +215,9 @@ void RegionOptions::check() const {
   require(min_x < max_x, "region.min_x", "less than region.max_x", min_x);
   require(min_y < max_y, "region.min_y", "less than region.max_y", min_y);
   require(min_z < max_z, "region.min_z", "less than region.max_z", min_z);
-  require(min_plane > 0.0 && min_plane <= 1.0, "region.min_plane", "in (0, 1]", min_plane);
   require(min_object > 0.0 && min_object <= 1.0, "region.min_object", "in (0, 1]", min_object);
   require(plane_margin >= 0.0 && std::isfinite(plane_margin), "region.plane_margin",
           "0 (automatic) or a positive distance in metres", plane_margin);
-  require(link_distance >= 0.0 && std::isfinite(link_distance), "region.link_distance",
-          "0 (automatic) or a positive distance in metres", link_distance);
-  require(keep_fraction > 0.0 && keep_fraction <= 1.0, "region.keep_fraction", "in (0, 1]", keep_fraction);
 }
 
 MaskImage select_region(const Frame& frame, const Camera& camera, const RegionOptions& options, const MaskRef& previous,

@@ -11,6 +11,7 @@
 namespace nacre {
 namespace {
 
+constexpr double least_plane = 0.1;  // part of the points that a supporting plane holds
 constexpr int num_hypotheses = 160;
 constexpr int num_refined = 6;             // of them, the best
 constexpr int num_refinements = 5;         // least squares over the cells of a plane, and its cells again
@@ -117,8 +118,7 @@ struct Search {
   // What hangs on the back of a plane is small against it, as the edge of a table is. And something stands on it, or it
   // goes on beyond the image; then what stands on it may also outweigh what hangs, by size and length of contact.
   bool is_support(const std::vector<std::uint8_t>& sides) const {
-    const auto link = static_cast<float>(options.link_distance);
-    const CellGroups groups = connect(frame, sides, link);
+    const CellGroups groups = connect(frame, sides);
     std::vector<double> contact(groups.size.size(), 0.0);
     std::vector<std::uint8_t> side_of(groups.size.size(), 0);
     for (int i = 0; i < frame.size(); ++i) {
@@ -129,7 +129,7 @@ struct Search {
       if (sides[k] == on) continue;
       bool touches = false;
       frame.for_neighbours(i, 2, [&](int j, int steps) {
-        touches = touches || (sides[static_cast<std::size_t>(j)] == on && are_linked(frame[i], frame[j], steps, link));
+        touches = touches || (sides[static_cast<std::size_t>(j)] == on && are_linked(frame[i], frame[j], steps));
       });
       contact[group] += touches;
     }
@@ -156,7 +156,7 @@ std::vector<SupportPlane> put_planes_aside(const CoarseFrame& frame, const Regio
   const Search search{frame, options, num_threads};
   std::vector<SupportPlane> planes;
   const auto num_points = std::count(left.begin(), left.end(), std::uint8_t{1});
-  const auto least = static_cast<std::int64_t>(options.min_plane * static_cast<double>(num_points)) + 1;
+  const auto least = static_cast<std::int64_t>(least_plane * static_cast<double>(num_points)) + 1;
   std::uint64_t seed = 0;
   bool found = true;
   while (found && planes.size() < most_planes) {

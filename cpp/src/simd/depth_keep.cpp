@@ -38,7 +38,7 @@ KeepCounts keep_pixels(const KeepRow& row, uint8_t* keep) {
   return counts;
 }
 
-void drop_lonely(const uint8_t* keep, ptrdiff_t stride, const uint8_t* least, int width, uint8_t* still_kept) {
+void remove_isolated(const uint8_t* keep, ptrdiff_t stride, const uint8_t* least, int width, uint8_t* still_kept) {
   constexpr int tile = 252;  // pixels, of 256 columns
   for (int begin = 0; begin < width; begin += tile) {
     const int count = width - begin < tile ? width - begin : tile;

@@ -26,8 +26,9 @@ NACRE_DECLARE_KERNEL(KeepPixels, keep_pixels)
 
 // Keeps pixels with at least `least` kept ones in their window of 5 x 5, themselves included. Around the image `keep`
 // is 0 for two pixels.
-using DropLonely = void(const uint8_t* keep, ptrdiff_t stride, const uint8_t* least, int width, uint8_t* still_kept);
-NACRE_DECLARE_KERNEL(DropLonely, drop_lonely)
+using RemoveIsolated = void(const uint8_t* keep, ptrdiff_t stride, const uint8_t* least, int width,
+                            uint8_t* still_kept);
+NACRE_DECLARE_KERNEL(RemoveIsolated, remove_isolated)
 
 // The values of kept pixels, NaN elsewhere; returns how many are kept.
 using SelectKept = int(const float* values, const uint8_t* keep, int width, float* kept);

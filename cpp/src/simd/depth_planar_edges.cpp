@@ -19,7 +19,7 @@ struct Unmarked {
   const float* at(int u) const { return values + side_depth * pitch + margin + u; }
 };
 
-NACRE_INLINE void gather(const PlanarRow& row, const SpareMarks& marks, int begin, int count, Unmarked& unmarked) {
+NACRE_INLINE void gather(const PlanarRow& row, const PlanarMarks& marks, int begin, int count, Unmarked& unmarked) {
   for (int i = 0; i < num_rows; ++i) {
     const ptrdiff_t v = i - side_depth;
     const float* const values = row.values + v * row.stride + begin - margin;
@@ -85,7 +85,7 @@ NACRE_INLINE void fit_side(const float* pixel, F32 own, ptrdiff_t ahead, ptrdiff
   best = {select(counts, predicted * predicted, best.error), select(counts, leverage, best.variance)};
 }
 
-NACRE_INLINE Mask is_spared(const float* pixel, F32 own, Mask asked, const SpareRule& rule) {
+NACRE_INLINE Mask is_planar(const float* pixel, F32 own, Mask asked, const PlanarRule& rule) {
   const F32 sigma = evaluate(rule.sigma, own), steepest = evaluate(rule.steepest, own), variance = sigma * sigma;
   Prediction best = {broadcast(0.0F), broadcast(HUGE_VALF)};
   fit_side(pixel, own, -1, pitch, asked, variance, steepest, best);
@@ -98,8 +98,8 @@ NACRE_INLINE Mask is_spared(const float* pixel, F32 own, Mask asked, const Spare
 
 }  // namespace
 
-void spare_pixels(const PlanarRow& row, const SpareRule& rule, const SpareMarks& marks, uint8_t* spared) {
-  const SpareRule r = rule;
+void keep_planar_pixels(const PlanarRow& row, const PlanarRule& rule, const PlanarMarks& marks, uint8_t* left_marked) {
+  const PlanarRule r = rule;
   for (int begin = 0; begin < row.width; begin += chunk) {
     const int count = row.width - begin < chunk ? row.width - begin : chunk;
     const uint8_t *const marked = marks.marks + begin, *const first = marks.first_marks + begin;
@@ -108,7 +108,7 @@ void spare_pixels(const PlanarRow& row, const SpareRule& rule, const SpareMarks&
     for (int i = 0; i < count; ++i) {
       asked[i] = (marked[i] != 0) & ((first[i] & slanted_mark) == 0);
       num_asked += asked[i];
-      spared[begin + i] = marked[i];
+      left_marked[begin + i] = marked[i];
     }
     if (num_asked == 0) continue;
     Unmarked unmarked;
@@ -116,9 +116,9 @@ void spare_pixels(const PlanarRow& row, const SpareRule& rule, const SpareMarks&
     for (int i = 0; i < count; i += lanes) {
       const Mask here = to_float(load(asked + i)) > broadcast(0.0F);
       if (!any(here)) continue;
-      unsigned found = bits(is_spared(unmarked.at(i), load(row.values + begin + i), here, r));
+      unsigned found = bits(is_planar(unmarked.at(i), load(row.values + begin + i), here, r));
       for (int u = begin + i; found != 0; ++u, found >>= 1U) {
-        if ((found & 1U) != 0) spared[u] = 0;
+        if ((found & 1U) != 0) left_marked[u] = 0;
       }
     }
   }

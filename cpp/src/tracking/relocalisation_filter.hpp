@@ -1,5 +1,5 @@
 // Where a lost camera may be, when a single frame says too little about it: the best place is followed from frame to
-// frame, while nothing is folded in, until views that differ have said enough (a sequential test, Wald 1945).
+// frame, while nothing is fused, until views that differ have said enough (a sequential test, Wald 1945).
 #pragma once
 
 #include <optional>

@@ -24,7 +24,7 @@ from nacre.report.text import label, quantity
 _STEPS = {
     "preprocess": "clean depth",
     "back_project": "points and normals",
-    "fold_in": "fold into the model",
+    "fuse": "fuse into the model",
 }
 
 

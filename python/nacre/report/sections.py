@@ -133,7 +133,7 @@ def funnel_section(frames: Sequence[FrameEntry]) -> str:
             left -= sum(gone.values())
             rows.append(_funnel_row(name, left, total, sum(gone.values()), gone))
     dropped = sum(_num_usable(frame) for frame in known if not _is_folded_in(frame))
-    rows.append(_funnel_row("in frames that were folded in", left - dropped, total, dropped))
+    rows.append(_funnel_row("in frames that were fused", left - dropped, total, dropped))
     moved = sum(frame.num_updated or 0 for frame in known)
     added = sum(frame.num_inserted or 0 for frame in known)
     points = next((frame.num_points for frame in reversed(known) if frame.num_points is not None), None)
@@ -175,7 +175,7 @@ def _funnel_chart(frames: Sequence[FrameEntry], reasons: Sequence[str]) -> str:
     dropped = [0 if _is_folded_in(frame) else _num_usable(frame) for frame in frames]
     missing = values(frames, lambda f: None if f.num_pixels is None else f.num_pixels - (f.num_measured or 0))
     layers = [
-        ("folded in", np.array(folded, float), _USED),
+        ("fused", np.array(folded, float), _USED),
         ("usable, but LOST or WEAK", np.array(dropped, float), _DROPPED),
         *(
             (

@@ -26,7 +26,7 @@ _NEXT_STEPS = {
     "what was seen before? Does an object turn before a background that stands still (--object)?",
     "region": "Nothing was found to model: does a thing stand on a plane (--object), is one in the box?",
     "unreadable": "These images could not be used: are the files whole, and is it the right camera?",
-    "weak": "WEAK frames have a pose but were not folded in: what they see, a wall or a smooth cylinder, "
+    "weak": "WEAK frames have a pose but were not fused: what they see, a wall or a smooth cylinder, "
     "leaves directions open. Move so that corners or texture come into view.",
 }
 

@@ -153,7 +153,7 @@ TEST_CASE("range and mask remove pixels but make no edges") {
   CHECK(report.num_out_of_range == 80 * height);
 }
 
-TEST_CASE("specks are removed") {
+TEST_CASE("speckles are removed") {
   DepthImage depth = DepthImage::Constant(height, width, missing);
   depth.block(10, 10, 4, 5).setConstant(1.0F);  // 20 pixels stay
   depth.block(40, 40, 3, 6).setConstant(1.0F);  // 18 do not
@@ -170,7 +170,7 @@ TEST_CASE("specks are removed") {
   CHECK(same_bits(preprocess_depth(depth, pinhole, options), depth));
 }
 
-TEST_CASE("a speck of any shape is one component") {
+TEST_CASE("a speckle of any shape is one component") {
   // A comb: its teeth meet in the last row only.
   DepthImage depth = DepthImage::Constant(height, width, missing);
   for (int u = 20; u <= 30; u += 2) depth.col(u).segment(20, 5).setConstant(1.0F);
@@ -273,7 +273,7 @@ TEST_CASE("options out of range are named") {
   CHECK(complaint([](DepthOptions& o) { o.gradient_threshold = 0.0; }).find("gradient_threshold") == 0);
   CHECK(complaint([](DepthOptions& o) { o.edge_dilation = -1; }).find("edge_dilation") == 0);
   CHECK(complaint([](DepthOptions& o) { o.edge_sigmas = missing; }).find("edge_sigmas") == 0);
-  CHECK(complaint([](DepthOptions& o) { o.edge_reprieve = -1.0; }).find("edge_reprieve") == 0);
+  CHECK(complaint([](DepthOptions& o) { o.planar_keep_sigmas = -1.0; }).find("planar_keep_sigmas") == 0);
   CHECK(complaint([](DepthOptions& o) { o.max_slant = 1.6; }).find("max_slant") == 0);
   CHECK(complaint([](DepthOptions& o) { o.max_missing = 1.1; }).find("max_missing") == 0);
   CHECK(complaint([](DepthOptions& o) { o.min_component = -1; }).find("min_component") == 0);

@@ -20,11 +20,11 @@ using nacre::ByteImage;
 using nacre::evaluate;
 using nacre::PlanarImage;
 
-std::vector<simd::SparePixels*> all_kernels() {
-  std::vector<simd::SparePixels*> kernels = {simd::baseline::spare_pixels};
+std::vector<simd::KeepPlanarPixels*> all_kernels() {
+  std::vector<simd::KeepPlanarPixels*> kernels = {simd::baseline::keep_planar_pixels};
 #ifdef NACRE_SIMD_X86
-  if (simd::active_isa() != simd::Isa::baseline) kernels.push_back(simd::avx2::spare_pixels);
-  if (simd::active_isa() == simd::Isa::avx512) kernels.push_back(simd::avx512::spare_pixels);
+  if (simd::active_isa() != simd::Isa::baseline) kernels.push_back(simd::avx2::keep_planar_pixels);
+  if (simd::active_isa() == simd::Isa::avx512) kernels.push_back(simd::avx512::keep_planar_pixels);
 #endif
   return kernels;
 }
@@ -35,7 +35,7 @@ struct Side {
 
 // The plane through the unmarked pixels on one side: its error at the pixel, in its standard deviations; nothing where
 // they are too few, too rough or too steep.
-std::optional<Side> fit(const PlanarImage& image, const ByteImage& marks, const simd::SpareRule& rule, int u, int v,
+std::optional<Side> fit(const PlanarImage& image, const ByteImage& marks, const simd::PlanarRule& rule, int u, int v,
                         std::array<int, 2> ahead) {
   const double own = image.row(v)[u],
                variance = std::pow(static_cast<double>(evaluate(rule.sigma, image.row(v)[u])), 2);
@@ -64,7 +64,7 @@ std::optional<Side> fit(const PlanarImage& image, const ByteImage& marks, const 
 }
 
 // What the plane with the least leverage says [sigmas]; infinite where no side has one.
-double error_of(const PlanarImage& image, const ByteImage& marks, const simd::SpareRule& rule, int u, int v) {
+double error_of(const PlanarImage& image, const ByteImage& marks, const simd::PlanarRule& rule, int u, int v) {
   std::optional<Side> best;
   for (const std::array<int, 2> ahead : {std::array{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
     const std::optional<Side> side = fit(image, marks, rule, u, v, ahead);
@@ -73,10 +73,10 @@ double error_of(const PlanarImage& image, const ByteImage& marks, const simd::Sp
   return best ? best->error : std::numeric_limits<double>::infinity();
 }
 
-TEST_CASE("pixels are spared as least squares say") {
+TEST_CASE("pixels are kept as least squares say") {
   constexpr int rows = 40;
   constexpr double sigmas = 3.0;
-  int num_spared = 0, num_left = 0, num_close = 0;
+  int num_kept = 0, num_left = 0, num_close = 0;
   for (const int w : {1, 7, 17, 64, 70, 133}) {
     const Camera camera = Camera::pinhole(w, rows, 90.0, 94.0, w / 2.0, 18.0);
     DepthImage depth(rows, w);
@@ -92,35 +92,35 @@ TEST_CASE("pixels are spared as least squares say") {
       }
     }
     const PlanarImage image(depth, camera, 1);
-    const simd::SpareRule rule = {image.sigma({0.003, 0.0, 0.0}), image.unit_slope() * 5.67F,
-                                  static_cast<float>(sigmas * sigmas)};
+    const simd::PlanarRule rule = {image.sigma({0.003, 0.0, 0.0}), image.unit_slope() * 5.67F,
+                                   static_cast<float>(sigmas * sigmas)};
     ByteImage expected(w, rows);
-    for (simd::SparePixels* const spare_pixels : all_kernels()) {
-      ByteImage spared(w, rows);
+    for (simd::KeepPlanarPixels* const keep_planar_pixels : all_kernels()) {
+      ByteImage left_marked(w, rows);
       for (int v = 0; v < rows; ++v) {
-        spare_pixels(image.planar_row(v), rule, {marks.row(v), first.row(v), marks.stride()}, spared.row(v));
+        keep_planar_pixels(image.planar_row(v), rule, {marks.row(v), first.row(v), marks.stride()}, left_marked.row(v));
         for (int u = 0; u < w; ++u) {
           CAPTURE(u);
           CAPTURE(v);
           const bool may_be =
               marks.row(v)[u] != 0 && (first.row(v)[u] & simd::slanted_mark) == 0 && image.row(v)[u] == image.row(v)[u];
           const double error = may_be ? error_of(image, marks, rule, u, v) : std::numeric_limits<double>::infinity();
-          if (spare_pixels == simd::baseline::spare_pixels) {
-            expected.row(v)[u] = spared.row(v)[u];
+          if (keep_planar_pixels == simd::baseline::keep_planar_pixels) {
+            expected.row(v)[u] = left_marked.row(v)[u];
             if (std::abs(error - sigmas) < 0.02) {
               ++num_close;
               continue;
             }
-            const bool is_spared = error < sigmas;
-            REQUIRE(spared.row(v)[u] == (is_spared ? 0 : marks.row(v)[u]));
-            if (marks.row(v)[u] != 0) ++(is_spared ? num_spared : num_left);
+            const bool is_planar = error < sigmas;
+            REQUIRE(left_marked.row(v)[u] == (is_planar ? 0 : marks.row(v)[u]));
+            if (marks.row(v)[u] != 0) ++(is_planar ? num_kept : num_left);
           }
-          REQUIRE(spared.row(v)[u] == expected.row(v)[u]);  // the same on every instruction set
+          REQUIRE(left_marked.row(v)[u] == expected.row(v)[u]);  // the same on every instruction set
         }
       }
     }
   }
-  CHECK(num_spared > 300);
+  CHECK(num_kept > 300);
   CHECK(num_left > 300);
   CHECK(num_close < 20);
 }
@@ -146,7 +146,7 @@ TEST_CASE("true pixels beside mixed ones stay, mixed ones go, at any slant") {
     const DepthImage clean = preprocess_depth(wall.depth, orthographic, options);
     CHECK(num_valid(clean.block(20, 31, 50, 58)) > 0.97 * 50 * 58);
     CHECK(num_valid(clean.col(30)) + num_valid(clean.col(89)) == 0);
-    options.edge_reprieve = 0.0;
+    options.planar_keep_sigmas = 0.0;
     CHECK(num_valid(preprocess_depth(wall.depth, orthographic, options).block(20, 31, 50, 58)) < 0.94 * 50 * 58);
   }
 }
@@ -161,17 +161,18 @@ TEST_CASE("a step of a few sigma is not bridged by a plane through both sides") 
   options.noise = NoiseModel{0.005, 0.0, 0.0};
   options.max_missing = 1.0;
   const PlanarImage image(depth, orthographic, 1);
-  ByteImage marks(width, height), first(width, height), spared(width, height);
+  ByteImage marks(width, height), first(width, height), left_marked(width, height);
   for (int v = 0; v < height; ++v) {
     for (int u = 0; u < width; ++u) marks.row(v)[u] = first.row(v)[u] = u == 60;
   }
-  const simd::SpareRule rule = {image.sigma(*options.noise), image.unit_slope() * 5.67F, 9.0F};
-  int num_spared = 0;
+  const simd::PlanarRule rule = {image.sigma(*options.noise), image.unit_slope() * 5.67F, 9.0F};
+  int num_kept = 0;
   for (int v = 0; v < height; ++v) {
-    simd::spare_pixels()(image.planar_row(v), rule, {marks.row(v), first.row(v), marks.stride()}, spared.row(v));
-    num_spared += spared.row(v)[60] == 0;
+    simd::keep_planar_pixels()(image.planar_row(v), rule, {marks.row(v), first.row(v), marks.stride()},
+                               left_marked.row(v));
+    num_kept += left_marked.row(v)[60] == 0;
   }
-  CHECK(num_spared <= height / 10);
+  CHECK(num_kept <= height / 10);
 }
 
 }  // namespace

@@ -17,8 +17,8 @@ PointModel plane(float height, std::int32_t frame, float confidence) {
       model.normals.emplace_back(0.0F, 0.0F, 1.0F);
       model.confidence.push_back(confidence);
       model.last_seen.push_back(frame);
-      model.violations.push_back(0);
-      model.sightings.push_back(200);
+      model.free_space_violations.push_back(0);
+      model.observations.push_back(200);
     }
   }
   return model;
@@ -29,8 +29,9 @@ void append(PointModel& model, const PointModel& more) {
   model.normals.insert(model.normals.end(), more.normals.begin(), more.normals.end());
   model.confidence.insert(model.confidence.end(), more.confidence.begin(), more.confidence.end());
   model.last_seen.insert(model.last_seen.end(), more.last_seen.begin(), more.last_seen.end());
-  model.sightings.insert(model.sightings.end(), more.sightings.begin(), more.sightings.end());
-  model.violations.insert(model.violations.end(), more.violations.begin(), more.violations.end());
+  model.observations.insert(model.observations.end(), more.observations.begin(), more.observations.end());
+  model.free_space_violations.insert(model.free_space_violations.end(), more.free_space_violations.begin(),
+                                     more.free_space_violations.end());
   model.colors.insert(model.colors.end(), more.colors.begin(), more.colors.end());
   for (std::size_t k = 0; k < model.attributes.size(); ++k) {
     std::vector<float>& values = model.attributes[k].values;
@@ -59,7 +60,7 @@ TEST_CASE("two layers of one surface become one, weighted by confidence") {
     CHECK(model.points[i].z() == doctest::Approx(0.002));
     CHECK(model.confidence[i] == 4.0F);
     CHECK(model.last_seen[i] == 50);
-    CHECK(model.sightings[i] == 255);
+    CHECK(model.observations[i] == 255);
   }
 }
 

@@ -77,13 +77,14 @@ bool same_bits(const std::vector<Value>& a, const std::vector<Value>& b) {
 bool same_bits(const PointModel& a, const PointModel& b) {
   return same_bits(a.points, b.points) && same_bits(a.normals, b.normals) && same_bits(a.colors, b.colors) &&
          same_bits(a.confidence, b.confidence) && same_bits(a.last_seen, b.last_seen) &&
-         same_bits(a.violations, b.violations);
+         same_bits(a.free_space_violations, b.free_space_violations);
 }
 
 bool is_consistent(const PointModel& model) {
   const std::size_t count = model.points.size();
   return model.normals.size() == count && (model.colors.empty() || model.colors.size() == count) &&
-         model.confidence.size() == count && model.last_seen.size() == count && model.violations.size() == count;
+         model.confidence.size() == count && model.last_seen.size() == count &&
+         model.free_space_violations.size() == count;
 }
 
 double least_distance_on_a_sheet(const PointModel& model) {
@@ -261,7 +262,7 @@ TEST_CASE("points that the camera sees through go after so many times in a row")
                          [](const Eigen::Vector3f& p) { return p.z() < 0.35F; });
   };
   FusionOptions options;
-  options.max_violations = 2;
+  options.max_free_space_violations = 2;
   PointModel model;
   // Pixels at the rim belong to neither.
   DepthImage image = image_of(with_disc);
@@ -297,7 +298,7 @@ TEST_CASE("points behind the measured surface are hidden, not wrong") {
   REQUIRE(model.size() > before.size());
   for (std::size_t i = 0; i < before.points.size(); ++i) {
     CHECK(model.points[i] == before.points[i]);
-    CHECK(model.violations[i] == 0);
+    CHECK(model.free_space_violations[i] == 0);
   }
 }
 
@@ -369,8 +370,8 @@ TEST_CASE("keep drops the points whose flag is 0, in order") {
     model.normals.emplace_back(0.0F, static_cast<float>(i), 0.0F);
     model.confidence.push_back(static_cast<float>(i));
     model.last_seen.push_back(i);
-    model.sightings.push_back(static_cast<std::uint8_t>(i));
-    model.violations.push_back(static_cast<std::uint8_t>(i));
+    model.observations.push_back(static_cast<std::uint8_t>(i));
+    model.free_space_violations.push_back(static_cast<std::uint8_t>(i));
   }
   model.keep({0, 1, 0, 1, 1});
   REQUIRE(model.size() == 3);
@@ -379,7 +380,7 @@ TEST_CASE("keep drops the points whose flag is 0, in order") {
   CHECK(model.last_seen == std::vector<std::int32_t>{1, 3, 4});
   CHECK(model.points[1].x() == 3.0F);
   CHECK(model.normals[2].y() == 4.0F);
-  CHECK(model.violations[0] == 1);
+  CHECK(model.free_space_violations[0] == 1);
 }
 
 TEST_CASE("a frame without points changes nothing") {
@@ -421,8 +422,8 @@ TEST_CASE("arguments out of range are named") {
   CHECK_THROWS_WITH_AS(add({}, spacing, 7), doctest::Contains("colors must be"), std::invalid_argument);
   CHECK_THROWS_WITH_AS(thin(model, 0.0), doctest::Contains("spacing must be"), std::invalid_argument);
   FusionOptions options;
-  options.max_violations = 256;
-  CHECK_THROWS_WITH_AS(add(options), doctest::Contains("max_violations must be"), std::invalid_argument);
+  options.max_free_space_violations = 256;
+  CHECK_THROWS_WITH_AS(add(options), doctest::Contains("max_free_space_violations must be"), std::invalid_argument);
   options = {};
   options.support = std::numeric_limits<double>::quiet_NaN();
   CHECK_THROWS_WITH_AS(add(options), doctest::Contains("support must be"), std::invalid_argument);

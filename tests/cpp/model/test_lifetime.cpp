@@ -22,7 +22,7 @@ TEST_CASE("A thousand models are made, run and destroyed") {
 
   for (int cycle = 0; cycle < 1000; ++cycle) {
     ModelOptions options;
-    options.fold_in = static_cast<FoldIn>(cycle % 3);
+    options.fusion_method = static_cast<FusionMethod>(cycle % 3);
     options.num_threads = 1 + cycle % 2;
     options.relocalise = cycle % 100 == 0;  // takes long
     Model model(camera, options);

@@ -72,7 +72,7 @@ bool same_bits(const std::vector<Value>& a, const std::vector<Value>& b) {
 bool same_bits(const PointModel& a, const PointModel& b) {
   return same_bits(a.points, b.points) && same_bits(a.normals, b.normals) && same_bits(a.colors, b.colors) &&
          same_bits(a.confidence, b.confidence) && same_bits(a.last_seen, b.last_seen) &&
-         same_bits(a.violations, b.violations);
+         same_bits(a.free_space_violations, b.free_space_violations);
 }
 
 double angle_between(const Pose& a, const Pose& b) {
@@ -207,9 +207,9 @@ TEST_CASE("the model never grows beyond its size") {
 
 TEST_CASE("presets") {
   const ModelOptions paper = ModelOptions::preset("paper");
-  CHECK(paper.fold_in == FoldIn::wlop);
+  CHECK(paper.fusion_method == FusionMethod::wlop);
   CHECK(paper.max_points == 2000);
-  CHECK(paper.consolidation.radius == 0.008);
+  CHECK(paper.wlop.radius == 0.008);
   CHECK_NOTHROW(paper.check());
   CHECK_NOTHROW(ModelOptions::preset("default").check());
   CHECK_THROWS_WITH_AS(ModelOptions::preset("best"), doctest::Contains("'best'"), std::invalid_argument);

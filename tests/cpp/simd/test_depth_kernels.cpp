@@ -194,7 +194,7 @@ TEST_CASE("pixels are kept and dropped as plain loops say") {
       std::vector<std::uint64_t> kept(words), left(words), above(words);
       std::vector<float> selected(static_cast<std::size_t>(w + 1), 7.0F);
       for (int v = 0; v < rows; ++v) {
-        kernels.drop_lonely(keep.row(v), keep.stride(), least.data(), w, still_kept.row(v));
+        kernels.remove_isolated(keep.row(v), keep.stride(), least.data(), w, still_kept.row(v));
         kernels.link_pixels(image.planar_row(v), rule, keep.row(v), keep.stride(),
                             {kept.data(), left.data(), above.data()});
         const int count = kernels.select_kept(&depth(v, 0), keep.row(v), w, selected.data());

@@ -18,7 +18,7 @@ TYPED = {
     "nacre reconstruct --pre": {"--preset"},
     "nacre reconstruct x --preset ": {"default", "paper"},
     "nacre reconstruct x --format ic": {"icl-nuim"},
-    "nacre reconstruct x --set fusion.max": {"fusion.max_angle=", "fusion.max_confidence="},
+    "nacre reconstruct x --set fusion.max": {"fusion.max_confidence=", "fusion.max_free_space_violations="},
 }  # fmt: skip
 
 # Prints what the shell offers after the words in $1, as its user would get it with the tab key.

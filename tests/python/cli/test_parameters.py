@@ -19,7 +19,7 @@ def test_set_wins_over_file_wins_over_preset(recording, tmp_path):
     config.write_text(
         'preset = "paper"\nspacing = 0.004\n[registration]\nmax_angle = 0.25\nmax_iterations = 7\n'
     )
-    arguments = ("--config", config, "--set", "registration.max_angle=0.5", "--set", "fold_in=wlop+")
+    arguments = ("--config", config, "--set", "registration.max_angle=0.5", "--set", "fusion_method=wlop+")
     report = reports(recording, tmp_path, *arguments)
     parameters, paper = report["parameters"], nacre.ModelParameters.preset("paper")
     assert report["preset"] == "paper"
@@ -27,7 +27,7 @@ def test_set_wins_over_file_wins_over_preset(recording, tmp_path):
     assert parameters["registration"]["max_angle"] == 0.5
     assert parameters["registration"]["max_iterations"] == 7
     assert parameters["registration"]["method"] == paper.registration.method
-    assert parameters["fold_in"] == "wlop+"
+    assert parameters["fusion_method"] == "wlop+"
 
 
 def test_depth_options_are_parameters(recording, tmp_path):

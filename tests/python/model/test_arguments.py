@@ -74,21 +74,19 @@ def test_illegal_parameters() -> None:
         ({"spacing": 1e30}, "spacing must be .* got 1e"),
         ({"max_points": 5}, "max_points must be at least 100, got 5"),
         ({"min_evidence": float("nan")}, "min_evidence must be .* got nan"),
-        ({"first_fraction": 0.0}, "first_fraction must be in .* got 0"),
-        ({"kept_fraction": -0.1}, "kept_fraction must be in .* got -0.1"),
-        ({"new_fraction": 2.0}, "new_fraction must be in .* got 2"),
+        ({"wlop.first_fraction": 0.0}, "first_fraction must be in .* got 0"),
+        ({"wlop.kept_fraction": -0.1}, "kept_fraction must be in .* got -0.1"),
+        ({"wlop.new_fraction": 2.0}, "new_fraction must be in .* got 2"),
         ({"num_threads": -1}, "num_threads must be .* got -1"),
-        ({"fold_in": "tsdf"}, r"fold_in must be one of 'fuse', 'wlop', 'wlop\+', got 'tsdf'"),
+        ({"fusion_method": "tsdf"}, r"fusion_method must be one of 'fuse', 'wlop', 'wlop\+', got 'tsdf'"),
         ({"registration.method": "icp"}, "method must be one of .* got 'icp'"),
         ({"registration.max_iterations": 0}, "max_iterations must be at least 1, got 0"),
-        ({"fusion.support": -1.0}, "support must be .* got -1"),
-        ({"fusion.max_angle": 0.0}, "max_angle must be .* got 0"),
         ({"fusion.max_confidence": 0.0}, "max_confidence must be positive, got 0"),
-        ({"fusion.min_sightings": -1}, "min_sightings must be .* got -1"),
-        ({"fusion.max_violations": 256}, "max_violations must be 1 to 255, got 256"),
+        ({"fusion.min_observations": -1}, "min_observations must be .* got -1"),
+        ({"fusion.max_free_space_violations": 256}, "max_free_space_violations must be 1 to 255, got 256"),
         ({"fusion.reference_sigma": -0.5}, "reference_sigma must be .* got -0.5"),
-        ({"consolidation.radius": 0.0}, "radius must be .* got 0"),
-        ({"consolidation.mu": 0.9}, "mu must be .* got 0.9"),
+        ({"wlop.radius": 0.0}, "radius must be .* got 0"),
+        ({"wlop.mu": 0.9}, "mu must be .* got 0.9"),
         ({"depth.edge_test": "sobel"}, "edge_test must be one of .* got 'sobel'"),
         ({"depth.max_missing": 3.0}, "max_missing must be .* got 3"),
     ],
@@ -100,7 +98,7 @@ def test_parameter_out_of_range_is_named(changes: dict[str, Any], message: str) 
 
 
 def test_parameters_of_the_caller_are_used() -> None:
-    parameters = updated(nacre.ModelParameters(), {"spacing": 0.004, "fold_in": "wlop+"})
+    parameters = updated(nacre.ModelParameters(), {"spacing": 0.004, "fusion_method": "wlop+"})
     model = nacre.Model(FLAT, parameters=parameters, max_points=400)
     assert model.parameters == updated(parameters, {"max_points": 400})
     assert model.add_frame(relief()).spacing == 0.004

@@ -36,7 +36,7 @@ def test_points_that_are_seen_through_vanish() -> None:
         report = model.add_frame(wall, guess=np.eye(4), keep_guess=True)
         on_disc.append(int((model.points[:, 2] < 0.34).sum()))
     assert on_disc[0] > 50
-    assert on_disc[1] == on_disc[2] == on_disc[0]  # fewer than max_violations
+    assert on_disc[1] == on_disc[2] == on_disc[0]  # fewer than max_free_space_violations
     assert on_disc[3] == 0
     assert report.num_removed == on_disc[0]
 
@@ -46,13 +46,13 @@ def test_points_that_are_never_confirmed_vanish() -> None:
     x, y = flat_grid()
     hill = np.hypot(x, y) < 0.012
     # Without its rim: the normals there lean towards the plain, which then moves the points instead.
-    model = nacre.Model(FLAT, spacing=0.002, depth={"edge_reprieve": 0.0})
+    model = nacre.Model(FLAT, spacing=0.002, depth={"planar_keep_sigmas": 0.0})
     model.add_frame(np.where(hill, 0.297, 0.3), guess=np.eye(4), keep_guess=True)
     in_front = [int((model.points[:, 2] < 0.2975).sum())]
     for _ in range(4):
         model.add_frame(np.full_like(x, 0.3), guess=np.eye(4), keep_guess=True)
         in_front.append(int((model.points[:, 2] < 0.2975).sum()))
-    assert in_front[0] == in_front[2] > 30  # fewer than max_violations
+    assert in_front[0] == in_front[2] > 30  # fewer than max_free_space_violations
     assert in_front[3:] == [0, 0]
 
 

@@ -96,7 +96,7 @@ def test_reports() -> None:
         assert report.depth.num_pixels == 224 * 224
         assert report.depth.num_kept + report.depth.num_invalid <= 224 * 224
         assert set(report.milliseconds) == {
-            "preprocess", "back_project", "region", "registration", "loop_closure", "fold_in", "normals",
+            "preprocess", "back_project", "region", "registration", "loop_closure", "fuse", "normals",
             "total",
         }  # fmt: skip
         steps = sum(value for name, value in report.milliseconds.items() if name != "total")

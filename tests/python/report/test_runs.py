@@ -101,7 +101,7 @@ def test_the_page_and_the_written_figures_agree(runs: dict[str, Run], name: str)
     assert f"{quantity(1 - invalid / pixels, 'fraction')} {count(pixels - invalid)}" in run.text
     folded = [f for f in figures["frames"] if f["status"] in ("TRACKED", "RELOCALISED")]
     used = sum(f["region"]["num_inside"] for f in folded)
-    assert f"in frames that were folded in {quantity(used / pixels, 'fraction')} {count(used)}" in run.text
+    assert f"in frames that were fused {quantity(used / pixels, 'fraction')} {count(used)}" in run.text
     assert len(run.page) < 1_000_000
     assert "https://" not in run.page
 

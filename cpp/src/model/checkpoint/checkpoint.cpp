@@ -112,7 +112,7 @@ void exchange_state(Archive& archive, Pipeline& state) {
           state.history, state.before, state.hypothesis, state.views, state.spacing, state.num_lost);
 }
 
-// Space that the table of rays may take before a frame was folded in: see load.
+// Space that the table of rays may take before a frame was fused: see load.
 std::string filler_of(const CameraFields& camera, const Pipeline& state) {
   constexpr std::size_t bytes_per_pixel = 8;
   const bool is_needed = camera.has_table() && state.before.depth.size() == 0;
@@ -138,8 +138,8 @@ bool is_unit(const Eigen::Vector3f& normal) { return std::abs(normal.squaredNorm
 bool is_sound(const PointModel& cloud, std::size_t num_frames) {
   const std::size_t count = cloud.points.size();
   if (cloud.normals.size() != count || (!cloud.colors.empty() && cloud.colors.size() != count) ||
-      cloud.confidence.size() != count || cloud.last_seen.size() != count || cloud.sightings.size() != count ||
-      cloud.violations.size() != count) {
+      cloud.confidence.size() != count || cloud.last_seen.size() != count || cloud.observations.size() != count ||
+      cloud.free_space_violations.size() != count) {
     return false;
   }
   for (const PointAttribute& attribute : cloud.attributes) {
@@ -150,7 +150,7 @@ bool is_sound(const PointModel& cloud, std::size_t num_frames) {
   }
   const auto is_count = [](auto number) { return number >= 0 && std::isfinite(static_cast<float>(number)); };
   return are_all(cloud.points, is_place) && are_all(cloud.normals, is_unit) && are_all(cloud.confidence, is_count) &&
-         are_all(cloud.sightings, is_count) && are_all(cloud.violations, is_count) &&
+         are_all(cloud.observations, is_count) && are_all(cloud.free_space_violations, is_count) &&
          are_all(cloud.last_seen, [&](std::int32_t frame) { return is_within(frame, num_frames); });
 }
 

@@ -26,13 +26,13 @@ template <class Archive>
 void exchange(Archive& archive, DepthOptions& options) {
   archive.choice(options.edge_test, EdgeTest::inverse_depth);
   archive(options.min_depth, options.max_depth, options.gradient_threshold, options.edge_dilation, options.edge_sigmas,
-          options.edge_reprieve, options.max_slant, options.max_missing, options.min_component, options.noise);
+          options.planar_keep_sigmas, options.max_slant, options.max_missing, options.min_component, options.noise);
 }
 
 template <class Archive>
 void exchange(Archive& archive, RegionOptions& options) {
   archive(options.min_x, options.max_x, options.min_y, options.max_y, options.min_z, options.max_z, options.object,
-          options.min_plane, options.min_object, options.plane_margin, options.link_distance, options.keep_fraction);
+          options.min_object, options.plane_margin);
 }
 
 template <class Archive>
@@ -45,32 +45,24 @@ void exchange(Archive& archive, AlignOptions& options) {
 
 template <class Archive>
 void exchange(Archive& archive, FusionOptions& options) {
-  archive(options.support, options.max_angle, options.max_confidence, options.min_sightings, options.max_violations,
-          options.reference_sigma);
+  archive(options.support, options.max_angle, options.max_confidence, options.min_observations,
+          options.max_free_space_violations, options.reference_sigma);
 }
 
-// Without the function that is told of progress.
 template <class Archive>
-void exchange(Archive& archive, ConsolidateOptions& options) {
-  archive.choice(options.method, ConsolidationMethod::cgal);
-  archive(options.radius, options.num_points, options.iterations, options.mu);
+void exchange(Archive& archive, WlopOptions& options) {
+  archive(options.radius, options.iterations, options.mu);
   archive.choice(options.theta, Theta::printed);
-  archive(options.seed, options.num_threads);
-}
-
-template <class Archive>
-void exchange(Archive& archive, NormalOptions& options) {
-  archive(options.k, options.max_radius, options.num_threads);
+  archive(options.first_fraction, options.kept_fraction, options.new_fraction, options.normal_neighbors,
+          options.normal_radius, options.seed);
 }
 
 template <class Archive>
 void exchange(Archive& archive, ModelOptions& options) {
   archive(options.depth, options.region, options.registration);
-  archive.choice(options.fold_in, FoldIn::wlop_plus);
-  archive(options.fusion, options.consolidation, options.normals, options.spacing, options.max_points,
-          options.predict_motion, options.relocalise, options.loop_closure, options.denoise_samples, options.verify,
-          options.min_evidence, options.first_fraction, options.kept_fraction, options.new_fraction,
-          options.num_threads);
+  archive.choice(options.fusion_method, FusionMethod::wlop_plus);
+  archive(options.fusion, options.wlop, options.spacing, options.max_points, options.predict_motion, options.relocalise,
+          options.loop_closure, options.denoise_samples, options.verify, options.min_evidence, options.num_threads);
 }
 
 template <class Archive>
@@ -81,7 +73,7 @@ void exchange(Archive& archive, PointAttribute& attribute) {
 template <class Archive>
 void exchange(Archive& archive, PointModel& model) {
   archive(model.points, model.normals, model.colors, model.attributes, model.confidence, model.last_seen,
-          model.sightings, model.violations);
+          model.observations, model.free_space_violations);
 }
 
 template <class Archive, class... Counts>
@@ -116,7 +108,7 @@ void exchange(Archive& archive, FusionReport& report) {
 template <class Archive>
 void exchange(Archive& archive, StepTimes& times) {
   for (double* milliseconds : {&times.preprocess, &times.back_project, &times.region, &times.registration,
-                               &times.loop_closure, &times.fold_in, &times.normals, &times.total}) {
+                               &times.loop_closure, &times.fuse, &times.normals, &times.total}) {
     std::int64_t nanoseconds = std::llround(1e6 * *milliseconds);
     archive(nanoseconds);
     *milliseconds = 1e-6 * static_cast<double>(nanoseconds);

@@ -29,14 +29,14 @@ def test_repaired_wlop_stays_on_the_surface_and_literal_wlop_drifts() -> None:
     """
     to_object = nacre.turntable_poses(thing())[0]
     found = {}
-    for fold_in in ("wlop", "wlop+"):
-        model = nacre.Model(nacre.default_camera(thing()), fold_in=fold_in, max_points=2000)
+    for fusion_method in ("wlop", "wlop+"):
+        model = nacre.Model(nacre.default_camera(thing()), fusion_method=fusion_method, max_points=2000)
         for index in range(12):
             model.add_frame(view(index), guess=true_pose(index), keep_guess=True)
             assert len(model) <= 2000
         inward = -model.normals @ to_object[:3, :3].T
         thickness = thing().cast(moved(to_object, model.points) + 0.001 * inward, inward).distances
-        found[fold_in] = rms(off_thing(model.points[thickness > 0.008]))
+        found[fusion_method] = rms(off_thing(model.points[thickness > 0.008]))
     raw = rms(off_thing(nacre.back_project(view(0), nacre.default_camera(thing()))))
     assert found["wlop+"] < raw
     assert found["wlop"] > 2 * found["wlop+"]
