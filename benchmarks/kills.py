@@ -28,10 +28,10 @@ from typing import Any
 import numpy as np
 
 import nacre
-from nacre.cli.journal import read_journal
 from nacre.datasets import open_sequence, write_recording
 from nacre.model import Model
 from nacre.reconstruction import Reconstruction
+from nacre.reconstruction.journal import read_journal
 
 NACRE = "from nacre.cli import main; main()"
 PLAIN = "import nacre.report; nacre.report.render_page = lambda data: '<html></html>'; " + NACRE

@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 
 import nacre
-from nacre.cli.journal import read_journal
+from nacre.reconstruction.journal import read_journal
 
 NACRE = (sys.executable, "-c", "from nacre.cli import main; main()")
 

@@ -12,7 +12,7 @@ from test_wide_views import view
 
 import nacre
 from nacre.cli import main
-from nacre.cli.unfinished import Unfinished
+from nacre.reconstruction.resume import UnfinishedRun
 
 
 class Killed(BaseException):
@@ -31,15 +31,15 @@ def command(*arguments: Any) -> tuple[int, str, str]:
 
 def killed_after(count: int, *arguments: Any) -> None:
     """Run a command that ends when so many frames are done."""
-    whole, frames = Unfinished.add, iter(range(10_000))
+    whole, frames = UnfinishedRun.add, iter(range(10_000))
 
-    def add(self: Unfinished, *more: Any) -> None:
+    def add(self: UnfinishedRun, *more: Any) -> None:
         whole(self, *more)
         if next(frames) + 1 == count:
             raise Killed
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Unfinished, "add", add)
+        patch.setattr(UnfinishedRun, "add", add)
         with pytest.raises(Killed):
             command(*arguments)
 

@@ -164,8 +164,8 @@ def test_only_the_facade_touches_the_extension_module() -> None:
     assert lines_matching(r"\b_core\b", outside) == []
 
 
-# The Python package from the bottom up: the facade's modules, and the packages behind it. What functions and type
-# checkers import does not count.
+# The Python package from the bottom up: the facade's modules, and the packages behind it. What functions and
+# type checkers import does not count.
 ROOMS = ["facade", "evaluation", "io", "datasets", "report", "reconstruction", "viewer", "cli"]
 
 

@@ -10,8 +10,8 @@ from typing import Annotated, Any, overload
 import typer
 
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
+from nacre.cli.follow import follow
 from nacre.cli.outputs import file_rows, trajectory_rows, write_results
-from nacre.cli.running import run_frames
 from nacre.cli.signals import interruptible
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
 
@@ -48,6 +48,7 @@ def demo(
     from nacre import evaluation
     from nacre.cli.surfaces import evaluate_surface, transformed
     from nacre.reconstruction import Reconstruction
+    from nacre.reconstruction.runner import Run
 
     mesh = nacre.built_in_object()
     camera = nacre.default_camera(mesh)
@@ -65,7 +66,7 @@ def demo(
         start += ", and from the one that continues the last motion"
     terminal.say(f"{words}; preset {preset_name}\neach view is registered starting from {start}")
     with interruptible() as stop:
-        run_frames(terminal, done, range(views), stop)
+        follow(terminal, Run(done, range(views), retry=False), stop)
     done.evaluate_trajectory()
     figures: dict[str, Any] = {}
     if len(done.model):

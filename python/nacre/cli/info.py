@@ -9,10 +9,10 @@ from typing import Annotated, Any
 import typer
 
 from nacre.cli.live_feed import is_camera, open_camera
+from nacre.cli.run_options import describe_unfinished
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
 from nacre.cli.surfaces import MESH_SUFFIXES, POINT_SUFFIXES, has_faces
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
-from nacre.cli.unfinished import describe_unfinished
 
 Rows = list[tuple[str, str]]
 
@@ -87,10 +87,10 @@ def _camera(source: Path) -> tuple[dict[str, Any], Rows]:
 def _recording(sequence: Any) -> tuple[dict[str, Any], Rows]:
     import numpy as np
 
-    from nacre.cli.run import recording
+    from nacre.cli.outputs import describe_recording
     from nacre.errors import FileFormatError
 
-    figures = {"kind": "recording", **recording(sequence), "timestamps": sequence.has_timestamps}
+    figures = {"kind": "recording", **describe_recording(sequence), "timestamps": sequence.has_timestamps}
     rows = [
         ("recording", sequence.name),
         ("format", sequence.format),

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Callable, Iterator
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nacre.cli.signals import Interruption
 from nacre.cli.terminal import CommandError
 from nacre.errors import CameraError
 
 if TYPE_CHECKING:
     from nacre.datasets import LiveQueue, RealSense, Sequence
+    from nacre.reconstruction.runner import Step
 
 _CAMERA = "realsense"
 
@@ -39,20 +42,48 @@ class LiveFeed:
         self._keep = keep
         self._pick = pick
         self._close = close
+        self._is_enough = False
+        self._is_closed = False
 
     def __iter__(self) -> Iterator[int]:
         try:
-            yield from islice(map(self._keep, self._queue), *self._pick)
+            for index in islice(map(self._keep, self._queue), *self._pick):
+                yield index
+                if self._is_enough:
+                    break
         except CameraError as error:
             if not self._queue.num_received:
                 raise
             self.error = error
 
-    def close(self) -> None:
+    def tend(self, step: Step, stop: Interruption) -> None:
+        """Between two steps of a run: see that what came can be read again; end where it is enough."""
+        from nacre.datasets.recorder import GrowingRecording
+        from nacre.reconstruction.runner import FrameDone, StageBegun
+
+        if isinstance(step, FrameDone) and isinstance(self.sequence, GrowingRecording):
+            self.sequence.settle()  # what a journal will name
+        if isinstance(step, StageBegun) and step.name == "lost frames":
+            self.close(stop)
+        self._heed(stop)
+
+    def close(self, stop: Interruption | None = None) -> None:
         """Stop the camera and finish its recording."""
-        if self._close is not None:
-            self._close()
-        self._queue.close()
+        if self._is_closed:
+            return
+        try:
+            if self._close is not None:
+                self._close()
+            self._queue.close()
+        finally:
+            self._heed(stop)
+            self._is_closed = True
+
+    def _heed(self, stop: Interruption | None) -> None:
+        """Take Ctrl-C: who stops a camera is content with what it saw."""
+        if stop is not None and stop.number == signal.SIGINT and self.is_camera and not self._is_closed:
+            stop.number = 0
+            self._is_enough = True
 
     @property
     def figures(self) -> dict[str, Any]:

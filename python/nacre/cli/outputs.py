@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from nacre.cli.terminal import to_json
 
 if TYPE_CHECKING:
+    from nacre.datasets import Sequence
     from nacre.reconstruction import Reconstruction
 
 _PICTURE_NAMES = {
@@ -106,6 +107,24 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
             ("time per frame", f"{quantity(float(np.median(times)), 'ms')} (median; 99 % within {slow})")
         )
     return rows
+
+
+def describe_recording(sequence: Sequence) -> dict[str, Any]:
+    """Return what report.json says about the recording."""
+    camera = sequence.camera
+    names: tuple[str, ...] = ("model", "width", "height", "pixel_size")
+    if camera.model != "orthographic":
+        names = ("model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "depth")
+    return {
+        "path": str(sequence.path),
+        "name": sequence.name,
+        "format": sequence.format,
+        "num_frames": len(sequence),
+        "camera": {name: getattr(camera, name) for name in names},
+        "depth_scale": sequence.depth_scale,
+        "color": sequence.has_color,
+        "truth": sequence.truth is not None,
+    }
 
 
 def file_rows(folder: Path) -> list[tuple[str, str]]:

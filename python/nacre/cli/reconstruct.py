@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -10,17 +11,18 @@ import typer
 
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
 from nacre.cli.live_feed import LiveFeed, camera_feed, is_camera, real_time_feed
-from nacre.cli.run import Run, carry_out
-from nacre.cli.run_options import RunOptions, asked_before, check_recording, describe
+from nacre.cli.run import Job, carry_out
+from nacre.cli.run_options import RunOptions, check_recording, describe, options_before, read_document
 from nacre.cli.signals import interruptible
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_folder
-from nacre.cli.unfinished import Unfinished, read_asked
 from nacre.cli.view import PortOption
 from nacre.errors import FileFormatError
 
 if TYPE_CHECKING:
     from nacre import ModelParameters
+    from nacre.datasets import Sequence as Recording
+    from nacre.reconstruction.resume import UnfinishedRun
 
 
 def reconstruct(
@@ -153,15 +155,18 @@ def reconstruct(
     that was killed, to the same model. OUT/unfinished is there as long as a run is not finished.
     """
     terminal = Terminal(json, quiet, verbose)
+    from nacre.reconstruction.resume import UnfinishedRun
+
     with interruptible() as stop, ExitStack() as ends:
         if resume is not None:
-            unfinished = ends.enter_context(closing(Unfinished(resume, checkpoint_every)))
-            run = _resumed(context, unfinished)
+            _refuse_more_options(context, resume)
+            unfinished = ends.enter_context(closing(UnfinishedRun(resume, checkpoint_every)))
+            job = _resumed(unfinished)
         else:
             if source is None or out is None:
                 missing = "argument 'SOURCE'" if source is None else "option '--out' / '-o'"
                 raise CommandError(f"missing {missing} (see nacre reconstruct --help)", 2)
-            unfinished = ends.enter_context(closing(Unfinished(out, checkpoint_every)))
+            unfinished = ends.enter_context(closing(UnfinishedRun(out, checkpoint_every)))
             more: dict[str, Any] = {
                 "depth.min_depth": min_depth,
                 "depth.max_depth": max_depth,
@@ -171,7 +176,7 @@ def reconstruct(
             more |= {f"region.{side}": value for side, value in zip(sides, box or (), strict=box is not None)}
             more["region.object"] = object or None
             parameters, preset_name = model_parameters(preset, config, settings, **more)
-            asked = RunOptions(
+            options = RunOptions(
                 str(source),
                 format=format,
                 camera=_text(camera),
@@ -188,93 +193,111 @@ def reconstruct(
                 preset=preset_name,
                 is_camera=is_camera(source),
             )
-            run = _begun(terminal, asked, unfinished, parameters)
-        carry_out(terminal, run, stop, port if view else None)
+            job = _begun(terminal, options, unfinished, parameters)
+        carry_out(terminal, job, stop, port if view else None)
 
 
 def _text(path: Path | None) -> str | None:
     return None if path is None else str(path)
 
 
-def _begun(terminal: Terminal, asked: RunOptions, unfinished: Unfinished, parameters: ModelParameters) -> Run:
-    """Open what was asked for, and note it in ``OUT/unfinished``."""
-    out = unfinished.out
-    feed: LiveFeed | None = None
-    indices: range | None = None
-    if asked.is_camera:
-        given: dict[str, Any] = {
-            "--format": asked.format,
-            "--camera": asked.camera,
-            "--depth-scale": asked.depth_scale,
-        }
-        given |= {"--masks": asked.masks, "--attribute": asked.attribute or None}
-        for option, value in (given | {"--realtime": asked.realtime or None}).items():
-            if value is not None:
-                raise CommandError(f"{option} is for recordings, and {asked.source} is a camera", 2)
-        feed = camera_feed(Path(asked.source), writable_folder(out), asked.color, asked.pick)
-        sequence, words = feed.sequence, f"live, {describe_camera(feed.sequence.camera)}"
-    else:
-        sequence = asked.open()
-        indices = asked.indices(sequence)
-        words = describe(sequence, indices)
-        if asked.realtime:
-            feed = real_time_feed(sequence, indices)
+def _begun(
+    terminal: Terminal, options: RunOptions, unfinished: UnfinishedRun, parameters: ModelParameters
+) -> Job:
+    """Open what is asked for, and note it in ``OUT/unfinished``."""
     import nacre
     from nacre.io.atomic import remove_leftovers
     from nacre.reconstruction import Reconstruction
-    from nacre.reconstruction.calibration import shows_one_scene
+    from nacre.reconstruction.calibration import DepthViews, shows_one_scene
+    from nacre.reconstruction.runner import Run
 
+    out = unfinished.out
+    feed: LiveFeed | None = None
+    indices: Iterable[int]
+    if options.is_camera:
+        options.require_none_for_a_camera()
+        feed = camera_feed(Path(options.source), writable_folder(out), options.color, options.pick)
+        sequence, num_frames = feed.sequence, None
+        words, indices = f"live, {describe_camera(sequence.camera)}", feed
+    else:
+        sequence = options.open()
+        chosen = options.indices(sequence)
+        words, num_frames, indices = describe(sequence, chosen), len(chosen), chosen
+        if options.realtime:
+            indices = feed = real_time_feed(sequence, chosen)
     done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
     writable_folder(out)
-    unfinished.hold()
+    _hold(unfinished)
     remove_leftovers(out)
-    whole = feed is None and shows_one_scene(sequence.camera, parameters)
-    calibrates = asked.calibrate and whole and asked.preset != "paper"
     if unfinished.checkpoint.exists():
         terminal.say(
             f"{out} held an unfinished run, which --resume would have gone on with: it is begun again"
         )
-    unfinished.stage.name = "views" if calibrates else "frames"
-    unfinished.stage.live = None if feed is None else feed.figures
-    unfinished.begin(done, asked.document(sequence))
-    return Run(asked, out, done, sequence, unfinished, words, indices, feed)
+    calibrates = options.calibrate and options.preset != "paper" and feed is None
+    views = DepthViews() if calibrates and shows_one_scene(sequence.camera, parameters) else None
+    run = Run(done, indices, views=views, retry=options.retry)
+    unfinished.live = None if feed is None else feed.figures
+    unfinished.begin(run, options.document(sequence))
+    return Job(options, sequence, words, num_frames, run, unfinished, feed)
 
 
-def _resumed(context: typer.Context, unfinished: Unfinished) -> Run:
-    """Open what a run was asked for that was stopped or killed, and load what it had."""
-    out = unfinished.out
+def _refuse_more_options(context: typer.Context, out: Path) -> None:
     allowed = ("resume", "checkpoint_every", "view", "port", "json", "quiet", "verbose")
     for name in context.params:
         if name not in allowed and str(context.get_parameter_source(name)).endswith("COMMANDLINE"):
             option = "SOURCE" if name == "source" else "--" + name.replace("_", "-")
             raise CommandError(f"--resume takes everything from {out / 'unfinished'}: leave out {option}", 2)
+
+
+def _resumed(unfinished: UnfinishedRun) -> Job:
+    """Open what a run was asked for that was stopped or killed, and load what it had."""
+    from nacre.io.atomic import remove_leftovers
+
+    out = unfinished.out
     if out.is_dir():
-        unfinished.hold()
-    document = read_asked(out)
-    asked, folder = asked_before(document, out / "unfinished" / "run.json")
-    if asked.is_camera:
+        _hold(unfinished)
+    document = read_document(unfinished)
+    options, folder = options_before(document, unfinished.document_path)
+    indices: Sequence[int]
+    if options.is_camera:
         from nacre.datasets.recorder import mend
 
         mend(out / "recording")
         sequence = open_source(out / "recording")
-        words = f"live, {describe_camera(sequence.camera)}"
-        indices: Any = range(len(sequence))
+        words, indices = f"live, {describe_camera(sequence.camera)}", range(len(sequence))
     else:
-        sequence = asked.open(folder)
+        sequence = options.open(folder)
         check_recording(document, sequence)
-        indices = asked.indices(sequence)
-        words = describe(sequence, indices)
-        if asked.realtime:  # what it had seen; which frames come, is the clock's doing
-            indices = unfinished.journaled_indices()
-            if max(indices, default=0) >= len(sequence):
-                reason = f"frame {max(indices)} is none of the recording's {len(sequence)}"
-                raise FileFormatError(unfinished.folder / "journal.txt", reason)
-    from nacre.io.atomic import remove_leftovers
-
+        chosen = options.indices(sequence)
+        words = describe(sequence, chosen)
+        # Of a recording in real time what it had seen; which frames come, is the clock's doing.
+        indices = _journaled_indices(unfinished, sequence) if options.realtime else chosen
     for place in (out, unfinished.folder):
         remove_leftovers(place)
-    done = unfinished.resume(sequence, compare=not asked.is_camera)  # its colours were kept as JPEG
-    live = unfinished.stage.live
-    if live is not None and len(done.frames) < len(unfinished.journaled_indices()):  # since, nobody counted
-        unfinished.stage.live = {**live, "num_received": None, "num_dropped": None}
-    return Run(asked, out, done, sequence, unfinished, words, indices, None)
+    compare = not options.is_camera  # its colours were kept as JPEG
+    run = unfinished.resume(sequence, indices, compare=compare, retry=options.retry)
+    live = unfinished.live
+    if live is not None and len(run.done.frames) < len(
+        unfinished.journaled_indices()
+    ):  # nobody counted since
+        unfinished.live = {**live, "num_received": None, "num_dropped": None}
+    return Job(options, sequence, words, len(indices), run, unfinished)
+
+
+def _journaled_indices(unfinished: UnfinishedRun, sequence: Recording) -> list[int]:
+    indices = unfinished.journaled_indices()
+    if max(indices, default=0) >= len(sequence):
+        reason = f"frame {max(indices)} is none of the recording's {len(sequence)}"
+        raise FileFormatError(unfinished.journal_path, reason)
+    return indices
+
+
+def _hold(unfinished: UnfinishedRun) -> None:
+    try:
+        unfinished.hold()
+    except BlockingIOError:
+        raise CommandError(
+            f"another nacre reconstruct is writing to {unfinished.out}: wait until it has ended; "
+            "a new run can go to another folder (-o)",
+            2,
+        ) from None

@@ -1,179 +1,170 @@
-"""The work of ``nacre reconstruct``: frames, lost frames again, results; saved where it is stopped."""
+"""The work of ``nacre reconstruct``: a run, results; saved where it is stopped."""
 
 from __future__ import annotations
 
 import dataclasses
-import signal
-from collections.abc import Sequence as Collection
-from contextlib import closing, suppress
+from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
-from nacre.cli.calibrating import run_staged, watching
+from nacre.cli.follow import follow
 from nacre.cli.live_feed import LiveFeed
-from nacre.cli.outputs import file_rows, trajectory_rows, write_results
+from nacre.cli.outputs import describe_recording, file_rows, trajectory_rows, write_results
 from nacre.cli.run_options import RunOptions
-from nacre.cli.running import retry_lost, run_frames
 from nacre.cli.signals import Interruption, Stopped
 from nacre.cli.terminal import CommandError, Terminal, table, to_json
-from nacre.cli.unfinished import Unfinished
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
-    from nacre.reconstruction import Reconstruction
-    from nacre.reconstruction.frame_record import FrameRecord
+    from nacre.reconstruction.reconstruction import Reconstruction
+    from nacre.reconstruction.resume import UnfinishedRun
+    from nacre.reconstruction.runner import Run, Step
     from nacre.viewer import LiveView
 
 
 @dataclass
-class Run:
-    """A run that may have been begun before: frames come by their indices, or by themselves (feed)."""
+class Job:
+    """A run that may have been begun before; where frames come by themselves there is a feed."""
 
-    asked: RunOptions
-    out: Path
-    done: Reconstruction
+    options: RunOptions
     sequence: Sequence
-    unfinished: Unfinished
     words: str
-    indices: Collection[int] | None
-    feed: LiveFeed | None
+    num_frames: int | None
+    run: Run
+    unfinished: UnfinishedRun
+    feed: LiveFeed | None = None
 
 
-def carry_out(terminal: Terminal, run: Run, stop: Interruption, port: int | None) -> None:
+def carry_out(terminal: Terminal, job: Job, stop: Interruption, port: int | None) -> None:
     """Bring a run to its end, or to where it is stopped; ``port``: show it there."""
-    terminal.say(f"{run.sequence.name}: {run.words}")
-    if run.done.frames:
-        terminal.say(f"going on after {len(run.done.frames)} frames")
-    live = None
-    if port is not None:
-        from nacre.viewer import LiveView
+    from nacre.reconstruction.journal import ChangedRunError
 
-        live = LiveView(run.done, run.sequence.name, port=port)
-        for frame in run.done.frames:
-            live.add(frame)
-        terminal.say(f"the model is at {live.viewer.url}")
+    terminal.say(f"{job.sequence.name}: {job.words}")
+    if job.run.done.frames:
+        terminal.say(f"going on after {len(job.run.done.frames)} frames")
+    live = None if port is None else _show(terminal, job, port)
     try:
-        done = _run_all(terminal, run, stop, live)
+        try:
+            _run(terminal, job, stop, live)
+        except ChangedRunError as error:
+            raise CommandError(f"{error}; run it again without --resume") from error
         if not stop.wanted:
             with suppress(Stopped), stop.at_once():
-                report = _write(run, done, stop)
+                report = _write(job, stop)
         if stop.wanted:
-            _save(terminal, run, done, stop)
+            _save(terminal, job, stop)
             raise typer.Exit(stop.exit_code)
     except CommandError:
-        if all(frame.report is None for frame in run.done.frames):
-            run.unfinished.remove()
+        if all(frame.report is None for frame in job.run.done.frames):
+            job.unfinished.remove()
         raise
     except (OSError, MemoryError) as error:
         what = "files can be written again" if isinstance(error, OSError) else "there is more memory"
-        terminal.say(f"nacre reconstruct --resume {run.out} goes on where {what}")
+        terminal.say(f"nacre reconstruct --resume {job.unfinished.out} goes on where {what}")
         raise
-    run.unfinished.remove()
+    job.unfinished.remove()
     if terminal.json:
         print(to_json(report))
-    rows = [] if run.feed is None else run.feed.rows
-    terminal.say(table([*trajectory_rows(done), *rows, *file_rows(run.out)]))
+    rows = [] if job.feed is None else job.feed.rows
+    terminal.say(table([*trajectory_rows(job.run.done), *rows, *file_rows(job.unfinished.out)]))
     if live is not None:
         live.finish()
         terminal.say(f"the model stays at {live.viewer.url}; Ctrl-C ends it")
         with suppress(Stopped), stop.at_once():
             live.viewer.wait()
         live.viewer.close()
-    if run.feed is not None and run.feed.error is not None:
-        raise CommandError(f"{run.feed.error}; what there is was written")
-    if done.num_tracked == 0:
-        reasons = list(dict.fromkeys(frame.reason for frame in done.frames))
-        others = " (and other reasons)" * (len(reasons) > 1)
-        raise CommandError(
-            f"every frame was lost: {reasons[0]}{others}; nacre info {run.asked.source} looks at its depth"
-        )
+    _complain(job)
 
 
-def _run_all(terminal: Terminal, run: Run, stop: Interruption, live: LiveView | None) -> Reconstruction:
-    """Run the frames that are not done yet; return the reconstruction, which may be another one by then."""
-    done = run.done
-    if run.feed is not None:
-        with closing(run.feed):
-            _run_feed(terminal, run, run.feed, stop, live)
-        if run.feed.is_camera and stop.number == signal.SIGINT:
-            stop.number = 0  # who stops a camera is content with what it saw
-    elif run.indices is not None:
-        done = run_staged(terminal, done, run.indices, run.unfinished, stop, live)
-    if run.asked.retry and not stop.wanted:
-        retry_lost(terminal, done, stop, watching(done, run.unfinished, None))
-    return done
+def _show(terminal: Terminal, job: Job, port: int) -> LiveView:
+    from nacre.viewer import LiveView
+
+    live = LiveView(job.run.done, job.sequence.name, port=port)
+    for frame in job.run.done.frames:
+        live.add(frame)
+    terminal.say(f"the model is at {live.viewer.url}")
+    return live
 
 
-def _run_feed(
-    terminal: Terminal, run: Run, feed: LiveFeed, stop: Interruption, live: LiveView | None
-) -> None:
-    """Run the frames that come by themselves."""
-    from nacre.datasets.recorder import GrowingRecording
+def _run(terminal: Terminal, job: Job, stop: Interruption, live: LiveView | None) -> None:
+    """Run the frames that are not done yet, and lost ones again."""
+    from nacre.reconstruction.runner import FrameDone, Restarted
 
-    tell = watching(run.done, run.unfinished, live)
+    def note(step: Step) -> None:
+        if isinstance(step, FrameDone):
+            job.unfinished.add(step.frame)
+            if live is not None:
+                live.add(step.frame)
+        elif isinstance(step, Restarted):
+            terminal.say(
+                f"depth is tilted by {step.calibration.tilt:.4f} (sigma {step.calibration.sigma:.4f}) per "
+                "metre: beginning again with corrected depth"
+            )
+            if live is not None:
+                live.begin_again(job.run.done)
 
-    def watch(frame: FrameRecord) -> None:
-        run.unfinished.stage.live = feed.figures
-        if isinstance(run.sequence, GrowingRecording):
-            run.sequence.settle()  # what the journal names can be read again
-        tell(frame)
+    feed = job.feed
+    if feed is None:
+        follow(terminal, job.run, stop, [note])
+        return
 
-    run_frames(terminal, run.done, feed, stop, watch=watch)
-    run.unfinished.stage.live = feed.figures
+    def tend(step: Step) -> None:
+        feed.tend(step, stop)
+        job.unfinished.live = feed.figures
+
+    try:
+        follow(terminal, job.run, stop, [tend, note])
+    finally:
+        feed.close(stop)
+    job.unfinished.live = feed.figures
 
 
-def _write(run: Run, done: Reconstruction, stop: Interruption) -> dict[str, Any]:
+def _write(job: Job, stop: Interruption) -> dict[str, Any]:
     """Write the results; of a run that is stopped without the page, whose pictures take long."""
+    done = job.run.done
     done.evaluate_trajectory()
-    feed, stage = run.feed, run.unfinished.stage
-    calibration = done.depth_calibration
+    feed, calibration = job.feed, done.depth_calibration
     return write_results(
-        run.out,
+        job.unfinished.out,
         done,
-        title=run.sequence.name,
-        source=run.words if feed is None else f"{run.words}; {feed.summary}",
+        title=job.sequence.name,
+        source=job.words if feed is None else f"{job.words}; {feed.summary}",
         document={
-            "recording": recording(run.sequence),
-            "preset": run.asked.preset,
+            "recording": describe_recording(job.sequence),
+            "preset": job.options.preset,
             "interrupted": stop.wanted,
             "depth_calibration": calibration
             and dataclasses.asdict(calibration) | {"used": calibration.is_significant},
-            "live": stage.live,
+            "live": job.unfinished.live,
         },
         figures=None if feed is None else dict(feed.rows),
         page=not stop.wanted,
     )
 
 
-def _save(terminal: Terminal, run: Run, done: Reconstruction, stop: Interruption) -> None:
+def _save(terminal: Terminal, job: Job, stop: Interruption) -> None:
     """Save a run that is stopped, and write what there is."""
-    run.unfinished.save(done)
-    report = _write(run, done, stop)
+    job.unfinished.save()
+    report = _write(job, stop)
     if terminal.json:
         print(to_json(report))
-    total = f" of {len(run.indices)}" if run.indices is not None else ""
+    total = "" if job.num_frames is None else f" of {job.num_frames}"
     terminal.say(
-        f"interrupted after {len(done.frames)}{total} frames; what there is was written, but report.html\n"
-        f"nacre reconstruct --resume {run.out} goes on"
+        f"interrupted after {len(job.run.done.frames)}{total} frames; what there is was written, but "
+        f"report.html\nnacre reconstruct --resume {job.unfinished.out} goes on"
     )
 
 
-def recording(sequence: Sequence) -> dict[str, Any]:
-    """Return what report.json says about the recording."""
-    camera = sequence.camera
-    names: tuple[str, ...] = ("model", "width", "height", "pixel_size")
-    if camera.model != "orthographic":
-        names = ("model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "depth")
-    return {
-        "path": str(sequence.path),
-        "name": sequence.name,
-        "format": sequence.format,
-        "num_frames": len(sequence),
-        "camera": {name: getattr(camera, name) for name in names},
-        "depth_scale": sequence.depth_scale,
-        "color": sequence.has_color,
-        "truth": sequence.truth is not None,
-    }
+def _complain(job: Job) -> None:
+    """Raise what went wrong with a run whose results are written all the same."""
+    done: Reconstruction = job.run.done
+    if job.feed is not None and job.feed.error is not None:
+        raise CommandError(f"{job.feed.error}; what there is was written")
+    if done.num_tracked == 0:
+        reasons = list(dict.fromkeys(frame.reason for frame in done.frames))
+        others = " (and other reasons)" * (len(reasons) > 1)
+        raise CommandError(
+            f"every frame was lost: {reasons[0]}{others}; nacre info {job.options.source} looks at its depth"
+        )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import logging
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +16,7 @@ from nacre.errors import FileFormatError, shown
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
+    from nacre.reconstruction.resume import UnfinishedRun
 
 _log = logging.getLogger(__name__)
 
@@ -43,6 +45,19 @@ class RunOptions:
     def pick(self) -> tuple[int, int | None, int]:
         """Which frames, as a slice."""
         return self.first, None if self.last is None else self.last + 1, self.every
+
+    def require_none_for_a_camera(self) -> None:
+        """Refuse the options that only recordings have."""
+        for option, value in (
+            ("--format", self.format),
+            ("--camera", self.camera),
+            ("--depth-scale", self.depth_scale),
+            ("--masks", self.masks),
+            ("--attribute", self.attribute or None),
+            ("--realtime", self.realtime or None),
+        ):
+            if value is not None:
+                raise CommandError(f"{option} is for recordings, and {self.source} is a camera", 2)
 
     def open(self, folder: Path | None = None) -> Sequence:
         """Open the recording; paths that are not absolute begin at a folder, or where we are."""
@@ -84,8 +99,8 @@ class RunOptions:
         }
 
 
-def asked_before(document: Mapping[str, Any], path: Path) -> tuple[RunOptions, Path]:
-    """Return what ``run.json`` says, and the folder that paths begin at."""
+def options_before(document: Mapping[str, Any], path: Path) -> tuple[RunOptions, Path]:
+    """Return the options that ``run.json`` tells, and the folder that paths begin at."""
     try:
         recording = document["recording"]
         if not (recording is None or (isinstance(recording, dict) and "files" in recording)):
@@ -95,25 +110,54 @@ def asked_before(document: Mapping[str, Any], path: Path) -> tuple[RunOptions, P
         raise FileFormatError(path, f"it does not say what was asked for ({error})") from None
 
 
-def _checked(asked: RunOptions) -> RunOptions:
-    """Return options that a file tells; a TypeError or a ValueError says what nobody can have asked for."""
+def read_document(unfinished: UnfinishedRun) -> dict[str, Any]:
+    """Return what ``run.json`` says, or say that there is nothing to resume."""
+    out = unfinished.out
+    try:
+        return unfinished.document()
+    except FileNotFoundError:
+        if (out / "report.json").exists():
+            raise CommandError(f"{out} holds a run that is finished: there is nothing to resume", 2) from None
+        what = f"{out} holds no unfinished run" if out.is_dir() else f"there is no folder {out}"
+        raise CommandError(f"{what}; give the folder that nacre reconstruct wrote to (its -o)", 2) from None
+
+
+def describe_unfinished(out: Path) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+    """Return what there is to tell of an unfinished run."""
+    from nacre.reconstruction.journal import read_journal
+    from nacre.reconstruction.resume import UnfinishedRun
+
+    unfinished = UnfinishedRun(out)
+    source = options_before(read_document(unfinished), unfinished.document_path)[0].source
+    entries, _ = read_journal(unfinished.journal_path)
+    figures = {"kind": "unfinished run", "path": os.fspath(out), "source": source, "num_done": len(entries)}
+    lost = sum(entry[2] == "LOST" for entry in entries)
+    return figures, [
+        ("unfinished run", f"of {source}"),
+        ("frames done", f"{len(entries)}" + f", {lost} lost" * bool(lost)),
+        ("go on", f"nacre reconstruct --resume {out}"),
+    ]
+
+
+def _checked(options: RunOptions) -> RunOptions:
+    """Return options that a file tells; a TypeError or a ValueError says what nobody can have options for."""
     from nacre._internal.arrays import as_count, as_flag, as_scale
 
     for name in ("source", "preset", "format", "camera", "masks"):
-        value = getattr(asked, name)
+        value = getattr(options, name)
         may_be_none = name not in ("source", "preset")
         if not (isinstance(value, str) and "\0" not in value) and not (value is None and may_be_none):
             raise TypeError(f"{name} must be a text, got {shown(value)}")
     for name in ("color", "realtime", "retry", "calibrate", "is_camera"):
-        as_flag(name, getattr(asked, name))
+        as_flag(name, getattr(options, name))
     for name, minimum in (("first", 0), ("last", 0), ("every", 1)):
-        if getattr(asked, name) is not None or name != "last":
-            as_count(name, getattr(asked, name), minimum=minimum)
-    if asked.depth_scale is not None:
-        as_scale("depth_scale", asked.depth_scale)
-    if not (isinstance(asked.attribute, list) and all(isinstance(text, str) for text in asked.attribute)):
-        raise TypeError(f"attribute must be a list of texts, got {shown(asked.attribute)}")
-    return asked
+        if getattr(options, name) is not None or name != "last":
+            as_count(name, getattr(options, name), minimum=minimum)
+    if options.depth_scale is not None:
+        as_scale("depth_scale", options.depth_scale)
+    if not (isinstance(options.attribute, list) and all(isinstance(text, str) for text in options.attribute)):
+        raise TypeError(f"attribute must be a list of texts, got {shown(options.attribute)}")
+    return options
 
 
 def check_recording(document: Mapping[str, Any], sequence: Sequence) -> None:

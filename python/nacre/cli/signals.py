@@ -17,11 +17,20 @@ class Stopped(BaseException):
 
 
 class Interruption:
-    """Whether Ctrl-C (SIGINT) or SIGTERM came."""
+    """
+    Whether Ctrl-C (SIGINT) or SIGTERM came.
+
+    Attributes
+    ----------
+    number : int
+        The first signal's; 0: none came.
+    ends_at_once : bool
+        Whether the first signal raises :class:`Stopped`: what runs has nothing to bring to its end.
+    """
 
     def __init__(self) -> None:
         self.number = 0
-        self._ends_at_once = False
+        self.ends_at_once = False
 
     @property
     def wanted(self) -> bool:
@@ -35,16 +44,16 @@ class Interruption:
 
     @contextmanager
     def at_once(self) -> Iterator[None]:
-        """While what runs here has nothing to bring to its end: the first signal raises :class:`Stopped`."""
-        self._ends_at_once = True
+        """While what runs here has nothing to bring to its end."""
+        self.ends_at_once = True
         try:
             yield
         finally:
-            self._ends_at_once = False
+            self.ends_at_once = False
 
     def note(self, number: int) -> None:
         """Take a signal."""
-        if self.number or self._ends_at_once:
+        if self.number or self.ends_at_once:
             self.number = self.number or number
             raise Stopped(number)
         self.number = number

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-
 import numpy as np
 import numpy.typing as npt
 
@@ -57,14 +55,6 @@ class DepthViews:
             if last is None or turn_between(last, pose) >= LEAST_TURN:
                 self.chosen.append((frame.index, pose.ravel().tolist()))
         return self.are_enough
-
-    def until_enough(self, frames: Iterable[FrameRecord]) -> Iterator[FrameRecord]:
-        """Yield frames that are done, as long as more are needed."""
-        for frame in frames:
-            enough = self.add(frame)
-            yield frame
-            if enough:
-                break
 
     def calibrate(self, done: Reconstruction) -> Reconstruction:
         """Return the run, which knows then what the views say; a new one where depth is to be corrected."""

@@ -14,6 +14,7 @@ from nacre.parameters import ModelParameters, Preset
 from nacre.reconstruction.calibration import DepthViews, shows_one_scene
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.reconstruction import Reconstruction
+from nacre.reconstruction.runner import Run
 
 
 def reconstruct(
@@ -86,7 +87,7 @@ def reconstruct(
         raise ValueError("source must have at least one frame, got none")
     of_all = frames.camera if isinstance(frames, Recording) else frames[0].camera
     model = Model(of_all, preset, parameters=parameters, **changes)
-    done = Reconstruction(frames, model)
+    views = None
     if calibrate:
         if not shows_one_scene(of_all, model.parameters):
             raise ValueError(
@@ -94,9 +95,5 @@ def reconstruct(
                 f"pinhole, got {calibrate!r}"
             )
         views = DepthViews()
-        done._work(views.until_enough(done.run()), progress)
-        if done.cancelled:
-            done.evaluate_trajectory()
-            return done
-        done = views.calibrate(done)
-    return done.complete(progress=progress, retry=retry)
+    run = Run(Reconstruction(frames, model), range(len(frames)), views=views, retry=retry)
+    return run.to_end(progress)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import collections.abc
 import dataclasses
-import itertools
 import logging
 import os
 from collections import Counter
@@ -26,7 +25,6 @@ from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result
 from nacre.frame_report import STATUSES, FrameReport
 from nacre.model import Model
-from nacre.progress import as_progress
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.saved_state import calibration_from, record_from, record_state
 from nacre.report.run_figures import run_dict, run_report
@@ -115,20 +113,10 @@ class Reconstruction(Checkpointed):
         Reconstruction
             This one.
         """
-        self._work(itertools.chain(self.run(indices), self.retry_lost() if retry else ()), progress)
-        self.evaluate_trajectory()
-        return self
+        from nacre.reconstruction.runner import Run
 
-    def _work(
-        self, frames: Iterable[FrameRecord], progress: Callable[[FrameRecord], bool | None] | None
-    ) -> None:
-        """Have frames done one after the other, as far as the callback wants them."""
-        goes_on = as_progress("progress", progress) if progress is not None else None
-        for frame in frames:
-            if goes_on is not None and not goes_on(frame):
-                self.cancelled = True
-                _log.info("cancelled after %d frames", len(self.frames))
-                break
+        rest = range(len(self.sequence)) if indices is None else iter(indices)
+        return Run(self, rest, retry=retry).to_end(progress)
 
     def run(self, indices: Iterable[int] | None = None) -> Iterator[FrameRecord]:
         """Add frames to the model, those with the given indices or all, and yield each when it is done."""

@@ -229,7 +229,7 @@ def start(options: str, *arguments: str) -> subprocess.Popen[str]:
 
 class TestTheCommand:
     def test_what_it_saw_before_it_was_killed_can_be_finished(self, tmp_path: Path) -> None:
-        from nacre.cli.journal import read_journal
+        from nacre.reconstruction.journal import read_journal
 
         out = tmp_path / "out"
         running = start("", "reconstruct", "realsense", "-o", str(out))

@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("typer")
 from killed_runs import command, killed_after, plain_page, recording_with_gaps, results, undisturbed_results  # noqa: F401  fixtures
 
-from nacre.cli.unfinished import Unfinished
+from nacre.reconstruction.resume import UnfinishedRun
 
 
 def test_the_second_is_refused_and_the_first_is_not_disturbed(
@@ -21,9 +21,9 @@ def test_the_second_is_refused_and_the_first_is_not_disturbed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     out = tmp_path / "o"
-    whole, refused = Unfinished.add, []
+    whole, refused = UnfinishedRun.add, []
 
-    def add(self: Unfinished, *more: Any) -> None:
+    def add(self: UnfinishedRun, *more: Any) -> None:
         whole(self, *more)
         if not refused:
             before = {path: path.read_bytes() for path in out.rglob("*") if path.is_file()}
@@ -31,7 +31,7 @@ def test_the_second_is_refused_and_the_first_is_not_disturbed(
             refused.append(command("reconstruct", recording, "-o", out))
             assert {path: path.read_bytes() for path in out.rglob("*") if path.is_file()} == before
 
-    monkeypatch.setattr(Unfinished, "add", add)
+    monkeypatch.setattr(UnfinishedRun, "add", add)
     assert command("reconstruct", recording, "-o", out)[0] == 0
     for code, _, error in refused:
         assert code == 2

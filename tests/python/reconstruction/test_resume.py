@@ -29,8 +29,8 @@ from killed_runs import (  # noqa: F401  fixtures
     undisturbed_results,
 )
 
-from nacre.cli.journal import _line, read_journal
-from nacre.cli.unfinished import Stage
+from nacre.reconstruction.journal import _line, read_journal
+from nacre.reconstruction.resume import Stage
 
 POSE = np.eye(4).ravel().tolist()
 

@@ -6,13 +6,14 @@ import json
 import os
 import zlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from nacre.cli.terminal import CommandError
 from nacre.errors import FileFormatError
+from nacre.reconstruction.frame_record import FrameRecord
 
-if TYPE_CHECKING:
-    from nacre.reconstruction.frame_record import FrameRecord
+
+class ChangedRunError(RuntimeError):
+    """What is run again comes out otherwise than before the run was interrupted."""
 
 
 def _line(entry: list[Any]) -> bytes:
@@ -89,10 +90,9 @@ class Journal:
         if self._expected:
             before = self._expected.pop()
             if before != entry:
-                raise CommandError(
+                raise ChangedRunError(
                     f"frame {record.index} is {record.status} at another place than before the run was "
-                    "interrupted: the recording, nacre or the processor has changed; run it again without "
-                    "--resume"
+                    "interrupted: the recording, nacre or the processor has changed"
                 )
             return
         try:

@@ -1,0 +1,197 @@
+"""``OUT/unfinished``: what a run is resumed from that was stopped or killed."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+from nacre._internal.arrays import as_count, as_vector
+from nacre.datasets.sequence import SequenceFrame
+from nacre.errors import FileFormatError
+from nacre.io.atomic import atomic_writer, remove_leftovers
+from nacre.io.folder_lock import lock_folder
+from nacre.io.json_files import read_json
+from nacre.reconstruction.calibration import DepthViews
+from nacre.reconstruction.frame_record import FrameRecord
+from nacre.reconstruction.journal import Journal, read_journal
+from nacre.reconstruction.reconstruction import Reconstruction
+from nacre.reconstruction.runner import Run
+
+_FORMAT = 1
+_RARE = 50.0  # a checkpoint is written when so many times what the last one took has gone by: 2 % of the time
+_LEAST_SECONDS = 5.0
+
+
+@dataclass
+class Stage:
+    """
+    Where a run is.
+
+    Attributes
+    ----------
+    name : str
+        "views": frames, until there are enough views to calibrate depth; "frames": the rest, or all of them.
+        Lost frames are tried again when there are no more.
+    views : list of (index, pose)
+        That were chosen for the calibration; poses row by row.
+    live : mapping or None
+        What report.json says of a camera.
+    """
+
+    name: str = "frames"
+    views: list[tuple[int, list[float]]] = field(default_factory=list)
+    live: Mapping[str, Any] | None = None
+
+    @classmethod
+    def of(cls, state: Any) -> Stage:
+        """Return the stage that plain values tell."""
+        name, live = state["name"], state["live"]
+        if name not in ("views", "frames") or not (live is None or isinstance(live, dict)):
+            raise ValueError(f"no stage is {name!r} with live {live!r}")
+        views = [(as_count("view", i), as_vector("pose", pose, 16).tolist()) for i, pose in state["views"]]
+        return cls(name, views, live)
+
+
+class UnfinishedRun:
+    """
+    The folder ``OUT/unfinished``: run.json (what was asked for), journal.txt and checkpoint.
+
+    Parameters
+    ----------
+    out : Path
+        The folder of the results.
+    every : int, optional
+        A checkpoint after so many frames; 0: only where the run is stopped. None: by time, see above.
+
+    Attributes
+    ----------
+    live : mapping or None
+        What report.json says of a camera.
+    """
+
+    def __init__(self, out: Path, every: int | None = None) -> None:
+        self.out = out
+        self.folder = out / "unfinished"
+        self.live: Mapping[str, Any] | None = None
+        self._every = every
+        self._run: Run | None = None
+        self._journal: Journal | None = None
+        self._lock: int | None = None
+        self._num_since = 0
+        self._next = time.monotonic() + _LEAST_SECONDS
+
+    @property
+    def checkpoint(self) -> Path:
+        """The file of the newest checkpoint."""
+        return self.folder / "checkpoint"
+
+    @property
+    def document_path(self) -> Path:
+        """The file that says what was asked for."""
+        return self.folder / "run.json"
+
+    @property
+    def journal_path(self) -> Path:
+        """The file with a line for each frame that is done."""
+        return self.folder / "journal.txt"
+
+    def hold(self) -> None:
+        """Keep other processes from writing to ``OUT`` until this is closed; BlockingIOError: one does."""
+        self._lock = lock_folder(self.out)
+
+    def begin(self, run: Run, document: Mapping[str, Any]) -> None:
+        """Begin a new run; what was left of another goes."""
+        self._clear()
+        self.folder.mkdir(exist_ok=True)
+        self._run = run
+        self._journal = Journal(self.journal_path)
+        self.save()
+        data = json.dumps({"format": _FORMAT, **document}, indent=2, default=str)
+        with atomic_writer(self.document_path) as stream:  # the last: from here on it can be resumed
+            stream.write(data.encode() + b"\n")
+
+    def document(self) -> dict[str, Any]:
+        """Return what ``run.json`` says; FileNotFoundError: there is nothing to resume."""
+        path = self.document_path
+        found = read_json(path)
+        if not isinstance(found, dict) or found.get("format") != _FORMAT:
+            raise FileFormatError(
+                path, "it was written by another version of nacre; run it again without --resume"
+            )
+        if not isinstance(found.get("options"), dict):
+            raise FileFormatError(path, "options must be an object: it is no run of nacre reconstruct")
+        return found
+
+    def resume(
+        self, sequence: Sequence[SequenceFrame], indices: Sequence[int], *, compare: bool, retry: bool
+    ) -> Run:
+        """Return the run as it was at the newest checkpoint; what is done again may be compared."""
+        done, more = Reconstruction._load(self.checkpoint, sequence)
+        try:
+            stage = Stage.of(more["stage"])
+            num_frames = as_count("num_journaled", more["num_journaled"])
+        except (KeyError, TypeError, ValueError) as error:
+            raise FileFormatError(self.checkpoint, f"it is no run of nacre reconstruct ({error})") from None
+        self.live = stage.live
+        # Views that a killed process had no time to keep are not there any more.
+        views = DepthViews([view for view in stage.views if view[0] < len(sequence)])
+        self._run = Run(done, indices, views=views if stage.name == "views" else None, retry=retry)
+        self._journal = Journal(self.journal_path, num_frames, compare)
+        return self._run
+
+    def journaled_indices(self) -> list[int]:
+        """Return which frames had been done, in order, each once."""
+        return list(dict.fromkeys(entry[0] for entry in read_journal(self.journal_path)[0]))
+
+    def add(self, frame: FrameRecord) -> None:
+        """Note a frame that is done; write a checkpoint where it is time."""
+        assert self._journal is not None
+        self._journal.add(frame)
+        self._num_since += 1
+        due = time.monotonic() >= self._next if self._every is None else self._num_since == self._every
+        if due:
+            self.save()
+
+    def save(self) -> None:
+        """Write a checkpoint."""
+        assert self._journal is not None
+        assert self._run is not None
+        start = time.monotonic()
+        self._journal.sync()
+        views = self._run.views
+        stage = Stage("frames", [], self.live) if views is None else Stage("views", views.chosen, self.live)
+        self._run.done._save(self.checkpoint, stage=asdict(stage), num_journaled=self._journal.num_frames)
+        now = time.monotonic()
+        self._next = now + max(_LEAST_SECONDS, _RARE * (now - start))
+        self._num_since = 0
+
+    def close(self) -> None:
+        """Close the journal, and let others write to the folder of the results."""
+        self._close_journal()
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+    def remove(self) -> None:
+        """Remove the folder: the run is finished."""
+        self._close_journal()
+        self._clear()
+        self.close()
+
+    def _close_journal(self) -> None:
+        if self._journal is not None:
+            self._journal.close()
+            self._journal = None
+
+    def _clear(self) -> None:
+        remove_leftovers(self.folder)
+        for path in (self.document_path, self.checkpoint, self.journal_path):  # no run without the first
+            path.unlink(missing_ok=True)
+        with suppress(OSError):
+            self.folder.rmdir()

@@ -1,0 +1,126 @@
+"""The way of a recording into a model: one generator of steps, for all who run one."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Literal
+
+from nacre.depth_calibration import DepthCalibration
+from nacre.progress import as_progress
+from nacre.reconstruction.calibration import DepthViews
+from nacre.reconstruction.frame_record import FrameRecord
+from nacre.reconstruction.reconstruction import Reconstruction
+
+_log = logging.getLogger("nacre.reconstruction")
+
+
+@dataclass(frozen=True)
+class StageBegun:
+    """A stage begins, with so many frames to come; None: nobody knows, or there are none in it."""
+
+    name: Literal["frames", "calibration", "lost frames"]
+    num_frames: int | None = None
+
+
+@dataclass(frozen=True)
+class FrameDone:
+    """A frame was run, or a lost one was tried again."""
+
+    frame: FrameRecord
+
+
+@dataclass(frozen=True)
+class Restarted:
+    """Depth turned out to be systematically wrong: all begins again with corrected depth."""
+
+    calibration: DepthCalibration
+
+
+Step = StageBegun | FrameDone | Restarted
+
+
+class Run:
+    """
+    A recording that is run through a model, step by step.
+
+    Parameters
+    ----------
+    done : Reconstruction
+        What there is already, of a run that goes on.
+    indices : iterable of int
+        The frames to run. Of a sequence, those that are done are left out; others are run as they come.
+    views : DepthViews, optional
+        Frames are run until there are enough of them; then depth is calibrated, and where it is wrong all
+        begins again. None: depth is right, or known to be wrong already.
+    retry : bool
+        Whether lost frames are tried again at the end.
+
+    Attributes
+    ----------
+    done : Reconstruction
+        The run up to now; another one from :class:`Restarted` on.
+    views : DepthViews or None
+        None once depth is calibrated.
+    """
+
+    def __init__(
+        self,
+        done: Reconstruction,
+        indices: Iterable[int],
+        *,
+        views: DepthViews | None = None,
+        retry: bool = True,
+    ) -> None:
+        self.done = done
+        self.views = views
+        self._indices = indices
+        self._retry = retry
+
+    def steps(self) -> Generator[Step, None, None]:
+        """Do one thing after the other, and yield each when it is done (a stage, when it begins)."""
+        if self.views is not None:
+            yield from self._frames_until_enough(self.views)
+            yield StageBegun("calibration")
+            calibrated = self.views.calibrate(self.done)
+            is_new = calibrated is not self.done
+            self.done, self.views = calibrated, None
+            if is_new and calibrated.depth_calibration is not None:
+                yield Restarted(calibrated.depth_calibration)
+        yield from self._frames()
+        if self._retry:
+            yield StageBegun("lost frames", self.done.counts["LOST"] or None)
+            yield from map(FrameDone, self.done.retry_lost())
+
+    def to_end(self, progress: Callable[[FrameRecord], bool | None] | None = None) -> Reconstruction:
+        """Do all of it, as far as a callback wants the frames, and evaluate the trajectory."""
+        goes_on = None if progress is None else as_progress("progress", progress)
+        with closing(self.steps()) as steps:
+            for step in steps:
+                if isinstance(step, FrameDone) and goes_on is not None and not goes_on(step.frame):
+                    self.done.cancelled = True
+                    _log.info("cancelled after %d frames", len(self.done.frames))
+                    break
+        self.done.evaluate_trajectory()
+        return self.done
+
+    def _frames_until_enough(self, views: DepthViews) -> Iterator[Step]:
+        if views.are_enough:
+            return
+        for step in self._frames():
+            enough = isinstance(step, FrameDone) and views.add(step.frame)
+            yield step
+            if enough:
+                break
+
+    def _frames(self) -> Iterator[Step]:
+        rest = self._indices
+        if isinstance(rest, Sequence):
+            done = {frame.index for frame in self.done.frames}
+            rest = [index for index in rest if index not in done]
+            if not rest:
+                return
+        yield StageBegun("frames", len(rest) if isinstance(rest, Sequence) else None)
+        yield from map(FrameDone, self.done.run(rest))

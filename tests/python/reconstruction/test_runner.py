@@ -1,0 +1,57 @@
+"""The steps of a run, as who listens to one is told of them."""
+
+import numpy as np
+import pytest
+from test_depth_calibration import (
+    CAMERA,
+    SIDE,
+    room,  # noqa: F401  a fixture
+)
+from test_wide_views import view
+
+import nacre
+from nacre.reconstruction import Reconstruction
+from nacre.reconstruction.calibration import DepthViews
+from nacre.reconstruction.runner import FrameDone, Restarted, Run, StageBegun
+
+
+def frames(depths: list[np.ndarray], camera: nacre.Camera) -> list[nacre.SequenceFrame]:
+    return [nacre.SequenceFrame(i, depth, camera, None, None, None) for i, depth in enumerate(depths)]
+
+
+def short(step: object) -> object:
+    return step.frame.index if isinstance(step, FrameDone) else step
+
+
+def test_lost_frames_are_tried_again_at_the_end() -> None:
+    camera = nacre.default_camera(nacre.built_in_object())
+    recording = frames([view(0), view(180), view(15), view(60), view(120)], camera)
+    run = Run(Reconstruction(recording, nacre.Model(camera)), range(5))
+    steps = [short(step) for step in run.steps()]
+    assert steps[:7] == [StageBegun("frames", 5), 0, 1, 2, 3, 4, StageBegun("lost frames", 1)]
+    assert set(steps[7:]) == {1}
+    assert run.done.counts["LOST"] == 0
+
+
+def test_what_is_done_is_left_out_of_a_sequence_and_others_are_taken_as_they_come() -> None:
+    camera = nacre.default_camera(nacre.built_in_object())
+    done = Reconstruction(frames([view(0), view(15), view(30)], camera), nacre.Model(camera))
+    next(iter(done.run([0])))
+    assert [short(s) for s in Run(done, range(2), retry=False).steps()] == [StageBegun("frames", 1), 1]
+    assert list(Run(done, range(2), retry=False).steps()) == []
+    steps = Run(done, iter([2]), retry=False).steps()
+    assert [short(step) for step in steps] == [StageBegun("frames"), 2]
+
+
+@pytest.mark.slow
+def test_wrong_depth_begins_again(room: tuple[list[np.ndarray], list[np.ndarray]]) -> None:  # noqa: F811
+    wrong = [depth / (1.0 + 0.01 * SIDE * depth) for depth in room[0]]
+    first = Reconstruction(frames(wrong, CAMERA), nacre.Model(CAMERA))
+    run = Run(first, range(len(wrong)), views=DepthViews())
+    steps = list(run.steps())
+    (again,) = (i for i, step in enumerate(steps) if isinstance(step, Restarted))
+    assert steps[again - 1] == StageBegun("calibration")
+    assert steps[again + 1] == StageBegun("frames", len(wrong))
+    assert run.done is not first
+    assert run.done.depth_calibration == steps[again].calibration  # type: ignore[union-attr]
+    assert len(run.done.frames) == len(wrong)
