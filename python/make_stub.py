@@ -16,6 +16,7 @@ REPLACEMENTS = (
     ("-> tuple:", "-> tuple[typing.Any, ...]:"),
     ("arg0: tuple)", "arg0: tuple[typing.Any, ...])"),
     ("-> dict:", "-> dict[str, typing.Any]:"),
+    ("collections.abc.Callable |", "collections.abc.Callable[..., typing.Any] |"),
     ("def __eq__(self, arg0: Camera)", "def __eq__(self, arg0: object)"),
 )
 

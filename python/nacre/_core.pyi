@@ -983,7 +983,7 @@ def consolidate(
     points: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
     options: ConsolidateOptions,
     attributes: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
-    progress: collections.abc.Callable | None,
+    progress: collections.abc.Callable[..., typing.Any] | None,
 ) -> tuple[typing.Any, ...]:
     """
     Points, attributes, sources, iterations; see nacre.consolidate.
@@ -994,7 +994,7 @@ def consolidate(
     points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"],
     options: ConsolidateOptions,
     attributes: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
-    progress: collections.abc.Callable | None,
+    progress: collections.abc.Callable[..., typing.Any] | None,
 ) -> tuple[typing.Any, ...]:
     """
     Points, attributes, sources, iterations; see nacre.consolidate.
