@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
@@ -97,6 +97,20 @@ class FrameReport(Value):
     def tracked(self) -> bool:
         """Whether the camera's pose is known: every status but LOST."""
         return self.status != "LOST"
+
+    @property
+    def removed(self) -> dict[str, int]:
+        """Measured pixels that were not used, by reason."""
+        depth = {name.removeprefix("num_"): number for name, number in asdict(self.depth).items()}
+        for name in ("pixels", "invalid", "kept"):
+            del depth[name]
+        return {**depth, "outside": self.region.num_outside}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return every figure but ``information`` under its name; reports in it as dictionaries."""
+        figures = asdict(self) | {"removed": self.removed}
+        del figures["information"]
+        return figures
 
     @classmethod
     def _from_core(cls, core: Any) -> FrameReport:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -50,3 +51,18 @@ class FrameRecord(Value):
     def refused(self) -> bool:
         """Whether the frame was read, but the model cannot use it: wrong size or wrong depth scale."""
         return self.error is not None and not isinstance(self.error, FileFormatError)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what is known of the frame by name: the report's figures, or None for each, and the rest."""
+        names = [field.name for field in fields(FrameReport) if field.name != "information"]
+        unknown = dict.fromkeys(names) | {"removed": {}}
+        figures = unknown if self.report is None else self.report.as_dict()
+        own = {
+            "index": self.index,
+            "status": self.status,
+            "reason": self.reason,
+            "timestamp": self.timestamp,
+            "world_from_camera": self.world_from_camera,
+            "truth": self.truth,
+        }
+        return own | {name: value for name, value in figures.items() if name not in own}

@@ -16,8 +16,8 @@ from nacre.report.charts import (
     map_chart,
     stacked_chart,
 )
-from nacre.report.data import FrameEntry
 from nacre.report.markup import chart, heading, keys, mark_keys, marks, positions, values
+from nacre.report.reported_frame import ReportedFrame
 from nacre.report.summary import is_tracked, total_milliseconds
 from nacre.report.text import label, quantity
 
@@ -28,7 +28,7 @@ _STEPS = {
 }
 
 
-def trajectory_section(frames: Sequence[FrameEntry], error: AbsoluteTrajectoryError | None) -> str:
+def trajectory_section(frames: Sequence[ReportedFrame], error: AbsoluteTrajectoryError | None) -> str:
     """Return the camera's path, with the truth and the errors where they are known."""
     path = positions(frames, lambda frame: frame.world_from_camera if is_tracked(frame) else None)
     if np.isfinite(path).all(axis=1).sum() < 2:
@@ -59,7 +59,7 @@ def trajectory_section(frames: Sequence[FrameEntry], error: AbsoluteTrajectoryEr
     return "".join(parts)
 
 
-def _error_charts(frames: Sequence[FrameEntry], error: AbsoluteTrajectoryError | None) -> str:
+def _error_charts(frames: Sequence[ReportedFrame], error: AbsoluteTrajectoryError | None) -> str:
     translation = values(frames, lambda frame: frame.translation_error)
     rotation = values(frames, lambda frame: frame.rotation_error)
     if error is not None and not np.isfinite(translation).any() and len(error.errors) == len(frames):
@@ -76,12 +76,12 @@ def _error_charts(frames: Sequence[FrameEntry], error: AbsoluteTrajectoryError |
     return f'{mark_keys(frames)}<div class="grid two">{"".join(charts)}</div>' if charts else ""
 
 
-def frames_section(frames: Sequence[FrameEntry], parameters: Mapping[str, Any]) -> str:
+def frames_section(frames: Sequence[ReportedFrame], parameters: Mapping[str, Any]) -> str:
     """Return what is known of each frame's registration, and the time of its steps."""
     if len(frames) < 2:
         return ""
 
-    def registered(value: Callable[[FrameEntry], float | None]) -> np.ndarray:
+    def registered(value: Callable[[ReportedFrame], float | None]) -> np.ndarray:
         return values(frames, lambda frame: value(frame) if frame.num_inliers != 0 else None)
 
     charts = []
@@ -130,7 +130,7 @@ def frames_section(frames: Sequence[FrameEntry], parameters: Mapping[str, Any]) 
 
 
 def _line(
-    frames: Sequence[FrameEntry],
+    frames: Sequence[ReportedFrame],
     caption: str,
     series: Sequence[Series],
     y_label: str,
@@ -150,7 +150,7 @@ def _line(
     return chart(caption, svg, keys(series) if len(series) > 1 else "", note)
 
 
-def time_section(frames: Sequence[FrameEntry]) -> str:
+def time_section(frames: Sequence[ReportedFrame]) -> str:
     """Return how long each step took, in each frame."""
     steps = _steps(frames)
     if not steps:
@@ -169,7 +169,7 @@ def time_section(frames: Sequence[FrameEntry]) -> str:
     )
 
 
-def _steps(frames: Sequence[FrameEntry]) -> list[Series]:
+def _steps(frames: Sequence[ReportedFrame]) -> list[Series]:
     """Return the time of each step that takes any; what the total has beyond the steps is the last layer."""
     names = list(dict.fromkeys(name for frame in frames for name in frame.milliseconds if name != "total"))
     times = {name: np.array([frame.milliseconds.get(name, np.nan) for frame in frames]) for name in names}

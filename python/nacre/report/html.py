@@ -13,9 +13,10 @@ from nacre import __version__
 from nacre.errors import printable
 from nacre.io.atomic import atomic_writer
 from nacre.report.charts import status_strip
-from nacre.report.data import FrameEntry, ReportData
+from nacre.report.data import ReportData
 from nacre.report.frame_sections import frames_section, time_section, trajectory_section
 from nacre.report.pictures import ModelPictures, draw_model
+from nacre.report.reported_frame import ReportedFrame
 from nacre.report.sections import depth_section, funnel_section, model_section
 from nacre.report.summary import Summary, summarize
 from nacre.report.tables import attention_section, figures_section, frames_table_section, parameters_section
@@ -106,7 +107,7 @@ def _verdict(verdict: Verdict | None, sentence: str) -> str:
     )
 
 
-def _strip(frames: Sequence[FrameEntry]) -> str:
+def _strip(frames: Sequence[ReportedFrame]) -> str:
     """Return the states of all frames as a bar, in the order in which they came."""
     if len(frames) < 2:
         return ""

@@ -12,8 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.report.charts import Mark, Series, length_unit, number, runs, ticks
-from nacre.report.data import FrameEntry
 from nacre.report.pictures import Picture
+from nacre.report.reported_frame import ReportedFrame
 
 Array = npt.NDArray[np.float64]
 
@@ -134,12 +134,12 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], *, caption: str =
     return f"<table>{told}{head}{body}</table>"
 
 
-def values(frames: Sequence[FrameEntry], value: Callable[[FrameEntry], float | None]) -> Array:
+def values(frames: Sequence[ReportedFrame], value: Callable[[ReportedFrame], float | None]) -> Array:
     """Return a figure of every frame; NaN where it is not known."""
     return np.array([np.nan if (v := value(frame)) is None else v for frame in frames], dtype=np.float64)
 
 
-def positions(frames: Sequence[FrameEntry], pose: Callable[[FrameEntry], Any]) -> Array:
+def positions(frames: Sequence[ReportedFrame], pose: Callable[[ReportedFrame], Any]) -> Array:
     """Return the place of a pose of every frame, (F, 3); NaN where it is not known."""
     missing = np.full(3, np.nan)
     rows = [
@@ -148,7 +148,7 @@ def positions(frames: Sequence[FrameEntry], pose: Callable[[FrameEntry], Any]) -
     return np.array(rows).reshape(-1, 3)
 
 
-def marks(frames: Sequence[FrameEntry]) -> list[Mark]:
+def marks(frames: Sequence[ReportedFrame]) -> list[Mark]:
     """Return the frames that charts set off."""
     return [
         Mark(first, end - 1, kind)
@@ -157,7 +157,7 @@ def marks(frames: Sequence[FrameEntry]) -> list[Mark]:
     ]
 
 
-def mark_keys(frames: Sequence[FrameEntry]) -> str:
+def mark_keys(frames: Sequence[ReportedFrame]) -> str:
     """Return what the marks mean that occur."""
     told = "".join(
         f'<span class="key"><i class="k-{kind}"></i>{name}</span>'
@@ -167,7 +167,7 @@ def mark_keys(frames: Sequence[FrameEntry]) -> str:
     return f'<p class="note">{told}</p>' if told else ""
 
 
-MARKED: dict[str, tuple[str, Callable[[FrameEntry], bool]]] = {
+MARKED: dict[str, tuple[str, Callable[[ReportedFrame], bool]]] = {
     "lost": ("LOST", lambda frame: frame.status.upper() == "LOST"),
     "weak": ("WEAK", lambda frame: frame.status.upper() == "WEAK"),
     "relocalised": ("RELOCALISED", lambda frame: frame.status.upper() == "RELOCALISED"),

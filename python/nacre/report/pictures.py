@@ -13,9 +13,10 @@ import numpy.typing as npt
 from nacre._internal.arrays import as_points
 from nacre.report.charts import length_unit, ticks
 from nacre.report.colormap import viridis
-from nacre.report.data import FrameEntry, ModelCloud
+from nacre.report.data import ModelCloud
 from nacre.report.palette import encode_small_png
 from nacre.report.render import is_inside_out, measure_spacing, nearest_distances, render_points, reverse_part
+from nacre.report.reported_frame import ReportedFrame
 from nacre.report.view import SIDES, View
 
 OBLIQUE = (-0.75, -0.55, -1.0)
@@ -67,7 +68,7 @@ def draw(caption: str, image: npt.NDArray[np.uint8], kind: str, *, note: str = "
     return Picture(caption, f"data:image/png;base64,{data}", (image.shape[1], image.shape[0]), note, alt)
 
 
-def draw_model(model: ModelCloud, frames: Sequence[FrameEntry] = ()) -> ModelPictures | None:
+def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> ModelPictures | None:
     """Draw the model from all sides, a scene also as its cameras saw it; None where there is no point."""
     model, spacing = _thinned(model)
     points = model.points

@@ -14,7 +14,7 @@ from nacre.depth import PIXEL_LABELS, label_pixels
 from nacre.errors import FileFormatError
 from nacre.evaluation.result import plain, result_dict
 from nacre.frame_report import STATUSES
-from nacre.report.frame_figures import frame_dict, frame_entry
+from nacre.report.reported_frame import ReportedFrame
 
 if TYPE_CHECKING:
     from nacre.reconstruction import FrameRecord, Reconstruction
@@ -25,7 +25,6 @@ def run_dict(run: Reconstruction, **more: Any) -> dict[str, Any]:
     """Return what ``report.json`` says of a run."""
     counts = run.counts
     times = run.milliseconds
-    errors = _frame_errors(run)
     figures: dict[str, Any] = plain(
         {
             "nacre": __version__,
@@ -50,9 +49,7 @@ def run_dict(run: Reconstruction, **more: Any) -> dict[str, Any]:
             },
             **{name: result_dict(result) for name, result in run.evaluation.items()},
             "parameters": run.parameters,
-            "frames": [
-                frame_dict(frame, *errors[i], _loop_frame(run, frame)) for i, frame in enumerate(run.frames)
-            ],
+            "frames": [frame.figures for frame in _reported_frames(run)],
         }
     )
     return figures
@@ -70,16 +67,13 @@ def run_report(
     from nacre.report import ModelCloud, ReportData
     from nacre.report.text import label
 
-    errors = _frame_errors(run)
     model = None
     if len(run.model):
         model = ModelCloud(run.model.points, run.model.normals, run.model.colors, run.model.confidence)
     return ReportData(
         title=title,
         source=source,
-        frames=[
-            frame_entry(frame, *errors[i], _loop_frame(run, frame)) for i, frame in enumerate(run.frames)
-        ],
+        frames=_reported_frames(run),
         model=model,
         depth=_depth_examples(run),
         evaluation={label(name): result for name, result in run.evaluation.items()},
@@ -87,6 +81,22 @@ def run_report(
         parameters=run.parameters,
         interrupted=interrupted,
     )
+
+
+def _reported_frames(run: Reconstruction) -> list[ReportedFrame]:
+    """Return what became of each frame, with what only the whole run knows."""
+    errors = _frame_errors(run)
+    return [
+        ReportedFrame(
+            **frame.as_dict()
+            | {
+                "translation_error": translation,
+                "rotation_error": rotation,
+                "loop_frame": _loop_frame(run, frame),
+            }
+        )
+        for frame, (translation, rotation) in zip(run.frames, errors, strict=True)
+    ]
 
 
 def _loop_frame(run: Reconstruction, frame: FrameRecord) -> int | None:

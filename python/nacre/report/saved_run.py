@@ -11,13 +11,12 @@ import numpy.typing as npt
 from nacre.errors import FileFormatError, shown
 from nacre.io.cameras import camera_of
 from nacre.io.json_files import read_json
+from nacre.report.reported_frame import NUMBERS
 
 if TYPE_CHECKING:
     from nacre import Camera
 
 Matrix = npt.NDArray[np.float64]
-
-FIGURES = ("overlap", "consistency", "evidence", "rmse", "num_inliers", "num_points")
 
 
 class SavedRun:
@@ -124,7 +123,7 @@ def _wrong_in_frame(frame: Any) -> str | None:
         pose = frame.get(name)
         if pose is not None and not _is_pose(pose):
             return f".{name} must be a rigid 4x4 matrix, got {shown(pose)}"
-    for name in FIGURES:
+    for name in NUMBERS:
         value = frame.get(name)
         if value is not None and not _is_number(value):
             return f".{name} must be a number, got {shown(value)}"

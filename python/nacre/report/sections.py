@@ -9,10 +9,11 @@ import numpy as np
 
 from nacre.report.charts import Series, stacked_chart
 from nacre.report.colormap import CATEGORIES
-from nacre.report.data import DepthExample, FrameEntry
+from nacre.report.data import DepthExample
 from nacre.report.depth_pictures import draw_depth, reason_color
 from nacre.report.markup import chart, color_bar, heading, keys, pictures, values
 from nacre.report.pictures import Attribute, ModelPictures, is_logarithmic
+from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import count, label, quantity
 
 _USED, _MISSING, _DROPPED, _OUTSIDE = 7, 6, 8, 9  # indices of the palette
@@ -65,7 +66,7 @@ def _attribute(title: str, attribute: Attribute, bar: str, told: str) -> str:
     )
 
 
-def depth_section(examples: Sequence[DepthExample], frames: Sequence[FrameEntry]) -> str:
+def depth_section(examples: Sequence[DepthExample], frames: Sequence[ReportedFrame]) -> str:
     """Return depth images before and after cleaning, and what was removed from each frame."""
     if not examples:
         return ""
@@ -113,7 +114,7 @@ def _depth_example(example: DepthExample) -> str:
     )
 
 
-def funnel_section(frames: Sequence[FrameEntry]) -> str:
+def funnel_section(frames: Sequence[ReportedFrame]) -> str:
     """Return how many pixels came through each step, of all frames and of each."""
     known = [frame for frame in frames if frame.num_pixels and frame.num_measured is not None]
     if not known:
@@ -170,7 +171,7 @@ def _funnel_row(name: str, num: int, total: int, gone: int = 0, reasons: dict[st
     )
 
 
-def _funnel_chart(frames: Sequence[FrameEntry], reasons: Sequence[str]) -> str:
+def _funnel_chart(frames: Sequence[ReportedFrame], reasons: Sequence[str]) -> str:
     folded = [_num_usable(frame) if _is_folded_in(frame) else 0 for frame in frames]
     dropped = [0 if _is_folded_in(frame) else _num_usable(frame) for frame in frames]
     missing = values(frames, lambda f: None if f.num_pixels is None else f.num_pixels - (f.num_measured or 0))
@@ -194,13 +195,13 @@ def _funnel_chart(frames: Sequence[FrameEntry], reasons: Sequence[str]) -> str:
     return chart("What became of the pixels of each frame", svg, keys(series))
 
 
-def _reasons(frames: Sequence[FrameEntry]) -> list[str]:
+def _reasons(frames: Sequence[ReportedFrame]) -> list[str]:
     return list(dict.fromkeys(name for frame in frames for name, num in frame.removed.items() if num))
 
 
-def _num_usable(frame: FrameEntry) -> int:
+def _num_usable(frame: ReportedFrame) -> int:
     return (frame.num_measured or 0) - sum(frame.removed.values())
 
 
-def _is_folded_in(frame: FrameEntry) -> bool:
+def _is_folded_in(frame: ReportedFrame) -> bool:
     return frame.status.upper() in ("TRACKED", "RELOCALISED")

@@ -15,7 +15,8 @@ from nacre.evaluation import (
     SurfaceAccuracy,
     absolute_trajectory_error,
 )
-from nacre.report.data import FrameEntry, ReportData
+from nacre.report.data import ReportData
+from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import count, quantity
 from nacre.report.verdict import Verdict, judge
 
@@ -41,12 +42,12 @@ class Summary:
     trajectory: AbsoluteTrajectoryError | None  #: given, or worked out from the poses
 
 
-def is_tracked(frame: FrameEntry) -> bool:
+def is_tracked(frame: ReportedFrame) -> bool:
     """Return whether a frame found its pose."""
     return frame.status.upper() != "LOST"
 
 
-def total_milliseconds(frame: FrameEntry) -> float:
+def total_milliseconds(frame: ReportedFrame) -> float:
     """Return the time of a frame; NaN where it was not measured."""
     if "total" in frame.milliseconds:
         return float(frame.milliseconds["total"])
@@ -110,13 +111,13 @@ def summarize(data: ReportData) -> Summary:
     return Summary(verdict, ". ".join(sentences) + "." * bool(sentences), tuple(tiles), trajectory)
 
 
-def _path_length(frames: Sequence[FrameEntry]) -> str:
+def _path_length(frames: Sequence[ReportedFrame]) -> str:
     places = [np.asarray(frame.truth, dtype=np.float64)[:3, 3] for frame in frames if frame.truth is not None]
     length = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum()) if len(places) > 1 else 0.0
     return f" on a path of {quantity(length, 'm')}" if length > 0 else ""
 
 
-def _trajectory_error(frames: Sequence[FrameEntry]) -> AbsoluteTrajectoryError | None:
+def _trajectory_error(frames: Sequence[ReportedFrame]) -> AbsoluteTrajectoryError | None:
     if not any(frame.truth is not None for frame in frames):
         return None
     missing = np.full((4, 4), np.nan)

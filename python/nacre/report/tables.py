@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from nacre.evaluation.result import Result
-from nacre.report.data import FrameEntry, ReportData
+from nacre.report.data import ReportData
 from nacre.report.markup import heading, scrolled, table, values
+from nacre.report.reported_frame import ReportedFrame
 from nacre.report.summary import Summary, total_milliseconds
 from nacre.report.text import count, flatten, label, quantity
 from nacre.report.verdict import stretches
@@ -19,7 +20,7 @@ _MAX_ROWS = 300
 _MAX_STRETCHES = 8
 
 
-def attention_section(frames: Sequence[FrameEntry]) -> str:
+def attention_section(frames: Sequence[ReportedFrame]) -> str:
     """Return which frames to look at, and why."""
     found = stretches(frames)
     if not found:
@@ -99,7 +100,7 @@ def parameters_section(data: ReportData) -> str:
     )
 
 
-def frames_table_section(frames: Sequence[FrameEntry]) -> str:
+def frames_table_section(frames: Sequence[ReportedFrame]) -> str:
     """Return the figures of every frame; of long recordings only of those that were not simply tracked."""
     if not frames:
         return ""
@@ -109,7 +110,7 @@ def frames_table_section(frames: Sequence[FrameEntry]) -> str:
         title = f"Frames that were not simply tracked (the first {_MAX_ROWS} at most)"
         if not chosen:
             return ""
-    columns: list[tuple[str, Callable[[FrameEntry], Any], str]] = [
+    columns: list[tuple[str, Callable[[ReportedFrame], Any], str]] = [
         ("Inliers", lambda frame: frame.num_inliers, "count"),
         ("Overlap", lambda frame: frame.overlap, "fraction"),
         ("Evidence", lambda frame: frame.evidence, "number"),
@@ -143,6 +144,6 @@ def frames_table_section(frames: Sequence[FrameEntry]) -> str:
     )
 
 
-def _remark(frame: FrameEntry) -> str:
+def _remark(frame: ReportedFrame) -> str:
     loop = "" if frame.loop_frame is None else f"closes a loop with frame {frame.loop_frame}"
     return "; ".join(part for part in (frame.reason, loop) if part)

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from nacre.evaluation import AbsoluteTrajectoryError
-from nacre.report.data import FrameEntry, ReportData
+from nacre.report.data import ReportData
+from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import count, quantity, ranges
 
 #: A trajectory whose error is a larger part of its extent is to be looked at.
@@ -108,9 +109,9 @@ def judge(data: ReportData, trajectory: AbsoluteTrajectoryError | None) -> Verdi
     return Verdict("ok", "Good", tracked)
 
 
-def stretches(frames: Sequence[FrameEntry]) -> list[Stretch]:
+def stretches(frames: Sequence[ReportedFrame]) -> list[Stretch]:
     """Return the frames to look at, neighbours together, the longest first."""
-    groups: list[list[FrameEntry]] = []
+    groups: list[list[ReportedFrame]] = []
     for i, frame in enumerate(frames):
         if frame.status.upper() not in ("LOST", "WEAK"):
             continue
@@ -149,10 +150,10 @@ def plain_reason(reason: str) -> str:
     return reason
 
 
-def _cause(frames: Sequence[FrameEntry]) -> str:
+def _cause(frames: Sequence[ReportedFrame]) -> str:
     """Return what most of the frames that were not tracked suffer from."""
 
-    def cause(frame: FrameEntry) -> str:
+    def cause(frame: ReportedFrame) -> str:
         if frame.status.upper() == "WEAK":
             return "weak"
         if frame.num_pixels is None and frame.reason:
@@ -166,7 +167,7 @@ def _cause(frames: Sequence[FrameEntry]) -> str:
     return Counter(cause(frame) for frame in frames).most_common(1)[0][0]
 
 
-def _drift(frames: Sequence[FrameEntry], trajectory: AbsoluteTrajectoryError | None) -> float:
+def _drift(frames: Sequence[ReportedFrame], trajectory: AbsoluteTrajectoryError | None) -> float:
     """Return the error of the positions as a part of the true path's extent; NaN where it is not known."""
     places = [np.asarray(frame.truth, dtype=np.float64)[:3, 3] for frame in frames if frame.truth is not None]
     if trajectory is None or len(places) < 2:

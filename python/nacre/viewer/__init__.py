@@ -8,11 +8,11 @@ from nacre.viewer.live import LiveView
 from nacre.viewer.page import Viewer, export_html
 from nacre.viewer.rerun_file import export_rrd
 from nacre.viewer.saved_timeline import read_timeline
-from nacre.viewer.timeline import Moment, Snapshot, Timeline
+from nacre.viewer.timeline import Snapshot, Timeline
 
 __all__ = [
     "LiveView",
-    "Moment",
+    "ReportedFrame",
     "Snapshot",
     "Timeline",
     "Viewer",

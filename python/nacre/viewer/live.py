@@ -6,8 +6,9 @@ import time
 
 from nacre.reconstruction import Reconstruction
 from nacre.reconstruction.frame_record import FrameRecord
+from nacre.report.reported_frame import ReportedFrame
 from nacre.viewer.page import Viewer
-from nacre.viewer.timeline import Moment, Snapshot, Timeline
+from nacre.viewer.timeline import Snapshot, Timeline
 
 _SHARE = 5.0
 
@@ -43,7 +44,7 @@ class LiveView:
 
     def add(self, record: FrameRecord) -> None:
         """Note a frame; show it if there is time."""
-        self.timeline.add(Moment.of(record))
+        self.timeline.add(ReportedFrame(**record.as_dict()))
         if time.monotonic() >= self._next:
             self.show()
 
@@ -58,5 +59,5 @@ class LiveView:
 
     def finish(self) -> None:
         """Show the end: poses as loops have corrected them, frames that were found after all."""
-        self.timeline.moments[:] = [Moment.of(record) for record in self._done.frames]
+        self.timeline.frames[:] = [ReportedFrame(**record.as_dict()) for record in self._done.frames]
         self.show()

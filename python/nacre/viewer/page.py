@@ -17,10 +17,11 @@ from nacre import back_project, preprocess_depth
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
 from nacre.parameters import DepthParameters
+from nacre.report.reported_frame import ReportedFrame
 from nacre.viewer.colors import STATUS_COLORS, color_kinds, color_range
 from nacre.viewer.depth_picture import depth_legend, depth_picture
 from nacre.viewer.scene import Scene, core, extent
-from nacre.viewer.timeline import Moment, Snapshot, Timeline
+from nacre.viewer.timeline import Snapshot, Timeline, words
 
 _MISSING = 'the viewer needs viser: pip install "nacre[view]"'
 
@@ -71,18 +72,18 @@ class Viewer:
     @property
     def place(self) -> int:
         """Which frame is shown, as a place in the timeline's list."""
-        return min(int(self._time.value), len(self.timeline.moments) - 1)
+        return min(int(self._time.value), len(self.timeline.frames) - 1)
 
     def refresh(self) -> None:
         """Show what the timeline has gained; the newest frame, unless a person has chosen another one."""
         with self._lock:
-            last = max(len(self.timeline.moments) - 1, 0)
+            last = max(len(self.timeline.frames) - 1, 0)
             self._time.max = max(last, 1)
             if self._follow.value and self._time.value != last:
                 self._is_moving = True
                 self._time.value = last
                 self._is_moving = False
-            self._strip.content = status_strip(self.timeline.moments)
+            self._strip.content = status_strip(self.timeline.frames)
             self._draw()
 
     def wait(self) -> None:
@@ -121,24 +122,24 @@ class Viewer:
         if self._is_moving:
             return
         with self._lock:
-            self._follow.value = self.place == len(self.timeline.moments) - 1
+            self._follow.value = self.place == len(self.timeline.frames) - 1
             self._draw()
 
     def _draw(self) -> None:
         """Draw the frame that is chosen."""
-        if not self.timeline.moments:
+        if not self.timeline.frames:
             return
         place = self.place
-        moment = self.timeline.moments[place]
+        frame = self.timeline.frames[place]
         with self._server.atomic():
             cloud = self.timeline.snapshot_at(place)
             if cloud is not None and len(cloud.points):
                 self._show_cloud(cloud)
             if self._size:
                 self._scene.show_cameras(self.timeline, place, 0.12 * self._size)
-            self._figures.content = figures_table(moment)
+            self._figures.content = figures_table(frame)
             self._summary.content = summary(self.timeline)
-            self._show_depth(moment)
+            self._show_depth(frame)
 
     def _show_cloud(self, cloud: Snapshot) -> None:
         kinds = color_kinds(cloud)
@@ -154,26 +155,26 @@ class Viewer:
             self._size = extent(cloud)
             look_at(self._server.initial_camera, cloud, self._size)
 
-    def _show_depth(self, moment: Moment) -> None:
-        depth = self._depth(moment)
+    def _show_depth(self, frame: ReportedFrame) -> None:
+        depth = self._depth(frame)
         self._picture.visible = depth is not None
         if depth is None or self.timeline.camera is None:
             return
         self._picture.image = depth_picture(depth, self.timeline.camera, self._parameters)
-        wanted = self._own_points.value and moment.world_from_camera is not None
+        wanted = self._own_points.value and frame.world_from_camera is not None
         points = np.zeros((0, 3), np.float32)
-        if wanted and moment.world_from_camera is not None:
+        if wanted and frame.world_from_camera is not None:
             clean = preprocess_depth(depth, self.timeline.camera)
-            pose = moment.world_from_camera.astype(np.float32)
+            pose = frame.world_from_camera.astype(np.float32)
             points = back_project(clean, self.timeline.camera) @ pose[:3, :3].T + pose[:3, 3]
         spacing = self._shown[0].spacing if self._shown else 0.001
         self._scene.show_points(points, 0.6 * spacing, bool(len(points)))
 
-    def _depth(self, moment: Moment) -> npt.NDArray[np.float32] | None:
+    def _depth(self, frame: ReportedFrame) -> npt.NDArray[np.float32] | None:
         if self.timeline.depth_of is None:
             return None
         try:
-            return self.timeline.depth_of(moment.index)
+            return self.timeline.depth_of(frame.index)
         except (FileFormatError, OSError):
             return None
 
@@ -188,9 +189,9 @@ def look_at(camera: Any, cloud: Snapshot, size: float) -> None:
 
 def summary(timeline: Timeline) -> str:
     """Return in a line how many frames there are of each status."""
-    counts = {status: sum(moment.status == status for moment in timeline.moments) for status in STATUS_COLORS}
+    counts = {status: sum(frame.status == status for frame in timeline.frames) for status in STATUS_COLORS}
     parts = [f"{number} {status}" for status, number in counts.items() if number]
-    return f"{len(timeline.moments)} frames: {', '.join(parts)}"
+    return f"{len(timeline.frames)} frames: {', '.join(parts)}"
 
 
 def color_bar(cloud: Snapshot, kind: str) -> str:
@@ -210,26 +211,26 @@ def color_bar(cloud: Snapshot, kind: str) -> str:
     )
 
 
-def figures_table(moment: Moment) -> str:
+def figures_table(frame: ReportedFrame) -> str:
     """Return what is known of a frame as Markdown."""
-    reason = f": {moment.reason}" if moment.reason else ""
-    rows = "".join(f"\n| {name} | {value} |" for name, value in moment.figures.items())
+    reason = f": {frame.reason}" if frame.reason else ""
+    rows = "".join(f"\n| {name} | {value} |" for name, value in words(frame).items())
     table = f"\n\n| | |\n|---|---|{rows}" if rows else ""
-    return f"**frame {moment.index}, {moment.status}**{reason}{table}"
+    return f"**frame {frame.index}, {frame.status}**{reason}{table}"
 
 
-def status_strip(moments: list[Moment], width: int = 1000) -> str:
+def status_strip(frames: list[ReportedFrame], width: int = 1000) -> str:
     """Return a bar of all frames in the colours of their statuses, for the time line."""
-    if not moments:
+    if not frames:
         return ""
-    step = width / len(moments)
+    step = width / len(frames)
     bars, start = [], 0
-    for end in range(1, len(moments) + 1):
-        if end == len(moments) or moments[end].status != moments[start].status:
-            color = "rgb({},{},{})".format(*STATUS_COLORS[moments[start].status])
+    for end in range(1, len(frames) + 1):
+        if end == len(frames) or frames[end].status != frames[start].status:
+            color = "rgb({},{},{})".format(*STATUS_COLORS[frames[start].status])
             bars.append(
                 f'<rect x="{start * step:.1f}" width="{(end - start) * step:.1f}" height="20" fill="{color}">'
-                f"<title>{escape(moments[start].status)}</title></rect>"
+                f"<title>{escape(frames[start].status)}</title></rect>"
             )
             start = end
     return (

@@ -10,8 +10,9 @@ import numpy as np
 
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_path
+from nacre.report.reported_frame import ReportedFrame
 from nacre.viewer.colors import STATUS_COLORS, color_kinds, point_colors
-from nacre.viewer.timeline import Moment, Timeline
+from nacre.viewer.timeline import Timeline, words
 
 _MISSING = 'files for Rerun need rerun-sdk: pip install "nacre[rerun]"'
 _MOST_DEPTH_IMAGES = 100
@@ -54,29 +55,29 @@ def _write(rr: Any, path: Path, timeline: Timeline) -> None:
     recording.log("world", rr.ViewCoordinates.RDF, static=True)
     for place, cloud in timeline.snapshots:
         if len(timeline.snapshots) > 1:
-            recording.set_time("frame", sequence=timeline.moments[place].index)
+            recording.set_time("frame", sequence=timeline.frames[place].index)
         colors = point_colors(cloud, color_kinds(cloud)[0])
         points = rr.Points3D(cloud.points, colors=colors, radii=0.6 * cloud.spacing)
         recording.log("world/model", points, static=len(timeline.snapshots) == 1)
-    step = -(-len(timeline.moments) // _MOST_DEPTH_IMAGES)
-    for place, moment in enumerate(timeline.moments):
-        recording.set_time("frame", sequence=moment.index)
-        _log_frame(rr, recording, timeline, moment, place % step == 0)
-    path_points = [m.world_from_camera[:3, 3] for m in timeline.moments if m.world_from_camera is not None]
+    step = -(-len(timeline.frames) // _MOST_DEPTH_IMAGES)
+    for place, frame in enumerate(timeline.frames):
+        recording.set_time("frame", sequence=frame.index)
+        _log_frame(rr, recording, timeline, frame, place % step == 0)
+    path_points = [m.world_from_camera[:3, 3] for m in timeline.frames if m.world_from_camera is not None]
     if len(path_points) > 1:
         recording.log("world/path", rr.LineStrips3D([np.array(path_points)]), static=True)
     recording.flush()
     recording.disconnect()
 
 
-def _log_frame(rr: Any, recording: Any, timeline: Timeline, moment: Moment, with_depth: bool) -> None:
+def _log_frame(rr: Any, recording: Any, timeline: Timeline, frame: ReportedFrame, with_depth: bool) -> None:
     """Log the camera of a frame, its depth image, its status and its figures."""
-    level = rr.TextLogLevel.WARN if moment.status in ("LOST", "WEAK") else rr.TextLogLevel.INFO
-    told = ", ".join(f"{name} {value}" for name, value in moment.figures.items())
-    reason = f": {moment.reason}" if moment.reason else ""
-    text = f"frame {moment.index} {moment.status}{reason}; {told}"
-    recording.log("frames", rr.TextLog(text, level=level, color=STATUS_COLORS[moment.status]))
-    for name, pose in (("camera", moment.world_from_camera), ("truth", moment.truth)):
+    level = rr.TextLogLevel.WARN if frame.status in ("LOST", "WEAK") else rr.TextLogLevel.INFO
+    told = ", ".join(f"{name} {value}" for name, value in words(frame).items())
+    reason = f": {frame.reason}" if frame.reason else ""
+    text = f"frame {frame.index} {frame.status}{reason}; {told}"
+    recording.log("frames", rr.TextLog(text, level=level, color=STATUS_COLORS[frame.status]))
+    for name, pose in (("camera", frame.world_from_camera), ("truth", frame.truth)):
         if pose is None:
             recording.log(f"world/{name}", rr.Clear(recursive=True))
             continue
@@ -89,9 +90,9 @@ def _log_frame(rr: Any, recording: Any, timeline: Timeline, moment: Moment, with
                 camera_xyz=rr.ViewCoordinates.RDF, image_plane_distance=0.1,
             )  # fmt: skip
             recording.log(f"world/{name}", pinhole)
-    if with_depth and timeline.depth_of is not None and moment.world_from_camera is not None:
+    if with_depth and timeline.depth_of is not None and frame.world_from_camera is not None:
         try:
-            depth = timeline.depth_of(moment.index)
+            depth = timeline.depth_of(frame.index)
         except (FileFormatError, OSError):
             return
         stored = np.rint(np.clip(np.nan_to_num(1000 * depth), 0, 65535)).astype(np.uint16)

@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from nacre.errors import FileFormatError
 from nacre.io.points import read_points
-from nacre.report.saved_run import FIGURES, SavedRun
-from nacre.viewer.timeline import Moment, Snapshot, Timeline, words
+from nacre.report.reported_frame import ReportedFrame
+from nacre.report.saved_run import SavedRun
+from nacre.viewer.timeline import Snapshot, Timeline
 
 
 def read_timeline(folder: str | os.PathLike[str]) -> Timeline:
@@ -38,7 +39,7 @@ def read_timeline(folder: str | os.PathLike[str]) -> Timeline:
     placed = out.truth_from_world
     world_from_truth = None if placed is None else np.asarray(np.linalg.inv(placed), np.float64)
     for frame in out.frames:
-        timeline.add(_moment(frame, world_from_truth))
+        timeline.add(_frame(frame, world_from_truth))
     model = read_points(Path(folder) / "model.ply")
     normals = model.normals
     if normals is None:
@@ -56,18 +57,11 @@ def read_timeline(folder: str | os.PathLike[str]) -> Timeline:
     return timeline
 
 
-def _moment(frame: dict[str, Any], world_from_truth: npt.NDArray[np.float64] | None) -> Moment:
-    pose, truth = frame.get("world_from_camera"), frame.get("truth")
-    figures = {name: frame.get(name) for name in FIGURES}
-    figures["milliseconds"] = (frame.get("milliseconds") or {}).get("total")
-    return Moment(
-        frame["index"],
-        frame["status"],
-        frame.get("reason") or "",
-        None if pose is None else np.array(pose, np.float64),
-        None if truth is None or world_from_truth is None else world_from_truth @ np.array(truth),
-        words(**figures),
-    )
+def _frame(document: dict[str, Any], world_from_truth: npt.NDArray[np.float64] | None) -> ReportedFrame:
+    frame = ReportedFrame.of(document)
+    if frame.truth is not None:
+        frame.figures["truth"] = None if world_from_truth is None else world_from_truth @ frame.truth
+    return frame
 
 
 def _recorded_depth(out: SavedRun) -> Any:

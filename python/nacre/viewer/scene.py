@@ -9,8 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre.report.reported_frame import ReportedFrame
 from nacre.viewer.colors import STATUS_COLORS, point_colors
-from nacre.viewer.timeline import Moment, Snapshot, Timeline
+from nacre.viewer.timeline import Snapshot, Timeline
 
 Array = npt.NDArray[np.float64]
 
@@ -51,8 +52,8 @@ class Scene:
 
     def show_cameras(self, timeline: Timeline, place: int, size: float) -> None:
         """Draw the path up to a frame, some of the cameras on it, the frame's own large, and the truth."""
-        moments = timeline.moments[: place + 1]
-        posed = [moment for moment in moments if moment.world_from_camera is not None]
+        frames = timeline.frames[: place + 1]
+        posed = [frame for frame in frames if frame.world_from_camera is not None]
         self._show_path("/path", posed, 2.5)
         chosen = posed[:: max(-(-len(posed) // _MAX_FRUSTUMS), 1)]
         self._lines(
@@ -62,9 +63,9 @@ class Scene:
             1.5,
         )
         pose = timeline.pose_at(place)
-        if moments and pose is not None:
-            self._lines("/camera", [self._frustum(pose, size)], [STATUS_COLORS[moments[-1].status]], 3.0)
-        truths = np.array([m.truth[:3, 3] for m in moments if m.truth is not None]).reshape(-1, 3)
+        if frames and pose is not None:
+            self._lines("/camera", [self._frustum(pose, size)], [STATUS_COLORS[frames[-1].status]], 3.0)
+        truths = np.array([m.truth[:3, 3] for m in frames if m.truth is not None]).reshape(-1, 3)
         self._lines("/truth", [_chain(truths)], [(160, 160, 160)], 1.0)
 
     def show_points(self, points: npt.NDArray[np.float32], size: float, visible: bool) -> None:
@@ -73,9 +74,9 @@ class Scene:
             "/frame", points, (255, 200, 60), point_size=size, precision="float32", visible=visible
         )
 
-    def _show_path(self, name: str, moments: Sequence[Moment], thickness: float) -> None:
-        positions = np.array([m.world_from_camera[:3, 3] for m in moments if m.world_from_camera is not None])
-        colors = [STATUS_COLORS[moment.status] for moment in moments[1:]]
+    def _show_path(self, name: str, frames: Sequence[ReportedFrame], thickness: float) -> None:
+        positions = np.array([m.world_from_camera[:3, 3] for m in frames if m.world_from_camera is not None])
+        colors = [STATUS_COLORS[frame.status] for frame in frames[1:]]
         segments = _chain(positions.reshape(-1, 3))
         self._lines(name, list(segments[:, None]), colors, thickness)
 

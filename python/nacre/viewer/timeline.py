@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import bisect
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ import numpy.typing as npt
 from nacre import Camera
 from nacre.errors import printable
 from nacre.model import Model
-from nacre.reconstruction.frame_record import FrameRecord
+from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import count, quantity
 
 
@@ -63,50 +63,6 @@ class Snapshot:
         return Snapshot(points, normals, self.spacing * step**0.5, *rest)
 
 
-@dataclass(frozen=True, eq=False)
-class Moment:
-    """
-    One frame of a run.
-
-    Attributes
-    ----------
-    index : int
-        Its place in the recording.
-    status, reason : str
-        See :class:`nacre.FrameReport`.
-    world_from_camera, truth : (4, 4) float64 or None
-        None where it is not known; the truth in the world of the model.
-    figures : mapping of str to str
-        In words, by name.
-    """
-
-    index: int
-    status: str
-    reason: str = ""
-    world_from_camera: npt.NDArray[np.float64] | None = None
-    truth: npt.NDArray[np.float64] | None = None
-    figures: Mapping[str, str] = field(default_factory=dict)
-
-    @classmethod
-    def of(cls, record: FrameRecord) -> Moment:
-        """Return what is to be told of a frame of a reconstruction."""
-        report = record.report
-        figures = {}
-        if report is not None:
-            figures = words(
-                overlap=report.overlap,
-                consistency=report.consistency,
-                evidence=report.evidence,
-                rmse=report.rmse,
-                num_inliers=report.num_inliers,
-                num_points=report.num_points,
-                milliseconds=report.milliseconds["total"],
-            )
-        return cls(
-            record.index, record.status, record.reason, record.world_from_camera, record.truth, figures
-        )
-
-
 _FIGURES: dict[str, tuple[str, Callable[[Any], str]]] = {
     "overlap": ("overlap", lambda value: quantity(value, "fraction")),
     "consistency": ("consistency", lambda value: quantity(value, "fraction")),
@@ -118,13 +74,12 @@ _FIGURES: dict[str, tuple[str, Callable[[Any], str]]] = {
 }
 
 
-def words(**figures: float | None) -> dict[str, str]:
-    """Return figures of a frame in words; what is not known or not finite is left out."""
-    return {
-        _FIGURES[name][0]: _FIGURES[name][1](value)
-        for name, value in figures.items()
-        if value is not None and np.isfinite(value)
+def words(frame: ReportedFrame) -> dict[str, str]:
+    """Return figures of a frame in words, by name; what is not known is left out."""
+    known = {name: frame.figures.get(name) for name in _FIGURES} | {
+        "milliseconds": frame.milliseconds.get("total")
     }
+    return {_FIGURES[name][0]: _FIGURES[name][1](value) for name, value in known.items() if value is not None}
 
 
 class Timeline:
@@ -146,8 +101,8 @@ class Timeline:
 
     Attributes
     ----------
-    moments : list of Moment
-        The frames, in the order in which they came.
+    frames : list of ReportedFrame
+        In the order in which they came; their true poses in the world of the model.
     """
 
     def __init__(
@@ -164,23 +119,23 @@ class Timeline:
         self.title = printable(title)
         self.camera = camera
         self.depth_of = depth_of
-        self.moments: list[Moment] = []
+        self.frames: list[ReportedFrame] = []
         self._snapshots: list[tuple[int, Snapshot]] = []
         self._max_snapshots = max_snapshots
         self._max_points = max_points
 
-    def add(self, moment: Moment) -> None:
+    def add(self, frame: ReportedFrame) -> None:
         """Append a frame."""
-        self.moments.append(moment)
+        self.frames.append(frame)
 
     def clear(self) -> None:
         """Forget the frames and the model."""
-        self.moments.clear()
+        self.frames.clear()
         self._snapshots.clear()
 
     def set_snapshot(self, cloud: Snapshot) -> None:
         """Note the model as it is after the last frame that was added."""
-        place = len(self.moments) - 1
+        place = len(self.frames) - 1
         if self._snapshots and self._snapshots[-1][0] == place:
             self._snapshots.pop()
         if len(self._snapshots) >= self._max_snapshots:
@@ -204,7 +159,8 @@ class Timeline:
 
     def pose_at(self, place: int) -> npt.NDArray[np.float64] | None:
         """Return the pose of a frame; for a lost one the last one known before."""
-        for moment in reversed(self.moments[: place + 1]):
-            if moment.world_from_camera is not None:
-                return moment.world_from_camera
+        for frame in reversed(self.frames[: place + 1]):
+            if frame.world_from_camera is not None:
+                pose: npt.NDArray[np.float64] = frame.world_from_camera
+                return pose
         return None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import re
 from collections.abc import Iterator
@@ -15,12 +14,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from nacre import DepthCalibration
 from nacre.evaluation import Completeness, SurfaceAccuracy, absolute_trajectory_error
 from nacre.report import (
     DepthExample,
-    FrameEntry,
     ModelCloud,
     ReportData,
+    ReportedFrame,
     pictures,
     render_page,
     write_report,
@@ -169,11 +169,11 @@ class TestText:
                 "preset": "default",
                 "depth": {"max": 0.1, "noise": None},
                 "k": 16,
-                "frame": FrameEntry(3, "LOST"),
+                "frame": DepthCalibration(0.01, 0.001, 7),
             }
         )
         assert rows[:4] == [("preset", "default"), ("depth.max", "0.1"), ("depth.noise", "None"), ("k", "16")]
-        assert ("frame.index", "3") in rows
+        assert ("frame.num_pairs", "7") in rows
 
 
 class PageCheck(HTMLParser):
@@ -207,7 +207,7 @@ class PageCheck(HTMLParser):
         self.text += data
 
 
-def entries(count: int, lost: tuple[int, ...] = ()) -> list[FrameEntry]:
+def entries(count: int, lost: tuple[int, ...] = ()) -> list[ReportedFrame]:
     world = np.eye(4)
     world[:3, :3] = [[0, 0, 1], [1, 0, 0], [0, 1, 0]]
     world[:3, 3] = [5, 6, 7]
@@ -217,7 +217,7 @@ def entries(count: int, lost: tuple[int, ...] = ()) -> list[FrameEntry]:
         truth[:3, 3] = [math.sin(0.1 * i), 0.1 * math.cos(0.37 * i), 1 - math.cos(0.1 * i)]
         estimated[:3, 3] = truth[:3, 3] + [0, 0.003 * (-1) ** i, 0]
         frames.append(
-            FrameEntry(
+            ReportedFrame(
                 index=i,
                 status="LOST" if i in lost else "TRACKED",
                 reason="<overlap>" if i in lost else "",
@@ -336,7 +336,7 @@ class TestPage:
 
     def test_loops_are_marked_and_named(self) -> None:
         frames = entries(12)
-        frames[9] = dataclasses.replace(frames[9], loop_frame=2)
+        frames[9] = ReportedFrame(**frames[9].figures | {"loop_frame": 2})
         page = render_page(ReportData("x", frames=frames))
         assert '<rect class="loop"' in page
         assert "closes a loop with frame 2" in PageCheck(page).text
@@ -359,11 +359,14 @@ class TestPage:
         "data",
         [
             ReportData(""),
-            ReportData("x", frames=[FrameEntry(0, "TRACKED")]),
-            ReportData("x", frames=[FrameEntry(i, "LOST") for i in range(5)]),
+            ReportData("x", frames=[ReportedFrame(0, "TRACKED")]),
+            ReportData("x", frames=[ReportedFrame(i, "LOST") for i in range(5)]),
             ReportData(
                 "x",
-                frames=[FrameEntry(0, "TRACKED", truth=np.eye(4)), FrameEntry(1, "lost", truth=np.eye(4))],
+                frames=[
+                    ReportedFrame(0, "TRACKED", truth=np.eye(4)),
+                    ReportedFrame(1, "lost", truth=np.eye(4)),
+                ],
             ),
             ReportData("x", model=ModelCloud(np.zeros((0, 3)))),
             ReportData("x", model=ModelCloud(np.full((4, 3), np.nan), np.zeros((4, 3)))),
@@ -420,7 +423,7 @@ class TestPictures:
     def test_a_room_is_also_shown_from_its_cameras(self) -> None:
         ball = ModelCloud(sphere(3000), sphere(3000))
         room = ModelCloud(sphere(3000), -sphere(3000))
-        frames = [FrameEntry(i, "TRACKED", world_from_camera=np.eye(4)) for i in range(4)]
+        frames = [ReportedFrame(i, "TRACKED", world_from_camera=np.eye(4)) for i in range(4)]
         outside, inside = draw_model(ball, frames), draw_model(room, frames)
         assert outside is not None
         assert inside is not None

@@ -159,7 +159,7 @@ def test_without_truth_no_error_is_told(runs: dict[str, Run]) -> None:
 
 
 def test_drift_is_to_be_looked_at() -> None:
-    from nacre.report import FrameEntry, ReportData, render_page
+    from nacre.report import ReportData, ReportedFrame, render_page
 
     frames = []
     for i in range(10):
@@ -167,7 +167,7 @@ def test_drift_is_to_be_looked_at() -> None:
         truth[0, 3], pose[0, 3] = 0.1 * i, 0.1 * i
         pose[1, 3] = 0.01 * i**2
         frames.append(
-            FrameEntry(i, "TRACKED", world_from_camera=pose, truth=truth, num_inliers=9, overlap=0.9)
+            ReportedFrame(i, "TRACKED", world_from_camera=pose, truth=truth, num_inliers=9, overlap=0.9)
         )
     page = render_page(ReportData("x", frames=frames))
     assert "Tracked, but look at the trajectory" in page

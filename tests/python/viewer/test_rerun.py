@@ -12,7 +12,8 @@ import pytest
 import nacre
 import nacre.viewer
 from nacre.cli.app import run
-from nacre.viewer import Moment, Snapshot, Timeline, export_rrd
+from nacre.report import ReportedFrame
+from nacre.viewer import Snapshot, Timeline, export_rrd
 
 
 def timeline() -> Timeline:
@@ -27,9 +28,9 @@ def timeline() -> Timeline:
         pose[0, 3] = 0.01 * i
         lost = i == 1
         told.add(
-            Moment(i, "LOST", "too few pairs")
+            ReportedFrame(i, "LOST", reason="too few pairs")
             if lost
-            else Moment(i, "TRACKED", "", pose, None, {"overlap": "98 %"})
+            else ReportedFrame(i, "TRACKED", world_from_camera=pose, overlap=0.98)
         )
         told.set_snapshot(Snapshot(points, np.zeros_like(points) - (0, 0, 1), 0.005))
     return told

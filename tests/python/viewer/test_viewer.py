@@ -14,12 +14,15 @@ import pytest
 import nacre
 from nacre.cli import main
 from nacre.reconstruction import Reconstruction
+from nacre.report import ReportedFrame
+from nacre.viewer.timeline import words
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from browser import CHROMIUM, Browser
 
 viewer = pytest.importorskip("nacre.viewer")
 pytest.importorskip("viser")
+
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
 FRAMES = 6
 
@@ -51,7 +54,7 @@ class TestStory:
     def test_snapshots_stay_few_and_evenly_spread(self) -> None:
         timeline = viewer.Timeline("x", None, max_snapshots=8)
         for i in range(100):
-            timeline.add(viewer.Moment(i, "TRACKED"))
+            timeline.add(ReportedFrame(i, "TRACKED"))
             timeline.set_snapshot(snapshot())
         places = [place for place, _ in timeline.snapshots]
         assert len(places) <= 8
@@ -63,7 +66,7 @@ class TestStory:
     def test_older_states_keep_fewer_points(self) -> None:
         timeline = viewer.Timeline("x", None, max_points=20)
         for i in range(3):
-            timeline.add(viewer.Moment(i, "TRACKED"))
+            timeline.add(ReportedFrame(i, "TRACKED"))
             timeline.set_snapshot(snapshot(50))
         assert [len(cloud.points) for _, cloud in timeline.snapshots] == [17, 17, 50]
         thin = timeline.snapshots[0][1]
@@ -75,8 +78,8 @@ class TestStory:
         timeline = viewer.Timeline("x", None)
         pose = np.eye(4)
         pose[0, 3] = 2
-        timeline.add(viewer.Moment(0, "TRACKED", world_from_camera=pose))
-        timeline.add(viewer.Moment(1, "LOST"))
+        timeline.add(ReportedFrame(0, "TRACKED", world_from_camera=pose))
+        timeline.add(ReportedFrame(1, "LOST"))
         assert timeline.pose_at(1) is pose
 
     def test_too_few_snapshots_are_refused(self) -> None:
@@ -85,10 +88,10 @@ class TestStory:
 
     def test_what_was_written_is_told(self, out: Path) -> None:
         timeline = viewer.read_timeline(out)
-        assert [moment.status for moment in timeline.moments].count("LOST") == 1
-        assert timeline.moments[3].reason
-        assert timeline.moments[0].figures["overlap"] == "100 %"
-        first, last = timeline.moments[0], timeline.moments[-1]
+        assert [frame.status for frame in timeline.frames].count("LOST") == 1
+        assert timeline.frames[3].reason
+        assert words(timeline.frames[0])["overlap"] == "100 %"
+        first, last = timeline.frames[0], timeline.frames[-1]
         assert last.truth is not None
         assert last.world_from_camera is not None
         assert np.allclose(first.truth, np.eye(4))
@@ -155,7 +158,7 @@ def test_a_run_is_shown_while_it_grows(out: Path) -> None:
         first, last = (live.timeline.snapshots[i][1] for i in (0, -1))
         assert len(first.points) < len(last.points)
         live.begin_again(done)
-        assert live.timeline.moments == []
+        assert live.timeline.frames == []
         assert live.timeline.snapshot_at(0) is None
         for record in done.frames:
             live.add(record)
