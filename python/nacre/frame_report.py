@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, Protocol, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -125,6 +126,17 @@ class FrameReport(Value):
             f"FrameReport(index={self.index}, {self.status}{reason}, overlap={self.overlap:.2f}, "
             f"num_points={self.num_points}, {self.milliseconds['total']:.1f} ms)"
         )
+
+
+class _HasStatus(Protocol):
+    @property
+    def status(self) -> str: ...
+
+
+def count_statuses(frames: Iterable[_HasStatus]) -> dict[str, int]:
+    """Return how many frames have each status."""
+    found = Counter(frame.status for frame in frames)
+    return {status: found[status] for status in STATUSES}
 
 
 class FrameReports(Sequence[FrameReport]):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -155,6 +155,12 @@ def as_poses(name: str, value: npt.ArrayLike) -> npt.NDArray[np.float64]:
         bad = present[np.argmin(is_near)]
         raise ValueError(f"{name}[{bad}] must lead at most {FARTHEST:g} m away, got\n{array[bad]}")
     return array
+
+
+def stacked_poses(poses: Iterable[npt.ArrayLike | None]) -> npt.NDArray[np.float64]:
+    """Return poses as (N, 4, 4), all NaN where there is none."""
+    missing = np.full((4, 4), np.nan)
+    return np.array([missing if pose is None else pose for pose in poses], np.float64).reshape(-1, 4, 4)
 
 
 def as_depth(name: str, value: npt.ArrayLike, depth_scale: float = 1.0) -> npt.NDArray[np.float32]:

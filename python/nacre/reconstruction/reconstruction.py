@@ -6,7 +6,6 @@ import collections.abc
 import dataclasses
 import logging
 import os
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre._internal.arrays import as_count, as_flag
+from nacre._internal.arrays import as_count, as_flag, stacked_poses
 from nacre._internal.checkpoint import Checkpointed
 from nacre.datasets.corrected import with_corrected_depth
 from nacre.datasets.sequence import SequenceFrame
@@ -23,7 +22,7 @@ from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result
-from nacre.frame_report import STATUSES, FrameReport
+from nacre.frame_report import FrameReport, count_statuses
 from nacre.model import Model
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.saved_state import calibration_from, record_from, record_state
@@ -265,8 +264,7 @@ class Reconstruction(Checkpointed):
     @property
     def counts(self) -> dict[str, int]:
         """How many frames have each status."""
-        found = Counter(frame.status for frame in self.frames)
-        return {status: found[status] for status in STATUSES}
+        return count_statuses(self.frames)
 
     @property
     def loops(self) -> list[FrameRecord]:
@@ -283,14 +281,14 @@ class Reconstruction(Checkpointed):
     @property
     def poses(self) -> npt.NDArray[np.float64]:
         """(F, 4, 4) ``world_from_camera``; NaN where it is not known."""
-        return _stacked([frame.world_from_camera for frame in self.frames])
+        return stacked_poses(frame.world_from_camera for frame in self.frames)
 
     @property
     def truths(self) -> npt.NDArray[np.float64] | None:
         """(F, 4, 4) true poses, NaN where they are not known; None where none is."""
         if all(frame.truth is None for frame in self.frames):
             return None
-        return _stacked([frame.truth for frame in self.frames])
+        return stacked_poses(frame.truth for frame in self.frames)
 
     @property
     def trajectory(self) -> Trajectory:
@@ -299,7 +297,7 @@ class Reconstruction(Checkpointed):
         timed = bool(tracked) and all(frame.timestamp is not None for frame in tracked)
         times = [frame.timestamp if timed else frame.index for frame in tracked]
         return Trajectory(
-            np.array(times, np.float64), _stacked([frame.world_from_camera for frame in tracked])
+            np.array(times, np.float64), stacked_poses(frame.world_from_camera for frame in tracked)
         )
 
     @property
@@ -350,8 +348,3 @@ class Reconstruction(Checkpointed):
         ReportData
         """
         return run_report(self, title, source, figures, interrupted=interrupted)
-
-
-def _stacked(poses: collections.abc.Sequence[npt.NDArray[np.float64] | None]) -> npt.NDArray[np.float64]:
-    missing = np.full((4, 4), np.nan)
-    return np.array([missing if pose is None else pose for pose in poses]).reshape(-1, 4, 4)

@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre._internal.arrays import stacked_poses
 from nacre.errors import FileFormatError, shown
+from nacre.frame_report import STATUSES, count_statuses
 from nacre.io.cameras import camera_of
 from nacre.io.json_files import read_json
-from nacre.report.reported_frame import NUMBERS
+from nacre.report.reported_frame import NUMBERS, ReportedFrame
 
 if TYPE_CHECKING:
     from nacre import Camera
@@ -30,6 +32,8 @@ class SavedRun:
 
     Attributes
     ----------
+    frames : list of ReportedFrame
+        In the order in which they came.
     camera : Camera or None
         The recording's camera, where the report names it.
 
@@ -46,49 +50,42 @@ class SavedRun:
         if not isinstance(report, dict) or not isinstance(report.get("frames"), list):
             raise FileFormatError(path, "not a report of nacre reconstruct")
         self.report: dict[str, Any] = report
-        self.frames: list[dict[str, Any]] = report["frames"]
-        for i, frame in enumerate(self.frames):
+        for i, frame in enumerate(report["frames"]):
             wrong = _wrong_in_frame(frame)
             if wrong:
                 raise FileFormatError(path, f"not a report of nacre reconstruct: frames[{i}]{wrong}")
         wrong = _wrong_in_report(report)
         if wrong:
             raise FileFormatError(path, f"not a report of nacre reconstruct: {wrong}")
+        self.frames = [ReportedFrame.of(frame) for frame in report["frames"]]
         document = (report.get("recording") or {}).get("camera")
         self.camera: Camera | None = None if document is None else camera_of(path, document).camera
 
     @property
     def poses(self) -> Matrix:
         """(F, 4, 4) ``world_from_camera``; NaN where it is not known."""
-        return self._stacked("world_from_camera")
+        return stacked_poses(frame.world_from_camera for frame in self.frames)
 
     @property
     def truths(self) -> Matrix | None:
         """(F, 4, 4) true poses, NaN where they are not known; None where none is."""
-        poses = self._stacked("truth")
+        poses = stacked_poses(frame.truth for frame in self.frames)
         return poses if np.isfinite(poses).any() else None
 
     @property
     def truth_from_world(self) -> Matrix | None:
         """What takes the model into the frame of the true poses, by the first frame that has both."""
         for frame in self.frames:
-            if frame.get("truth") is not None and frame.get("world_from_camera") is not None:
-                pose: Matrix = np.array(frame["truth"]) @ np.linalg.inv(frame["world_from_camera"])
+            if frame.truth is not None and frame.world_from_camera is not None:
+                pose: Matrix = frame.truth @ np.linalg.inv(frame.world_from_camera)
                 return pose
         return None
 
     @property
     def counts(self) -> dict[str, int]:
         """How many frames there are, and how many of each status."""
-        from nacre.frame_report import STATUSES
-
-        found = [frame.get("status") for frame in self.frames]
-        return {"num_frames": len(found), **{f"num_{s.lower()}": found.count(s) for s in STATUSES}}
-
-    def _stacked(self, name: str) -> Matrix:
-        missing = np.full((4, 4), np.nan)
-        poses = [missing if frame.get(name) is None else frame[name] for frame in self.frames]
-        return np.array(poses, dtype=np.float64).reshape(-1, 4, 4)
+        counts = {f"num_{status.lower()}": count for status, count in count_statuses(self.frames).items()}
+        return {"num_frames": len(self.frames), **counts}
 
 
 def _wrong_in_report(report: dict[str, Any]) -> str | None:
@@ -110,8 +107,6 @@ def _wrong_in_report(report: dict[str, Any]) -> str | None:
 
 def _wrong_in_frame(frame: Any) -> str | None:
     """Say what is not as nacre reconstruct writes a frame."""
-    from nacre.frame_report import STATUSES
-
     if not isinstance(frame, dict):
         return f" must be an object, got {shown(frame)}"
     index, status = frame.get("index"), frame.get("status")

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
+from nacre._internal.arrays import stacked_poses
 from nacre.evaluation import (
     AbsoluteTrajectoryError,
     Completeness,
@@ -120,14 +121,9 @@ def _path_length(frames: Sequence[ReportedFrame]) -> str:
 def _trajectory_error(frames: Sequence[ReportedFrame]) -> AbsoluteTrajectoryError | None:
     if not any(frame.truth is not None for frame in frames):
         return None
-    missing = np.full((4, 4), np.nan)
-
-    def stack(poses: Sequence[Any]) -> Any:
-        return np.stack([missing if pose is None else np.asarray(pose, dtype=np.float64) for pose in poses])
-
     return absolute_trajectory_error(
-        stack([frame.world_from_camera for frame in frames]),
-        stack([frame.truth for frame in frames]),
+        stacked_poses(frame.world_from_camera for frame in frames),
+        stacked_poses(frame.truth for frame in frames),
         valid=[is_tracked(frame) for frame in frames],
     )
 

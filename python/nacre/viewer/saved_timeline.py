@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from nacre.errors import FileFormatError
 from nacre.io.points import read_points
-from nacre.report.reported_frame import ReportedFrame
 from nacre.report.saved_run import SavedRun
 from nacre.viewer.timeline import Snapshot, Timeline
 
@@ -39,7 +37,9 @@ def read_timeline(folder: str | os.PathLike[str]) -> Timeline:
     placed = out.truth_from_world
     world_from_truth = None if placed is None else np.asarray(np.linalg.inv(placed), np.float64)
     for frame in out.frames:
-        timeline.add(_frame(frame, world_from_truth))
+        if frame.truth is not None:
+            frame.figures["truth"] = None if world_from_truth is None else world_from_truth @ frame.truth
+        timeline.add(frame)
     model = read_points(Path(folder) / "model.ply")
     normals = model.normals
     if normals is None:
@@ -55,13 +55,6 @@ def read_timeline(folder: str | os.PathLike[str]) -> Timeline:
     )
     timeline.set_snapshot(cloud)
     return timeline
-
-
-def _frame(document: dict[str, Any], world_from_truth: npt.NDArray[np.float64] | None) -> ReportedFrame:
-    frame = ReportedFrame.of(document)
-    if frame.truth is not None:
-        frame.figures["truth"] = None if world_from_truth is None else world_from_truth @ frame.truth
-    return frame
 
 
 def _recorded_depth(out: SavedRun) -> Any:
