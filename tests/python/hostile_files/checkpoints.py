@@ -12,7 +12,7 @@ from hostile_files.seals import sealed_line
 _random = np.random.default_rng(7)
 
 
-def checkpoint(body: bytes = b"", *, form: int = 3, told: int | None = None, checksum: int = 0) -> bytes:
+def checkpoint(body: bytes = b"", *, form: int = 4, told: int | None = None, checksum: int = 0) -> bytes:
     """Return the header of a checkpoint, and a body."""
     length = 48 + len(body) if told is None else told
     return b"nacremdl" + struct.pack("<I20sQQ", form, b"0.1.0", length, checksum) + body
