@@ -4,7 +4,7 @@
 
 namespace nacre {
 
-ModelView::ModelView(const Camera& camera, const Pose& world_from_camera) : camera_(camera) {
+PointProjection::PointProjection(const Camera& camera, const Pose& world_from_camera) : camera_(camera) {
   const Pose camera_from_world = world_from_camera.inverse();
   Eigen::Map<Eigen::Matrix<float, 3, 3, Eigen::RowMajor>>(view_.rotation) = camera_from_world.linear().cast<float>();
   Eigen::Map<Eigen::Vector3f>(view_.translation) = camera_from_world.translation().cast<float>();
@@ -15,7 +15,7 @@ ModelView::ModelView(const Camera& camera, const Pose& world_from_camera) : came
   view_.orthographic = camera.model() == Camera::Model::orthographic;
 }
 
-void ModelView::project(const float* points, const float* normals, int count, Block& b) const {
+void PointProjection::project(const float* points, const float* normals, int count, Block& b) const {
   simd::project_points()(view_, points, normals, count,
                          {b.x, b.y, b.z, b.normal_x, b.normal_y, b.normal_z, b.u, b.v, b.facing});
   const bool is_distorted = camera_.distortion() != Camera::Distortion{};

@@ -6,7 +6,7 @@
 
 namespace nacre {
 
-class ModelView {
+class PointProjection {
  public:
   static constexpr int capacity = 256;
 
@@ -23,7 +23,7 @@ class ModelView {
     Eigen::Vector3f normal(int i) const { return {normal_x[i], normal_y[i], normal_z[i]}; }
   };
 
-  ModelView(const Camera& camera, const Pose& world_from_camera);
+  PointProjection(const Camera& camera, const Pose& world_from_camera);
 
   // points and normals: count <= capacity times x, y, z, in the world frame.
   void project(const float* points, const float* normals, int count, Block& block) const;

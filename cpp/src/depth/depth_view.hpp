@@ -1,6 +1,11 @@
 // Does a depth image confirm points that should be seen there?
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+#include "camera/point_projection.hpp"
 #include "nacre/camera.hpp"
 #include "nacre/types.hpp"
 
@@ -13,10 +18,57 @@ struct DepthView {
   Values measured = {};  // the depth before it was cleaned, 0 or NaN for none; empty: the same
 };
 
-// Of oriented points that face a camera at a pose and project onto a pixel that it measured: the part that agrees with
-// it, among those that agree and those that the camera sees through. Points behind the measured surface are hidden, not
-// wrong. NaN where too few of the points can be judged.
-double consistency_of(const PointsRef& points, const PointsRef& normals, const DepthView& view,
-                      const Pose& world_from_camera, const Camera& camera, double spacing, int num_threads);
+// What a camera says of a point that it looks at.
+enum class Visibility {
+  agrees,
+  seen_through,  // it measured something behind the point
+  occluded,      // or something before it, which says nothing about the point
+  unknown,       // or nothing
+};
+
+// `behind`: how far behind the point the camera measured something; differences up to the margin agree.
+template <class T>
+Visibility visibility(T behind, T margin) {
+  if (!std::isfinite(behind)) return Visibility::unknown;
+  return behind > margin ? Visibility::seen_through : behind < -margin ? Visibility::occluded : Visibility::agrees;
+}
+
+struct VisibilityCounts {
+  std::int64_t agreeing = 0, seen_through = 0, occluded = 0;
+
+  void add(Visibility visibility);
+  VisibilityCounts& operator+=(const VisibilityCounts& other);
+  // The part of the points that agrees, among those that agree and those that the camera sees through; NaN where fewer
+  // than `least` are either.
+  double consistency(std::int64_t least) const;
+};
+
+// How far along its normal a point may be from what the camera measures: a distance, and no less than so much as the
+// measurement errs by. Surfaces seen at a smaller cosine are not asked.
+struct VisibilityMargin {
+  double distance = 0.0;              // [m]
+  double part_of_depth = 0.0;         // beside it
+  bool with_systematic_error = true;  // see systematic_error.hpp
+  float least_facing = 0.3F;          // cosine between normal and viewing direction
+};
+
+// Of oriented points, as a camera at a pose in their frame sees them: what it measured there says of each.
+VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, const DepthView& view,
+                         const Pose& points_from_camera, const Camera& camera, const VisibilityMargin& margin,
+                         int num_threads);
+
+// Calls visit(block, i) for each of the first `count` points that is in the image of a camera at a pose in their frame.
+template <class Visit>
+void visit_points_in_view(const PointsRef& points, const PointsRef& normals, Eigen::Index first, Eigen::Index count,
+                          const PointProjection& projection, Visit&& visit) {
+  PointProjection::Block block;
+  for (Eigen::Index begin = first; begin < first + count; begin += PointProjection::capacity) {
+    const auto size = static_cast<int>(std::min<Eigen::Index>(PointProjection::capacity, first + count - begin));
+    projection.project(points.data() + 3 * begin, normals.data() + 3 * begin, size, block);
+    for (int i = 0; i < size; ++i) {
+      if (block.inside[i]) visit(block, i);
+    }
+  }
+}
 
 }  // namespace nacre

@@ -90,12 +90,12 @@ void fuse_attributes(PointModel& model, std::int64_t first, const Frame& frame, 
   }
   for (const AttributePlanes::Part& part : planes.parts()) targets.push_back(find(model, part.attribute->name));
 
-  const ModelView view(camera, world_from_camera);
-  constexpr std::int64_t block_size = ModelView::capacity;
+  const PointProjection view(camera, world_from_camera);
+  constexpr std::int64_t block_size = PointProjection::capacity;
   parallel_blocks(
       model.size() - first, block_size, num_threads, [&](std::int64_t, std::int64_t begin, std::int64_t end) {
         const auto start = static_cast<std::size_t>(first + begin);
-        ModelView::Block points;
+        PointProjection::Block points;
         view.project(model.points[start].data(), model.normals[start].data(), static_cast<int>(end - begin), points);
         ObservationBlock block;
         std::size_t seen[block_size];

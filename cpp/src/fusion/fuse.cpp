@@ -10,6 +10,7 @@
 #include "base/pose_check.hpp"
 #include "camera/point_projection.hpp"
 #include "camera/point_spacing.hpp"
+#include "depth/depth_view.hpp"
 #include "fusion/attribute_fusion.hpp"
 #include "fusion/observable.hpp"
 #include "fusion/pixel_index.hpp"
@@ -65,7 +66,7 @@ std::vector<T> concatenate(const std::vector<std::vector<T>>& parts) {
 }
 
 // Whether a point beside the image stands for surface within it: where points are farther apart than windows reach.
-bool reaches_image(const ModelView::Block& points, int i, const Camera& camera, double spacing) {
+bool reaches_image(const PointProjection::Block& points, int i, const Camera& camera, double spacing) {
   const double reach = spacing / camera.footprint(points.z[i]);
   return reach > simd::largest_window && points.u[i] > -reach && points.u[i] < camera.width() - 1 + reach &&
          points.v[i] > -reach && points.v[i] < camera.height() - 1 + reach;
@@ -75,10 +76,10 @@ bool reaches_image(const ModelView::Block& points, int i, const Camera& camera, 
 Known update(PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
              const Pose& world_from_camera, double spacing, std::int32_t frame_index, const FusionOptions& options,
              FusionReport& report, int num_threads) {
-  const ModelView view(camera, world_from_camera);
+  const PointProjection view(camera, world_from_camera);
   const Eigen::Matrix3f world_rotation = world_from_camera.linear().cast<float>();
-  constexpr std::int64_t block_size = ModelView::capacity;
-  static_assert(ModelView::capacity <= ObservationBlock::capacity);
+  constexpr std::int64_t block_size = PointProjection::capacity;
+  static_assert(PointProjection::capacity <= ObservationBlock::capacity);
   struct Cover {
     std::size_t point;
     std::int32_t pixel;
@@ -91,15 +92,15 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
   parallel_blocks(
       model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
         const auto first = static_cast<std::size_t>(begin);
-        ModelView::Block points;
+        PointProjection::Block points;
         view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin), points);
         const auto note_free_space_violation = [&](int j, float sigma) {
           const std::size_t i = first + static_cast<std::size_t>(j);
           const float margin = std::max(static_cast<float>(2.0 * spacing), 4.0F * sigma);
           const bool is_confirmed = model.observations[i] >= options.min_observations;
-          const float behind = frame.points(points.pixel[j], 2) - points.z[j];
-          const bool is_missed =
-              is_confirmed ? observer.sees_through(points.point(j), points.pixel[j], margin) : behind > -margin;
+          const Visibility is = visibility(frame.points(points.pixel[j], 2) - points.z[j], margin);
+          const bool is_missed = is_confirmed ? observer.sees_through(points.point(j), points.pixel[j], margin)
+                                              : is == Visibility::agrees || is == Visibility::seen_through;
           if (is_missed) count_up(model.free_space_violations[i]);
         };
         ObservationBlock block;

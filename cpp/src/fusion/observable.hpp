@@ -18,7 +18,8 @@ inline float sigma_at(const Frame& frame, std::int32_t pixel) {
 }
 
 // Whether the frame may show a point of a block.
-inline bool is_observable(const ModelView::Block& points, int j, const Frame& frame, const SurfaceObserver& observer) {
+inline bool is_observable(const PointProjection::Block& points, int j, const Frame& frame,
+                          const SurfaceObserver& observer) {
   if (!points.inside[j] || !(points.facing[j] > least_facing)) return false;
   const float sigma = sigma_at(frame, points.pixel[j]);
   return observer.may_observe(points.point(j), points.pixel[j], sigma, least_weight * observer.frontal_weight(sigma));

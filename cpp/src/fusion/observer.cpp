@@ -5,6 +5,7 @@
 
 #include "base/parallel.hpp"
 #include "base/statistics.hpp"
+#include "depth/depth_view.hpp"
 
 namespace nacre {
 namespace {
@@ -177,7 +178,8 @@ bool SurfaceObserver::sees_through(const Eigen::Vector3f& point, std::int32_t pi
   if (u < 1 || v < 1 || u + 1 >= width_ || v + 1 >= height_) return false;
   for (int y = v - 1; y <= v + 1; ++y) {
     for (int x = u - 1; x <= u + 1; ++x) {
-      if (!(image_.z[y * image_.stride + x] > point.z() + margin)) return false;
+      const float behind = image_.z[y * image_.stride + x] - point.z();
+      if (visibility(behind, margin) != Visibility::seen_through) return false;
     }
   }
   return true;

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "camera/view_distance.hpp"
+#include "depth/depth_view.hpp"
 #include "outlines/occluding_edges.hpp"
 #include "tracking/frame_samples.hpp"
 
@@ -21,14 +22,8 @@ struct KeyFrame {
   int last_seen;  // the last stop of the camera where its surface was in view and known to be in place
 };
 
-// What a frame says about points whose place is known about.
-struct CloudInView {
-  double seen = 0.0;     // part of the points that are where the frame measures something
-  double through = 0.0;  // part of them that it sees through
-};
-
-// margin: of the depth, that counts as the same place.
-CloudInView look_for(const FrameCloud& cloud, const Pose& camera_from_cloud, const Frame& frame, const Camera& camera,
-                     double margin);
+// What a camera says of a cloud of another one's: of so much of the depth as margin it counts as the same place.
+VisibilityCounts compare(const FrameCloud& cloud, const Pose& camera_from_cloud, const DepthView& view,
+                         const Camera& camera, double margin);
 
 }  // namespace nacre

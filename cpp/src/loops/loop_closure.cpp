@@ -53,6 +53,16 @@ Pose blend(const Pose& a, const Pose& b, double part, const Eigen::Vector3d& piv
   return pose;
 }
 
+double part_of(std::int64_t count, const FrameCloud& cloud) {
+  return static_cast<double>(count) / static_cast<double>(std::max<Eigen::Index>(1, cloud.points.rows()));
+}
+
+// The part of a cloud's points that is about where a camera measures something.
+double part_in_view(const FrameCloud& cloud, const Pose& camera_from_cloud, const DepthView& view,
+                    const Camera& camera) {
+  return part_of(compare(cloud, camera_from_cloud, view, camera, reach).agreeing, cloud);
+}
+
 }  // namespace
 
 bool LoopClosure::is_in_place(int key_frame) const {
@@ -93,10 +103,10 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
   std::vector<int> in_view;
   for (int k = 0; k < num_key_frames(); ++k) {
     KeyFrame& other = key_frames_[static_cast<std::size_t>(k)];
-    const CloudInView view = look_for(other.cloud, pose.inverse() * pose_of(k), frame.frame, camera_, reach);
-    if (view.seen < least_overlap) continue;
+    const double seen = part_in_view(other.cloud, pose.inverse() * pose_of(k), frame.view, camera_);
+    if (seen < least_overlap) continue;
     if (!is_in_place(k) && !frame.to_whole_model && !frame.is_given) {
-      in_question.emplace_back(-view.seen, k);
+      in_question.emplace_back(-seen, k);
     } else {
       in_view.push_back(k);
     }
@@ -122,9 +132,8 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
       least_distance = distance;
       nearest = k;
     }
-    const double part = look_for(key_frames_[static_cast<std::size_t>(k)].cloud, pose.inverse() * pose_of(k),
-                                 frame.frame, camera_, reach)
-                            .seen;
+    const FrameCloud& cloud = key_frames_[static_cast<std::size_t>(k)].cloud;
+    const double part = part_in_view(cloud, pose.inverse() * pose_of(k), frame.view, camera_);
     if (part > largest_part) {
       largest_part = part;
       most_seen = k;
@@ -229,16 +238,17 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
       found.alignment.weak_directions.cols() > 0 || found.alignment.residual_ratio > largest_ratio) {
     return std::nullopt;
   }
-  CloudInView view;
+  double seen = 0.0, through = 0.0;
   for (const int k : candidates) {
-    const CloudInView part = look_for(key_frames_[static_cast<std::size_t>(k)].cloud, pose.inverse() * pose_of(k),
-                                      frame.frame, camera_, 2.75 * frame.spacing / cloud.depth);
-    view.seen += part.seen;
-    view.through += part.through;
+    const FrameCloud& other = key_frames_[static_cast<std::size_t>(k)].cloud;
+    const VisibilityCounts counts =
+        compare(other, pose.inverse() * pose_of(k), frame.view, camera_, 2.75 * frame.spacing / cloud.depth);
+    seen += part_of(counts.agreeing, other);
+    through += part_of(counts.seen_through, other);
   }
-  if (view.seen < least_consistency * (view.seen + view.through)) return std::nullopt;
+  if (seen < least_consistency * (seen + through)) return std::nullopt;
   found.correction = orthonormal(pose * frame.alignment.target_from_source.inverse());
-  found.is_beyond_doubt = found.alignment.overlap > 2.0 * least_overlap && view.through < 0.05 * view.seen &&
+  found.is_beyond_doubt = found.alignment.overlap > 2.0 * least_overlap && through < 0.05 * seen &&
                           found.alignment.residual_ratio < 0.5 * largest_ratio;
   found.distance = rms_distance(cloud.points, pose, frame.alignment.target_from_source);
   return found;

@@ -15,6 +15,7 @@ namespace nacre {
 struct LoopFrame {
   std::int32_t index;
   const Frame& frame;
+  const DepthView& view;
   const SurfaceObserver& observer;
   const std::vector<OutlinePoint>& outline;
   const AlignResult& alignment;  // world_from_camera as target_from_source

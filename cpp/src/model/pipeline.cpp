@@ -250,8 +250,8 @@ void Pipeline::close_loops(const TrackingResult& tracking, bool is_given, FrameR
   if (!keeps_key_frames()) return;
   const std::int32_t oldest_frame = loops.oldest_frame();
   const LoopReport loop =
-      loops.add_frame({static_cast<std::int32_t>(report.index), frame, observer, outline, tracking.alignment, spacing,
-                       is_given, was_lost() || tracking.is_to_whole_model});
+      loops.add_frame({static_cast<std::int32_t>(report.index), frame, now, observer, outline, tracking.alignment,
+                       spacing, is_given, was_lost() || tracking.is_to_whole_model});
   if (loop.corrections.empty()) return;
   report.loop_frame = loop.frame;
   report.loop_distance = loop.distance;

@@ -16,9 +16,9 @@ constexpr double look_within = 3.0;     // [pixels]: nearer to an edge, pixels s
 constexpr double look_beyond = 5.0;     // [pixels]
 constexpr double least_distance = 2.0;  // of a surface from another [pixels]
 
-// How far before a point of a surface a camera saw something, along its normal [m], averaged over the pixels around;
+// How far behind a point of a surface a camera saw something, along its normal [m], averaged over the pixels around;
 // NaN where it saw nothing, none outside of the image. All in the camera frame.
-std::optional<double> distance_before(const DepthView& sight, const Camera& camera, const Eigen::Vector3d& point,
+std::optional<double> distance_behind(const DepthView& view, const Camera& camera, const Eigen::Vector3d& point,
                                       const Eigen::Vector3d& normal) {
   const Eigen::Vector2d pixel = camera.project(point);
   if (!(pixel.x() > 1.0 && pixel.y() > 1.0 && pixel.x() < camera.width() - 2 && pixel.y() < camera.height() - 2)) {
@@ -29,26 +29,27 @@ std::optional<double> distance_before(const DepthView& sight, const Camera& came
   int count = 0;
   for (int y = v - 1; y <= v + 1; ++y) {
     for (int x = u - 1; x <= u + 1; ++x) {
-      const double z = static_cast<double>(sight.depth[y * camera.width() + x]);
+      const double z = static_cast<double>(view.depth[y * camera.width() + x]);
       if (!std::isfinite(z)) continue;
-      sum += (unproject(camera, x, y, z) - point).dot(normal);
+      sum -= (unproject(camera, x, y, z) - point).dot(normal);
       ++count;
     }
   }
   return sum / count;
 }
 
-bool is_contradicted(const OutlinePoint& edge, const DepthView& sight, const Camera& camera, double pixel,
+bool is_contradicted(const OutlinePoint& edge, const DepthView& view, const Camera& camera, double pixel,
                      double noise) {
   const bool is_orthographic = camera.model() == Camera::Model::orthographic;
   const Eigen::Vector3d sight_line = is_orthographic ? Eigen::Vector3d::UnitZ() : edge.point.normalized();
   if (!(-edge.normal.dot(sight_line) > least_facing)) return false;
   const double tolerance = least_distance * pixel + noise;
-  const auto here = distance_before(sight, camera, edge.point - look_within * pixel * edge.outward, edge.normal);
+  const auto here = distance_behind(view, camera, edge.point - look_within * pixel * edge.outward, edge.normal);
   if (!here) return false;
-  if (!(*here > -tolerance)) return true;
-  const auto beyond = distance_before(sight, camera, edge.point + look_beyond * pixel * edge.outward, edge.normal);
-  return beyond && std::abs(*beyond) < tolerance;
+  const Visibility inside = visibility(*here, tolerance);
+  if (inside == Visibility::seen_through || inside == Visibility::unknown) return true;
+  const auto beyond = distance_behind(view, camera, edge.point + look_beyond * pixel * edge.outward, edge.normal);
+  return beyond && visibility(*beyond, tolerance) == Visibility::agrees;
 }
 
 }  // namespace
@@ -87,14 +88,14 @@ std::vector<int> nearest_edges(const std::vector<OutlinePoint>& outline, const s
   return nearest;
 }
 
-double agreement_of(const std::vector<OutlinePoint>& outline, const std::vector<int>& matches, const DepthView& sight,
+double agreement_of(const std::vector<OutlinePoint>& outline, const std::vector<int>& matches, const DepthView& view,
                     const Camera& camera, double pixel, double noise) {
-  const std::vector<OutlinePoint> seen = moved(outline, sight.world_from_camera.inverse());
+  const std::vector<OutlinePoint> seen = moved(outline, view.world_from_camera.inverse());
   std::size_t agree = 0, contradicted = 0;
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (matches[i] >= 0) {
       ++agree;
-    } else if (is_contradicted(seen[i], sight, camera, pixel, noise)) {
+    } else if (is_contradicted(seen[i], view, camera, pixel, noise)) {
       ++contradicted;
     }
   }

@@ -6,7 +6,7 @@
 
 #include "base/random.hpp"
 #include "base/statistics.hpp"
-#include "camera/point_projection.hpp"
+#include "depth/depth_view.hpp"
 #include "region/support_planes.hpp"
 
 namespace nacre {
@@ -71,25 +71,22 @@ Eigen::Vector3d ObjectView::body() const {
 ViewEvidence look_at(const ObjectView& moved, const ObjectView& seen, const Pose& seen_from_moved, const Camera& camera,
                      Eigen::Index count) {
   count = std::min(count, moved.points.rows());
-  const ModelView view(camera, seen_from_moved.inverse());
+  const PointProjection projection(camera, seen_from_moved.inverse());
   const auto tolerance = static_cast<float>(std::max(moved.tolerance, seen.tolerance));
-  ModelView::Block block;
   float agree = 0.0F, through = 0.0F, hidden = 0.0F;
-  for (Eigen::Index begin = 0; begin < count; begin += ModelView::capacity) {
-    const auto size = static_cast<int>(std::min<Eigen::Index>(ModelView::capacity, count - begin));
-    view.project(moved.points.data() + 3 * begin, moved.normals.data() + 3 * begin, size, block);
-    for (int i = 0; i < size; ++i) {
-      if (!block.inside[i]) continue;
-      const float behind = seen.depth[block.pixel[i]] - block.z[i];
-      if (!std::isfinite(behind)) continue;
-      const float margin = 2.0F * tolerance / std::max(block.facing[i], least_cosine_to_camera);
-      if (behind > margin) through += 1.0F;
-      if (!(block.facing[i] > least_cosine_to_camera) || seen.region.data()[block.pixel[i]] == 0) continue;
-      if (behind < -margin) hidden += 1.0F;
-      const float ratio = behind * block.facing[i] / tolerance;
-      agree += std::max(0.0F, 1.0F - ratio * ratio);
-    }
-  }
+  visit_points_in_view(moved.points, moved.normals, 0, count, projection,
+                       [&](const PointProjection::Block& block, int i) {
+                         const float behind = seen.depth[block.pixel[i]] - block.z[i];
+                         const float margin = 2.0F * tolerance / std::max(block.facing[i], least_cosine_to_camera);
+                         const Visibility is = visibility(behind, margin);
+                         if (is == Visibility::unknown) return;
+                         if (is == Visibility::seen_through) through += 1.0F;
+                         if (!(block.facing[i] > least_cosine_to_camera) || seen.region.data()[block.pixel[i]] == 0)
+                           return;
+                         if (is == Visibility::occluded) hidden += 1.0F;
+                         const float ratio = behind * block.facing[i] / tolerance;
+                         agree += std::max(0.0F, 1.0F - ratio * ratio);
+                       });
   const auto all = static_cast<double>(std::max<Eigen::Index>(count, 1));
   return {static_cast<double>(agree) / all, static_cast<double>(through) / all, static_cast<double>(hidden) / all};
 }

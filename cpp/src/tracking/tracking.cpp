@@ -35,15 +35,15 @@ struct View {
 // n of them, so that at most max_target_points are left.
 View points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera,
                     std::int32_t oldest_frame, int num_threads) {
-  constexpr std::int64_t block_size = ModelView::capacity;
-  const ModelView model_view(camera, world_from_camera);
+  constexpr std::int64_t block_size = PointProjection::capacity;
+  const PointProjection model_view(camera, world_from_camera);
   const auto width = static_cast<float>(camera.width()), height = static_cast<float>(camera.height());
   const float margin_u = width / 3.0F, margin_v = height / 3.0F;
   std::vector<std::vector<std::uint32_t>> found(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
   parallel_blocks(
       model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
         const auto first = static_cast<std::size_t>(begin);
-        ModelView::Block block;
+        PointProjection::Block block;
         model_view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin),
                            block);
         std::uint32_t rows[block_size];
@@ -133,6 +133,12 @@ struct Search {
     return gated;
   }
 
+  // NaN where too few of the points are seen.
+  double consistency(const Points& points, const Points& normals, const DepthView& seen, const Pose& pose) const {
+    constexpr std::int64_t least_judged = 20;
+    return compare(points, normals, seen, pose, camera, {3.0 * spacing}, options.num_threads).consistency(least_judged);
+  }
+
   // Near: the guess is about right, and a narrow gate is safest. Wide: it is not. expectation: of the guess.
   TrackingResult register_from(const Pose& guess, bool wide, Expectation expectation) const {
     const View view = points_in_view(model, camera, guess, oldest_frame, options.num_threads);
@@ -154,13 +160,12 @@ struct Search {
       result.alignment = determine_by_outline(target, gated, outlines(), result.alignment, align_options);
     }
     const Pose& pose = result.alignment.target_from_source;
-    const double in_view = consistency_of(view.points, view.normals, now, pose, camera, spacing, options.num_threads);
+    const double in_view = consistency(view.points, view.normals, now, pose);
     const Eigen::Matrix3f rotation = pose.linear().cast<float>();
     const Eigen::RowVector3f translation = pose.translation().cast<float>().transpose();
     const Points points = (source.cloud.points * rotation.transpose()).rowwise() + translation;
     const Points normals = source.cloud.normals * rotation.transpose();
-    const double earlier =
-        consistency_of(points, normals, before, before.world_from_camera, camera, spacing, options.num_threads);
+    const double earlier = consistency(points, normals, before, before.world_from_camera);
     result.consistency = std::isfinite(in_view) || std::isfinite(earlier) ? std::fmin(in_view, earlier) : 0.0;
     result.expectation = view_distance(guess, pose, depth) > largest_distance ? Expectation::unexpected : expectation;
     judge(result, options);

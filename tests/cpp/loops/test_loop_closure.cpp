@@ -328,7 +328,8 @@ TEST_CASE("a ring is not closed by a view that leaves directions open") {
       alignment.center = Turntable::middle();
       alignment.information = 1e6 * Matrix6::Identity();
       if (is_weak) alignment.weak_directions = Vector6::Unit(4);
-      const LoopReport report = loops.add_frame({k, frame, observer, {}, alignment, 0.003, false, false});
+      const DepthView view{frame.points.col(2), frame.sigma};
+      const LoopReport report = loops.add_frame({k, frame, view, observer, {}, alignment, 0.003, false, false});
       num_closed += report.frame.has_value() ? 1 : 0;
       CHECK(report.frame.has_value() == !report.corrections.empty());
     }
@@ -360,13 +361,15 @@ TEST_CASE("a cloud is found in its own view, not behind the camera, and seen thr
   const FrameCloud cloud = sample_cloud(frame, observer, {});
   CHECK(cloud.points.rows() == 3000);
   CHECK(cloud.depth == doctest::Approx(1.0).epsilon(0.001));
-  CHECK(look_for(cloud, Pose::Identity(), frame, camera, 0.02).seen == 1.0);
+  const DepthView view{frame.points.col(2), frame.sigma};
+  CHECK(compare(cloud, Pose::Identity(), view, camera, 0.02).agreeing == 3000);
   Pose behind = Pose::Identity(), nearer = Pose::Identity(), farther = Pose::Identity();
   behind.linear() = Eigen::AngleAxisd(pi, Eigen::Vector3d::UnitY()).toRotationMatrix();
   nearer.translation().z() = -0.2;
   farther.translation().z() = 0.2;
-  CHECK(look_for(cloud, behind, frame, camera, 0.02).seen == 0.0);
-  CHECK(look_for(cloud, nearer, frame, camera, 0.02).through > 0.5);
-  CHECK(look_for(cloud, nearer, frame, camera, 0.02).seen == 0.0);
-  CHECK(look_for(cloud, farther, frame, camera, 0.02).through == 0.0);  // hidden
+  CHECK(compare(cloud, behind, view, camera, 0.02).agreeing == 0);
+  CHECK(compare(cloud, nearer, view, camera, 0.02).seen_through > 1500);
+  CHECK(compare(cloud, nearer, view, camera, 0.02).agreeing == 0);
+  CHECK(compare(cloud, farther, view, camera, 0.02).seen_through == 0);
+  CHECK(compare(cloud, farther, view, camera, 0.02).occluded > 1500);
 }

@@ -26,7 +26,7 @@ template <class Change>
 TrackingResult judged(Change&& change, Expectation expectation = Expectation::expected) {
   TrackingResult result = good(expectation);
   change(result);
-  judge(result, ModelOptions{});
+  judge(result, TrackingOptions{});
   return result;
 }
 
@@ -97,7 +97,7 @@ TEST_CASE("too few matches, and no verification") {
   TrackingResult result = good();
   result.alignment.overlap = 0.01;
   result.alignment.size_difference = {0.5, 0.001};
-  ModelOptions options;
+  TrackingOptions options;
   options.verify = false;
   judge(result, options);
   CHECK(result.status == FrameStatus::tracked);
