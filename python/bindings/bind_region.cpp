@@ -12,9 +12,9 @@ using nacre::NoiseModel;
 using nacre::RegionOptions;
 using nacre::RegionReport;
 
-std::pair<MaskImage, RegionReport> select_region(const DepthRef& depth, const Camera& camera,
-                                                 const RegionOptions& options, const MaskRef& previous,
-                                                 const std::optional<NoiseModel>& noise, int num_threads) {
+std::pair<MaskImage, RegionReport> select_in_depth(const DepthRef& depth, const Camera& camera,
+                                                   const RegionOptions& options, const MaskRef& previous,
+                                                   const std::optional<NoiseModel>& noise, int num_threads) {
   std::pair<MaskImage, RegionReport> result;
   const Frame frame = nacre::make_frame(depth, camera, noise, num_threads);
   result.first = nacre::select_region(frame, camera, options, previous, &result.second, num_threads);
@@ -48,6 +48,6 @@ void bind_region(py::module_& m) {
         return planes;
       });
 
-  m.def("select_region", &select_region, py::arg("depth"), py::arg("camera"), py::arg("options"), py::arg("previous"),
+  m.def("select_region", &select_in_depth, py::arg("depth"), py::arg("camera"), py::arg("options"), py::arg("previous"),
         py::arg("noise"), py::arg("num_threads"), ReleaseGil());
 }

@@ -15,8 +15,6 @@ namespace {
 constexpr float infinity = std::numeric_limits<float>::infinity(), largest = std::numeric_limits<float>::max();
 constexpr std::int64_t nodes_per_task = 4;
 
-std::size_t as_size(std::int64_t i) { return static_cast<std::size_t>(i); }
-
 // The nearest float that is not greater, or not smaller, within a unit in the last place. Finite, for infinities would
 // make boxes that do not exist look near; where there is no number, the box has no end.
 float round_down(double x) {

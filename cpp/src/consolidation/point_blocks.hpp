@@ -15,6 +15,8 @@ struct Scaling {
   double scale;
 };
 
+inline std::size_t as_size(std::int64_t i) { return static_cast<std::size_t>(i); }
+
 class PointBlocks {
  public:
   static constexpr std::int64_t size = simd::block_size;

@@ -20,8 +20,6 @@ namespace {
 
 constexpr double cells_a_radius = 4.0;
 
-std::size_t as_size(std::int64_t i) { return static_cast<std::size_t>(i); }
-
 // What makes a method, in the unit of length in which theta(r) = 2^(-r^2).
 struct Form {
   double scale = 1.0;                   // units a metre

@@ -11,13 +11,13 @@
 namespace nacre {
 namespace {
 
-constexpr int border = 3;              // of an image, where cleaning may have removed pixels
-constexpr int reach = 6;               // of the window that shows the surface [pixels]
-constexpr double least_facing = 0.5;   // cosine between the normal and the direction to the camera
-constexpr double least_offset = 0.25;  // of the window's pixels from its middle, in units of its reach: a half disc
-constexpr double most_offset = 0.65;   // has 0.42, a corner of 90 degrees 0.6
-constexpr double least_filled = 0.18;  // part of the window that shows the surface
-constexpr double most_slope = 3.0;     // of depth, in pixels' sizes, along a surface
+constexpr int border = 3;                  // of an image, where cleaning may have removed pixels
+constexpr int reach = 6;                   // of the window that shows the surface [pixels]
+constexpr double least_edge_facing = 0.5;  // cosine between the normal and the direction to the camera
+constexpr double least_offset = 0.25;      // of the window's pixels from its middle, in units of its reach: a half disc
+constexpr double most_offset = 0.65;       // has 0.42, a corner of 90 degrees 0.6
+constexpr double least_filled = 0.18;      // part of the window that shows the surface
+constexpr double most_slope = 3.0;         // of depth, in pixels' sizes, along a surface
 
 constexpr double most_off = 4.0;  // of a pixel from its surface, in standard deviations
 
@@ -81,7 +81,7 @@ class OutlineSearch {
     const Eigen::Vector3d sight_line =
         camera_.model() == Camera::Model::orthographic ? Eigen::Vector3d::UnitZ() : origin.normalized();
     if (found.normal.dot(sight_line) > 0.0) found.normal = -found.normal;
-    if (!(-found.normal.dot(sight_line) > least_facing)) return std::nullopt;
+    if (!(-found.normal.dot(sight_line) > least_edge_facing)) return std::nullopt;
     const Eigen::Vector3d along = across * -inward.y() + down * inward.x();
     found.outward = along.cross(found.normal).normalized();
     const Eigen::Vector3d outwards = -(across * inward.x() + down * inward.y());

@@ -11,7 +11,7 @@
 namespace nacre {
 namespace {
 
-constexpr std::size_t fewest = 25;              // pairs
+constexpr std::size_t fewest_matches = 25;      // pairs
 constexpr int num_rounds = 4, least_steps = 4;  // after each round of steps, back onto the surface
 constexpr double gate_decay = 0.8;              // at each step
 constexpr double first_gate = 12.0;             // [pixels]; of an object seen whole also a third of its size
@@ -81,7 +81,7 @@ class EdgeSearch {
       pairs.push_back({edge.point - center, other.outward, edge.outward, (edge.point - other.point).dot(across)});
       sizes.push_back(std::abs(pairs.back().residual));
     }
-    if (pairs.size() < fewest) return {};
+    if (pairs.size() < fewest_matches) return {};
     noise_ = std::max(least_noise * pixel_, mad_to_sigma * median_of(sizes));
     for (EdgePair& pair : pairs) pair.weight = robust_weight(pair.residual, noise_);
     return pairs;
@@ -190,7 +190,7 @@ class EdgeSearch {
 
 IcpResult determine_by_outline(const IcpTarget& target, const IcpSource& source, const OutlinePair& outlines,
                                const IcpResult& geometric, const AlignOptions& options) {
-  if (outlines.target.size() < fewest || outlines.source.size() < fewest) return geometric;
+  if (outlines.target.size() < fewest_matches || outlines.source.size() < fewest_matches) return geometric;
   EdgeSearch search(target, source, outlines, geometric, options);
   // The nearer solution first: structures repeat.
   double best = 0.0, gate = 0.0;

@@ -13,7 +13,7 @@ namespace {
 
 constexpr int num_neighbors = 24;
 constexpr float least_cosine = 0.8F;  // between the normals of neighbours on one surface
-constexpr std::int64_t block_size = 256;
+constexpr std::int64_t cloud_block = 256;
 
 Points normals_of(const GlobalCloud& cloud, int num_threads) {
   if (cloud.normals.rows() > 0) return cloud.normals;
@@ -47,7 +47,7 @@ void denoise(const PointsRef& all, const Points& all_normals, const std::vector<
              Points& points, const Points& normals) {
   const Neighbors near =
       KdTree(all, num_threads).query(PointsRef(points), num_neighbors, KdTree::infinity, num_threads);
-  parallel_for(points.rows(), block_size, num_threads, [&](std::int64_t i) {
+  parallel_for(points.rows(), cloud_block, num_threads, [&](std::int64_t i) {
     float sum = 0.0F, count = 0.0F;
     for (Eigen::Index k = 0; k < near.indices.cols(); ++k) {
       const std::int64_t row = near.indices(i, k);

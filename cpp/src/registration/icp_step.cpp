@@ -12,7 +12,7 @@
 namespace nacre {
 namespace {
 
-constexpr std::int64_t block_size = 256;
+constexpr std::int64_t step_block = 256;
 constexpr double damping = 1e-9;  // information per pair, so that there always is a solution
 
 struct Moments {
@@ -35,7 +35,7 @@ struct Moments {
 // Points relative to an origin near them.
 Moments sum_moments(const std::vector<Pair>& pairs, Metric metric, const Eigen::Vector3d& origin, int num_threads) {
   const auto count = static_cast<std::int64_t>(pairs.size());
-  return block_reduce(count, block_size, num_threads, Moments{}, [&](std::int64_t begin, std::int64_t end) {
+  return block_reduce(count, step_block, num_threads, Moments{}, [&](std::int64_t begin, std::int64_t end) {
     Moments sum;
     for (std::int64_t i = begin; i < end; ++i) {
       const Pair& pair = pairs[static_cast<std::size_t>(i)];

@@ -15,13 +15,13 @@
 namespace nacre {
 namespace {
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double no_limit = std::numeric_limits<double>::infinity();
 constexpr int num_iterations = 12;
 constexpr Eigen::Index num_samples = 800;
-constexpr double cos_angle = 0.7;                                 // between normals that match
-constexpr std::size_t least_pairs = 40;                           // of two views that see the same surface
-constexpr double still = 1e-6;                                    // motions of all views together [rad], [m]
-constexpr double first_gate = 2.0, last_gate = 1.0, decay = 0.8;  // in tolerances
+constexpr double view_cosine = 0.7;           // between normals that match
+constexpr std::size_t least_view_pairs = 40;  // of two views that see the same surface
+constexpr double still = 1e-6;                // motions of all views together [rad], [m]
+constexpr double first_view_gate = 2.0, last_view_gate = 1.0, view_decay = 0.8;  // in tolerances
 
 struct Side {
   IcpSource source;
@@ -35,8 +35,8 @@ std::vector<Pair> match(const IcpSource& source, const IcpTarget& target, const 
   nearest.resize(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
   std::vector<Pair> pairs =
       target.match(source, source.cloud.points.rows(), world_from_target.inverse() * world_from_source,
-                   {gate, cos_angle, false}, nearest);
-  if (pairs.size() < least_pairs) return {};
+                   {gate, view_cosine, false}, nearest);
+  if (pairs.size() < least_view_pairs) return {};
   weight_robustly(pairs, 0.05 * tolerance);
   for (Pair& pair : pairs) {
     // Beyond a view's rim, matches only continue it: the farther along the surface, the less they count.
@@ -90,7 +90,7 @@ struct JointEquations {
   Eigen::VectorXd solve(Eigen::Index count, double weak_threshold) {
     hessian.diagonal().array() += 1e-6 * hessian.trace() / static_cast<double>(hessian.rows());
     const Eigen::Index rest = hessian.rows() / count * (count - 1);
-    const double least = weak_threshold > 0.0 ? weak_threshold * agreement / static_cast<double>(count) : -infinity;
+    const double least = weak_threshold > 0.0 ? weak_threshold * agreement / static_cast<double>(count) : -no_limit;
     const Eigen::MatrixXd sure = split_directions((hessian - chance).bottomRightCorner(rest, rest), least).sure;
     const Eigen::MatrixXd matrix = sure.transpose() * hessian.bottomRightCorner(rest, rest) * sure;
     return sure * solve_normal_equations(matrix, sure.transpose() * gradient.tail(rest));
@@ -129,7 +129,7 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
   std::vector<std::uint8_t> see_the_same(views.size() * views.size(), 1);
   for (std::size_t i = 0; i < views.size(); ++i) see_the_same[i * views.size() + i] = 0;
   std::vector<std::vector<std::uint32_t>> nearest(see_the_same.size());
-  double gate = first_gate;
+  double gate = first_view_gate;
   for (int iteration = 0; iteration < num_iterations; ++iteration) {
     std::vector<Overlap> overlaps(see_the_same.size());
     parallel_for(count * count, 1, num_threads, [&](std::int64_t index) {
@@ -138,7 +138,7 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
       const std::vector<Pair> pairs =
           match(sides[i]->source, sides[j]->target, poses[i], poses[j], gate * tolerance, tolerance, nearest[k]);
       overlaps[k] = Overlap(pairs, motions.center);
-      if (gate == last_gate && pairs.empty()) see_the_same[k] = 0;
+      if (gate == last_view_gate && pairs.empty()) see_the_same[k] = 0;
     });
     JointEquations equations(freedom * count);
     for (Eigen::Index k = 0; k < count * count; ++k) {
@@ -149,8 +149,8 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
       Pose& pose = poses[static_cast<std::size_t>(k)];
       pose = orthonormal(motions.apply(solution.segment(freedom * (k - 1), freedom)) * pose);
     }
-    if (gate == last_gate && solution.norm() < still) break;
-    gate = std::max(last_gate, decay * gate);
+    if (gate == last_view_gate && solution.norm() < still) break;
+    gate = std::max(last_view_gate, view_decay * gate);
   }
   return poses;
 }

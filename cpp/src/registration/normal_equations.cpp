@@ -6,7 +6,7 @@
 namespace nacre {
 namespace {
 
-constexpr std::int64_t block_size = 256;
+constexpr std::int64_t equation_block = 256;
 constexpr double unknown_chance = 0.008;  // information that normals off by 5 degrees feign
 
 Matrix6 symmetric(const double* upper) {
@@ -36,9 +36,9 @@ NormalEquations normal_equations(const std::vector<Pair>& pairs, Metric metric, 
                                  const Eigen::Vector3d& p_mean, const Eigen::Vector3d& q_mean, double extent,
                                  int num_threads) {
   const auto count = static_cast<std::int64_t>(pairs.size());
-  return block_reduce(count, block_size, num_threads, NormalEquations{}, [&](std::int64_t begin, std::int64_t end) {
+  return block_reduce(count, equation_block, num_threads, NormalEquations{}, [&](std::int64_t begin, std::int64_t end) {
     NormalEquations sum;
-    simd::PairRow rows[3 * block_size];
+    simd::PairRow rows[3 * equation_block];
     std::int64_t num_rows = 0;
     double weight_of_single = 0.0;
     for (std::int64_t i = begin; i < end; ++i) {

@@ -9,7 +9,7 @@ namespace {
 
 constexpr std::size_t neighbours = 32;
 constexpr std::size_t least_rows = 16;  // for seven unknowns
-constexpr double damping = 1e-9;        // of the mean information, so that there always is a solution
+constexpr double scale_damping = 1e-9;  // of the mean information, so that there always is a solution
 
 // Weighted sums over neighbouring pairs.
 struct Row {
@@ -63,7 +63,7 @@ SizeDifference size_difference(const std::vector<Pair>& pairs, Metric metric) {
 
   const std::vector<Row> rows = sum_neighbours(pairs, metric, center, extent);
   if (rows.size() < least_rows) return {};
-  Matrix6 hessian = Matrix6::Identity() * damping * weight;
+  Matrix6 hessian = Matrix6::Identity() * scale_damping * weight;
   Vector6 mixed = Vector6::Zero(), gradient = Vector6::Zero();
   for (const Row& row : rows) {
     hessian.noalias() += row.pose * row.pose.transpose() / row.weight;
@@ -75,7 +75,7 @@ SizeDifference size_difference(const std::vector<Pair>& pairs, Metric metric) {
 
   // What the motion cannot do: the rest of the column, on which the rest of the right side is regressed.
   const auto rest = [&](const Row& row) { return row.size - row.pose.dot(by_pose); };
-  double information = damping * weight, slope = 0.0, noise = 0.0;
+  double information = scale_damping * weight, slope = 0.0, noise = 0.0;
   for (const Row& row : rows) {
     information += rest(row) * rest(row) / row.weight;
     slope += rest(row) * (row.right_side - row.pose.dot(motion)) / row.weight;

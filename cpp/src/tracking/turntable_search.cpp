@@ -13,10 +13,10 @@ namespace {
 constexpr int num_angles = 72;  // from which the search starts
 constexpr std::size_t num_candidates = 10;
 constexpr Eigen::Index coarse_samples = 300, climb_samples = 800;
-constexpr double same_turn = 0.15;                        // [rad]
-constexpr double same_shift = 0.08;                       // of the object's size
-constexpr double first_gate = 0.25;                       // of the object's size
-constexpr double least_score = 0.1, least_overlap = 0.1;  // parts of the samples
+constexpr double same_turn = 0.15;                             // [rad]
+constexpr double same_shift = 0.08;                            // of the object's size
+constexpr double first_gate = 0.25;                            // of the object's size
+constexpr double least_score = 0.1, least_view_overlap = 0.1;  // parts of the samples
 constexpr double least_consistency = 0.75;
 
 struct Candidate {
@@ -24,10 +24,10 @@ struct Candidate {
   double score = -1e9, overlap = 0.0, agree = 0.0, through = 0.0;
 };
 
-class Search {
+class TurntableSearch {
  public:
-  Search(const PointModel& model, const std::vector<ObjectView>& views, const ObjectView& frame, const Camera& camera,
-         const AlignOptions& options)
+  TurntableSearch(const PointModel& model, const std::vector<ObjectView>& views, const ObjectView& frame,
+                  const Camera& camera, const AlignOptions& options)
       : views_(views),
         frame_(frame),
         camera_(camera),
@@ -172,10 +172,10 @@ class Search {
 std::optional<PlaneFit> fit_on_plane(const PointModel& model, const std::vector<ObjectView>& views,
                                      const ObjectView& frame, const Camera& camera, const AlignOptions& options) {
   if (model.size() == 0 || views.empty()) return std::nullopt;
-  const Search search(model, views, frame, camera, options);
+  const TurntableSearch search(model, views, frame, camera, options);
   const std::vector<Candidate> candidates = search.run();
   const Candidate& best = candidates.front();
-  if (!(best.score > least_score) || !(best.overlap > least_overlap)) return std::nullopt;
+  if (!(best.score > least_score) || !(best.overlap > least_view_overlap)) return std::nullopt;
   PlaneFit fit;
   fit.score = best.score;
   fit.overlap = best.overlap;
