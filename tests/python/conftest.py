@@ -27,11 +27,12 @@ def pytest_report_header() -> str:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip the tests that need recordings where there are none."""
-    if not RECORDINGS.is_dir():
-        for item in items:
-            if item.get_closest_marker("data"):
-                item.add_marker(pytest.mark.skip(reason="no recordings in ../shared/data"))
+    """Skip the tests that need recordings where there are none, and those of the weekly run elsewhere."""
+    for item in items:
+        if not RECORDINGS.is_dir() and item.get_closest_marker("data"):
+            item.add_marker(pytest.mark.skip(reason="no recordings in ../shared/data"))
+        if "NACRE_TEST_ALL" not in os.environ and item.get_closest_marker("weekly"):
+            item.add_marker(pytest.mark.skip(reason="part of .ci/slow: NACRE_TEST_ALL=1 runs it"))
 
 
 @pytest.fixture(scope="session")
@@ -102,11 +103,40 @@ def build_project(cmake: Callable[..., str], source: Path, name: str, *definitio
     return folder
 
 
+def is_newer_than_its_sources(library: Path) -> bool:
+    """Whether nothing that a library is made of has changed since."""
+    sources = [path for path in (ROOT / "cpp").rglob("*") if path.is_file()]
+    return library.stat().st_mtime > max(path.stat().st_mtime for path in sources)
+
+
 @pytest.fixture(scope="session")
-def static_build(cmake: Callable[..., str]) -> Path:
-    """Build the static library, the C++ tests and the examples."""
-    programs = ("-DNACRE_BUILD_TESTS=ON", "-DNACRE_BUILD_EXAMPLES=ON")
-    return build_project(cmake, ROOT, "test-static", "-DBUILD_SHARED_LIBS=OFF", *programs)
+def library_build(cmake: Callable[..., str]) -> Path:
+    """Return the build folder of the static library: of the installation itself, where it is left."""
+    for library in sorted((ROOT / "build").glob("cp*/cpp/libnacre.a")):
+        if is_newer_than_its_sources(library):
+            return library.parents[1]
+    return build_project(cmake, ROOT, "test-library", "-DBUILD_SHARED_LIBS=OFF", "-DNACRE_INSTALL=ON")
+
+
+@pytest.fixture(scope="session")
+def installed_library(cmake: Callable[..., str], library_build: Path) -> Path:
+    """Install the static library, its headers and package files."""
+    folder = ROOT / "build" / "test-installed"
+    cmake("--install", library_build, "--prefix", folder, "--component", "development")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def cpp_tests(cmake: Callable[..., str], installed_library: Path) -> Path:
+    """Build the C++ tests on the installed library."""
+    return build_project(cmake, ROOT / "tests" / "cpp", "test-cpp", f"-Dnacre_ROOT={installed_library}")
+
+
+@pytest.fixture(scope="session")
+def cpp_examples(cmake: Callable[..., str], installed_library: Path) -> Path:
+    """Build the C++ examples on the installed library."""
+    definitions = (f"-Dnacre_ROOT={installed_library}", "-DCMAKE_BUILD_TYPE=Release")
+    return build_project(cmake, ROOT / "examples" / "cpp", "test-examples", *definitions)
 
 
 @pytest.fixture(scope="session")

@@ -14,7 +14,7 @@ CPU_FLAGS = Path("/proc/cpuinfo")
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="session", params=["static", "shared"])
+@pytest.fixture(scope="session", params=["static", pytest.param("shared", marks=pytest.mark.weekly)])
 def kind(request: pytest.FixtureRequest) -> str:
     return str(request.param)
 
@@ -27,7 +27,7 @@ def installed(
     tmp_path_factory: pytest.TempPathFactory,
 ) -> Path:
     """Install the library and then move it: an installed tree works wherever it stands."""
-    build = request.getfixturevalue(f"{kind}_build")
+    build = request.getfixturevalue("library_build" if kind == "static" else "shared_build")
     before = tmp_path_factory.mktemp(kind) / "before"
     cmake("--install", build, "--prefix", before, "--component", "development")
     return before.rename(before.parent / "installed")
@@ -48,10 +48,12 @@ def test_find_package(
     assert "FAILED" not in output
 
 
+@pytest.mark.weekly
 def test_add_subdirectory(cmake: Callable[..., str], run: Callable[..., str], tmp_path: Path) -> None:
     assert "FAILED" not in build_and_run(cmake, run, "add_subdirectory", tmp_path)
 
 
+@pytest.mark.weekly
 def test_add_subdirectory_shared(shared_build: Path, run: Callable[..., str]) -> None:
     assert "FAILED" not in run(shared_build / "consumer")
 
@@ -88,6 +90,7 @@ def test_client_with_other_vector_flags(
     assert "FAILED" not in build_and_run(cmake, run, "find_package", tmp_path, *definitions)
 
 
+@pytest.mark.weekly
 @pytest.mark.skipif(shutil.which("nm") is None, reason="nm is missing")
 def test_shared_library_shows_its_own_names_only(shared_build: Path, run: Callable[..., str]) -> None:
     (library,) = (shared_build / "nacre" / "cpp").glob("libnacre.so.*.*.*")

@@ -9,17 +9,17 @@ import pytest
 
 import nacre
 
-TESTS = sorted((Path(__file__).parents[1] / "cpp").glob("test_*.cpp"))
+TESTS = sorted((Path(__file__).parents[1] / "cpp").rglob("test_*.cpp"))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [path.stem for path in TESTS])
-def test_cpp(name: str, static_build: Path, run: Callable[..., str]) -> None:
-    assert "SUCCESS!" in run(static_build / "tests" / "cpp" / name)
+def test_cpp(name: str, cpp_tests: Path, run: Callable[..., str]) -> None:
+    assert "SUCCESS!" in run(cpp_tests / name)
 
 
 @pytest.mark.slow
-def test_reconstruct_example(static_build: Path, run: Callable[..., str], tmp_path: Path) -> None:
+def test_reconstruct_example(cpp_examples: Path, run: Callable[..., str], tmp_path: Path) -> None:
     camera = nacre.Camera(width=160, height=120, fx=150, fy=150, cx=79.5, cy=59.5)
     thing = nacre.built_in_object()
     poses = nacre.turntable_poses(thing, 4, np.radians(10), camera=camera)
@@ -29,7 +29,7 @@ def test_reconstruct_example(static_build: Path, run: Callable[..., str], tmp_pa
         stored.tofile(tmp_path / f"{index:03d}.raw")
     model = tmp_path / "model.ply"
     intrinsics = (str(value) for value in (160, 120, 150, 150, 79.5, 59.5, 10000))
-    output = run(static_build / "examples" / "cpp" / "reconstruct", tmp_path, model, *intrinsics)
+    output = run(cpp_examples / "reconstruct", tmp_path, model, *intrinsics)
 
     assert output.count("TRACKED") == 4
     points = np.loadtxt(model.read_text().split("end_header\n")[1].splitlines())
@@ -40,9 +40,9 @@ def test_reconstruct_example(static_build: Path, run: Callable[..., str], tmp_pa
 
 
 @pytest.mark.slow
-def test_reconstruct_example_names_what_is_wrong(static_build: Path, tmp_path: Path) -> None:
+def test_reconstruct_example_names_what_is_wrong(cpp_examples: Path, tmp_path: Path) -> None:
     (tmp_path / "000.raw").write_bytes(b"short")
-    program = static_build / "examples" / "cpp" / "reconstruct"
+    program = cpp_examples / "reconstruct"
     words = [program, tmp_path, tmp_path / "model.ply", "160", "120", "150", "150", "79.5", "59.5", "1000"]
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 1

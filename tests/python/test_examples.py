@@ -149,8 +149,8 @@ def test_example_on_points_of_ones_own(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_cpp_example(static_build: Path, run: Callable[..., str]) -> None:
-    text = run(static_build / "examples" / "cpp" / "turntable")
+def test_cpp_example(cpp_examples: Path, run: Callable[..., str]) -> None:
+    text = run(cpp_examples / "turntable")
     assert text.count("TRACKED") == 12
     assert float(text.splitlines()[-1].split()[0]) < 0.2
     assert is_shown(text, "turntable.cpp"), text
