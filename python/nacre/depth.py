@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
-from typing import Any, Literal, overload
+from dataclasses import dataclass
+from typing import Literal, overload
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal.arrays import as_camera, as_count, as_depth, as_flag, as_mask
-from nacre._internal.core_options import to_core
+from nacre._internal.core_options import mirrored, to_core
 from nacre.noise import Noise, NoiseModel, as_noise, estimate_noise
 from nacre.parameters import DepthParameters, EdgeTest
 
@@ -47,10 +47,6 @@ class DepthReport:
     num_slanted: int
     num_isolated: int
     num_kept: int
-
-    @classmethod
-    def _from_core(cls, core: Any) -> DepthReport:
-        return cls(*(getattr(core, field.name) for field in fields(cls)))
 
 
 @overload
@@ -199,7 +195,7 @@ def preprocess_depth(
         as_mask("mask", mask, shape),
         as_count("num_threads", num_threads),
     )
-    return (clean, DepthReport._from_core(report)) if wants_report else clean
+    return (clean, mirrored(DepthReport, report)) if wants_report else clean
 
 
 def label_pixels(

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, Protocol, overload
 
 import numpy as np
 import numpy.typing as npt
 
+from nacre._internal.core_options import mirrored
 from nacre._internal.value_equality import Value
 from nacre.depth import DepthReport
 from nacre.region import RegionReport
@@ -113,19 +114,18 @@ class FrameReport(Value):
         del figures["information"]
         return figures
 
-    @classmethod
-    def _from_core(cls, core: Any) -> FrameReport:
-        values = {f.name: getattr(core, f.name) for f in fields(cls)}
-        values["depth"] = DepthReport._from_core(core.depth)
-        values["region"] = RegionReport._from_core(core.region)
-        return cls(**values)
-
     def __repr__(self) -> str:
         reason = f" ({self.reason})" if self.reason else ""
         return (
             f"FrameReport(index={self.index}, {self.status}{reason}, overlap={self.overlap:.2f}, "
             f"num_points={self.num_points}, {self.milliseconds['total']:.1f} ms)"
         )
+
+
+def report_from(core: Any) -> FrameReport:
+    """Return the report that C++ made."""
+    depth, region = mirrored(DepthReport, core.depth), mirrored(RegionReport, core.region)
+    return mirrored(FrameReport, core, depth=depth, region=region)
 
 
 class _HasStatus(Protocol):
@@ -164,7 +164,7 @@ class FrameReports(Sequence[FrameReport]):
         if isinstance(place, range):
             return tuple(self[i] for i in place)
         with self._lock:
-            return FrameReport._from_core(self._core.report(place))
+            return report_from(self._core.report(place))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, FrameReports | tuple):

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal.arrays import FloatArray, as_points, as_unit_rows, as_vector, localize
-from nacre._internal.core_options import to_core
+from nacre._internal.core_options import mirrored, to_core
 from nacre._internal.value_equality import Value
 from nacre.parameters import GlobalRegistrationParameters
 
@@ -190,13 +190,10 @@ def align_global(
     alignment: Any = result.alignment
     pose = alignment.target_from_source.copy()
     pose[:3, 3] += target_origin - pose[:3, :3] @ source_origin
-    return GlobalAlignResult(
+    return mirrored(
+        GlobalAlignResult,
+        result,
         target_from_source=pose if result.status != "too_few_points" else np.eye(4),
-        status=result.status,
-        overlap=result.overlap,
-        consistency=result.consistency,
-        rivalry=result.rivalry,
-        tolerance=result.tolerance,
         rmse=alignment.rmse,
         information=alignment.information,
         weak_directions=alignment.weak_directions,

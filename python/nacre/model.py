@@ -27,9 +27,9 @@ from nacre._internal.arrays import (
     as_scale,
 )
 from nacre._internal.checkpoint import Checkpointed, checkpoint_of, read_checkpoint
-from nacre._internal.core_options import from_core, to_core, updated
+from nacre._internal.core_options import from_core, mirrored, to_core, updated
 from nacre._internal.point_exchange import ExchangeablePoints
-from nacre.frame_report import FrameReport, FrameReports
+from nacre.frame_report import FrameReport, FrameReports, report_from
 from nacre.noise import NoiseModel
 from nacre.parameters import (
     ModelParameters,
@@ -151,9 +151,7 @@ class Model(ExchangeablePoints, Checkpointed):
         time = None if timestamp is None else as_number("timestamp", timestamp)
         keeps = as_flag("keep_guess", keep_guess)
         with self._lock:
-            return FrameReport._from_core(
-                self._core.add_frame(image, pixels, colors, more, time, pose, keeps)
-            )
+            return report_from(self._core.add_frame(image, pixels, colors, more, time, pose, keeps))
 
     def _checkpoint(self, **more: Any) -> bytes:
         with self._lock:
@@ -288,7 +286,7 @@ class Model(ExchangeablePoints, Checkpointed):
     def noise(self) -> NoiseModel:
         """The noise of the depth: as given, or measured from the frames so far."""
         with self._lock:
-            return NoiseModel._from_core(self._core.noise)
+            return mirrored(NoiseModel, self._core.noise)
 
     def in_camera(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
         """Return points and normals in the newest registered camera's frame, as the paper keeps its model."""

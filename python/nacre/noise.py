@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numbers
 from collections.abc import Iterable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal.arrays import as_camera, as_count, as_depth, as_number, as_real
-from nacre._internal.core_options import to_core
+from nacre._internal.core_options import mirrored, to_core
 
 NoiseName = Literal["auto", "kinect", "stereo", "tof"]
 
@@ -60,12 +60,12 @@ class NoiseModel:
 
     def local(self) -> NoiseModel:
         """Return the noise about a smooth surface fitted to 7 x 7 pixels, without most of what they share."""
-        return self._from_core(self.to_core().local())
+        return mirrored(type(self), self.to_core().local())
 
     @classmethod
     def kinect(cls) -> NoiseModel:
         """Return that of structured light, Nguyen et al. 2012: 1.2 mm + 1.9 mm (z - 0.4 m)^2."""
-        return cls._from_core(_core.NoiseModel.kinect())
+        return mirrored(cls, _core.NoiseModel.kinect())
 
     @classmethod
     def stereo(cls, fx: float, baseline: float = 0.05, disparity_sigma: float = 0.08) -> NoiseModel:
@@ -85,26 +85,23 @@ class NoiseModel:
         -------
         NoiseModel
         """
-        return cls._from_core(
+        return mirrored(
+            cls,
             _core.NoiseModel.stereo(
                 as_number("fx", fx),
                 as_number("baseline", baseline),
                 as_number("disparity_sigma", disparity_sigma),
-            )
+            ),
         )
 
     @classmethod
     def time_of_flight(cls) -> NoiseModel:
         """Return that of time of flight, Fankhauser et al. 2015: 1.5 mm - 0.5 mm z + 0.3 mm z^2."""
-        return cls._from_core(_core.NoiseModel.time_of_flight())
+        return mirrored(cls, _core.NoiseModel.time_of_flight())
 
     def to_core(self) -> Any:
         """Return the C++ model with these values."""
         return to_core(self, _core.NoiseModel())
-
-    @classmethod
-    def _from_core(cls, core: Any) -> NoiseModel:
-        return cls(*(getattr(core, field.name) for field in fields(cls)))
 
 
 Noise = NoiseModel | float | NoiseName | None
@@ -168,12 +165,13 @@ def estimate_noise(
     TypeError, ValueError
         An argument of the wrong type, shape or range; depth and camera differ in size.
     """
-    return NoiseModel._from_core(
+    return mirrored(
+        NoiseModel,
         _core.estimate_noise(
             as_depth("depth", depth, depth_scale),
             as_camera("camera", camera),
             as_count("num_threads", num_threads),
-        )
+        ),
     )
 
 
@@ -216,4 +214,4 @@ def calibrate_noise(
     threads = as_count("num_threads", num_threads)
     for image in images:
         calibration.add(as_depth("images", image, depth_scale), threads)
-    return NoiseModel._from_core(calibration.model())
+    return mirrored(NoiseModel, calibration.model())

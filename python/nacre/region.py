@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any, Literal, overload
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal.arrays import as_camera, as_count, as_depth, as_flag, as_mask
-from nacre._internal.core_options import to_core, updated
+from nacre._internal.core_options import mirrored, to_core, updated
 from nacre._internal.value_equality import Value
 from nacre.noise import Noise, as_noise
 from nacre.parameters import RegionParameters
@@ -41,10 +41,6 @@ class RegionReport(Value):
     planes: npt.NDArray[np.float64]
     support: int
     reason: str
-
-    @classmethod
-    def _from_core(cls, core: Any) -> RegionReport:
-        return cls(*(getattr(core, field.name) for field in fields(cls)))
 
 
 @overload
@@ -146,4 +142,4 @@ def select_region(
         as_count("num_threads", num_threads),
     )
     selected: Mask = mask != 0
-    return (selected, RegionReport._from_core(report)) if wants_report else selected
+    return (selected, mirrored(RegionReport, report)) if wants_report else selected

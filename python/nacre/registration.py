@@ -19,7 +19,7 @@ from nacre._internal.arrays import (
     as_unit_rows,
     localize,
 )
-from nacre._internal.core_options import to_core
+from nacre._internal.core_options import mirrored, to_core
 from nacre._internal.value_equality import Value
 from nacre.parameters import Method, RegistrationParameters
 
@@ -248,14 +248,9 @@ def align(
         _shifted(first, source_origin, target_origin),
         options,
     )
-    return AlignResult(
+    return mirrored(
+        AlignResult,
+        result,
         target_from_source=_shifted(result.target_from_source, -source_origin, -target_origin),
-        status=result.status,
-        iterations=result.iterations,
-        num_inliers=result.num_inliers,
-        overlap=result.overlap,
-        rmse=result.rmse,
-        information=result.information,
-        weak_directions=result.weak_directions,
         center=result.center + target_origin,
     )

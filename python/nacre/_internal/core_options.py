@@ -1,4 +1,4 @@
-"""Parameters as frozen dataclasses, each the mirror of a C++ struct; a test compares the defaults."""
+"""Dataclasses and the C++ structs that they mirror: options there, results back, changes by name."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from nacre.errors import meant
 
 Core = TypeVar("Core")
 Parameters = TypeVar("Parameters")
+Result = TypeVar("Result")
 
 
 def to_core(parameters: Any, core: Core) -> Core:
@@ -60,6 +61,12 @@ def from_core(parameters_type: type[Parameters], core: Any) -> Parameters:
             value = value.name.replace("_plus", "+")
         values[field.name] = value
     return parameters_type(**values)
+
+
+def mirrored(kind: type[Result], core: Any, **other: Any) -> Result:
+    """Return a result with the fields of the C++ object that it mirrors, but for those that are given."""
+    names = (field.name for field in dataclasses.fields(kind))  # type: ignore[arg-type]
+    return kind(**{name: getattr(core, name) for name in names if name not in other}, **other)
 
 
 def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
