@@ -112,6 +112,9 @@ __all__ = [
     "write_trajectory",
 ]
 
+# What else there is for users, in modules of its own.
+_PACKAGES = ("datasets", "io", "meshing", "reconstruction", "report", "viewer")
+
 # Where each name is, so that it is imported when it is first asked for: most programs need few of them.
 _NAMES = {
     "_core": "Camera __version__",
@@ -160,4 +163,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted([*__all__, *_PACKAGES])

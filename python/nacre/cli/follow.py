@@ -25,6 +25,7 @@ def follow(
     try:
         with closing(run.steps()) as steps, _Bars(terminal, run) as bars:
             for step in steps:
+                calibrates = stop.ends_at_once = False
                 _refuse_a_wrong_recording(run.done, step)
                 for listener in listeners:
                     listener(step)
@@ -32,8 +33,7 @@ def follow(
                 if stop.wanted:
                     break
                 # A calibration takes seconds, and has nothing to bring to its end.
-                calibrates = isinstance(step, StageBegun) and step.name == "calibration"
-                stop.ends_at_once = calibrates
+                calibrates = stop.ends_at_once = isinstance(step, StageBegun) and step.name == "calibration"
     except Stopped:
         if not calibrates:
             raise

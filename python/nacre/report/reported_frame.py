@@ -56,6 +56,9 @@ class ReportedFrame:
         poses = {name: np.array(known[name], np.float64) for name in _POSES if known.get(name) is not None}
         return cls(**known | poses)
 
+    def __repr__(self) -> str:
+        return f"ReportedFrame({self.index}, {self.status})"
+
     def __getattr__(self, name: str) -> Any:
         if name not in _NAMES:
             raise AttributeError(f"a frame has no {name}")
