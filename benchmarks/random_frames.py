@@ -103,7 +103,7 @@ PARAMETERS: dict[str, Any] = {
     "loop_closure": _one_of(True, False),
     "denoise_samples": _one_of(True, False),
     "verify": _one_of(True, False),
-    "min_evidence": _one_of(0.0, 0.1, 0.3, 3.0, math.inf),
+    "min_score": _one_of(0.0, 0.1, 0.3, 3.0, math.inf),
     "wlop.first_fraction": _one_of(1e-9, 0.01, 0.5, 1.0),
     "wlop.kept_fraction": _one_of(1e-9, 0.1, 0.9, 1.0),
     "wlop.new_fraction": _one_of(0.0, 1e-9, 0.2, 1.0),

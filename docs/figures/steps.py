@@ -116,8 +116,8 @@ def anywhere(table: Turntable, size):
     return draw.sheet(panels)
 
 
-def verdict(table: Turntable, size):
-    """Draw the evidence of frames, among them three of another object."""
+def acceptance(table: Turntable, size):
+    """Draw the registration score of frames, among them three of another object."""
     around = Turntable.around(table.mesh, 24, 15.0, small=size[0] < 200)
     low, high = table.mesh.bounds
     other = scenes.joined([scenes.box((low + high) / 2, 0.6 * (high - low), 0.5)])
@@ -134,15 +134,15 @@ def verdict(table: Turntable, size):
     for name, color in states.items():
         chosen = [frame for frame in model.frames[1:] if frame.status == name]
         if chosen:
-            at, evidence = [frame.index for frame in chosen], [frame.evidence for frame in chosen]
-            curves.append(draw.Curve(name, at, evidence, color, "dots"))
-    least = nacre.ModelParameters().min_evidence
+            at, score = [frame.index for frame in chosen], [frame.score for frame in chosen]
+            curves.append(draw.Curve(name, at, score, color, "dots"))
+    least = nacre.ModelParameters().min_score
     return draw.chart(
         curves,
         x_label="frame",
-        y_label="evidence",
+        y_label="registration score",
         size=(size[0] * 3 // 2, size[1]),
-        level=(least, "min_evidence"),
+        level=(least, "min_score"),
     )
 
 
@@ -265,7 +265,7 @@ FIGURES = {
     "noise": noise,
     "weak": weak,
     "anywhere": anywhere,
-    "verdict": verdict,
+    "acceptance": acceptance,
     "confidence": confidence,
     "consolidation": consolidation,
     "loops": loops,

@@ -102,7 +102,7 @@ void bind_model(py::module_& m) {
       .def_readwrite("loop_closure", &ModelOptions::loop_closure)
       .def_readwrite("denoise_samples", &ModelOptions::denoise_samples)
       .def_readwrite("verify", &ModelOptions::verify)
-      .def_readwrite("min_evidence", &ModelOptions::min_evidence)
+      .def_readwrite("min_score", &ModelOptions::min_score)
       .def_readwrite("num_threads", &ModelOptions::num_threads);
 
   py::class_<PointModel>(m, "PointModel")
@@ -125,7 +125,7 @@ void bind_model(py::module_& m) {
       .def_readonly("num_inliers", &FrameReport::num_inliers)
       .def_readonly("overlap", &FrameReport::overlap)
       .def_readonly("consistency", &FrameReport::consistency)
-      .def_readonly("evidence", &FrameReport::evidence)
+      .def_readonly("score", &FrameReport::score)
       .def_readonly("rmse", &FrameReport::rmse)
       .def_property_readonly("information",
                              [](const FrameReport& report) { return Eigen::Matrix<double, 6, 6>(report.information); })

@@ -46,11 +46,12 @@ class FrameReport(Value):
     consistency : float
         Part of the model's points in view that the frame does not see through, or of the frame's points that
         the camera did not see through before, whichever is smaller.
-    evidence : float
-        That the registration is right, against chance: what the residuals tell a match, times overlap^2 and
-        consistency^4 (consistency^8 far from all guesses); less where residuals of neighbours agree beyond
-        what noise explains. Unrelated surfaces seldom reach 0.3; good registrations have 0.35 to 3. Of an
-        object that was found turned on its supporting plane: what agrees less what contradicts, as parts.
+    score : float
+        The registration score, that the pose is right, against chance: what the residuals tell a match, times
+        overlap^2 and consistency^4 (consistency^8 far from all guesses); less where residuals of neighbours
+        agree beyond what noise explains. Unrelated surfaces seldom reach 0.3; good registrations have 0.35 to
+        3. Of an object that was found turned on its supporting plane: what agrees less what contradicts, as
+        parts.
     loop_frame : int or None
         The earlier frame that this one closed a loop with: model and poses were corrected.
     loop_distance : float
@@ -79,7 +80,7 @@ class FrameReport(Value):
     num_inliers: int
     overlap: float
     consistency: float
-    evidence: float
+    score: float
     rmse: float
     information: npt.NDArray[np.float64]
     weak_directions: npt.NDArray[np.float64]

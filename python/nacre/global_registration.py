@@ -108,8 +108,8 @@ def align_global(
     Find the rigid motion that brings one cloud onto another, wherever they are.
 
     Short registrations (:func:`nacre.align`) start from rotations spread over all [1]_, with few points. What
-    agrees best, point for point in both directions, is refined with more. Then the best motion is judged:
-    does enough agree, does nothing contradict, and is no other motion nearly as good?
+    agrees best, point for point in both directions, is refined with more. Then the best motion is
+    accepted or not: does enough agree, does nothing contradict, and is no other motion nearly as good?
 
     Give viewpoints where the clouds were each seen from one place, as depth images are: what is known to be
     free space tells right from wrong where surfaces are smooth. (0, 0, 0) for points in a camera's frame.

@@ -199,8 +199,8 @@ class ModelParameters:
     denoise_samples : bool
         Register surface points averaged over their pixels, not single pixels.
     verify : bool
-        Judge registrations by their evidence.
-    min_evidence : float
+        Test registrations by their score before they are accepted.
+    min_score : float
         A frame with less is lost; see :class:`nacre.FrameReport`.
     num_threads : int
         0: all.
@@ -219,7 +219,7 @@ class ModelParameters:
     loop_closure: bool = True
     denoise_samples: bool = True
     verify: bool = True
-    min_evidence: float = 0.3
+    min_score: float = 0.3
     num_threads: int = 0
 
     @classmethod

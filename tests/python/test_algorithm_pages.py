@@ -71,7 +71,7 @@ CONSTANTS = [
     ("tracking", r"O\, C^{12}", "tracking/acceptance.cpp", "overlap * std::pow(result.consistency, 12)"),
     (
         "tracking",
-        "| `min_evidence` | 4 | 1 | 0.005 | 5 |",
+        "| `min_score` | 4 | 1 | 0.005 | 5 |",
         "tracking/acceptance.cpp",
         "return {1.0, 4.0, 1.0, 0.005, 5.0}",
     ),
@@ -87,11 +87,11 @@ CONSTANTS = [
         "tracking/acceptance.cpp",
         "return {1.2, 8.0, 0.5, std::numeric_limits<double>::infinity(), 3.0}",
     ),
-    ("tracking", "($I < 0.1$", "tracking/acceptance.cpp", "plane_information = 0.1, plane_evidence = 4.0"),
+    ("tracking", "($I < 0.1$", "tracking/acceptance.cpp", "plane_information = 0.1, plane_score = 4.0"),
     ("tracking", r"\max(0.025,", "tracking/acceptance.cpp", "other_size = 0.025"),
     ("tracking", "blocks $b$ of 32", "registration/scale_check.cpp", "neighbours = 32"),
     ("tracking", "0.58", "tracking/acceptance.cpp", "chance = 0.58"),
-    ("tracking", "twice `min_evidence`", "tracking/acceptance.cpp", "beyond_doubt = 2.0"),
+    ("tracking", "twice `min_score`", "tracking/acceptance.cpp", "clear_cut = 2.0"),
     (
         "tracking",
         "by less than 0.35 rad, moved by less than 0.26",

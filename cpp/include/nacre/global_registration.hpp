@@ -63,8 +63,8 @@ struct GlobalAlignResult {
 };
 
 /// The motion that brings source onto target, wherever they are. Starts iterative closest point from rotations spread
-/// over all (super-Fibonacci spirals, Alexa 2022), keeps what agrees best in both directions, and judges it. Never
-/// throws for data that allows no answer.
+/// over all (super-Fibonacci spirals, Alexa 2022), keeps what agrees best in both directions, and accepts it or not.
+/// Never throws for data that allows no answer.
 GlobalAlignResult align_global(const GlobalCloud& source, const GlobalCloud& target,
                                const GlobalAlignOptions& options = {});
 

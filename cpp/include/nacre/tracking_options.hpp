@@ -13,8 +13,8 @@ struct TrackingOptions {
                                 ///< around earlier poses, everywhere
   bool loop_closure = true;     ///< fuse: correct model and poses where the camera comes back to what it saw before
   bool denoise_samples = true;  ///< register surface points averaged over their pixels, not single pixels
-  bool verify = true;           ///< judge registrations by their evidence
-  double min_evidence = 0.3;    ///< a frame with less is lost; see FrameReport
+  bool verify = true;           ///< accept registrations by their score only
+  double min_score = 0.3;       ///< a frame with less is lost; see FrameReport
   int num_threads = 0;          ///< 0: all
 };
 

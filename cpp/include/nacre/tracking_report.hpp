@@ -22,15 +22,15 @@ struct TrackingReport {
   std::string reason;                         ///< why the frame is weak or lost; empty otherwise
   Pose world_from_camera = Pose::Identity();  ///< of a lost frame: the last known pose
   int num_inliers = 0;
-  double overlap = 0.0;                   ///< part of the frame that matches the model
-  double consistency = 0.0;               ///< part of the model's points in view that the frame does not see through,
-                                          ///< and of the frame's that the camera did not see through before
-  double evidence = 0.0;                  ///< that the registration is right, against chance: what the residuals tell a
-                                          ///< match, times overlap^2 consistency^4 (^8 far from all guesses), less
-                                          ///< where residuals of neighbours agree beyond noise; of an object that was
-                                          ///< found turned on its supporting plane: what agrees less what contradicts
-  double rmse = 0.0;                      ///< of the inliers, along the normals [m]
-  Matrix6 information = Matrix6::Zero();  ///< see AlignResult
+  double overlap = 0.0;      ///< part of the frame that matches the model
+  double consistency = 0.0;  ///< part of the model's points in view that the frame does not see through,
+                             ///< and of the frame's that the camera did not see through before
+  double score = 0.0;        ///< of the registration: that it is right, against chance: what the residuals tell a
+                             ///< match, times overlap^2 consistency^4 (^8 far from all guesses), less
+                             ///< where residuals of neighbours agree beyond noise; of an object that was
+                             ///< found turned on its supporting plane: what agrees less what contradicts
+  double rmse = 0.0;         ///< of the inliers, along the normals [m]
+  Matrix6 information = Matrix6::Zero();                     ///< see AlignResult
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult
 };
 

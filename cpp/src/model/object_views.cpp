@@ -24,7 +24,7 @@ std::vector<Pose> adjust(std::vector<ObjectView>& views, const std::vector<Pose>
   }
   const ObjectView& first = views.front();
   const MotionBasis motions = MotionBasis::on_plane(first.world_from_camera.linear() * first.support.normal,
-                                                    first.world_from_camera * first.body());
+                                                    first.world_from_camera * first.center());
   const std::vector<Pose> adjusted = adjust_views(adjustable, motions, tolerance, 0.0, num_threads);
   std::vector<Pose> corrections;
   for (const Pose& camera : cameras) {

@@ -61,7 +61,7 @@ void ModelOptions::check() const {
   require(spacing >= 0.0 && spacing < farthest_place, "spacing",
           "0 (automatic) or a positive distance in metres below 1e30", spacing);
   require(max_points >= 100, "max_points", "at least 100", max_points);
-  require(min_evidence >= 0.0, "min_evidence", "0 or more", min_evidence);
+  require(min_score >= 0.0, "min_score", "0 or more", min_score);
   require(num_threads >= 0, "num_threads", "0 (all) or more", num_threads);
 }
 

@@ -9,9 +9,9 @@
 namespace nacre {
 namespace {
 
-double consistency_of(const Evidence& evidence, bool outlines) {
-  const double judged = evidence.agree + evidence.against(outlines);
-  return judged > 0.0 ? evidence.agree / judged : 0.0;
+double consistency_of(const ViewAgreement& agreement, bool outlines) {
+  const double compared = agreement.agree + agreement.against(outlines);
+  return compared > 0.0 ? agreement.agree / compared : 0.0;
 }
 
 }  // namespace
@@ -53,23 +53,26 @@ GlobalCloud::GlobalCloud(const PointsRef& points_in, const PointsRef& normals_in
 }
 
 // A motion whose residuals are too large for the tolerance is no rival, however much is within it.
-Verdict judge(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options, double tolerance) {
+GlobalAcceptance accept_motion(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options,
+                               double tolerance) {
   const double largest = options.max_residual * tolerance;
   const auto is_close = [&](const SearchCandidate& candidate) { return candidate.alignment.rmse <= largest; };
   const auto found = std::find_if(candidates.begin(), candidates.end(), is_close);
   const SearchCandidate& best = found != candidates.end() ? *found : candidates.front();
-  Verdict verdict{GlobalAlignStatus::not_found, best, std::max(best.forward.agree, best.backward.agree), 0.0, 0.0};
-  verdict.consistency =
+  GlobalAcceptance acceptance{GlobalAlignStatus::not_found, best, std::max(best.forward.agree, best.backward.agree),
+                              0.0, 0.0};
+  acceptance.consistency =
       std::min(consistency_of(best.forward, options.outlines), consistency_of(best.backward, options.outlines));
-  if (found == candidates.end()) return verdict;
+  if (found == candidates.end()) return acceptance;
   const auto rival = std::find_if(found + 1, candidates.end(), is_close);
-  if (rival != candidates.end() && best.score > 0.0) verdict.rivalry = std::max(0.0, rival->score / best.score);
-  if (!(best.score > 0.0) || verdict.overlap < options.min_overlap || verdict.consistency < options.min_consistency) {
-    return verdict;
+  if (rival != candidates.end() && best.score > 0.0) acceptance.rivalry = std::max(0.0, rival->score / best.score);
+  if (!(best.score > 0.0) || acceptance.overlap < options.min_overlap ||
+      acceptance.consistency < options.min_consistency) {
+    return acceptance;
   }
-  const bool is_unique = verdict.rivalry <= options.max_rivalry && best.alignment.weak_directions.cols() == 0;
-  verdict.status = is_unique ? GlobalAlignStatus::found : GlobalAlignStatus::ambiguous;
-  return verdict;
+  const bool is_unique = acceptance.rivalry <= options.max_rivalry && best.alignment.weak_directions.cols() == 0;
+  acceptance.status = is_unique ? GlobalAlignStatus::found : GlobalAlignStatus::ambiguous;
+  return acceptance;
 }
 
 GlobalAlignResult align_global(const GlobalCloud& source_cloud, const GlobalCloud& target_cloud,
@@ -80,12 +83,12 @@ GlobalAlignResult align_global(const GlobalCloud& source_cloud, const GlobalClou
   const SearchSide source(source_cloud, options, true), target(target_cloud, options, true);
   if (!is_enough(source) || !is_enough(target)) return result;
   const GlobalSearch search(source, target, options);
-  const Verdict verdict = judge(search.run(), options, search.tolerance());
-  result.status = verdict.status;
-  result.alignment = verdict.best.alignment;
-  result.overlap = verdict.overlap;
-  result.consistency = verdict.consistency;
-  result.rivalry = verdict.rivalry;
+  const GlobalAcceptance acceptance = accept_motion(search.run(), options, search.tolerance());
+  result.status = acceptance.status;
+  result.alignment = acceptance.best.alignment;
+  result.overlap = acceptance.overlap;
+  result.consistency = acceptance.consistency;
+  result.rivalry = acceptance.rivalry;
   result.tolerance = search.tolerance();
   return result;
 }

@@ -39,30 +39,30 @@ IcpSource few_of(IcpSource source) {
   return source;
 }
 
-Evidence ask(const IcpSource& source, const SearchSide& onto, const Pose& pose, const Gate& gate, double tolerance,
-             double margin) {
+ViewAgreement ask(const IcpSource& source, const SearchSide& onto, const Pose& pose, const Gate& gate, double tolerance,
+                  double margin) {
   const Eigen::Index count = source.cloud.points.rows();
   std::vector<std::uint32_t> nearest(static_cast<std::size_t>(count), no_slot);
-  Evidence evidence;
+  ViewAgreement agreement;
   for (const Pair& pair : onto.target.match(source, count, pose, gate, nearest)) {
     const double ratio = residual(pair, Metric::symmetric) / tolerance;
-    evidence.agree += std::max(0.0, 1.0 - ratio * ratio);
+    agreement.agree += std::max(0.0, 1.0 - ratio * ratio);
   }
   for (Eigen::Index i = 0; onto.seen && i < count; ++i) {
     const Eigen::Vector3d point = pose * source.cloud.points.row(i).transpose().cast<double>();
     const FreeSpace::Seen seen = onto.seen->look(point, margin);
-    if (seen == FreeSpace::Seen::free) evidence.free += 1.0;
-    if (seen == FreeSpace::Seen::beyond) evidence.beyond += 1.0;
+    if (seen == FreeSpace::Seen::free) agreement.free += 1.0;
+    if (seen == FreeSpace::Seen::beyond) agreement.beyond += 1.0;
     if (seen == FreeSpace::Seen::hidden) {
       const Eigen::Vector3d normal = pose.linear() * source.cloud.normals.row(i).transpose().cast<double>();
       const double facing = normal.dot((onto.seen->viewpoint() - point).normalized());
-      if (facing > least_facing && !source.cloud.has_estimated_normals) evidence.hidden += 1.0;
+      if (facing > least_facing && !source.cloud.has_estimated_normals) agreement.hidden += 1.0;
     }
   }
-  for (double* part : {&evidence.agree, &evidence.free, &evidence.hidden, &evidence.beyond}) {
+  for (double* part : {&agreement.agree, &agreement.free, &agreement.hidden, &agreement.beyond}) {
     *part /= static_cast<double>(std::max<Eigen::Index>(count, 1));
   }
-  return evidence;
+  return agreement;
 }
 
 }  // namespace
@@ -112,7 +112,7 @@ SearchCandidate GlobalSearch::start_from(int number) const {
   guess.translation() = target_.middle - guess.linear() * source_.middle;
   SearchCandidate candidate;
   candidate.alignment = align_to(target_.target, source_.few, guess, icp);
-  weigh(candidate, true, std::max(tolerance_, coarse_tolerance * size_));
+  score(candidate, true, std::max(tolerance_, coarse_tolerance * size_));
   return candidate;
 }
 
@@ -120,10 +120,10 @@ void GlobalSearch::refine(SearchCandidate& candidate) const {
   AlignOptions icp = icp_options(options_);
   icp.max_distance = refined_gate * size_;
   candidate.alignment = align_to(target_.target, source_.all, candidate.alignment.target_from_source, icp);
-  weigh(candidate, false, tolerance_);
+  score(candidate, false, tolerance_);
 }
 
-void GlobalSearch::weigh(SearchCandidate& candidate, bool with_few, double tolerance) const {
+void GlobalSearch::score(SearchCandidate& candidate, bool with_few, double tolerance) const {
   candidate.score = -10.0;
   if (candidate.alignment.status == AlignStatus::too_few_pairs) return;
   // Along the surface the nearest point is as far as the points are apart.

@@ -26,7 +26,7 @@ struct SearchSide {
 bool is_enough(const SearchSide& side);
 
 // What the points of one cloud say about a motion, as parts of all that were asked.
-struct Evidence {
+struct ViewAgreement {
   double agree = 0.0;   // the other cloud has such a surface there; less for one that is less close
   double free = 0.0;    // the other's viewpoint sees through them
   double hidden = 0.0;  // they face the other's viewpoint, but something else is in front
@@ -38,7 +38,7 @@ struct Evidence {
 
 struct SearchCandidate {
   AlignResult alignment;
-  Evidence forward, backward;  // of the source's points, of the target's
+  ViewAgreement forward, backward;  // of the source's points, of the target's
   double score = -10.0;
 };
 
@@ -55,7 +55,7 @@ class GlobalSearch {
  private:
   SearchCandidate start_from(int number) const;
   void refine(SearchCandidate& candidate) const;
-  void weigh(SearchCandidate& candidate, bool with_few, double tolerance) const;
+  void score(SearchCandidate& candidate, bool with_few, double tolerance) const;
   bool is_same(const Pose& a, const Pose& b) const;
   std::vector<SearchCandidate> best_different(std::vector<SearchCandidate> candidates, std::size_t most) const;
 
@@ -67,11 +67,12 @@ class GlobalSearch {
 };
 
 // What becomes of the candidates of a search.
-struct Verdict {
+struct GlobalAcceptance {
   GlobalAlignStatus status;
   SearchCandidate best;
   double overlap, consistency, rivalry;  // see GlobalAlignResult
 };
-Verdict judge(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options, double tolerance);
+GlobalAcceptance accept_motion(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options,
+                               double tolerance);
 
 }  // namespace nacre

@@ -11,9 +11,9 @@ namespace {
 // What is asked of a registration. Far from all guesses there are many places, and some resemble: boxes' corners fit
 // corners, and of unrelated round shapes that match the misfit is 0.54 and more.
 struct Demands {
-  double evidence;           // times min_evidence
-  double consistency_power;  // in the evidence
-  double largest_misfit;     // that does not lower the evidence
+  double score;              // times min_score
+  double consistency_power;  // in the score
+  double largest_misfit;     // that does not lower the score
   double size_sigma;         // largest standard deviation of a size that counts
   double size_certainty;     // standard deviations by which a size must differ to be another
 };
@@ -33,14 +33,14 @@ Demands demands_on(Expectation expectation) {
 
 TrackingReport TrackingResult::report() const {
   return {
-      status,   reason,         alignment.target_from_source, alignment.num_inliers,    alignment.overlap, consistency,
-      evidence, alignment.rmse, alignment.information,        alignment.weak_directions};
+      status, reason,         alignment.target_from_source, alignment.num_inliers,    alignment.overlap, consistency,
+      score,  alignment.rmse, alignment.information,        alignment.weak_directions};
 }
 
-void judge(TrackingResult& result, const TrackingOptions& options) {
+void accept_frame(TrackingResult& result, const TrackingOptions& options) {
   constexpr double chance = 0.58;  // the rms of a uniform distribution, 1 / sqrt(3)
-  constexpr double plane_information = 0.1, plane_evidence = 4.0;
-  constexpr double beyond_doubt = 2.0;  // times min_evidence
+  constexpr double plane_information = 0.1, plane_score = 4.0;
+  constexpr double clear_cut = 2.0;     // times min_score
   constexpr double least_ratio = 0.01;  // data without noise is no more certain
   constexpr double other_size = 0.025;  // relative; of right registrations of real depth 0.015 at most
   std::ostringstream reason;
@@ -52,31 +52,31 @@ void judge(TrackingResult& result, const TrackingOptions& options) {
   const double ratio = std::max(least_ratio, alignment.residual_ratio);
   const double bent = std::max(1.0, alignment.misfit / demands.largest_misfit);
   const double per_match = std::max(0.0, std::log(chance / ratio)) / (bent * bent);
-  result.evidence = overlap * overlap * std::pow(result.consistency, demands.consistency_power) * per_match;
-  result.recognition =
+  result.score = overlap * overlap * std::pow(result.consistency, demands.consistency_power) * per_match;
+  result.relocalisation_score =
       overlap * std::pow(result.consistency, 12) * per_match / (bent * bent) * alignment.normal_information;
   const bool is_plane = alignment.normal_information < plane_information;
   const bool is_doubtful_plane = is_plane && result.expectation == Expectation::unexpected;
-  const double least = options.min_evidence * (is_doubtful_plane ? plane_evidence : demands.evidence);
+  const double least = options.min_score * (is_doubtful_plane ? plane_score : demands.score);
   const auto [size, size_sigma] = alignment.size_difference;
   const bool is_other_size =
       size_sigma <= demands.size_sigma && std::abs(size) > std::max(other_size, demands.size_certainty * size_sigma);
   if (alignment.status == AlignStatus::too_few_pairs) {
-    result.evidence = result.recognition = 0.0;
+    result.score = result.relocalisation_score = 0.0;
     reason << "too few points of the frame match the model";
   } else if (options.verify && is_other_size) {
-    result.recognition = 0.0;
+    result.relocalisation_score = 0.0;
     reason << "the frame is " << 1.0 / (1.0 + size) << " times as large as the part of the model that it fits";
-  } else if (options.verify && !(result.evidence >= least)) {
-    reason << "evidence " << result.evidence << " is below " << least << ": overlap " << overlap << ", consistency "
-           << result.consistency << ", residuals " << ratio << " of the largest that match";
+  } else if (options.verify && !(result.score >= least)) {
+    reason << "registration score " << result.score << " is below " << least << ": overlap " << overlap
+           << ", consistency " << result.consistency << ", residuals " << ratio << " of the largest that match";
     if (bent > 1.0) reason << ", bent " << bent << " times as much as true matches may be";
   } else if (options.verify && alignment.weak_directions.cols() > 0) {
     result.status = FrameStatus::weak;
     reason << alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
   } else {
     result.status = FrameStatus::tracked;
-    result.is_beyond_doubt = options.verify && result.evidence >= beyond_doubt * options.min_evidence;
+    result.is_clear_cut = options.verify && result.score >= clear_cut * options.min_score;
   }
   result.reason = reason.str();
 }

@@ -1,4 +1,4 @@
-// Is a registration of a frame right? The verdict rests on what frame and model say about each other, not on ICP's own
+// Is a registration of a frame right? Acceptance rests on what frame and model say about each other, not on ICP's own
 // opinion.
 #pragma once
 
@@ -25,35 +25,34 @@ struct TrackingResult {
   // did not see through before, whichever is smaller.
   double consistency = 0.0;
   Expectation expectation = Expectation::expected;  // of where it ended
-  double evidence = 0.0;                            // see judge
-  double recognition = 0.0;                         // see judge
+  double score = 0.0;                               // of the registration, see accept_frame
+  double relocalisation_score = 0.0;                // see accept_frame
   FrameStatus status = FrameStatus::lost;
   std::string reason;  // why it is weak or lost
   // Most of the frame matches, closely, and nothing contradicts: no other guess needs to be tried.
-  bool is_beyond_doubt = false;
+  bool is_clear_cut = false;
   bool is_to_whole_model = false;  // older points included
   bool is_on_plane = false;        // found by the search on the plane
 
   TrackingReport report() const;
 
   // A frame that is not lost before one that is.
-  double rank() const { return status == FrameStatus::lost ? recognition : 1000.0 + evidence; }
+  double rank() const { return status == FrameStatus::lost ? relocalisation_score : 1000.0 + score; }
 };
 
-// Fills in evidence, recognition, status, reason and is_beyond_doubt. The evidence is what the matches tell against
-// chance: for each a residual that is small among those that would have matched, ln(0.58 / ratio), where chance gives a
-// ratio of 0.58; times overlap^2, since any two surfaces touch somewhere, and consistency^4, since true ones contradict
-// nowhere; by misfit^2 where it is above 1, since a shape that only resembles is bent another way. Far from all guesses
-// there are many places that resemble: consistency^8, misfit above half counts, and more is asked for, much more of a
-// plane.
+// The acceptance test: fills in the scores, status, reason and is_clear_cut. The registration score is what the matches
+// tell against chance: for each a residual that is small among those that would have matched, ln(0.58 / ratio), where
+// chance gives a ratio of 0.58; times overlap^2, since any two surfaces touch somewhere, and consistency^4, since true
+// ones contradict nowhere; by misfit^2 where it is above 1, since a shape that only resembles is bent another way. Far
+// from all guesses there are many places that resemble: consistency^8, misfit above half counts, and more is asked for,
+// much more of a plane.
 //
-// The recognition is evidence for a place that nothing but the frame speaks for. New surface does not speak against it
-// (overlap, not its square), contradictions and misfit do the more (consistency^12, misfit^4), and what the residuals
-// tell counts as much as the normals agree: see normal_information. Where only a plane of the one fits a plane of the
-// other it is 0.
+// The relocalisation score is that of a place that nothing but the frame speaks for. New surface does not speak against
+// it (overlap, not its square), contradictions and misfit do the more (consistency^12, misfit^4), and what the
+// residuals tell counts as much as the normals agree: see normal_information. Where only a plane of the one fits a
+// plane of the other it is 0.
 //
-// A frame that is larger or smaller than what it fits, beyond doubt, is lost: its depth is wrong, or it is another
-// thing.
-void judge(TrackingResult& result, const TrackingOptions& options);
+// A frame that is clearly larger or smaller than what it fits is lost: its depth is wrong, or it is another thing.
+void accept_frame(TrackingResult& result, const TrackingOptions& options);
 
 }  // namespace nacre

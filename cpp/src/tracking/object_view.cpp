@@ -50,16 +50,16 @@ std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& regio
   return view;
 }
 
-Pose ObjectView::foot() const {
+Pose ObjectView::ground_frame() const {
   const Eigen::Vector3d middle = points.colwise().mean().transpose().cast<double>();
-  Pose camera_from_foot = Pose::Identity();
+  Pose camera_from_ground = Pose::Identity();
   const Eigen::Vector3d x = support.normal.unitOrthogonal();
-  camera_from_foot.linear() << x, support.normal.cross(x), support.normal;
-  camera_from_foot.translation() = middle - (support.normal.dot(middle) - support.offset) * support.normal;
-  return camera_from_foot;
+  camera_from_ground.linear() << x, support.normal.cross(x), support.normal;
+  camera_from_ground.translation() = middle - (support.normal.dot(middle) - support.offset) * support.normal;
+  return camera_from_ground;
 }
 
-Eigen::Vector3d ObjectView::body() const {
+Eigen::Vector3d ObjectView::center() const {
   Eigen::Vector3d middle = points.colwise().mean().transpose().cast<double>();
   const Eigen::Vector3d level = middle - support.normal.dot(middle) * support.normal;
   if (!(level.norm() > 1e-6 * middle.norm())) return middle;
@@ -68,8 +68,8 @@ Eigen::Vector3d ObjectView::body() const {
   return middle + body_depth * std::sqrt(across.squaredNorm() / static_cast<double>(across.size())) * away;
 }
 
-ViewEvidence look_at(const ObjectView& moved, const ObjectView& seen, const Pose& seen_from_moved, const Camera& camera,
-                     Eigen::Index count) {
+ViewAgreement look_at(const ObjectView& moved, const ObjectView& seen, const Pose& seen_from_moved,
+                      const Camera& camera, Eigen::Index count) {
   count = std::min(count, moved.points.rows());
   const PointProjection projection(camera, seen_from_moved.inverse());
   const auto tolerance = static_cast<float>(std::max(moved.tolerance, seen.tolerance));

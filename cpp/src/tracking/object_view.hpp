@@ -19,8 +19,8 @@ struct ObjectView {
   double size = 0.0;       // of the bounding box of what is seen [m]
 
   // The camera from a frame in the plane: z is its normal, the origin below the middle of what is seen.
-  Pose foot() const;
-  Eigen::Vector3d body() const;  // about the middle of the object, of which the view shows the front, camera frame
+  Pose ground_frame() const;
+  Eigen::Vector3d center() const;  // about the middle of the object, of which the view shows the front, camera frame
 };
 
 // None where the object is too small. The samples are some of the frame's.
@@ -28,7 +28,7 @@ std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& regio
                                       const FrameSamples& samples, std::uint64_t seed);
 
 // Of the samples of one view, parts.
-struct ViewEvidence {
+struct ViewAgreement {
   double agree = 0.0;    // the other camera measured the object there; less for one that is less close
   double through = 0.0;  // it sees through them
   double hidden = 0.0;   // they face it, but it saw another part of the object before them
@@ -36,7 +36,7 @@ struct ViewEvidence {
 };
 
 // What `seen` says about the first `count` samples of `moved`.
-ViewEvidence look_at(const ObjectView& moved, const ObjectView& seen, const Pose& seen_from_moved, const Camera& camera,
-                     Eigen::Index count);
+ViewAgreement look_at(const ObjectView& moved, const ObjectView& seen, const Pose& seen_from_moved,
+                      const Camera& camera, Eigen::Index count);
 
 }  // namespace nacre

@@ -48,13 +48,13 @@ std::optional<Pose> fit_anywhere(const PointModel& model, const IcpSource& sourc
   if (!is_enough(moving) || !is_enough(still)) return std::nullopt;
   const GlobalSearch search(moving, still, search_options);
   const std::vector<SearchCandidate> candidates = search.run();
-  const Verdict verdict = judge(candidates, search_options, search.tolerance());
-  if (verdict.status != GlobalAlignStatus::found) return std::nullopt;
-  const double rival = search_options.max_rivalry * verdict.best.score;
+  const GlobalAcceptance acceptance = accept_motion(candidates, search_options, search.tolerance());
+  if (acceptance.status != GlobalAlignStatus::found) return std::nullopt;
+  const double rival = search_options.max_rivalry * acceptance.best.score;
   const auto num_good = std::count_if(candidates.begin(), candidates.end(),
                                       [&](const SearchCandidate& candidate) { return candidate.score > rival; });
   if (num_good > 1) return std::nullopt;
-  return verdict.best.alignment.target_from_source;
+  return acceptance.best.alignment.target_from_source;
 }
 
 }  // namespace nacre

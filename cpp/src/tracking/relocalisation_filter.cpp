@@ -9,8 +9,8 @@ namespace nacre {
 namespace {
 
 // Measured where 1000 images of rooms and objects fit a model of another image best, wrongly: of the 438 with any
-// evidence one in ten has a recognition above `chance`, some ten above 0.6, none above 1.02.
-constexpr double chance = 0.3;         // what a view says is what its recognition has beyond
+// score one in ten has a relocalisation score above `chance`, some ten above 0.6, none above 1.02.
+constexpr double chance = 0.3;         // what a view adds is what its relocalisation score has beyond
 constexpr double enough = 0.45;        // from several views
 constexpr double enough_alone = 1.3;   // from a single one
 constexpr double enough_far = 2.0;     // from a single one that is far from all guesses
@@ -40,15 +40,15 @@ bool PlaceHypothesis::is_near(const TrackingResult& result) const {
 }
 
 bool PlaceHypothesis::is_confirmed_by(const TrackingResult& result) const {
-  return is_near(result) && result.recognition > chance && result.alignment.weak_directions.cols() == 0;
+  return is_near(result) && result.relocalisation_score > chance && result.alignment.weak_directions.cols() == 0;
 }
 
-bool PlaceHypothesis::weigh(const TrackingResult& best, const IcpSource& frame) {
+bool PlaceHypothesis::add(const TrackingResult& best, const IcpSource& frame) {
   const Pose& pose = best.alignment.target_from_source;
   const bool is_determined = best.alignment.weak_directions.cols() == 0;
   if (!is_near(best) || !is_determined) {
     forget();
-    if (!is_determined || best.recognition <= chance) return false;
+    if (!is_determined || best.relocalisation_score <= chance) return false;
     place_ = Place{pose, pose, {}, 0.0};
   }
   before_ = Surface{frame.cloud.points, frame.cloud.normals};
@@ -58,11 +58,11 @@ bool PlaceHypothesis::weigh(const TrackingResult& best, const IcpSource& frame) 
   for (const Pose& view : place_->views) distance = std::min(distance, view_distance(view, pose, depth_));
   if (distance < least_step) return false;
   place_->views.push_back(pose);
-  place_->belief += distance * (best.recognition - chance);
-  if (place_->belief < 0.0) forget();
+  place_->log_odds += distance * (best.relocalisation_score - chance);
+  if (place_->log_odds < 0.0) forget();
   if (!place_) return false;
-  return best.recognition >= (best.expectation == Expectation::unexpected ? enough_far : enough_alone) ||
-         (place_->views.size() > 1 && place_->belief >= enough);
+  return best.relocalisation_score >= (best.expectation == Expectation::unexpected ? enough_far : enough_alone) ||
+         (place_->views.size() > 1 && place_->log_odds >= enough);
 }
 
 }  // namespace nacre

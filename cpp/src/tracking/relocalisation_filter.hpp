@@ -21,7 +21,7 @@ class PlaceHypothesis {
 
   // Takes the best registration of the frame for or against the hypothesis; where it is elsewhere it is a new one.
   // Returns whether there is enough to believe it.
-  bool weigh(const TrackingResult& best, const IcpSource& frame);
+  bool add(const TrackingResult& best, const IcpSource& frame);
 
   void forget() { *this = {}; }
 
@@ -31,7 +31,7 @@ class PlaceHypothesis {
     Pose pose;                // as registered to the model, world_from_camera
     Pose followed;            // as moved from frame to frame since the start
     std::vector<Pose> views;  // that have been counted
-    double belief = 0.0;
+    double log_odds = 0.0;
   };
   struct Surface {
     Points points, normals;  // camera frame

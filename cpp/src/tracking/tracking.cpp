@@ -168,7 +168,7 @@ struct Search {
     const double earlier = consistency(points, normals, before, before.world_from_camera);
     result.consistency = std::isfinite(in_view) || std::isfinite(earlier) ? std::fmin(in_view, earlier) : 0.0;
     result.expectation = view_distance(guess, pose, depth) > largest_distance ? Expectation::unexpected : expectation;
-    judge(result, options);
+    accept_frame(result, options);
     return result;
   }
 
@@ -205,13 +205,13 @@ struct Search {
   }
 };
 
-// What the search on the plane found needs no other verdict: it has seen all other places.
+// What the search on the plane found needs no other test: it has seen all other places.
 TrackingResult on_plane(const PlaneFit& fit) {
   TrackingResult result;
   result.alignment = fit.alignment;
   result.consistency = fit.consistency;
   result.status = FrameStatus::tracked;
-  result.evidence = fit.score;
+  result.score = fit.score;
   result.is_to_whole_model = result.is_on_plane = true;
   return result;
 }
@@ -246,7 +246,7 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
         const TrackingResult result =
             search.register_from(guess, wide, was_lost ? Expectation::near_lost : Expectation::expected);
         if (result.rank() >= best.rank()) best = result;
-        if (result.is_beyond_doubt) return;
+        if (result.is_clear_cut) return;
       }
     }
   };
@@ -280,7 +280,7 @@ TrackingResult track(const PointModel& model, const Frame& frame, const Camera& 
       if (found.rank() > best.rank()) best = found;
     }
   }
-  if (options.relocalise && options.verify && hypothesis.weigh(best, search.source)) {
+  if (options.relocalise && options.verify && hypothesis.add(best, search.source)) {
     best.status = FrameStatus::tracked;
     best.reason.clear();
   }

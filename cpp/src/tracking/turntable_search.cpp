@@ -36,15 +36,15 @@ class TurntableSearch {
         source_(AlignCloud(frame.points, frame.normals), options_),
         target_(AlignCloud(rows_of(model.points), rows_of(model.normals)), options_) {
     const ObjectView& first = views.front();
-    plane_ = first.world_from_camera * first.foot();
+    plane_ = first.world_from_camera * first.ground_frame();
     normal_ = plane_.linear().col(2);
     Eigen::Vector3d middle = Eigen::Vector3d::Zero();
     for (const ObjectView& view : views)
-      middle += view.world_from_camera * view.body() / static_cast<double>(views.size());
+      middle += view.world_from_camera * view.center() / static_cast<double>(views.size());
     plane_.translation() += middle - plane_.translation() - normal_.dot(middle - plane_.translation()) * normal_;
-    foot_ = frame.foot();
-    const Eigen::Vector3d body = frame.body() - foot_.translation();
-    foot_.translation() += body - foot_.linear().col(2).dot(body) * foot_.linear().col(2);
+    ground_frame_ = frame.ground_frame();
+    const Eigen::Vector3d center = frame.center() - ground_frame_.translation();
+    ground_frame_.translation() += center - ground_frame_.linear().col(2).dot(center) * ground_frame_.linear().col(2);
   }
 
   std::vector<Candidate> run() const {
@@ -55,7 +55,7 @@ class TurntableSearch {
                                         Eigen::Vector3d::UnitZ())
                           .toRotationMatrix();
       const PlaneGates gates{first_gate * frame_.size, 3.0 * frame_.tolerance, 14, coarse_samples};
-      candidates[static_cast<std::size_t>(i)] = align(plane_ * turn * foot_.inverse(), gates, coarse_samples);
+      candidates[static_cast<std::size_t>(i)] = align(plane_ * turn * ground_frame_.inverse(), gates, coarse_samples);
     });
     candidates = different(std::move(candidates), num_candidates);
     parallel_for(static_cast<std::int64_t>(candidates.size()), 1, num_threads_, [&](std::int64_t i) {
@@ -87,17 +87,17 @@ class TurntableSearch {
   Candidate align(const Pose& guess, const PlaneGates& gates, Eigen::Index num_samples) const {
     Candidate candidate;
     candidate.alignment = align_on_plane(target_, source_, guess, normal_, gates);
-    if (candidate.alignment.status != AlignStatus::too_few_pairs) weigh(candidate, num_samples);
+    if (candidate.alignment.status != AlignStatus::too_few_pairs) score(candidate, num_samples);
     return candidate;
   }
 
-  void weigh(Candidate& candidate, Eigen::Index num_samples) const {
+  void score(Candidate& candidate, Eigen::Index num_samples) const {
     candidate.score = candidate.overlap = candidate.agree = candidate.through = 0.0;
     const Pose& pose = candidate.alignment.target_from_source;
     for (const ObjectView& view : views_) {
       const Pose view_from_frame = view.world_from_camera.inverse() * pose;
-      const ViewEvidence forward = look_at(frame_, view, view_from_frame, camera_, num_samples);
-      const ViewEvidence backward = look_at(view, frame_, view_from_frame.inverse(), camera_, num_samples);
+      const ViewAgreement forward = look_at(frame_, view, view_from_frame, camera_, num_samples);
+      const ViewAgreement backward = look_at(view, frame_, view_from_frame.inverse(), camera_, num_samples);
       candidate.score += forward.score() + backward.score();
       candidate.overlap = std::max(candidate.overlap, std::max(forward.agree, backward.agree));
       candidate.agree += forward.agree + backward.agree;
@@ -109,7 +109,7 @@ class TurntableSearch {
   // and Jeeves 1961 on the score, in which outlines count.
   Candidate climb(Candidate best) const {
     if (best.alignment.status == AlignStatus::too_few_pairs) return best;
-    weigh(best, climb_samples);
+    score(best, climb_samples);
     const Eigen::Vector3d axes[] = {normal_, plane_.linear().col(0), plane_.linear().col(1)};
     for (double step = frame_.tolerance; step > 0.1 * frame_.tolerance; step *= 0.5) {
       bool is_better = true;
@@ -121,27 +121,27 @@ class TurntableSearch {
           Candidate next = best;
           Pose& pose = next.alignment.target_from_source;
           if (direction < 2) {
-            const Eigen::Vector3d center = pose * frame_.body();
+            const Eigen::Vector3d center = pose * frame_.center();
             pose = Eigen::Translation3d(center) * Eigen::AngleAxisd(3.0 * length / frame_.size, axis) *
                    Eigen::Translation3d(-center) * pose;
           } else {
             pose.pretranslate(length * axis);
           }
-          weigh(next, climb_samples);
+          score(next, climb_samples);
           if (next.score <= best.score) continue;
           best = next;
           is_better = true;
         }
       }
     }
-    weigh(best, frame_.points.rows());
+    score(best, frame_.points.rows());
     return best;
   }
 
   std::vector<Candidate> different(std::vector<Candidate> candidates, std::size_t most) const {
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& a, const Candidate& b) { return a.score > b.score; });
-    const Eigen::Vector3d middle = frame_.body();
+    const Eigen::Vector3d middle = frame_.center();
     std::vector<Candidate> kept;
     for (const Candidate& candidate : candidates) {
       if (kept.size() == most) break;
@@ -163,7 +163,7 @@ class TurntableSearch {
   int num_threads_;
   IcpSource source_;
   IcpTarget target_;
-  Pose plane_, foot_;  // world and camera, from a frame in the plane below the object's middle
+  Pose plane_, ground_frame_;  // world and camera, from a frame in the plane below the object's middle
   Eigen::Vector3d normal_;
 };
 

@@ -93,16 +93,16 @@ def frames_section(frames: Sequence[ReportedFrame], parameters: Mapping[str, Any
         ]
         both = [one for one in both if np.isfinite(one.values).any()]
         charts.append(_line(frames, "Overlap and consistency", both, "part of the frame [%]", y_max=100))
-    evidence = registered(lambda frame: frame.evidence)
-    if np.isfinite(evidence).any():
-        least = parameters.get("min_evidence")
+    score = registered(lambda frame: frame.score)
+    if np.isfinite(score).any():
+        least = parameters.get("min_score")
         told = f"a frame below {least:g} is lost" if isinstance(least, float) else ""
         charts.append(
             _line(
                 frames,
-                "Evidence that it is right",
-                [Series("", evidence)],
-                "evidence",
+                "Registration score",
+                [Series("", score)],
+                "registration score",
                 note=told,
                 level=least,
             )

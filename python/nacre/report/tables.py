@@ -113,7 +113,7 @@ def frames_table_section(frames: Sequence[ReportedFrame]) -> str:
     columns: list[tuple[str, Callable[[ReportedFrame], Any], str]] = [
         ("Inliers", lambda frame: frame.num_inliers, "count"),
         ("Overlap", lambda frame: frame.overlap, "fraction"),
-        ("Evidence", lambda frame: frame.evidence, "number"),
+        ("Registration score", lambda frame: frame.score, "number"),
         ("Residual", lambda frame: frame.rmse, "m"),
         ("Position error", lambda frame: frame.translation_error, "m"),
         ("Rotation error", lambda frame: frame.rotation_error, "rad"),

@@ -139,7 +139,7 @@ def stretches(frames: Sequence[ReportedFrame]) -> list[Stretch]:
 
 def plain_reason(reason: str) -> str:
     """Return a frame's reason without the figures that differ from frame to frame."""
-    if reason.startswith("evidence "):
+    if reason.startswith("registration score "):
         return "too little agrees with the model"
     if re.match(r"only 0 pixels", reason):
         return "no usable pixel"

@@ -66,7 +66,7 @@ class Snapshot:
 _FIGURES: dict[str, tuple[str, Callable[[Any], str]]] = {
     "overlap": ("overlap", lambda value: quantity(value, "fraction")),
     "consistency": ("consistency", lambda value: quantity(value, "fraction")),
-    "evidence": ("evidence", lambda value: f"{value:.2f}"),
+    "score": ("registration score", lambda value: f"{value:.2f}"),
     "rmse": ("residual", lambda value: quantity(value, "m")),
     "num_inliers": ("pairs", count),
     "num_points": ("model points", count),

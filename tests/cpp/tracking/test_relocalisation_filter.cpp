@@ -26,24 +26,24 @@ IcpSource frame_at(double angle) {
   return IcpSource(AlignCloud(seen.points, seen.normals), AlignOptions{});
 }
 
-TrackingResult found_at(const Pose& pose, double recognition) {
+TrackingResult found_at(const Pose& pose, double relocalisation_score) {
   TrackingResult result;
   result.alignment.target_from_source = pose;
   result.alignment.weak_directions.resize(6, 0);
-  result.recognition = recognition;
+  result.relocalisation_score = relocalisation_score;
   return result;
 }
 
-// The number of the first frame of a camera that turns by a step each time, and is found with a recognition, at which
-// the place is believed; -1: never.
-int believed_at(double step, double recognition, const Pose& error = Pose::Identity(), int num_frames = 12) {
+// The number of the first frame of a camera that turns by a step each time, and is found with a relocalisation_score,
+// at which the place is believed; -1: never.
+int believed_at(double step, double relocalisation_score, const Pose& error = Pose::Identity(), int num_frames = 12) {
   PlaceHypothesis hypothesis;
   for (int i = 0; i < num_frames; ++i) {
     const IcpSource frame = frame_at(i * step);
     hypothesis.predict(frame, AlignOptions{});
     Pose pose = camera_at(i * step);
     if (i % 2 == 1) pose = error * pose;
-    if (hypothesis.weigh(found_at(pose, recognition), frame)) return i;
+    if (hypothesis.add(found_at(pose, relocalisation_score), frame)) return i;
   }
   return -1;
 }
@@ -55,9 +55,9 @@ TEST_CASE("a place is believed at once where one view says enough") { CHECK(beli
 TEST_CASE("where nothing led there, one view must say more") {
   TrackingResult found = found_at(camera_at(0.0), 1.5);
   found.expectation = Expectation::unexpected;
-  CHECK_FALSE(PlaceHypothesis().weigh(found, frame_at(0.0)));
-  found.recognition = 2.1;
-  CHECK(PlaceHypothesis().weigh(found, frame_at(0.0)));
+  CHECK_FALSE(PlaceHypothesis().add(found, frame_at(0.0)));
+  found.relocalisation_score = 2.1;
+  CHECK(PlaceHypothesis().add(found, frame_at(0.0)));
 }
 
 TEST_CASE("a place is believed when several views have said enough, the sooner the more they differ") {
@@ -81,7 +81,7 @@ TEST_CASE("a place that does not move with the camera is not believed") {
 TEST_CASE("the prediction is the place moved as the frames say") {
   PlaceHypothesis hypothesis;
   CHECK_FALSE(hypothesis.predict(frame_at(0.0), AlignOptions{}).has_value());
-  hypothesis.weigh(found_at(camera_at(0.0), 0.7), frame_at(0.0));
+  hypothesis.add(found_at(camera_at(0.0), 0.7), frame_at(0.0));
   const std::optional<Pose> predicted = hypothesis.predict(frame_at(0.1), AlignOptions{});
   REQUIRE(predicted.has_value());
   CHECK((predicted->matrix() - camera_at(0.1).matrix()).norm() < 1e-3);

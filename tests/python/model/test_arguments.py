@@ -73,7 +73,7 @@ def test_illegal_parameters() -> None:
         ({"spacing": float("inf")}, "spacing must be .* got inf"),
         ({"spacing": 1e30}, "spacing must be .* got 1e"),
         ({"max_points": 5}, "max_points must be at least 100, got 5"),
-        ({"min_evidence": float("nan")}, "min_evidence must be .* got nan"),
+        ({"min_score": float("nan")}, "min_score must be .* got nan"),
         ({"wlop.first_fraction": 0.0}, "first_fraction must be in .* got 0"),
         ({"wlop.kept_fraction": -0.1}, "kept_fraction must be in .* got -0.1"),
         ({"wlop.new_fraction": 2.0}, "new_fraction must be in .* got 2"),

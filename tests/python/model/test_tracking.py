@@ -77,17 +77,17 @@ def test_relocalised_after_lost() -> None:
 
 
 @pytest.mark.parametrize(("least", "status"), [(0.3, "TRACKED"), (4.0, "LOST")])
-def test_min_evidence_decides(least: float, status: str) -> None:
-    model = object_model(1, min_evidence=least, relocalise=False)
+def test_min_score_decides(least: float, status: str) -> None:
+    model = object_model(1, min_score=least, relocalise=False)
     report = model.add_frame(view(1))
-    assert 0.6 < report.evidence < 4.0
+    assert 0.6 < report.score < 4.0
     assert report.status == status
     if status == "LOST":
-        assert report.reason.startswith(f"evidence {report.evidence:.3g} is below 4.8: overlap ")
+        assert report.reason.startswith(f"registration score {report.score:.3g} is below 4.8: overlap ")
         assert f"overlap {report.overlap:.3g}, consistency {report.consistency:.3g}" in report.reason
 
 
-def test_seeing_through_the_model_is_evidence_against_a_pose() -> None:
+def test_seeing_through_the_model_speaks_against_a_pose() -> None:
     """Something in front of half of a wall has gone: the rest matches as well as ever."""
     x, y = flat_grid()
     wall = relief() + 0.1
@@ -97,10 +97,10 @@ def test_seeing_through_the_model_is_evidence_against_a_pose() -> None:
     report = model.add_frame(wall)
     assert 0.1 < report.consistency < 0.9
     assert report.status == "LOST"
-    assert report.reason.startswith("evidence ")
+    assert report.reason.startswith("registration score ")
 
 
-def test_a_surface_where_the_camera_saw_through_before_is_evidence_against_a_pose() -> None:
+def test_a_surface_where_the_camera_saw_through_before_speaks_against_a_pose() -> None:
     """The same the other way round: what is new would have hidden the wall."""
     x, y = flat_grid()
     wall = relief() + 0.1

@@ -62,7 +62,7 @@ void exchange(Archive& archive, ModelOptions& options) {
   archive(options.depth, options.region, options.registration);
   archive.choice(options.fusion_method, FusionMethod::wlop_plus);
   archive(options.fusion, options.wlop, options.spacing, options.max_points, options.predict_motion, options.relocalise,
-          options.loop_closure, options.denoise_samples, options.verify, options.min_evidence, options.num_threads);
+          options.loop_closure, options.denoise_samples, options.verify, options.min_score, options.num_threads);
 }
 
 template <class Archive>
@@ -135,7 +135,7 @@ template <class Archive>
 void exchange(Archive& archive, FrameReport& report) {
   archive.choice(report.status, FrameStatus::relocalised);
   archive(report.timestamp, report.reason, report.num_inliers);
-  archive.single(report.overlap, report.consistency, report.evidence, report.rmse, report.loop_distance);
+  archive.single(report.overlap, report.consistency, report.score, report.rmse, report.loop_distance);
   exchange_symmetric(archive, report.information);
   archive(report.weak_directions, report.loop_frame, report.corrects_earlier, report.depth, report.region,
           report.fusion, report.num_points, report.spacing, report.milliseconds);

@@ -92,12 +92,13 @@ struct PrivateState {
   }
   template <class Archive>
   static void exchange(Archive& archive, LoopClosure& loops) {
-    archive(loops.key_frames_, loops.seen_with_, loops.graph_, loops.stops_, loops.first_in_place_, loops.pending_);
+    archive(loops.key_frames_, loops.seen_with_, loops.graph_, loops.stops_, loops.first_in_place_,
+            loops.pending_);
   }
 
   template <class Archive>
   static void exchange(Archive& archive, PlaceHypothesis::Place& place) {
-    archive(place.pose, place.followed, place.views, place.belief);
+    archive(place.pose, place.followed, place.views, place.log_odds);
   }
   template <class Archive>
   static void exchange(Archive& archive, PlaceHypothesis::Surface& surface) {
