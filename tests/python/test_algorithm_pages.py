@@ -59,8 +59,8 @@ CONSTANTS = [
     (
         "global",
         r"A - 3 F - \tfrac12 H",
-        "registration/global_search.hpp",
-        "agree - 3.0 * free - 0.5 * hidden",
+        "registration/view_agreement.hpp",
+        "agree - 3.0 * seen_through - 0.5 * occluded",
     ),
     (
         "tracking",

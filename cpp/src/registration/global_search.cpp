@@ -51,15 +51,15 @@ ViewAgreement ask(const IcpSource& source, const SearchSide& onto, const Pose& p
   for (Eigen::Index i = 0; onto.seen && i < count; ++i) {
     const Eigen::Vector3d point = pose * source.cloud.points.row(i).transpose().cast<double>();
     const FreeSpace::Seen seen = onto.seen->look(point, margin);
-    if (seen == FreeSpace::Seen::free) agreement.free += 1.0;
+    if (seen == FreeSpace::Seen::free) agreement.seen_through += 1.0;
     if (seen == FreeSpace::Seen::beyond) agreement.beyond += 1.0;
     if (seen == FreeSpace::Seen::hidden) {
       const Eigen::Vector3d normal = pose.linear() * source.cloud.normals.row(i).transpose().cast<double>();
       const double facing = normal.dot((onto.seen->viewpoint() - point).normalized());
-      if (facing > least_facing && !source.cloud.has_estimated_normals) agreement.hidden += 1.0;
+      if (facing > least_facing && !source.cloud.has_estimated_normals) agreement.occluded += 1.0;
     }
   }
-  for (double* part : {&agreement.agree, &agreement.free, &agreement.hidden, &agreement.beyond}) {
+  for (double* part : {&agreement.agree, &agreement.seen_through, &agreement.occluded, &agreement.beyond}) {
     *part /= static_cast<double>(std::max<Eigen::Index>(count, 1));
   }
   return agreement;

@@ -8,6 +8,7 @@
 #include "registration/correspondences.hpp"
 #include "registration/denoised_cloud.hpp"
 #include "registration/range_image.hpp"
+#include "registration/view_agreement.hpp"
 
 namespace nacre {
 
@@ -24,17 +25,6 @@ struct SearchSide {
 
 // Whether there is enough to search with.
 bool is_enough(const SearchSide& side);
-
-// What the points of one cloud say about a motion, as parts of all that were asked.
-struct ViewAgreement {
-  double agree = 0.0;   // the other cloud has such a surface there; less for one that is less close
-  double free = 0.0;    // the other's viewpoint sees through them
-  double hidden = 0.0;  // they face the other's viewpoint, but something else is in front
-  double beyond = 0.0;  // they lie beyond the outline of what was seen from there
-
-  double score(bool outlines) const { return agree - 3.0 * free - 0.5 * hidden - (outlines ? 2.0 * beyond : 0.0); }
-  double against(bool outlines) const { return free + hidden + (outlines ? beyond : 0.0); }
-};
 
 struct SearchCandidate {
   AlignResult alignment;

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "nacre/region.hpp"
+#include "registration/view_agreement.hpp"
 #include "tracking/frame_samples.hpp"
 
 namespace nacre {
@@ -26,14 +27,6 @@ struct ObjectView {
 // None where the object is too small. The samples are some of the frame's.
 std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& region, const SupportPlane& support,
                                       const FrameSamples& samples, std::uint64_t seed);
-
-// Of the samples of one view, parts.
-struct ViewAgreement {
-  double agree = 0.0;    // the other camera measured the object there; less for one that is less close
-  double through = 0.0;  // it sees through them
-  double hidden = 0.0;   // they face it, but it saw another part of the object before them
-  double score() const { return agree - 3.0 * through - 0.5 * hidden; }
-};
 
 // What `seen` says about the first `count` samples of `moved`.
 ViewAgreement look_at(const ObjectView& moved, const ObjectView& seen, const Pose& seen_from_moved,

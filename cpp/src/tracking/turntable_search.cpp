@@ -101,7 +101,7 @@ class TurntableSearch {
       candidate.score += forward.score() + backward.score();
       candidate.overlap = std::max(candidate.overlap, std::max(forward.agree, backward.agree));
       candidate.agree += forward.agree + backward.agree;
-      candidate.through += forward.through + backward.through;
+      candidate.through += forward.seen_through + backward.seen_through;
     }
   }
 

@@ -92,8 +92,7 @@ struct PrivateState {
   }
   template <class Archive>
   static void exchange(Archive& archive, LoopClosure& loops) {
-    archive(loops.key_frames_, loops.seen_with_, loops.graph_, loops.stops_, loops.first_in_place_,
-            loops.pending_);
+    archive(loops.key_frames_, loops.seen_with_, loops.graph_, loops.stops_, loops.first_in_place_, loops.pending_);
   }
 
   template <class Archive>
