@@ -3,12 +3,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "loops/limits.hpp"
+
 namespace nacre {
 
 FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, const TrackingOptions& options) {
-  constexpr int most_points = 3000;
   TrackingOptions fewer = options;
-  fewer.registration.max_samples = most_points;
+  fewer.registration.max_samples = loops_limits::key_frame_points;
   FrameCloud cloud{sample_frame(frame, observer, fewer), 0.0};
   cloud.depth = median_depth(cloud.points);
   return cloud;

@@ -5,6 +5,7 @@
 
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
+#include "loops/limits.hpp"
 #include "outlines/match.hpp"
 #include "registration/icp.hpp"
 #include "registration/multiview.hpp"
@@ -12,23 +13,7 @@
 namespace nacre {
 namespace {
 
-constexpr std::size_t most_key_frames = 500;  // about 80 kB each
-constexpr std::size_t most_candidates = 4;    // key frames that a frame is registered to at once
-constexpr int stops_in_place = 12;            // what was seen since is taken to be in place
 constexpr int never = -1000000;
-constexpr double least_overlap = 0.3;        // of a frame and a key frame
-constexpr double least_consistency = 0.8;    // of what both should see, the part that agrees
-constexpr double largest_ratio = 0.35;       // of the residuals to the largest that match; 0.58 by chance
-constexpr double reach = 0.12;               // drift that is looked for, as a part of the depth
-constexpr double drift = 0.005;              // of a step: [rad], and as a part of the depth
-constexpr double weak_drift = 10.0 * drift;  // where the registration leaves a direction open
-constexpr double loop_error = 0.25 * drift;
-constexpr double optimism = 25.0;                 // of the covariance that a registration claims
-constexpr double most_stretch = 4.0;              // of an edge, in standard deviations
-constexpr int ring_steps = 3;                     // from view to view around a ring, at least
-constexpr std::size_t most_in_ring = 64;          // views
-constexpr double ring_tolerance = 1.5;            // in spacings
-constexpr double most_surprise = 4.0 * optimism;  // squared, per unknown, of the newest view's registration
 
 double rms_distance(const Points& points, const Pose& a, const Pose& b) {
   double sum = 0.0;
@@ -60,27 +45,25 @@ double part_of(std::int64_t count, const FrameCloud& cloud) {
 // The part of a cloud's points that is about where a camera measures something.
 double part_in_view(const FrameCloud& cloud, const Pose& camera_from_cloud, const DepthView& view,
                     const Camera& camera) {
-  return part_of(compare(cloud, camera_from_cloud, view, camera, reach).agreeing, cloud);
+  return part_of(compare(cloud, camera_from_cloud, view, camera, loops_limits::search_radius).agreeing, cloud);
 }
 
 }  // namespace
 
 bool LoopClosure::is_in_place(int key_frame) const {
-  return now() - key_frames_[static_cast<std::size_t>(key_frame)].last_seen <= stops_in_place;
+  return now() - key_frames_[static_cast<std::size_t>(key_frame)].last_seen <= loops_limits::verified_nodes;
 }
 
 std::int32_t LoopClosure::oldest_frame() const {
-  if (now() <= stops_in_place) return first_in_place_;
-  return std::max(first_in_place_, stops_[static_cast<std::size_t>(now() - 1 - stops_in_place)].frame);
+  if (now() <= loops_limits::verified_nodes) return first_in_place_;
+  return std::max(first_in_place_, stops_[static_cast<std::size_t>(now() - 1 - loops_limits::verified_nodes)].frame);
 }
 
 std::vector<std::vector<OutlinePoint>> LoopClosure::outlines_near(const Pose& pose) const {
-  constexpr std::size_t most = 3;
-  constexpr double nearest_view = 4.0;
   std::vector<std::vector<OutlinePoint>> outlines;
-  for (int k = 0; k < num_key_frames() && outlines.size() < most; ++k) {
+  for (int k = 0; k < num_key_frames() && outlines.size() < loops_limits::most_near_views; ++k) {
     const KeyFrame& other = key_frames_[static_cast<std::size_t>(k)];
-    if (!is_in_place(k) || view_distance(pose_of(k), pose, other.cloud.depth) > nearest_view) continue;
+    if (!is_in_place(k) || view_distance(pose_of(k), pose, other.cloud.depth) > loops_limits::near_view) continue;
     if (!other.outline.empty()) outlines.push_back(moved(other.outline, pose_of(k)));
   }
   return outlines;
@@ -104,7 +87,7 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
   for (int k = 0; k < num_key_frames(); ++k) {
     KeyFrame& other = key_frames_[static_cast<std::size_t>(k)];
     const double seen = part_in_view(other.cloud, pose.inverse() * pose_of(k), frame.view, camera_);
-    if (seen < least_overlap) continue;
+    if (seen < loops_limits::least_overlap) continue;
     if (!is_in_place(k) && !frame.to_whole_model && !frame.is_given) {
       in_question.emplace_back(-seen, k);
     } else {
@@ -112,7 +95,7 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
     }
   }
   std::sort(in_question.begin(), in_question.end());
-  in_question.resize(std::min(in_question.size(), most_candidates));
+  in_question.resize(std::min(in_question.size(), loops_limits::most_candidates));
   std::vector<int> candidates;
   candidates.reserve(in_question.size());
   for (const auto& [part, k] : in_question) candidates.push_back(k);
@@ -142,7 +125,7 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
 
   // A new view becomes a key frame.
   int node = found && !agrees ? -1 : nearest;
-  const bool is_new = node < 0 && key_frames_.size() < most_key_frames;
+  const bool is_new = node < 0 && key_frames_.size() < loops_limits::most_key_frames;
   if (is_new) {
     const double depth = key.cloud.depth;
     key_frames_.push_back(std::move(key));
@@ -226,7 +209,7 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
     source.reach[i] = static_cast<float>(std::min(std::max(2.5 * target.spacing(), noise), largest));
     source.largest_residual[i] = static_cast<float>(std::min(std::max(2.75 * frame.spacing, noise), largest));
   }
-  align_options.max_distance = reach * cloud.depth;
+  align_options.max_distance = loops_limits::search_radius * cloud.depth;
   align_options.final_distance = static_cast<double>(median_of(source.reach));
 
   Match found;
@@ -234,8 +217,8 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
   found.key_frame = candidates.front();
   found.alignment = align_to(target, source, frame.alignment.target_from_source, align_options);
   const Pose& pose = found.alignment.target_from_source;
-  if (found.alignment.status == AlignStatus::too_few_pairs || found.alignment.overlap < least_overlap ||
-      found.alignment.weak_directions.cols() > 0 || found.alignment.residual_ratio > largest_ratio) {
+  if (found.alignment.status == AlignStatus::too_few_pairs || found.alignment.overlap < loops_limits::least_overlap ||
+      found.alignment.weak_directions.cols() > 0 || found.alignment.residual_ratio > loops_limits::largest_ratio) {
     return std::nullopt;
   }
   double seen = 0.0, through = 0.0;
@@ -246,10 +229,10 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
     seen += part_of(counts.agreeing, other);
     through += part_of(counts.seen_through, other);
   }
-  if (seen < least_consistency * (seen + through)) return std::nullopt;
+  if (seen < loops_limits::least_consistency * (seen + through)) return std::nullopt;
   found.correction = orthonormal(pose * frame.alignment.target_from_source.inverse());
-  found.is_beyond_doubt = found.alignment.overlap > 2.0 * least_overlap && through < 0.05 * seen &&
-                          found.alignment.residual_ratio < 0.5 * largest_ratio;
+  found.is_beyond_doubt = found.alignment.overlap > 2.0 * loops_limits::least_overlap && through < 0.05 * seen &&
+                          found.alignment.residual_ratio < 0.5 * loops_limits::largest_ratio;
   found.distance = rms_distance(cloud.points, pose, frame.alignment.target_from_source);
   return found;
 }
@@ -259,12 +242,12 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
 PoseEdge LoopClosure::edge(int from, int to, const Pose& pose, const AlignResult& alignment, double depth,
                            bool is_loop) const {
   const bool is_weak = alignment.weak_directions.cols() > 0;
-  const double error = is_loop ? loop_error : is_weak ? weak_drift : drift;
+  const double error = is_loop ? loops_limits::loop_error : is_weak ? loops_limits::weak_drift : loops_limits::drift;
   Matrix6 covariance = Matrix6::Zero();
   if (alignment.information.trace() > 0.0) {
     Matrix6 information = alignment.information;
     information.diagonal().array() += 1e-12 * information.trace();
-    covariance = optimism * information.inverse();
+    covariance = loops_limits::covariance_inflation * information.inverse();
   }
   covariance.diagonal().head<3>().array() += error * error;
   covariance.diagonal().tail<3>().array() += error * error * depth * depth;
@@ -286,8 +269,8 @@ std::vector<Pose> LoopClosure::close(const std::vector<Match>& matches, double d
     const Pose& pose = loop.alignment.target_from_source;
     graph_.add_edge(edge(loop.key_frame, loop.node, pose, loop.alignment, depth, true));
   }
-  const PoseGraphFit fit = graph_.optimise(most_stretch);
-  const bool is_closed = fit.converged && fit.largest_error <= most_stretch &&
+  const PoseGraphFit fit = graph_.optimise(loops_limits::most_normalized_error);
+  const bool is_closed = fit.converged && fit.largest_error <= loops_limits::most_normalized_error &&
                          std::all_of(fit.weights.begin() + static_cast<std::ptrdiff_t>(num_edges), fit.weights.end(),
                                      [](double weight) { return weight > 0.0; });
   if (!is_closed) {
@@ -314,7 +297,7 @@ bool LoopClosure::closes_ring(const std::vector<int>& in_view) const {
     }
   }
   return std::any_of(in_view.begin(), in_view.end(),
-                     [&](int k) { return steps[static_cast<std::size_t>(k)] >= ring_steps; });
+                     [&](int k) { return steps[static_cast<std::size_t>(k)] >= loops_limits::least_loop_views; });
 }
 
 // A ring of views is closed, and what has drifted is less than would show: the views together determine each other
@@ -322,7 +305,7 @@ bool LoopClosure::closes_ring(const std::vector<int>& in_view) const {
 LoopReport LoopClosure::adjust_ring(const LoopFrame& frame, const std::vector<int>& in_view) {
   LoopReport report;
   const bool is_weak = frame.alignment.weak_directions.cols() > 0;  // the ring need not determine them either
-  if (is_weak || key_frames_.size() > most_in_ring || graph_.has_fixed()) return report;
+  if (is_weak || key_frames_.size() > loops_limits::most_loop_views || graph_.has_fixed()) return report;
   std::vector<AdjustableView> views;
   for (int k = 0; k < num_key_frames(); ++k) {
     const FrameCloud& cloud = key_frames_[static_cast<std::size_t>(k)].cloud;
@@ -330,13 +313,13 @@ LoopReport LoopClosure::adjust_ring(const LoopFrame& frame, const std::vector<in
   }
   const std::vector<Pose> before = graph_.poses();
   const double extent = rms_extent(key_frames_.back().cloud.points);
-  const std::vector<Pose> adjusted =
-      adjust_views(views, MotionBasis::all(frame.alignment.center, extent), ring_tolerance * frame.spacing,
-                   options_.registration.weak_threshold, options_.num_threads);
+  const std::vector<Pose> adjusted = adjust_views(views, MotionBasis::all(frame.alignment.center, extent),
+                                                  loops_limits::loop_tolerance * frame.spacing,
+                                                  options_.registration.weak_threshold, options_.num_threads);
   // The newest was registered to all the others: they may not contradict that.
   const Eigen::Translation3d to_center(-frame.alignment.center);
   const Vector6 twist = log_motion(to_center * (adjusted.back() * before.back().inverse()) * to_center.inverse());
-  if (twist.dot(frame.alignment.information * twist) > 6.0 * most_surprise) return report;
+  if (twist.dot(frame.alignment.information * twist) > 6.0 * loops_limits::most_surprise) return report;
   graph_.set_poses(adjusted);
   graph_.measure_edges();
   report.corrections = corrections(before, frame.index + 1);

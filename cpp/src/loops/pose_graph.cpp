@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/se3.hpp"
+#include "loops/limits.hpp"
 
 namespace nacre {
 namespace {
@@ -113,12 +114,11 @@ bool PoseGraph::step(const std::vector<double>& weights, double& damping, double
 }
 
 PoseGraphFit PoseGraph::fit(const std::vector<double>& weights) {
-  constexpr int max_iterations = 50;
   PoseGraphFit fit;
   fit.weights = weights;
   fit.cost = cost(poses_, weights);
   double damping = 1e-6;
-  while (!fit.converged && fit.iterations < max_iterations && num_unknowns_ > 0) {
+  while (!fit.converged && fit.iterations < loops_limits::most_graph_steps && num_unknowns_ > 0) {
     fit.converged = !step(weights, damping, fit.cost);
     ++fit.iterations;
   }
@@ -129,7 +129,6 @@ PoseGraphFit PoseGraph::fit(const std::vector<double>& weights) {
 }
 
 PoseGraphFit PoseGraph::optimise(double outlier) {
-  constexpr int most_suspects = 16;
   const std::vector<Pose> before = poses_;
   PoseGraphFit best = fit(std::vector<double>(edges_.size(), 1.0));
   while (best.largest_error > outlier) {
@@ -137,7 +136,7 @@ PoseGraphFit PoseGraph::optimise(double outlier) {
     int num_suspects = 0;
     PoseGraphFit without;
     std::vector<Pose> poses;
-    for (std::size_t i = edges_.size(); i-- > 0 && num_suspects < most_suspects;) {
+    for (std::size_t i = edges_.size(); i-- > 0 && num_suspects < loops_limits::most_suspects;) {
       if (!edges_[i].is_loop || best.weights[i] == 0.0) continue;
       ++num_suspects;
       std::vector<double> weights = best.weights;

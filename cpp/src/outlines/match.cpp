@@ -6,15 +6,10 @@
 
 #include "base/parallel.hpp"
 #include "base/statistics.hpp"
+#include "outlines/limits.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr double cos_alike = 0.75;      // of the largest angle between matched outlines, and their surfaces
-constexpr double least_facing = 0.5;    // cosine between a normal and the direction to the camera
-constexpr double look_within = 3.0;     // [pixels]: nearer to an edge, pixels see both of its sides
-constexpr double look_beyond = 5.0;     // [pixels]
-constexpr double least_distance = 2.0;  // of a surface from another [pixels]
 
 // How far behind a point of a surface a camera saw something, along its normal [m], averaged over the pixels around;
 // NaN where it saw nothing, none outside of the image. All in the camera frame.
@@ -42,13 +37,15 @@ bool is_contradicted(const OutlinePoint& edge, const DepthView& view, const Came
                      double noise) {
   const bool is_orthographic = camera.model() == Camera::Model::orthographic;
   const Eigen::Vector3d sight_line = is_orthographic ? Eigen::Vector3d::UnitZ() : edge.point.normalized();
-  if (!(-edge.normal.dot(sight_line) > least_facing)) return false;
-  const double tolerance = least_distance * pixel + noise;
-  const auto here = distance_behind(view, camera, edge.point - look_within * pixel * edge.outward, edge.normal);
+  if (!(-edge.normal.dot(sight_line) > outlines_limits::least_facing)) return false;
+  const double tolerance = outlines_limits::least_distance * pixel + noise;
+  const auto here =
+      distance_behind(view, camera, edge.point - outlines_limits::look_within * pixel * edge.outward, edge.normal);
   if (!here) return false;
   const Visibility inside = visibility(*here, tolerance);
   if (inside == Visibility::seen_through || inside == Visibility::unknown) return true;
-  const auto beyond = distance_behind(view, camera, edge.point + look_beyond * pixel * edge.outward, edge.normal);
+  const auto beyond =
+      distance_behind(view, camera, edge.point + outlines_limits::look_beyond * pixel * edge.outward, edge.normal);
   return beyond && visibility(*beyond, tolerance) == Visibility::agrees;
 }
 
@@ -77,8 +74,8 @@ std::vector<int> nearest_edges(const std::vector<OutlinePoint>& outline, const s
     double least = gate * gate;
     for (std::size_t k = 0; k < others.size(); ++k) {
       const double squared = (others[k].point - edge.point).squaredNorm();
-      if (!(squared < least) || others[k].outward.dot(edge.outward) < cos_alike ||
-          others[k].normal.dot(edge.normal) < cos_alike) {
+      if (!(squared < least) || others[k].outward.dot(edge.outward) < outlines_limits::like_cosine ||
+          others[k].normal.dot(edge.normal) < outlines_limits::like_cosine) {
         continue;
       }
       least = squared;

@@ -7,19 +7,10 @@
 #include <optional>
 
 #include "base/parallel.hpp"
+#include "outlines/limits.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr int border = 3;                  // of an image, where cleaning may have removed pixels
-constexpr int reach = 6;                   // of the window that shows the surface [pixels]
-constexpr double least_edge_facing = 0.5;  // cosine between the normal and the direction to the camera
-constexpr double least_offset = 0.25;      // of the window's pixels from its middle, in units of its reach: a half disc
-constexpr double most_offset = 0.65;       // has 0.42, a corner of 90 degrees 0.6
-constexpr double least_filled = 0.18;      // part of the window that shows the surface
-constexpr double most_slope = 3.0;         // of depth, in pixels' sizes, along a surface
-
-constexpr double most_off = 4.0;  // of a pixel from its surface, in standard deviations
 
 class OutlineSearch {
  public:
@@ -29,7 +20,7 @@ class OutlineSearch {
         measured_(sight.measured.size() > 0 ? sight.measured : sight.depth),
         width_(camera.width()),
         height_(camera.height()),
-        gap_(std::max(reach + 2, std::max(width_, height_) / 16)) {}
+        gap_(std::max(outlines_limits::window_radius + 2, std::max(width_, height_) / 16)) {}
 
   // Whether beside a pixel nothing was measured, or something farther.
   bool is_candidate(int u, int v) const {
@@ -43,14 +34,14 @@ class OutlineSearch {
   std::optional<OutlinePoint> look(int u, int v) const {
     // The pixels of the same surface: each point an affine function of the pixel.
     const double z = depth(u, v);
-    constexpr int side = 2 * reach + 1;
+    constexpr int side = 2 * outlines_limits::window_radius + 1;
     Eigen::Vector3d points[side * side];
     Eigen::Vector2d pixels[side * side];
     int count = 0, inside = 0;
     Eigen::Vector2d offset = Eigen::Vector2d::Zero();
-    for (int y = -reach; y <= reach; ++y) {
-      for (int x = -reach; x <= reach; ++x) {
-        if (x * x + y * y > reach * reach + 1) continue;
+    for (int y = -outlines_limits::window_radius; y <= outlines_limits::window_radius; ++y) {
+      for (int x = -outlines_limits::window_radius; x <= outlines_limits::window_radius; ++x) {
+        if (x * x + y * y > outlines_limits::window_radius * outlines_limits::window_radius + 1) continue;
         ++inside;
         const double distance = std::sqrt(static_cast<double>(x * x + y * y));
         if (!(std::abs(depth(u + x, v + y) - z) <= tolerance(u, v, distance))) continue;
@@ -59,10 +50,12 @@ class OutlineSearch {
         offset += pixels[count++];
       }
     }
-    if (count < least_filled * inside) return std::nullopt;
+    if (count < outlines_limits::least_filled * inside) return std::nullopt;
     offset /= count;
     const double length = offset.norm();
-    if (length < least_offset * reach || length > most_offset * reach) return std::nullopt;
+    if (length < outlines_limits::least_offset * outlines_limits::window_radius ||
+        length > outlines_limits::most_offset * outlines_limits::window_radius)
+      return std::nullopt;
     const Eigen::Vector2d inward = offset / length;
 
     Eigen::Matrix4d products = Eigen::Matrix4d::Zero();
@@ -81,7 +74,7 @@ class OutlineSearch {
     const Eigen::Vector3d sight_line =
         camera_.model() == Camera::Model::orthographic ? Eigen::Vector3d::UnitZ() : origin.normalized();
     if (found.normal.dot(sight_line) > 0.0) found.normal = -found.normal;
-    if (!(-found.normal.dot(sight_line) > least_edge_facing)) return std::nullopt;
+    if (!(-found.normal.dot(sight_line) > outlines_limits::least_edge_facing)) return std::nullopt;
     const Eigen::Vector3d along = across * -inward.y() + down * inward.x();
     found.outward = along.cross(found.normal).normalized();
     const Eigen::Vector3d outwards = -(across * inward.x() + down * inward.y());
@@ -91,7 +84,8 @@ class OutlineSearch {
     // Whether the surface bends towards its outline.
     const Eigen::Matrix4d inverse = products.ldlt().solve(Eigen::Matrix4d::Identity());
     const Eigen::Vector3d bend = (inverse * sums).row(3);
-    const double half = 0.25 * reach * reach, sigma = static_cast<double>(sight_.sigma[v * width_ + u]);
+    const double half = 0.25 * outlines_limits::window_radius * outlines_limits::window_radius,
+                 sigma = static_cast<double>(sight_.sigma[v * width_ + u]);
     const double sag = std::abs(bend.dot(found.normal)) * half;
     if (sag > std::max(0.5 * camera_.footprint(z), 2.5 * sigma * std::sqrt(inverse(3, 3)) * half)) return std::nullopt;
 
@@ -118,8 +112,8 @@ class OutlineSearch {
   std::optional<double> surface_end(int u, int v, const Eigen::Vector3d& origin, const Eigen::Vector3d& across,
                                     const Eigen::Vector3d& down, const Eigen::Vector2d& direction) const {
     constexpr double stride = 0.5, most_smeared = 2.5;
-    const double off =
-        most_off * static_cast<double>(sight_.sigma[v * width_ + u]) + 0.5 * camera_.footprint(depth(u, v));
+    const double off = outlines_limits::most_off * static_cast<double>(sight_.sigma[v * width_ + u]) +
+                       0.5 * camera_.footprint(depth(u, v));
     double last = 0.0;
     for (double at = 0.5 * stride; at < gap_; at += stride) {
       const int x = static_cast<int>(std::lround(direction.x() * at)),
@@ -145,7 +139,7 @@ class OutlineSearch {
   }
   double depth(int u, int v) const { return static_cast<double>(sight_.depth[v * width_ + u]); }
   double tolerance(int u, int v, double distance) const {
-    return most_slope * camera_.footprint(depth(u, v)) * distance +
+    return outlines_limits::most_slope * camera_.footprint(depth(u, v)) * distance +
            6.0 * static_cast<double>(sight_.sigma[v * width_ + u]);
   }
 
@@ -163,12 +157,12 @@ bool is_cut_off(const Values& depth, const Camera& camera) {
   int count = 0;
   const auto look = [&](int u, int v) { count += static_cast<int>(std::isfinite(depth[v * width + u])); };
   for (int u = 0; u < width; ++u) {
-    look(u, border);
-    look(u, height - 1 - border);
+    look(u, outlines_limits::border_pixels);
+    look(u, height - 1 - outlines_limits::border_pixels);
   }
   for (int v = 0; v < height; ++v) {
-    look(border, v);
-    look(width - 1 - border, v);
+    look(outlines_limits::border_pixels, v);
+    look(width - 1 - outlines_limits::border_pixels, v);
   }
   return 10 * count > 2 * (width + height);
 }

@@ -6,19 +6,11 @@
 
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
+#include "outlines/limits.hpp"
 #include "outlines/match.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr std::size_t fewest = 25;  // points of an outline, and pairs
-constexpr int max_iterations = 12;
-constexpr double gate = 4.0;            // [pixels]
-constexpr double largest_rms = 1.0;     // of the residuals [pixels]: outlines that move with the camera have 1.3 to 1.9
-constexpr double point_sigma = 0.5;     // [pixels]
-constexpr double shift_sigma = 0.5;     // [pixels], of an outline as a whole: mixed pixels differ with the slant
-constexpr double points_for_one = 4.0;  // neighbours on an outline err together
-constexpr double pairs_for_one = 30.0;  // so do pairs of surface points
 
 // What outlines say of a twist.
 struct OutlineEquations {
@@ -37,10 +29,11 @@ OutlineEquations equations_of(const std::vector<OutlinePoint>& edges,
   OutlineEquations equations;
   Matrix9 hessian = Matrix9::Zero();
   Vector9 gradient = Vector9::Zero();
-  const double sigma = point_sigma * pixel;
-  const double certainty = 1.0 / (sigma * sigma * points_for_one * static_cast<double>(earlier.size()));
+  const double sigma = outlines_limits::point_sigma * pixel;
+  const double certainty =
+      1.0 / (sigma * sigma * outlines_limits::points_for_one * static_cast<double>(earlier.size()));
   for (const std::vector<OutlinePoint>& seen : earlier) {
-    const std::vector<int> nearest = nearest_edges(edges, seen, gate * pixel, num_threads);
+    const std::vector<int> nearest = nearest_edges(edges, seen, outlines_limits::refining_gate * pixel, num_threads);
     for (std::size_t i = 0; i < nearest.size(); ++i) {
       if (nearest[i] < 0) continue;
       const OutlinePoint &edge = edges[i], &other = seen[static_cast<std::size_t>(nearest[i])];
@@ -55,7 +48,8 @@ OutlineEquations equations_of(const std::vector<OutlinePoint>& edges,
       ++equations.count;
     }
   }
-  hessian.diagonal().tail<3>().array() += 1.0 / (shift_sigma * pixel * shift_sigma * pixel);
+  hessian.diagonal().tail<3>().array() +=
+      1.0 / (outlines_limits::shift_sigma * pixel * outlines_limits::shift_sigma * pixel);
   const Eigen::Matrix<double, 6, 3> mixed = hessian.topRightCorner<6, 3>();
   const Eigen::Matrix<double, 6, 3> eliminated = mixed * hessian.bottomRightCorner<3, 3>().inverse();
   equations.hessian = hessian.topLeftCorner<6, 6>() - eliminated * mixed.transpose();
@@ -67,25 +61,25 @@ OutlineEquations equations_of(const std::vector<OutlinePoint>& edges,
 
 void refine_by_outlines(IcpResult& result, const std::vector<OutlinePoint>& outline,
                         const std::vector<std::vector<OutlinePoint>>& earlier, int num_threads) {
-  if (outline.size() < fewest || earlier.empty()) return;
+  if (outline.size() < outlines_limits::least_refining || earlier.empty()) return;
   const Pose start = result.target_from_source;
   const double pixel = median_pixel(outline);
-  const Matrix6 shape = result.shape_information / pairs_for_one;
+  const Matrix6 shape = result.shape_information / outlines_limits::pairs_for_one;
   Vector6 twist = Vector6::Zero();
   OutlineEquations equations;
-  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+  for (int iteration = 0; iteration < outlines_limits::most_refinements; ++iteration) {
     const std::vector<OutlinePoint> edges = moved(outline, motion_about(result.center, twist) * start);
     equations = equations_of(edges, earlier, result.center, pixel, num_threads);
     const double mean_square = equations.squares / static_cast<double>(equations.count);
-    const bool lie_on_each_other = std::sqrt(mean_square) <= largest_rms * pixel || iteration == 0;
-    if (equations.count < fewest || !lie_on_each_other) return;
+    const bool lie_on_each_other = std::sqrt(mean_square) <= outlines_limits::largest_rms * pixel || iteration == 0;
+    if (equations.count < outlines_limits::least_refining || !lie_on_each_other) return;
     const Vector6 step = -(equations.hessian + shape).ldlt().solve(equations.gradient + shape * twist);
     if (!step.allFinite()) return;
     twist += step;
     if (step.head<3>().norm() < 1e-5 && step.tail<3>().norm() < 1e-3 * pixel) break;
   }
   result.target_from_source = motion_about(result.center, twist) * start;
-  result.information += pairs_for_one * equations.hessian;
+  result.information += outlines_limits::pairs_for_one * equations.hessian;
 }
 
 }  // namespace nacre

@@ -5,23 +5,12 @@
 
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
+#include "outlines/limits.hpp"
 #include "outlines/match.hpp"
 #include "registration/weak_directions.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr std::size_t fewest_matches = 25;      // pairs
-constexpr int num_rounds = 4, least_steps = 4;  // after each round of steps, back onto the surface
-constexpr double gate_decay = 0.8;              // at each step
-constexpr double first_gate = 12.0;             // [pixels]; of an object seen whole also a third of its size
-constexpr double beyond_doubt = 0.9;            // agreement
-constexpr double last_gate = 4.0;               // [pixels]
-constexpr double least_agreement = 0.6;         // of the outlines
-constexpr double largest_ratio = 0.4;           // residuals to the gate, root mean square; chance gives 0.58
-constexpr double least_information = 0.1;       // per pair, for a direction to be known: outlines that hardly move
-                                                // with it make much of small errors
-constexpr double least_noise = 0.3;             // pixels are where they are to half a pixel
 
 using Basis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
@@ -56,17 +45,17 @@ class EdgeSearch {
     // Outlines that the image cuts off slide along themselves.
     const bool is_cut =
         is_cut_off(outlines.depth, outlines.camera) || is_cut_off(outlines.before.depth, outlines.camera);
-    widest_ = std::max(is_cut ? first_gate * pixel_ : box.diagonal().norm() / 3.0, smallest_gate());
+    widest_ = std::max(is_cut ? outlines_limits::first_gate * pixel_ : box.diagonal().norm() / 3.0, smallest_gate());
     extent_ = extent_of(geometric, reach);
   }
 
-  double narrow_gate() const { return std::min(first_gate * pixel_, widest_); }
+  double narrow_gate() const { return std::min(outlines_limits::first_gate * pixel_, widest_); }
   double widest_gate() const { return widest_; }
-  double smallest_gate() const { return last_gate * pixel_; }
+  double smallest_gate() const { return outlines_limits::last_gate * pixel_; }
   double noise() const { return noise_; }
   double extent() const { return extent_; }
   // The information that leaves a direction no more uncertain than a pixel.
-  double least_known() const { return std::pow(noise_ / (least_noise * pixel_), 2); }
+  double least_known() const { return std::pow(noise_ / (outlines_limits::least_noise * pixel_), 2); }
 
   // Each source edge with the nearest target edge of its kind, if that lies within the gate; robust weights.
   std::vector<EdgePair> match(const Pose& pose, const Eigen::Vector3d& center, double gate) {
@@ -81,8 +70,8 @@ class EdgeSearch {
       pairs.push_back({edge.point - center, other.outward, edge.outward, (edge.point - other.point).dot(across)});
       sizes.push_back(std::abs(pairs.back().residual));
     }
-    if (pairs.size() < fewest_matches) return {};
-    noise_ = std::max(least_noise * pixel_, mad_to_sigma * median_of(sizes));
+    if (pairs.size() < outlines_limits::least_matches) return {};
+    noise_ = std::max(outlines_limits::least_noise * pixel_, mad_to_sigma * median_of(sizes));
     for (EdgePair& pair : pairs) pair.weight = robust_weight(pair.residual, noise_);
     return pairs;
   }
@@ -90,14 +79,14 @@ class EdgeSearch {
   // From a pose at rest on the surface, along the given directions or, without any, all that geometry leaves open.
   IcpResult run(const IcpResult& start, double gate, const Basis* only) {
     IcpResult result = start;
-    for (int round = 0; round < num_rounds; ++round) {
+    for (int round = 0; round < outlines_limits::num_rounds; ++round) {
       const Basis open = only != nullptr ? *only : Basis(result.weak_directions);
       if (open.cols() == 0) break;
-      for (int i = 0; i < least_steps || gate > smallest_gate(); ++i) {
+      for (int i = 0; i < outlines_limits::least_steps || gate > smallest_gate(); ++i) {
         const std::vector<EdgePair> pairs = match(result.target_from_source, result.center, gate);
         if (pairs.empty()) return start;
         step(pairs, open, result);
-        gate = std::max(smallest_gate(), gate * gate_decay);
+        gate = std::max(smallest_gate(), gate * outlines_limits::gate_decay);
       }
       const IcpResult back = align_held(target_, source_, result.target_from_source, held_);
       if (back.status == AlignStatus::too_few_pairs) return start;
@@ -124,7 +113,7 @@ class EdgeSearch {
     double squares = 0.0;
     for (const EdgePair& pair : pairs) squares += pair.residual * pair.residual;
     const double ratio = std::sqrt(squares / static_cast<double>(pairs.size())) / smallest_gate();
-    if (!(ratio < largest_ratio)) return 0.0;
+    if (!(ratio < outlines_limits::largest_ratio)) return 0.0;
     const std::vector<OutlinePoint> edges = moved(outlines_.source, pose);
     const DepthView now{outlines_.depth, Values(), pose};
     const auto part = [&](const auto& outline, const auto& others, const DepthView& sight) {
@@ -190,7 +179,9 @@ class EdgeSearch {
 
 IcpResult determine_by_outline(const IcpTarget& target, const IcpSource& source, const OutlinePair& outlines,
                                const IcpResult& geometric, const AlignOptions& options) {
-  if (outlines.target.size() < fewest_matches || outlines.source.size() < fewest_matches) return geometric;
+  if (outlines.target.size() < outlines_limits::least_matches ||
+      outlines.source.size() < outlines_limits::least_matches)
+    return geometric;
   EdgeSearch search(target, source, outlines, geometric, options);
   // The nearer solution first: structures repeat.
   double best = 0.0, gate = 0.0;
@@ -199,21 +190,21 @@ IcpResult determine_by_outline(const IcpTarget& target, const IcpSource& source,
     const Fit fit = search.fit(geometric, first, nullptr);
     if (fit.agreement > best) gate = first;
     best = std::max(best, fit.agreement);
-    if (best > beyond_doubt) break;
+    if (best > outlines_limits::clear_agreement) break;
   }
-  if (best < least_agreement) return geometric;
+  if (best < outlines_limits::least_agreement) return geometric;
 
   Basis known;
   IcpResult result = geometric;
   for (const bool restricted : {false, true}) {
     const auto [found, pairs, agreement] = search.fit(geometric, gate, restricted ? &known : nullptr);
-    if (agreement < least_agreement) return geometric;
+    if (agreement < outlines_limits::least_agreement) return geometric;
     // What shape says only where outlines took it must be said by the outlines, too.
     const bool is_shaped = found.weak_directions.cols() == 0;
     const Basis open = is_shaped ? geometric.weak_directions : found.weak_directions;
     double weight = 0.0;
     for (const EdgePair& pair : pairs) weight += pair.weight;
-    const double least = std::max(search.least_known(), least_information * weight);
+    const double least = std::max(search.least_known(), outlines_limits::least_information * weight);
     const Directions directions = split_directions(search.agreed_information(pairs, open), least);
     if (is_shaped) return directions.weak.cols() == 0 ? found : geometric;
     if (directions.sure.cols() == 0) return geometric;

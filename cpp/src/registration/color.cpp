@@ -6,15 +6,11 @@
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
+#include "registration/limits.hpp"
 #include "registration/weak_directions.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr int most_steps = 12;             // at each level
-constexpr double least_correlation = 0.6;  // of the brightnesses, for them to be believed
-constexpr double least_noise = 1.0;        // of the brightness, on a scale to 255
-constexpr double small_step = 0.01;        // of the target's spacing
 
 using Basis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 
@@ -67,7 +63,7 @@ class ColorSearch {
         pairs.push_back(pair);
       }
     }
-    if (pairs.size() >= fewest) weigh(pairs);
+    if (pairs.size() >= registration_limits::least_color_pairs) weigh(pairs);
     return pairs;
   }
 
@@ -78,11 +74,11 @@ class ColorSearch {
   IcpResult run(const std::vector<ColorLevel>& levels, const IcpResult& start, const Basis* only) {
     IcpResult result = start;
     for (const ColorLevel& level : levels) {
-      for (int i = 0; i < most_steps; ++i) {
+      for (int i = 0; i < registration_limits::most_color_steps; ++i) {
         const Basis open = only != nullptr ? *only : Basis(result.weak_directions);
         if (open.cols() == 0) break;
         const std::vector<ColorPair> pairs = match(level, result.target_from_source, result.center);
-        if (pairs.size() < fewest) break;
+        if (pairs.size() < registration_limits::least_color_pairs) break;
         const double size = step(pairs, open, result);
         const IcpResult back = align_held(target_, source_, result.target_from_source, held_);
         if (back.status == AlignStatus::too_few_pairs) return start;
@@ -90,7 +86,7 @@ class ColorSearch {
         result = back;
         result.status = start.status;
         result.iterations = iterations;
-        if (size < small_step * target_.spacing()) break;
+        if (size < registration_limits::small_color_step * target_.spacing()) break;
       }
     }
     return result;
@@ -124,8 +120,6 @@ class ColorSearch {
     return sum / std::max(weight, 1e-12);
   }
 
-  static constexpr std::size_t fewest = 50;  // pairs
-
  private:
   void weigh(std::vector<ColorPair>& pairs) {
     std::vector<double> target_values, source_values, values;
@@ -143,7 +137,7 @@ class ColorSearch {
       pair.residual = pair.target_value - target_middle - gain_ * (pair.source_value - source_middle);
       values.push_back(std::abs(pair.residual));
     }
-    noise_ = std::max(least_noise, mad_to_sigma * median_of(values));
+    noise_ = std::max(registration_limits::least_brightness_noise, mad_to_sigma * median_of(values));
     double products = 0.0, target_squares = 0.0, source_squares = 0.0;
     for (ColorPair& pair : pairs) {
       pair.weight = robust_weight(pair.residual, noise_);
@@ -211,7 +205,9 @@ IcpResult determine_by_color(const IcpTarget& target, const IcpSource& source, c
     IcpResult found = search.run(levels, geometric, restricted ? &known : nullptr);
     const std::vector<ColorPair> pairs = search.match(levels.back(), found.target_from_source, found.center);
     const bool still_fits = found.num_inliers > 0.8 * geometric.num_inliers;
-    if (pairs.size() < ColorSearch::fewest || !still_fits || search.correlation() < least_correlation) return geometric;
+    if (pairs.size() < registration_limits::least_color_pairs || !still_fits ||
+        search.correlation() < registration_limits::least_correlation)
+      return geometric;
     const Basis open = found.weak_directions;
     if (open.cols() == 0) return found;
     const Directions directions =

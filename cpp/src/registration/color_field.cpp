@@ -6,11 +6,10 @@
 
 #include "base/parallel.hpp"
 #include "base/random.hpp"
+#include "registration/limits.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr int num_neighbours = 16, fewest = 6;
 
 Points rows_of(const PointsRef& points, const std::vector<Eigen::Index>& rows) {
   Points chosen(static_cast<Eigen::Index>(rows.size()), 3);
@@ -54,10 +53,10 @@ ColorField fit_color_field(const BrightCloud& cloud, const Points& points, const
     const Eigen::Vector3d point = points.row(i).transpose().cast<double>();
     const Eigen::Vector3d normal = normals.row(i).transpose().cast<double>();
     if (!point.allFinite() || !normal.allFinite()) return;
-    std::int64_t neighbours[num_neighbours];
-    double squared[num_neighbours];
-    const int count = tree.nearest(point, num_neighbours, max_distance, neighbours, squared);
-    if (count < fewest) return;
+    std::int64_t neighbours[registration_limits::color_neighbors];
+    double squared[registration_limits::color_neighbors];
+    const int count = tree.nearest(point, registration_limits::color_neighbors, max_distance, neighbours, squared);
+    if (count < registration_limits::least_color_neighbors) return;
     const Eigen::Vector3d across = normal.unitOrthogonal(), along = normal.cross(across);
     const double radius = std::sqrt(squared[count - 1]);
     // Unknowns: the value, and the slopes along two directions in units of the radius.

@@ -7,6 +7,7 @@
 #include "base/random.hpp"
 #include "base/statistics.hpp"
 #include "nacre/normals.hpp"
+#include "registration/limits.hpp"
 #include "spatial/hilbert_order.hpp"
 
 namespace nacre {
@@ -54,8 +55,7 @@ Matrix rows_of(const Eigen::Ref<const Matrix>& values, const std::vector<std::in
 }
 
 double median_spacing(const BlockTree<float>& tree) {
-  constexpr std::int64_t num_probes = 500;
-  const std::int64_t step = std::max<std::int64_t>(1, tree.num_points() / num_probes);
+  const std::int64_t step = std::max<std::int64_t>(1, tree.num_points() / registration_limits::spacing_probes);
   std::vector<double> distances;
   for (std::int64_t slot = 0; slot < tree.num_points(); slot += step) {
     Found found[2];

@@ -6,13 +6,12 @@
 #include "base/parallel.hpp"
 #include "base/statistics.hpp"
 #include "nacre/normals.hpp"
+#include "registration/limits.hpp"
 #include "spatial/subset.hpp"
 
 namespace nacre {
 namespace {
 
-constexpr int num_neighbors = 24;
-constexpr float least_cosine = 0.8F;  // between the normals of neighbours on one surface
 constexpr std::int64_t cloud_block = 256;
 
 Points normals_of(const GlobalCloud& cloud, int num_threads) {
@@ -24,8 +23,7 @@ Points normals_of(const GlobalCloud& cloud, int num_threads) {
 
 // The median distance of near points from a point's tangent plane, as a standard deviation.
 double roughness(const Points& points, const Points& normals, int num_threads) {
-  constexpr Eigen::Index num_probes = 500;
-  const Eigen::Index step = std::max<Eigen::Index>(1, points.rows() / num_probes);
+  const Eigen::Index step = std::max<Eigen::Index>(1, points.rows() / registration_limits::roughness_probes);
   Points probes(points.rows() / step, 3);
   for (Eigen::Index i = 0; i < probes.rows(); ++i) probes.row(i) = points.row(i * step);
   const Neighbors near = KdTree(points, num_threads).query(PointsRef(probes), 4, KdTree::infinity, num_threads);
@@ -46,13 +44,14 @@ double roughness(const Points& points, const Points& normals, int num_threads) {
 void denoise(const PointsRef& all, const Points& all_normals, const std::vector<std::int64_t>& rows, int num_threads,
              Points& points, const Points& normals) {
   const Neighbors near =
-      KdTree(all, num_threads).query(PointsRef(points), num_neighbors, KdTree::infinity, num_threads);
+      KdTree(all, num_threads)
+          .query(PointsRef(points), registration_limits::mean_neighbors, KdTree::infinity, num_threads);
   parallel_for(points.rows(), cloud_block, num_threads, [&](std::int64_t i) {
     float sum = 0.0F, count = 0.0F;
     for (Eigen::Index k = 0; k < near.indices.cols(); ++k) {
       const std::int64_t row = near.indices(i, k);
       if (row >= all.rows()) break;
-      if (!(std::abs(all_normals.row(row).dot(normals.row(i))) > least_cosine)) continue;
+      if (!(std::abs(all_normals.row(row).dot(normals.row(i))) > registration_limits::same_surface_cosine)) continue;
       sum += (all.row(row) - all.row(rows[static_cast<std::size_t>(i)])).dot(normals.row(i));
       count += 1.0F;
     }

@@ -7,19 +7,13 @@
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "registration/icp.hpp"
+#include "registration/limits.hpp"
 #include "registration/rotation_grid.hpp"
 
 namespace nacre {
 namespace {
 
-constexpr Eigen::Index least_points = 50;
 // Parts of the smaller cloud's diameter.
-constexpr double first_gate = 0.25, coarse_gate = 0.04, refined_gate = 0.06;
-constexpr double coarse_tolerance = 0.02, least_tolerance = 0.003;
-constexpr double same_shift = 0.1;
-constexpr double same_turn = 0.26;    // [rad]
-constexpr double body_depth = 0.7;    // from the middle of what is seen to that of the body, in radii of what is seen
-constexpr double least_facing = 0.3;  // cosine
 
 AlignOptions icp_options(const GlobalAlignOptions& options) {
   AlignOptions icp;
@@ -56,7 +50,7 @@ ViewAgreement ask(const IcpSource& source, const SearchSide& onto, const Pose& p
     if (seen == FreeSpace::Seen::hidden) {
       const Eigen::Vector3d normal = pose.linear() * source.cloud.normals.row(i).transpose().cast<double>();
       const double facing = normal.dot((onto.seen->viewpoint() - point).normalized());
-      if (facing > least_facing && !source.cloud.has_estimated_normals) agreement.occluded += 1.0;
+      if (facing > registration_limits::least_facing && !source.cloud.has_estimated_normals) agreement.occluded += 1.0;
     }
   }
   for (double* part : {&agreement.agree, &agreement.seen_through, &agreement.occluded, &agreement.beyond}) {
@@ -67,7 +61,7 @@ ViewAgreement ask(const IcpSource& source, const SearchSide& onto, const Pose& p
 
 }  // namespace
 
-bool is_enough(const SearchSide& side) { return side.all.cloud.points.rows() >= least_points; }
+bool is_enough(const SearchSide& side) { return side.all.cloud.points.rows() >= registration_limits::least_points; }
 
 SearchSide::SearchSide(const GlobalCloud& cloud_in, const GlobalAlignOptions& options, bool is_noisy)
     : cloud(cloud_in, options, is_noisy),
@@ -77,7 +71,7 @@ SearchSide::SearchSide(const GlobalCloud& cloud_in, const GlobalAlignOptions& op
   if (cloud.points.rows() > 0) middle = cloud.points.cast<double>().colwise().mean().transpose();
   if (!cloud_in.viewpoint) return;
   seen.emplace(cloud_in.points, *cloud_in.viewpoint);
-  middle += body_depth * seen->radius() * seen->axis();
+  middle += registration_limits::center_depth * seen->radius() * seen->axis();
 }
 
 GlobalSearch::GlobalSearch(const SearchSide& source, const SearchSide& target, const GlobalAlignOptions& options)
@@ -87,7 +81,8 @@ GlobalSearch::GlobalSearch(const SearchSide& source, const SearchSide& target, c
       size_(std::min(source.target.diameter(), target.target.diameter())),
       tolerance_(options.tolerance) {
   if (tolerance_ > 0.0) return;
-  tolerance_ = std::max(least_tolerance * size_, 3.0 * std::hypot(source.cloud.noise, target.cloud.noise));
+  tolerance_ =
+      std::max(registration_limits::least_tolerance * size_, 3.0 * std::hypot(source.cloud.noise, target.cloud.noise));
 }
 
 std::vector<SearchCandidate> GlobalSearch::run() const {
@@ -103,8 +98,8 @@ std::vector<SearchCandidate> GlobalSearch::run() const {
 
 SearchCandidate GlobalSearch::start_from(int number) const {
   AlignOptions icp = icp_options(options_);
-  icp.max_distance = first_gate * size_;
-  icp.final_distance = coarse_gate * size_;
+  icp.max_distance = registration_limits::first_search_gate * size_;
+  icp.final_distance = registration_limits::coarse_gate * size_;
   icp.max_iterations = 12;
   icp.weak_threshold = 0.0;
   Pose guess = Pose::Identity();
@@ -112,13 +107,13 @@ SearchCandidate GlobalSearch::start_from(int number) const {
   guess.translation() = target_.middle - guess.linear() * source_.middle;
   SearchCandidate candidate;
   candidate.alignment = align_to(target_.target, source_.few, guess, icp);
-  score(candidate, true, std::max(tolerance_, coarse_tolerance * size_));
+  score(candidate, true, std::max(tolerance_, registration_limits::coarse_tolerance * size_));
   return candidate;
 }
 
 void GlobalSearch::refine(SearchCandidate& candidate) const {
   AlignOptions icp = icp_options(options_);
-  icp.max_distance = refined_gate * size_;
+  icp.max_distance = registration_limits::refined_gate * size_;
   candidate.alignment = align_to(target_.target, source_.all, candidate.alignment.target_from_source, icp);
   score(candidate, false, tolerance_);
 }
@@ -137,7 +132,8 @@ void GlobalSearch::score(SearchCandidate& candidate, bool with_few, double toler
 }
 
 bool GlobalSearch::is_same(const Pose& a, const Pose& b) const {
-  return angle_between(a, b) < same_turn && (a * source_.middle - b * source_.middle).norm() < same_shift * size_;
+  return angle_between(a, b) < registration_limits::same_turn &&
+         (a * source_.middle - b * source_.middle).norm() < registration_limits::same_shift * size_;
 }
 
 std::vector<SearchCandidate> GlobalSearch::best_different(std::vector<SearchCandidate> candidates,

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "base/statistics.hpp"
+#include "registration/limits.hpp"
 #include "registration/scale_check.hpp"
 
 namespace nacre {
@@ -12,10 +13,9 @@ namespace {
 
 template <class Value>
 double median_of(const std::vector<Pair>& pairs, Value&& value) {
-  constexpr std::size_t num_probes = 1000;  // enough for a scale
-  const std::size_t step = (pairs.size() + num_probes - 1) / num_probes;
+  const std::size_t step = (pairs.size() + registration_limits::scale_probes - 1) / registration_limits::scale_probes;
   std::vector<double> values;
-  values.reserve(num_probes);
+  values.reserve(registration_limits::scale_probes);
   for (std::size_t i = 0; i < pairs.size(); i += step) values.push_back(value(pairs[i]));
   return nacre::median_of(std::move(values));
 }
@@ -113,19 +113,19 @@ double residual_ratio_of(const std::vector<Pair>& pairs, Metric metric) {
 }
 
 // Of pairs in the order of space. Noise is independent from one to the next; the error of a surface that is bent
-// another way is not: what neighbours lie off by on average, in units of what noise and the model's resolution explain.
+// another way is not: what neighbours lie off by on average, in units of what noise and the
+// model's resolution explain.
 double misfit_of(const std::vector<Pair>& pairs, Metric metric) {
-  constexpr std::size_t neighbours = 32;
-  constexpr double resolution = 0.06;  // of the largest residual
   double sum = 0.0, count = 0.0;
-  for (std::size_t first = 0; first + neighbours <= pairs.size(); first += neighbours) {
+  for (std::size_t first = 0; first + registration_limits::cell_pairs <= pairs.size();
+       first += registration_limits::cell_pairs) {
     double offset = 0.0, variance = 0.0;
-    for (std::size_t i = first; i < first + neighbours; ++i) {
-      const double coarse = resolution * pairs[i].largest_residual;
+    for (std::size_t i = first; i < first + registration_limits::cell_pairs; ++i) {
+      const double coarse = registration_limits::cell_resolution * pairs[i].largest_residual;
       offset += residual(pairs[i], metric);
       variance += pairs[i].agreement / pairs[i].weight + coarse * coarse;
     }
-    sum += offset * offset / (static_cast<double>(neighbours) * variance);
+    sum += offset * offset / (static_cast<double>(registration_limits::cell_pairs) * variance);
     count += 1.0;
   }
   return count > 0.0 ? std::sqrt(sum / count) : 0.0;

@@ -6,6 +6,7 @@
 
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
+#include "registration/limits.hpp"
 #include "registration/normal_equations.hpp"
 #include "registration/weak_directions.hpp"
 
@@ -13,7 +14,6 @@ namespace nacre {
 namespace {
 
 constexpr std::int64_t step_block = 256;
-constexpr double damping = 1e-9;  // information per pair, so that there always is a solution
 
 struct Moments {
   double weight = 0.0, agreement = 0.0, squares = 0.0, weighted_squares = 0.0;
@@ -72,7 +72,6 @@ Eigen::Matrix3d closest_rotation(const Eigen::Matrix3d& covariance) {
 }  // namespace
 
 double normal_information(const std::vector<Pair>& pairs, Metric metric) {
-  constexpr double least_variance = 1e-3;  // of each component: normals are no more certain than 2 degrees
   Eigen::Vector3d source_sum = Eigen::Vector3d::Zero(), target_sum = Eigen::Vector3d::Zero();
   Eigen::Matrix3d squares = Eigen::Matrix3d::Zero(), differences = Eigen::Matrix3d::Zero();
   double count = 0.0;
@@ -88,7 +87,7 @@ double normal_information(const std::vector<Pair>& pairs, Metric metric) {
     count += 1.0;
   }
   if (!(count > 0.0)) return 0.0;
-  const Eigen::Matrix3d floor = least_variance * Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d floor = registration_limits::least_variance * Eigen::Matrix3d::Identity();
   const Eigen::Matrix3d apart = differences / count + floor;
   const Eigen::Matrix3d independent =
       (squares - (source_sum * source_sum.transpose() + target_sum * target_sum.transpose()) / count) / count + floor;
@@ -118,7 +117,7 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   step.weak_directions = eigen.eigenvectors().leftCols(num_weak);
   const Eigen::Matrix<double, 6, Eigen::Dynamic> sure = eigen.eigenvectors().rightCols(6 - num_weak);
   Matrix6 damped = equations.hessian;
-  damped.diagonal().array() += damping * sums.weight;
+  damped.diagonal().array() += registration_limits::step_damping * sums.weight;
   const Vector6 solution =
       sure * solve_normal_equations(sure.transpose() * damped * sure, sure.transpose() * equations.gradient);
   step.reduction = solution.dot(equations.hessian * solution);

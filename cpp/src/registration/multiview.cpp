@@ -8,6 +8,7 @@
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "registration/correspondences.hpp"
+#include "registration/limits.hpp"
 #include "registration/normal_equations.hpp"
 #include "registration/planar.hpp"
 #include "registration/weak_directions.hpp"
@@ -16,12 +17,6 @@ namespace nacre {
 namespace {
 
 constexpr double no_limit = std::numeric_limits<double>::infinity();
-constexpr int num_iterations = 12;
-constexpr Eigen::Index num_samples = 800;
-constexpr double view_cosine = 0.7;           // between normals that match
-constexpr std::size_t least_view_pairs = 40;  // of two views that see the same surface
-constexpr double still = 1e-6;                // motions of all views together [rad], [m]
-constexpr double first_view_gate = 2.0, last_view_gate = 1.0, view_decay = 0.8;  // in tolerances
 
 struct Side {
   IcpSource source;
@@ -35,8 +30,8 @@ std::vector<Pair> match(const IcpSource& source, const IcpTarget& target, const 
   nearest.resize(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
   std::vector<Pair> pairs =
       target.match(source, source.cloud.points.rows(), world_from_target.inverse() * world_from_source,
-                   {gate, view_cosine, false}, nearest);
-  if (pairs.size() < least_view_pairs) return {};
+                   {gate, registration_limits::view_cosine, false}, nearest);
+  if (pairs.size() < registration_limits::least_view_pairs) return {};
   weight_robustly(pairs, 0.05 * tolerance);
   for (Pair& pair : pairs) {
     // Beyond a view's rim, matches only continue it: the farther along the surface, the less they count.
@@ -115,7 +110,7 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
   for (const AdjustableView& view : views) poses.push_back(view.world_from_camera);
   if (views.size() < 3) return poses;
   AlignOptions options;
-  options.max_samples = static_cast<int>(num_samples);
+  options.max_samples = static_cast<int>(registration_limits::view_samples);
   options.num_threads = 1;
   std::vector<std::unique_ptr<Side>> sides(views.size());
   parallel_for(static_cast<std::int64_t>(views.size()), 1, num_threads, [&](std::int64_t i) {
@@ -129,8 +124,8 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
   std::vector<std::uint8_t> see_the_same(views.size() * views.size(), 1);
   for (std::size_t i = 0; i < views.size(); ++i) see_the_same[i * views.size() + i] = 0;
   std::vector<std::vector<std::uint32_t>> nearest(see_the_same.size());
-  double gate = first_view_gate;
-  for (int iteration = 0; iteration < num_iterations; ++iteration) {
+  double gate = registration_limits::first_view_gate;
+  for (int iteration = 0; iteration < registration_limits::most_view_steps; ++iteration) {
     std::vector<Overlap> overlaps(see_the_same.size());
     parallel_for(count * count, 1, num_threads, [&](std::int64_t index) {
       const auto k = static_cast<std::size_t>(index), i = k / views.size(), j = k % views.size();
@@ -138,7 +133,7 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
       const std::vector<Pair> pairs =
           match(sides[i]->source, sides[j]->target, poses[i], poses[j], gate * tolerance, tolerance, nearest[k]);
       overlaps[k] = Overlap(pairs, motions.center);
-      if (gate == last_view_gate && pairs.empty()) see_the_same[k] = 0;
+      if (gate == registration_limits::last_view_gate && pairs.empty()) see_the_same[k] = 0;
     });
     JointEquations equations(freedom * count);
     for (Eigen::Index k = 0; k < count * count; ++k) {
@@ -149,8 +144,8 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
       Pose& pose = poses[static_cast<std::size_t>(k)];
       pose = orthonormal(motions.apply(solution.segment(freedom * (k - 1), freedom)) * pose);
     }
-    if (gate == last_view_gate && solution.norm() < still) break;
-    gate = std::max(last_view_gate, view_decay * gate);
+    if (gate == registration_limits::last_view_gate && solution.norm() < registration_limits::still) break;
+    gate = std::max(registration_limits::last_view_gate, registration_limits::view_decay * gate);
   }
   return poses;
 }

@@ -1,13 +1,13 @@
 #include "registration/normal_equations.hpp"
 
 #include "base/parallel.hpp"
+#include "registration/limits.hpp"
 #include "simd/icp_equations.hpp"
 
 namespace nacre {
 namespace {
 
 constexpr std::int64_t equation_block = 256;
-constexpr double unknown_chance = 0.008;  // information that normals off by 5 degrees feign
 
 Matrix6 symmetric(const double* upper) {
   Matrix6 matrix;
@@ -61,7 +61,7 @@ NormalEquations normal_equations(const std::vector<Pair>& pairs, Metric metric, 
     simd::sum_pair_equations()(rows, num_rows, sums);
     sum.hessian = symmetric(sums.hessian);
     sum.chance = symmetric(sums.chance);
-    sum.chance.diagonal().array() += unknown_chance * weight_of_single;
+    sum.chance.diagonal().array() += registration_limits::unknown_noise_bias * weight_of_single;
     sum.gradient = Eigen::Map<const Vector6>(sums.gradient);
     return sum;
   });

@@ -4,13 +4,10 @@
 #include <cmath>
 
 #include "base/statistics.hpp"
+#include "registration/limits.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr double planar_cosine = 0.7;  // between normals that match
-constexpr double planar_decay = 0.7;
-constexpr std::size_t least_planar_pairs = 30;
 
 // Least squares of the residuals, about the middle of the pairs.
 Pose plane_step(const std::vector<Pair>& pairs, const Eigen::Vector3d& normal) {
@@ -49,18 +46,20 @@ IcpResult align_on_plane(const IcpTarget& target, const IcpSource& source, const
   bool at_rest = false;
   double distance = gates.first;
   for (int i = 0; i < gates.max_iterations && !at_rest; ++i) {
-    std::vector<Pair> pairs = target.match(source, count, pose, {distance, planar_cosine, false}, nearest);
-    if (pairs.size() < least_planar_pairs) return result;
+    std::vector<Pair> pairs =
+        target.match(source, count, pose, {distance, registration_limits::planar_cosine, false}, nearest);
+    if (pairs.size() < registration_limits::least_planar_pairs) return result;
     weight_robustly(pairs, floor);
     const Pose motion = plane_step(pairs, normal);
     pose = motion * pose;
     const bool is_smallest = distance <= gates.last;
     at_rest = is_smallest && (motion * pairs.front().p - pairs.front().p).norm() < 0.1 * floor;
-    distance = std::max(gates.last, planar_decay * distance);
+    distance = std::max(gates.last, registration_limits::planar_decay * distance);
     result.iterations = i + 1;
   }
-  std::vector<Pair> pairs = target.match(source, count, pose, {gates.last, planar_cosine, false}, nearest);
-  if (pairs.size() < least_planar_pairs) return result;
+  std::vector<Pair> pairs =
+      target.match(source, count, pose, {gates.last, registration_limits::planar_cosine, false}, nearest);
+  if (pairs.size() < registration_limits::least_planar_pairs) return result;
   weight_robustly(pairs, floor);
   const IcpStep last = solve_step(pairs, Metric::symmetric, 0.0, 1);
   result.target_from_source = pose;

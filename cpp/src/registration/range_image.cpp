@@ -4,13 +4,11 @@
 #include <cmath>
 #include <limits>
 
+#include "registration/limits.hpp"
+
 namespace nacre {
 namespace {
 
-constexpr double points_per_cell = 6.0;
-constexpr int most_cells = 256;  // across
-constexpr int outline = 2;       // so far from a cell with points nothing is certain [cells]
-constexpr int least_filled = 8;  // of a cell and its eight neighbours, to know what is in front and behind
 constexpr float infinity = std::numeric_limits<float>::infinity();
 
 }  // namespace
@@ -46,11 +44,12 @@ FreeSpace::FreeSpace(const PointsRef& points, const Eigen::Vector3d& viewpoint) 
   radius_ = std::sqrt(squares / static_cast<double>(finite.size()));
   // A cloud fills about half of the rectangle around it.
   const Eigen::Vector2d extent = (high - low).cwiseMax(1e-9);
-  cell_ = std::max(std::sqrt(0.5 * extent.prod() * points_per_cell / static_cast<double>(finite.size())),
-                   extent.maxCoeff() / most_cells);
-  first_ = low.array() - (outline + 1) * cell_;
-  width_ = static_cast<int>(extent.x() / cell_) + 2 * outline + 3;
-  height_ = static_cast<int>(extent.y() / cell_) + 2 * outline + 3;
+  cell_ = std::max(
+      std::sqrt(0.5 * extent.prod() * registration_limits::points_per_cell / static_cast<double>(finite.size())),
+      extent.maxCoeff() / registration_limits::most_cells);
+  first_ = low.array() - (registration_limits::uncertain_cells + 1) * cell_;
+  width_ = static_cast<int>(extent.x() / cell_) + 2 * registration_limits::uncertain_cells + 3;
+  height_ = static_cast<int>(extent.y() / cell_) + 2 * registration_limits::uncertain_cells + 3;
   fill_cells(projections);
 }
 
@@ -65,12 +64,13 @@ void FreeSpace::fill_cells(const std::vector<Projection>& projections) {
     range.farthest = std::max(range.farthest, static_cast<float>(projection.range));
   }
   cells_.resize(single.size());
-  for (int row = outline; row < height_ - outline; ++row) {
-    for (int column = outline; column < width_ - outline; ++column) {
+  for (int row = registration_limits::uncertain_cells; row < height_ - registration_limits::uncertain_cells; ++row) {
+    for (int column = registration_limits::uncertain_cells; column < width_ - registration_limits::uncertain_cells;
+         ++column) {
       Cell cell;
       int filled = 0;
-      for (int v = -outline; v <= outline; ++v) {
-        for (int u = -outline; u <= outline; ++u) {
+      for (int v = -registration_limits::uncertain_cells; v <= registration_limits::uncertain_cells; ++v) {
+        for (int u = -registration_limits::uncertain_cells; u <= registration_limits::uncertain_cells; ++u) {
           const Range& range = single[static_cast<std::size_t>((row + v) * width_ + column + u)];
           if (!(range.nearest < infinity)) continue;
           cell.is_reached = true;
@@ -80,7 +80,7 @@ void FreeSpace::fill_cells(const std::vector<Projection>& projections) {
           cell.farthest = std::max(cell.farthest, range.farthest);
         }
       }
-      cell.is_known = filled >= least_filled;
+      cell.is_known = filled >= registration_limits::least_filled_cells;
       cells_[static_cast<std::size_t>(row * width_ + column)] = cell;
     }
   }

@@ -4,12 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "registration/limits.hpp"
+
 namespace nacre {
 namespace {
-
-constexpr std::size_t neighbours = 32;
-constexpr std::size_t least_rows = 16;  // for seven unknowns
-constexpr double scale_damping = 1e-9;  // of the mean information, so that there always is a solution
 
 // Weighted sums over neighbouring pairs.
 struct Row {
@@ -32,11 +30,12 @@ struct Row {
 
 std::vector<Row> sum_neighbours(const std::vector<Pair>& pairs, Metric metric, const Eigen::Vector3d& center,
                                 double extent) {
-  std::vector<Row> rows((pairs.size() + neighbours - 1) / neighbours);
+  std::vector<Row> rows((pairs.size() + registration_limits::scale_cell_pairs - 1) /
+                        registration_limits::scale_cell_pairs);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const Pair& pair = pairs[i];
     const Eigen::Vector3d p = (pair.p - center) / extent, difference = pair.q - pair.p;
-    Row& row = rows[i / neighbours];
+    Row& row = rows[i / registration_limits::scale_cell_pairs];
     if (metric == Metric::point_to_point) {
       for (int axis = 0; axis < 3; ++axis) row.add(pair.weight, p, difference, Eigen::Vector3d::Unit(axis));
     } else {
@@ -62,8 +61,8 @@ SizeDifference size_difference(const std::vector<Pair>& pairs, Metric metric) {
   extent = std::sqrt(std::max(extent / weight, 1e-24));
 
   const std::vector<Row> rows = sum_neighbours(pairs, metric, center, extent);
-  if (rows.size() < least_rows) return {};
-  Matrix6 hessian = Matrix6::Identity() * scale_damping * weight;
+  if (rows.size() < registration_limits::least_scale_rows) return {};
+  Matrix6 hessian = Matrix6::Identity() * registration_limits::scale_damping * weight;
   Vector6 mixed = Vector6::Zero(), gradient = Vector6::Zero();
   for (const Row& row : rows) {
     hessian.noalias() += row.pose * row.pose.transpose() / row.weight;
@@ -75,7 +74,7 @@ SizeDifference size_difference(const std::vector<Pair>& pairs, Metric metric) {
 
   // What the motion cannot do: the rest of the column, on which the rest of the right side is regressed.
   const auto rest = [&](const Row& row) { return row.size - row.pose.dot(by_pose); };
-  double information = scale_damping * weight, slope = 0.0, noise = 0.0;
+  double information = registration_limits::scale_damping * weight, slope = 0.0, noise = 0.0;
   for (const Row& row : rows) {
     information += rest(row) * rest(row) / row.weight;
     slope += rest(row) * (row.right_side - row.pose.dot(motion)) / row.weight;

@@ -1,0 +1,34 @@
+// Numbers that decide when a loop closes.
+// Each line: [unit] kind: meaning; what guards it. Kinds: derived, budget, tuned; docs/numbers.md shows them all.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// clang-format off
+namespace nacre::loops_limits {
+
+constexpr int key_frame_points = 3000;  // [points] budget: of the surface that a key frame keeps; room
+constexpr std::size_t most_key_frames = 500;  // [views] budget: about 80 kB each; test_loop_closure
+constexpr std::size_t most_candidates = 4;  // [views] budget: that a frame is registered to at once; room
+constexpr int verified_nodes = 12;  // [nodes] tuned: of the trajectory: what was seen since is taken to be in place; room, teddy
+constexpr double least_overlap = 0.3;  // [1] tuned: of a frame and a key frame; room
+constexpr double least_consistency = 0.8;  // [1] tuned: of what both should see, the part that agrees; room
+constexpr double largest_ratio = 0.35;  // [1] tuned: of the residuals to the largest that match; 0.58 by chance; room
+constexpr double search_radius = 0.12;  // [depth] tuned: drift that is looked for; room
+constexpr double drift = 0.005;  // [rad, depth] tuned: standard deviation of a step between nodes; room
+constexpr double weak_drift = 10.0 * drift;  // [rad, depth] tuned: where the registration leaves a direction open; room
+constexpr double loop_error = 0.25 * drift;  // [rad, depth] tuned: standard deviation of a registration that closes a loop; room
+constexpr double covariance_inflation = 25.0;  // [1] tuned: of the covariance that a registration claims; room
+constexpr double most_normalized_error = 4.0;  // [sigma] derived: of an edge; room
+constexpr int least_loop_views = 3;  // [views] tuned: from view to view around a loop of views, at least; bunny12
+constexpr std::size_t most_loop_views = 64;  // [views] budget: adjusted at once; bunny12
+constexpr double loop_tolerance = 1.5;  // [spacing] tuned: to which views agree; bunny12
+constexpr double most_surprise = 4.0 * covariance_inflation;  // [sigma^2] tuned: per unknown, of the newest view's registration; bunny12
+constexpr double near_view = 4.0;  // [view_distance] tuned: of key frames whose outlines refine a pose; dog
+constexpr std::size_t most_near_views = 3;  // [views] budget: whose outlines refine a pose; dog
+constexpr int most_graph_steps = 50;  // [steps] budget: of Gauss-Newton; test_pose_graph
+constexpr int most_suspects = 16;  // [edges] budget: that are taken out in turn to see what contradicts; test_pose_graph
+
+}  // namespace nacre::loops_limits
+// clang-format on

@@ -1,0 +1,45 @@
+// Numbers that decide what outlines say of a pose.
+// Each line: [unit] kind: meaning; what guards it. Kinds: derived, budget, tuned; docs/numbers.md shows them all.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+// clang-format off
+namespace nacre::outlines_limits {
+
+constexpr double like_cosine = 0.75;  // [1] tuned: between outlines that match, and between their surfaces; dog
+constexpr double least_facing = 0.5;  // [1] tuned: cosine at which a surface near an edge is asked; dog
+constexpr double look_within = 3.0;  // [pixel] derived: nearer to an edge, pixels see both of its sides; dog
+constexpr double look_beyond = 5.0;  // [pixel] tuned: beyond an edge, where the surface must not continue; dog
+constexpr double least_distance = 2.0;  // [pixel] tuned: between surfaces that differ; dog
+constexpr int border_pixels = 3;  // [pixels] derived: of an image, where cleaning may have removed some; test_occluding_edges
+constexpr int window_radius = 6;  // [pixels] tuned: of the window that shows the surface; test_occluding_edges
+constexpr double least_edge_facing = 0.5;  // [1] tuned: cosine at which a surface may end in an occluding edge; test_occluding_edges
+constexpr double least_offset = 0.25;  // [radius] derived: of the window's pixels from its center; a half window has 0.42; test_occluding_edges
+constexpr double most_offset = 0.65;  // [radius] derived: likewise; a corner of 90 degrees has 0.6; test_occluding_edges
+constexpr double least_filled = 0.18;  // [1] derived: part of the window that shows the surface; a corner of 90 degrees has 0.25; test_occluding_edges
+constexpr double most_slope = 3.0;  // [1] tuned: of depth along a surface, in sizes of a pixel; test_occluding_edges
+constexpr double most_off = 4.0;  // [sigma] derived: of a pixel from its surface; test_occluding_edges
+constexpr std::size_t least_matches = 25;  // [pairs] tuned: of outlines that decide a direction; dog, wall
+constexpr int num_rounds = 4;  // [rounds] budget: of steps along the outline, each then back onto the surface; dog
+constexpr int least_steps = 4;  // [steps] budget: in each round; dog
+constexpr double gate_decay = 0.8;  // [1] tuned: at each step; dog
+constexpr double first_gate = 12.0;  // [pixel] tuned: of an object seen whole also a third of its size; dog
+constexpr double clear_agreement = 0.9;  // [1] tuned: no other start needs to be tried; dog
+constexpr double last_gate = 4.0;  // [pixel] tuned: of matches, at last; dog
+constexpr double least_agreement = 0.6;  // [1] tuned: part of the outlines that must match; wall
+constexpr double largest_ratio = 0.4;  // [1] derived: residuals to the gate, root mean square; chance gives 0.58; wall
+constexpr double least_information = 0.1;  // [1] tuned: per pair, for a direction to be known; wall, pipe
+constexpr double least_noise = 0.3;  // [pixel] derived: pixels are where they are to half of one; wall
+constexpr std::size_t least_refining = 25;  // [points] tuned: of an outline, and pairs; dog
+constexpr int most_refinements = 12;  // [steps] budget: of a refinement; dog
+constexpr double refining_gate = 4.0;  // [pixel] tuned: of matches; dog
+constexpr double largest_rms = 1.0;  // [pixel] tuned: of the residuals; outlines that move with the camera have 1.3 to 1.9; dog
+constexpr double point_sigma = 0.5;  // [pixel] derived: of an outline's point; dog
+constexpr double shift_sigma = 0.5;  // [pixel] tuned: of an outline as a whole: mixed pixels differ with the slant; dog
+constexpr double points_for_one = 4.0;  // [points] tuned: neighbors on an outline err together; dog
+constexpr double pairs_for_one = 30.0;  // [pairs] tuned: so do pairs of surface points; dog
+
+}  // namespace nacre::outlines_limits
+// clang-format on

@@ -1,0 +1,59 @@
+// Numbers that decide how surfaces are registered.
+// Each line: [unit] kind: meaning; what guards it. Kinds: derived, budget, tuned; docs/numbers.md shows them all.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+
+// clang-format off
+namespace nacre::registration_limits {
+
+constexpr std::size_t scale_probes = 1000;  // [pairs] budget: that tell the scale of the residuals; test_icp
+constexpr std::size_t cell_pairs = 32;  // [pairs] budget: in the order of space, whose mean residual tells what they share; test_icp
+constexpr double cell_resolution = 0.06;  // [1] tuned: of the largest residual, that neighbors may share; pairs, docs: tracking
+constexpr double step_damping = 1e-9;  // [1] derived: information per pair, so that there always is a solution; test_icp
+constexpr double least_variance = 1e-3;  // [1] derived: of a normal's components: none is more certain than 2 degrees; pairs
+constexpr double unknown_noise_bias = 0.008;  // [1] derived: noise bias of the Hessian where a normal's error is unknown: 5 degrees; ball, wall
+constexpr std::int64_t spacing_probes = 500;  // [points] budget: that tell a cloud's spacing; test_icp
+constexpr std::size_t scale_cell_pairs = 32;  // [pairs] budget: whose sum is one row, since neighbors err together; test_scale_check
+constexpr std::size_t least_scale_rows = 16;  // [rows] derived: for seven unknowns; test_scale_check
+constexpr double scale_damping = 1e-9;  // [1] derived: of the mean information, so that there always is a solution; test_scale_check
+constexpr int most_color_steps = 12;  // [steps] budget: at each level of the colors; test_color_registration
+constexpr double least_correlation = 0.6;  // [1] tuned: of the brightnesses, for them to be believed; test_color_registration
+constexpr double least_brightness_noise = 1.0;  // [1/255] derived: of the brightness: a step of its scale; test_color_registration
+constexpr double small_color_step = 0.01;  // [spacing] budget: of a search by color that has converged; test_color_registration
+constexpr std::size_t least_color_pairs = 50;  // [pairs] tuned: that colors may decide by; test_color_registration
+constexpr int color_neighbors = 16;  // [points] budget: around a point, that show how brightness changes; test_color_registration
+constexpr int least_color_neighbors = 6;  // [points] derived: for three unknowns with some to spare; test_color_registration
+constexpr int mean_neighbors = 24;  // [points] tuned: that a noisy point is averaged with; test_global_registration
+constexpr float same_surface_cosine = 0.8F;  // [1] tuned: between the normals of neighbors on one surface; test_global_registration
+constexpr Eigen::Index roughness_probes = 500;  // [points] budget: that tell a cloud's noise; test_global_registration
+constexpr Eigen::Index least_points = 50;  // [points] tuned: of a cloud that is searched for; test_global_registration
+constexpr double first_search_gate = 0.25;  // [size] tuned: of the search, in diameters of the smaller cloud; test_global_registration
+constexpr double coarse_gate = 0.04;  // [size] tuned: at the end of the search; test_global_registration
+constexpr double refined_gate = 0.06;  // [size] tuned: of candidates that are refined; test_global_registration
+constexpr double coarse_tolerance = 0.02;  // [size] tuned: to which surfaces agree in the search; test_global_registration
+constexpr double least_tolerance = 0.003;  // [size] tuned: to which surfaces agree at the end, at least; test_global_registration
+constexpr double same_shift = 0.1;  // [size] tuned: closer motions are the same; test_global_registration
+constexpr double same_turn = 0.26;  // [rad] tuned: closer rotations are the same; test_global_registration
+constexpr double center_depth = 0.7;  // [radius] derived: from what is seen of an object to its center; a half sphere has 0.6; test_global_registration
+constexpr double least_facing = 0.3;  // [1] tuned: cosine at which a surface should be seen; test_global_registration
+constexpr double points_per_cell = 6.0;  // [points] budget: of a cloud seen from a place; test_global_registration
+constexpr int most_cells = 256;  // [cells] budget: across a cloud's range image; test_global_registration
+constexpr int uncertain_cells = 2;  // [cells] derived: from points, where nothing is certain; test_global_registration
+constexpr int least_filled_cells = 8;  // [cells] tuned: of nine, to know what is in front and behind; test_global_registration
+constexpr double planar_cosine = 0.7;  // [1] tuned: between normals that match; dog
+constexpr double planar_decay = 0.7;  // [1] tuned: of the gate, at each step; dog
+constexpr std::size_t least_planar_pairs = 30;  // [pairs] tuned: that a motion on a plane is found by; dog
+constexpr int most_view_steps = 12;  // [steps] budget: of views that are adjusted to each other; bunny12
+constexpr Eigen::Index view_samples = 800;  // [points] budget: of each view; bunny12
+constexpr double view_cosine = 0.7;  // [1] tuned: between normals that match; bunny12
+constexpr std::size_t least_view_pairs = 40;  // [pairs] tuned: of two views that see the same surface; bunny12
+constexpr double still = 1e-6;  // [rad, m] derived: motions of all views that have converged; bunny12
+constexpr double first_view_gate = 2.0;  // [tolerance] tuned: of matches, at first; bunny12
+constexpr double last_view_gate = 1.0;  // [tolerance] derived: of matches, at last; bunny12
+constexpr double view_decay = 0.8;  // [1] tuned: of the gate, at each step; bunny12
+
+}  // namespace nacre::registration_limits
+// clang-format on
