@@ -7,22 +7,15 @@
 #include "base/statistics.hpp"
 #include "outlines/limits.hpp"
 #include "outlines/match.hpp"
+#include "registration/gauss_newton.hpp"
 #include "registration/weak_directions.hpp"
 
 namespace nacre {
 namespace {
 
-using Basis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
-
-struct EdgePair {
-  Eigen::Vector3d lever;  // of the source point about the centre [m]
-  Eigen::Vector3d target_outward, source_outward;
-  double residual, weight = 1.0;
-};
-
 struct Fit {
   IcpResult result;
-  std::vector<EdgePair> pairs;
+  std::vector<MotionRow> pairs;
   double agreement = 0.0;  // see EdgeSearch
 };
 
@@ -58,48 +51,44 @@ class EdgeSearch {
   double least_known() const { return std::pow(noise_ / (outlines_limits::least_noise * pixel_), 2); }
 
   // Each source edge with the nearest target edge of its kind, if that lies within the gate; robust weights.
-  std::vector<EdgePair> match(const Pose& pose, const Eigen::Vector3d& center, double gate) {
+  std::vector<MotionRow> match(const Pose& pose, const Eigen::Vector3d& center, double gate) {
     const std::vector<OutlinePoint> edges = moved(outlines_.source, pose);
     const std::vector<int> nearest = nearest_edges(edges, edges_, gate, options_.num_threads);
-    std::vector<EdgePair> pairs;
+    std::vector<MotionRow> pairs;
     std::vector<double> sizes;
     for (std::size_t i = 0; i < nearest.size(); ++i) {
       if (nearest[i] < 0) continue;
       const OutlinePoint &edge = edges[i], &other = edges_[static_cast<std::size_t>(nearest[i])];
       const Eigen::Vector3d across = (edge.outward + other.outward).normalized();
-      pairs.push_back({edge.point - center, other.outward, edge.outward, (edge.point - other.point).dot(across)});
+      pairs.push_back(
+          {edge.point - center, other.outward, edge.outward, across, (edge.point - other.point).dot(across)});
       sizes.push_back(std::abs(pairs.back().residual));
     }
     if (pairs.size() < outlines_limits::least_matches) return {};
     noise_ = std::max(outlines_limits::least_noise * pixel_, mad_to_sigma * median_of(sizes));
-    for (EdgePair& pair : pairs) pair.weight = robust_weight(pair.residual, noise_);
+    for (MotionRow& pair : pairs) pair.weight = robust_weight(pair.residual, noise_);
     return pairs;
   }
 
   // From a pose at rest on the surface, along the given directions or, without any, all that geometry leaves open.
-  IcpResult run(const IcpResult& start, double gate, const Basis* only) {
+  IcpResult run(const IcpResult& start, double gate, const TwistBasis* only) {
     IcpResult result = start;
     for (int round = 0; round < outlines_limits::num_rounds; ++round) {
-      const Basis open = only != nullptr ? *only : Basis(result.weak_directions);
+      const TwistBasis open = only != nullptr ? *only : TwistBasis(result.weak_directions);
       if (open.cols() == 0) break;
       for (int i = 0; i < outlines_limits::least_steps || gate > smallest_gate(); ++i) {
-        const std::vector<EdgePair> pairs = match(result.target_from_source, result.center, gate);
+        const std::vector<MotionRow> pairs = match(result.target_from_source, result.center, gate);
         if (pairs.empty()) return start;
         step(pairs, open, result);
         gate = std::max(smallest_gate(), gate * outlines_limits::gate_decay);
       }
-      const IcpResult back = align_held(target_, source_, result.target_from_source, held_);
-      if (back.status == AlignStatus::too_few_pairs) return start;
-      const int iterations = result.iterations + back.iterations;
-      result = back;
-      result.status = start.status;
-      result.iterations = iterations;
+      if (!return_to_surface(target_, source_, held_, result)) return start;
     }
     return result;
   }
 
   // The same with its pairs within the last gate, and their agreement; 0 where the surfaces no longer fit.
-  Fit fit(const IcpResult& start, double gate, const Basis* only) {
+  Fit fit(const IcpResult& start, double gate, const TwistBasis* only) {
     Fit fit;
     fit.result = run(start, gate, only);
     fit.pairs = match(fit.result.target_from_source, fit.result.center, smallest_gate());
@@ -109,9 +98,9 @@ class EdgeSearch {
   }
 
   // See agreement_of: of either outline, whichever is less; 0 where the matches are no closer than chance has it.
-  double agreement(const Pose& pose, const std::vector<EdgePair>& pairs) const {
+  double agreement(const Pose& pose, const std::vector<MotionRow>& pairs) const {
     double squares = 0.0;
-    for (const EdgePair& pair : pairs) squares += pair.residual * pair.residual;
+    for (const MotionRow& pair : pairs) squares += pair.residual * pair.residual;
     const double ratio = std::sqrt(squares / static_cast<double>(pairs.size())) / smallest_gate();
     if (!(ratio < outlines_limits::largest_ratio)) return 0.0;
     const std::vector<OutlinePoint> edges = moved(outlines_.source, pose);
@@ -121,22 +110,6 @@ class EdgeSearch {
       return agreement_of(outline, matches, sight, outlines_.camera, pixel_, outlines_.noise);
     };
     return std::min(part(edges, edges_, outlines_.before), part(edges_, edges, now));
-  }
-
-  Eigen::MatrixXd agreed_information(const std::vector<EdgePair>& pairs, const Basis& open) const {
-    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(open.cols(), open.cols());
-    for (const EdgePair& pair : pairs) {
-      const Eigen::VectorXd a = open.transpose() * row_of(pair.lever, pair.target_outward);
-      const Eigen::VectorXd b = open.transpose() * row_of(pair.lever, pair.source_outward);
-      sum += 0.5 * pair.weight * (a * b.transpose() + b * a.transpose());
-    }
-    return sum;
-  }
-
-  Vector6 row_of(const Eigen::Vector3d& lever, const Eigen::Vector3d& outward) const {
-    Vector6 row;
-    row << lever.cross(outward) / extent_, outward;
-    return row;
   }
 
  private:
@@ -149,19 +122,8 @@ class EdgeSearch {
     return std::sqrt(std::max(squares / std::max<double>(1.0, static_cast<double>(pairs.size())), 1e-24));
   }
 
-  void step(const std::vector<EdgePair>& pairs, const Basis& open, IcpResult& result) const {
-    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(open.cols(), open.cols());
-    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(open.cols());
-    double weight = 0.0;
-    for (const EdgePair& pair : pairs) {
-      const Eigen::Vector3d across = (pair.target_outward + pair.source_outward).normalized();
-      const Eigen::VectorXd row = open.transpose() * row_of(pair.lever, across);
-      hessian += pair.weight * row * row.transpose();
-      gradient -= pair.weight * pair.residual * row;
-      weight += pair.weight;
-    }
-    hessian.diagonal().array() += 1e-3 * weight;
-    Vector6 twist = open * solve_normal_equations(hessian, gradient);
+  void step(const std::vector<MotionRow>& pairs, const TwistBasis& open, IcpResult& result) const {
+    Vector6 twist = gauss_newton_step(pairs, open, extent_, {1e-3, 0.0});
     twist.head<3>() /= extent_;
     result.target_from_source = motion_about(result.center, twist) * result.target_from_source;
   }
@@ -194,28 +156,24 @@ IcpResult determine_by_outline(const IcpTarget& target, const IcpSource& source,
   }
   if (best < outlines_limits::least_agreement) return geometric;
 
-  Basis known;
+  TwistBasis known;
   IcpResult result = geometric;
   for (const bool restricted : {false, true}) {
     const auto [found, pairs, agreement] = search.fit(geometric, gate, restricted ? &known : nullptr);
     if (agreement < outlines_limits::least_agreement) return geometric;
     // What shape says only where outlines took it must be said by the outlines, too.
     const bool is_shaped = found.weak_directions.cols() == 0;
-    const Basis open = is_shaped ? geometric.weak_directions : found.weak_directions;
+    const TwistBasis open = is_shaped ? geometric.weak_directions : found.weak_directions;
     double weight = 0.0;
-    for (const EdgePair& pair : pairs) weight += pair.weight;
+    for (const MotionRow& pair : pairs) weight += pair.weight;
     const double least = std::max(search.least_known(), outlines_limits::least_information * weight);
-    const Directions directions = split_directions(search.agreed_information(pairs, open), least);
+    const Directions directions = split_directions(agreed_information(pairs, open, search.extent(), 1.0), least);
     if (is_shaped) return directions.weak.cols() == 0 ? found : geometric;
     if (directions.sure.cols() == 0) return geometric;
     known = open * directions.sure;
     result = found;
     result.weak_directions = open * directions.weak;
-    for (const EdgePair& pair : pairs) {
-      Vector6 row = known * (known.transpose() * search.row_of(pair.lever, pair.target_outward));
-      row.head<3>() *= search.extent();
-      result.information += pair.weight / (search.noise() * search.noise()) * row * row.transpose();
-    }
+    add_information(pairs, known, search.extent(), search.noise(), result.information);
     if (directions.weak.cols() == 0) break;
   }
   return result;

@@ -6,20 +6,16 @@
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
+#include "registration/gauss_newton.hpp"
 #include "registration/limits.hpp"
 #include "registration/weak_directions.hpp"
 
 namespace nacre {
 namespace {
 
-using Basis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
-
-// A matched pair: how the brightness changes when the source moves, after the target and after the source.
-struct ColorPair {
-  Eigen::Vector3d lever;  // of the source point about the centre [m]
-  Eigen::Vector3d target_gradient, source_gradient;
-  double target_value, source_value;  // at the source point
-  double residual = 0.0, weight = 0.0;
+// The brightness of both sides at a source point.
+struct Brightness {
+  double target, source;
 };
 
 struct ColorLevel {
@@ -41,130 +37,100 @@ class ColorSearch {
   }
 
   // Pairs about a centre, their residuals after the best gain and offset, and robust weights.
-  std::vector<ColorPair> match(const ColorLevel& level, const Pose& pose, const Eigen::Vector3d& center) {
+  std::vector<MotionRow> match(const ColorLevel& level, const Pose& pose, const Eigen::Vector3d& center) {
     std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source_.cloud.points.rows()), no_slot);
     const std::int64_t count = source_.levels.back();
     target_.match(source_, count, pose, gate(), nearest);
-    std::vector<ColorPair> pairs;
+    std::vector<MotionRow> rows;
+    std::vector<Brightness> values;
     for (Eigen::Index i = 0; i < count; ++i) {
       const std::uint32_t slot = nearest[static_cast<std::size_t>(i)];
       if (slot == no_slot) continue;
       const auto k = static_cast<Eigen::Index>(slot);
-      ColorPair pair;
+      MotionRow pair;
       pair.target_gradient = level.target.gradient.row(k).transpose().cast<double>();
       pair.source_gradient = pose.linear() * level.source.gradient.row(i).transpose().cast<double>();
       const Eigen::Vector3d p = pose * source_.cloud.points.row(i).transpose().cast<double>();
       const Eigen::Vector3d q = target_.cloud().points.row(k).transpose().cast<double>();
       pair.lever = p - center;
       // Park, Zhou and Koltun 2017, eq. 11: the target's brightness where the source point falls on its tangent plane.
-      pair.target_value = level.target.brightness[k] + pair.target_gradient.dot(p - q);
-      pair.source_value = level.source.brightness[i];
-      if (std::isfinite(pair.target_value + pair.source_value) && pair.source_gradient.allFinite()) {
-        pairs.push_back(pair);
-      }
+      const Brightness value{level.target.brightness[k] + pair.target_gradient.dot(p - q), level.source.brightness[i]};
+      if (!std::isfinite(value.target + value.source) || !pair.source_gradient.allFinite()) continue;
+      rows.push_back(pair);
+      values.push_back(value);
     }
-    if (pairs.size() >= registration_limits::least_color_pairs) weigh(pairs);
-    return pairs;
+    if (rows.size() >= registration_limits::least_color_pairs) weigh(values, rows);
+    return rows;
   }
 
   double noise() const { return noise_; }
   double correlation() const { return correlation_; }
 
   // From a pose at rest on the surface, along the given directions or, without any, all that geometry leaves open.
-  IcpResult run(const std::vector<ColorLevel>& levels, const IcpResult& start, const Basis* only) {
+  IcpResult run(const std::vector<ColorLevel>& levels, const IcpResult& start, const TwistBasis* only) {
     IcpResult result = start;
     for (const ColorLevel& level : levels) {
       for (int i = 0; i < registration_limits::most_color_steps; ++i) {
-        const Basis open = only != nullptr ? *only : Basis(result.weak_directions);
+        const TwistBasis open = only != nullptr ? *only : TwistBasis(result.weak_directions);
         if (open.cols() == 0) break;
-        const std::vector<ColorPair> pairs = match(level, result.target_from_source, result.center);
-        if (pairs.size() < registration_limits::least_color_pairs) break;
-        const double size = step(pairs, open, result);
-        const IcpResult back = align_held(target_, source_, result.target_from_source, held_);
-        if (back.status == AlignStatus::too_few_pairs) return start;
-        const int iterations = result.iterations + back.iterations;
-        result = back;
-        result.status = start.status;
-        result.iterations = iterations;
+        const std::vector<MotionRow> rows = match(level, result.target_from_source, result.center);
+        if (rows.size() < registration_limits::least_color_pairs) break;
+        const double size = step(rows, open, result);
+        if (!return_to_surface(target_, source_, held_, result)) return start;
         if (size < registration_limits::small_color_step * target_.spacing()) break;
       }
     }
     return result;
   }
 
-  static double extent_of(const std::vector<ColorPair>& pairs) {
+  static double extent_of(const std::vector<MotionRow>& rows) {
     double squares = 0.0;
-    for (const ColorPair& pair : pairs) squares += pair.lever.squaredNorm();
-    return std::sqrt(std::max(squares / static_cast<double>(pairs.size()), 1e-24));
+    for (const MotionRow& row : rows) squares += row.lever.squaredNorm();
+    return std::sqrt(std::max(squares / static_cast<double>(rows.size()), 1e-24));
   }
 
-  static Vector6 row_of(const Eigen::Vector3d& lever, const Eigen::Vector3d& gradient, double extent) {
-    Vector6 row;
-    row << lever.cross(gradient) / extent, gradient;
-    return row;
-  }
-
-  // Information on the directions that source and target agree on, as if it were of distances: noise cancels, as it
-  // does among normals (registration/normal_equations.hpp).
-  Eigen::MatrixXd agreed_information(const std::vector<ColorPair>& pairs, const Basis& open,
-                                     double distance_noise) const {
-    const double extent = extent_of(pairs), scale = distance_noise / noise_;
-    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(open.cols(), open.cols());
+  // As if it were of distances, per pair.
+  Eigen::MatrixXd agreed(const std::vector<MotionRow>& rows, const TwistBasis& open, double distance_noise) const {
     double weight = 0.0;
-    for (const ColorPair& pair : pairs) {
-      const Eigen::VectorXd a = open.transpose() * row_of(pair.lever, pair.target_gradient, extent);
-      const Eigen::VectorXd b = open.transpose() * row_of(pair.lever, gain_ * pair.source_gradient, extent);
-      sum += 0.5 * pair.weight * scale * scale * (a * b.transpose() + b * a.transpose());
-      weight += pair.weight;
-    }
-    return sum / std::max(weight, 1e-12);
+    for (const MotionRow& row : rows) weight += row.weight;
+    return agreed_information(rows, open, extent_of(rows), distance_noise / noise_) / std::max(weight, 1e-12);
   }
 
  private:
-  void weigh(std::vector<ColorPair>& pairs) {
+  void weigh(const std::vector<Brightness>& brightness, std::vector<MotionRow>& rows) {
     std::vector<double> target_values, source_values, values;
-    for (const ColorPair& pair : pairs) {
-      target_values.push_back(pair.target_value);
-      source_values.push_back(pair.source_value);
+    for (const Brightness& value : brightness) {
+      target_values.push_back(value.target);
+      source_values.push_back(value.source);
     }
     const double target_middle = median_of(target_values), source_middle = median_of(source_values);
     for (double& value : target_values) value = std::abs(value - target_middle);
     for (double& value : source_values) value = std::abs(value - source_middle);
     // By the spreads: a regression would flatten what does not yet agree.
     const double source_spread = median_of(source_values);
-    gain_ = source_spread > 0.0 ? std::clamp(median_of(target_values) / source_spread, 0.25, 4.0) : 1.0;
-    for (ColorPair& pair : pairs) {
-      pair.residual = pair.target_value - target_middle - gain_ * (pair.source_value - source_middle);
-      values.push_back(std::abs(pair.residual));
+    const double gain = source_spread > 0.0 ? std::clamp(median_of(target_values) / source_spread, 0.25, 4.0) : 1.0;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      rows[i].residual = brightness[i].target - target_middle - gain * (brightness[i].source - source_middle);
+      rows[i].source_gradient = gain * rows[i].source_gradient;
+      rows[i].gradient = 0.5 * (rows[i].target_gradient + rows[i].source_gradient);
+      values.push_back(std::abs(rows[i].residual));
     }
     noise_ = std::max(registration_limits::least_brightness_noise, mad_to_sigma * median_of(values));
     double products = 0.0, target_squares = 0.0, source_squares = 0.0;
-    for (ColorPair& pair : pairs) {
-      pair.weight = robust_weight(pair.residual, noise_);
-      const double a = pair.target_value - target_middle, b = pair.source_value - source_middle;
-      products += pair.weight * a * b;
-      target_squares += pair.weight * a * a;
-      source_squares += pair.weight * b * b;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const double weight = rows[i].weight = robust_weight(rows[i].residual, noise_);
+      const double a = brightness[i].target - target_middle, b = brightness[i].source - source_middle;
+      products += weight * a * b;
+      target_squares += weight * a * a;
+      source_squares += weight * b * b;
     }
     correlation_ = products / std::sqrt(std::max(target_squares * source_squares, 1e-12));
   }
 
   // Moves the pose along the open directions; returns how far, root mean square over the pairs [m].
-  double step(const std::vector<ColorPair>& pairs, const Basis& open, IcpResult& result) const {
-    const double extent = extent_of(pairs);
-    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(open.cols(), open.cols());
-    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(open.cols());
-    double weight = 0.0;
-    for (const ColorPair& pair : pairs) {
-      // The mean of both gradients: efficient second-order minimisation (Malis 2004).
-      const Eigen::Vector3d slope = 0.5 * (pair.target_gradient + gain_ * pair.source_gradient);
-      const Eigen::VectorXd row = open.transpose() * row_of(pair.lever, slope, extent);
-      hessian += pair.weight * row * row.transpose();
-      gradient -= pair.weight * pair.residual * row;
-      weight += pair.weight;
-    }
-    hessian.diagonal().array() += 1e-6 * hessian.trace() + 1e-9 * weight;
-    Vector6 twist = open * solve_normal_equations(hessian, gradient);
+  double step(const std::vector<MotionRow>& rows, const TwistBasis& open, IcpResult& result) const {
+    const double extent = extent_of(rows);
+    Vector6 twist = gauss_newton_step(rows, open, extent, {1e-9, 1e-6});
     const double longest = 4.0 * target_.spacing(), length = twist.norm();
     if (length > longest) twist *= longest / length;
     const double size = twist.norm();
@@ -177,7 +143,7 @@ class ColorSearch {
   const IcpSource& source_;
   const AlignOptions& options_;
   AlignOptions held_;  // few steps within the last gate, weak directions held
-  double noise_ = 1.0, gain_ = 1.0, correlation_ = 0.0;
+  double noise_ = 1.0, correlation_ = 0.0;
 };
 
 }  // namespace
@@ -199,29 +165,23 @@ IcpResult determine_by_color(const IcpTarget& target, const IcpSource& source, c
 
   ColorSearch search(target, source, options);
   const double distance_noise = std::max(geometric.rmse, 0.1 * target.spacing());
-  Basis known;
+  TwistBasis known;
   IcpResult result = geometric;
   for (const bool restricted : {false, true}) {
     IcpResult found = search.run(levels, geometric, restricted ? &known : nullptr);
-    const std::vector<ColorPair> pairs = search.match(levels.back(), found.target_from_source, found.center);
+    const std::vector<MotionRow> pairs = search.match(levels.back(), found.target_from_source, found.center);
     const bool still_fits = found.num_inliers > 0.8 * geometric.num_inliers;
     if (pairs.size() < registration_limits::least_color_pairs || !still_fits ||
         search.correlation() < registration_limits::least_correlation)
       return geometric;
-    const Basis open = found.weak_directions;
+    const TwistBasis open = found.weak_directions;
     if (open.cols() == 0) return found;
-    const Directions directions =
-        split_directions(search.agreed_information(pairs, open, distance_noise), options.weak_threshold);
+    const Directions directions = split_directions(search.agreed(pairs, open, distance_noise), options.weak_threshold);
     if (directions.sure.cols() == 0) return geometric;
     known = open * directions.sure;
     result = found;
     result.weak_directions = open * directions.weak;
-    const double extent = ColorSearch::extent_of(pairs);
-    for (const ColorPair& pair : pairs) {
-      Vector6 row = known * (known.transpose() * ColorSearch::row_of(pair.lever, pair.target_gradient, extent));
-      row.head<3>() *= extent;
-      result.information += pair.weight / (search.noise() * search.noise()) * row * row.transpose();
-    }
+    add_information(pairs, known, ColorSearch::extent_of(pairs), search.noise(), result.information);
     if (directions.weak.cols() == 0) break;
   }
   return result;
