@@ -25,7 +25,7 @@ include_patterns = [
     "third_party/README.md",
 ]
 exclude_patterns = ["build", ".venv", "**/results/**"]
-extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "breathe", "mathml", "parameters"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "breathe", "decisions", "mathml", "parameters"]
 html_math_renderer = "mathml"
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 3

@@ -13,6 +13,8 @@ import pytest
 import nacre
 
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "docs" / "extensions"))
+import limit_lines  # noqa: E402 - of the documentation
 
 # The folder of cpp/src that a public header belongs to.
 PUBLIC = {
@@ -126,6 +128,30 @@ def test_no_modules_include_each_other_in_a_circle() -> None:
         graph.setdefault(module_of(path), set()).update(needed)
     assert circles(graph) == set()
     assert circles({("a", "a"): {("b", "b")}, ("b", "b"): {("a", "a")}, ("c", "c"): set()}) != set()
+
+
+# Folders whose numbers decide about data, and stand in their limits.hpp; those before only decide how fast.
+DECIDING = ["camera", "depth", "region", "registration", "outlines", "fusion", "loops", "model"]
+# What decides nothing about data: sizes of blocks and arrays, names of values.
+STRUCTURE = (
+    "block_size capacity border right_border tile_size size side radius shift group per_chunk nobody magic"
+)
+STRUCTURE += " version_at bytes_per_pixel none any nothing missing largest infinity nan reach step kWordBits"
+STRUCTURE += " kBorder kOverhang kRadius kStep num_bins least_judged farthest"
+
+
+@pytest.mark.parametrize("folder", DECIDING)
+def test_numbers_that_decide_stand_in_limits(folder: str) -> None:
+    sources = [
+        path for path in SOURCES if path.relative_to(CPP).parts[0] == folder and path.name != "limits.hpp"
+    ]
+    number = (
+        r"constexpr (?:double|float|int|std::\w+|Eigen::Index) (?!(?:"
+        + "|".join(STRUCTURE.split())
+        + r")\b)\w+ = "
+    )
+    assert lines_matching(number, sources) == []
+    assert limit_lines.numbers_of(CPP / folder / "limits.hpp")
 
 
 def test_the_tests_of_a_folder_are_in_a_folder_of_its_name() -> None:

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "camera/limits.hpp"
 #include "nacre/camera.hpp"
 
 namespace nacre {
@@ -10,8 +11,8 @@ namespace nacre {
 // Between neighbours on a surface at a depth, measured with a noise [m]: the model's spacing, but never finer than what
 // the frame tells apart, across the image or in depth.
 inline float spacing_at(float z, float sigma, const Camera& camera, double spacing) {
-  constexpr double least_pixels = 1.5;
-  return static_cast<float>(std::max({spacing, least_pixels * camera.footprint(z), static_cast<double>(sigma)}));
+  return static_cast<float>(
+      std::max({spacing, camera_limits::least_point_pixels * camera.footprint(z), static_cast<double>(sigma)}));
 }
 
 }  // namespace nacre

@@ -4,6 +4,7 @@
 
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
+#include "camera/limits.hpp"
 
 namespace nacre {
 
@@ -12,9 +13,9 @@ double median_depth(const Points& points) {
 }
 
 double view_distance(const Pose& a, const Pose& b, double depth) {
-  constexpr double turn = 0.2, part_of_depth = 0.15;
   const double angle = angle_between(a, b);
-  return std::max(angle / turn, (a.translation() - b.translation()).norm() / (part_of_depth * depth));
+  return std::max(angle / camera_limits::view_turn,
+                  (a.translation() - b.translation()).norm() / (camera_limits::view_shift * depth));
 }
 
 }  // namespace nacre

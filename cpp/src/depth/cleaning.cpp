@@ -12,6 +12,7 @@
 #include "depth/cleaning.hpp"
 #include "depth/edges.hpp"
 #include "depth/inverse_depth_image.hpp"
+#include "depth/limits.hpp"
 #include "depth/speckles.hpp"
 #include "depth/window_fits.hpp"
 #include "simd/depth_edges.hpp"
@@ -22,9 +23,7 @@ namespace {
 
 // A wrong depth_scale shows as a median depth that no depth camera measures. A sample of the pixels tells enough.
 void require_plausible_median(const DepthRef& depth) {
-  constexpr float nearest = 0.05F, farthest = 50.0F;
-  constexpr std::int64_t max_sample = 1 << 13;
-  const std::int64_t stride = std::max<std::int64_t>(1, depth.size() / max_sample);
+  const std::int64_t stride = std::max<std::int64_t>(1, depth.size() / depth_limits::most_probes);
   std::vector<float> sample;
   sample.reserve(static_cast<std::size_t>(depth.size() / stride + 1));
   std::size_t num_near = 0, num_far = 0;
@@ -33,8 +32,8 @@ void require_plausible_median(const DepthRef& depth) {
     const float z = depth(v, u);
     if (!is_measurement(z)) continue;
     sample.push_back(z);
-    num_near += z < nearest;
-    num_far += z > farthest;
+    num_near += z < depth_limits::nearest_median;
+    num_far += z > depth_limits::farthest_median;
   }
   const std::size_t half = sample.size() / 2;
   if (sample.empty() || (num_near <= half && num_far < sample.size() - half)) return;

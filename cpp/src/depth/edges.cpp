@@ -5,29 +5,23 @@
 #include <cmath>
 
 #include "base/parallel.hpp"
+#include "depth/limits.hpp"
 #include "simd/depth_edges.hpp"
 #include "simd/depth_planar_edges.hpp"
 
 namespace nacre {
 namespace {
 
-// A crease between two surfaces is an edge of the second difference as well. Up to a bend of this slope it is kept.
-constexpr float kCreaseSlope = 3.0F;
-
-// Allowance of the steepness test for noise, on top of the slant itself.
-constexpr float kStepSigmas = 3.0F;
-
-// A pixel looks this far to the side (standard deviation, in pixels), which on a slanted surface is noise of depth:
-// Nguyen et al. 2012, figure 7. What slants add to the noise of recordings of a Kinect and an Xtion is 0.65.
-constexpr float kLateralSigma = 0.8F;
-
 simd::EdgeLimits edge_limits(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options) {
   const Quadratic sigma = image.sigma(noise.local()), unit_slope = image.unit_slope();
   const auto bend_sigmas = static_cast<float>(options.edge_sigmas * std::sqrt(6.0));
-  const float step_sigmas = kStepSigmas * std::sqrt(2.0F);
-  return {sigma * bend_sigmas,         unit_slope * kCreaseSlope,
-          sigma * step_sigmas,         unit_slope * static_cast<float>(std::tan(options.max_slant)),
-          bend_sigmas * kLateralSigma, step_sigmas * kLateralSigma};
+  const float step_sigmas = depth_limits::step_sigmas * std::sqrt(2.0F);
+  return {sigma * bend_sigmas,
+          unit_slope * depth_limits::crease_slope,
+          sigma * step_sigmas,
+          unit_slope * static_cast<float>(std::tan(options.max_slant)),
+          bend_sigmas * depth_limits::lateral_sigma,
+          step_sigmas * depth_limits::lateral_sigma};
 }
 
 // The slopes of the surface at the pixels of image rows: each the least of the nearest window and the eight around it,

@@ -4,6 +4,7 @@
 #include "base/parallel.hpp"
 #include "camera/ray_table.hpp"
 #include "depth/inverse_depth_image.hpp"
+#include "depth/limits.hpp"
 #include "depth/window_fits.hpp"
 #include "simd/depth_normals.hpp"
 #include "simd/depth_points.hpp"
@@ -11,16 +12,17 @@
 namespace nacre {
 namespace {
 
-constexpr float kSlopeSigma = 0.07F;  // the window grows until the fitted slope is this certain
-constexpr float kMinFilled = 0.4F;    // of the window
-constexpr float kMinSpread = 0.02F;   // of the squared spread of a full window, in its two directions together
-constexpr float kGateSlope = 5.67F;   // neighbours belong to the surface up to a slant of 80 degrees
-constexpr float kGateSigmas = 4.0F;
-
 simd::NormalRule normal_rule(const PlanarImage& image, const Camera& camera, const NoiseModel& noise) {
   const Quadratic sigma = image.sigma(noise.local()), unit_slope = image.unit_slope();
-  return {sigma,      unit_slope, sigma * (kGateSigmas * std::sqrt(2.0F)), unit_slope * kGateSlope,        kSlopeSigma,
-          kMinFilled, kMinSpread, static_cast<float>(camera.fx()),         static_cast<float>(camera.fy())};
+  return {sigma,
+          unit_slope,
+          sigma * (depth_limits::gate_sigmas * std::sqrt(2.0F)),
+          unit_slope * depth_limits::gate_slope,
+          depth_limits::slope_sigma,
+          depth_limits::least_filled,
+          depth_limits::least_spread,
+          static_cast<float>(camera.fx()),
+          static_cast<float>(camera.fy())};
 }
 
 // Moves the first counts[row] values of each row together.

@@ -7,15 +7,11 @@
 
 #include "base/check.hpp"
 #include "base/parallel.hpp"
+#include "depth/limits.hpp"
 #include "depth/window_fits.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr std::int64_t kMinSamples = 8;
-
-constexpr double kMinStepped = 0.1;     // of the windows of a coarsely quantised image cross from plateau to plateau
-constexpr float kMaxStepPixels = 3.0F;  // orthographic: a larger step is an edge
 
 std::int64_t count_values(const std::vector<float>& values) {
   std::int64_t count = 0;
@@ -25,21 +21,17 @@ std::int64_t count_values(const std::vector<float>& values) {
 
 // Structured light and stereo match windows, so that their noise is a rough part, independent from pixel to pixel, and
 // a smooth one that neighbours share. The smooth part's correlation is like exp(-(d / 3.3 pixels)^2), as measured on
-// recordings of three such sensors. Of its variance, a quadratic surface fitted to 7 x 7 pixels leaves kSmoothLeft
-// over, and second differences see kSmoothBent.
-constexpr double kSmoothLeft = 0.1192, kSmoothBent = 0.0145;
-// Curved surfaces leave a little more over than they bend: not taken for a smooth part.
-constexpr double kIndependent = 0.95;
-// The part of the variance that is shared has a limit: clean images leave nothing but curvature over.
-constexpr double kMostShared = 0.85;
+// recordings of three such sensors. Of its variance, a quadratic surface fitted to 7 x 7 pixels leaves smooth_left
+// over, and second differences see smooth_bent. Curved surfaces leave a little more over than they bend, which is not
+// taken for a smooth part; and clean images leave nothing but curvature over, so that what is shared has a limit.
 
 // The total variance by the one left over by fits, given the ratio of the variances by bends and by fits: solves
-// fits = rough + kSmoothLeft smooth, bends = rough + kSmoothBent smooth.
+// fits = rough + smooth_left smooth, bends = rough + smooth_bent smooth.
 double total_by_left(double bends_by_fits) {
-  const double least = kMostShared * kSmoothLeft + (1.0 - kMostShared);
-  const double missing = std::max(0.0, kIndependent - bends_by_fits);
-  const double smooth = missing / (kSmoothLeft - kSmoothBent);
-  const double rough = std::max(0.0, 1.0 - kSmoothLeft * smooth);
+  const double least = depth_limits::most_shared * depth_limits::smooth_left + (1.0 - depth_limits::most_shared);
+  const double missing = std::max(0.0, depth_limits::independent - bends_by_fits);
+  const double smooth = missing / (depth_limits::smooth_left - depth_limits::smooth_bent);
+  const double rough = std::max(0.0, 1.0 - depth_limits::smooth_left * smooth);
   return std::min(rough + smooth, 1.0 / least);
 }
 
@@ -102,7 +94,7 @@ WindowFits fit_windows(const PlanarImage& image, const Camera& camera, int num_t
   constexpr float any = std::numeric_limits<float>::infinity();
   const bool pinhole = camera.model() == Camera::Model::pinhole;
   const simd::WindowRule rule = {image.sigma(sensor_prior(camera)), image.unit_slope(),
-                                 pinhole ? std::sqrt(12.0F) : any, pinhole ? any : kMaxStepPixels};
+                                 pinhole ? std::sqrt(12.0F) : any, pinhole ? any : depth_limits::largest_step};
   const auto fit_row = simd::fit_windows();
   parallel_for(fits.rows, rows_per_block(fits.cols * WindowFits::kStep * WindowFits::kStep), num_threads,
                [&](std::int64_t row) {
@@ -124,7 +116,7 @@ void NoiseModel::check() const {
 }
 
 NoiseModel NoiseModel::local() const {
-  const double part = std::sqrt(1.0 - shared * (1.0 - kSmoothLeft));
+  const double part = std::sqrt(1.0 - shared * (1.0 - depth_limits::smooth_left));
   return {part * constant, part * quadratic, offset, 0.0};
 }
 
@@ -143,13 +135,15 @@ NoiseModel estimate_noise(const DepthRef& depth, const Camera& camera, int num_t
 
 std::optional<NoiseScale> measure_noise(const WindowFits& fits, int num_threads) {
   const std::int64_t num_windows = count_values(fits.residual), num_steps = count_values(fits.step);
-  if (num_windows < kMinSamples) return std::nullopt;
+  if (num_windows < depth_limits::least_windows) return std::nullopt;
   const std::array<std::function<double()>, 3> parts = {
       // Below the median of the residuals: edges and fine structure leave more over than noise does.
-      [&] { return quantile(fits.residual, 0.4); }, [&] { return 1e-3 * quantile(fits.pixel, 0.5); },
+      [&] { return quantile(fits.residual, depth_limits::noise_quantile); },
+      [&] { return depth_limits::least_noise * quantile(fits.pixel, 0.5); },
       // Plateaus leave nothing over.
       [&] {
-        const bool is_stepped = static_cast<double>(num_steps) > kMinStepped * static_cast<double>(num_windows);
+        const bool is_stepped =
+            static_cast<double>(num_steps) > depth_limits::least_stepped * static_cast<double>(num_windows);
         return is_stepped ? quantile(fits.step, 0.5) / std::sqrt(12.0) : 0.0;
       }};
   std::array<double, 3> scales{};
@@ -168,14 +162,15 @@ NoiseModel scaled_prior(const Camera& camera, const NoiseScale& scale) {
   const NoiseModel shape = sensor_prior(camera);
   const double part = scale.local / scale.total, left = part * part;  // of the variance
   return {shape.constant * scale.total, shape.quadratic * scale.total, shape.offset,
-          std::clamp((1.0 - left) / (1.0 - kSmoothLeft), 0.0, kMostShared)};
+          std::clamp((1.0 - left) / (1.0 - depth_limits::smooth_left), 0.0, depth_limits::most_shared)};
 }
 
 NoiseModel estimate_noise(const WindowFits& fits, const Camera& camera, int num_threads) {
   if (const std::optional<NoiseScale> scale = measure_noise(fits, num_threads)) return scaled_prior(camera, *scale);
   // Nothing to measure: the sensor's prior, or a tenth of a pixel.
-  return camera.model() == Camera::Model::pinhole ? sensor_prior(camera)
-                                                  : NoiseModel{0.1 * camera.pixel_size(), 0.0, 0.0, 0.0};
+  return camera.model() == Camera::Model::pinhole
+             ? sensor_prior(camera)
+             : NoiseModel{depth_limits::unknown_noise * camera.pixel_size(), 0.0, 0.0, 0.0};
 }
 
 }  // namespace nacre

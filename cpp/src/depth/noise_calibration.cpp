@@ -3,16 +3,12 @@
 #include <cmath>
 #include <vector>
 
+#include "depth/limits.hpp"
 #include "depth/window_fits.hpp"
 #include "nacre/depth.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr double kMostFrames = 100.0;      // a frame counts at least so much, so that drift is followed
-constexpr std::size_t kLeastWindows = 40;  // of a frame at some depth
-constexpr double kPriorWeight = 0.01;      // of the prior's curve against all that was measured
-constexpr double kNearest = 0.25, kBinsPerOctave = 3.0;
 
 // c and q, not negative, of c + q s_i = 1 in the sense of weighted least squares, drawn to (c0, q0).
 struct CurveFit {
@@ -49,7 +45,7 @@ void NoiseCalibration::add(const PlanarImage& image, const WindowFits& fits, int
   const std::optional<NoiseScale> scale = measure_noise(fits, num_threads);
   if (!scale) return;
   const auto pool = [](Mean& mean, double value) {
-    mean.count = std::min(mean.count + 1.0, kMostFrames);
+    mean.count = std::min(mean.count + 1.0, depth_limits::most_frames);
     mean.value += (value - mean.value) / mean.count;
   };
   pool(local_, std::log(scale->local));
@@ -63,17 +59,17 @@ void NoiseCalibration::add(const PlanarImage& image, const WindowFits& fits, int
       const float residual = fits.residual[static_cast<std::size_t>(row * fits.cols + column)];
       if (!(residual >= 0.0F)) continue;
       const double z = 1.0 / static_cast<double>(values[WindowFits::centre(column)]);
-      const double bin = std::floor(kBinsPerOctave * std::log2(z / kNearest));
+      const double bin = std::floor(depth_limits::bins_per_octave * std::log2(z / depth_limits::nearest_bin));
       if (bin < 0.0 || bin >= static_cast<double>(num_bins)) continue;
       residuals[static_cast<std::size_t>(bin)].push_back(residual);
     }
   }
   for (std::size_t bin = 0; bin < num_bins; ++bin) {
-    if (residuals[bin].size() < kLeastWindows) continue;
-    const double typical = quantile(residuals[bin], 0.4);
+    if (residuals[bin].size() < depth_limits::least_bin_windows) continue;
+    const double typical = quantile(residuals[bin], depth_limits::noise_quantile);
     if (typical > 0.0) pool(bins_[bin], std::log(typical));
   }
-  pool(fitted_, std::log(std::max(quantile(fits.residual, 0.4), 1e-6)));
+  pool(fitted_, std::log(std::max(quantile(fits.residual, depth_limits::noise_quantile), 1e-6)));
 }
 
 NoiseModel NoiseCalibration::model() const {
@@ -86,12 +82,13 @@ NoiseModel NoiseCalibration::model() const {
   CurveFit fit;
   for (std::size_t bin = 0; bin < num_bins; ++bin) {
     if (bins_[bin].count == 0.0) continue;
-    const double z = kNearest * std::exp2((static_cast<double>(bin) + 0.5) / kBinsPerOctave);
+    const double z =
+        depth_limits::nearest_bin * std::exp2((static_cast<double>(bin) + 0.5) / depth_limits::bins_per_octave);
     const double sigma = prior.sigma(z) * std::exp(bins_[bin].value - fitted_.value);
     fit.add(1.0 / sigma, (z - prior.offset) * (z - prior.offset) / sigma, bins_[bin].count);
   }
   if (fit.weight == 0.0) return model;
-  const double weight = kPriorWeight * fit.weight;
+  const double weight = depth_limits::prior_weight * fit.weight;
   fit.add(1.0 / prior.constant, 0.0, weight);
   fit.add(0.0, 1.0 / prior.quadratic, weight);
   const auto [constant, quadratic] = fit.solve();

@@ -7,14 +7,14 @@
 #include "base/check.hpp"
 #include "base/parallel.hpp"
 #include "camera/point_projection.hpp"
+#include "fusion/limits.hpp"
 #include "fusion/observable.hpp"
 
 namespace nacre {
 namespace {
 
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
-constexpr float least_coverage = 0.25F;  // of a window, where only some pixels have values
-constexpr int group = 3;                 // channels that the kernel takes at once
+constexpr int group = 3;  // channels that the kernel takes at once
 
 PointAttribute* find(PointModel& model, const std::string& name) {
   const auto found = std::find_if(model.attributes.begin(), model.attributes.end(),
@@ -109,14 +109,14 @@ void fuse_attributes(PointModel& model, std::int64_t first, const Frame& frame, 
         planes.observe(block, averages.data());
         for (int k = 0; k < block.size(); ++k) {
           const float weight = block[k].weight;
-          if (!(weight > least_weight * observer.frontal_weight(block.sigma(k)))) continue;
+          if (!(weight > fusion_limits::least_weight * observer.frontal_weight(block.sigma(k)))) continue;
           const auto average = [&](int plane) {
             return averages[static_cast<std::size_t>(plane * ObservationBlock::capacity + k)];
           };
           for (std::size_t p = 0; p < targets.size(); ++p) {
             const AttributePlanes::Part& part = planes.parts()[p];
             const float coverage = part.coverage < 0 ? 1.0F : average(part.coverage);
-            if (!(coverage > least_coverage)) continue;
+            if (!(coverage > fusion_limits::least_coverage)) continue;
             const float gain = weight * coverage / (model.confidence[seen[k]] + weight * coverage);
             float* const value =
                 targets[p]->values.data() + seen[k] * static_cast<std::size_t>(targets[p]->num_channels);

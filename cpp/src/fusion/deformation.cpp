@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/parallel.hpp"
+#include "fusion/limits.hpp"
 #include "spatial/hash_grid.hpp"
 
 namespace nacre {
@@ -22,17 +23,14 @@ void move_points(PointModel& model, const std::vector<Pose>& corrections, int nu
 
 void merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
                   const std::function<double(const Eigen::Vector3f&)>& spacing_of) {
-  constexpr float least_cosine = 0.5F;
-  constexpr double thickness = 2.75;  // of the layers, in spacings
   std::vector<std::size_t> old;
   std::vector<std::uint8_t> flags(model.points.size(), 1);
   for (std::size_t i = 0; i < model.points.size(); ++i) {
     if (model.last_seen[i] < oldest_frame) old.push_back(i);
   }
-  constexpr int num_levels = 4;  // of spacing, each twice the one before
   std::vector<PointGrid> grids;
-  for (int level = 0; level < num_levels; ++level) {
-    grids.emplace_back(std::ldexp(spacing, level) * std::hypot(1.0, thickness), old.size());
+  for (int level = 0; level < fusion_limits::layer_levels; ++level) {
+    grids.emplace_back(std::ldexp(spacing, level) * std::hypot(1.0, fusion_limits::layer_thickness), old.size());
     for (const std::size_t i : old) grids.back().add(model.points[i]);
   }
 
@@ -44,9 +42,10 @@ void merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
     }
     int level = 0;
     const double wanted = spacing_of(model.points[i]);
-    while (level + 1 < num_levels && std::ldexp(spacing, level) < wanted) ++level;
+    while (level + 1 < fusion_limits::layer_levels && std::ldexp(spacing, level) < wanted) ++level;
     const double between = std::clamp(wanted, spacing, std::ldexp(spacing, level));
-    const auto reach = static_cast<float>(between), across = static_cast<float>(thickness * between);
+    const auto reach = static_cast<float>(between),
+               across = static_cast<float>(fusion_limits::layer_thickness * between);
     // The nearest along the surface, the older of two as near.
     std::size_t best = 0;
     float least = reach * reach;
@@ -56,7 +55,7 @@ void merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
       const float offset = difference.dot(model.normals[j]);
       const float along = difference.squaredNorm() - offset * offset;
       if (std::abs(offset) < across && (along < least || (along == least && j < best)) &&
-          model.normals[i].dot(model.normals[j]) > least_cosine) {
+          model.normals[i].dot(model.normals[j]) > fusion_limits::layer_cosine) {
         least = along;
         best = j;
       }

@@ -12,6 +12,7 @@
 #include "camera/point_spacing.hpp"
 #include "depth/depth_view.hpp"
 #include "fusion/attribute_fusion.hpp"
+#include "fusion/limits.hpp"
 #include "fusion/observable.hpp"
 #include "fusion/pixel_index.hpp"
 #include "spatial/hash_grid.hpp"
@@ -21,16 +22,13 @@ namespace {
 
 // A new point must be seen by so many pixels of its own slant, and by more the greater it is: by as many as hold the
 // information of so many from the front.
-constexpr float insertion_pixels = 3.0F, insertion_weight = 1.0F;
-constexpr float sheet_cosine = 0.3F;  // normals that differ more belong to different sheets
-
 // Whether a point with a normal stands for the same piece of surface as another.
 bool same_surface(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, const Eigen::Vector3f& other,
                   const Eigen::Vector3f& other_normal, float spacing, float largest_offset) {
   const Eigen::Vector3f difference = other - point;
   const float along = difference.dot(normal);
   return std::abs(along) < largest_offset && difference.squaredNorm() - along * along < spacing * spacing &&
-         normal.dot(other_normal) > sheet_cosine;
+         normal.dot(other_normal) > fusion_limits::sheet_cosine;
 }
 
 // What of the image the model knows.
@@ -96,7 +94,8 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
         view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin), points);
         const auto note_free_space_violation = [&](int j, float sigma) {
           const std::size_t i = first + static_cast<std::size_t>(j);
-          const float margin = std::max(static_cast<float>(2.0 * spacing), 4.0F * sigma);
+          const float margin = std::max(static_cast<float>(fusion_limits::margin_spacings * spacing),
+                                        fusion_limits::margin_sigmas * sigma);
           const bool is_confirmed = model.observations[i] >= options.min_observations;
           const Visibility is = visibility(frame.points(points.pixel[j], 2) - points.z[j], margin);
           const bool is_missed = is_confirmed ? observer.sees_through(points.point(j), points.pixel[j], margin)
@@ -109,11 +108,11 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
           if (!points.inside[j] && reaches_image(points, j, camera, spacing)) {
             beside[static_cast<std::size_t>(number)].push_back({first + static_cast<std::size_t>(j), points.pixel[j]});
           }
-          if (!points.inside[j] || !(points.facing[j] > least_facing)) continue;
+          if (!points.inside[j] || !(points.facing[j] > fusion_limits::least_facing)) continue;
           const float measured_sigma = frame.sigma[points.pixel[j]];
           const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
           if (!observer.may_observe(points.point(j), points.pixel[j], sigma,
-                                    least_weight * observer.frontal_weight(sigma))) {
+                                    fusion_limits::least_weight * observer.frontal_weight(sigma))) {
             note_free_space_violation(j, sigma);
             continue;
           }
@@ -121,12 +120,12 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
           observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma,
                        spacing_at(points.z[j], sigma, camera, spacing));
         }
-        observer.observe_and_cover(block, sheet_cosine);
+        observer.observe_and_cover(block, fusion_limits::sheet_cosine);
         for (int k = 0; k < block.size(); ++k) {
           const int j = seen[k];  // NOLINT(clang-analyzer-core.uninitialized.Assign): filled with the block
           const std::size_t i = first + static_cast<std::size_t>(j);
           const Observation observed = block[k];
-          if (observed.weight > least_weight * observer.frontal_weight(block.sigma(k))) {
+          if (observed.weight > fusion_limits::least_weight * observer.frontal_weight(block.sigma(k))) {
             const float gain = observed.weight / (model.confidence[i] + observed.weight);
             model.points[i] += world_rotation * (gain * observed.offset * points.normal(j));
             model.normals[i] = (model.confidence[i] * model.normals[i] + world_rotation * observed.normal).normalized();
@@ -190,18 +189,18 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
       candidate.row = row;
       candidate.point = frame.points.row(row).transpose();
       candidate.normal = frame.normals.row(row).transpose();
-      if (!(candidate.normal.dot(observer.towards_camera(candidate.point)) > least_facing)) continue;
+      if (!(candidate.normal.dot(observer.towards_camera(candidate.point)) > fusion_limits::least_facing)) continue;
       candidate.spacing = spacing_at(candidate.point.z(), frame.sigma[row], camera, spacing);
       observer.add(block, candidate.point, candidate.normal, row, frame.sigma[row], candidate.spacing);
       candidates.push_back(candidate);
     }
-    observer.observe_and_cover(block, sheet_cosine);
+    observer.observe_and_cover(block, fusion_limits::sheet_cosine);
     std::size_t kept = 0;
     for (int k = 0; k < block.size(); ++k) {
       const Observation observed = block[k];
       NewPoint candidate = candidates[static_cast<std::size_t>(k)];
       const float facing = candidate.normal.dot(observer.towards_camera(candidate.point));
-      const float least = std::max(insertion_pixels * facing, insertion_weight);
+      const float least = std::max(fusion_limits::insertion_pixels * facing, fusion_limits::insertion_weight);
       if (!(observed.weight * facing > least * observer.frontal_weight(block.sigma(k)))) continue;
       candidate.point += observed.offset * block.ray(k);
       candidate.normal = observed.normal.normalized();
@@ -224,15 +223,14 @@ void insert(PointModel& model, const std::vector<NewPoint>& candidates, Known& k
   const Eigen::Isometry3f to_world(world_from_camera.cast<float>());
   int farthest = 0;
   for (const NewPoint& candidate : candidates) farthest = std::max(farthest, candidate.reach);
-  constexpr int squares_across = 8;  // of a reach
-  PixelIndex points(frame.width, frame.height, std::max(1, farthest / squares_across));
+  PixelIndex points(frame.width, frame.height, std::max(1, farthest / fusion_limits::squares_across));
   for (const Known::Point& seen : known.points) points.add(seen.pixel, seen.point);
   for (const NewPoint& candidate : candidates) {
     if (known.covered.contains(candidate.row % frame.width, candidate.row / frame.width)) continue;
     known.covered.insert(candidate.cover);
     const Eigen::Vector3f point = to_world * candidate.point;
     const Eigen::Vector3f normal = to_world.linear() * candidate.normal;
-    const float largest_offset = std::max(candidate.spacing, 3.0F * frame.sigma[candidate.row]);
+    const float largest_offset = std::max(candidate.spacing, fusion_limits::cover_sigmas * frame.sigma[candidate.row]);
     const bool is_known = points.any_near(candidate.row, candidate.reach, [&](std::size_t i) {
       return same_surface(point, normal, model.points[i], model.normals[i], candidate.spacing, largest_offset);
     });

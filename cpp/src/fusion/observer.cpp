@@ -6,6 +6,7 @@
 #include "base/parallel.hpp"
 #include "base/statistics.hpp"
 #include "depth/depth_view.hpp"
+#include "fusion/limits.hpp"
 
 namespace nacre {
 namespace {
@@ -16,8 +17,7 @@ constexpr int border = simd::largest_window;
 
 float median_sigma(const Frame& frame) {
   if (frame.valid.empty()) return 0.0F;
-  constexpr std::size_t num_probes = 5000;
-  const std::size_t step = std::max<std::size_t>(1, frame.valid.size() / num_probes);
+  const std::size_t step = std::max<std::size_t>(1, frame.valid.size() / fusion_limits::sigma_probes);
   std::vector<float> values;
   for (std::size_t i = 0; i < frame.valid.size(); i += step) values.push_back(frame.sigma[frame.valid[i]]);
   return median_of(std::move(values));
@@ -83,7 +83,7 @@ bool SurfaceObserver::may_observe(const Eigen::Vector3f& point, std::int32_t pix
   const Tile& tile =
       tiles_[static_cast<std::size_t>(pixel / width_ / tile_size * tiles_across_ + pixel % width_ / tile_size)];
   const float radius = support(sigma, static_cast<float>(camera_.footprint(point.z())));
-  const float reach = radius + std::max(radius, 4.0F * sigma);
+  const float reach = radius + std::max(radius, fusion_limits::offset_sigmas * sigma);
   const bool is_in_range = point.z() > tile.nearest - reach && point.z() < tile.farthest + reach;
   const float largest_sum = static_cast<float>(PixelWindow::size * PixelWindow::size) * tile.largest_weight;
   return is_in_range && largest_sum > least_weight;
@@ -96,7 +96,8 @@ Eigen::Vector3f SurfaceObserver::towards_camera(const Eigen::Vector3f& point) co
 
 float SurfaceObserver::support(float sigma, float footprint) const {
   if (options_.support > 0.0) return static_cast<float>(options_.support);
-  return std::clamp(6.0F * sigma, 3.0F * footprint, 4.0F * footprint);
+  return std::clamp(fusion_limits::support_sigmas * sigma, fusion_limits::least_support * footprint,
+                    fusion_limits::largest_support * footprint);
 }
 
 void SurfaceObserver::add(ObservationBlock& block, const Eigen::Vector3f& point, const Eigen::Vector3f& normal,
@@ -111,7 +112,7 @@ void SurfaceObserver::add(ObservationBlock& block, const Eigen::Vector3f& point,
   block.normal_y_[i] = normal.y();
   block.normal_z_[i] = normal.z();
   const Eigen::Vector3f back = towards_camera(point);
-  const Eigen::Vector3f ray = back / std::max(normal.dot(back), least_facing);
+  const Eigen::Vector3f ray = back / std::max(normal.dot(back), fusion_limits::least_facing);
   block.ray_x_[i] = ray.x();
   block.ray_y_[i] = ray.y();
   block.ray_z_[i] = ray.z();
@@ -119,7 +120,7 @@ void SurfaceObserver::add(ObservationBlock& block, const Eigen::Vector3f& point,
   block.u_[i] = pixel % width_;
   block.v_[i] = pixel / width_;
   block.radius_[i] = radius;
-  block.largest_offset_[i] = std::max(radius, 4.0F * sigma);
+  block.largest_offset_[i] = std::max(radius, fusion_limits::offset_sigmas * sigma);
   block.spacing_[i] = spacing;
   constexpr auto largest = static_cast<float>(simd::largest_window);
   block.window_[i] = static_cast<int>(std::ceil(std::min(largest, std::max(1.0F, reach / footprint))));
@@ -138,7 +139,7 @@ void SurfaceObserver::observe(ObservationBlock& block) const {
 
 void SurfaceObserver::observe_and_cover(ObservationBlock& block, float least_cosine) const {
   for (int i = 0; i < block.count_; ++i) {
-    block.cover_offset_[i] = std::max(block.spacing_[i], 3.0F * block.sigma_[i]);
+    block.cover_offset_[i] = std::max(block.spacing_[i], fusion_limits::cover_sigmas * block.sigma_[i]);
   }
   const simd::WindowCover cover = {block.spacing_, block.cover_offset_, least_cosine, block.cover_rows_};
   float* const colors[3] = {block.red_, block.green_, block.blue_};

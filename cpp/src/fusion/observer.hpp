@@ -9,8 +9,6 @@
 
 namespace nacre {
 
-constexpr float least_facing = 0.1F;  // surfaces that are seen at a smaller cosine are not judged
-
 // What the pixels around a surface point say about it.
 struct Observation {
   float weight;

@@ -3,15 +3,15 @@
 #include <algorithm>
 
 #include "base/se3.hpp"
+#include "model/limits.hpp"
 #include "registration/multiview.hpp"
 
 namespace nacre {
 
 bool is_new_direction(const std::vector<ObjectView>& views, const Pose& world_from_camera) {
-  constexpr std::size_t most_views = 24;
-  constexpr double least_angle = 0.35;
-  return views.size() < most_views && std::all_of(views.begin(), views.end(), [&](const ObjectView& view) {
-           return angle_between(view.world_from_camera, world_from_camera) > least_angle;
+  return views.size() < model_limits::most_object_views &&
+         std::all_of(views.begin(), views.end(), [&](const ObjectView& view) {
+           return angle_between(view.world_from_camera, world_from_camera) > model_limits::view_angle;
          });
 }
 

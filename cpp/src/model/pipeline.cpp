@@ -13,15 +13,13 @@
 #include "fusion/attribute_fusion.hpp"
 #include "fusion/deformation.hpp"
 #include "fusion/fuse.hpp"
+#include "model/limits.hpp"
 #include "model/object_views.hpp"
 #include "model/wlop_fusion.hpp"
 #include "outlines/refinement.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr std::size_t least_pixels = 100;  // a frame with fewer valid pixels cannot be registered
-constexpr double coarsening = 1.25;        // of the spacing, when the model reaches its largest size
 
 // Adds the milliseconds of its own life to a step's.
 class Stopwatch {
@@ -45,7 +43,7 @@ double spacing_for(const Frame& frame, const Camera& camera) {
   for (const std::int32_t row : frame.valid) z.push_back(frame.points(row, 2));
   const auto quartile = z.begin() + static_cast<std::ptrdiff_t>(z.size() / 4);
   std::nth_element(z.begin(), quartile, z.end());
-  return 2.0 * camera.footprint(*quartile);
+  return model_limits::spacing_pixels * camera.footprint(*quartile);
 }
 
 void check_extras(const Camera& camera, const FrameExtras& extras, const PointModel& model) {
@@ -140,16 +138,15 @@ TrackingResult Pipeline::locate(const FrameExtras& extras, FrameReport& report) 
 }
 
 TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionReport& region_report) {
-  constexpr std::size_t most_outline_points = 800;
   TrackingResult result;
   result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
   outline.clear();
-  if (frame.valid.size() < least_pixels) {
+  if (frame.valid.size() < model_limits::least_pixels) {
     const std::string count = "only " + std::to_string(frame.valid.size()) + " pixels of the frame are usable";
     result.reason = region_report.reason.empty() ? count : region_report.reason;
     return result;
   }
-  if (keeps_key_frames()) outline = find_outline(now, camera, most_outline_points, options.num_threads);
+  if (keeps_key_frames()) outline = find_outline(now, camera, model_limits::most_outline_points, options.num_threads);
   if (cloud.size() == 0 || extras.keep_guess) {
     result.status = FrameStatus::tracked;
     result.alignment.target_from_source = extras.guess.value_or(Pose::Identity());
@@ -169,9 +166,8 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
 
 // Whether the camera's last motion was none that goes on: views far apart, in any order.
 bool Pipeline::jumped() const {
-  constexpr double largest_turn = 0.7;
   if (history.num_registered() < 2) return false;
-  return angle_between(history.registered_pose(1), history.registered_pose(0)) > largest_turn;
+  return angle_between(history.registered_pose(1), history.registered_pose(0)) > model_limits::largest_turn;
 }
 
 std::vector<Pose> Pipeline::guesses(const FrameExtras& extras) const {
@@ -184,13 +180,12 @@ std::vector<Pose> Pipeline::guesses(const FrameExtras& extras) const {
 
 // Some of the newest poses from which the camera looked in different directions.
 static std::vector<Pose> key_poses(const FrameHistory& history) {
-  constexpr std::size_t most = 8;
-  constexpr double least_angle = 0.35;
   std::vector<Pose> chosen;
-  for (std::size_t age = 0; age < history.num_registered() && chosen.size() < most; ++age) {
+  for (std::size_t age = 0; age < history.num_registered() && chosen.size() < model_limits::most_key_poses; ++age) {
     const Pose pose = history.registered_pose(age);
-    const bool is_new = std::all_of(chosen.begin(), chosen.end(),
-                                    [&](const Pose& other) { return angle_between(other, pose) > least_angle; });
+    const bool is_new = std::all_of(chosen.begin(), chosen.end(), [&](const Pose& other) {
+      return angle_between(other, pose) > model_limits::view_angle;
+    });
     if (is_new) chosen.push_back(pose);
   }
   return chosen;
@@ -198,13 +193,12 @@ static std::vector<Pose> key_poses(const FrameHistory& history) {
 
 // Around some poses; and everywhere, but not at every frame where that has been to no avail.
 WhereElse Pipeline::elsewhere(const RegionReport& region_report) const {
-  constexpr std::int64_t patience = 8;
   WhereElse where;
   if (!options.relocalise) return where;
   where.views = &views;
   where.view_of_frame = [&] { return view_of_object(region_report); };
   where.key_poses = [this] { return key_poses(history); };
-  where.everywhere = num_lost < patience || num_lost % patience == 0;
+  where.everywhere = num_lost < model_limits::patience || num_lost % model_limits::patience == 0;
   return where;
 }
 
@@ -286,7 +280,7 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
       consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
     }
     while (options.fusion_method == FusionMethod::fuse && cloud.size() > options.max_points) {
-      spacing *= coarsening;
+      spacing *= model_limits::coarsening;
       thin(cloud, spacing);
     }
   }

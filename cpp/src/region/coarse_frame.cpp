@@ -4,18 +4,14 @@
 #include <cmath>
 #include <limits>
 
+#include "region/limits.hpp"
+
 namespace nacre {
-namespace {
-
-constexpr int border = 1;         // of the image [cells]
-constexpr float steepest = 3.0F;  // tangent of the slant at which neighbouring cells still hold together
-constexpr int link_reach = 3;     // [cells]; noisy edges between are missing
-constexpr int most_steps = 2;     // that the distance between linked cells may grow with
-
-}  // namespace
-
 CoarseFrame::CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef& mask) {
-  while ((frame.width / step) * (frame.height / step) > most_cells && step < largest_step) ++step;
+  while ((frame.width / step) * (frame.height / step) > region_limits::most_cells &&
+         step < region_limits::largest_step) {
+    ++step;
+  }
   width = (frame.width + step - 1) / step;
   height = (frame.height + step - 1) / step;
   cells.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
@@ -47,7 +43,8 @@ CoarseFrame::CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef
 }
 
 bool are_linked(const Cell& a, const Cell& b, int steps) {
-  const float reach = steepest * static_cast<float>(std::min(steps, most_steps)) * std::min(a.footprint, b.footprint);
+  const float reach = region_limits::steepest * static_cast<float>(std::min(steps, region_limits::most_link_steps)) *
+                      std::min(a.footprint, b.footprint);
   return (a.point - b.point).squaredNorm() < reach * reach;
 }
 
@@ -55,12 +52,12 @@ std::vector<std::int32_t> border_cells(const CoarseFrame& frame, const std::vect
                                        std::size_t num_groups) {
   std::vector<std::int32_t> count(num_groups, 0);
   const auto visit = [&](int u, int v) {
-    // Cleaning leaves little at the very border.
-    const int x = std::clamp(u, border, frame.width - 1 - border), y = std::clamp(v, border, frame.height - 1 - border);
+    const int x = std::clamp(u, region_limits::image_border, frame.width - 1 - region_limits::image_border),
+              y = std::clamp(v, region_limits::image_border, frame.height - 1 - region_limits::image_border);
     const std::int32_t number = group[static_cast<std::size_t>(y * frame.width + x)];
     if (number >= 0) ++count[static_cast<std::size_t>(number)];
   };
-  if (std::min(frame.width, frame.height) <= 2 * border) return count;
+  if (std::min(frame.width, frame.height) <= 2 * region_limits::image_border) return count;
   for (int u = 0; u < frame.width; ++u) visit(u, 0), visit(u, frame.height - 1);
   for (int v = 1; v + 1 < frame.height; ++v) visit(0, v), visit(frame.width - 1, v);
   return count;
@@ -81,7 +78,7 @@ CellGroups connect(const CoarseFrame& frame, const std::vector<std::uint8_t>& si
       const int i = open.back();
       open.pop_back();
       ++groups.size.back();
-      frame.for_neighbours(i, link_reach, [&](int j, int steps) {
+      frame.for_neighbours(i, region_limits::link_reach, [&](int j, int steps) {
         const auto k = static_cast<std::size_t>(j);
         if (side[k] != side[first] || groups.group[k] >= 0 || !are_linked(frame[i], frame[j], steps)) return;
         groups.group[k] = number;

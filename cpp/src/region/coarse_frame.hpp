@@ -21,7 +21,6 @@ struct Cell {
 };
 
 struct CoarseFrame {
-  static constexpr int most_cells = 20000, largest_step = 12;
   int width = 0, height = 0;
   int step = 1;  // [pixels]
   std::vector<Cell> cells;

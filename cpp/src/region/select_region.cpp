@@ -9,14 +9,11 @@
 #include "depth/inverse_depth_image.hpp"
 #include "nacre/region.hpp"
 #include "region/coarse_frame.hpp"
+#include "region/limits.hpp"
 #include "region/support_planes.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr double same_thing = 0.25;  // part of its pixels that a thing shares with the last one
-constexpr int contact_reach = 12;    // [pixels] between a thing and the plane that it stands on
-constexpr int adoption_reach = 24;   // [pixels] between parts of a thing that hide what joins them
 
 // The pixels with a point in the box.
 MaskImage box_mask(const Frame& frame, const RegionOptions& options) {
@@ -42,9 +39,11 @@ std::vector<std::uint8_t> standing_groups(const CoarseFrame& frame, const CellGr
   std::vector<std::uint8_t> stands(groups.size.size(), 0);
   for (int i = 0; i < frame.size(); ++i) {
     if (on_plane[static_cast<std::size_t>(i)] == 0) continue;
-    frame.for_neighbours(i, contact_reach / frame.step, [&](int j, int) {
+    frame.for_neighbours(i, region_limits::contact_reach / frame.step, [&](int j, int) {
       const std::int32_t group = groups.group[static_cast<std::size_t>(j)];
-      if (group < 0 || !((frame[i].point - frame[j].point).norm() < 0.75F * extent_of(groups, group, frame[j]))) return;
+      if (group < 0) return;
+      const float apart = (frame[i].point - frame[j].point).norm();
+      if (!(apart < region_limits::adoption_size * extent_of(groups, group, frame[j]))) return;
       stands[static_cast<std::size_t>(group)] = 1;
     });
   }
@@ -58,7 +57,7 @@ void adopt_floating(const CoarseFrame& frame, const std::vector<std::uint8_t>& s
   for (int i = 0; i < frame.size(); ++i) {
     const std::int32_t floating = groups.group[static_cast<std::size_t>(i)];
     if (floating < 0 || stands[static_cast<std::size_t>(floating)] != 0) continue;
-    frame.for_neighbours(i, adoption_reach / frame.step, [&](int j, int) {
+    frame.for_neighbours(i, region_limits::adoption_reach / frame.step, [&](int j, int) {
       const std::int32_t other = groups.group[static_cast<std::size_t>(j)];
       if (other < 0 || stands[static_cast<std::size_t>(other)] == 0) return;
       links[{floating, other}] += (frame[i].point - frame[j].point).norm() < extent_of(groups, other, frame[j]);
@@ -85,7 +84,9 @@ void adopt_floating(const CoarseFrame& frame, const std::vector<std::uint8_t>& s
 // Walls and the like: beside a plane, what the image's border cuts off on most sides is no thing.
 void leave_out_background(const CoarseFrame& frame, const CellGroups& groups, std::vector<std::uint8_t>& eligible) {
   const std::vector<std::int32_t> cut = border_cells(frame, groups.group, groups.size.size());
-  for (std::size_t g = 0; g < cut.size(); ++g) eligible[g] &= cut_off(cut[g], groups.size[g]) < 4.0;
+  for (std::size_t g = 0; g < cut.size(); ++g) {
+    eligible[g] &= cut_off(cut[g], groups.size[g]) < region_limits::background;
+  }
 }
 
 // How large a group is: the longer the image's border cuts it, the less it counts, for the camera is aimed at others.
@@ -93,7 +94,7 @@ std::vector<double> importance(const CoarseFrame& frame, const CellGroups& group
   std::vector<double> values;
   const std::vector<std::int32_t> cut = border_cells(frame, groups.group, groups.size.size());
   for (std::size_t g = 0; g < cut.size(); ++g)
-    values.push_back(groups.size[g] / (1.0 + 2.0 * cut_off(cut[g], groups.size[g])));
+    values.push_back(groups.size[g] / (1.0 + region_limits::cut_off_weight * cut_off(cut[g], groups.size[g])));
   return values;
 }
 
@@ -114,7 +115,7 @@ std::int32_t choose_group(const CoarseFrame& frame, const CellGroups& groups, co
   for (std::size_t g = 0; g < groups.size.size(); ++g) {
     if (eligible[g] == 0 || groups.size[g] < options.min_object * frame.size()) continue;
     const double smaller = static_cast<double>(std::min<std::int64_t>(groups.size[g], num_previous));
-    const bool is_known = shared[g] > 0 && static_cast<double>(shared[g]) >= same_thing * smaller;
+    const bool is_known = shared[g] > 0 && static_cast<double>(shared[g]) >= region_limits::same_thing * smaller;
     const std::pair<std::int64_t, double> rank{is_known ? shared[g] : 0, sizes[g]};
     if (best >= 0 && rank <= best_rank) continue;
     best = static_cast<std::int32_t>(g);
@@ -159,7 +160,6 @@ void draw_group(const Frame& frame, const CoarseFrame& coarse, const Camera& cam
 
 // The plane to which the lower end of a thing is nearest.
 int support_of(const Frame& frame, const MaskImage& mask, const std::vector<SupportPlane>& planes) {
-  constexpr double lower_end = 0.02;  // of the points
   int support = -1;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < planes.size(); ++k) {
@@ -169,7 +169,8 @@ int support_of(const Frame& frame, const MaskImage& mask, const std::vector<Supp
       heights.push_back(planes[k].normal.dot(frame.points.row(row).transpose().cast<double>()) - planes[k].offset);
     }
     if (heights.empty()) return -1;
-    const auto low = heights.begin() + static_cast<std::ptrdiff_t>(lower_end * static_cast<double>(heights.size()));
+    const auto low =
+        heights.begin() + static_cast<std::ptrdiff_t>(region_limits::lower_end * static_cast<double>(heights.size()));
     std::nth_element(heights.begin(), low, heights.end());
     if (*low >= least) continue;
     least = *low;

@@ -7,22 +7,15 @@
 
 #include "base/parallel.hpp"
 #include "base/random.hpp"
+#include "region/limits.hpp"
 
 namespace nacre {
 namespace {
 
-constexpr double least_plane = 0.1;  // part of the points that a supporting plane holds
-constexpr int num_hypotheses = 160;
-constexpr int num_refined = 6;             // of them, the best
-constexpr int num_refinements = 5;         // least squares over the cells of a plane, and its cells again
-constexpr std::size_t most_voters = 3000;  // cells that choose between the planes
-constexpr float start_margin = 3.0F;       // times the last one, for planes from one noisy normal
-constexpr std::size_t most_planes = 8;     // in a frame
-constexpr double small_part = 0.3;         // of a plane
-constexpr int num_candidates = 4;          // planes that are tried before a frame is said to have no more
-
 // The part of the first margin that counts at a refinement.
-float margin_factor(int refinement) { return std::max(1.0F, start_margin - static_cast<float>(refinement)); }
+float margin_factor(int refinement) {
+  return std::max(1.0F, region_limits::start_margin - static_cast<float>(refinement));
+}
 
 enum Side : std::uint8_t { on = 1, before, behind };
 
@@ -74,24 +67,25 @@ struct Search {
                                             std::uint64_t seed) const {
     if (rows.empty()) return std::nullopt;
     std::vector<int> voters;
-    const std::size_t stride = (rows.size() + most_voters - 1) / most_voters;
+    const std::size_t stride = (rows.size() + region_limits::most_voters - 1) / region_limits::most_voters;
     for (std::size_t i = 0; i < rows.size(); i += stride) voters.push_back(rows[i]);
-    std::vector<std::pair<std::int64_t, int>> votes(num_hypotheses);  // negative, so that the most come first
+    std::vector<std::pair<std::int64_t, int>> votes(
+        region_limits::num_hypotheses);  // negative, so that the most come first
     const auto hypothesis = [&](int k) {
       const auto row = random_bits(seed, static_cast<std::uint64_t>(k)) % rows.size();
       const Cell& cell = frame[rows[row]];
       const Eigen::Vector3d normal = cell.normal.cast<double>();
       return SupportPlane{normal, normal.dot(cell.point.cast<double>())};
     };
-    parallel_for(num_hypotheses, 8, num_threads, [&](std::int64_t k) {
+    parallel_for(region_limits::num_hypotheses, 8, num_threads, [&](std::int64_t k) {
       const int number = static_cast<int>(k);
-      votes[static_cast<std::size_t>(k)] = {-count(hypothesis(number), voters, start_margin), number};
+      votes[static_cast<std::size_t>(k)] = {-count(hypothesis(number), voters, region_limits::start_margin), number};
     });
     std::sort(votes.begin(), votes.end());
-    std::vector<std::pair<std::int64_t, SupportPlane>> found(num_refined);
-    parallel_for(num_refined, 1, num_threads, [&](std::int64_t k) {
+    std::vector<std::pair<std::int64_t, SupportPlane>> found(region_limits::num_refined);
+    parallel_for(region_limits::num_refined, 1, num_threads, [&](std::int64_t k) {
       SupportPlane plane = hypothesis(votes[static_cast<std::size_t>(k)].second);
-      for (int i = 0; i < num_refinements; ++i) {
+      for (int i = 0; i < region_limits::num_refinements; ++i) {
         if (!refine(plane, voters, margin_factor(i))) return;
       }
       found[static_cast<std::size_t>(k)] = {count(plane, rows, 1.0F), plane};
@@ -142,8 +136,8 @@ struct Search {
     const auto size = static_cast<std::int32_t>(std::count(sides.begin(), sides.end(), on));
     std::vector<std::int32_t> is_on(sides.size());
     std::transform(sides.begin(), sides.end(), is_on.begin(), [](std::uint8_t side) { return side == on ? 0 : -1; });
-    const bool goes_on = cut_off(border_cells(frame, is_on, 1)[0], size) > 0.5;
-    const bool is_edge = hanging < small_part * size;
+    const bool goes_on = cut_off(border_cells(frame, is_on, 1)[0], size) > region_limits::goes_on;
+    const bool is_edge = hanging < region_limits::small_part * size;
     return goes_on ? is_edge || hanging_weight < standing_weight
                    : is_edge && standing >= options.min_object * frame.size();
   }
@@ -156,16 +150,16 @@ std::vector<SupportPlane> put_planes_aside(const CoarseFrame& frame, const Regio
   const Search search{frame, options, num_threads};
   std::vector<SupportPlane> planes;
   const auto num_points = std::count(left.begin(), left.end(), std::uint8_t{1});
-  const auto least = static_cast<std::int64_t>(least_plane * static_cast<double>(num_points)) + 1;
+  const auto least = static_cast<std::int64_t>(region_limits::least_plane * static_cast<double>(num_points)) + 1;
   std::uint64_t seed = 0;
   bool found = true;
-  while (found && planes.size() < most_planes) {
+  while (found && planes.size() < region_limits::most_planes) {
     found = false;
     std::vector<int> rows;
     for (int i = 0; i < frame.size(); ++i) {
       if (left[static_cast<std::size_t>(i)] != 0 && frame[i].normal.squaredNorm() > 0.0F) rows.push_back(i);
     }
-    for (int candidate = 0; candidate < num_candidates && !found; ++candidate) {
+    for (int candidate = 0; candidate < region_limits::num_candidates && !found; ++candidate) {
       const std::optional<SupportPlane> plane = search.largest_plane(rows, least, ++seed);
       if (!plane) break;
       const std::vector<std::uint8_t> sides = search.sides_of(*plane, left);

@@ -6,30 +6,30 @@
 
 #include "nacre/region.hpp"
 #include "region/coarse_frame.hpp"
+#include "region/limits.hpp"
 
 namespace nacre {
 
-// Which side of a plane a point is on. Depth cameras bend planes by more than their noise: up to a wide margin a point
-// belongs to the plane if its normal does, up to a narrow one in any case.
+// Which side of a plane a point is on. Depth cameras region_limits::bend planes by more than their noise: up to a wide
+// margin a point belongs to the plane if its normal does, up to a narrow one in any case.
 class PlaneCut {
  public:
-  static constexpr float least_cosine = 0.9F;  // between normals of one plane, as measured: 26 degrees
-  static constexpr float bend = 0.008F;        // of a plane, as a part of its distance
-
   PlaneCut(const SupportPlane& plane, double margin)
       : normal_(plane.normal.cast<float>()),
         offset_(static_cast<float>(plane.offset)),
         margin_(static_cast<float>(margin)) {}
 
   float height(const Eigen::Vector3f& point) const { return normal_.dot(point) - offset_; }
-  bool has_normal(const Eigen::Vector3f& normal) const { return normal.dot(normal_) > least_cosine; }
+  bool has_normal(const Eigen::Vector3f& normal) const { return normal.dot(normal_) > region_limits::least_cosine; }
   // 4 standard deviations and 2 pixels [m].
-  float margin(float sigma, float pixel) const { return margin_ > 0.0F ? margin_ : 4.0F * sigma + 2.0F * pixel; }
+  float margin(float sigma, float pixel) const {
+    return margin_ > 0.0F ? margin_ : region_limits::plane_sigmas * sigma + region_limits::plane_pixels * pixel;
+  }
 
   // 1: before the plane, 0: on it, -1: behind it.
   int side(const Eigen::Vector3f& point, const Eigen::Vector3f& normal, float sigma, float pixel) const {
     float reach = margin(sigma, pixel);
-    if (!(margin_ > 0.0F) && has_normal(normal)) reach = std::max(reach, bend * point.norm());
+    if (!(margin_ > 0.0F) && has_normal(normal)) reach = std::max(reach, region_limits::bend * point.norm());
     const float distance = height(point);
     return distance > reach ? 1 : distance < -reach ? -1 : 0;
   }

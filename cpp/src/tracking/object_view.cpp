@@ -7,6 +7,7 @@
 #include "base/random.hpp"
 #include "base/statistics.hpp"
 #include "depth/depth_view.hpp"
+#include "region/limits.hpp"
 #include "region/support_planes.hpp"
 
 namespace nacre {
@@ -40,7 +41,7 @@ std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& regio
     view.points.row(i) = samples.points.row(row);
     view.normals.row(i) = samples.normals.row(row);
     errors[static_cast<std::size_t>(i)] =
-        std::hypot(3.0F * samples.noise[row], PlaneCut::bend * samples.points.row(row).norm());
+        std::hypot(3.0F * samples.noise[row], region_limits::bend * samples.points.row(row).norm());
   }
   view.size = static_cast<double>((view.points.colwise().maxCoeff() - view.points.colwise().minCoeff()).norm());
   view.tolerance = std::min(static_cast<double>(median_of(std::move(errors))), largest_part * view.size);

@@ -1,0 +1,15 @@
+// Numbers that decide when two views are one.
+// Each line: [unit] kind: meaning; what guards it. Kinds: derived, budget, tuned; docs/numbers.md shows them all.
+#pragma once
+
+#include <cstddef>
+
+// clang-format off
+namespace nacre::camera_limits {
+
+constexpr double view_turn = 0.2;  // [rad] tuned: turn that makes another view; test_loop_closure
+constexpr double view_shift = 0.15;  // [depth] tuned: shift that makes another view; test_loop_closure
+constexpr double least_point_pixels = 1.5;  // [pixel] tuned: between new points in their frame; bunny12 NN CoV
+
+}  // namespace nacre::camera_limits
+// clang-format on
