@@ -6,6 +6,14 @@ install(TARGETS nacre EXPORT nacre-targets COMPONENT development
   INCLUDES DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}")
 install(DIRECTORY include/nacre TYPE INCLUDE COMPONENT development FILES_MATCHING PATTERN "*.hpp")
 
+# A static library needs what it is linked with.
+set(nacre_find_openmp "")
+set(nacre_thread_flags -pthread)
+if(NACRE_PARALLEL STREQUAL "openmp" AND NOT BUILD_SHARED_LIBS)
+  set(nacre_find_openmp "find_dependency(OpenMP COMPONENTS CXX)")
+  string(APPEND nacre_thread_flags " ${OpenMP_CXX_FLAGS}")
+endif()
+
 set(nacre_cmake_dir "${CMAKE_INSTALL_LIBDIR}/cmake/nacre")
 install(EXPORT nacre-targets NAMESPACE nacre:: DESTINATION "${nacre_cmake_dir}" COMPONENT development)
 configure_package_config_file(nacre-config.cmake.in nacre-config.cmake INSTALL_DESTINATION "${nacre_cmake_dir}")

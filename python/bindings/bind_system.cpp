@@ -4,4 +4,5 @@
 void bind_system(py::module_& m) {
   m.def("instruction_set", &nacre::instruction_set);
   m.def("default_threads", &nacre::default_threads);
+  m.def("parallel_backend", &nacre::parallel_backend);
 }

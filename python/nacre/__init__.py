@@ -44,7 +44,7 @@ if TYPE_CHECKING:
     from nacre.region import RegionReport, select_region
     from nacre.registration import AlignResult, align
     from nacre.simulation import default_camera, simulate_depth, turntable_poses
-    from nacre.system import default_threads, instruction_set
+    from nacre.system import default_threads, instruction_set, parallel_backend
     from nacre.trajectory import Trajectory, associate
 
 __all__ = [
@@ -95,6 +95,7 @@ __all__ = [
     "instruction_set",
     "label_pixels",
     "open_sequence",
+    "parallel_backend",
     "preprocess_depth",
     "project_samples",
     "read_camera",
@@ -143,7 +144,7 @@ _NAMES = {
     "region": "RegionReport select_region",
     "registration": "AlignResult align",
     "simulation": "default_camera simulate_depth turntable_poses",
-    "system": "default_threads instruction_set",
+    "system": "default_threads instruction_set parallel_backend",
 }
 _MODULES = {name: module for module, names in _NAMES.items() for name in names.split()}
 

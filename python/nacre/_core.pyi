@@ -1042,6 +1042,7 @@ def make_frame(
     noise: NoiseModel | None,
     num_threads: typing.SupportsInt | typing.SupportsIndex,
 ) -> Frame: ...
+def parallel_backend() -> str: ...
 def preprocess_depth(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,

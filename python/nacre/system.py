@@ -30,3 +30,14 @@ def default_threads() -> int:
         number of processors that the process may run on.
     """
     return _core.default_threads()
+
+
+def parallel_backend() -> str:
+    """Return what lends threads to nacre's loops, chosen when it was built.
+
+    Returns
+    -------
+    str
+        ``"threads"``, a pool of nacre's own, as in all wheels; or ``"openmp"``.
+    """
+    return _core.parallel_backend()

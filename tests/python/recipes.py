@@ -384,4 +384,5 @@ RECIPES: dict[str, Recipe] = {
     ),
     "nacre.system.default_threads": Recipe(nacre.default_threads, {}),
     "nacre.system.instruction_set": Recipe(nacre.instruction_set, {}),
+    "nacre.system.parallel_backend": Recipe(nacre.parallel_backend, {}),
 }  # fmt: skip

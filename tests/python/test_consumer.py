@@ -42,10 +42,14 @@ def build_and_run(
 
 
 def test_find_package(
-    installed: Path, cmake: Callable[..., str], run: Callable[..., str], tmp_path: Path
+    kind: str, installed: Path, cmake: Callable[..., str], run: Callable[..., str], tmp_path: Path
 ) -> None:
     output = build_and_run(cmake, run, "find_package", tmp_path, f"-Dnacre_ROOT={installed}")
     assert "FAILED" not in output
+    if (with_openmp := tmp_path / "consumer_openmp").exists():
+        output = run(with_openmp)
+        assert "FAILED" not in output
+        assert kind == "static" or "backend: openmp" in output  # the static one is that of the Python package
 
 
 @pytest.mark.weekly

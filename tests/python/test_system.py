@@ -32,6 +32,10 @@ def points(n: int = 20000) -> np.ndarray:
     return np.random.default_rng(3).random((n, 3))
 
 
+def test_packages_have_threads_of_their_own():
+    assert nacre.parallel_backend() == "threads"
+
+
 def test_threads_sleep_after_a_call():
     tree = nacre.KdTree(points())
     tree.query(points(), k=4, num_threads=8)

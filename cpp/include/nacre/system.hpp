@@ -9,7 +9,11 @@ namespace nacre {
 const char* instruction_set();
 
 /// How many threads `num_threads = 0` means: OMP_NUM_THREADS of the environment where it is set, else the number of
-/// processors that the process may run on.
+/// processors that the process may run on. Where OpenMP lends the threads, omp_set_num_threads() changes it.
 int default_threads();
+
+/// What lends threads to loops, chosen when the library was built: "openmp", whose team the program's own loops share, or
+/// "threads", a pool of nacre's own.
+const char* parallel_backend();
 
 }  // namespace nacre

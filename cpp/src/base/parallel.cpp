@@ -1,204 +1,68 @@
-// A pool of threads that sleep when there is nothing to do.
-//
-// Not OpenMP: its threads stay busy for milliseconds after each loop, a process that forks after a loop hangs in the
-// child's next one, and two OpenMP libraries in one process (PyTorch brings its own) fight over the processors.
 #include "base/parallel.hpp"
 
 #include <atomic>
-#include <chrono>
-#include <condition_variable>
-#include <cstdlib>
 #include <exception>
-#include <mutex>
-#include <system_error>
-#include <thread>
 
+#include "base/parallel_backend.hpp"
 #include "nacre/cancel.hpp"
-
-#if defined(__unix__) || defined(__APPLE__)
-#define NACRE_POSIX
-#include <pthread.h>
-#include <signal.h>
-#endif
-#ifdef __linux__
-#include <sched.h>
-#endif
-#if defined(__x86_64__) || defined(_M_X64)
-#include <emmintrin.h>
-#endif
+#include "nacre/system.hpp"
 
 namespace nacre {
 namespace {
 
-constexpr int most_workers = 255;
-// A loop often follows another at once: waking a thread takes about as long.
-constexpr std::chrono::microseconds spin_time{30};
-
-void pause_briefly() {
-#if defined(__x86_64__) || defined(_M_X64)
-  _mm_pause();
+#ifdef NACRE_OPENMP
+namespace backend = openmp;
+constexpr const char* backend_name = "openmp";
+#else
+namespace backend = threads;
+constexpr const char* backend_name = "threads";
 #endif
-}
 
-// Waits a short time for a condition; returns whether it holds.
-template <class Condition>
-bool spin_until(Condition&& condition) {
-  const auto end = std::chrono::steady_clock::now() + spin_time;
-  do {
-    for (int i = 0; i < 32; ++i) {
-      if (condition()) return true;
-      pause_briefly();
-    }
-  } while (std::chrono::steady_clock::now() < end);
-  return false;
-}
+constexpr std::int64_t most_threads = 256;
 
-// One loop.
-struct Job {
-  void (*run)(void*, std::int64_t);
-  void* context;
-  std::int64_t num_blocks;
-  int free_places;  // for threads that may still join; guarded by the pool's mutex
-  std::atomic<std::int64_t> next_block{0};
-  std::atomic<int> num_helpers{0};     // who have joined and not left
-  std::exception_ptr error = nullptr;  // guarded by the pool's mutex
-};
-
-class ThreadPool {
+// The blocks of a loop: each thread of its team takes the next, until there is none.
+class Blocks {
  public:
-  void run(Job& job) {
-    const int num_helpers = job.free_places;
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      while (num_workers_ < num_helpers && start_worker()) {
-      }
-      jobs_.push_back(&job);
-      num_posted_.fetch_add(1, std::memory_order_relaxed);
-    }
-    for (int i = 0; i < num_helpers; ++i) posted_.notify_one();
-    work_on(job);
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      jobs_.erase(std::find(jobs_.begin(), jobs_.end(), &job));
-    }
-    const auto is_done = [&] { return job.num_helpers.load(std::memory_order_acquire) == 0; };
-    if (!spin_until(is_done)) {
-      std::unique_lock<std::mutex> lock(mutex_);
-      left_.wait(lock, is_done);
-    }
-    if (job.error) std::rethrow_exception(job.error);
-  }
+  Blocks(std::int64_t count, void (*run)(void*, std::int64_t), void* context)
+      : count_(count), run_(run), context_(context) {}
 
-  // Around a fork, so that the child gets a mutex that nobody holds.
-  void lock() { mutex_.lock(); }
-  void unlock() { mutex_.unlock(); }
+  static void work_on(void* blocks) { static_cast<Blocks*>(blocks)->work(); }
+
+  void rethrow() const {
+    if (error_) std::rethrow_exception(error_);
+  }
 
  private:
-  bool start_worker() {
-#ifdef NACRE_POSIX
-    // Signals are for the threads of the program.
-    sigset_t all, before;
-    sigfillset(&all);
-    pthread_sigmask(SIG_SETMASK, &all, &before);
-#endif
-    bool started = true;
-    try {
-      std::thread([this] { serve(); }).detach();
-      ++num_workers_;
-    } catch (const std::system_error&) {  // no more threads: fewer do
-      started = false;
-    }
-#ifdef NACRE_POSIX
-    pthread_sigmask(SIG_SETMASK, &before, nullptr);
-#endif
-    return started;
-  }
-
-  void serve() {
-    std::unique_lock<std::mutex> lock(mutex_);
-    for (;;) {
-      const auto job = std::find_if(jobs_.begin(), jobs_.end(), [](const Job* open) { return open->free_places > 0; });
-      if (job == jobs_.end()) {
-        const std::uint64_t seen = num_posted_.load(std::memory_order_relaxed);
-        const auto is_posted = [&] { return num_posted_.load(std::memory_order_relaxed) != seen; };
-        lock.unlock();
-        const bool spun = spin_until(is_posted);
-        lock.lock();
-        if (!spun) posted_.wait(lock, is_posted);
-        continue;
-      }
-      Job& joined = **job;
-      --joined.free_places;
-      joined.num_helpers.fetch_add(1, std::memory_order_relaxed);
-      lock.unlock();
-      work_on(joined);
-      lock.lock();
-      // The caller may return, and the job be gone, as soon as the count is 0.
-      joined.num_helpers.fetch_sub(1, std::memory_order_release);
-      left_.notify_all();
-    }
-  }
-
-  void work_on(Job& job) {
+  void work() {
     try {
       for (;;) {
-        const std::int64_t block = job.next_block.fetch_add(1, std::memory_order_relaxed);
-        if (block >= job.num_blocks) return;
+        const std::int64_t block = next_.fetch_add(1, std::memory_order_relaxed);
+        if (block >= count_) return;
         CancelScope::check();  // of the caller: the other threads have none
-        job.run(job.context, block);
+        run_(context_, block);
       }
     } catch (...) {
-      job.next_block.store(job.num_blocks, std::memory_order_relaxed);
-      const std::lock_guard<std::mutex> lock(mutex_);
-      if (!job.error) job.error = std::current_exception();
+      next_.store(count_, std::memory_order_relaxed);
+      if (!has_error_.exchange(true)) error_ = std::current_exception();
     }
   }
 
-  std::mutex mutex_;
-  std::condition_variable posted_, left_;
-  std::vector<Job*> jobs_;  // the loops that run, oldest first; guarded by the mutex
-  std::atomic<std::uint64_t> num_posted_{0};
-  int num_workers_ = 0;
+  const std::int64_t count_;
+  void (*const run_)(void*, std::int64_t);
+  void* const context_;
+  std::atomic<std::int64_t> next_{0};
+  std::atomic<bool> has_error_{false};
+  std::exception_ptr error_;  // the first one; read when the team is done
 };
-
-// Never destroyed: its threads sleep in it until the process ends.
-ThreadPool* the_pool = nullptr;
-
-ThreadPool& pool() {
-  static const bool once = [] {
-    the_pool = new ThreadPool;
-#ifdef NACRE_POSIX
-    // A child process has none of its parent's threads, so it starts with a pool of its own.
-    pthread_atfork([] { the_pool->lock(); }, [] { the_pool->unlock(); }, [] { the_pool = new ThreadPool; });
-#endif
-    return true;
-  }();
-  (void)once;
-  return *the_pool;
-}
-
-int usable_threads() {
-  if (const char* text = std::getenv("OMP_NUM_THREADS")) {
-    const int number = std::atoi(text);
-    if (number > 0) return number;
-  }
-#ifdef __linux__
-  cpu_set_t processors;
-  if (sched_getaffinity(0, sizeof processors, &processors) == 0) return CPU_COUNT(&processors);
-#endif
-  return std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-}
 
 }  // namespace
 
-int resolve_threads(int num_threads) {
-  static const int usable = usable_threads();
-  return num_threads > 0 ? num_threads : usable;
-}
+const char* parallel_backend() { return backend_name; }
+
+int resolve_threads(int num_threads) { return num_threads > 0 ? num_threads : backend::usable_threads(); }
 
 void run_blocks(std::int64_t num_blocks, int num_threads, void (*run)(void*, std::int64_t), void* context) {
-  const std::int64_t threads =
-      std::min<std::int64_t>({num_blocks, resolve_threads(num_threads), std::int64_t{most_workers} + 1});
+  const std::int64_t threads = std::min<std::int64_t>({num_blocks, resolve_threads(num_threads), most_threads});
   if (threads <= 1) {
     for (std::int64_t block = 0; block < num_blocks; ++block) {
       CancelScope::check();
@@ -206,12 +70,9 @@ void run_blocks(std::int64_t num_blocks, int num_threads, void (*run)(void*, std
     }
     return;
   }
-  Job job;
-  job.run = run;
-  job.context = context;
-  job.num_blocks = num_blocks;
-  job.free_places = static_cast<int>(threads) - 1;
-  pool().run(job);
+  Blocks blocks(num_blocks, run, context);
+  backend::run_team(static_cast<int>(threads), Blocks::work_on, &blocks);
+  blocks.rethrow();
 }
 
 }  // namespace nacre

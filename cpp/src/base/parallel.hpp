@@ -10,7 +10,7 @@
 namespace nacre {
 
 // The number of threads meant by an option: 0 is all that the process may use (OMP_NUM_THREADS where that is set, else
-// the processors it may run on).
+// the processors it may run on; with OpenMP what omp_set_num_threads says).
 int resolve_threads(int num_threads);
 
 // run(context, block) for each block of [0, num_blocks), in any order, on the caller's and up to num_threads - 1 other

@@ -30,6 +30,7 @@ def doctor(json: Json = False) -> None:
         "processor": processor(),
         "instruction_set": nacre.instruction_set(),
         "threads": nacre.default_threads(),
+        "parallel_backend": nacre.parallel_backend(),
         "environment": {name: os.environ[name] for name in _VARIABLES if name in os.environ},
         "extras": extras(),
         "self_test": self_test(),

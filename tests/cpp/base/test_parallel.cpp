@@ -1,9 +1,16 @@
+#include <atomic>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include "base/parallel.hpp"
 #include "base/random.hpp"
 #include "doctest/doctest.h"
+
+#if defined(__unix__) || defined(__APPLE__)
+#include <sys/wait.h>
+#include <unistd.h>
+#endif
 
 using namespace nacre;
 
@@ -42,3 +49,64 @@ TEST_CASE("an exception of a block reaches the caller") {
                          "seven hundred", std::runtime_error);
   }
 }
+
+TEST_CASE("an exception of any thread leaves the next loop whole") {
+  for (int round = 0; round < 100; ++round) {
+    CHECK_THROWS_AS(parallel_for(64, 1, 4, [](std::int64_t) { throw std::logic_error("each"); }), std::logic_error);
+    std::atomic<int> visits{0};
+    parallel_for(64, 1, 4, [&](std::int64_t) { ++visits; });
+    CHECK(visits == 64);
+  }
+}
+
+namespace {
+
+// A loop in each block of a loop.
+std::int64_t nested_sum(int threads) {
+  return block_reduce(40, 3, threads, std::int64_t{0}, [&](std::int64_t begin, std::int64_t end) {
+    return block_reduce(end - begin, 1, threads, std::int64_t{0}, [&](std::int64_t i, std::int64_t) {
+      return block_reduce(100, 7, threads, std::int64_t{0},
+                          [&](std::int64_t first, std::int64_t last) { return (last - first) * (begin + i); });
+    });
+  });
+}
+
+}  // namespace
+
+TEST_CASE("loops inside loops, and several callers at once") {
+  const std::int64_t expected = 100 * 39 * 40 / 2;
+  for (int threads : {1, 2, 4}) CHECK(nested_sum(threads) == expected);
+  std::vector<std::int64_t> sums(6);
+  std::vector<std::thread> callers;
+  for (std::int64_t& sum : sums) callers.emplace_back([&sum] { sum = nested_sum(3); });
+  for (std::thread& caller : callers) caller.join();
+  CHECK(sums == std::vector<std::int64_t>(6, expected));
+}
+
+#if defined(__has_feature)
+#if __has_feature(thread_sanitizer)
+#define FORK_IS_WATCHED  // the thread sanitizer ends children that start threads
+#endif
+#endif
+
+#if (defined(__unix__) || defined(__APPLE__)) && !defined(FORK_IS_WATCHED)
+TEST_CASE("a forked process goes on, and so do its children") {
+  const std::int64_t expected = nested_sum(4);  // the parent's threads are there
+  const pid_t child = fork();
+  REQUIRE(child >= 0);
+  if (child == 0) {
+    alarm(60);  // ends a child that hangs
+    if (nested_sum(4) != expected) _exit(1);
+    const pid_t grandchild = fork();
+    if (grandchild == 0) _exit(nested_sum(4) == expected ? 0 : 2);
+    int status = 0;
+    waitpid(grandchild, &status, 0);
+    _exit(WIFEXITED(status) ? WEXITSTATUS(status) : 3);
+  }
+  CHECK(nested_sum(4) == expected);
+  int status = 0;
+  waitpid(child, &status, 0);
+  CHECK(WIFEXITED(status));
+  CHECK(WEXITSTATUS(status) == 0);
+}
+#endif

@@ -28,6 +28,7 @@ def test_it_tells_versions_and_that_the_library_works(capsys: pytest.CaptureFixt
     figures = json.loads(run(capsys, "doctor", "--json"))
     assert figures["nacre"] == nacre.__version__
     assert figures["instruction_set"] == nacre.instruction_set()
+    assert figures["parallel_backend"] == nacre.parallel_backend()
     assert figures["self_test"] == "passed"
     assert "self test" in run(capsys, "doctor")
 
