@@ -27,7 +27,7 @@ if(NOT TARGET Threads::Threads)
   set_target_properties(Threads::Threads PROPERTIES IMPORTED_GLOBAL ON)
 endif()
 
-# What lends threads to loops: OpenMP where the compiler has it, unless NACRE_PARALLEL says otherwise.
+# What lends threads to loops: OpenMP where the compiler has it; in the Python package nacre's own, see docs/install.md.
 if(NOT NACRE_PARALLEL STREQUAL "threads" AND NOT TARGET OpenMP::OpenMP_CXX)
   find_package(OpenMP QUIET COMPONENTS CXX)
   if(TARGET OpenMP::OpenMP_CXX)
@@ -35,7 +35,7 @@ if(NOT NACRE_PARALLEL STREQUAL "threads" AND NOT TARGET OpenMP::OpenMP_CXX)
   endif()
 endif()
 set(nacre_parallel_default threads)
-if(TARGET OpenMP::OpenMP_CXX)
+if(TARGET OpenMP::OpenMP_CXX AND NOT NACRE_BUILD_PYTHON)
   set(nacre_parallel_default openmp)
 endif()
 set(NACRE_PARALLEL ${nacre_parallel_default} CACHE STRING "What lends threads to loops: openmp or threads (nacre's own)")

@@ -114,7 +114,7 @@ void print_model(const Camera& camera) {
   }
   print("simulated depth", depth);
   print("model of six frames", model.cloud().points);
-  print("last pose", model.frames().back().world_from_camera->matrix());
+  print("last pose", model.frames().back().world_from_camera.matrix());
   std::printf("points %lld, last frame %s\n", static_cast<long long>(model.cloud().size()),
               to_string(model.frames().back().status));
 }

@@ -19,6 +19,19 @@ def test_cpp(name: str, cpp_tests: Path, run: Callable[..., str]) -> None:
 
 
 @pytest.mark.slow
+def test_both_kinds_of_threads_give_the_same_bits(cpp_tests: Path, run: Callable[..., str]) -> None:
+    with_openmp = cpp_tests / "test_parallel_openmp"
+    if not with_openmp.exists():
+        pytest.skip("the compiler has no OpenMP")
+    for kind in ("threads", "openmp"):
+        assert "SUCCESS!" in run(cpp_tests / f"test_parallel_{kind}")
+    fingerprints = run(cpp_tests / "fingerprints_threads", OMP_NUM_THREADS="1")
+    assert fingerprints.count("\n") > 10
+    for kind in ("threads", "openmp"):
+        assert run(cpp_tests / f"fingerprints_{kind}", OMP_NUM_THREADS="3") == fingerprints
+
+
+@pytest.mark.slow
 def test_reconstruct_example(cpp_examples: Path, run: Callable[..., str], tmp_path: Path) -> None:
     camera = nacre.Camera(width=160, height=120, fx=150, fy=150, cx=79.5, cy=59.5)
     thing = nacre.built_in_object()
