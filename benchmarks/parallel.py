@@ -1,13 +1,11 @@
 """Which threads a package should have: nacre's own against OpenMP's, idle, busy, and beside others.
 
-The extension modules differ in NACRE_PARALLEL alone; each measurement is a process of its own, and the
-modules take turns:
+The installations differ in NACRE_PARALLEL alone; each measurement is a process, and they take turns:
 
     for backend in threads openmp; do
-      cmake -S . -B build/$backend -G Ninja -DNACRE_BUILD_PYTHON=ON -DNACRE_PARALLEL=$backend
-      cmake --build build/$backend --target _core
+      pip install --target build/$backend -C cmake.define.NACRE_PARALLEL=$backend .
     done
-    python benchmarks/parallel.py build/threads/python/_core*.so build/openmp/python/_core*.so
+    python benchmarks/parallel.py build/threads build/openmp
 """
 
 from __future__ import annotations
@@ -36,16 +34,6 @@ ABOUT = {
 }
 
 
-def load_core(path: str) -> None:
-    """Let ``import nacre`` find this extension module."""
-    spec = importlib.util.spec_from_file_location("nacre._core", path)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["nacre._core"] = module
-    spec.loader.exec_module(module)
-
-
 def between_frames(scene: str) -> Callable[[], object]:
     """Return what the process does after each frame."""
     if scene == "pause":
@@ -56,7 +44,7 @@ def between_frames(scene: str) -> Callable[[], object]:
         matrix = np.random.default_rng(0).random((400, 400))
         return lambda: matrix @ matrix
     if scene == "torch":
-        import torch  # type: ignore[import-not-found]  # where it is installed
+        import torch
 
         tensor = torch.rand(400, 400)
         return lambda: torch.mm(tensor, tensor).relu_()
@@ -106,14 +94,16 @@ def spin() -> None:
         sum(range(100000))
 
 
-def run(core: str, scene: str) -> dict[str, float]:
+def run(installation: str, scene: str) -> dict[str, float]:
     """Measure in a process of its own."""
     busy = [multiprocessing.Process(target=spin, daemon=True) for _ in range(os.cpu_count() or 1)]
     for process in busy if scene == "busy" else []:
         process.start()
     try:
-        command = [sys.executable, __file__, core, "--scene", scene]
-        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        command = [sys.executable, __file__, "--scene", scene]
+        path = os.pathsep.join([installation, os.environ.get("PYTHONPATH", "")])
+        environment = {**os.environ, "PYTHONPATH": path}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     finally:
         for process in busy if scene == "busy" else []:
             process.kill()
@@ -124,20 +114,19 @@ def main() -> None:
     """Print a table."""
     as_written = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=as_written)
-    parser.add_argument("cores", nargs="+", metavar="CORE", help="extension modules to compare")
-    parser.add_argument("--scene", choices=SCENES, help="measure this one in this process")
+    parser.add_argument("installations", nargs="*", metavar="FOLDER", help="what to compare")
+    parser.add_argument("--scene", choices=SCENES, help="measure this one, of the nacre that Python finds")
     parser.add_argument("--rounds", type=int, default=5)
     options = parser.parse_args()
     if options.scene:
-        load_core(options.cores[0])
         print(json.dumps(measure(options.scene)))
         return
     scenes = [scene for scene in SCENES if scene != "torch" or importlib.util.find_spec("torch")]
     print(f"{'':46} {'frame':>8} {'whole':>8} {'processor':>10}   medians of {options.rounds} [ms]")
     for scene in scenes:
-        rounds = [[run(core, scene) for core in options.cores] for _ in range(options.rounds)]
-        for index, core in enumerate(options.cores):
-            name = f"{scene:6} {Path(core).resolve().parents[1].name}"
+        rounds = [[run(folder, scene) for folder in options.installations] for _ in range(options.rounds)]
+        for index, folder in enumerate(options.installations):
+            name = f"{scene:6} {Path(folder).name}"
             figures = [
                 statistics.median(answers[index][key] for answers in rounds)
                 for key in ("frame", "whole", "processor")

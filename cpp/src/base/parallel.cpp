@@ -5,7 +5,6 @@
 
 #include "base/parallel_backend.hpp"
 #include "nacre/cancel.hpp"
-#include "nacre/system.hpp"
 
 namespace nacre {
 namespace {
@@ -57,7 +56,7 @@ class Blocks {
 
 }  // namespace
 
-const char* parallel_backend() { return backend_name; }
+const char* thread_backend() { return backend_name; }
 
 int resolve_threads(int num_threads) { return num_threads > 0 ? num_threads : backend::usable_threads(); }
 

@@ -9,6 +9,9 @@
 
 namespace nacre {
 
+// What lends the threads: "openmp" or "threads".
+const char* thread_backend();
+
 // The number of threads meant by an option: 0 is all that the process may use (OMP_NUM_THREADS where that is set, else
 // the processors it may run on; with OpenMP what omp_set_num_threads says).
 int resolve_threads(int num_threads);

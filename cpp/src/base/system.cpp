@@ -9,4 +9,6 @@ const char* instruction_set() { return simd::to_string(simd::active_isa()); }
 
 int default_threads() { return resolve_threads(0); }
 
+const char* parallel_backend() { return thread_backend(); }
+
 }  // namespace nacre
