@@ -11,9 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 import nacre
-from nacre.report.png import encode_png
-from nacre.report.render import render_points
-from nacre.report.view import View
+from nacre.rendering import View, render_points
+from nacre.report.image_files import encode_png
 from track.rows import Places
 
 Image = npt.NDArray[np.uint8]

@@ -9,10 +9,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from nacre.rendering import View, render_points
 from nacre.report.charts import ticks
 from nacre.report.colormap import CATEGORIES, category_rgb, viridis
-from nacre.report.render import render_points
-from nacre.report.view import View
 
 __all__ = [
     "Curve",

@@ -49,5 +49,6 @@ void bind_model(py::module_& m);
 void bind_normals(py::module_& m);
 void bind_region(py::module_& m);
 void bind_registration(py::module_& m);
+void bind_rendering(py::module_& m);
 void bind_simulation(py::module_& m);
 void bind_system(py::module_& m);

@@ -14,5 +14,6 @@ PYBIND11_MODULE(_core, m) {
   bind_consolidation(m);
   bind_mesh(m);
   bind_simulation(m);
+  bind_rendering(m);
   bind_model(m);
 }

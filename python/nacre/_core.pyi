@@ -1064,6 +1064,21 @@ def project_samples(
     options: ConsolidateOptions,
     hints: ProjectionHints,
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+def render_points(
+    points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"],
+    normals: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
+    colors: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 3]", "flags.c_contiguous"],
+    radii: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
+    *,
+    view_from_model: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 3]"],
+    center: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    metres_per_pixel: typing.SupportsFloat | typing.SupportsIndex,
+    distance: typing.SupportsFloat | typing.SupportsIndex,
+    width: typing.SupportsInt | typing.SupportsIndex,
+    height: typing.SupportsInt | typing.SupportsIndex,
+    hide_reverse: bool,
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.uint8]: ...
 def select_region(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,

@@ -23,7 +23,7 @@ PUBLIC = {
     "mesh": ["mesh"],
     "camera": ["camera"],
     "depth": ["depth"],
-    "simulation": ["simulation"],
+    "simulation": ["rendering", "simulation"],
     "region": ["region"],
     "registration": ["global_registration", "registration"],
     "consolidation": ["consolidation"],

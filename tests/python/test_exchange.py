@@ -88,6 +88,14 @@ def test_notebooks_get_pictures_of_clouds_and_frames(model: nacre.Model) -> None
     assert shown[0, 170, 0] > 200 > shown[0, -1, 0]  # near is yellow, far is violet
 
 
+def test_without_pillow_notebooks_say_what_to_install(
+    model: nacre.Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "PIL.Image", None)
+    with pytest.warns(UserWarning, match=r'no picture is shown: .* pip install "nacre\[images\]"'):
+        assert model._repr_png_() is None
+
+
 def test_parameters_and_results_can_be_pickled(model: nacre.Model) -> None:
     report = pickle.loads(pickle.dumps(model.frames[1]))
     assert np.array_equal(report.world_from_camera, model.frames[1].world_from_camera)

@@ -70,10 +70,12 @@ def _write(path: Path, data: bytes) -> None:
 
 def _write_pictures(folder: Path, page: str) -> None:
     """Write the pictures that a page holds as PNG files, as they are named there."""
+    from nacre.report.image_files import as_png
+
     folder.mkdir(exist_ok=True)
-    pattern = r'<img src="data:image/png;base64,([^"]+)"[^>]* data-name="([^"]+)"'
+    pattern = r'<img src="data:image/webp;base64,([^"]+)"[^>]* data-name="([^"]+)"'
     for data, name in reversed(re.findall(pattern, page)):  # of pictures of one name the first stays
-        _write(folder / f"{_PICTURE_NAMES.get(name, name)}.png", base64.b64decode(data))
+        _write(folder / f"{_PICTURE_NAMES.get(name, name)}.png", as_png(base64.b64decode(data)))
 
 
 def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:

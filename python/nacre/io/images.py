@@ -93,7 +93,7 @@ def decode_color(
             )
         rgb = image.convert("RGB")
         if size is not None and rgb.size != size:
-            rgb = rgb.resize(size, _pillow().Resampling.BOX)
+            rgb = rgb.resize(size, import_pillow().Resampling.BOX)
         return np.array(rgb, dtype=np.uint8)
 
 
@@ -147,7 +147,8 @@ def _checked_color(color: npt.ArrayLike) -> npt.NDArray[np.uint8]:
     return array
 
 
-def _pillow() -> Any:
+def import_pillow() -> Any:
+    """Return ``PIL.Image``, or say how to install it."""
     try:
         import PIL.Image
     except ImportError as error:
@@ -158,7 +159,7 @@ def _pillow() -> Any:
 
 
 def _write_image(path: str | os.PathLike[str], array: npt.NDArray[Any], format: str, **options: Any) -> None:
-    image = _pillow().fromarray(array)
+    image = import_pillow().fromarray(array)
     with atomic_writer(path, named=False) as stream:
         image.save(stream, format=format, **options)
 
@@ -170,7 +171,7 @@ def decoded(data: bytes, path: str | os.PathLike[str], formats: Sequence[str]) -
 
     Other formats are not tried, some of which start programs (Ghostscript).
     """
-    pillow = _pillow()
+    pillow = import_pillow()
     data = checked_png(path, data)
     try:
         image = pillow.open(BytesIO(data), formats=formats)

@@ -1,11 +1,10 @@
 """Pictures of models, and a page that shows what a reconstruction gave."""
 
+from nacre.rendering import View, render_points
 from nacre.report.data import DepthExample, ModelCloud, ReportData
 from nacre.report.html import render_page, write_report
-from nacre.report.png import encode_png
-from nacre.report.render import render_points
+from nacre.report.image_files import encode_png
 from nacre.report.reported_frame import ReportedFrame
-from nacre.report.view import View
 
 __all__ = [
     "DepthExample",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,8 @@ _MOST_POINTS = 100_000
 def picture_of_points(points: npt.ArrayLike, normals: Any = None, colors: Any = None) -> bytes | None:
     """Return a PNG image of points from above at an angle, shaded by normals; None where there are none."""
     from nacre.normals import estimate_normals
+    from nacre.rendering import View, measure_spacing, render_points
     from nacre.report.pictures import OBLIQUE
-    from nacre.report.png import encode_png
-    from nacre.report.render import measure_spacing, render_points
-    from nacre.report.view import View
 
     cloud = np.asarray(points)
     finite = np.flatnonzero(np.isfinite(cloud).all(axis=1))
@@ -42,13 +41,12 @@ def picture_of_points(points: npt.ArrayLike, normals: Any = None, colors: Any = 
         spacing=measure_spacing(shown),
         background=None,
     )
-    return encode_png(image)
+    return _png(image)
 
 
 def picture_of_depth(depth: npt.NDArray[np.floating[Any]]) -> bytes | None:
     """Return a PNG image of a depth image by inverse depth, near yellow; None where nothing was measured."""
     from nacre.report.colormap import viridis
-    from nacre.report.png import encode_png
 
     step = max(1, -(-depth.shape[1] // _SIZE[0]))
     part = depth[::step, ::step]
@@ -59,4 +57,14 @@ def picture_of_depth(depth: npt.NDArray[np.floating[Any]]) -> bytes | None:
     inverse = 1.0 / np.where(measured, part, 1.0)
     color = viridis((inverse - low) / (high - low) if high > low else np.ones(part.shape))
     alpha = np.where(measured, np.uint8(255), np.uint8(0))
-    return encode_png(np.concatenate([color, alpha[..., None]], axis=2))
+    return _png(np.concatenate([color, alpha[..., None]], axis=2))
+
+
+def _png(image: npt.NDArray[np.uint8]) -> bytes | None:
+    from nacre.report.image_files import encode_png
+
+    try:
+        return encode_png(image)
+    except ImportError as error:
+        warnings.warn(f"no picture is shown: {error}", stacklevel=4)
+        return None

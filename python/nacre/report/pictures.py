@@ -11,13 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_points
+from nacre.kdtree import KdTree
+from nacre.rendering import SIDES, View, measure_spacing, render_points
 from nacre.report.charts import length_unit, ticks
 from nacre.report.colormap import viridis
 from nacre.report.data import ModelCloud
-from nacre.report.palette import encode_small_png
-from nacre.report.render import is_inside_out, measure_spacing, nearest_distances, render_points, reverse_part
+from nacre.report.image_files import encode_small
 from nacre.report.reported_frame import ReportedFrame
-from nacre.report.view import SIDES, View
+from nacre.report.reverse_sides import is_inside_out, reverse_part
 
 OBLIQUE = (-0.75, -0.55, -1.0)
 BEHIND = (0.75, -0.55, 1.0)
@@ -26,7 +27,8 @@ _SIZE = (560, 560)
 _MAIN_SIZE = (680, 640)
 _CAMERA_SIZE = (640, 480)
 _MAX_POINTS = 300_000
-_MAX_BYTES = {"main": 150_000, "camera": 100_000, "side": 70_000, "attribute": 85_000, "depth": 50_000}
+_FITTED_POINTS = 50_000  # tell how far a model reaches
+_MAX_BYTES = {"main": 70_000, "camera": 55_000, "side": 50_000, "attribute": 60_000, "depth": 24_000}
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,8 @@ class ModelPictures:
 
 def draw(caption: str, image: npt.NDArray[np.uint8], kind: str, *, note: str = "", alt: str = "") -> Picture:
     """Return an image as a picture whose file is as small as its kind asks for."""
-    data = base64.b64encode(encode_small_png(image, _MAX_BYTES[kind])).decode("ascii")
-    return Picture(caption, f"data:image/png;base64,{data}", (image.shape[1], image.shape[0]), note, alt)
+    data = base64.b64encode(encode_small(image, _MAX_BYTES[kind], lossless=kind == "depth")).decode("ascii")
+    return Picture(caption, f"data:image/webp;base64,{data}", (image.shape[1], image.shape[0]), note, alt)
 
 
 def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> ModelPictures | None:
@@ -74,10 +76,11 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
     points = model.points
     if not len(points):
         return None
-    sides, scale = _fit_sides(points, 0.001)
+    extent = points[:: -(-len(points) // _FITTED_POINTS)]
+    sides, scale = _fit_sides(extent, 0.001)
     is_scene = model.normals is not None and _is_scene(points, model.normals, sides)
     if is_scene:
-        sides, scale = _fit_sides(points, 0.02)  # what lies far away would make the rest tiny
+        sides, scale = _fit_sides(extent, 0.02)  # what lies far away would make the rest tiny
     reach = measure_spacing(points, 5 if is_scene else 2)
 
     def picture(
@@ -95,22 +98,22 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
         return draw(caption, image, kind, note="reverse sides left out" if hidden else "", alt=alt)
 
     poses = [f for f in frames if f.world_from_camera is not None and f.status.upper() != "LOST"]
-    main = View.fit(points, OBLIQUE, size=_MAIN_SIZE, outliers=0.004)
+    main = View.fit(extent, OBLIQUE, size=_MAIN_SIZE, outliers=0.004)
     views = {
-        "from the front": View.fit(points, OBLIQUE, size=_SIZE, outliers=0.004),
-        "from behind": View.fit(points, BEHIND, size=_SIZE, outliers=0.004),
+        "from the front": View.fit(extent, OBLIQUE, size=_SIZE, outliers=0.004),
+        "from behind": View.fit(extent, BEHIND, size=_SIZE, outliers=0.004),
     }
     cameras: dict[str, View] = {}
     if is_scene and poses:
         chosen = [poses[i] for i in sorted({0, len(poses) // 2, len(poses) - 1})]
         views = {
             f"as frame {frame.index} saw it": View.from_camera(
-                points, frame.world_from_camera, size=_CAMERA_SIZE
+                extent, frame.world_from_camera, size=_CAMERA_SIZE
             )
             for frame in chosen
             if frame.world_from_camera is not None
         }
-        main, cameras = View.from_camera(points, np.eye(4), size=_MAIN_SIZE), views
+        main, cameras = View.from_camera(extent, np.eye(4), size=_MAIN_SIZE), views
     few = list(views.items())[:2]
 
     def attribute(name: str, values: npt.NDArray[np.float64]) -> Attribute:
@@ -184,7 +187,7 @@ def _thinned(model: ModelCloud) -> tuple[ModelCloud, npt.NDArray[np.float64]]:
     points = as_points("model.points", model.points)
     rows = np.flatnonzero(np.isfinite(points).all(axis=1))
     spacing = np.zeros(len(points))
-    spacing[rows] = nearest_distances(points[rows])
+    spacing[rows] = _nearest_distances(points[rows])
     if len(rows) > _MAX_POINTS:
         rows = np.sort(np.random.default_rng(0).choice(rows, _MAX_POINTS, replace=False))
 
@@ -202,6 +205,13 @@ def _thinned(model: ModelCloud) -> tuple[ModelCloud, npt.NDArray[np.float64]]:
         pick("confidence", model.confidence),
     )
     return thinned, spacing[rows]
+
+
+def _nearest_distances(points: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.float64]:
+    """Return how far each point is from the nearest other one; 0 for a lone point."""
+    if len(points) < 2:
+        return np.zeros(len(points))
+    return np.asarray(KdTree(points).query(points, k=2)[0], dtype=np.float64)[:, 1]
 
 
 def _is_scene(points: npt.ArrayLike, normals: npt.ArrayLike, sides: dict[str, View]) -> bool:

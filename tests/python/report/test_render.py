@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import struct
-import zlib
-from pathlib import Path
+import io
+import sys
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nacre.report import View, encode_png, render_points
+from nacre.report.image_files import encode_small
+
+Image = pytest.importorskip("PIL.Image")
 
 
 def sphere(count: int = 6000, radius: float = 0.1) -> np.ndarray:
@@ -31,31 +33,8 @@ def square(center: Any, half: float, spacing: float = 0.02) -> np.ndarray:
     return np.asarray(grid + np.asarray(center))
 
 
-def decode_png(data: bytes) -> np.ndarray:
-    """A decoder of its own for what encode_png writes."""
-    assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    position, body = 8, b""
-    while position < len(data):
-        length, kind = struct.unpack(">I4s", data[position : position + 8])
-        chunk = data[position + 8 : position + 8 + length]
-        (checksum,) = struct.unpack(">I", data[position + 8 + length : position + 12 + length])
-        assert checksum == zlib.crc32(kind + chunk)
-        if kind == b"IHDR":
-            width, height, depth, color, *rest = struct.unpack(">IIBBBBB", chunk)
-            assert (depth, rest) == (8, [0, 0, 0])
-        body += chunk if kind == b"IDAT" else b""
-        position += 12 + length
-    channels = {0: 1, 2: 3, 6: 4}[color]
-    lines = np.frombuffer(zlib.decompress(body), np.uint8).reshape(height, 1 + width * channels)
-    image = np.zeros((height, width, channels), np.uint8)
-    for row, line in enumerate(lines):
-        values = line[1:].reshape(width, channels)
-        if line[0] == 1:
-            values = np.cumsum(values, axis=0, dtype=np.uint8)
-        elif line[0] == 2 and row:
-            values = values + image[row - 1]
-        image[row] = values
-    return image[:, :, 0] if channels == 1 else image
+def decoded(data: bytes) -> np.ndarray:
+    return np.asarray(Image.open(io.BytesIO(data)))
 
 
 class TestPng:
@@ -63,19 +42,15 @@ class TestPng:
     @given(st.integers(1, 9), st.integers(1, 9), st.sampled_from([(), (3,), (4,)]), st.integers(0, 99))
     def test_round_trip(self, height: int, width: int, channels: tuple[int, ...], seed: int) -> None:
         image = np.random.default_rng(seed).integers(0, 256, (height, width, *channels), dtype=np.uint8)
-        np.testing.assert_array_equal(decode_png(encode_png(image)), image)
+        data = encode_png(image)
+        assert data.startswith(b"\x89PNG\r\n\x1a\n")
+        np.testing.assert_array_equal(decoded(data), image)
 
     def test_smooth_pictures_become_small(self) -> None:
         ramp = np.tile(np.arange(256, dtype=np.uint8), (256, 1))
-        assert len(encode_png(ramp)) < 1500
-        np.testing.assert_array_equal(decode_png(encode_png(ramp)), ramp)
-        np.testing.assert_array_equal(decode_png(encode_png(ramp.T)), ramp.T)
-
-    def test_another_reader_agrees(self, tmp_path: Path) -> None:
-        pillow = pytest.importorskip("PIL.Image")
-        image = np.random.default_rng(1).integers(0, 256, (7, 5, 4), dtype=np.uint8)
-        (tmp_path / "a.png").write_bytes(encode_png(image))
-        np.testing.assert_array_equal(np.asarray(pillow.open(tmp_path / "a.png")), image)
+        for image in (ramp, ramp.T):
+            assert len(encode_png(image)) < 1500
+            np.testing.assert_array_equal(decoded(encode_png(image)), image)
 
     def test_illegal_input_is_named(self) -> None:
         with pytest.raises(TypeError, match="image must be uint8"):
@@ -83,6 +58,28 @@ class TestPng:
         for shape in ((2,), (2, 2, 2), (0, 3, 3)):
             with pytest.raises(ValueError, match="image must have shape"):
                 encode_png(np.zeros(shape, np.uint8))
+
+    def test_without_pillow_the_error_says_what_to_install(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "PIL.Image", None)
+        with pytest.raises(ImportError, match=r'pip install "nacre\[images\]"'):
+            encode_png(np.zeros((2, 2), np.uint8))
+
+
+class TestSmallPictures:
+    def test_few_colours_are_kept_as_they_are(self) -> None:
+        image = np.random.default_rng(0).integers(0, 4, (20, 30, 3), dtype=np.uint8) * 80
+        np.testing.assert_array_equal(decoded(encode_small(image, 50_000, lossless=True)), image)
+
+    def test_many_colours_become_close_ones(self) -> None:
+        u, v = np.meshgrid(np.arange(200), np.arange(150))
+        image = np.stack([u, v, (u + v) // 2], axis=2).astype(np.uint8)
+        assert np.abs(decoded(encode_small(image, 50_000)).astype(int) - image).mean() < 4
+
+    def test_a_picture_is_no_larger_than_it_may_be(self) -> None:
+        noise = np.random.default_rng(0).integers(0, 256, (240, 320, 4), dtype=np.uint8)
+        for lossless in (False, True):
+            assert len(encode_small(noise, 10**6, lossless=lossless)) > 40_000
+            assert len(encode_small(noise, 20_000, lossless=lossless)) <= 20_000
 
 
 class TestRenderPoints:
@@ -170,6 +167,12 @@ class TestRenderPoints:
         bad = np.concatenate([points, [[np.nan, 0, 0], [0, np.inf, 0]]])
         image = render_points(bad, np.concatenate([normals, np.ones((2, 3))]), size=(80, 80))
         np.testing.assert_array_equal(image, expected)
+
+    def test_a_large_coordinate_is_no_more_than_left_out(self) -> None:
+        points = np.concatenate([square((0, 0, 0), 0.2), [[0, 0, 1e300], [1e300, 0, 0], [0, -1e150, 1e150]]])
+        view = View.fit(points[:-3], size=(60, 60))
+        for each in (view, View.from_camera(points, np.eye(4), size=(60, 60))):
+            assert render_points(points, np.zeros_like(points), view=each, spacing=0.02).shape == (60, 60, 3)
 
     def test_normals_that_are_not_finite_face_the_viewer(self) -> None:
         points = square((0, 0, 0), 0.2)
