@@ -137,6 +137,7 @@ STRUCTURE = (
     "block_size capacity border right_border tile_size size side radius shift group per_chunk nobody magic"
 )
 STRUCTURE += " version_at bytes_per_pixel none any nothing missing largest infinity nan reach step kWordBits"
+STRUCTURE += " unknown never no_limit step_block equation_block cloud_block phi"
 STRUCTURE += " kBorder kOverhang kRadius kStep num_bins least_judged farthest"
 
 

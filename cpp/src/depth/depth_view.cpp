@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "base/parallel.hpp"
+#include "depth/limits.hpp"
 #include "depth/systematic_error.hpp"
 
 namespace nacre {
@@ -29,7 +30,6 @@ double VisibilityCounts::consistency(std::int64_t least) const {
 VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, const DepthView& view,
                          const Pose& points_from_camera, const Camera& camera, const VisibilityMargin& margin,
                          int num_threads) {
-  constexpr float sigmas = 4.0F, systematic_errors = 2.0F;
   const PointProjection projection(camera, points_from_camera);
   const auto distance = static_cast<float>(margin.distance), part_of_depth = static_cast<float>(margin.part_of_depth);
   return block_reduce(
@@ -41,7 +41,8 @@ VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, cons
               if (!(block.facing[i] > margin.least_facing)) return;
               const float measured = view.depth[block.pixel[i]];
               const float systematic = margin.with_systematic_error ? systematic_error(measured) : 0.0F;
-              const float error = std::hypot(sigmas * view.sigma[block.pixel[i]], systematic_errors * systematic);
+              const float error = std::hypot(depth_limits::view_sigmas * view.sigma[block.pixel[i]],
+                                             depth_limits::view_systematic * systematic);
               const float allowed = std::max(distance + part_of_depth * block.z[i], error) / block.facing[i];
               counts.add(visibility(measured - block.z[i], allowed));
             });

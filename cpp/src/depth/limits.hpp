@@ -35,6 +35,8 @@ constexpr float systematic_growth = 0.0015F;  // [1/m^2] tuned: systematic error
 constexpr float nearest_median = 0.05F;  // [m] derived: nearer medians: a wrong depth_scale; test_depth
 constexpr float farthest_median = 50.0F;  // [m] derived: farther medians: a wrong depth_scale; test_depth
 constexpr std::int64_t most_probes = 8192;  // [pixels] budget: that tell an image's median depth; test_depth
+constexpr float view_sigmas = 4.0F;  // [sigma] derived: a point this far from a measurement contradicts it; test_loop_closure
+constexpr float view_systematic = 2.0F;  // [sigma] tuned: likewise, of the systematic error; teddy, rpy
 
 }  // namespace nacre::depth_limits
 // clang-format on

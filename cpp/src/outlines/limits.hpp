@@ -40,6 +40,8 @@ constexpr double point_sigma = 0.5;  // [pixel] derived: of an outline's point; 
 constexpr double shift_sigma = 0.5;  // [pixel] tuned: of an outline as a whole: mixed pixels differ with the slant; dog
 constexpr double points_for_one = 4.0;  // [points] tuned: neighbors on an outline err together; dog
 constexpr double pairs_for_one = 30.0;  // [pairs] tuned: so do pairs of surface points; dog
+constexpr double smear_step = 0.5;  // [pixel] budget: between places that are asked across an edge; test_occluding_edges
+constexpr double most_smeared = 2.5;  // [pixel] tuned: of an edge, over which depth falls off; test_occluding_edges
 
 }  // namespace nacre::outlines_limits
 // clang-format on

@@ -111,11 +111,10 @@ class OutlineSearch {
   // they are not too many: others see a side of the same body at a grazing angle. None where the surface goes on.
   std::optional<double> surface_end(int u, int v, const Eigen::Vector3d& origin, const Eigen::Vector3d& across,
                                     const Eigen::Vector3d& down, const Eigen::Vector2d& direction) const {
-    constexpr double stride = 0.5, most_smeared = 2.5;
     const double off = outlines_limits::most_off * static_cast<double>(sight_.sigma[v * width_ + u]) +
                        0.5 * camera_.footprint(depth(u, v));
     double last = 0.0;
-    for (double at = 0.5 * stride; at < gap_; at += stride) {
+    for (double at = 0.5 * outlines_limits::smear_step; at < gap_; at += outlines_limits::smear_step) {
       const int x = static_cast<int>(std::lround(direction.x() * at)),
                 y = static_cast<int>(std::lround(direction.y() * at));
       const double z = measured(u + x, v + y);
@@ -128,7 +127,7 @@ class OutlineSearch {
                 next_y = static_cast<int>(std::lround(direction.y() * (at + 1.0)));
       const double next = measured(u + next_x, v + next_y);
       const bool is_other = !std::isfinite(z) || (std::isfinite(next) && std::abs(next - z) < tolerance(u, v, 1.0));
-      if (is_other) return last + 0.5 * std::min(at - last, most_smeared);
+      if (is_other) return last + 0.5 * std::min(at - last, outlines_limits::most_smeared);
     }
     return std::nullopt;
   }

@@ -240,14 +240,14 @@ class StateReader {
   void get(Eigen::PlainObjectBase<Derived>& matrix) {
     using Scalar = typename Derived::Scalar;
     if constexpr (Derived::SizeAtCompileTime == Eigen::Dynamic) {
-      constexpr std::uint64_t most = std::uint64_t{1} << 40;
+      constexpr std::uint64_t largest = std::uint64_t{1} << 40;
       const std::uint64_t rows = get_number(), cols = get_number();
       const bool has_rows = Derived::RowsAtCompileTime == Eigen::Dynamic ||
                             rows == static_cast<std::uint64_t>(Derived::RowsAtCompileTime);
       const bool has_cols = Derived::ColsAtCompileTime == Eigen::Dynamic ||
                             cols == static_cast<std::uint64_t>(Derived::ColsAtCompileTime);
       require(has_rows && has_cols, "a matrix has another shape");
-      require(rows < most && cols < most && (rows == 0 || cols <= left() / sizeof(Scalar) / rows),
+      require(rows < largest && cols < largest && (rows == 0 || cols <= left() / sizeof(Scalar) / rows),
               "a matrix is larger than what is left");
       matrix.resize(static_cast<Eigen::Index>(rows), static_cast<Eigen::Index>(cols));
     }
