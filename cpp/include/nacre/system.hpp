@@ -12,8 +12,8 @@ const char* instruction_set();
 /// processors that the process may run on. Where OpenMP lends the threads, omp_set_num_threads() changes it.
 int default_threads();
 
-/// What lends threads to loops, chosen when the library was built: "openmp", whose team the program's own loops share, or
-/// "threads", a pool of nacre's own.
+/// What lends threads to loops, chosen when the library was built: "openmp", whose team the program's own loops share,
+/// or "threads", a pool of nacre's own.
 const char* parallel_backend();
 
 }  // namespace nacre
