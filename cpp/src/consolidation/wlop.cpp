@@ -94,8 +94,8 @@ class Projection {
     counts_ = Values::Ones(points.num_readable());
     if (hints.point_weights.size() > 0) {
       // Only their ratios matter: sums of them stay within single precision, and keep their bits.
-      const float largest = hints.point_weights.maxCoeff();
-      const int exponent = largest > 0.0F ? std::ilogb(largest) : 0;
+      const float heaviest = hints.point_weights.maxCoeff();
+      const int exponent = heaviest > 0.0F ? std::ilogb(heaviest) : 0;
       for (std::int64_t j = 0; j < points.num_points(); ++j) {
         counts_[j] = std::scalbn(hints.point_weights[points.row(j)], -exponent);
       }

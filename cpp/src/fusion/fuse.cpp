@@ -48,7 +48,7 @@ struct NewPoint {
   float weight = 0.0F;
   float spacing = 0.0F;  // to its neighbours [m]
   int reach = 0;         // as far may they be in the image [pixels]
-  PixelWindow cover;
+  PixelWindow cover = {};
 };
 
 void count_up(std::uint8_t& count) { count = static_cast<std::uint8_t>(std::min(255, count + 1)); }

@@ -9,10 +9,10 @@ namespace nacre {
 
 // A residual of a pair, and how it changes with the place of the point that moves.
 struct MotionRow {
-  Eigen::Vector3d lever;                             // of the point about the center of the motion [m]
-  Eigen::Vector3d target_gradient, source_gradient;  // as either side has it
-  Eigen::Vector3d gradient;                          // of both: efficient second-order minimisation (Malis 2004)
-  double residual, weight = 1.0;
+  Eigen::Vector3d lever = Eigen::Vector3d::Zero();                   // of the point about the center of the motion [m]
+  Eigen::Vector3d target_gradient = lever, source_gradient = lever;  // as either side has it
+  Eigen::Vector3d gradient = lever;                                  // of both: second-order minimisation (Malis 2004)
+  double residual = 0.0, weight = 1.0;
 };
 
 // Directions of twists, rotations in units of an extent, one a column.

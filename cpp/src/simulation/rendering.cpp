@@ -219,9 +219,8 @@ class Canvas {
     const Vector3f base =
         has_colors ? Vector3f(pixel.color / pixel.weight) : Vector3f((1.0f - brown) * front + brown * reverse);
     const float shade = has_colors ? 0.55f + 0.45f * lambert : 0.22f + 0.78f * lambert;
-    Array4f color;
-    color << (shade * cavity * base).array().max(0.0f).min(1.0f), 1.0f;
-    return color;
+    const Vector3f lit = (shade * cavity * base).array().max(0.0f).min(1.0f);
+    return {lit.x(), lit.y(), lit.z(), 1.0f};
   }
 
   // Each pixel's brightness by its depth against its surroundings (Luft et al. 2006), a small and a large one.
