@@ -10,6 +10,7 @@ import pytest
 import nacre
 
 TESTS = sorted((Path(__file__).parents[1] / "cpp").rglob("test_*.cpp"))
+assert len(TESTS) > 20, "the C++ tests are somewhere else"
 
 
 @pytest.mark.slow
