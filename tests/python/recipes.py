@@ -206,7 +206,9 @@ RECIPES: dict[str, Recipe] = {
         _samples,
         grows=("iterations",),
     ),
-    "nacre.depth.DepthParameters.for_camera": Recipe(nacre.DepthParameters().for_camera, {"camera": CAMERA}),
+    "nacre.parameters.DepthParameters.for_camera": Recipe(
+        nacre.DepthParameters().for_camera, {"camera": CAMERA}
+    ),
     "nacre.depth.back_project": Recipe(nacre.back_project, _DEPTH, is_finite),
     "nacre.depth.depth_normals": Recipe(
         nacre.depth_normals, {**_DEPTH, "noise": 0.001}, lambda result, **_: has_unit_rows(result)
@@ -327,7 +329,7 @@ RECIPES: dict[str, Recipe] = {
         lists=("color",),
     ),
     "nacre.model.Model.in_camera": Recipe(lambda: nacre.Model(CAMERA).in_camera(), {}),
-    "nacre.model.ModelParameters.preset": Recipe(
+    "nacre.parameters.ModelParameters.preset": Recipe(
         lambda preset: nacre.ModelParameters.preset(preset), {"preset": "paper"}
     ),
     "nacre.kdtree.KdTree": Recipe(nacre.KdTree, {"points": bumpy(), "num_threads": 1}),
