@@ -50,8 +50,7 @@ class FrameReport(Value):
         The registration score, that the pose is right, against chance: what the residuals tell a match, times
         overlap^2 and consistency^4 (consistency^8 far from all guesses); less where residuals of neighbours
         agree beyond what noise explains. Unrelated surfaces seldom reach 0.3; good registrations have 0.35 to
-        3. Of an object that was found turned on its supporting plane: what agrees less what contradicts, as
-        parts.
+        3, those of an object that turned far on its plane less.
     loop_frame : int or None
         The earlier frame that this one closed a loop with: model and poses were corrected.
     loop_distance : float

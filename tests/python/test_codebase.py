@@ -131,14 +131,14 @@ def test_no_modules_include_each_other_in_a_circle() -> None:
 
 
 # Folders whose numbers decide about data, and stand in their limits.hpp; those before only decide how fast.
-DECIDING = ["camera", "depth", "region", "registration", "outlines", "fusion", "loops", "model"]
+DECIDING = ["camera", "depth", "region", "registration", "outlines", "fusion", "tracking", "loops", "model"]
 # What decides nothing about data: sizes of blocks and arrays, names of values.
 STRUCTURE = (
     "block_size capacity border right_border tile_size size side radius shift group per_chunk nobody magic"
 )
 STRUCTURE += " version_at bytes_per_pixel none any nothing missing largest infinity nan reach step kWordBits"
 STRUCTURE += " unknown never no_limit step_block equation_block cloud_block phi"
-STRUCTURE += " kBorder kOverhang kRadius kStep num_bins least_judged farthest"
+STRUCTURE += " kBorder kOverhang kRadius kStep num_bins farthest"
 
 
 @pytest.mark.parametrize("folder", DECIDING)

@@ -27,8 +27,7 @@ struct TrackingReport {
                              ///< and of the frame's that the camera did not see through before
   double score = 0.0;        ///< of the registration: that it is right, against chance: what the residuals tell a
                              ///< match, times overlap^2 consistency^4 (^8 far from all guesses), less
-                             ///< where residuals of neighbours agree beyond noise; of an object that was
-                             ///< found turned on its supporting plane: what agrees less what contradicts
+                             ///< where residuals of neighbours agree beyond noise
   double rmse = 0.0;         ///< of the inliers, along the normals [m]
   Matrix6 information = Matrix6::Zero();                     ///< see AlignResult
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult

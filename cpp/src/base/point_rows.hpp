@@ -4,11 +4,21 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 namespace nacre {
 
 template <class T>
 using PointMatrix = Eigen::Matrix<T, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
+// The given rows of a matrix or vector, in this order; nothing where it is empty.
+template <class Matrix, class Index>
+Matrix take_rows(const Eigen::Ref<const Matrix>& values, const std::vector<Index>& rows) {
+  if (values.rows() == 0) return Matrix(0, values.cols());
+  Matrix chosen(static_cast<Eigen::Index>(rows.size()), values.cols());
+  for (std::size_t i = 0; i < rows.size(); ++i) chosen.row(static_cast<Eigen::Index>(i)) = values.row(rows[i]);
+  return chosen;
+}
 
 template <class T>
 class Rows {

@@ -96,7 +96,7 @@ bool is_finite(const Scalar* point) {
 }
 
 template <class Cloud>
-Rows<typename Cloud::Scalar> rows_of(const Cloud& points) {
+Rows<typename Cloud::Scalar> scalar_rows(const Cloud& points) {
   return {points.data(), points.outerStride(), points.rows()};
 }
 
@@ -302,7 +302,7 @@ template <class Cloud>
 CellLattice cell_lattice(std::initializer_list<const Cloud*> clouds, double cell, int num_threads) {
   Extent whole;
   for (const Cloud* cloud : clouds) {
-    const auto rows = rows_of(*cloud);
+    const auto rows = scalar_rows(*cloud);
     const Chunks chunks(rows.count);
     std::vector<Extent> extents(static_cast<std::size_t>(chunks.count));
     parallel_blocks(rows.count, chunks.size, num_threads,
@@ -321,7 +321,7 @@ CellLattice cell_lattice(std::initializer_list<const Cloud*> clouds, double cell
   lattice.origin = whole.lower;
   lattice.center = 0.5 * whole.lower + 0.5 * whole.upper;
   if ((whole.upper - whole.lower).maxCoeff() >= 2.0 * half) {
-    lattice.center = median(rows_of(**clouds.begin()));
+    lattice.center = median(scalar_rows(**clouds.begin()));
     lattice.origin = lattice.center - half;
   }
   lattice.reach =
@@ -333,7 +333,7 @@ CellLattice cell_lattice(std::initializer_list<const Cloud*> clouds, double cell
 
 template <class Cloud>
 CellOrder cell_order(const Cloud& points, const CellLattice& lattice, int num_threads) {
-  const auto rows = rows_of(points);
+  const auto rows = scalar_rows(points);
   return 3 * lattice.num_bits <= 32 ? order_rows<ShortItem>(rows, lattice, num_threads)
                                     : order_rows<LongItem>(rows, lattice, num_threads);
 }
@@ -346,7 +346,7 @@ void halve_cubes(const Cloud& points, CellOrder& order, std::int64_t block_size,
   }
   const auto num_cubes = static_cast<std::int64_t>(starts.size());
   starts.push_back(order.rows.size());
-  const auto rows = rows_of(points);
+  const auto rows = scalar_rows(points);
   parallel_blocks(num_cubes, 8, num_threads, [&](std::int64_t, std::int64_t begin, std::int64_t end) {
     std::vector<Place> places;
     for (std::int64_t cube = begin; cube < end; ++cube) {

@@ -19,7 +19,7 @@ struct KeyFrame {
   std::int32_t frame;  // its number
   FrameCloud cloud;
   std::vector<OutlinePoint> outline;  // camera frame
-  int last_seen;  // the last stop of the camera where its surface was in view and known to be in place
+  int last_verified;                  // the last node of the trajectory from which its surface was seen to lie right
 };
 
 // What a camera says of a cloud of another one's: of so much of the depth as margin it counts as the same place.

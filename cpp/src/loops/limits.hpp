@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "nacre/types.hpp"
+
 // clang-format off
 namespace nacre::loops_limits {
 
@@ -13,8 +15,11 @@ constexpr std::size_t most_key_frames = 500;  // [views] budget: about 80 kB eac
 constexpr std::size_t most_candidates = 4;  // [views] budget: that a frame is registered to at once; room
 constexpr int verified_nodes = 12;  // [nodes] tuned: of the trajectory: what was seen since is taken to be in place; room, teddy
 constexpr double least_overlap = 0.3;  // [1] tuned: of a frame and a key frame; room
-constexpr double least_consistency = 0.8;  // [1] tuned: of what both should see, the part that agrees; room
-constexpr double largest_ratio = 0.35;  // [1] tuned: of the residuals to the largest that match; 0.58 by chance; room
+constexpr Eigen::Index least_points = 100;  // [points] tuned: of a frame, for a loop; room
+constexpr double largest_reach = 0.05;  // [size] tuned: of matches, in diameters of the key frames' surface; room
+constexpr double reach_spacings = 2.5;  // [spacing] tuned: of matches along the key frames' surface; room
+constexpr double residual_spacings = 2.75;  // [spacing] tuned: of matches across it, in the model's; room
+constexpr double residual_sigmas = 4.0;  // [sigma] derived: likewise, where noise is larger; room
 constexpr double search_radius = 0.12;  // [depth] tuned: drift that is looked for; room
 constexpr double drift = 0.005;  // [rad, depth] tuned: standard deviation of a step between nodes; room
 constexpr double weak_drift = 10.0 * drift;  // [rad, depth] tuned: where the registration leaves a direction open; room

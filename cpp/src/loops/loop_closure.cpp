@@ -42,133 +42,169 @@ double part_of(std::int64_t count, const FrameCloud& cloud) {
   return static_cast<double>(count) / static_cast<double>(std::max<Eigen::Index>(1, cloud.points.rows()));
 }
 
-// The part of a cloud's points that is about where a camera measures something.
-double part_in_view(const FrameCloud& cloud, const Pose& camera_from_cloud, const DepthView& view,
-                    const Camera& camera) {
-  return part_of(compare(cloud, camera_from_cloud, view, camera, loops_limits::search_radius).agreeing, cloud);
+// To which surfaces lie on each other.
+double tolerance_of(const LoopFrame& frame) {
+  return std::max(frame.spacing, static_cast<double>(median_sigma(frame.frame)));
 }
 
 }  // namespace
 
-bool LoopClosure::is_in_place(int key_frame) const {
-  return now() - key_frames_[static_cast<std::size_t>(key_frame)].last_seen <= loops_limits::verified_nodes;
+bool LoopClosure::is_verified(int key_frame) const {
+  return time() - key_frames_[static_cast<std::size_t>(key_frame)].last_verified <= loops_limits::verified_nodes;
 }
 
 std::int32_t LoopClosure::oldest_frame() const {
-  if (now() <= loops_limits::verified_nodes) return first_in_place_;
-  return std::max(first_in_place_, stops_[static_cast<std::size_t>(now() - 1 - loops_limits::verified_nodes)].frame);
+  if (time() <= loops_limits::verified_nodes) return first_verified_;
+  const auto node = static_cast<std::size_t>(time() - 1 - loops_limits::verified_nodes);
+  return std::max(first_verified_, trajectory_[node].frame);
 }
 
 std::vector<std::vector<OutlinePoint>> LoopClosure::outlines_near(const Pose& pose) const {
   std::vector<std::vector<OutlinePoint>> outlines;
   for (int k = 0; k < num_key_frames() && outlines.size() < loops_limits::most_near_views; ++k) {
     const KeyFrame& other = key_frames_[static_cast<std::size_t>(k)];
-    if (!is_in_place(k) || view_distance(pose_of(k), pose, other.cloud.depth) > loops_limits::near_view) continue;
+    if (!is_verified(k) || view_distance(pose_of(k), pose, other.cloud.depth) > loops_limits::near_view) continue;
     if (!other.outline.empty()) outlines.push_back(moved(other.outline, pose_of(k)));
   }
   return outlines;
 }
 
 LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
-  LoopReport report;
-  const Pose& pose = frame.alignment.target_from_source;
-  if (!stops_.empty()) {
-    const Stop& last = stops_.back();
-    const double depth = key_frames_[static_cast<std::size_t>(last.key_frame)].cloud.depth;
-    if (!frame.to_whole_model && view_distance(last.pose, pose, depth) < 1.0) return report;
+  if (!is_next_node(frame)) return {};
+  KeyFrame view{frame.index, sample_cloud(frame.frame, frame.observer, options_), frame.outline, time()};
+  auto [seen, in_question] = select(frame);
+  std::optional<Match> loop = match(frame, view.cloud, in_question);
+  const bool is_apart = loop && loop->distance > tolerance_of(frame);
+  if (loop && !is_apart) {
+    for (const int k : in_question) seen.push_back({k, part_in_view(k, frame)});
   }
-  KeyFrame key{frame.index, sample_cloud(frame.frame, frame.observer, options_), frame.outline, now()};
+  if (frame.to_whole_model) doubt_all(frame.index);
+  for (const SeenKeyFrame& other : seen) {
+    key_frames_[static_cast<std::size_t>(other.key_frame)].last_verified = time();
+  }
+  if (!insert(frame, std::move(view), seen, is_apart)) return {};
 
-  // Which key frames' surfaces are in view?
-  std::vector<std::pair<double, int>> in_question;
-  int nearest = -1, most_seen = -1;
-  double least_distance = 1.0, largest_part = 0.0;
-  std::vector<int> in_view;
-  for (int k = 0; k < num_key_frames(); ++k) {
-    KeyFrame& other = key_frames_[static_cast<std::size_t>(k)];
-    const double seen = part_in_view(other.cloud, pose.inverse() * pose_of(k), frame.view, camera_);
-    if (seen < loops_limits::least_overlap) continue;
-    if (!is_in_place(k) && !frame.to_whole_model && !frame.is_given) {
-      in_question.emplace_back(-seen, k);
-    } else {
-      in_view.push_back(k);
-    }
+  const int newest = num_key_frames() - 1;
+  const bool is_around = comes_around(seen);
+  seen_with_.emplace_back();
+  for (const SeenKeyFrame& other : seen) {
+    seen_with_.back().push_back(other.key_frame);
+    seen_with_[static_cast<std::size_t>(other.key_frame)].push_back(newest);
   }
-  std::sort(in_question.begin(), in_question.end());
-  in_question.resize(std::min(in_question.size(), loops_limits::most_candidates));
-  std::vector<int> candidates;
-  candidates.reserve(in_question.size());
-  for (const auto& [part, k] : in_question) candidates.push_back(k);
-  std::optional<Match> found = match(frame, key.cloud, candidates);
-  const double tolerance = std::max(frame.spacing, static_cast<double>(median_sigma(frame.frame)));
-  const bool agrees = found && found->distance <= tolerance;
-  if (agrees) in_view.insert(in_view.end(), candidates.begin(), candidates.end());
-  if (frame.to_whole_model) {  // how the rest of the model lies to what is in view is not known
-    first_in_place_ = frame.index;
-    for (KeyFrame& other : key_frames_) other.last_seen = never;
+  if (loop) {
+    loop->node = newest;
+    if (is_apart) return close(frame, *loop, in_question);
+    const double depth = key_frames_.back().cloud.depth;
+    graph_.add_edge(edge(loop->key_frame, newest, loop->alignment.target_from_source, loop->alignment, depth, true));
     pending_.reset();
   }
-  for (const int k : in_view) {
-    key_frames_[static_cast<std::size_t>(k)].last_seen = now();
-    const double distance = view_distance(pose_of(k), pose, key.cloud.depth);
+  return is_around ? adjust_loop_of_views(frame, seen) : LoopReport{};
+}
+
+bool LoopClosure::is_next_node(const LoopFrame& frame) const {
+  if (trajectory_.empty() || frame.to_whole_model) return true;
+  const TrajectoryNode& last = trajectory_.back();
+  const double depth = key_frames_[static_cast<std::size_t>(last.key_frame)].cloud.depth;
+  return !(view_distance(last.pose, frame.alignment.target_from_source, depth) < 1.0);
+}
+
+// The part of a key frame's points that is about where the camera measures something.
+double LoopClosure::part_in_view(int key_frame, const LoopFrame& frame) const {
+  const FrameCloud& cloud = key_frames_[static_cast<std::size_t>(key_frame)].cloud;
+  const Pose camera_from_cloud = frame.alignment.target_from_source.inverse() * pose_of(key_frame);
+  return part_of(compare(cloud, camera_from_cloud, frame.view, camera_, loops_limits::search_radius).agreeing, cloud);
+}
+
+// The key frames whose surfaces are in view.
+LoopClosure::SeenKeyFrames LoopClosure::select(const LoopFrame& frame) const {
+  SeenKeyFrames seen;
+  std::vector<SeenKeyFrame> in_question;
+  for (int k = 0; k < num_key_frames(); ++k) {
+    const double part = part_in_view(k, frame);
+    if (part < loops_limits::least_overlap) continue;
+    const bool is_sure = is_verified(k) || frame.to_whole_model || frame.is_given;
+    (is_sure ? seen.verified : in_question).push_back({k, part});
+  }
+  std::stable_sort(in_question.begin(), in_question.end(),
+                   [](const SeenKeyFrame& a, const SeenKeyFrame& b) { return a.part > b.part; });
+  in_question.resize(std::min(in_question.size(), loops_limits::most_candidates));
+  for (const SeenKeyFrame& other : in_question) seen.in_question.push_back(other.key_frame);
+  return seen;
+}
+
+// How the rest of the model lies to what is in view is not known.
+void LoopClosure::doubt_all(std::int32_t frame) {
+  first_verified_ = frame;
+  for (KeyFrame& other : key_frames_) other.last_verified = never;
+  pending_.reset();
+}
+
+// Adds the frame to the trajectory; as a key frame, where none stands for it. Returns whether it became one.
+bool LoopClosure::insert(const LoopFrame& frame, KeyFrame&& view, const std::vector<SeenKeyFrame>& seen,
+                         bool is_apart) {
+  const Pose& pose = frame.alignment.target_from_source;
+  int nearest = -1, most_seen = -1;
+  double least_distance = 1.0, largest_part = 0.0;
+  for (const SeenKeyFrame& other : seen) {
+    const double distance = view_distance(pose_of(other.key_frame), pose, view.cloud.depth);
     if (distance < least_distance) {
       least_distance = distance;
-      nearest = k;
+      nearest = other.key_frame;
     }
-    const FrameCloud& cloud = key_frames_[static_cast<std::size_t>(k)].cloud;
-    const double part = part_in_view(cloud, pose.inverse() * pose_of(k), frame.view, camera_);
-    if (part > largest_part) {
-      largest_part = part;
-      most_seen = k;
+    if (other.part > largest_part) {
+      largest_part = other.part;
+      most_seen = other.key_frame;
     }
   }
-
-  // A new view becomes a key frame.
-  int node = found && !agrees ? -1 : nearest;
-  const bool is_new = node < 0 && key_frames_.size() < loops_limits::most_key_frames;
-  if (is_new) {
-    const double depth = key.cloud.depth;
-    key_frames_.push_back(std::move(key));
+  int node = is_apart ? -1 : nearest;
+  const bool is_key_frame = node < 0 && key_frames_.size() < loops_limits::most_key_frames;
+  if (is_key_frame) {
+    const double depth = view.cloud.depth;
+    key_frames_.push_back(std::move(view));
     node = graph_.add_node(pose, frame.is_given);
-    if (!stops_.empty()) {
-      const int from = frame.to_whole_model && most_seen >= 0 ? most_seen : stops_.back().key_frame;
+    if (!trajectory_.empty()) {
+      const int from = frame.to_whole_model && most_seen >= 0 ? most_seen : trajectory_.back().key_frame;
       graph_.add_edge(edge(from, node, pose, frame.alignment, depth, false));
     }
   } else if (node < 0) {
-    node = most_seen >= 0 ? most_seen : stops_.back().key_frame;
+    node = most_seen >= 0 ? most_seen : trajectory_.back().key_frame;
   }
-  stops_.push_back({frame.index, node, pose});
-  if (!is_new) return report;
+  trajectory_.push_back({frame.index, node, pose});
+  return is_key_frame;
+}
 
-  const bool is_ring = closes_ring(in_view);
-  seen_with_.push_back(in_view);
-  for (const int k : in_view) seen_with_[static_cast<std::size_t>(k)].push_back(node);
-  if (!found) return is_ring ? adjust_ring(frame, in_view) : report;
+// Another loop, a step or two before, moves the same points to the same place.
+bool LoopClosure::is_confirmed(const LoopFrame& frame, const Match& loop) const {
+  if (!pending_ || loop.time - pending_->time > 2) return false;
+  const Pose& pose = frame.alignment.target_from_source;
+  const double apart =
+      rms_distance(key_frames_.back().cloud.points, loop.correction * pose, pending_->correction * pose);
+  return apart < std::max(3.0 * tolerance_of(frame), 0.3 * loop.distance);
+}
 
-  found->node = node;
+// The frame lies elsewhere than it should: corrects all poses, or waits for another loop to say the same.
+LoopReport LoopClosure::close(const LoopFrame& frame, const Match& loop, const std::vector<int>& in_question) {
+  LoopReport report;
+  std::vector<Match> loops = {loop};
+  PlaceOdds odds;
+  if (is_confirmed(frame, loop)) {
+    odds.add(pending_->relocalisation_score, 1.0);
+    loops.insert(loops.begin(), *pending_);
+  }
+  odds.add(loop.relocalisation_score, 1.0);
   const double depth = key_frames_.back().cloud.depth;
-  if (agrees) {
-    graph_.add_edge(edge(found->key_frame, node, found->alignment.target_from_source, found->alignment, depth, true));
-    pending_.reset();
-    return is_ring ? adjust_ring(frame, in_view) : report;
+  if (odds.is_enough(loop.relocalisation_score, Expectation::expected)) {
+    report.corrections = optimise(loops, depth, frame.index);
   }
-  const bool is_confirmed =
-      pending_ && found->stop - pending_->stop <= 2 &&
-      rms_distance(key_frames_.back().cloud.points, found->correction * pose, pending_->correction * pose) <
-          std::max(3.0 * tolerance, 0.3 * found->distance);
-  if (is_confirmed || found->is_beyond_doubt) {
-    report.corrections =
-        close(is_confirmed ? std::vector<Match>{*pending_, *found} : std::vector<Match>{*found}, depth, frame.index);
-    if (!report.corrections.empty()) {
-      report.frame = key_frames_[static_cast<std::size_t>(found->key_frame)].frame;
-      report.distance = found->distance;
-      report.depth = depth;
-      for (const int k : candidates) key_frames_[static_cast<std::size_t>(k)].last_seen = now() - 1;
-      pending_.reset();
-      return report;
-    }
+  if (report.corrections.empty()) {
+    pending_ = loop;
+    return report;
   }
-  pending_ = found;
+  report.frame = key_frames_[static_cast<std::size_t>(loop.key_frame)].frame;
+  report.distance = loop.distance;
+  report.depth = depth;
+  for (const int k : in_question) key_frames_[static_cast<std::size_t>(k)].last_verified = time() - 1;
+  pending_.reset();
   return report;
 }
 
@@ -178,18 +214,16 @@ void LoopClosure::move(const std::vector<Pose>& motions) {
     poses[k] = motions[static_cast<std::size_t>(key_frames_[k].frame)] * poses[k];
   }
   graph_.set_poses(poses);
-  for (Stop& stop : stops_) stop.pose = motions[static_cast<std::size_t>(stop.frame)] * stop.pose;
+  for (TrajectoryNode& node : trajectory_) node.pose = motions[static_cast<std::size_t>(node.frame)] * node.pose;
 }
 
-// Registers a frame to the clouds of key frames.
-std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, const FrameCloud& cloud,
-                                                     const std::vector<int>& candidates) const {
-  if (candidates.empty() || cloud.points.rows() < 100) return std::nullopt;
+// The clouds of key frames as one.
+IcpTarget LoopClosure::target_of(const std::vector<int>& key_frames, const AlignOptions& options) const {
   Eigen::Index rows = 0;
-  for (const int k : candidates) rows += key_frames_[static_cast<std::size_t>(k)].cloud.points.rows();
+  for (const int k : key_frames) rows += key_frames_[static_cast<std::size_t>(k)].cloud.points.rows();
   Points points(rows, 3), normals(rows, 3);
   rows = 0;
-  for (const int k : candidates) {
+  for (const int k : key_frames) {
     const FrameCloud& other = key_frames_[static_cast<std::size_t>(k)].cloud;
     const Eigen::Isometry3f pose(pose_of(k).cast<float>());
     for (Eigen::Index i = 0; i < other.points.rows(); ++i, ++rows) {
@@ -197,42 +231,50 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
       normals.row(rows) = (pose.linear() * other.normals.row(i).transpose()).transpose();
     }
   }
+  return IcpTarget(AlignCloud(points, normals), options);
+}
+
+// Registers a frame to key frames. None where nothing speaks for it.
+std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, const FrameCloud& cloud,
+                                                     const std::vector<int>& in_question) const {
+  if (in_question.empty() || cloud.points.rows() < loops_limits::least_points) return std::nullopt;
   AlignOptions align_options = options_.registration;
   align_options.max_samples = align_options.max_points = 0;
-  const IcpTarget target(AlignCloud(points, normals), align_options);
+  const IcpTarget target = target_of(in_question, align_options);
   IcpSource source(AlignCloud(cloud.points, cloud.normals, cloud.sigma), align_options);
-  const double largest = 0.05 * target.diameter();
+  const double largest = loops_limits::largest_reach * target.diameter();
   source.reach.resize(source.cloud.points.rows());
   source.largest_residual.resize(source.cloud.points.rows());
   for (Eigen::Index i = 0; i < source.reach.size(); ++i) {
-    const double noise = 4.0 * static_cast<double>(cloud.noise[source.cloud.rows[static_cast<std::size_t>(i)]]);
-    source.reach[i] = static_cast<float>(std::min(std::max(2.5 * target.spacing(), noise), largest));
-    source.largest_residual[i] = static_cast<float>(std::min(std::max(2.75 * frame.spacing, noise), largest));
+    const double noise = loops_limits::residual_sigmas *
+                         static_cast<double>(cloud.noise[source.cloud.rows[static_cast<std::size_t>(i)]]);
+    const double along = std::max(loops_limits::reach_spacings * target.spacing(), noise);
+    const double across = std::max(loops_limits::residual_spacings * frame.spacing, noise);
+    source.reach[i] = static_cast<float>(std::min(along, largest));
+    source.largest_residual[i] = static_cast<float>(std::min(across, largest));
   }
   align_options.max_distance = loops_limits::search_radius * cloud.depth;
   align_options.final_distance = static_cast<double>(median_of(source.reach));
 
   Match found;
-  found.stop = now();
-  found.key_frame = candidates.front();
+  found.time = time();
+  found.key_frame = in_question.front();
   found.alignment = align_to(target, source, frame.alignment.target_from_source, align_options);
   const Pose& pose = found.alignment.target_from_source;
-  if (found.alignment.status == AlignStatus::too_few_pairs || found.alignment.overlap < loops_limits::least_overlap ||
-      found.alignment.weak_directions.cols() > 0 || found.alignment.residual_ratio > loops_limits::largest_ratio) {
-    return std::nullopt;
-  }
   double seen = 0.0, through = 0.0;
-  for (const int k : candidates) {
+  for (const int k : in_question) {
     const FrameCloud& other = key_frames_[static_cast<std::size_t>(k)].cloud;
-    const VisibilityCounts counts =
-        compare(other, pose.inverse() * pose_of(k), frame.view, camera_, 2.75 * frame.spacing / cloud.depth);
+    const VisibilityCounts counts = compare(other, pose.inverse() * pose_of(k), frame.view, camera_,
+                                            loops_limits::residual_spacings * frame.spacing / cloud.depth);
     seen += part_of(counts.agreeing, other);
     through += part_of(counts.seen_through, other);
   }
-  if (seen < loops_limits::least_consistency * (seen + through)) return std::nullopt;
+  const double consistency = seen > 0.0 ? seen / (seen + through) : 0.0;
+  found.relocalisation_score =
+      accept(found.alignment, consistency, Expectation::expected, {options_.min_score, true}).relocalisation_score;
+  const bool is_determined = found.alignment.weak_directions.cols() == 0;
+  if (!is_determined || !PlaceOdds::is_for(found.relocalisation_score)) return std::nullopt;
   found.correction = orthonormal(pose * frame.alignment.target_from_source.inverse());
-  found.is_beyond_doubt = found.alignment.overlap > 2.0 * loops_limits::least_overlap && through < 0.05 * seen &&
-                          found.alignment.residual_ratio < 0.5 * loops_limits::largest_ratio;
   found.distance = rms_distance(cloud.points, pose, frame.alignment.target_from_source);
   return found;
 }
@@ -262,10 +304,11 @@ PoseEdge LoopClosure::edge(int from, int to, const Pose& pose, const AlignResult
   return {from, to, pose_of(from).inverse() * pose, information, is_loop};
 }
 
-std::vector<Pose> LoopClosure::close(const std::vector<Match>& matches, double depth, std::int32_t frame) {
+// Poses that agree with the loops, as motions of all frames; none where the graph contradicts them.
+std::vector<Pose> LoopClosure::optimise(const std::vector<Match>& loops, double depth, std::int32_t frame) {
   const std::vector<Pose> before = graph_.poses();
   const std::size_t num_edges = graph_.edges().size();
-  for (const Match& loop : matches) {
+  for (const Match& loop : loops) {
     const Pose& pose = loop.alignment.target_from_source;
     graph_.add_edge(edge(loop.key_frame, loop.node, pose, loop.alignment, depth, true));
   }
@@ -279,14 +322,16 @@ std::vector<Pose> LoopClosure::close(const std::vector<Match>& matches, double d
     return {};
   }
   std::vector<Pose> motions = corrections(before, frame + 1);
-  for (Stop& stop : stops_) stop.pose = motions[static_cast<std::size_t>(stop.frame)] * stop.pose;
+  for (TrajectoryNode& node : trajectory_) node.pose = motions[static_cast<std::size_t>(node.frame)] * node.pose;
   return motions;
 }
 
 // Whether key frames that are all in view now have been tied to each other by a long way only.
-bool LoopClosure::closes_ring(const std::vector<int>& in_view) const {
-  if (in_view.empty()) return false;
-  std::vector<int> steps(seen_with_.size(), -1), queue = {*std::max_element(in_view.begin(), in_view.end())};
+bool LoopClosure::comes_around(const std::vector<SeenKeyFrame>& seen) const {
+  if (seen.empty()) return false;
+  int newest = -1;
+  for (const SeenKeyFrame& other : seen) newest = std::max(newest, other.key_frame);
+  std::vector<int> steps(seen_with_.size(), -1), queue = {newest};
   steps[static_cast<std::size_t>(queue.front())] = 0;
   for (std::size_t next = 0; next < queue.size(); ++next) {
     for (const int other : seen_with_[static_cast<std::size_t>(queue[next])]) {
@@ -296,15 +341,16 @@ bool LoopClosure::closes_ring(const std::vector<int>& in_view) const {
       queue.push_back(other);
     }
   }
-  return std::any_of(in_view.begin(), in_view.end(),
-                     [&](int k) { return steps[static_cast<std::size_t>(k)] >= loops_limits::least_loop_views; });
+  return std::any_of(seen.begin(), seen.end(), [&](const SeenKeyFrame& other) {
+    return steps[static_cast<std::size_t>(other.key_frame)] >= loops_limits::least_loop_views;
+  });
 }
 
-// A ring of views is closed, and what has drifted is less than would show: the views together determine each other
+// The camera has come around, and what has drifted is less than would show: the views together determine each other
 // better than each did when it was the newest.
-LoopReport LoopClosure::adjust_ring(const LoopFrame& frame, const std::vector<int>& in_view) {
+LoopReport LoopClosure::adjust_loop_of_views(const LoopFrame& frame, const std::vector<SeenKeyFrame>& seen) {
   LoopReport report;
-  const bool is_weak = frame.alignment.weak_directions.cols() > 0;  // the ring need not determine them either
+  const bool is_weak = frame.alignment.weak_directions.cols() > 0;  // the views need not determine them either
   if (is_weak || key_frames_.size() > loops_limits::most_loop_views || graph_.has_fixed()) return report;
   std::vector<AdjustableView> views;
   for (int k = 0; k < num_key_frames(); ++k) {
@@ -323,27 +369,29 @@ LoopReport LoopClosure::adjust_ring(const LoopFrame& frame, const std::vector<in
   graph_.set_poses(adjusted);
   graph_.measure_edges();
   report.corrections = corrections(before, frame.index + 1);
-  for (Stop& stop : stops_) stop.pose = report.corrections[static_cast<std::size_t>(stop.frame)] * stop.pose;
-  report.frame = key_frames_[static_cast<std::size_t>(in_view.front())].frame;
+  for (TrajectoryNode& node : trajectory_) {
+    node.pose = report.corrections[static_cast<std::size_t>(node.frame)] * node.pose;
+  }
+  report.frame = key_frames_[static_cast<std::size_t>(seen.front().key_frame)].frame;
   const Pose& pose = frame.alignment.target_from_source;
   report.distance = rms_distance(key_frames_.back().cloud.points, report.corrections.back() * pose, pose);
   report.depth = key_frames_.back().cloud.depth;
   return report;
 }
 
-// Of each frame: between those of the stops before and after it.
+// Of each frame: between those of the nodes before and after it.
 std::vector<Pose> LoopClosure::corrections(const std::vector<Pose>& before, std::int32_t num_frames) const {
-  const auto correction_at = [&](const Stop& stop) {
-    const auto k = static_cast<std::size_t>(stop.key_frame);
+  const auto correction_at = [&](const TrajectoryNode& node) {
+    const auto k = static_cast<std::size_t>(node.key_frame);
     return orthonormal(graph_.poses()[k] * before[k].inverse());
   };
   std::vector<Pose> motions;
   motions.reserve(static_cast<std::size_t>(num_frames));
-  std::size_t next = 0;  // the stop after the frame
+  std::size_t next = 0;  // the node after the frame
   for (std::int32_t i = 0; i < num_frames; ++i) {
-    while (next < stops_.size() && stops_[next].frame <= i) ++next;
-    const Stop& a = stops_[next > 0 ? next - 1 : 0];
-    const Stop& b = stops_[std::min(next, stops_.size() - 1)];
+    while (next < trajectory_.size() && trajectory_[next].frame <= i) ++next;
+    const TrajectoryNode& a = trajectory_[next > 0 ? next - 1 : 0];
+    const TrajectoryNode& b = trajectory_[std::min(next, trajectory_.size() - 1)];
     const double part = b.frame > a.frame
                             ? std::max(0.0, static_cast<double>(i - a.frame) / static_cast<double>(b.frame - a.frame))
                             : 0.0;

@@ -7,7 +7,7 @@
 
 #include "loops/key_frames.hpp"
 #include "loops/pose_graph.hpp"
-#include "registration/icp.hpp"
+#include "registration/acceptance.hpp"
 
 namespace nacre {
 
@@ -28,7 +28,7 @@ struct LoopReport {
   std::optional<std::int64_t> frame;  // the earlier one that a loop was closed with
   double distance = 0.0;              // between the surfaces before [m], root mean square
   double depth = 0.0;                 // of this frame, the median [m]
-  std::vector<Pose> corrections;      // corrected world from the world before, of each frame; empty: all are in place
+  std::vector<Pose> corrections;      // corrected world from the world before, of each frame; empty: none
 };
 
 class LoopClosure {
@@ -39,7 +39,7 @@ class LoopClosure {
   // The frames have moved, each by its motion.
   void move(const std::vector<Pose>& motions);
 
-  // The outlines of the oldest key frames that are near a pose, and in place (world frame).
+  // The outlines of the oldest key frames that are near a pose, and verified (world frame).
   std::vector<std::vector<OutlinePoint>> outlines_near(const Pose& pose) const;
 
   // Of what was last seen by earlier frames it is not known whether it is still in place.
@@ -50,29 +50,51 @@ class LoopClosure {
  private:
   friend struct PrivateState;
   // The camera went on by a step of view_distance.
-  struct Stop {
+  struct TrajectoryNode {
     std::int32_t frame;
-    int key_frame;
+    int key_frame;  // that stands for it
     Pose pose;
   };
+  // A key frame, and the part of its surface that is in view of a frame.
+  struct SeenKeyFrame {
+    int key_frame;
+    double part;
+  };
+  struct SeenKeyFrames {
+    std::vector<SeenKeyFrame> verified;  // to lie right
+    std::vector<int> in_question;        // those that are seen most
+  };
+  // A loop: a frame as registered to key frames in question.
   struct Match {
     int key_frame = -1;
-    int node = -1;
-    int stop = 0;
+    int node = -1;  // of the graph: the frame's
+    int time = 0;
     IcpResult alignment;
+    double relocalisation_score = 0.0;
     Pose correction = Pose::Identity();  // world then from world now
     double distance = 0.0;               // [m]
-    bool is_beyond_doubt = false;        // needs no other to confirm it
   };
 
-  int now() const { return static_cast<int>(stops_.size()); }  // the number of the stop to come
-  bool is_in_place(int key_frame) const;
+  int time() const { return static_cast<int>(trajectory_.size()); }  // the number of the node to come
+  bool is_verified(int key_frame) const;
   const Pose& pose_of(int key_frame) const { return graph_.poses()[static_cast<std::size_t>(key_frame)]; }
-  std::optional<Match> match(const LoopFrame& frame, const FrameCloud& cloud, const std::vector<int>& candidates) const;
+
+  // The steps of add_frame.
+  bool is_next_node(const LoopFrame& frame) const;
+  SeenKeyFrames select(const LoopFrame& frame) const;
+  std::optional<Match> match(const LoopFrame& frame, const FrameCloud& cloud,
+                             const std::vector<int>& in_question) const;
+  void doubt_all(std::int32_t frame);
+  bool insert(const LoopFrame& frame, KeyFrame&& view, const std::vector<SeenKeyFrame>& seen, bool is_apart);
+  bool comes_around(const std::vector<SeenKeyFrame>& seen) const;
+  LoopReport close(const LoopFrame& frame, const Match& loop, const std::vector<int>& in_question);
+  LoopReport adjust_loop_of_views(const LoopFrame& frame, const std::vector<SeenKeyFrame>& seen);
+
+  double part_in_view(int key_frame, const LoopFrame& frame) const;
+  IcpTarget target_of(const std::vector<int>& key_frames, const AlignOptions& options) const;
   PoseEdge edge(int from, int to, const Pose& pose, const AlignResult& alignment, double depth, bool is_loop) const;
-  std::vector<Pose> close(const std::vector<Match>& matches, double depth, std::int32_t frame);
-  bool closes_ring(const std::vector<int>& in_view) const;
-  LoopReport adjust_ring(const LoopFrame& frame, const std::vector<int>& in_view);
+  bool is_confirmed(const LoopFrame& frame, const Match& loop) const;
+  std::vector<Pose> optimise(const std::vector<Match>& loops, double depth, std::int32_t frame);
   std::vector<Pose> corrections(const std::vector<Pose>& before, std::int32_t num_frames) const;
 
   const Camera& camera_;
@@ -80,8 +102,8 @@ class LoopClosure {
   std::vector<KeyFrame> key_frames_;         // nodes of the graph
   std::vector<std::vector<int>> seen_with_;  // the earlier key frames in view when one was made, and the later ones
   PoseGraph graph_;
-  std::vector<Stop> stops_;
-  std::int32_t first_in_place_ = 0;  // the frame that was last registered to the whole model
+  std::vector<TrajectoryNode> trajectory_;
+  std::int32_t first_verified_ = 0;  // the frame that was last registered to the whole model
   std::optional<Match> pending_;     // a loop that waits for another to confirm it
 };
 

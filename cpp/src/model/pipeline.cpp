@@ -148,15 +148,16 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   }
   if (keeps_key_frames()) outline = find_outline(now, camera, model_limits::most_outline_points, options.num_threads);
   if (cloud.size() == 0 || extras.keep_guess) {
-    result.status = FrameStatus::tracked;
+    result.decision = Decision::accepted;
     result.alignment.target_from_source = extras.guess.value_or(Pose::Identity());
     result.alignment.rmse = 0.0;
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  result = track(cloud, frame, camera, observer, now, guesses(extras), elsewhere(region_report), was_lost() || jumped(),
-                 before, hypothesis, options.loop_closure && !was_lost() ? loops.oldest_frame() : 0, spacing, options);
-  const bool is_determined = result.status == FrameStatus::tracked && result.alignment.weak_directions.cols() == 0;
+  const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
+  result = track({frame, camera, observer, now}, {cloud, spacing, before, oldest_frame},
+                 {guesses(extras), was_lost() || jumped(), elsewhere(region_report)}, hypothesis, options);
+  const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
   if (is_determined && !result.is_on_plane) {
     refine_by_outlines(result.alignment, outline, loops.outlines_near(result.alignment.target_from_source),
                        options.num_threads);
@@ -178,28 +179,11 @@ std::vector<Pose> Pipeline::guesses(const FrameExtras& extras) const {
   return {orthonormal(predicted), last};
 }
 
-// Some of the newest poses from which the camera looked in different directions.
-static std::vector<Pose> key_poses(const FrameHistory& history) {
-  std::vector<Pose> chosen;
-  for (std::size_t age = 0; age < history.num_registered() && chosen.size() < model_limits::most_key_poses; ++age) {
-    const Pose pose = history.registered_pose(age);
-    const bool is_new = std::all_of(chosen.begin(), chosen.end(), [&](const Pose& other) {
-      return angle_between(other, pose) > model_limits::view_angle;
-    });
-    if (is_new) chosen.push_back(pose);
-  }
-  return chosen;
-}
-
-// Around some poses; and everywhere, but not at every frame where that has been to no avail.
-WhereElse Pipeline::elsewhere(const RegionReport& region_report) const {
-  WhereElse where;
-  if (!options.relocalise) return where;
-  where.views = &views;
-  where.view_of_frame = [&] { return view_of_object(region_report); };
-  where.key_poses = [this] { return key_poses(history); };
-  where.everywhere = num_lost < model_limits::patience || num_lost % model_limits::patience == 0;
-  return where;
+// An object may have turned; and everywhere, but not at every frame where that has been to no avail.
+RelocalisationPlaces Pipeline::elsewhere(const RegionReport& region_report) const {
+  if (!options.relocalise) return {};
+  const bool everywhere = num_lost < model_limits::patience || num_lost % model_limits::patience == 0;
+  return {&views, [&] { return view_of_object(region_report); }, everywhere};
 }
 
 // Of the newest frame, where it shows an object that stands on a plane.

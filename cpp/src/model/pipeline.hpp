@@ -9,7 +9,6 @@
 #include "model/frame_history.hpp"
 #include "nacre/frame_report.hpp"
 #include "nacre/model_options.hpp"
-#include "tracking/acceptance.hpp"
 #include "tracking/object_view.hpp"
 #include "tracking/relocalisation_filter.hpp"
 #include "tracking/tracking.hpp"
@@ -59,7 +58,7 @@ struct Pipeline {
   bool keeps_key_frames() const { return options.loop_closure && options.fusion_method == FusionMethod::fuse; }
   TrackingResult register_frame(const FrameExtras& extras, const RegionReport& region_report);
   std::vector<Pose> guesses(const FrameExtras& extras) const;
-  WhereElse elsewhere(const RegionReport& region_report) const;
+  RelocalisationPlaces elsewhere(const RegionReport& region_report) const;
   std::optional<ObjectView> view_of_object(const RegionReport& region_report) const;
   void move_all(const std::vector<Pose>& corrections, FrameReport& report);
 };

@@ -4,6 +4,7 @@
 
 #include "base/check.hpp"
 #include "nacre/global_registration.hpp"
+#include "registration/acceptance.hpp"
 #include "registration/global_search.hpp"
 
 namespace nacre {
@@ -52,26 +53,22 @@ GlobalCloud::GlobalCloud(const PointsRef& points_in, const PointsRef& normals_in
   if (viewpoint) require(viewpoint->allFinite(), "viewpoint", "finite", viewpoint->transpose());
 }
 
-// A motion whose residuals are too large for the tolerance is no rival, however much is within it.
 GlobalAcceptance accept_motion(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options,
                                double tolerance) {
-  const double largest = options.max_residual * tolerance;
-  const auto is_close = [&](const SearchCandidate& candidate) { return candidate.alignment.rmse <= largest; };
-  const auto found = std::find_if(candidates.begin(), candidates.end(), is_close);
-  const SearchCandidate& best = found != candidates.end() ? *found : candidates.front();
-  GlobalAcceptance acceptance{GlobalAlignStatus::not_found, best, std::max(best.forward.agree, best.backward.agree),
-                              0.0, 0.0};
-  acceptance.consistency =
-      std::min(consistency_of(best.forward, options.outlines), consistency_of(best.backward, options.outlines));
-  if (found == candidates.end()) return acceptance;
-  const auto rival = std::find_if(found + 1, candidates.end(), is_close);
-  if (rival != candidates.end() && best.score > 0.0) acceptance.rivalry = std::max(0.0, rival->score / best.score);
-  if (!(best.score > 0.0) || acceptance.overlap < options.min_overlap ||
-      acceptance.consistency < options.min_consistency) {
-    return acceptance;
+  std::vector<SearchFit> fits;
+  for (const SearchCandidate& candidate : candidates) {
+    fits.push_back({candidate.score, std::max(candidate.forward.agree, candidate.backward.agree),
+                    std::min(consistency_of(candidate.forward, options.outlines),
+                             consistency_of(candidate.backward, options.outlines)),
+                    candidate.alignment.rmse <= options.max_residual * tolerance});
   }
-  const bool is_unique = acceptance.rivalry <= options.max_rivalry && best.alignment.weak_directions.cols() == 0;
-  acceptance.status = is_unique ? GlobalAlignStatus::found : GlobalAlignStatus::ambiguous;
+  const SearchAcceptance accepted =
+      accept_best(fits, options.min_overlap, options.min_consistency, options.max_rivalry);
+  const SearchFit& fit = fits[accepted.best];
+  GlobalAcceptance acceptance{accepted.status, candidates[accepted.best], fit.overlap, fit.consistency,
+                              accepted.rivalry};
+  const bool is_open = acceptance.best.alignment.weak_directions.cols() > 0;
+  if (acceptance.status == GlobalAlignStatus::found && is_open) acceptance.status = GlobalAlignStatus::ambiguous;
   return acceptance;
 }
 

@@ -5,33 +5,18 @@
 #include <limits>
 
 #include "base/parallel.hpp"
+#include "base/point_rows.hpp"
 #include "base/random.hpp"
 #include "registration/limits.hpp"
 
 namespace nacre {
-namespace {
-
-Points rows_of(const PointsRef& points, const std::vector<Eigen::Index>& rows) {
-  Points chosen(static_cast<Eigen::Index>(rows.size()), 3);
-  for (std::size_t i = 0; i < rows.size(); ++i) chosen.row(static_cast<Eigen::Index>(i)) = points.row(rows[i]);
-  return chosen;
-}
-
-Values rows_of(const ValuesRef& values, const std::vector<Eigen::Index>& rows) {
-  Values chosen(static_cast<Eigen::Index>(rows.size()));
-  for (std::size_t i = 0; i < rows.size(); ++i) chosen[static_cast<Eigen::Index>(i)] = values[rows[i]];
-  return chosen;
-}
-
-}  // namespace
-
 BrightCloud::BrightCloud(const PointsRef& points_in, const ValuesRef& brightness_in) {
   std::vector<Eigen::Index> rows;
   for (Eigen::Index i = 0; i < brightness_in.size(); ++i) {
     if (std::isfinite(brightness_in[i]) && points_in.row(i).allFinite()) rows.push_back(i);
   }
-  points = rows_of(points_in, rows);
-  brightness = rows_of(brightness_in, rows);
+  points = take_rows<Points>(points_in, rows);
+  brightness = take_rows<Values>(brightness_in, rows);
 }
 
 BrightCloud BrightCloud::thinned(std::int64_t step, std::uint64_t seed) const {
@@ -41,7 +26,7 @@ BrightCloud BrightCloud::thinned(std::int64_t step, std::uint64_t seed) const {
     const auto index = static_cast<std::uint64_t>(i);
     if (index % part == random_bits(seed, index / part) % part) rows.push_back(i);
   }
-  return BrightCloud(rows_of(PointsRef(points), rows), rows_of(ValuesRef(brightness), rows));
+  return BrightCloud(take_rows<Points>(points, rows), take_rows<Values>(brightness, rows));
 }
 
 ColorField fit_color_field(const BrightCloud& cloud, const Points& points, const Points& normals, double max_distance,

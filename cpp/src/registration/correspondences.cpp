@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/parallel.hpp"
+#include "base/point_rows.hpp"
 #include "base/random.hpp"
 #include "base/statistics.hpp"
 #include "nacre/normals.hpp"
@@ -46,14 +47,6 @@ void shuffle(std::vector<std::int32_t>& rows, std::uint64_t seed) {
   for (std::size_t i = rows.size(); i > 1; --i) std::swap(rows[i - 1], rows[random_bits(seed, i) % i]);
 }
 
-template <class Matrix>
-Matrix rows_of(const Eigen::Ref<const Matrix>& values, const std::vector<std::int32_t>& rows) {
-  if (values.rows() == 0) return Matrix(0, values.cols());
-  Matrix chosen(static_cast<Eigen::Index>(rows.size()), values.cols());
-  for (std::size_t i = 0; i < rows.size(); ++i) chosen.row(static_cast<Eigen::Index>(i)) = values.row(rows[i]);
-  return chosen;
-}
-
 double median_spacing(const BlockTree<float>& tree) {
   const std::int64_t step = std::max<std::int64_t>(1, tree.num_points() / registration_limits::spacing_probes);
   std::vector<double> distances;
@@ -80,7 +73,7 @@ double bounding_diameter(const PointsRef& points) {
 void sort_in_space(const Points& points, std::vector<std::int32_t>::iterator begin,
                    std::vector<std::int32_t>::iterator end) {
   const std::vector<std::int32_t> rows(begin, end);
-  const Points chosen = rows_of<Points>(points, rows);
+  const Points chosen = take_rows<Points>(points, rows);
   SpatialOrder<float>(chosen.data(), chosen.rows(), 1)
       .for_each_stretch(1, [&](std::int64_t first, const std::uint64_t* entries, std::int64_t count) {
         for (std::int64_t i = 0; i < count; ++i) begin[first + i] = rows[SpatialOrder<float>::row(entries[i])];
@@ -95,9 +88,9 @@ IcpCloud::IcpCloud(const AlignCloud& cloud, const AlignOptions& options, bool is
   // A gate that somebody has set is meant for the cloud as it is.
   const bool may_thin_out = options.max_points > 0 && !(options.final_distance > 0.0);
   if (may_thin_out) rows = choose(rows, static_cast<std::size_t>(options.max_points), options.seed);
-  points = rows_of<Points>(cloud.points, rows);
-  normals = rows_of<Points>(cloud.normals, rows);
-  sigma = rows_of<Values>(cloud.sigma, rows);
+  points = take_rows<Points>(cloud.points, rows);
+  normals = take_rows<Points>(cloud.normals, rows);
+  sigma = take_rows<Values>(cloud.sigma, rows);
   if (!has_estimated_normals) return;
 
   NormalOptions normal_options;
@@ -106,9 +99,9 @@ IcpCloud::IcpCloud(const AlignCloud& cloud, const AlignOptions& options, bool is
 }
 
 void IcpCloud::keep(const std::vector<std::int32_t>& kept) {
-  points = rows_of<Points>(points, kept);
-  normals = rows_of<Points>(normals, kept);
-  sigma = rows_of<Values>(sigma, kept);
+  points = take_rows<Points>(points, kept);
+  normals = take_rows<Points>(normals, kept);
+  sigma = take_rows<Values>(sigma, kept);
   std::vector<std::int32_t> kept_rows(kept.size());
   for (std::size_t i = 0; i < kept.size(); ++i) kept_rows[i] = rows[static_cast<std::size_t>(kept[i])];
   rows = std::move(kept_rows);

@@ -6,6 +6,7 @@
 #include "base/parallel.hpp"
 #include "base/random.hpp"
 #include "depth/systematic_error.hpp"
+#include "tracking/limits.hpp"
 
 namespace nacre {
 
@@ -42,7 +43,7 @@ FrameSamples sample_frame(const Frame& frame, const SurfaceObserver& observer, c
 }
 
 BrightCloud bright_cloud(const Frame& frame, const SurfaceObserver& observer) {
-  constexpr std::size_t most = 100000;
+  const std::size_t most = tracking_limits::most_bright_points;
   const std::size_t step = std::max<std::size_t>(1, (frame.valid.size() + most - 1) / most);
   const auto count = static_cast<Eigen::Index>(frame.valid.size() / step);
   Points points(count, 3);

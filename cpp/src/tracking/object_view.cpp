@@ -9,27 +9,18 @@
 #include "depth/depth_view.hpp"
 #include "region/limits.hpp"
 #include "region/support_planes.hpp"
+#include "tracking/limits.hpp"
 
 namespace nacre {
-namespace {
-
-constexpr Eigen::Index least_samples = 100;
-constexpr Eigen::Index most_samples = 2000;
-constexpr double largest_part = 0.03;  // of the object's size, that the tolerance may be
-constexpr double body_depth = 0.9;     // from the middle of what is seen to that of the body, in radii of what is seen
-constexpr float least_cosine_to_camera = 0.3F;  // cosine
-
-}  // namespace
-
 std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& region, const SupportPlane& support,
                                       const FrameSamples& samples, std::uint64_t seed) {
   std::vector<Eigen::Index> rows;
   for (Eigen::Index i = 0; i < samples.points.rows(); ++i) {
     if (samples.points.row(i).allFinite() && samples.normals.row(i).allFinite()) rows.push_back(i);
   }
-  if (static_cast<Eigen::Index>(rows.size()) < least_samples) return std::nullopt;
+  if (static_cast<Eigen::Index>(rows.size()) < tracking_limits::least_object_samples) return std::nullopt;
   for (std::size_t i = rows.size(); i > 1; --i) std::swap(rows[i - 1], rows[random_bits(seed, i) % i]);
-  rows.resize(std::min(rows.size(), static_cast<std::size_t>(most_samples)));
+  rows.resize(std::min(rows.size(), static_cast<std::size_t>(tracking_limits::most_object_samples)));
 
   ObjectView view;
   const auto count = static_cast<Eigen::Index>(rows.size());
@@ -44,7 +35,8 @@ std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& regio
         std::hypot(3.0F * samples.noise[row], region_limits::bend * samples.points.row(row).norm());
   }
   view.size = static_cast<double>((view.points.colwise().maxCoeff() - view.points.colwise().minCoeff()).norm());
-  view.tolerance = std::min(static_cast<double>(median_of(std::move(errors))), largest_part * view.size);
+  view.tolerance =
+      std::min(static_cast<double>(median_of(std::move(errors))), tracking_limits::largest_tolerance * view.size);
   view.depth = frame.points.col(2);
   view.region = region;
   view.support = support;
@@ -66,7 +58,8 @@ Eigen::Vector3d ObjectView::center() const {
   if (!(level.norm() > 1e-6 * middle.norm())) return middle;
   const Eigen::Vector3d away = level.normalized(), side = support.normal.cross(away);
   const Eigen::VectorXd across = (points.cast<double>().rowwise() - middle.transpose()) * side;
-  return middle + body_depth * std::sqrt(across.squaredNorm() / static_cast<double>(across.size())) * away;
+  return middle +
+         tracking_limits::body_depth * std::sqrt(across.squaredNorm() / static_cast<double>(across.size())) * away;
 }
 
 ViewAgreement look_at(const ObjectView& moved, const ObjectView& seen, const Pose& seen_from_moved,
@@ -75,19 +68,19 @@ ViewAgreement look_at(const ObjectView& moved, const ObjectView& seen, const Pos
   const PointProjection projection(camera, seen_from_moved.inverse());
   const auto tolerance = static_cast<float>(std::max(moved.tolerance, seen.tolerance));
   float agree = 0.0F, through = 0.0F, hidden = 0.0F;
-  visit_points_in_view(moved.points, moved.normals, 0, count, projection,
-                       [&](const PointProjection::Block& block, int i) {
-                         const float behind = seen.depth[block.pixel[i]] - block.z[i];
-                         const float margin = 2.0F * tolerance / std::max(block.facing[i], least_cosine_to_camera);
-                         const Visibility is = visibility(behind, margin);
-                         if (is == Visibility::unknown) return;
-                         if (is == Visibility::seen_through) through += 1.0F;
-                         if (!(block.facing[i] > least_cosine_to_camera) || seen.region.data()[block.pixel[i]] == 0)
-                           return;
-                         if (is == Visibility::occluded) hidden += 1.0F;
-                         const float ratio = behind * block.facing[i] / tolerance;
-                         agree += std::max(0.0F, 1.0F - ratio * ratio);
-                       });
+  visit_points_in_view(
+      moved.points, moved.normals, 0, count, projection, [&](const PointProjection::Block& block, int i) {
+        const float behind = seen.depth[block.pixel[i]] - block.z[i];
+        const float margin = 2.0F * tolerance / std::max(block.facing[i], tracking_limits::least_cosine_to_camera);
+        const Visibility is = visibility(behind, margin);
+        if (is == Visibility::unknown) return;
+        if (is == Visibility::seen_through) through += 1.0F;
+        if (!(block.facing[i] > tracking_limits::least_cosine_to_camera) || seen.region.data()[block.pixel[i]] == 0)
+          return;
+        if (is == Visibility::occluded) hidden += 1.0F;
+        const float ratio = behind * block.facing[i] / tolerance;
+        agree += std::max(0.0F, 1.0F - ratio * ratio);
+      });
   const auto all = static_cast<double>(std::max<Eigen::Index>(count, 1));
   return {static_cast<double>(agree) / all, static_cast<double>(through) / all, static_cast<double>(hidden) / all};
 }

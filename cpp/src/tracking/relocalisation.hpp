@@ -1,18 +1,12 @@
-// Where may a camera be that has been lost? Candidates, found with a few points of its frame.
+// Where may a camera be that has been lost?
 #pragma once
 
 #include <optional>
-#include <vector>
 
 #include "nacre/fusion.hpp"
 #include "registration/correspondences.hpp"
 
 namespace nacre {
-
-// The guesses (world_from_camera) after a short registration of a few points of the frame to the whole model: the
-// `count` of them on which most agrees, best first.
-std::vector<Pose> most_promising(const PointModel& model, const IcpSource& source, const std::vector<Pose>& guesses,
-                                 const AlignOptions& options, std::size_t count);
 
 // Where a frame fits the model, wherever the camera is: none where it fits nowhere, or in several places about as well.
 // `source` holds points of the frame. Takes some tenths of a second.

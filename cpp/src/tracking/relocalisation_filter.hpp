@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "registration/correspondences.hpp"
-#include "tracking/acceptance.hpp"
+#include "tracking/tracking_result.hpp"
 
 namespace nacre {
 
@@ -31,7 +31,7 @@ class PlaceHypothesis {
     Pose pose;                // as registered to the model, world_from_camera
     Pose followed;            // as moved from frame to frame since the start
     std::vector<Pose> views;  // that have been counted
-    double log_odds = 0.0;
+    PlaceOdds odds;
   };
   struct Surface {
     Points points, normals;  // camera frame

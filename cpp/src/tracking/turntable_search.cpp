@@ -6,18 +6,11 @@
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "registration/planar.hpp"
+#include "tracking/limits.hpp"
+#include "tracking/points_in_view.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr int num_angles = 72;  // from which the search starts
-constexpr std::size_t num_candidates = 10;
-constexpr Eigen::Index coarse_samples = 300, climb_samples = 800;
-constexpr double same_turn = 0.15;                             // [rad]
-constexpr double same_shift = 0.08;                            // of the object's size
-constexpr double first_gate = 0.25;                            // of the object's size
-constexpr double least_score = 0.1, least_view_overlap = 0.1;  // parts of the samples
-constexpr double least_consistency = 0.75;
 
 struct Candidate {
   IcpResult alignment;
@@ -34,7 +27,7 @@ class TurntableSearch {
         options_(single_threaded(options)),
         num_threads_(options.num_threads),
         source_(AlignCloud(frame.points, frame.normals), options_),
-        target_(AlignCloud(rows_of(model.points), rows_of(model.normals)), options_) {
+        target_(AlignCloud(as_rows(model.points), as_rows(model.normals)), options_) {
     const ObjectView& first = views.front();
     plane_ = first.world_from_camera * first.ground_frame();
     normal_ = plane_.linear().col(2);
@@ -48,16 +41,19 @@ class TurntableSearch {
   }
 
   std::vector<Candidate> run() const {
-    std::vector<Candidate> candidates(num_angles);
-    parallel_for(num_angles, 2, num_threads_, [&](std::int64_t i) {
+    std::vector<Candidate> candidates(tracking_limits::num_turns);
+    parallel_for(tracking_limits::num_turns, 2, num_threads_, [&](std::int64_t i) {
       Pose turn = Pose::Identity();
-      turn.linear() = Eigen::AngleAxisd(static_cast<double>(i) * 2.0 * static_cast<double>(EIGEN_PI) / num_angles,
-                                        Eigen::Vector3d::UnitZ())
-                          .toRotationMatrix();
-      const PlaneGates gates{first_gate * frame_.size, 3.0 * frame_.tolerance, 14, coarse_samples};
-      candidates[static_cast<std::size_t>(i)] = align(plane_ * turn * ground_frame_.inverse(), gates, coarse_samples);
+      turn.linear() =
+          Eigen::AngleAxisd(static_cast<double>(i) * 2.0 * static_cast<double>(EIGEN_PI) / tracking_limits::num_turns,
+                            Eigen::Vector3d::UnitZ())
+              .toRotationMatrix();
+      const PlaneGates gates{tracking_limits::first_turn_gate * frame_.size, 3.0 * frame_.tolerance, 14,
+                             tracking_limits::coarse_turn_samples};
+      candidates[static_cast<std::size_t>(i)] =
+          align(plane_ * turn * ground_frame_.inverse(), gates, tracking_limits::coarse_turn_samples);
     });
-    candidates = different(std::move(candidates), num_candidates);
+    candidates = different(std::move(candidates), tracking_limits::num_turn_candidates);
     parallel_for(static_cast<std::int64_t>(candidates.size()), 1, num_threads_, [&](std::int64_t i) {
       Candidate& candidate = candidates[static_cast<std::size_t>(i)];
       const PlaneGates gates{4.0 * frame_.tolerance, 2.0 * frame_.tolerance, 30, frame_.points.rows()};
@@ -79,9 +75,6 @@ class TurntableSearch {
     options.method = Metric::symmetric;
     options.num_threads = 1;
     return options;
-  }
-  static PointsRef rows_of(const std::vector<Eigen::Vector3f>& vectors) {
-    return Eigen::Map<const Points>(vectors.front().data(), static_cast<Eigen::Index>(vectors.size()), 3);
   }
 
   Candidate align(const Pose& guess, const PlaneGates& gates, Eigen::Index num_samples) const {
@@ -109,7 +102,7 @@ class TurntableSearch {
   // and Jeeves 1961 on the score, in which outlines count.
   Candidate climb(Candidate best) const {
     if (best.alignment.status == AlignStatus::too_few_pairs) return best;
-    score(best, climb_samples);
+    score(best, tracking_limits::climb_samples);
     const Eigen::Vector3d axes[] = {normal_, plane_.linear().col(0), plane_.linear().col(1)};
     for (double step = frame_.tolerance; step > 0.1 * frame_.tolerance; step *= 0.5) {
       bool is_better = true;
@@ -127,7 +120,7 @@ class TurntableSearch {
           } else {
             pose.pretranslate(length * axis);
           }
-          score(next, climb_samples);
+          score(next, tracking_limits::climb_samples);
           if (next.score <= best.score) continue;
           best = next;
           is_better = true;
@@ -148,8 +141,8 @@ class TurntableSearch {
       const Pose& pose = candidate.alignment.target_from_source;
       const auto is_known = [&](const Candidate& other) {
         const Pose& other_pose = other.alignment.target_from_source;
-        return angle_between(pose, other_pose) < same_turn &&
-               (pose * middle - other_pose * middle).norm() < same_shift * frame_.size;
+        return angle_between(pose, other_pose) < tracking_limits::same_turn &&
+               (pose * middle - other_pose * middle).norm() < tracking_limits::same_shift * frame_.size;
       };
       if (std::none_of(kept.begin(), kept.end(), is_known)) kept.push_back(candidate);
     }
@@ -174,14 +167,17 @@ std::optional<PlaneFit> fit_on_plane(const PointModel& model, const std::vector<
   if (model.size() == 0 || views.empty()) return std::nullopt;
   const TurntableSearch search(model, views, frame, camera, options);
   const std::vector<Candidate> candidates = search.run();
-  const Candidate& best = candidates.front();
-  if (!(best.score > least_score) || !(best.overlap > least_view_overlap)) return std::nullopt;
+  std::vector<SearchFit> fits;
+  for (const Candidate& candidate : candidates) {
+    fits.push_back({candidate.score, candidate.overlap, candidate.agree / (candidate.agree + candidate.through), true});
+  }
+  // A rival that is not contradicted is enough for doubt.
+  const SearchAcceptance accepted =
+      accept_best(fits, tracking_limits::least_view_overlap, tracking_limits::least_view_consistency, 0.0);
+  if (accepted.status != GlobalAlignStatus::found) return std::nullopt;
+  const Candidate& best = candidates[accepted.best];
   PlaneFit fit;
-  fit.score = best.score;
-  fit.overlap = best.overlap;
-  fit.consistency = best.agree / (best.agree + best.through);
-  const bool has_rival = candidates.size() > 1 && candidates[1].score > 0.0;  // not contradicted
-  if (has_rival || fit.consistency < least_consistency) return std::nullopt;
+  fit.consistency = fits[accepted.best].consistency;
   fit.alignment = search.settle(best);
   fit.alignment.target_from_source = orthonormal(fit.alignment.target_from_source);
   return fit;

@@ -13,8 +13,6 @@ namespace nacre {
 
 struct PlaneFit {
   IcpResult alignment;       // world_from_camera as target_from_source
-  double score = 0.0;        // of all views
-  double overlap = 0.0;      // with the view that agrees most
   double consistency = 0.0;  // with the views: what agrees, of that and what they see through
 };
 

@@ -249,14 +249,14 @@ bool PrivateState::is_sound(const LoopClosure& loops, std::size_t num_frames) {
     if (!std::all_of(others.begin(), others.end(), [&](int other) { return is_within(other, count); })) return false;
   }
   std::int32_t last = -1;
-  for (const LoopClosure::Stop& stop : loops.stops_) {
-    if (!is_within(stop.key_frame, count) || !is_within(stop.frame, num_frames) || stop.frame <= last) return false;
-    last = stop.frame;
+  for (const LoopClosure::TrajectoryNode& node : loops.trajectory_) {
+    if (!is_within(node.key_frame, count) || !is_within(node.frame, num_frames) || node.frame <= last) return false;
+    last = node.frame;
   }
-  if (loops.stops_.empty() != loops.key_frames_.empty()) return false;
+  if (loops.trajectory_.empty() != loops.key_frames_.empty()) return false;
   const auto& pending = loops.pending_;
   return !pending || (is_within(pending->key_frame, count) && is_within(pending->node, count) &&
-                      is_within(pending->stop, loops.stops_.size() + 1));
+                      is_within(pending->time, loops.trajectory_.size() + 1));
 }
 
 bool PrivateState::is_sound(const PlaceHypothesis& hypothesis) {

@@ -5,7 +5,6 @@
 #include "loops/loop_closure.hpp"
 #include "model/checkpoint/fields.hpp"
 #include "model/frame_history.hpp"
-#include "tracking/acceptance.hpp"
 #include "tracking/object_view.hpp"
 #include "tracking/relocalisation_filter.hpp"
 
@@ -36,7 +35,7 @@ void exchange(Archive& archive, OutlinePoint& point) {
 
 template <class Archive>
 void exchange(Archive& archive, KeyFrame& key_frame) {
-  archive(key_frame.frame, key_frame.cloud, key_frame.outline, key_frame.last_seen);
+  archive(key_frame.frame, key_frame.cloud, key_frame.outline, key_frame.last_verified);
 }
 
 template <class Archive>
@@ -82,22 +81,27 @@ struct PrivateState {
   }
 
   template <class Archive>
-  static void exchange(Archive& archive, LoopClosure::Stop& stop) {
-    archive(stop.frame, stop.key_frame, stop.pose);
+  static void exchange(Archive& archive, LoopClosure::TrajectoryNode& node) {
+    archive(node.frame, node.key_frame, node.pose);
   }
   template <class Archive>
   static void exchange(Archive& archive, LoopClosure::Match& match) {
-    archive(match.key_frame, match.node, match.stop, match.alignment, match.correction, match.distance,
-            match.is_beyond_doubt);
+    archive(match.key_frame, match.node, match.time, match.alignment, match.relocalisation_score, match.correction,
+            match.distance);
   }
   template <class Archive>
   static void exchange(Archive& archive, LoopClosure& loops) {
-    archive(loops.key_frames_, loops.seen_with_, loops.graph_, loops.stops_, loops.first_in_place_, loops.pending_);
+    archive(loops.key_frames_, loops.seen_with_, loops.graph_, loops.trajectory_, loops.first_verified_,
+            loops.pending_);
   }
 
   template <class Archive>
+  static void exchange(Archive& archive, PlaceOdds& odds) {
+    archive(odds.log_odds_, odds.num_views_);
+  }
+  template <class Archive>
   static void exchange(Archive& archive, PlaceHypothesis::Place& place) {
-    archive(place.pose, place.followed, place.views, place.log_odds);
+    archive(place.pose, place.followed, place.views, place.odds);
   }
   template <class Archive>
   static void exchange(Archive& archive, PlaceHypothesis::Surface& surface) {

@@ -1,0 +1,112 @@
+#include "registration/acceptance.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+
+#include "registration/limits.hpp"
+
+namespace nacre {
+namespace {
+
+// What is asked of a registration. Far from all guesses there are many places, and some resemble: boxes' corners fit
+// corners, and of unrelated round shapes that match the misfit is 0.54 and more.
+struct Demands {
+  double score;  // times min_score
+  double consistency_power;
+  double largest_misfit;  // that does not lower the score
+};
+
+Demands demands_on(const IcpResult& alignment, Expectation expectation) {
+  using namespace registration_limits;
+  const bool is_plane = alignment.normal_information < plane_information;
+  switch (expectation) {
+    case Expectation::expected:
+      return {1.0, consistency_power, 1.0};
+    case Expectation::near_lost:
+      return {doubtful_score, consistency_power, 1.0};
+    case Expectation::unexpected:
+      return {is_plane ? doubtful_plane_score : doubtful_score, far_consistency_power, far_misfit};
+    default:
+      return {0.0, consistency_power, 1.0};
+  }
+}
+
+bool is_other_size(const SizeDifference& size, Expectation expectation) {
+  using namespace registration_limits;
+  const bool is_far = expectation == Expectation::unexpected;
+  const double certainty = is_far ? far_size_sigmas : size_sigmas;
+  return (is_far || size.sigma <= size_sigma) && std::abs(size.relative) > std::max(other_size, certainty * size.sigma);
+}
+
+}  // namespace
+
+Acceptance accept(const IcpResult& alignment, double consistency, Expectation expectation,
+                  const AcceptanceOptions& options) {
+  using namespace registration_limits;
+  Acceptance acceptance;
+  std::ostringstream reason;
+  reason.precision(3);
+  if (alignment.status == AlignStatus::too_few_pairs) {
+    acceptance.reason = "too few points of the frame match the model";
+    return acceptance;
+  }
+  const Demands demands = demands_on(alignment, expectation);
+  const double overlap = alignment.overlap;
+  const double ratio = std::max(least_ratio, alignment.residual_ratio);
+  const double bent = std::max(1.0, alignment.misfit / demands.largest_misfit);
+  const double per_match = std::max(0.0, std::log(chance_ratio / ratio)) / (bent * bent);
+  const double least = demands.score * options.min_score;
+  acceptance.score = overlap * overlap * std::pow(consistency, demands.consistency_power) * per_match;
+  acceptance.relocalisation_score = overlap * std::pow(consistency, relocalisation_consistency_power) * per_match /
+                                    (bent * bent) * alignment.normal_information;
+  if (options.verify && is_other_size(alignment.size_difference, expectation)) {
+    acceptance.relocalisation_score = 0.0;
+    reason << "the frame is " << 1.0 / (1.0 + alignment.size_difference.relative)
+           << " times as large as the part of the model that it fits";
+  } else if (options.verify && !(acceptance.score >= least)) {
+    reason << "registration score " << acceptance.score << " is below " << least << ": overlap " << overlap
+           << ", consistency " << consistency << ", residuals " << ratio << " of the largest that match";
+    if (bent > 1.0) reason << ", bent " << bent << " times as much as true matches may be";
+  } else if (options.verify && alignment.weak_directions.cols() > 0) {
+    acceptance.decision = Decision::undetermined;
+    reason << alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
+  } else {
+    acceptance.decision = Decision::accepted;
+    acceptance.is_clear_cut = options.verify && acceptance.score >= clear_cut_score * options.min_score;
+  }
+  acceptance.reason = reason.str();
+  return acceptance;
+}
+
+void PlaceOdds::add(double relocalisation_score, double novelty) {
+  ++num_views_;
+  log_odds_ += novelty * (relocalisation_score - registration_limits::chance_relocalisation);
+}
+
+bool PlaceOdds::is_for(double relocalisation_score) {
+  return relocalisation_score > registration_limits::chance_relocalisation;
+}
+
+bool PlaceOdds::is_enough(double relocalisation_score, Expectation expectation) const {
+  using namespace registration_limits;
+  return relocalisation_score >= (expectation == Expectation::unexpected ? enough_far : enough_alone) ||
+         (num_views_ > 1 && log_odds_ >= enough_together);
+}
+
+SearchAcceptance accept_best(const std::vector<SearchFit>& fits, double min_overlap, double min_consistency,
+                             double max_rivalry) {
+  const auto is_close = [](const SearchFit& fit) { return fit.is_close; };
+  const auto found = std::find_if(fits.begin(), fits.end(), is_close);
+  if (found == fits.end()) return {GlobalAlignStatus::not_found, 0, 0.0};
+  SearchAcceptance acceptance{GlobalAlignStatus::not_found, static_cast<std::size_t>(found - fits.begin()), 0.0};
+  const auto rival = std::find_if(found + 1, fits.end(), is_close);
+  if (rival != fits.end() && found->score > 0.0) acceptance.rivalry = std::max(0.0, rival->score / found->score);
+  const bool agrees = found->score > 0.0 && found->overlap >= min_overlap && found->consistency >= min_consistency;
+  if (agrees) {
+    acceptance.status = acceptance.rivalry <= max_rivalry ? GlobalAlignStatus::found : GlobalAlignStatus::ambiguous;
+  }
+  return acceptance;
+}
+
+}  // namespace nacre

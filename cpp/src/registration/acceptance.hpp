@@ -1,0 +1,96 @@
+// Is a registration right? The only place where a pose is believed or not: of a frame, of a loop, of the best motion
+// that a search found, of a place that several views speak for. It rests on what the two sides say about each other,
+// not on ICP's own opinion.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nacre/global_registration.hpp"
+#include "registration/icp.hpp"
+
+namespace nacre {
+
+// What speaks for a place before anything is registered there: the less, the more is asked of the registration.
+enum class Expectation {
+  expected,    // near a guess, from the frame before
+  near_lost,   // near the last pose, but frames have been lost since
+  unexpected,  // far from all guesses
+  only_place,  // of all places, which a search has compared, the only one: see accept_best
+};
+
+struct AcceptanceOptions {
+  double min_score;
+  bool verify;
+};
+
+enum class Decision {
+  rejected,
+  undetermined,  // right as far as it goes: directions of the pose are open
+  accepted,
+};
+
+// The test of one registration.
+struct Acceptance {
+  Decision decision = Decision::rejected;
+  std::string reason;  // why it is not accepted
+  double score = 0.0;
+  double relocalisation_score = 0.0;
+  // Most of the source matches, closely, and nothing contradicts: no other guess needs to be tried.
+  bool is_clear_cut = false;
+};
+
+// The registration score is what the matches tell against chance: for each a residual that is small among those that
+// would have matched, ln(0.58 / ratio), where chance gives a ratio of 0.58; times overlap^2, since any two surfaces
+// touch somewhere, and consistency^4, since true ones contradict nowhere; by misfit^2 where it is above 1, since a
+// shape that only resembles is bent another way. Far from all guesses there are many places that resemble:
+// consistency^8, misfit above half counts, and more is asked for, much more of a plane.
+//
+// The relocalisation score is that of a place that nothing but the source speaks for. New surface does not speak
+// against it (overlap, not its square), contradictions and misfit do the more (consistency^12, misfit^4), and what the
+// residuals tell counts as much as the normals agree: see normal_information. Where only a plane of the one fits a
+// plane of the other it is 0.
+//
+// A source that is clearly larger or smaller than what it fits is lost: its depth is wrong, or it is another thing.
+//
+// A registration score of min_score is enough where everything speaks for the place; without `verify` whatever matches
+// is accepted. consistency: the part of what both sides should see that they do not see through.
+Acceptance accept(const IcpResult& alignment, double consistency, Expectation expectation,
+                  const AcceptanceOptions& options);
+
+// Views of one place, each of which may say too little alone (a sequential test, Wald 1945).
+class PlaceOdds {
+ public:
+  // A view with a relocalisation score, as far from those before as `novelty` says (1: another view altogether).
+  void add(double relocalisation_score, double novelty);
+  // Whether there is enough to believe in the place, after this view.
+  bool is_enough(double relocalisation_score, Expectation expectation) const;
+  bool is_against() const { return log_odds_ < 0.0; }
+
+  // Whether a view says more than chance does.
+  static bool is_for(double relocalisation_score);
+
+ private:
+  friend struct PrivateState;
+  double log_odds_ = 0.0;
+  int num_views_ = 0;
+};
+
+// One of the motions that a search found, and how well the two sides explain each other there.
+struct SearchFit {
+  double score, overlap, consistency;
+  bool is_close;  // its residuals are within what the search takes for one surface; others are no rivals
+};
+
+struct SearchAcceptance {
+  GlobalAlignStatus status;  // found, ambiguous or not_found
+  std::size_t best;          // the first close one, or the first of all
+  double rivalry;            // score of the next close one, as a part of the best's
+};
+
+// Fits differ from each other, the one of the highest score first. The best is believed where it agrees, and no other
+// comes near it: all places have been compared.
+SearchAcceptance accept_best(const std::vector<SearchFit>& fits, double min_overlap, double min_consistency,
+                             double max_rivalry);
+
+}  // namespace nacre

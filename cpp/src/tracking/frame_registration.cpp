@@ -1,0 +1,124 @@
+#include "tracking/frame_registration.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/statistics.hpp"
+#include "camera/point_spacing.hpp"
+#include "camera/view_distance.hpp"
+#include "registration/color.hpp"
+#include "tracking/limits.hpp"
+
+namespace nacre {
+
+FrameRegistration::FrameRegistration(const CurrentFrame& now, const TrackingTarget& target,
+                                     const TrackingOptions& options)
+    : FrameRegistration(now, target, options, sample_frame(now.frame, now.observer, options)) {}
+
+FrameRegistration::FrameRegistration(const CurrentFrame& now, const TrackingTarget& target,
+                                     const TrackingOptions& options, const FrameSamples& samples)
+    : now_(now),
+      target_(target),
+      options_(options),
+      source_(AlignCloud(samples.points, samples.normals, samples.sigma), options.registration),
+      noise_(samples.noise),
+      depth_(median_depth(samples.points)) {}
+
+TrackingResult FrameRegistration::from(const Pose& guess, Gate gate, Expectation expectation) const {
+  const PointsInView view = in_view(guess);
+  AlignOptions align_options = options_.registration;
+  align_options.max_points = 0;  // the view is thin enough
+  const IcpTarget target(AlignCloud(view.points, view.normals), align_options);
+  const IcpSource source = gated(view, target);
+  if (!(align_options.final_distance > 0.0)) {
+    align_options.final_distance = source.reach.size() > 0 ? static_cast<double>(median_of(source.reach)) : 0.0;
+  }
+  if (has_automatic_gate() && gate == Gate::narrow) {
+    align_options.max_distance = tracking_limits::narrow_gate * align_options.final_distance;
+  }
+
+  TrackingResult result;
+  result.alignment = align_to(target, source, guess, align_options);
+  determine_open_directions(view, target, source, align_options, result.alignment);
+  const Pose& pose = result.alignment.target_from_source;
+  result.consistency = consistency(view, pose);
+  const bool is_far = view_distance(guess, pose, depth_) > tracking_limits::far_from_guess;
+  result.expectation = is_far ? Expectation::unexpected : expectation;
+  result.test(options_);
+  return result;
+}
+
+PointsInView FrameRegistration::in_view(const Pose& world_from_camera) const {
+  return points_in_view(target_.model, now_.camera, world_from_camera, target_.oldest_frame, options_.num_threads);
+}
+
+// A match may be about as far along the surface as the model's points are apart, and as far across it as noise and the
+// shape between the points take it.
+IcpSource FrameRegistration::gated(const PointsInView& view, const IcpTarget& target) const {
+  IcpSource source = source_;
+  const auto count = static_cast<Eigen::Index>(source.cloud.rows.size());
+  source.reach.resize(count);
+  source.largest_residual.resize(count);
+  const double set = options_.registration.final_distance;
+  // Noise or spacing that is large against one of the surfaces would match anything.
+  const Points& points = source.cloud.points;
+  const auto extent = static_cast<double>((points.colwise().maxCoeff() - points.colwise().minCoeff()).norm());
+  const double largest = tracking_limits::largest_reach * std::min(target.diameter(), extent);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const float sigma = noise_[source.cloud.rows[static_cast<std::size_t>(i)]];
+    const double apart = spacing_at(points(i, 2), sigma, now_.camera, target_.spacing);
+    const double along = tracking_limits::reach_spacings * view.thinning * apart;
+    const double across = std::max(tracking_limits::residual_spacings * apart,
+                                   tracking_limits::residual_sigmas * static_cast<double>(sigma));
+    source.reach[i] = static_cast<float>(set > 0.0 ? set : std::min(along, largest));
+    source.largest_residual[i] = static_cast<float>(set > 0.0 ? set : std::min(across, largest));
+  }
+  return source;
+}
+
+// What the shapes leave open, colours or outlines may decide.
+void FrameRegistration::determine_open_directions(const PointsInView& view, const IcpTarget& target,
+                                                  const IcpSource& source, const AlignOptions& options,
+                                                  IcpResult& result) const {
+  const Eigen::Index num_weak = result.weak_directions.cols();
+  if (num_weak > 0 && view.brightness.size() > 0 && now_.observer.has_colors()) {
+    result = determine_by_color(target, source, BrightCloud(view.points, view.brightness),
+                                bright_cloud(now_.frame, now_.observer), result, options);
+  }
+  if (num_weak > 0 && result.weak_directions.cols() == num_weak) {
+    result = determine_by_outline(target, source, outlines(), result, options);
+  }
+}
+
+double FrameRegistration::consistency(const PointsInView& view, const Pose& world_from_camera) const {
+  const double now = consistency(view.points, view.normals, now_.view, world_from_camera);
+  const Eigen::Matrix3f rotation = world_from_camera.linear().cast<float>();
+  const Eigen::RowVector3f translation = world_from_camera.translation().cast<float>().transpose();
+  const Points points = (source_.cloud.points * rotation.transpose()).rowwise() + translation;
+  const Points normals = source_.cloud.normals * rotation.transpose();
+  const double before = consistency(points, normals, target_.last_view, target_.last_view.world_from_camera);
+  return std::isfinite(now) || std::isfinite(before) ? std::fmin(now, before) : 0.0;
+}
+
+// NaN where too few of the points are seen.
+double FrameRegistration::consistency(const Points& points, const Points& normals, const DepthView& seen,
+                                      const Pose& pose) const {
+  const double margin = tracking_limits::margin_spacings * target_.spacing;
+  return compare(points, normals, seen, pose, now_.camera, {margin}, options_.num_threads)
+      .consistency(tracking_limits::least_judged);
+}
+
+const OutlinePair& FrameRegistration::outlines() const {
+  if (!outlines_) {
+    const auto outline_of = [&](const DepthView& view, std::size_t most) {
+      return find_outline(view, now_.camera, most, options_.num_threads);
+    };
+    outlines_.emplace(OutlinePair{now_.camera, target_.last_view,
+                                  outline_of(target_.last_view, tracking_limits::last_outline_points),
+                                  outline_of(now_.view, tracking_limits::outline_points), now_.view.depth,
+                                  static_cast<double>(median_sigma(now_.frame))});
+  }
+  return *outlines_;
+}
+
+}  // namespace nacre

@@ -1,0 +1,69 @@
+// Registers one frame to the model, from as many guesses as it takes.
+#pragma once
+
+#include <optional>
+
+#include "fusion/observer.hpp"
+#include "nacre/fusion.hpp"
+#include "outlines/registration.hpp"
+#include "tracking/frame_samples.hpp"
+#include "tracking/points_in_view.hpp"
+#include "tracking/tracking_result.hpp"
+
+namespace nacre {
+
+// The newest frame.
+struct CurrentFrame {
+  const Frame& frame;
+  const Camera& camera;
+  const SurfaceObserver& observer;
+  const DepthView& view;  // from the origin: where the camera is, is to be found
+};
+
+// What it is registered to.
+struct TrackingTarget {
+  const PointModel& model;
+  double spacing;              // of the model [m]
+  const DepthView& last_view;  // what the camera saw when it was last registered
+  std::int32_t oldest_frame;   // points that no later frame has seen may have drifted away: they are left out
+};
+
+class FrameRegistration {
+ public:
+  // Keeps references to its arguments.
+  FrameRegistration(const CurrentFrame& now, const TrackingTarget& target, const TrackingOptions& options);
+
+  enum class Gate {
+    narrow,  // the guess is about right
+    wide,    // it is not
+  };
+  // expectation: of the guess (world_from_camera).
+  TrackingResult from(const Pose& guess, Gate gate, Expectation expectation) const;
+
+  // A gate that the user has set is neither narrow nor wide.
+  bool has_automatic_gate() const { return !(options_.registration.max_distance > 0.0); }
+
+  void include_older_points() { target_.oldest_frame = 0; }
+  const IcpSource& source() const { return source_; }
+
+ private:
+  FrameRegistration(const CurrentFrame& now, const TrackingTarget& target, const TrackingOptions& options,
+                    const FrameSamples& samples);
+  PointsInView in_view(const Pose& world_from_camera) const;
+  IcpSource gated(const PointsInView& view, const IcpTarget& target) const;
+  void determine_open_directions(const PointsInView& view, const IcpTarget& target, const IcpSource& gated,
+                                 const AlignOptions& options, IcpResult& result) const;
+  double consistency(const PointsInView& view, const Pose& world_from_camera) const;
+  double consistency(const Points& points, const Points& normals, const DepthView& seen, const Pose& pose) const;
+  const OutlinePair& outlines() const;
+
+  CurrentFrame now_;
+  TrackingTarget target_;
+  const TrackingOptions& options_;
+  IcpSource source_;
+  Values noise_;                                 // of the sampled points [m]
+  double depth_;                                 // of the sampled points, the median [m]
+  mutable std::optional<OutlinePair> outlines_;  // found when they are first asked for
+};
+
+}  // namespace nacre

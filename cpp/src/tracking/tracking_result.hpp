@@ -1,0 +1,46 @@
+// Where a frame was registered to the model, and whether that is believed.
+#pragma once
+
+#include "nacre/tracking_options.hpp"
+#include "nacre/tracking_report.hpp"
+#include "registration/acceptance.hpp"
+
+namespace nacre {
+
+struct TrackingResult : Acceptance {
+  IcpResult alignment;  // world_from_camera as target_from_source
+  // Part of the model's points in view that the frame does not see through, or of the frame's points that the camera
+  // did not see through before, whichever is smaller.
+  double consistency = 0.0;
+  Expectation expectation = Expectation::expected;  // of where it ended
+  bool is_to_whole_model = false;                   // older points included
+  bool is_on_plane = false;                         // found by the search on the plane
+
+  void test(const TrackingOptions& options) {
+    static_cast<Acceptance&>(*this) = accept(alignment, consistency, expectation, {options.min_score, options.verify});
+  }
+
+  FrameStatus status() const {
+    return decision == Decision::rejected       ? FrameStatus::lost
+           : decision == Decision::undetermined ? FrameStatus::weak
+                                                : FrameStatus::tracked;
+  }
+  bool is_lost() const { return decision == Decision::rejected; }
+  // A frame that is not lost before one that is.
+  double rank() const { return is_lost() ? relocalisation_score : 1000.0 + score; }
+
+  TrackingReport report() const {
+    return {status(),
+            reason,
+            alignment.target_from_source,
+            alignment.num_inliers,
+            alignment.overlap,
+            consistency,
+            score,
+            alignment.rmse,
+            alignment.information,
+            alignment.weak_directions};
+  }
+};
+
+}  // namespace nacre

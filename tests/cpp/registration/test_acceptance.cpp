@@ -1,0 +1,149 @@
+#include <cmath>
+#include <functional>
+
+#include "doctest/doctest.h"
+#include "registration/acceptance.hpp"
+
+using namespace nacre;
+
+namespace {
+
+// Of a frame most of which fits a curved surface well.
+struct Registration {
+  IcpResult alignment;
+  double consistency = 1.0;
+
+  Registration() {
+    alignment.status = AlignStatus::converged;
+    alignment.overlap = 0.8;
+    alignment.residual_ratio = 0.15;
+    alignment.normal_information = 3.0;
+    alignment.misfit = 0.1;
+    alignment.weak_directions.resize(6, 0);
+  }
+};
+
+template <class Change>
+Acceptance tested(Change&& change, Expectation expectation = Expectation::expected,
+                  const AcceptanceOptions& options = {0.3, true}) {
+  Registration registration;
+  change(registration);
+  return accept(registration.alignment, registration.consistency, expectation, options);
+}
+
+const auto as_it_is = [](Registration&) {};
+
+}  // namespace
+
+TEST_CASE("a good registration is tracked, wherever it is") {
+  for (const Expectation expectation : {Expectation::expected, Expectation::near_lost, Expectation::unexpected}) {
+    const Acceptance result = tested(as_it_is, expectation);
+    CHECK(result.decision == Decision::accepted);
+    CHECK(result.is_clear_cut);
+    CHECK(result.reason.empty());
+    CHECK(result.score == doctest::Approx(0.8 * 0.8 * std::log(0.58 / 0.15)));
+  }
+}
+
+TEST_CASE("the more speaks for a place, the less is asked of the frame") {
+  const auto bent = [](Registration& result) { result.alignment.misfit = 0.9; };
+  const auto plane = [](Registration& result) { result.alignment.normal_information = 0.01; };
+  const auto contradicted = [](Registration& result) { result.consistency = 0.85; };
+  const auto faint = [](Registration& result) { result.alignment.overlap = 0.49; };
+  const std::function<void(Registration&)> changes[] = {bent, plane, contradicted};
+  for (const auto& change : changes) {
+    CHECK(tested(change, Expectation::expected).decision == Decision::accepted);
+    CHECK(tested(change, Expectation::near_lost).decision == Decision::accepted);
+    CHECK(tested(change, Expectation::unexpected).decision == Decision::rejected);
+  }
+  CHECK(tested(faint, Expectation::expected).decision == Decision::accepted);
+  CHECK(tested(faint, Expectation::near_lost).decision == Decision::rejected);
+}
+
+TEST_CASE("what is bent more than noise explains has a lower score, and is said to be") {
+  const Acceptance result = tested([](Registration& bent) { bent.alignment.misfit = 2.0; });
+  CHECK(result.decision == Decision::rejected);
+  CHECK(result.score == doctest::Approx(tested(as_it_is).score / 4.0));
+  CHECK(result.relocalisation_score == doctest::Approx(tested(as_it_is).relocalisation_score / 16.0));
+  CHECK(result.reason.find("bent 2 times") != std::string::npos);
+}
+
+TEST_CASE("a frame of another size is lost where the difference is certain, with the factor") {
+  const auto of_size = [](double relative, double sigma, Expectation expectation = Expectation::expected) {
+    return tested([&](Registration& r) { r.alignment.size_difference = {relative, sigma}; }, expectation);
+  };
+  const Acceptance larger = of_size(-0.05, 0.001), smaller = of_size(0.05, 0.001);
+  CHECK(larger.decision == Decision::rejected);
+  CHECK(larger.relocalisation_score == 0.0);
+  CHECK(larger.reason.rfind("the frame is 1.05 times as large", 0) == 0);
+  CHECK(smaller.decision == Decision::rejected);
+  CHECK(smaller.reason.rfind("the frame is 0.952 times as large", 0) == 0);
+  CHECK(of_size(-0.02, 0.001).decision == Decision::accepted);
+  CHECK(of_size(-0.05, 0.006).decision == Decision::accepted);
+  CHECK(of_size(-0.05, 0.0125).decision == Decision::accepted);
+  CHECK(of_size(-0.05, 0.0125, Expectation::unexpected).decision == Decision::rejected);
+  CHECK(of_size(0.0, std::numeric_limits<double>::infinity()).decision == Decision::accepted);
+}
+
+TEST_CASE("directions that are not determined make a frame weak") {
+  const auto open = [](Registration& result) { result.alignment.weak_directions.resize(6, 2); };
+  CHECK(tested(open).decision == Decision::undetermined);
+  CHECK(tested(open).reason.rfind("2 direction(s)", 0) == 0);
+}
+
+TEST_CASE("too few matches, and no verification") {
+  const auto few = [](Registration& result) { result.alignment.status = AlignStatus::too_few_pairs; };
+  CHECK(tested(few).decision == Decision::rejected);
+  CHECK(tested(few).score == 0.0);
+  const Acceptance result = tested(
+      [](Registration& other) {
+        other.alignment.overlap = 0.01;
+        other.alignment.size_difference = {0.5, 0.001};
+      },
+      Expectation::expected, {0.3, false});
+  CHECK(result.decision == Decision::accepted);
+  CHECK_FALSE(result.is_clear_cut);
+}
+
+TEST_CASE("where a search has compared all places, less is asked of the one that is left") {
+  const auto faint = [](Registration& result) { result.alignment.overlap = 0.3; };
+  CHECK(tested(faint, Expectation::expected).decision == Decision::rejected);
+  CHECK(tested(faint, Expectation::only_place).decision == Decision::accepted);
+}
+
+TEST_CASE("the best of a search is believed where it agrees and no other comes near it") {
+  const SearchFit good{1.0, 0.6, 0.9, true}, weaker{0.4, 0.6, 0.9, true};
+  const auto best_of = [](const std::vector<SearchFit>& fits) { return accept_best(fits, 0.3, 0.8, 0.7); };
+  CHECK(best_of({good}).status == GlobalAlignStatus::found);
+  CHECK(best_of({good, weaker}).status == GlobalAlignStatus::found);
+  CHECK(best_of({good, weaker}).rivalry == doctest::Approx(0.4));
+  SearchFit rival = good, far = good, contradicted = good, small = good, negative = good;
+  rival.score = 0.8;
+  CHECK(best_of({good, rival}).status == GlobalAlignStatus::ambiguous);
+  far.is_close = false;
+  far.score = 1.2;
+  CHECK(best_of({far, good}).best == 1);
+  CHECK(best_of({far, good}).status == GlobalAlignStatus::found);
+  CHECK(best_of({far}).status == GlobalAlignStatus::not_found);
+  contradicted.consistency = 0.7;
+  CHECK(best_of({contradicted}).status == GlobalAlignStatus::not_found);
+  small.overlap = 0.2;
+  CHECK(best_of({small}).status == GlobalAlignStatus::not_found);
+  negative.score = -0.1;
+  CHECK(best_of({negative}).status == GlobalAlignStatus::not_found);
+  CHECK(best_of({}).status == GlobalAlignStatus::not_found);
+}
+
+TEST_CASE("views of a place add up, by how much they differ") {
+  PlaceOdds odds;
+  odds.add(0.6, 1.0);
+  CHECK_FALSE(odds.is_enough(0.6, Expectation::expected));
+  odds.add(0.6, 0.1);
+  CHECK_FALSE(odds.is_enough(0.6, Expectation::expected));
+  odds.add(0.6, 1.0);
+  CHECK(odds.is_enough(0.6, Expectation::expected));
+  odds.add(0.0, 4.0);
+  CHECK(odds.is_against());
+  CHECK(PlaceOdds().is_enough(1.5, Expectation::expected));
+  CHECK_FALSE(PlaceOdds().is_enough(1.5, Expectation::unexpected));
+}
