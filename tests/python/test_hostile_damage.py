@@ -1,4 +1,4 @@
-"""Damaged files give an error or what an independent reader reads in them: never something else."""
+"""Damaged files give an error or what is in them, which an independent reader tells: never something else."""
 
 import math
 import random
@@ -13,6 +13,8 @@ from hostile_files.valid import VALID
 import nacre
 from nacre.io.cameras import read_camera
 from nacre.io.images import read_depth
+from nacre.io.meshes import read_mesh_arrays
+from nacre.io.ply import read_range_grid
 
 NUM_FILES = 1000
 
@@ -87,6 +89,73 @@ def test_what_is_read_is_what_is_there(tmp_path, suffix):
             pass
         except Exception as error:
             raise AssertionError(f"{error!r} with {data!r}") from error
-    assert num_read >= (1 if suffix == ".png" else 50), (
-        num_read
-    )  # else nothing was compared; PNG has check sums
+    # Else nothing was compared; PNG has check sums.
+    assert num_read >= (1 if suffix == ".png" else 50), num_read
+
+
+def check_cloud(cloud):
+    assert cloud.points.shape[1:] == (3,)
+    assert cloud.shape is None or len(cloud.shape) == 2
+
+
+def check_grid(grid):
+    assert grid.shape is None or grid.ndim == 3
+
+
+def check_mesh(mesh):
+    vertices, triangles = mesh
+    assert triangles.size == 0 or (triangles.min() >= 0 and triangles.max() < len(vertices))
+
+
+SOUND = {
+    "points": (nacre.read_points, check_cloud, (".ply", ".pcd")),
+    "range grid": (read_range_grid, check_grid, (".ply",)),
+    "mesh": (read_mesh_arrays, check_mesh, (".ply", ".obj", ".off", ".stl")),
+}
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("what", SOUND)
+def test_what_no_other_reads_is_sound(tmp_path, what):
+    """Of compressed points, range grids and meshes."""
+    chance = random.Random(what)
+    read, check, suffixes = SOUND[what]
+    for suffix in suffixes:
+        files = [case.files[case.opens] for case in VALID.values() if case.opens.endswith(suffix)]
+        path = tmp_path / f"a{suffix}"
+        for k in range(NUM_FILES // 2):
+            data = (damaged, scratched)[k % 2](files, chance)
+            path.write_bytes(data)
+            try:
+                check(read(path))
+            except nacre.FileFormatError:
+                pass
+            except Exception as error:
+                raise AssertionError(f"{error!r} with {data!r}") from error
+
+
+BINARY = "binary.ply big.ply many.ply mixed.ply mixed_big.ply binary.pcd compressed.pcd fields.pcd full.pcd"
+
+
+@pytest.mark.parametrize("name", BINARY.split())
+def test_every_beginning_of_a_binary_file_is_refused(tmp_path, name):
+    case = VALID[f"points/valid_{name}"]
+    data = case.files[case.opens]
+    path = tmp_path / name
+    for size in range(len(data)):
+        path.write_bytes(data[:size])
+        with pytest.raises(nacre.FileFormatError):
+            nacre.read_points(path)
+
+
+@pytest.mark.data
+def test_malformed_set(recordings):
+    """An older set."""
+    paths = sorted((recordings / "malformed-ply").glob("*.ply"))
+    assert len(paths) == 16
+    for path in paths:
+        if path.name in ("nan.ply", "ok.ply"):
+            nacre.read_points(path)
+        else:
+            with pytest.raises(nacre.FileFormatError):
+                nacre.read_points(path)

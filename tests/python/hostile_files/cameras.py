@@ -39,7 +39,27 @@ TEXTS = {
     "nested 100000 deep": ("[" * 100_000 + "]" * 100_000, "nested|larger"),
     "nested 20000 deep in a key": (raw("fx", '{"a":' * 5_000 + "1" + "}" * 5_000), "nested|fx must be"),
     "key twice": (changed().replace('"fy": 5.0', '"fy": 5.0, "fx": 50.0'), "the key 'fx' is there twice"),
-    "key missing": (changed().replace('"fx"', '"f"'), "the key 'fx' is missing"),
+    **{
+        f"key {key} missing": (changed().replace(f'"{key}"', '"f"'), f"the key '{key}' is missing")
+        for key in ("model", "width", "height", "fx", "fy", "cx", "cy")
+    },
+    **{
+        f"{key} {what}": (changed(**{key: value}), f"{key} must be")
+        for key, what, value in (
+            ("model", "a number", 3),
+            ("width", "a text", "640"),
+            ("width", "true", True),
+            ("height", "negative", -1),
+            ("fx", "0", 0),
+            ("fy", "a list", [525]),
+            ("cx", "a word", "middle"),
+            ("distortion", "of two", [0, 0]),
+            ("distortion", "a number", 0),
+            ("distortion", "of a word", [0, 0, 0, 0, "k3"]),
+            ("depth_scale", "a text", "1000"),
+        )
+    },
+    "comma after the last": ('{"model": "pinhole",}', "line 1: not a JSON file"),
     "nan": (raw("cx", "NaN"), "cx must be a finite number, got nan"),
     "infinite": (raw("cx", "-Infinity"), "cx must be a finite number, got -inf"),
     "1e400": (raw("fx", "1e400"), "fx must be a finite number, got inf"),
@@ -86,4 +106,4 @@ BYTES = {
     "utf-8 with a mark": (b"\xef\xbb\xbf" + changed().encode(), "not a JSON file"),
     "latin-1": (changed(note="gr").encode().replace(b"gr", b"gr\xfc\xdf"), "not text"),
 }
-CAMERAS = single("camera", "camera", ".json", {n: (t.encode(), m) for n, (t, m) in TEXTS.items()} | BYTES)
+CAMERAS = single("camera", "camera", ".json", TEXTS | BYTES)

@@ -53,15 +53,19 @@ class Case:
 
 
 def single(
-    kind: str, reader: str, suffix: str, table: Mapping[str, tuple[bytes, str]], **more: str
+    kind: str, reader: str, suffix: str, table: Mapping[str, tuple[bytes | str, str]], **more: str
 ) -> list[Case]:
     """Return a case for each file of a table: name to content and message."""
+    file = f"a{suffix}"
     return [
-        Case(
-            f"{kind}/{name.replace(' ', '_')}", reader, {f"a{suffix}": content}, message, f"a{suffix}", **more
-        )
+        Case(f"{kind}/{name.replace(' ', '_')}", reader, {file: as_bytes(content)}, message, file, **more)
         for name, (content, message) in table.items()
     ]
+
+
+def as_bytes(content: bytes | str) -> bytes:
+    """Return what a file holds."""
+    return content if isinstance(content, bytes) else content.encode()
 
 
 def write(case: Case, folder: Path) -> Path:

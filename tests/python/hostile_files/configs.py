@@ -36,4 +36,4 @@ BYTES = {
     "utf-16": ("seed = 1".encode("utf-16"), "not text"),
     "latin-1": (b"# gr\xfc\xdf\n", "not text"),
 }
-CONFIGS = single("config", "config", ".toml", {n: (t.encode(), m) for n, (t, m) in TEXTS.items()} | BYTES)
+CONFIGS = single("config", "config", ".toml", TEXTS | BYTES)

@@ -135,6 +135,9 @@ PNG = {
 PGM = {
     "pgm empty": (b"", "byte 0: expected a binary PGM header"),
     "pgm of text": (b"P2 2 2 65535 1 2 3 4", "byte 0: expected"),
+    "pgm cut in the header": (b"P5 2 2", "byte 0: expected"),
+    "pgm maxval 70000": (pgm(70000), "largest value is 70000"),
+    "pgm of size 99999999 squared": (pgm(size="99999999 99999999"), "truncated"),
     "pgm of colour": (b"P6 2 2 65535\n" + bytes(24), "byte 0: expected"),
     "pgm maxval 0": (pgm(0), "largest value is 0"),
     "pgm maxval 255": (pgm(255), "largest value is 255"),
@@ -174,6 +177,9 @@ NPY = {
     ),
     "npy header is code": (npy_header("__import__('os').abort()"), "not a readable"),
     "npy header deep": (npy_header("(" * 9000), "not a readable"),
+    "npy cut in the header": (b"\x93NUMPY\x01\x00", "not a readable"),
+    "npy of text": (b"not an array at all", "not a readable"),
+    "npy of one row": (npy(np.zeros(5)), "must be .H, W. numbers"),
     "npy header short": (b"\x93NUMPY\x01\x00\xff\xff{", "not a readable"),
     "npy version 9": (b"\x93NUMPY\x09\x00" + npy(np.zeros((3, 4)))[8:], "not a readable"),
     "npy cut": (npy(np.zeros((3, 4)))[:-1], "not a readable"),
@@ -255,6 +261,7 @@ BMP = {
         "damaged or truncated|refused",
     ),
 }
+DEPTH_TIFF = {"depth tiff": (b"II*\0", "a depth image must be")}
 TIFF = {
     "attribute tiff of 2 to the 31 squared": (
         b"II*\0\x08\0\0\0\x03\0"
@@ -274,6 +281,7 @@ DEPTH_IMAGES: list[Case] = (
     + single("image", "depth", ".pgm", PGM)
     + single("image", "depth", ".npy", NPY)
     + single("image", "depth", ".exr", EXR, needs="OpenEXR")
+    + single("image", "depth", ".tif", DEPTH_TIFF)
     + single("image", "color", ".png", COLOR, needs="PIL")
     + single("image", "color", ".bmp", BMP, needs="PIL")
     + single("image", "attribute", ".tif", TIFF, needs="PIL")

@@ -6,6 +6,10 @@ from hostile_files.case import single
 from hostile_files.ply import FACES, TEXT, text, vertices
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+TEXT_STL = (
+    "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\n"
+    "endfacet\nendsolid a\n"
+)
 OFF = "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n"
 
 
@@ -17,21 +21,47 @@ def stl(num_facets: int, body: bytes = bytes(50)) -> bytes:
 _OBJ = {
     "obj empty": ("", "no face"),
     "obj nul bytes": ("\0" * 100, "line 1: cannot read"),
+    "obj of another program": (b"\x7fELF\x02\x01\x01" + bytes(range(256)), "line 1: cannot read"),
+    "obj of a number first": ("1 2 3\n", "line 1: cannot read"),
+    "obj of points": (TRIANGLE, "no face"),
+    "obj index a word": (TRIANGLE + "f 1 2 c\n", "line 4: cannot read 'f 1 2 c'"),
+    "obj index missing": (TRIANGLE + "f 1 2 /3\n", "line 4: cannot read"),
     "obj index 0": (TRIANGLE + "f 0 1 2\n", "line 4: cannot read"),
     "obj index beyond": (TRIANGLE + "f 1 2 4\n", "face 0 names vertex 3"),
+    "obj index beyond in the second face": (TRIANGLE + "f 1 2 3\nf 1 2 4\n", "face 1 names vertex 3"),
+    "obj index of 30 digits": (TRIANGLE + f"f 1 2 {10**30}\n", "line 4: cannot read"),
     "obj index 2 to the 64": (TRIANGLE + f"f 1 2 {2**64}\n", "line 4: cannot read"),
     "obj index of 5000 digits": (TRIANGLE + f"f 1 2 {'9' * 5000}\n", "line 4: cannot read"),
     "obj index back beyond": (TRIANGLE + "f -1 -2 -4\n", "line 4: cannot read"),
     "obj face of two": (TRIANGLE + "f 1 2\n", "face 0 has 2 corners"),
+    "obj face of none": (TRIANGLE + "f\n", "face 0 has 0 corners"),
+    "obj vertex a word": (TRIANGLE + "v 1 2 z\nf 1 2 3\n", "line 4: cannot read 'v 1 2 z'"),
+    "obj vertex with an underscore": (TRIANGLE + "v 1 2 1_0\nf 1 2 3\n", "line 4: cannot read"),
     "obj vertex of two": ("v 0 0\nf 1 1 1\n", "line 1: cannot read"),
     "obj vertex nan": (TRIANGLE.replace("1 0 0", "nan 0 0") + "f 1 2 3\n", "finite"),
     "obj vertex 1e400": (TRIANGLE.replace("1 0 0", "1e400 0 0") + "f 1 2 3\n", "finite"),
 }
 _OFF = {
     "off without OFF": ("3 1 0\n", "line 1: an OFF file begins with 'OFF'"),
-    "off count huge": (OFF.replace("3 1 0", f"{10**15} 1 0"), "ends after|cannot read"),
+    "off empty": ("", "begins with 'OFF'"),
+    "off of four dimensions": ("4" + OFF + "3 0 1 2\n", "begins with 'OFF'"),
+    "off binary": (b"OFF BINARY\n\0\0\0\4\0\0\0\1", "line 1: cannot read 'BINARY'"),
+    "off without counts": ("OFF\n", "line 1"),
+    "off of one count": ("OFF\n4\n", "line 2"),
+    "off count huge": (
+        OFF.replace("3 1 0", f"{10**15} 1 0"),
+        "line 5: .*after 3 of 1000000000000000 vertices",
+    ),
+    "off count of faces huge": (
+        OFF.replace("3 1 0", f"3 {10**12} 0") + "3 0 1 2\n",
+        "after 3 of 3 vertices and 1 of 1000000000000 faces",
+    ),
     "off count negative": (OFF.replace("3 1 0", "-3 1 0"), "line 2: cannot read"),
     "off face cut": (OFF + "3 0 1\n", "line 6: cannot read"),
+    "off vertex cut": (OFF.replace("1 0 0", "0 0"), "line 4: cannot read '0 0'"),
+    "off face of one": (OFF + "1 0\n", "face 0 has 1 corners"),
+    "off face negative": (OFF + "3 0 1 -1\n", "line 6: cannot read"),
+    "off face of 30 digits": (OFF + f"3 0 1 {10**30}\n", "line 6: cannot read"),
     "off face missing": (OFF, "0 of 1 faces"),
     "off face beyond": (OFF + "3 0 1 3\n", "face 0 names vertex 3"),
     "off face of 1e9": (OFF + f"{10**9} 0 1 2\n", "line 6: cannot read"),
@@ -40,10 +70,24 @@ _OFF = {
 _STL = {
     "stl empty": (b"", "byte 0: neither"),
     "stl count huge": (stl(2**32 - 1), "byte 80: .*4294967295 facets"),
+    "stl of 34 bytes": (b"STL:" + bytes(30), "neither a binary STL file nor"),
+    "stl short like text": (b"solid".ljust(83, b"\0"), "line 1"),
+    "stl cut like text": (b"solid" + stl(1)[5:-1], "line 1"),
     "stl cut": (stl(1)[:-1], "byte 80: .*1 facets has 134 bytes, this one 133"),
     "stl goes on": (stl(1, bytes(51)), "byte 80"),
     "stl nan": (stl(1, b"\xff" * 50), "finite"),
     "stl text cut": (b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\n", "before 'endsolid'"),
+    "stl text without its end": (TEXT_STL[:-11], "the file ends before 'endsolid'"),
+    **{
+        f"stl text {what}": (TEXT_STL.replace(old, new, 1), f"line {line}: cannot read")
+        for what, old, new, line in (
+            ("without the end of a facet", "endfacet\n", "", 8),
+            ("with two corners", "vertex 1 0 0\n", "", 6),
+            ("with four corners", "endloop", "vertex 1 2 3\nendloop", 7),
+            ("with a word", "vertex 1 0 0", "vertex 1 0 z", 5),
+            ("without solid", "solid a", "solidus", 1),
+        )
+    },
     "stl text vertex of two": (b"solid a\nfacet\nouter loop\nvertex 0 0\n", "line 4: cannot read"),
     "stl of no facets": (stl(0, b""), "no triangle|at least one|triangles"),
 }
@@ -52,16 +96,22 @@ _PLY = {
     "ply face beyond": (text(TEXT + "3 0 1 2\n", f"{vertices(2)}\n{FACES}"), "face 0 names vertex 2"),
     "ply face negative": (text(TEXT + "3 0 1 -1\n", f"{vertices(2)}\n{FACES}"), "face 0 names vertex -1"),
     "ply face of two": (text(TEXT + "2 0 1\n", f"{vertices(2)}\n{FACES}"), "face 0 has 2 corners"),
+    "ply face no list": (
+        text(TEXT + "3\n", f"{vertices(2)}\n{FACES.replace('list uchar ', '')}"),
+        "no element face with",
+    ),
+    "ply face cut": (
+        text(TEXT + "3 0 1", f"{vertices(2)}\n{FACES}"),
+        "line 12: .*not hold 3 values",
+    ),
     "ply face of floats": (
         text(TEXT + "3 0 1 0\n", f"{vertices(2)}\n{FACES.replace('int', 'float')}"),
         "no element face with",
     ),
 }
 MESHES = (
-    single("mesh", "mesh", ".obj", {name: (body.encode(), message) for name, (body, message) in _OBJ.items()})
-    + single(
-        "mesh", "mesh", ".off", {name: (body.encode(), message) for name, (body, message) in _OFF.items()}
-    )
+    single("mesh", "mesh", ".obj", _OBJ)
+    + single("mesh", "mesh", ".off", _OFF)
     + single("mesh", "mesh", ".stl", _STL)
     + single("mesh", "mesh", ".ply", _PLY)
 )

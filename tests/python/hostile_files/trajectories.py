@@ -24,6 +24,8 @@ TUM = {
     "tum arabic digits": (GOOD + "\u0661 0 0 0 0 0 0 1\n", "line 2: expected numbers"),
     "tum comma": ("0,0,0,0,0,0,0,1\n", "line 1: expected numbers"),
     "tum value short": (GOOD + "1 0 0 0 0 0 1\n", "line 2: expected 8 numbers"),
+    "tum value short in the first line": ("1 2 3 4 5 6 7\n", "line 1: expected"),
+    "tum value short after a comment": ("# a\n" + GOOD + "2 0 0 0 0 0 0\n", "line 3: expected 8 numbers"),
     "tum value more": (GOOD + "1 0 0 0 0 0 0 1 9\n", "line 2: expected 8 numbers"),
     "tum cut in the last line": (GOOD * 2 + "2 0 0 0 0 0", "line 3: expected 8 numbers"),
     "tum quaternion of zero length": (GOOD + "1 0 0 0 0 0 0 0\n", "line 2: the quaternion is 0"),
@@ -52,12 +54,17 @@ LOG = {
     "log matrix nan": ("0 0 1\n" + EYE.replace("0 1 0 0", "0 nan 0 0"), "line 3: expected finite"),
     "log matrix 1e308": ("0 0 1\n" + EYE.replace("0 1 0 0", "0 1e308 1e308 0"), "line 2: .*not a rotation"),
     "log without matrices": ("0 0 1\n" * 20_000, "line 2: expected 4 numbers"),
+    "log second header short": ("0 0 1\n" + EYE + "1 1\n" + EYE, "line 6: expected"),
+    "log matrix of two rows": ("0 0 1\n1 0 0 0\n0 1 0 0\n", "cut off"),
     "log second matrix missing": ("0 0 1\n" + EYE + "1 1 2\n", "cut off"),
 }
 OTHER = {
     "pose of three rows": ("\n".join(EYE.split("\n")[:3]), "line 1: expected lines of 8 numbers"),
     "pose of five rows": (EYE + "0 0 0 1\n", "line 1: expected lines of 8 numbers"),
     "pose of one number": ("1\n", "line 1: expected lines of 8 numbers"),
+    "pose mirrors": (EYE.replace("0 0 1 0", "0 0 -1 0"), "line 1: .*not a rotation"),
+    "pose scales": ("2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n", "line 1: .*not a rotation"),
+    "pose with a wrong last row": (EYE.replace("0 0 0 1", "0 0 1 1"), "line 1: .*not a rotation"),
     "pose no rotation": (EYE.replace("1 0 0 0", "1 1 0 0"), "line 1: .*not a rotation"),
 }
 BYTES = {
@@ -68,15 +75,9 @@ BYTES = {
 }
 
 
-def _encoded(table: dict[str, tuple[str, str]]) -> dict[str, tuple[bytes, str]]:
-    return {name: (body.encode(), message) for name, (body, message) in table.items()}
-
-
 TRAJECTORIES = (
-    single("trajectory", "trajectory", ".txt", _encoded(TUM) | BYTES)
-    + single("trajectory", "trajectory", ".log", _encoded(LOG))
-    + single("trajectory", "trajectory", ".pose.txt", _encoded(OTHER))
-    + single(
-        "trajectory", "matrix", ".mat", {"matrix of two poses": ((GOOD + "1" + GOOD[1:]).encode(), "2 poses")}
-    )
+    single("trajectory", "trajectory", ".txt", TUM | BYTES)
+    + single("trajectory", "trajectory", ".log", LOG)
+    + single("trajectory", "trajectory", ".pose.txt", OTHER)
+    + single("trajectory", "matrix", ".mat", {"matrix of two poses": (GOOD + "1" + GOOD[1:], "2 poses")})
 )

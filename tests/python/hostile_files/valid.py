@@ -5,6 +5,9 @@ import struct
 import zlib
 
 import numpy as np
+from pcd_files import COLUMNS, FIELDS, compressed, field_columns
+from pcd_files import pcd as other_pcd
+from ply_files import MIXED, mixed_binary, mixed_text
 
 from hostile_files.cameras import OPEN3D, PINHOLE
 from hostile_files.case import Case
@@ -33,10 +36,17 @@ FILES = {
         "text.ply": text(TEXT),
         "lists.ply": text("0 1 2 7\n3 4 5 8\n3 0 1 0\n", LISTS),
         "many.ply": ply(_wide, MANY),
+        "mixed.ply": ply(mixed_binary("<"), MIXED),
+        "mixed_big.ply": ply(mixed_binary(">"), MIXED, "binary_big_endian"),
+        "mixed_text.ply": text(mixed_text(), MIXED),
         "binary.pcd": pcd(PCD_TWO),
         "text.pcd": pcd(b"0 1 2\n3 4 5\n", "ascii"),
         "image.pcd": pcd(PCD_TWO * 2, WIDTH=2, HEIGHT=2, POINTS=4),
         "packed.pcd": packed(23, *PCD_TWO),
+        "compressed.pcd": other_pcd(compressed(COLUMNS), "binary_compressed"),
+        "fields.pcd": other_pcd(
+            compressed(b"".join(map(b"".join, field_columns()))), "binary_compressed", **FIELDS
+        ),
         "full.pcd": pcd(
             struct.pack("<6fIHd", 0, 1, 2, 0, 0, 1, 0x102030, 7, 0.5) * 2,
             FIELDS="x y z normal_x normal_y normal_z rgb label time",
@@ -49,6 +59,8 @@ FILES = {
     "mesh": {
         "a.obj": (TRIANGLE + "f 1 2 3\n").encode(),
         "a.off": (OFF + "3 0 1 2\n").encode(),
+        "corners.obj": (TRIANGLE + "v 1 1 0\nf 1/2 2//3 3/4/5 -1\n# end\n").encode(),
+        "colors.off": b"COFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0\n3 0 2 1\n",
         "a.stl": stl(1, struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)),
         "text.stl": b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
         b"endloop\nendfacet\nendsolid\n",

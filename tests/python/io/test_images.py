@@ -1,4 +1,4 @@
-"""Depth and colour images: what is stored comes back, and what is damaged is named."""
+"""Depth and colour images: what is stored comes back; test_hostile_files has what is damaged."""
 
 import os
 import sys
@@ -112,18 +112,6 @@ def test_eight_bit_image_is_not_depth(tmp_path, mode):
         read_depth(tmp_path / "d.png")
 
 
-def test_eight_bit_pgm_is_not_depth(tmp_path):
-    (tmp_path / "d.pgm").write_bytes(b"P5 2 2 255\n1234")
-    with pytest.raises(FileFormatError, match="largest value is 255"):
-        read_depth(tmp_path / "d.pgm")
-
-
-def test_depth_image_is_not_color(tmp_path, depth):
-    write_depth_png(tmp_path / "d.png", depth)
-    with pytest.raises(FileFormatError, match="8 bits"):
-        read_color(tmp_path / "d.png")
-
-
 @pytest.mark.parametrize("read", [read_depth, read_color])
 @pytest.mark.parametrize("keep", [0, 4, 20, 60, 0.5, 0.9])
 def test_truncated_png_is_named(tmp_path, depth, read, keep):
@@ -136,16 +124,6 @@ def test_truncated_png_is_named(tmp_path, depth, read, keep):
     path.write_bytes(data[: keep if isinstance(keep, int) else int(keep * len(data))])
     with pytest.raises(FileFormatError, match=r"cut\.png.*damaged or truncated"):
         read(path)
-
-
-def test_flipped_bits_are_told(tmp_path, depth):
-    path = tmp_path / "bad.png"
-    write_depth_png(path, depth)
-    data = bytearray(path.read_bytes())
-    data[len(data) // 2] ^= 0xFF
-    path.write_bytes(bytes(data))
-    with pytest.raises(FileFormatError, match=r"bad\.png"):
-        read_depth(path)
 
 
 @pytest.mark.parametrize("part", [b"zTXt", b"iCCP", b"iTXt"])
@@ -163,62 +141,6 @@ def test_bombs_beside_the_pixels_are_not_unpacked(tmp_path, part):
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 1 << 19
-
-
-def test_gigantic_png_is_refused(tmp_path):
-    def chunk(name, data):
-        return len(data).to_bytes(4, "big") + name + data + zlib.crc32(name + data).to_bytes(4, "big")
-
-    header = (60000).to_bytes(4, "big") * 2 + bytes((16, 0, 0, 0, 0))
-    (tmp_path / "big.png").write_bytes(
-        b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", b"") + chunk(b"IEND", b"")
-    )
-    with pytest.raises(FileFormatError, match=r"big\.png: refused"):
-        read_depth(tmp_path / "big.png")
-
-
-@pytest.mark.parametrize(
-    ("name", "data"),
-    [
-        ("a.pgm", b""),
-        ("a.pgm", b"P2 2 2 65535\n1 2 3 4"),
-        ("a.pgm", b"P5 2 2"),
-        ("a.pgm", b"P5 2 2 70000\n" + bytes(8)),
-        ("a.pgm", b"P5 2 2 65535\n" + bytes(7)),
-        ("a.pgm", b"P5 0 2 65535\n"),
-        ("a.pgm", b"P5 99999999 99999999 65535\n"),
-        ("a.npy", b""),
-        ("a.npy", b"\x93NUMPY\x01\x00"),
-        ("a.npy", b"not an array at all"),
-        ("a.tif", b"II*\x00"),
-    ],
-)
-def test_damaged_files_are_named(tmp_path, name, data):
-    (tmp_path / name).write_bytes(data)
-    with pytest.raises(FileFormatError, match=r"a\.(pgm|npy|tif)"):
-        read_depth(tmp_path / name)
-
-
-def test_truncated_npy_is_named(tmp_path, depth):
-    np.save(tmp_path / "a.npy", depth)
-    (tmp_path / "a.npy").write_bytes((tmp_path / "a.npy").read_bytes()[:-1])
-    with pytest.raises(FileFormatError, match=r"a\.npy"):
-        read_depth(tmp_path / "a.npy")
-
-
-@pytest.mark.parametrize(
-    "array", [np.zeros((3, 4, 2)), np.zeros(5), np.zeros((0, 4)), np.zeros((2, 2), complex)]
-)
-def test_npy_must_be_a_depth_image(tmp_path, array):
-    np.save(tmp_path / "a.npy", array)
-    with pytest.raises(FileFormatError, match=r"\(H, W\) numbers"):
-        read_depth(tmp_path / "a.npy")
-
-
-def test_npy_with_objects_is_refused(tmp_path):
-    np.save(tmp_path / "a.npy", np.array([[{}, {}]], dtype=object), allow_pickle=True)
-    with pytest.raises(FileFormatError, match=r"a\.npy"):
-        read_depth(tmp_path / "a.npy")
 
 
 @pytest.mark.parametrize("name", ["x.png", "x.pgm", "x.npy"])

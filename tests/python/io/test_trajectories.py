@@ -9,8 +9,6 @@ from hypothesis import assume, given
 from nacre import FileFormatError, Trajectory, associate, read_trajectory, write_trajectory
 from nacre._internal.quaternions import matrix_from_quaternion, quaternion_from_matrix
 
-IDENTITY = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
-
 
 def random_poses(count, seed=0):
     rng = np.random.default_rng(seed)
@@ -119,42 +117,6 @@ def test_seven_scenes_pose(tmp_path):
     found = read_trajectory(tmp_path / "p.txt")
     assert len(found) == 1
     np.testing.assert_allclose(found.poses[0], pose, atol=1e-6)
-
-
-@pytest.mark.parametrize(
-    ("text", "line"),
-    [
-        ("1 2 3 4 5 6 7\n", 1),
-        ("# a\n1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0\n", 3),
-        ("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 0\n", 2),
-        ("1 0 0 0 0 0 0 1\n2 0 x 0 0 0 0 1\n", 2),
-        ("1 0 0 0 0 0 0 1\n2 0 nan 0 0 0 0 1\n", 2),
-        ("0 0 1\n" + IDENTITY + "1 1\n" + IDENTITY, 6),
-        ("0 0 1\n1 0 0 0\n0 1 0\n0 0 1 0\n0 0 0 1\n", 3),
-        ("1 0 0 0\n0 1 0 0\n0 0 -1 0\n0 0 0 1\n", 1),
-        ("2 0 0 0\n0 2 0 0\n0 0 2 0\n0 0 0 1\n", 1),
-        ("1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 1 1\n", 1),
-        (IDENTITY + "1 0 0 0\n", 1),
-    ],
-)
-def test_wrong_line_is_named(tmp_path, text, line):
-    (tmp_path / "t.txt").write_text(text)
-    with pytest.raises(FileFormatError, match=r"t\.txt") as caught:
-        read_trajectory(tmp_path / "t.txt")
-    assert caught.value.line == line
-
-
-@pytest.mark.parametrize("text", ["", "# only a comment\n", "0 0 1\n1 0 0 0\n0 1 0 0\n"])
-def test_empty_and_cut_files_are_named(tmp_path, text):
-    (tmp_path / "t.txt").write_text(text)
-    with pytest.raises(FileFormatError, match=r"t\.txt.*(empty|cut off)"):
-        read_trajectory(tmp_path / "t.txt")
-
-
-def test_binary_file_is_told(tmp_path):
-    (tmp_path / "t.txt").write_bytes(b"\x89PNG\xff\xfe")
-    with pytest.raises(FileFormatError, match="not text"):
-        read_trajectory(tmp_path / "t.txt")
 
 
 @pytest.mark.parametrize(
