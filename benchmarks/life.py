@@ -1,5 +1,5 @@
 """
-What a long-lived program sees of nacre: models that come and go, threads, forks, other thread pools.
+What a long-lived program sees of nacre: models that come and go, forks, other thread pools.
 
     python benchmarks/life.py                 # 1000 cycles, ten seconds of ticks
     python benchmarks/life.py --cycles 60 --seconds 2 --busy    # as the tests run it
@@ -141,23 +141,6 @@ def lost_ticks(seconds: float) -> float:
     return float(np.median(lost))
 
 
-def two_at_once() -> bool:
-    """Return whether two models in two threads have the bits that each has alone."""
-    scenes = [Scene("static", 96), Scene("turning", 96, views=60)]
-    alone = [bits(grown(scene, 12)) for scene in scenes]
-    found = ["", ""]
-
-    def run(k: int) -> None:
-        found[k] = bits(grown(scenes[k], 12))
-
-    threads = [threading.Thread(target=run, args=(k,)) for k in range(2)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    return found == alone
-
-
 # In a fresh interpreter: before and after, in the same process, each has to work.
 BESIDE = """
 import sys
@@ -234,8 +217,7 @@ def main(words: list[str] | None = None) -> int:
         "--busy", action="store_true", help="the machine is: print the ticks, and demand nothing"
     )
     options = parser.parse_args(words)
-    holds = [two_at_once()]
-    print(f"two models in two threads have the bits of each alone: {holds[-1]}")
+    holds = []
     if hasattr(os, "fork"):
         holds.append(goes_on_after_fork())
         print(f"a child process gets its parent's bits: {holds[-1]}", flush=True)

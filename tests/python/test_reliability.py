@@ -98,7 +98,7 @@ def test_the_load_program_tells_a_slower_model_from_a_slower_machine() -> None:
 
 def test_models_come_and_go_and_others_live_beside_them() -> None:
     said = run("life.py", "--cycles", "60", "--seconds", "2", "--busy")
-    assert "two models in two threads have the bits of each alone: True" in said
+    assert "a child process gets its parent's bits: True" in said
 
 
 def test_thirty_two_bytes_that_a_model_leaves_are_found() -> None:

@@ -11,14 +11,20 @@ import nacre
 
 
 def test_models_in_threads_are_as_if_alone() -> None:
-    alone = state(object_model(3))
-    found: list[Any] = []
-    threads = [threading.Thread(target=lambda: found.append(state(object_model(3)))) for _ in range(2)]
+    """Two of the same kind, and one of another."""
+    kinds: list[dict[str, Any]] = [{}, {}, {"fusion_method": "wlop+", "max_points": 500}]
+    alone = [state(object_model(4, **kind)) for kind in kinds]
+    found: dict[int, Any] = {}
+
+    def run(place: int) -> None:
+        found[place] = state(object_model(4, **kinds[place]))
+
+    threads = [threading.Thread(target=run, args=(place,)) for place in range(len(kinds))]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert found == [alone, alone]
+    assert [found[place] for place in range(len(kinds))] == alone
 
 
 def test_other_threads_run_while_a_frame_is_added() -> None:

@@ -312,6 +312,24 @@ class TestSignals:
         assert results(out) == undisturbed
 
 
+@pytest.mark.data
+@pytest.mark.weekly
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM], ids=["SIGINT", "SIGTERM"])
+def test_a_large_model_is_saved_within_two_seconds(recordings: Path, tmp_path: Path, number: int) -> None:
+    code = "from nacre.cli import main; main()"
+    words = ["reconstruct", recordings / "tum-fr3-teddy", "-o", tmp_path, "--set", "spacing=0.002"]
+    journal = tmp_path / "unfinished" / "journal.txt"
+    running = subprocess.Popen([sys.executable, "-c", code, *map(str, words)], stdout=subprocess.DEVNULL)
+    while not (journal.exists() and len(read_journal(journal)[0]) >= 150):
+        assert running.poll() is None
+        time.sleep(0.02)
+    start = time.monotonic()
+    running.send_signal(number)
+    assert running.wait(60) == 128 + number
+    assert time.monotonic() - start < 2
+    assert len(nacre.read_points(tmp_path / "model.ply")) > 100_000
+
+
 def test_a_camera_that_was_killed_leaves_a_whole_recording(tmp_path: Path) -> None:
     from nacre.datasets import SequenceFrame
     from nacre.datasets.recorder import GrowingRecording, mend
