@@ -96,6 +96,11 @@ def test_the_load_program_tells_a_slower_model_from_a_slower_machine() -> None:
         subprocess.run([sys.executable, "-c", program, str(BENCHMARKS), cause], check=True)
 
 
+def test_every_hostile_point_file_is_told() -> None:
+    files, *told = map(int, run("damaged_points.py", "--only", "nacre").split()[-7:])
+    assert told == [files, 0, 0, 0, 0, 0]
+
+
 def test_models_come_and_go_and_others_live_beside_them() -> None:
     said = run("life.py", "--cycles", "60", "--seconds", "2", "--busy")
     assert "a child process gets its parent's bits: True" in said

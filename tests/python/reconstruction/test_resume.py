@@ -349,10 +349,11 @@ def test_a_camera_that_was_killed_leaves_a_whole_recording(tmp_path: Path) -> No
 
 
 @pytest.mark.slow
-def test_killed_at_random_moments() -> None:
+@pytest.mark.parametrize("kills", ["5", pytest.param("30", marks=pytest.mark.weekly)])
+def test_killed_at_random_moments(kills: str) -> None:
     script = Path(__file__).resolve().parents[3] / "benchmarks" / "kills.py"
     done = subprocess.run(
-        [sys.executable, str(script), "--kills", "5", "--views", "12", "--plain-page"],
+        [sys.executable, str(script), "--kills", kills, "--views", "12", "--plain-page"],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
