@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "base/parallel.hpp"
 #include "base/point_rows.hpp"
@@ -124,6 +125,15 @@ IcpSource::IcpSource(const AlignCloud& cloud_in, const AlignOptions& options) : 
   cloud.keep(rows);
 }
 
+IcpSource IcpSource::few() const {
+  IcpSource source = *this;
+  std::vector<std::int32_t> rows(static_cast<std::size_t>(levels.front()));
+  std::iota(rows.begin(), rows.end(), 0);
+  source.cloud.keep(rows);
+  source.levels.fill(levels.front());
+  return source;
+}
+
 IcpTarget::IcpTarget(const AlignCloud& cloud, const AlignOptions& options)
     : options_(options),
       cloud_(cloud, options, true),
@@ -174,6 +184,7 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, std::int64_t count, 
           const std::uint32_t match = nearest[static_cast<std::size_t>(i)];
           if (match == no_slot) continue;
           Pair pair;
+          pair.largest_residual = gate.distance;
           pair.p = moved[i - begin];
           pair.q = cloud_.points.row(match).transpose().cast<double>();
           pair.half_difference.setConstant(std::numeric_limits<double>::quiet_NaN());

@@ -32,6 +32,7 @@ struct IcpSource {
   Values reach, largest_residual;
 
   IcpSource(const AlignCloud& cloud, const AlignOptions& options);
+  IcpSource few() const;  // those of the first level alone
 };
 
 struct Gate {

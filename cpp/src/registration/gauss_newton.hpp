@@ -15,9 +15,6 @@ struct MotionRow {
   double residual = 0.0, weight = 1.0;
 };
 
-// Directions of twists, rotations in units of an extent, one a column.
-using TwistBasis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
-
 struct Damping {
   double of_weight, of_trace;  // added to the Hessian's diagonal
 };

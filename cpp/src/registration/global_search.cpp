@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
@@ -23,14 +22,6 @@ AlignOptions icp_options(const GlobalAlignOptions& options) {
   icp.seed = options.seed;
   icp.num_threads = 1;  // many registrations run side by side
   return icp;
-}
-
-IcpSource few_of(IcpSource source) {
-  std::vector<std::int32_t> rows(static_cast<std::size_t>(source.levels.front()));
-  std::iota(rows.begin(), rows.end(), 0);
-  source.cloud.keep(rows);
-  source.levels.fill(source.levels.front());
-  return source;
 }
 
 ViewAgreement ask(const IcpSource& source, const SearchSide& onto, const Pose& pose, const Gate& gate, double tolerance,
@@ -66,7 +57,7 @@ bool is_enough(const SearchSide& side) { return side.all.cloud.points.rows() >= 
 SearchSide::SearchSide(const GlobalCloud& cloud_in, const GlobalAlignOptions& options, bool is_noisy)
     : cloud(cloud_in, options, is_noisy),
       all(AlignCloud(cloud.points, cloud.normals), icp_options(options)),
-      few(few_of(all)),
+      few(all.few()),
       target(AlignCloud(cloud.points, cloud.normals), icp_options(options)) {
   if (cloud.points.rows() > 0) middle = cloud.points.cast<double>().colwise().mean().transpose();
   if (!cloud_in.viewpoint) return;

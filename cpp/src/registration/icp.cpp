@@ -20,23 +20,6 @@ double median_of(const std::vector<Pair>& pairs, Value&& value) {
   return nacre::median_of(std::move(values));
 }
 
-// Weights relative to the median pair; with `robust` also robust ones of the whitened residuals, whose scale is their
-// median absolute value but at least `floor` [m]. Returns that scale [m].
-double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double floor) {
-  const double median_weight = median_of(pairs, [](const Pair& pair) { return pair.weight; });
-  for (Pair& pair : pairs) pair.weight /= median_weight;
-  const auto whitened = [&](const Pair& pair) { return std::abs(residual(pair, metric)) * std::sqrt(pair.weight); };
-  const double scale = std::max(floor, mad_to_sigma * median_of(pairs, whitened));
-  if (robust) {
-    for (Pair& pair : pairs) {
-      const double agreement = robust_weight(whitened(pair), scale);
-      pair.agreement *= agreement;
-      pair.weight *= agreement;
-    }
-  }
-  return scale;
-}
-
 // How many points and which gate an iteration uses. The gate starts wide and shrinks to the accuracy of the data, with
 // few points; then it stays, and the points become more until the pose is at rest.
 class Schedule {
@@ -137,7 +120,7 @@ std::size_t least_pairs(std::int64_t num_samples) {
 
 // hold_weak: whether directions that the pairs do not determine stay as they are in each step.
 IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
-                  bool hold_weak) {
+                  bool hold_weak, const TwistBasis& along = {}) {
   IcpResult result;
   result.target_from_source = initial;
   result.rmse = std::numeric_limits<double>::quiet_NaN();
@@ -154,7 +137,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
     if (pairs.size() < least_pairs(schedule.num_samples())) return result;
     const double scale = weight_pairs(pairs, options.method, options.robust, resolution);
     const double weak_threshold = hold_weak ? options.weak_threshold : 0.0;
-    const IcpStep step = solve_step(pairs, options.method, weak_threshold, options.num_threads);
+    const IcpStep step = solve_step(pairs, options.method, weak_threshold, along, options.num_threads);
     if (step.rmse < best_rmse) {
       best_rmse = step.rmse;
       best_pose = pose;
@@ -175,7 +158,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   if (pairs.size() < least_pairs(schedule.num_samples())) return result;
   result.misfit = misfit_of(pairs, options.method);
   weight_pairs(pairs, options.method, options.robust, resolution);
-  const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, options.num_threads);
+  const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, along, options.num_threads);
   result.size_difference = size_difference(pairs, options.method);
   result.target_from_source = pose;
   result.status = at_rest ? AlignStatus::converged : AlignStatus::max_iterations;
@@ -194,6 +177,21 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
 
 }  // namespace
 
+double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double floor) {
+  const double median_weight = median_of(pairs, [](const Pair& pair) { return pair.weight; });
+  for (Pair& pair : pairs) pair.weight /= median_weight;
+  const auto whitened = [&](const Pair& pair) { return std::abs(residual(pair, metric)) * std::sqrt(pair.weight); };
+  const double scale = std::max(floor, mad_to_sigma * median_of(pairs, whitened));
+  if (robust) {
+    for (Pair& pair : pairs) {
+      const double agreement = robust_weight(whitened(pair), scale);
+      pair.agreement *= agreement;
+      pair.weight *= agreement;
+    }
+  }
+  return scale;
+}
+
 IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options) {
   // What pairs know of a direction shows at the end only: while source and target are apart their normals disagree.
   IcpResult free = iterate(target, source, initial, options, false);
@@ -204,6 +202,20 @@ IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose&
 IcpResult align_held(const IcpTarget& target, const IcpSource& source, const Pose& initial,
                      const AlignOptions& options) {
   return iterate(target, source, initial, options, true);
+}
+
+IcpResult align_along(const TwistBasis& directions, const IcpTarget& target, const IcpSource& source,
+                      const Pose& initial, const AlignOptions& options) {
+  return iterate(target, source, initial, options, false, directions);
+}
+
+TwistBasis motions_on_plane(const Eigen::Vector3d& normal) {
+  TwistBasis twists = TwistBasis::Zero(6, 3);
+  const Eigen::Vector3d x = normal.unitOrthogonal();
+  twists.col(0).head<3>() = normal;
+  twists.col(1).tail<3>() = x;
+  twists.col(2).tail<3>() = normal.cross(x);
+  return twists;
 }
 
 }  // namespace nacre

@@ -16,9 +16,19 @@ struct IcpResult : AlignResult {
   SizeDifference size_difference;  // by which the source would have to grow to fit better
 };
 
-// align with a prepared target. Held: directions that the pairs do not determine stay as they are in every step.
+// align with a prepared target.
 IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options);
+// The same, where directions that the pairs do not determine stay as they are in every step,
 IcpResult align_held(const IcpTarget& target, const IcpSource& source, const Pose& initial,
                      const AlignOptions& options);
+// or where the source only moves along some directions.
+IcpResult align_along(const TwistBasis& directions, const IcpTarget& target, const IcpSource& source,
+                      const Pose& initial, const AlignOptions& options);
+// A turn about a plane's normal (of the target frame, unit length), and shifts along the plane.
+TwistBasis motions_on_plane(const Eigen::Vector3d& normal);
+
+// Weights relative to the median pair's; with `robust` also robust ones (Geman and McClure) of the whitened residuals,
+// whose scale is their median absolute value but at least `floor` [m]. Returns that scale [m].
+double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double floor);
 
 }  // namespace nacre

@@ -94,7 +94,8 @@ double normal_information(const std::vector<Pair>& pairs, Metric metric) {
   return std::max(0.0, 0.5 * std::log(independent.determinant() / apart.determinant()));
 }
 
-IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, int num_threads) {
+IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, const TwistBasis& along,
+                   int num_threads) {
   IcpStep step;
   if (pairs.empty()) return step;
   const Eigen::Vector3d origin = pairs.front().q;
@@ -115,7 +116,8 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   const double least = weak_threshold * sums.agreement;
   const Eigen::Index num_weak = weak_threshold > 0.0 ? (eigen.eigenvalues().array() < least).count() : 0;
   step.weak_directions = eigen.eigenvectors().leftCols(num_weak);
-  const Eigen::Matrix<double, 6, Eigen::Dynamic> sure = eigen.eigenvectors().rightCols(6 - num_weak);
+  const bool is_free = num_weak == 0 && along.cols() == 0;
+  const TwistBasis sure = along.cols() > 0 ? along : TwistBasis(eigen.eigenvectors().rightCols(6 - num_weak));
   Matrix6 damped = equations.hessian;
   damped.diagonal().array() += registration_limits::step_damping * sums.weight;
   const Vector6 solution =
@@ -128,9 +130,9 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   step.shape = axes * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * axes.transpose();
 
   const Eigen::Vector3d rotation_vector = solution.head<3>() / extent, translation = solution.tail<3>();
-  if (metric == Metric::point_to_point && num_weak == 0) {
+  if (metric == Metric::point_to_point && is_free) {
     step.motion = motion_from_to(p_mean, closest_rotation(equations.covariance), q_mean);
-  } else if (metric == Metric::symmetric && num_weak == 0) {
+  } else if (metric == Metric::symmetric && is_free) {
     // Rusinkiewicz 2019, section 3: half the rotation, the translation t cos(theta), half the rotation.
     const double half_angle = std::atan(0.5 * rotation_vector.norm());
     const Eigen::Matrix3d half = rotation(rotation_vector, half_angle);

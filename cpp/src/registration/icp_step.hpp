@@ -8,6 +8,9 @@
 
 namespace nacre {
 
+// Twists, rotations in units of an extent, one a column: directions of a pose.
+using TwistBasis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
 struct IcpStep {
   Pose motion = Pose::Identity();  // p <- motion * p
   double size = 0.0;               // how far the motion moves the pairs, root mean square [m]
@@ -17,7 +20,7 @@ struct IcpStep {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   Matrix6 hessian = Matrix6::Zero();  // of half the weighted squares, for a twist (rotation, translation) about center
   Matrix6 shape = Matrix6::Zero();    // what the normals of both sides agree on of the hessian
-  Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  // scaled unit twists about center
+  TwistBasis weak_directions;         // about center
 };
 
 // What the normals of a source and of the target tell about each other, for each pair: their mutual information, were
@@ -26,7 +29,8 @@ double normal_information(const std::vector<Pair>& pairs, Metric metric);
 
 // Directions in which the normals of source and target agree on less information than weak_threshold, per pair that
 // agrees and with rotations in units of the pairs' extent, do not move: what a shape leaves open does not depend on how
-// well its parts are measured.
-IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, int num_threads);
+// well its parts are measured. Where `along` has directions, the motion has no others.
+IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, const TwistBasis& along,
+                   int num_threads);
 
 }  // namespace nacre

@@ -1,6 +1,7 @@
 #include "registration/motion_basis.hpp"
 
 #include "base/se3.hpp"
+#include "registration/icp.hpp"
 
 namespace nacre {
 
@@ -11,18 +12,7 @@ MotionBasis MotionBasis::all(const Eigen::Vector3d& center, double extent) {
 }
 
 MotionBasis MotionBasis::on_plane(const Eigen::Vector3d& normal, const Eigen::Vector3d& center) {
-  MotionBasis basis{Twists::Zero(6, 3), center};
-  const Eigen::Vector3d x = normal.unitOrthogonal();
-  basis.twists.col(0).head<3>() = normal;
-  basis.twists.col(1).tail<3>() = x;
-  basis.twists.col(2).tail<3>() = normal.cross(x);
-  return basis;
-}
-
-MotionBasis::Amounts MotionBasis::row(const Pair& pair) const {
-  Vector6 by_twist;
-  by_twist << (pair.p - center).cross(pair.normal), pair.normal;
-  return twists.transpose() * by_twist;
+  return {motions_on_plane(normal), center};
 }
 
 Pose MotionBasis::apply(const Amounts& amounts) const { return motion_about(center, twists * amounts); }

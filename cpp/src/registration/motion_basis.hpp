@@ -17,8 +17,6 @@ struct MotionBasis {
   // Turns about the normal of a plane (unit length), and shifts across it.
   static MotionBasis on_plane(const Eigen::Vector3d& normal, const Eigen::Vector3d& center);
 
-  // How a residual changes with the amounts.
-  Amounts row(const Pair& pair) const;
   Pose apply(const Amounts& amounts) const;
 };
 

@@ -7,10 +7,9 @@
 
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
-#include "registration/correspondences.hpp"
+#include "registration/icp.hpp"
 #include "registration/limits.hpp"
 #include "registration/normal_equations.hpp"
-#include "registration/planar.hpp"
 #include "registration/weak_directions.hpp"
 
 namespace nacre {
@@ -32,7 +31,7 @@ std::vector<Pair> match(const IcpSource& source, const IcpTarget& target, const 
       target.match(source, source.cloud.points.rows(), world_from_target.inverse() * world_from_source,
                    {gate, registration_limits::view_cosine, false}, nearest);
   if (pairs.size() < registration_limits::least_view_pairs) return {};
-  weight_robustly(pairs, 0.05 * tolerance);
+  weight_pairs(pairs, Metric::symmetric, true, 0.05 * tolerance);
   for (Pair& pair : pairs) {
     // Beyond a view's rim, matches only continue it: the farther along the surface, the less they count.
     const double across = residual(pair, Metric::symmetric);

@@ -5,7 +5,7 @@
 
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
-#include "registration/planar.hpp"
+#include "registration/icp.hpp"
 #include "tracking/limits.hpp"
 #include "tracking/points_in_view.hpp"
 
@@ -27,6 +27,7 @@ class TurntableSearch {
         options_(single_threaded(options)),
         num_threads_(options.num_threads),
         source_(AlignCloud(frame.points, frame.normals), options_),
+        few_(source_.few()),
         target_(AlignCloud(as_rows(model.points), as_rows(model.normals)), options_) {
     const ObjectView& first = views.front();
     plane_ = first.world_from_camera * first.ground_frame();
@@ -48,16 +49,13 @@ class TurntableSearch {
           Eigen::AngleAxisd(static_cast<double>(i) * 2.0 * static_cast<double>(EIGEN_PI) / tracking_limits::num_turns,
                             Eigen::Vector3d::UnitZ())
               .toRotationMatrix();
-      const PlaneGates gates{tracking_limits::first_turn_gate * frame_.size, 3.0 * frame_.tolerance, 14,
-                             tracking_limits::coarse_turn_samples};
-      candidates[static_cast<std::size_t>(i)] =
-          align(plane_ * turn * ground_frame_.inverse(), gates, tracking_limits::coarse_turn_samples);
+      candidates[static_cast<std::size_t>(i)] = align(few_, plane_ * turn * ground_frame_.inverse(),
+                                                      gates(tracking_limits::first_turn_gate * frame_.size, 3.0, 14));
     });
     candidates = different(std::move(candidates), tracking_limits::num_turn_candidates);
     parallel_for(static_cast<std::int64_t>(candidates.size()), 1, num_threads_, [&](std::int64_t i) {
       Candidate& candidate = candidates[static_cast<std::size_t>(i)];
-      const PlaneGates gates{4.0 * frame_.tolerance, 2.0 * frame_.tolerance, 30, frame_.points.rows()};
-      candidate = climb(align(candidate.alignment.target_from_source, gates, frame_.points.rows()));
+      candidate = climb(align(source_, candidate.alignment.target_from_source, gates(4.0 * frame_.tolerance, 2.0, 30)));
     });
     const std::size_t num_refined = candidates.size();
     return different(std::move(candidates), num_refined);
@@ -65,22 +63,34 @@ class TurntableSearch {
 
   // The surfaces decide in the end, closer than the score asks for.
   IcpResult settle(const Candidate& candidate) const {
-    const PlaneGates gates{2.0 * frame_.tolerance, frame_.tolerance, 30, frame_.points.rows()};
-    const IcpResult settled = align_on_plane(target_, source_, candidate.alignment.target_from_source, normal_, gates);
+    const IcpResult settled =
+        align_along(motions_on_plane(normal_), target_, source_, candidate.alignment.target_from_source,
+                    gates(2.0 * frame_.tolerance, 1.0, 30));
     return settled.status != AlignStatus::too_few_pairs ? settled : candidate.alignment;
   }
 
  private:
   static AlignOptions single_threaded(AlignOptions options) {
     options.method = Metric::symmetric;
+    options.coarse_samples = static_cast<int>(tracking_limits::coarse_turn_samples);
+    options.weak_threshold = 0.0;
     options.num_threads = 1;
     return options;
   }
 
-  Candidate align(const Pose& guess, const PlaneGates& gates, Eigen::Index num_samples) const {
+  // From a gate [m] down to one of so many tolerances.
+  AlignOptions gates(double first, double last, int max_iterations) const {
+    AlignOptions options = options_;
+    options.max_distance = first;
+    options.final_distance = last * frame_.tolerance;
+    options.max_iterations = max_iterations;
+    return options;
+  }
+
+  Candidate align(const IcpSource& source, const Pose& guess, const AlignOptions& options) const {
     Candidate candidate;
-    candidate.alignment = align_on_plane(target_, source_, guess, normal_, gates);
-    if (candidate.alignment.status != AlignStatus::too_few_pairs) score(candidate, num_samples);
+    candidate.alignment = align_along(motions_on_plane(normal_), target_, source, guess, options);
+    if (candidate.alignment.status != AlignStatus::too_few_pairs) score(candidate, source.cloud.points.rows());
     return candidate;
   }
 
@@ -154,7 +164,7 @@ class TurntableSearch {
   const Camera& camera_;
   AlignOptions options_;
   int num_threads_;
-  IcpSource source_;
+  IcpSource source_, few_;
   IcpTarget target_;
   Pose plane_, ground_frame_;  // world and camera, from a frame in the plane below the object's middle
   Eigen::Vector3d normal_;
