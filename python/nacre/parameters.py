@@ -191,8 +191,8 @@ class ModelParameters:
         Start also from the pose that continues the last motion.
     relocalise : bool
         Search where the guesses fail: for an object that turned by any angle on the plane on which it stands
-        (``region.object``), then everywhere (some tenths of a second; not at every frame where that has
-        failed often).
+        (``region.object``), around earlier poses, then everywhere (some tenths of a second; not at every
+        frame where that has failed often).
     loop_closure : bool
         Where ``fusion_method`` is "fuse": correct model and poses where the camera comes back to what it saw
         before.

@@ -10,7 +10,7 @@ struct TrackingOptions {
   AlignOptions registration;
   bool predict_motion = true;   ///< start also from the pose that continues the last motion
   bool relocalise = true;       ///< search where the guesses fail: for an object that turned on its supporting plane,
-                                ///< and everywhere
+                                ///< around earlier poses, everywhere
   bool loop_closure = true;     ///< fuse: correct model and poses where the camera comes back to what it saw before
   bool denoise_samples = true;  ///< register surface points averaged over their pixels, not single pixels
   bool verify = true;           ///< accept registrations by their score only

@@ -179,11 +179,24 @@ std::vector<Pose> Pipeline::guesses(const FrameExtras& extras) const {
   return {orthonormal(predicted), last};
 }
 
-// An object may have turned; and everywhere, but not at every frame where that has been to no avail.
+// Some of the newest poses from which the camera looked in different directions.
+static std::vector<Pose> key_poses(const FrameHistory& history) {
+  std::vector<Pose> chosen;
+  for (std::size_t age = 0; age < history.num_registered() && chosen.size() < model_limits::most_key_poses; ++age) {
+    const Pose pose = history.registered_pose(age);
+    const bool is_new = std::all_of(chosen.begin(), chosen.end(), [&](const Pose& other) {
+      return angle_between(other, pose) > model_limits::view_angle;
+    });
+    if (is_new) chosen.push_back(pose);
+  }
+  return chosen;
+}
+
+// Around some poses; and everywhere, but not at every frame where that has been to no avail.
 RelocalisationPlaces Pipeline::elsewhere(const RegionReport& region_report) const {
   if (!options.relocalise) return {};
   const bool everywhere = num_lost < model_limits::patience || num_lost % model_limits::patience == 0;
-  return {&views, [&] { return view_of_object(region_report); }, everywhere};
+  return {&views, [&] { return view_of_object(region_report); }, [this] { return key_poses(history); }, everywhere};
 }
 
 // Of the newest frame, where it shows an object that stands on a plane.

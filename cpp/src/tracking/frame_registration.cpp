@@ -121,4 +121,20 @@ const OutlinePair& FrameRegistration::outlines() const {
   return *outlines_;
 }
 
+std::vector<Pose> FrameRegistration::around(const Pose& world_from_camera) const {
+  const PointsInView view = in_view(world_from_camera);
+  std::vector<Pose> poses = {world_from_camera};
+  if (view.points.rows() == 0) return poses;
+  const Eigen::Vector3d center = view.points.colwise().mean().transpose().cast<double>();
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double angle : {-tracking_limits::turn_around, tracking_limits::turn_around}) {
+      Pose turn = Pose::Identity();
+      turn.linear() = Eigen::AngleAxisd(angle, world_from_camera.linear().col(axis)).toRotationMatrix();
+      turn.translation() = center - turn.linear() * center;
+      poses.push_back(turn * world_from_camera);
+    }
+  }
+  return poses;
+}
+
 }  // namespace nacre

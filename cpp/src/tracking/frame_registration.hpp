@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "fusion/observer.hpp"
 #include "nacre/fusion.hpp"
@@ -45,6 +46,9 @@ class FrameRegistration {
 
   void include_older_points() { target_.oldest_frame = 0; }
   const IcpSource& source() const { return source_; }
+
+  // Cameras around what a known camera saw: it turned about each of its axes, one way and the other.
+  std::vector<Pose> around(const Pose& world_from_camera) const;
 
  private:
   FrameRegistration(const CurrentFrame& now, const TrackingTarget& target, const TrackingOptions& options,

@@ -1,12 +1,38 @@
 #include "tracking/relocalisation.hpp"
 
+#include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "registration/global_search.hpp"
+#include "registration/icp.hpp"
 #include "tracking/limits.hpp"
 #include "tracking/points_in_view.hpp"
 
 namespace nacre {
+
+std::vector<Pose> most_promising(const PointModel& model, const IcpSource& source, const std::vector<Pose>& guesses,
+                                 const AlignOptions& options) {
+  const IcpTarget whole(AlignCloud(as_rows(model.points), as_rows(model.normals)), options);
+  AlignOptions coarse = options;
+  coarse.max_samples = coarse.coarse_samples = tracking_limits::finalist_samples;
+  coarse.max_iterations = tracking_limits::finalist_steps;
+  const IcpSource few(AlignCloud(source.cloud.points, source.cloud.normals, source.cloud.sigma), coarse);
+
+  std::vector<std::pair<double, Pose>> candidates;
+  candidates.reserve(guesses.size());
+  for (const Pose& guess : guesses) {
+    const AlignResult result = align_to(whole, few, guess, coarse);
+    candidates.emplace_back(result.overlap, result.target_from_source);
+  }
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  std::vector<Pose> best;
+  for (const auto& [overlap, pose] : candidates) {
+    if (best.size() < tracking_limits::num_finalists) best.push_back(pose);
+  }
+  return best;
+}
 
 std::optional<Pose> fit_anywhere(const PointModel& model, const IcpSource& source, const AlignOptions& options) {
   GlobalAlignOptions search_options;

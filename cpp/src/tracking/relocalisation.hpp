@@ -1,12 +1,18 @@
-// Where may a camera be that has been lost?
+// Where may a camera be that has been lost? Candidates, found with a few points of its frame.
 #pragma once
 
 #include <optional>
+#include <vector>
 
 #include "nacre/fusion.hpp"
 #include "registration/correspondences.hpp"
 
 namespace nacre {
+
+// The guesses (world_from_camera) on which most agrees after a short registration of a few points of the frame to the
+// whole model, best first: few enough to be registered in full.
+std::vector<Pose> most_promising(const PointModel& model, const IcpSource& source, const std::vector<Pose>& guesses,
+                                 const AlignOptions& options);
 
 // Where a frame fits the model, wherever the camera is: none where it fits nowhere, or in several places about as well.
 // `source` holds points of the frame. Takes some tenths of a second.

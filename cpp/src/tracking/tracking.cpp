@@ -44,6 +44,20 @@ std::optional<TrackingResult> turned_on_plane(const TrackingTarget& target, cons
   return result;
 }
 
+// From every place where a camera has been, and around it: a few points each, then the best with all.
+TrackingResult around_key_poses(const FrameRegistration& registration, const PointModel& model,
+                                const std::vector<Pose>& key_poses, const TrackingOptions& options) {
+  std::vector<Pose> guesses;
+  for (const Pose& key_pose : key_poses) {
+    for (const Pose& guess : registration.around(key_pose)) guesses.push_back(guess);
+  }
+  TrackingResult best;
+  for (const Pose& candidate : most_promising(model, registration.source(), guesses, options.registration)) {
+    keep_better(registration.from(candidate, FrameRegistration::Gate::narrow, Expectation::unexpected), best);
+  }
+  return best;
+}
+
 }  // namespace
 
 TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, TrackingPrior prior,
@@ -67,7 +81,10 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   const RelocalisationPlaces& places = prior.elsewhere;
   if (const auto turned = turned_on_plane(target, now, places, options)) return *turned;
   const bool goes_on = followed && hypothesis.is_confirmed_by(best);
-  if (!goes_on && places.everywhere) {
+  if (!goes_on && places.key_poses) {
+    keep_better(around_key_poses(registration, target.model, places.key_poses(), options), best);
+  }
+  if (best.is_lost() && !goes_on && places.everywhere) {
     const std::optional<Pose> pose = fit_anywhere(target.model, source, options.registration);
     if (pose) keep_better(registration.from(*pose, FrameRegistration::Gate::narrow, Expectation::unexpected), best);
   }
