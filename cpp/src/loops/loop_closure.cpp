@@ -92,11 +92,9 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
     seen_with_[static_cast<std::size_t>(other.key_frame)].push_back(newest);
   }
   if (loop) {
-    loop->node = newest;
     if (is_apart) return close(frame, *loop, in_question);
     const double depth = key_frames_.back().cloud.depth;
     graph_.add_edge(edge(loop->key_frame, newest, loop->alignment.target_from_source, loop->alignment, depth, true));
-    pending_.reset();
   }
   return is_around ? adjust_loop_of_views(frame, seen) : LoopReport{};
 }
@@ -136,7 +134,6 @@ LoopClosure::SeenKeyFrames LoopClosure::select(const LoopFrame& frame) const {
 void LoopClosure::doubt_all(std::int32_t frame) {
   first_verified_ = frame;
   for (KeyFrame& other : key_frames_) other.last_verified = never;
-  pending_.reset();
 }
 
 // Adds the frame to the trajectory; as a key frame, where none stands for it. Returns whether it became one.
@@ -173,38 +170,16 @@ bool LoopClosure::insert(const LoopFrame& frame, KeyFrame&& view, const std::vec
   return is_key_frame;
 }
 
-// Another loop, a step or two before, moves the same points to the same place.
-bool LoopClosure::is_confirmed(const LoopFrame& frame, const Match& loop) const {
-  if (!pending_ || loop.time - pending_->time > 2) return false;
-  const Pose& pose = frame.alignment.target_from_source;
-  const double apart =
-      rms_distance(key_frames_.back().cloud.points, loop.correction * pose, pending_->correction * pose);
-  return apart < std::max(3.0 * tolerance_of(frame), 0.3 * loop.distance);
-}
-
-// The frame lies elsewhere than it should: corrects all poses, or waits for another loop to say the same.
+// The frame lies elsewhere than it should: corrects all poses, where the loop says enough alone.
 LoopReport LoopClosure::close(const LoopFrame& frame, const Match& loop, const std::vector<int>& in_question) {
   LoopReport report;
-  std::vector<Match> loops = {loop};
-  PlaceOdds odds;
-  if (is_confirmed(frame, loop)) {
-    odds.add(pending_->relocalisation_score, 1.0);
-    loops.insert(loops.begin(), *pending_);
-  }
-  odds.add(loop.relocalisation_score, 1.0);
-  const double depth = key_frames_.back().cloud.depth;
-  if (odds.is_enough(loop.relocalisation_score, Expectation::expected)) {
-    report.corrections = optimise(loops, depth, frame.index);
-  }
-  if (report.corrections.empty()) {
-    pending_ = loop;
-    return report;
-  }
+  if (!PlaceOdds().is_enough(loop.relocalisation_score, Expectation::expected)) return report;
+  report.depth = key_frames_.back().cloud.depth;
+  report.corrections = optimise(loop, report.depth, frame.index);
+  if (report.corrections.empty()) return report;
   report.frame = key_frames_[static_cast<std::size_t>(loop.key_frame)].frame;
   report.distance = loop.distance;
-  report.depth = depth;
   for (const int k : in_question) key_frames_[static_cast<std::size_t>(k)].last_verified = time() - 1;
-  pending_.reset();
   return report;
 }
 
@@ -257,7 +232,6 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
   align_options.final_distance = static_cast<double>(median_of(source.reach));
 
   Match found;
-  found.time = time();
   found.key_frame = in_question.front();
   found.alignment = align_to(target, source, frame.alignment.target_from_source, align_options);
   const Pose& pose = found.alignment.target_from_source;
@@ -274,7 +248,6 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
       accept(found.alignment, consistency, Expectation::expected, {options_.min_score, true}).relocalisation_score;
   const bool is_determined = found.alignment.weak_directions.cols() == 0;
   if (!is_determined || !PlaceOdds::is_for(found.relocalisation_score)) return std::nullopt;
-  found.correction = orthonormal(pose * frame.alignment.target_from_source.inverse());
   found.distance = rms_distance(cloud.points, pose, frame.alignment.target_from_source);
   return found;
 }
@@ -304,14 +277,12 @@ PoseEdge LoopClosure::edge(int from, int to, const Pose& pose, const AlignResult
   return {from, to, pose_of(from).inverse() * pose, information, is_loop};
 }
 
-// Poses that agree with the loops, as motions of all frames; none where the graph contradicts them.
-std::vector<Pose> LoopClosure::optimise(const std::vector<Match>& loops, double depth, std::int32_t frame) {
+// Poses that agree with the loop, as motions of all frames; none where the graph contradicts it.
+std::vector<Pose> LoopClosure::optimise(const Match& loop, double depth, std::int32_t frame) {
   const std::vector<Pose> before = graph_.poses();
   const std::size_t num_edges = graph_.edges().size();
-  for (const Match& loop : loops) {
-    const Pose& pose = loop.alignment.target_from_source;
-    graph_.add_edge(edge(loop.key_frame, loop.node, pose, loop.alignment, depth, true));
-  }
+  graph_.add_edge(
+      edge(loop.key_frame, num_key_frames() - 1, loop.alignment.target_from_source, loop.alignment, depth, true));
   const PoseGraphFit fit = graph_.optimise(loops_limits::most_normalized_error);
   const bool is_closed = fit.converged && fit.largest_error <= loops_limits::most_normalized_error &&
                          std::all_of(fit.weights.begin() + static_cast<std::ptrdiff_t>(num_edges), fit.weights.end(),

@@ -67,12 +67,9 @@ class LoopClosure {
   // A loop: a frame as registered to key frames in question.
   struct Match {
     int key_frame = -1;
-    int node = -1;  // of the graph: the frame's
-    int time = 0;
     IcpResult alignment;
     double relocalisation_score = 0.0;
-    Pose correction = Pose::Identity();  // world then from world now
-    double distance = 0.0;               // [m]
+    double distance = 0.0;  // [m]
   };
 
   int time() const { return static_cast<int>(trajectory_.size()); }  // the number of the node to come
@@ -93,8 +90,7 @@ class LoopClosure {
   double part_in_view(int key_frame, const LoopFrame& frame) const;
   IcpTarget target_of(const std::vector<int>& key_frames, const AlignOptions& options) const;
   PoseEdge edge(int from, int to, const Pose& pose, const AlignResult& alignment, double depth, bool is_loop) const;
-  bool is_confirmed(const LoopFrame& frame, const Match& loop) const;
-  std::vector<Pose> optimise(const std::vector<Match>& loops, double depth, std::int32_t frame);
+  std::vector<Pose> optimise(const Match& loop, double depth, std::int32_t frame);
   std::vector<Pose> corrections(const std::vector<Pose>& before, std::int32_t num_frames) const;
 
   const Camera& camera_;
@@ -104,7 +100,6 @@ class LoopClosure {
   PoseGraph graph_;
   std::vector<TrajectoryNode> trajectory_;
   std::int32_t first_verified_ = 0;  // the frame that was last registered to the whole model
-  std::optional<Match> pending_;     // a loop that waits for another to confirm it
 };
 
 }  // namespace nacre

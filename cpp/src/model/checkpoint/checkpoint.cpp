@@ -253,10 +253,7 @@ bool PrivateState::is_sound(const LoopClosure& loops, std::size_t num_frames) {
     if (!is_within(node.key_frame, count) || !is_within(node.frame, num_frames) || node.frame <= last) return false;
     last = node.frame;
   }
-  if (loops.trajectory_.empty() != loops.key_frames_.empty()) return false;
-  const auto& pending = loops.pending_;
-  return !pending || (is_within(pending->key_frame, count) && is_within(pending->node, count) &&
-                      is_within(pending->time, loops.trajectory_.size() + 1));
+  return loops.trajectory_.empty() == loops.key_frames_.empty();
 }
 
 bool PrivateState::is_sound(const PlaceHypothesis& hypothesis) {

@@ -43,15 +43,6 @@ void exchange(Archive& archive, PoseEdge& edge) {
   archive(edge.from, edge.to, edge.from_from_to, edge.information, edge.is_loop);
 }
 
-template <class Archive>
-void exchange(Archive& archive, IcpResult& result) {
-  archive(result.target_from_source);
-  archive.choice(result.status, AlignStatus::too_few_pairs);
-  archive(result.iterations, result.num_inliers, result.overlap, result.rmse, result.center, result.information,
-          result.weak_directions, result.residual_ratio, result.shape_information, result.normal_information,
-          result.misfit, result.size_difference.relative, result.size_difference.sigma);
-}
-
 // Of classes that keep theirs to themselves.
 struct PrivateState {
   template <class Archive>
@@ -85,14 +76,8 @@ struct PrivateState {
     archive(node.frame, node.key_frame, node.pose);
   }
   template <class Archive>
-  static void exchange(Archive& archive, LoopClosure::Match& match) {
-    archive(match.key_frame, match.node, match.time, match.alignment, match.relocalisation_score, match.correction,
-            match.distance);
-  }
-  template <class Archive>
   static void exchange(Archive& archive, LoopClosure& loops) {
-    archive(loops.key_frames_, loops.seen_with_, loops.graph_, loops.trajectory_, loops.first_verified_,
-            loops.pending_);
+    archive(loops.key_frames_, loops.seen_with_, loops.graph_, loops.trajectory_, loops.first_verified_);
   }
 
   template <class Archive>
