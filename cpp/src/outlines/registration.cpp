@@ -7,19 +7,13 @@
 #include "base/statistics.hpp"
 #include "outlines/limits.hpp"
 #include "outlines/match.hpp"
-#include "registration/gauss_newton.hpp"
-#include "registration/weak_directions.hpp"
+#include "registration/limits.hpp"
+#include "registration/open_directions.hpp"
 
 namespace nacre {
 namespace {
 
-struct Fit {
-  IcpResult result;
-  std::vector<MotionRow> pairs;
-  double agreement = 0.0;  // see EdgeSearch
-};
-
-class EdgeSearch {
+class EdgeSearch : public OpenDirectionSearch {
  public:
   EdgeSearch(const IcpTarget& target, const IcpSource& source, const OutlinePair& outlines, const IcpResult& geometric,
              const AlignOptions& options)
@@ -42,13 +36,37 @@ class EdgeSearch {
     extent_ = extent_of(geometric, reach);
   }
 
-  double narrow_gate() const { return std::min(outlines_limits::first_gate * pixel_, widest_); }
-  double widest_gate() const { return widest_; }
+  // The nearer solution first: structures repeat. Returns whether either explains the outlines.
+  bool choose_gate(const IcpResult& geometric) {
+    double best = 0.0;
+    const double narrow = std::min(outlines_limits::first_gate * pixel_, widest_);
+    for (const double first : {narrow, widest_}) {
+      if (first == gate_) break;
+      const double agreement = agreement_from(geometric, first, nullptr).second;
+      if (agreement > best) gate_ = first;
+      best = std::max(best, agreement);
+      if (best > outlines_limits::clear_agreement) break;
+    }
+    return best >= outlines_limits::least_agreement;
+  }
+
+  OpenFit fit(const IcpResult& geometric, const TwistBasis* only) override {
+    auto [fit, agreement] = agreement_from(geometric, gate_, only);
+    fit.agrees = agreement >= outlines_limits::least_agreement;
+    return fit;
+  }
+
+  // Down to what leaves a direction no more uncertain than a pixel.
+  Directions determined(const OpenFit& fit, const TwistBasis& open) const override {
+    double weight = 0.0;
+    for (const MotionRow& row : fit.rows) weight += row.weight;
+    const double of_a_pixel = std::pow(fit.noise / (outlines_limits::least_noise * pixel_), 2);
+    const double least = std::max(of_a_pixel, outlines_limits::least_information * weight);
+    return split_directions(agreed_information(fit.rows, open, fit.extent, 1.0), least);
+  }
+
+ private:
   double smallest_gate() const { return outlines_limits::last_gate * pixel_; }
-  double noise() const { return noise_; }
-  double extent() const { return extent_; }
-  // The information that leaves a direction no more uncertain than a pixel.
-  double least_known() const { return std::pow(noise_ / (outlines_limits::least_noise * pixel_), 2); }
 
   // Each source edge with the nearest target edge of its kind, if that lies within the gate; robust weights.
   std::vector<MotionRow> match(const Pose& pose, const Eigen::Vector3d& center, double gate) {
@@ -87,14 +105,17 @@ class EdgeSearch {
     return result;
   }
 
-  // The same with its pairs within the last gate, and their agreement; 0 where the surfaces no longer fit.
-  Fit fit(const IcpResult& start, double gate, const TwistBasis* only) {
-    Fit fit;
+  // The same with its rows within the last gate, and their agreement; 0 where the surfaces no longer fit.
+  std::pair<OpenFit, double> agreement_from(const IcpResult& start, double gate, const TwistBasis* only) {
+    OpenFit fit;
     fit.result = run(start, gate, only);
-    fit.pairs = match(fit.result.target_from_source, fit.result.center, smallest_gate());
-    const bool still_fits = fit.result.num_inliers > 0.8 * start.num_inliers;
-    if (still_fits && !fit.pairs.empty()) fit.agreement = agreement(fit.result.target_from_source, fit.pairs);
-    return fit;
+    fit.rows = match(fit.result.target_from_source, fit.result.center, smallest_gate());
+    fit.extent = extent_;
+    fit.noise = noise_;
+    const bool still_fits =
+        fit.result.num_inliers > registration_limits::still_matching * start.num_inliers && !fit.rows.empty();
+    const double agrees = still_fits ? agreement(fit.result.target_from_source, fit.rows) : 0.0;
+    return {std::move(fit), agrees};
   }
 
   // See agreement_of: of either outline, whichever is less; 0 where the matches are no closer than chance has it.
@@ -112,7 +133,6 @@ class EdgeSearch {
     return std::min(part(edges, edges_, outlines_.before), part(edges_, edges, now));
   }
 
- private:
   double extent_of(const IcpResult& geometric, double reach) const {
     std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source_.cloud.points.rows()), no_slot);
     const Gate gate{reach, std::cos(std::min(options_.max_angle, 3.14)), true};
@@ -123,7 +143,7 @@ class EdgeSearch {
   }
 
   void step(const std::vector<MotionRow>& pairs, const TwistBasis& open, IcpResult& result) const {
-    Vector6 twist = gauss_newton_step(pairs, open, extent_, {1e-3, 0.0});
+    Vector6 twist = gauss_newton_step(pairs, open, extent_, {outlines_limits::step_damping, 0.0});
     twist.head<3>() /= extent_;
     result.target_from_source = motion_about(result.center, twist) * result.target_from_source;
   }
@@ -134,7 +154,7 @@ class EdgeSearch {
   const AlignOptions& options_;
   AlignOptions held_;                // few steps within the last gate, weak directions held
   std::vector<OutlinePoint> edges_;  // of the target
-  double pixel_ = 0.0, widest_ = 0.0, extent_ = 1.0, noise_ = 1.0;
+  double pixel_ = 0.0, widest_ = 0.0, gate_ = 0.0, extent_ = 1.0, noise_ = 1.0;
 };
 
 }  // namespace
@@ -145,38 +165,7 @@ IcpResult determine_by_outline(const IcpTarget& target, const IcpSource& source,
       outlines.source.size() < outlines_limits::least_matches)
     return geometric;
   EdgeSearch search(target, source, outlines, geometric, options);
-  // The nearer solution first: structures repeat.
-  double best = 0.0, gate = 0.0;
-  for (const double first : {search.narrow_gate(), search.widest_gate()}) {
-    if (first == gate) break;
-    const Fit fit = search.fit(geometric, first, nullptr);
-    if (fit.agreement > best) gate = first;
-    best = std::max(best, fit.agreement);
-    if (best > outlines_limits::clear_agreement) break;
-  }
-  if (best < outlines_limits::least_agreement) return geometric;
-
-  TwistBasis known;
-  IcpResult result = geometric;
-  for (const bool restricted : {false, true}) {
-    const auto [found, pairs, agreement] = search.fit(geometric, gate, restricted ? &known : nullptr);
-    if (agreement < outlines_limits::least_agreement) return geometric;
-    // What shape says only where outlines took it must be said by the outlines, too.
-    const bool is_shaped = found.weak_directions.cols() == 0;
-    const TwistBasis open = is_shaped ? geometric.weak_directions : found.weak_directions;
-    double weight = 0.0;
-    for (const MotionRow& pair : pairs) weight += pair.weight;
-    const double least = std::max(search.least_known(), outlines_limits::least_information * weight);
-    const Directions directions = split_directions(agreed_information(pairs, open, search.extent(), 1.0), least);
-    if (is_shaped) return directions.weak.cols() == 0 ? found : geometric;
-    if (directions.sure.cols() == 0) return geometric;
-    known = open * directions.sure;
-    result = found;
-    result.weak_directions = open * directions.weak;
-    add_information(pairs, known, search.extent(), search.noise(), result.information);
-    if (directions.weak.cols() == 0) break;
-  }
-  return result;
+  return search.choose_gate(geometric) ? determine_open_directions(geometric, search) : geometric;
 }
 
 }  // namespace nacre

@@ -6,9 +6,8 @@
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
-#include "registration/gauss_newton.hpp"
 #include "registration/limits.hpp"
-#include "registration/weak_directions.hpp"
+#include "registration/open_directions.hpp"
 
 namespace nacre {
 namespace {
@@ -22,15 +21,38 @@ struct ColorLevel {
   ColorField target, source;
 };
 
-class ColorSearch {
+class ColorSearch : public OpenDirectionSearch {
  public:
-  ColorSearch(const IcpTarget& target, const IcpSource& source, const AlignOptions& options)
-      : target_(target), source_(source), options_(options) {
+  ColorSearch(const IcpTarget& target, const IcpSource& source, std::vector<ColorLevel> levels,
+              const AlignOptions& options)
+      : target_(target), source_(source), levels_(std::move(levels)), options_(options) {
     held_ = options;
     held_.max_distance = gate().distance;
     held_.max_iterations = 6;
   }
 
+  OpenFit fit(const IcpResult& geometric, const TwistBasis* only) override {
+    OpenFit fit;
+    fit.result = run(geometric, only);
+    fit.rows = match(levels_.back(), fit.result.target_from_source, fit.result.center);
+    fit.extent = extent_of(fit.rows);
+    fit.noise = noise_;
+    distance_noise_ = std::max(geometric.rmse, 0.1 * target_.spacing());
+    fit.agrees = fit.rows.size() >= registration_limits::least_color_pairs &&
+                 fit.result.num_inliers > registration_limits::still_matching * geometric.num_inliers &&
+                 correlation_ >= registration_limits::least_correlation;
+    return fit;
+  }
+
+  // Information as if it were of distances, per pair.
+  Directions determined(const OpenFit& fit, const TwistBasis& open) const override {
+    double weight = 0.0;
+    for (const MotionRow& row : fit.rows) weight += row.weight;
+    const Eigen::MatrixXd information = agreed_information(fit.rows, open, fit.extent, distance_noise_ / noise_);
+    return split_directions(information / std::max(weight, 1e-12), options_.weak_threshold);
+  }
+
+ private:
   Gate gate() const {
     const double reach = options_.final_distance > 0.0 ? options_.final_distance : 2.5 * target_.spacing();
     return {reach, std::cos(std::min(options_.max_angle, 3.14)), true};
@@ -63,13 +85,9 @@ class ColorSearch {
     return rows;
   }
 
-  double noise() const { return noise_; }
-  double correlation() const { return correlation_; }
-
-  // From a pose at rest on the surface, along the given directions or, without any, all that geometry leaves open.
-  IcpResult run(const std::vector<ColorLevel>& levels, const IcpResult& start, const TwistBasis* only) {
+  IcpResult run(const IcpResult& start, const TwistBasis* only) {
     IcpResult result = start;
-    for (const ColorLevel& level : levels) {
+    for (const ColorLevel& level : levels_) {
       for (int i = 0; i < registration_limits::most_color_steps; ++i) {
         const TwistBasis open = only != nullptr ? *only : TwistBasis(result.weak_directions);
         if (open.cols() == 0) break;
@@ -86,17 +104,9 @@ class ColorSearch {
   static double extent_of(const std::vector<MotionRow>& rows) {
     double squares = 0.0;
     for (const MotionRow& row : rows) squares += row.lever.squaredNorm();
-    return std::sqrt(std::max(squares / static_cast<double>(rows.size()), 1e-24));
+    return std::sqrt(std::max(squares / std::max(1.0, static_cast<double>(rows.size())), 1e-24));
   }
 
-  // As if it were of distances, per pair.
-  Eigen::MatrixXd agreed(const std::vector<MotionRow>& rows, const TwistBasis& open, double distance_noise) const {
-    double weight = 0.0;
-    for (const MotionRow& row : rows) weight += row.weight;
-    return agreed_information(rows, open, extent_of(rows), distance_noise / noise_) / std::max(weight, 1e-12);
-  }
-
- private:
   void weigh(const std::vector<Brightness>& brightness, std::vector<MotionRow>& rows) {
     std::vector<double> target_values, source_values, values;
     for (const Brightness& value : brightness) {
@@ -130,8 +140,9 @@ class ColorSearch {
   // Moves the pose along the open directions; returns how far, root mean square over the pairs [m].
   double step(const std::vector<MotionRow>& rows, const TwistBasis& open, IcpResult& result) const {
     const double extent = extent_of(rows);
-    Vector6 twist = gauss_newton_step(rows, open, extent, {1e-9, 1e-6});
-    const double longest = 4.0 * target_.spacing(), length = twist.norm();
+    Vector6 twist = gauss_newton_step(rows, open, extent,
+                                      {registration_limits::color_damping, registration_limits::color_trace_damping});
+    const double longest = registration_limits::longest_color_step * target_.spacing(), length = twist.norm();
     if (length > longest) twist *= longest / length;
     const double size = twist.norm();
     twist.head<3>() /= extent;
@@ -141,9 +152,10 @@ class ColorSearch {
 
   const IcpTarget& target_;
   const IcpSource& source_;
+  std::vector<ColorLevel> levels_;
   const AlignOptions& options_;
   AlignOptions held_;  // few steps within the last gate, weak directions held
-  double noise_ = 1.0, correlation_ = 0.0;
+  double noise_ = 1.0, correlation_ = 0.0, distance_noise_ = 1.0;
 };
 
 }  // namespace
@@ -163,28 +175,8 @@ IcpResult determine_by_color(const IcpTarget& target, const IcpSource& source, c
     levels.push_back({field(target_colors, target.cloud()), field(source_colors, source.cloud)});
   }
 
-  ColorSearch search(target, source, options);
-  const double distance_noise = std::max(geometric.rmse, 0.1 * target.spacing());
-  TwistBasis known;
-  IcpResult result = geometric;
-  for (const bool restricted : {false, true}) {
-    IcpResult found = search.run(levels, geometric, restricted ? &known : nullptr);
-    const std::vector<MotionRow> pairs = search.match(levels.back(), found.target_from_source, found.center);
-    const bool still_fits = found.num_inliers > 0.8 * geometric.num_inliers;
-    if (pairs.size() < registration_limits::least_color_pairs || !still_fits ||
-        search.correlation() < registration_limits::least_correlation)
-      return geometric;
-    const TwistBasis open = found.weak_directions;
-    if (open.cols() == 0) return found;
-    const Directions directions = split_directions(search.agreed(pairs, open, distance_noise), options.weak_threshold);
-    if (directions.sure.cols() == 0) return geometric;
-    known = open * directions.sure;
-    result = found;
-    result.weak_directions = open * directions.weak;
-    add_information(pairs, known, ColorSearch::extent_of(pairs), search.noise(), result.information);
-    if (directions.weak.cols() == 0) break;
-  }
-  return result;
+  ColorSearch search(target, source, std::move(levels), options);
+  return determine_open_directions(geometric, search);
 }
 
 }  // namespace nacre
