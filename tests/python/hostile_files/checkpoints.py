@@ -7,12 +7,14 @@ import struct
 import numpy as np
 
 from hostile_files.case import Case, single
+from hostile_files.saved_runs import SAVED_MODEL
 from hostile_files.seals import sealed_line
 
+FORMAT = int.from_bytes(SAVED_MODEL[8:12], "little")
 _random = np.random.default_rng(7)
 
 
-def checkpoint(body: bytes = b"", *, form: int = 4, told: int | None = None, checksum: int = 0) -> bytes:
+def checkpoint(body: bytes = b"", *, form: int = FORMAT, told: int | None = None, checksum: int = 0) -> bytes:
     """Return the header of a checkpoint, and a body."""
     length = 48 + len(body) if told is None else told
     return b"nacremdl" + struct.pack("<I20sQQ", form, b"0.1.0", length, checksum) + body
