@@ -10,8 +10,8 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from nacre.rendering import View, render_points
-from nacre.report.charts import ticks
 from nacre.report.colormap import CATEGORIES, category_rgb, viridis
+from nacre.report.text import ticks
 
 __all__ = [
     "Curve",

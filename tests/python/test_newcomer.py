@@ -212,6 +212,7 @@ def test_parameters_and_choices_are_suggested_in_python_too() -> None:
 # What needs a package that is not there, and the command that brings it.
 LAZY = {
     "PIL": ("nacre.io.images.read_depth('a.png')", 'pip install "nacre[images]"'),
+    "jinja2": ("nacre.report.render_page(nacre.report.ReportData('empty'))", 'pip install "nacre[report]"'),
     "OpenEXR": ("nacre.io.images.read_depth('a.exr')", 'pip install "nacre[exr]"'),
     "rosbags": ("nacre.open_sequence('a.bag')", 'pip install "nacre[ros]"'),
     "skimage": ("mesh_points(np.eye(3), np.eye(3))", 'pip install "nacre[mesh]"'),
@@ -229,7 +230,7 @@ def test_a_missing_package_comes_with_the_command_that_brings_it(package: str, t
     (tmp_path / "a.bag").write_bytes(b"#ROSBAG V2.0\n")
     program = f"""
 import os, sys; sys.modules[{package!r}] = None
-import numpy as np, nacre, nacre.io.images, nacre.viewer
+import numpy as np, nacre, nacre.io.images, nacre.report, nacre.viewer
 from nacre.meshing import mesh_points
 os.chdir({str(tmp_path)!r})
 model = nacre.Model(nacre.Camera(8, 8, 8, 8, 4, 4))

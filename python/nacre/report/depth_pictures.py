@@ -32,6 +32,7 @@ class DepthPictures:
     pictures: tuple[Picture, ...]
     removed: tuple[tuple[str, int, int], ...]  #: reason, its colour's index, pixels
     num_measured: int
+    num_pixels: int
     range: tuple[float, float]  #: nearest and farthest colour [m]
 
 
@@ -96,7 +97,7 @@ def draw_depth(example: DepthExample) -> DepthPictures:
         ),
         draw("As used", by_depth(kept)[::step, ::step], "depth", alt=f"The {of} without what was removed"),
     )
-    return DepthPictures(pictures, tuple(removed), int(measured.sum()), (low, high))
+    return DepthPictures(pictures, tuple(removed), int(measured.sum()), before.size, (low, high))
 
 
 def _alpha(visible: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:

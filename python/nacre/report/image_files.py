@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from nacre.io.images import import_pillow
 
-_QUALITIES = (88, 70, 50)
+_QUALITIES = (80, 65, 50)
 
 
 def encode_png(image: npt.NDArray[np.uint8]) -> bytes:

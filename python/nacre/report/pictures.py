@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -13,12 +14,12 @@ import numpy.typing as npt
 from nacre._internal.arrays import as_points
 from nacre.kdtree import KdTree
 from nacre.rendering import SIDES, View, measure_spacing, render_points
-from nacre.report.charts import length_unit, ticks
 from nacre.report.colormap import viridis
 from nacre.report.data import ModelCloud
 from nacre.report.image_files import encode_small
 from nacre.report.reported_frame import ReportedFrame
-from nacre.report.reverse_sides import is_inside_out, reverse_part
+from nacre.report.reverse_sides import reverse_parts
+from nacre.report.text import length_unit, ticks
 
 OBLIQUE = (-0.75, -0.55, -1.0)
 BEHIND = (0.75, -0.55, 1.0)
@@ -50,6 +51,11 @@ class Attribute:
     range: tuple[float, float]  #: of the colours
     typical: float  #: median
 
+    @property
+    def is_logarithmic(self) -> bool:
+        """Whether the colours are by the logarithm."""
+        return _is_logarithmic(*self.range)
+
 
 @dataclass(frozen=True)
 class ModelPictures:
@@ -78,7 +84,9 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
         return None
     extent = points[:: -(-len(points) // _FITTED_POINTS)]
     sides, scale = _fit_sides(extent, 0.001)
-    is_scene = model.normals is not None and _is_scene(points, model.normals, sides)
+    reverse = functools.cache(functools.partial(reverse_parts, points, model.normals))
+    # A scene surrounds its cameras: two or more of its sides are seen from behind.
+    is_scene = sum(reverse(view).from_behind for view in sides.values()) >= 2
     if is_scene:
         sides, scale = _fit_sides(extent, 0.02)  # what lies far away would make the rest tiny
     reach = measure_spacing(points, 5 if is_scene else 2)
@@ -90,7 +98,7 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
         colors: npt.NDArray[np.uint8] | None = None,
         by: str = "shaded grey",
     ) -> Picture:
-        hidden = model.normals is not None and is_inside_out(points, model.normals, view)
+        hidden = reverse(view).inside_out
         image = render_points(
             points, model.normals, colors, view=view, spacing=reach, hide_reverse=hidden, background=None
         )
@@ -163,7 +171,7 @@ def _fit_sides(points: npt.NDArray[Any], outliers: float) -> tuple[dict[str, Vie
     return sides, scale
 
 
-def is_logarithmic(low: float, high: float) -> bool:
+def _is_logarithmic(low: float, high: float) -> bool:
     """Return whether values between two bounds are coloured by their logarithm."""
     return 0 < 30 * low < high
 
@@ -173,7 +181,7 @@ def _positions(values: npt.NDArray[np.float64], low: float, high: float) -> npt.
     if high <= low:
         return np.ones(len(values))
     values = np.clip(values, low, high)
-    if is_logarithmic(low, high):
+    if _is_logarithmic(low, high):
         return np.asarray(np.log(values / low) / np.log(high / low))
     return np.asarray((values - low) / (high - low))
 
@@ -212,11 +220,6 @@ def _nearest_distances(points: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.
     if len(points) < 2:
         return np.zeros(len(points))
     return np.asarray(KdTree(points).query(points, k=2)[0], dtype=np.float64)[:, 1]
-
-
-def _is_scene(points: npt.ArrayLike, normals: npt.ArrayLike, sides: dict[str, View]) -> bool:
-    """Return whether a model surrounds its cameras: two or more of its sides are seen from behind."""
-    return sum(reverse_part(points, normals, view) > 0.5 for view in sides.values()) >= 2
 
 
 def _scale_bar(width: float) -> tuple[str, float]:

@@ -44,7 +44,7 @@ class ReportedFrame:
         unknown = figures.keys() - _NAMES
         if unknown:
             raise TypeError(f"a frame has no {', '.join(sorted(unknown))}")
-        self.figures: dict[str, Any] = {"index": index, "status": status} | {
+        self.figures: dict[str, Any] = {"index": index, "status": status.upper()} | {
             name: None if isinstance(value, float) and not math.isfinite(value) else value
             for name, value in figures.items()
         }
@@ -73,6 +73,18 @@ class ReportedFrame:
     def milliseconds(self) -> Mapping[str, float]:
         """Time of each step; "total" may contain more."""
         return self.figures.get("milliseconds") or {}
+
+    @property
+    def total_milliseconds(self) -> float | None:
+        """Time of all steps; None where it was not measured."""
+        times = self.milliseconds
+        total = times["total"] if "total" in times else sum(times.values()) if times else None
+        return None if total is None or math.isnan(total) else total
+
+    @property
+    def is_tracked(self) -> bool:
+        """Whether it found its pose."""
+        return self.status != "LOST"
 
     @property
     def removed(self) -> Mapping[str, int]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -13,23 +14,28 @@ from nacre.rendering import View
 _MOST_POINTS = 50_000  # tell it well enough
 
 
-def reverse_part(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) -> float:
-    """Return which part of a picture of a model would show reverse sides of surfaces."""
-    return _reverse_parts(points, normals, view)[0]
+@dataclass(frozen=True)
+class ReverseParts:
+    """Which part of the nearest and which part of all points in a picture turn their back to it."""
+
+    nearest: float
+    all: float
+
+    @property
+    def from_behind(self) -> bool:
+        """Whether the picture mostly shows reverse sides of surfaces."""
+        return self.nearest > 0.5
+
+    @property
+    def inside_out(self) -> bool:
+        """Whether hiding them would show the front: so a room is seen through one of its walls."""
+        return self.from_behind and self.all < 0.75
 
 
-def is_inside_out(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) -> bool:
-    """
-    Return whether a view shows a model from behind, and hiding its reverse sides would show its front.
-
-    That is so for a room that is seen through one of its walls.
-    """
-    in_picture, in_model = _reverse_parts(points, normals, view)
-    return in_picture > 0.5 and in_model < 0.75
-
-
-def _reverse_parts(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) -> tuple[float, float]:
-    """Return which part of the nearest and which part of all points in a picture turn their back to it."""
+def reverse_parts(points: npt.ArrayLike, normals: npt.ArrayLike | None, view: View) -> ReverseParts:
+    """Return how much of a picture of a model shows reverse sides of surfaces; nothing without normals."""
+    if normals is None:
+        return ReverseParts(0.0, 0.0)
     cloud = as_points("points", points)
     rows = slice(None, None, -(-len(cloud) // _MOST_POINTS) or 1)
     seen = view.project(cloud[rows])
@@ -42,8 +48,8 @@ def _reverse_parts(points: npt.ArrayLike, normals: npt.ArrayLike, view: View) ->
     inside = (np.abs(seen[:, :2]) < np.asarray(view.size) / 2).all(axis=1)  # False for NaN
     seen, reverse = seen[inside], reverse[inside]
     if not len(seen):
-        return 0.0, 0.0
+        return ReverseParts(0.0, 0.0)
     cell = (seen[:, :2] // 12).astype(np.int64) @ (1 << 20, 1)
     order = np.lexsort((seen[:, 2], cell))
     _, nearest = np.unique(cell[order], return_index=True)
-    return float(reverse[order[nearest]].mean()), float(reverse.mean())
+    return ReverseParts(float(reverse[order[nearest]].mean()), float(reverse.mean()))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeVar
@@ -43,18 +42,6 @@ class Summary:
     trajectory: AbsoluteTrajectoryError | None  #: given, or worked out from the poses
 
 
-def is_tracked(frame: ReportedFrame) -> bool:
-    """Return whether a frame found its pose."""
-    return frame.status.upper() != "LOST"
-
-
-def total_milliseconds(frame: ReportedFrame) -> float:
-    """Return the time of a frame; NaN where it was not measured."""
-    if "total" in frame.milliseconds:
-        return float(frame.milliseconds["total"])
-    return float(sum(frame.milliseconds.values())) if frame.milliseconds else math.nan
-
-
 def find(data: ReportData, kind: type[ResultType]) -> ResultType | None:
     """Return the first evaluation result of a kind."""
     return next((result for result in data.evaluation.values() if isinstance(result, kind)), None)
@@ -67,10 +54,10 @@ def summarize(data: ReportData) -> Summary:
     sentences, tiles = [], []
     if verdict is not None:
         sentences.append(verdict.why)
-        num_frames, num_tracked = len(data.frames), sum(is_tracked(frame) for frame in data.frames)
+        num_frames, num_tracked = len(data.frames), sum(frame.is_tracked for frame in data.frames)
         part = quantity(num_tracked / num_frames, "fraction")
         tiles.append(Tile("Frames tracked", f"{count(num_tracked)} / {count(num_frames)}", part))
-    matching = [f.overlap for f in data.frames if is_tracked(f) and f.num_inliers and f.overlap is not None]
+    matching = [f.overlap for f in data.frames if f.is_tracked and f.num_inliers and f.overlap is not None]
     if matching:
         typical = 100 * float(np.median(matching))
         sentences.append(f"Typically {typical:.0f} % of a frame matches the model")
@@ -98,9 +85,8 @@ def summarize(data: ReportData) -> Summary:
             )
         )
 
-    times = np.array([total_milliseconds(frame) for frame in data.frames])
-    times = times[np.isfinite(times)]
-    if len(times):
+    times = [time for frame in data.frames if (time := frame.total_milliseconds) is not None]
+    if times:
         median = quantity(float(np.median(times)), "ms")
         tiles.append(
             Tile(
@@ -124,7 +110,7 @@ def _trajectory_error(frames: Sequence[ReportedFrame]) -> AbsoluteTrajectoryErro
     return absolute_trajectory_error(
         stacked_poses(frame.world_from_camera for frame in frames),
         stacked_poses(frame.truth for frame in frames),
-        valid=[is_tracked(frame) for frame in frames],
+        valid=[frame.is_tracked for frame in frames],
     )
 
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from nacre.evaluation.result import plain
-from nacre.report.charts import length_unit
 
 _MISSING = "\N{EN DASH}"
 _WORDS = {
@@ -58,6 +57,30 @@ def quantity(value: Any, unit: str = "") -> str:
 def count(value: int) -> str:
     """Return a whole number with its digits in groups of three."""
     return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+
+
+def length_unit(metres: float) -> tuple[str, float]:
+    """Return the unit in which a length reads well, and how many of it are in a metre."""
+    if not math.isfinite(metres) or metres >= 2:
+        return "m", 1.0
+    return ("mm", 1e3) if metres >= 5e-5 else ("µm", 1e6)
+
+
+def ticks(low: float, high: float, count: int = 4) -> list[float]:
+    """Return about ``count`` round numbers between two bounds."""
+    span = high - low
+    if not (math.isfinite(span) and span > 0):
+        return [low]
+    rough = span / count
+    power = 10 ** math.floor(math.log10(rough))
+    step = next(factor * power for factor in (1, 2, 2.5, 5, 10) if factor * power >= rough * 0.999)
+    return [i * step for i in range(math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9) + 1)]
+
+
+def number(value: float) -> str:
+    """Return the number at a tick."""
+    text = f"{value:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}") if abs(value) >= 1e4 else f"{value:.6g}"
+    return text.replace("-", "\N{MINUS SIGN}")
 
 
 def ranges(indices: Sequence[int], most: int = 4) -> str:

@@ -7,6 +7,7 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 
 import numpy as np
 
@@ -58,10 +59,10 @@ def judge(data: ReportData, trajectory: AbsoluteTrajectoryError | None) -> Verdi
     frames = data.frames
     if not frames:
         return None
-    statuses = Counter(frame.status.upper() for frame in frames)
+    statuses = Counter(frame.status for frame in frames)
     num_lost, num_weak, num_frames = statuses["LOST"], statuses["WEAK"], len(frames)
     num_tracked = num_frames - num_lost
-    bad = [frame for frame in frames if frame.status.upper() in ("LOST", "WEAK")]
+    bad = [frame for frame in frames if frame.status in ("LOST", "WEAK")]
     extra = [f"{count(num_lost)} lost"] * bool(num_lost) + [f"{count(num_weak)} with weak geometry"] * bool(
         num_weak
     )
@@ -111,28 +112,16 @@ def judge(data: ReportData, trajectory: AbsoluteTrajectoryError | None) -> Verdi
 
 def stretches(frames: Sequence[ReportedFrame]) -> list[Stretch]:
     """Return the frames to look at, neighbours together, the longest first."""
-    groups: list[list[ReportedFrame]] = []
-    for i, frame in enumerate(frames):
-        if frame.status.upper() not in ("LOST", "WEAK"):
-            continue
-        if (
-            i
-            and groups
-            and groups[-1][-1] is frames[i - 1]
-            and groups[-1][-1].status.upper() == frame.status.upper()
-        ):
-            groups[-1].append(frame)
-        else:
-            groups.append([frame])
+    bad = [list(group) for status, group in groupby(frames, lambda f: f.status) if status in ("LOST", "WEAK")]
     found = [
         Stretch(
             group[0].index,
             group[-1].index,
-            group[0].status.upper(),
+            group[0].status,
             len(group),
             Counter(plain_reason(frame.reason) for frame in group).most_common(1)[0][0],
         )
-        for group in groups
+        for group in bad
     ]
     return sorted(found, key=lambda stretch: (-stretch.num_frames, stretch.first))
 
@@ -154,7 +143,7 @@ def _cause(frames: Sequence[ReportedFrame]) -> str:
     """Return what most of the frames that were not tracked suffer from."""
 
     def cause(frame: ReportedFrame) -> str:
-        if frame.status.upper() == "WEAK":
+        if frame.status == "WEAK":
             return "weak"
         if frame.num_pixels is None and frame.reason:
             return "unreadable"

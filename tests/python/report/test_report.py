@@ -25,11 +25,11 @@ from nacre.report import (
     render_page,
     write_report,
 )
-from nacre.report.charts import MAX_VALUES, Mark, Series, grouped, line_chart, map_chart, stacked_chart, ticks
+from nacre.report.charts import MAX_VALUES, Mark, Series, grouped, line_chart, map_chart, stacked_chart
 from nacre.report.colormap import viridis
 from nacre.report.depth_pictures import draw_depth
 from nacre.report.pictures import draw_model
-from nacre.report.text import flatten, label, quantity, ranges
+from nacre.report.text import flatten, label, quantity, ranges, ticks
 
 SPACE = "\N{NARROW NO-BREAK SPACE}"
 
@@ -325,19 +325,36 @@ class TestPage:
         assert told not in PageCheck(render_page(ReportData("x", frames=frames))).text
         assert told in PageCheck(render_page(ReportData("x", frames=frames, evaluation={"ATE": given}))).text
 
+    def test_it_has_2_mb_at_most_however_long_the_recording_and_large_the_model(self) -> None:
+        random = np.random.default_rng(0)
+        points, normals = random.uniform(-1, 1, (60_000, 3)), random.normal(size=(60_000, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        colors = random.integers(0, 256, (60_000, 3), dtype=np.uint8)
+        depth, reasons = random.uniform(0.3, 8, (480, 640)), random.integers(0, 4, (480, 640))
+        names = ("edge", "slanted", "isolated")
+        page = render_page(
+            ReportData(
+                "noise",
+                frames=entries(5000, lost=tuple(range(0, 5000, 2))),
+                model=ModelCloud(points, normals, colors, random.exponential(1, 60_000)),
+                depth=2 * [DepthExample(depth, np.where(reasons > 0, np.nan, depth), reasons, names)],
+            )
+        )
+        assert len(page.encode()) <= 2_000_000
+
     def test_lost_frames_are_marked(self, page: str) -> None:
-        assert '<rect class="lost"' in page
+        assert '<path class="lost"' in page
         assert 'class="verdict weak"' in page
         assert 'class="status-LOST"' in page
         tracked = render_page(ReportData("x", frames=entries(12)))
-        assert '<rect class="lost"' not in tracked
+        assert '<path class="lost"' not in tracked
         assert 'class="verdict ok"' in tracked
 
     def test_loops_are_marked_and_named(self) -> None:
         frames = entries(12)
         frames[9] = ReportedFrame(**frames[9].figures | {"loop_frame": 2})
         page = render_page(ReportData("x", frames=frames))
-        assert '<rect class="loop"' in page
+        assert '<path class="loop"' in page
         assert "closes a loop with frame 2" in PageCheck(page).text
         assert "loop closed" not in PageCheck(render_page(ReportData("x", frames=entries(12)))).text
 

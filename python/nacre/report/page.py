@@ -1,0 +1,103 @@
+"""The page: one self-contained HTML file."""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from nacre import __version__
+from nacre.errors import printable
+from nacre.io.atomic import atomic_writer
+from nacre.report.charts import status_strip
+from nacre.report.data import ReportData
+from nacre.report.depth_pictures import draw_depth
+from nacre.report.frame_charts import registration_charts, time_chart, trajectory_charts
+from nacre.report.pictures import draw_model
+from nacre.report.pixel_counts import pixel_counts, removed_chart
+from nacre.report.reported_frame import ReportedFrame
+from nacre.report.summary import summarize
+from nacre.report.tables import frame_table, result_tables
+from nacre.report.templating import render
+from nacre.report.text import flatten, ranges
+from nacre.report.verdict import stretches
+
+
+class Section(NamedTuple):
+    """A part of the page; ``templates/NAME.html`` shows its content."""
+
+    name: str
+    title: str
+    content: Any
+
+
+def write_report(path: str | os.PathLike[str], data: ReportData) -> None:
+    """
+    Write a reconstruction's report: one HTML file with its pictures inside, without network or script.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to write, usually ``report.html``; its folder must exist. It appears only when it is
+        complete.
+    data : ReportData
+        What to show. Whatever is missing is left out.
+
+    Raises
+    ------
+    ImportError
+        When jinja2 or pillow is missing, with the command that installs it.
+
+    Notes
+    -----
+    The same data gives the same bytes, 2 MB at most for any number of frames and points. Errors of the poses
+    are worked out from ``frames`` where ``evaluation`` holds no trajectory error.
+    """
+    page = render_page(data)
+    with atomic_writer(path) as stream:
+        stream.write(page.encode())
+
+
+def render_page(data: ReportData) -> str:
+    """Return the report as HTML text."""
+    summary = summarize(data)
+    model = None if data.model is None else draw_model(data.model, data.frames)
+    depth = {
+        "examples": [(example, draw_depth(example)) for example in data.depth],
+        "removed": removed_chart(data.frames),
+    }
+    sections = [
+        Section("look", "Frames to look at", stretches(data.frames)),
+        Section("model", "Model", model),
+        Section("depth", "Depth before and after cleaning", depth if data.depth else None),
+        Section("funnel", "Where the points were lost", pixel_counts(data.frames)),
+        Section("trajectory", "Trajectory", trajectory_charts(data.frames, summary.trajectory)),
+        Section("frames", "Frames", registration_charts(data.frames, data.parameters)),
+        Section("time", "Time", time_chart(data.frames)),
+        Section("figures", "Figures", result_tables(data, summary.trajectory)),
+        Section("table", "Table of frames", frame_table(data.frames)),
+        Section("parameters", "Parameters", flatten(data.parameters)),
+    ]
+    page = render(
+        "page.html",
+        data=data,
+        summary=summary,
+        model=model,
+        states=_states(data.frames),
+        sections=[section for section in sections if section.content],
+        version=__version__,
+    )
+    return printable(page)
+
+
+def _states(frames: Sequence[ReportedFrame]) -> dict[str, Any] | None:
+    """Return the states of all frames, in the order in which they came."""
+    if len(frames) < 2:
+        return None
+    states = [frame.status for frame in frames]
+    counts = Counter(states)
+    shown = [(name, counts[name]) for name in ("TRACKED", "RELOCALISED", "WEAK", "LOST") if counts[name]]
+    lost = [frame.index for frame in frames if frame.status == "LOST"]
+    words = ", ".join(f"{num} {name}" for name, num in shown) + (f"; lost: {ranges(lost)}" if lost else "")
+    return {"paths": status_strip(states), "counts": shown, "in_words": words}
