@@ -36,4 +36,4 @@ def copied(recording, tmp_path):
 @pytest.fixture
 def no_pictures(monkeypatch):
     """Leave the pictures of the model out of the report: they take most of a short run's time."""
-    monkeypatch.setattr("nacre.report.html.draw_model", lambda *_: None)
+    monkeypatch.setattr("nacre.report.page.draw_model", lambda *_: None)
