@@ -44,8 +44,7 @@ class FrameReport(Value):
     num_inliers, overlap, rmse, information, weak_directions
         Of the registration; see :class:`nacre.AlignResult`.
     consistency : float
-        Part of the model's points in view that the frame does not see through, or of the frame's points that
-        the camera did not see through before, whichever is smaller.
+        Part of the model's points in view that the frame does not see through.
     score : float
         The registration score, that the pose is right, against chance: what the residuals tell a match, times
         overlap^2 and consistency^4 (consistency^8 far from all guesses); less where residuals of neighbours

@@ -23,8 +23,7 @@ struct TrackingReport {
   Pose world_from_camera = Pose::Identity();  ///< of a lost frame: the last known pose
   int num_inliers = 0;
   double overlap = 0.0;      ///< part of the frame that matches the model
-  double consistency = 0.0;  ///< part of the model's points in view that the frame does not see through,
-                             ///< and of the frame's that the camera did not see through before
+  double consistency = 0.0;  ///< part of the model's points in view that the frame does not see through
   double score = 0.0;        ///< of the registration: that it is right, against chance: what the residuals tell a
                              ///< match, times overlap^2 consistency^4 (^8 far from all guesses), less
                              ///< where residuals of neighbours agree beyond noise

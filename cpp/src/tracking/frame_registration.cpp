@@ -90,22 +90,13 @@ void FrameRegistration::determine_open_directions(const PointsInView& view, cons
   }
 }
 
+// 0 where too few of the points are seen.
 double FrameRegistration::consistency(const PointsInView& view, const Pose& world_from_camera) const {
-  const double now = consistency(view.points, view.normals, now_.view, world_from_camera);
-  const Eigen::Matrix3f rotation = world_from_camera.linear().cast<float>();
-  const Eigen::RowVector3f translation = world_from_camera.translation().cast<float>().transpose();
-  const Points points = (source_.cloud.points * rotation.transpose()).rowwise() + translation;
-  const Points normals = source_.cloud.normals * rotation.transpose();
-  const double before = consistency(points, normals, target_.last_view, target_.last_view.world_from_camera);
-  return std::isfinite(now) || std::isfinite(before) ? std::fmin(now, before) : 0.0;
-}
-
-// NaN where too few of the points are seen.
-double FrameRegistration::consistency(const Points& points, const Points& normals, const DepthView& seen,
-                                      const Pose& pose) const {
   const double margin = tracking_limits::margin_spacings * target_.spacing;
-  return compare(points, normals, seen, pose, now_.camera, {margin}, options_.num_threads)
-      .consistency(tracking_limits::least_judged);
+  const double part =
+      compare(view.points, view.normals, now_.view, world_from_camera, now_.camera, {margin}, options_.num_threads)
+          .consistency(tracking_limits::least_judged);
+  return std::isfinite(part) ? part : 0.0;
 }
 
 const OutlinePair& FrameRegistration::outlines() const {

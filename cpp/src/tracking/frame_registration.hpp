@@ -58,7 +58,6 @@ class FrameRegistration {
   void determine_open_directions(const PointsInView& view, const IcpTarget& target, const IcpSource& gated,
                                  const AlignOptions& options, IcpResult& result) const;
   double consistency(const PointsInView& view, const Pose& world_from_camera) const;
-  double consistency(const Points& points, const Points& normals, const DepthView& seen, const Pose& pose) const;
   const OutlinePair& outlines() const;
 
   CurrentFrame now_;
