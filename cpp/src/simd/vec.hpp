@@ -21,6 +21,9 @@
 #if defined(__SSE2__) || defined(_M_X64)
 #define NACRE_SSE2
 #include <emmintrin.h>
+#elif defined(__aarch64__) || defined(_M_ARM64)
+#define NACRE_NEON
+#include <arm_neon.h>
 #endif
 #endif
 
@@ -273,7 +276,89 @@ NACRE_INLINE void store_interleaved(float* p, F32 x, F32 y, F32 z) {
   store(p + 8, select(first, c, select(second, a, b)));
 }
 
-#else  // plain loops, which a compiler for NEON and the like makes vectors of
+#elif defined(NACRE_NEON)
+
+constexpr int lanes = 4;
+struct Mask {
+  uint32x4_t v;
+};
+struct F32 {
+  float32x4_t v;
+};
+struct I32 {
+  int32x4_t v;
+};
+
+NACRE_INLINE F32 load(const float* p) { return {vld1q_f32(p)}; }
+NACRE_INLINE I32 load(const int32_t* p) { return {vld1q_s32(p)}; }
+NACRE_INLINE void store(float* p, F32 a) { vst1q_f32(p, a.v); }
+NACRE_INLINE void store(int32_t* p, I32 a) { vst1q_s32(p, a.v); }
+NACRE_INLINE F32 broadcast(float a) { return {vdupq_n_f32(a)}; }
+NACRE_INLINE I32 broadcast(int32_t a) { return {vdupq_n_s32(a)}; }
+NACRE_INLINE F32 gather(const float* p, I32 index) {
+  int32_t i[4];
+  store(i, index);
+  const float values[4] = {p[i[0]], p[i[1]], p[i[2]], p[i[3]]};
+  return load(values);
+}
+
+NACRE_INLINE F32 operator+(F32 a, F32 b) { return {vaddq_f32(a.v, b.v)}; }
+NACRE_INLINE F32 operator-(F32 a, F32 b) { return {vsubq_f32(a.v, b.v)}; }
+NACRE_INLINE F32 operator*(F32 a, F32 b) { return {vmulq_f32(a.v, b.v)}; }
+NACRE_INLINE F32 operator/(F32 a, F32 b) { return {vdivq_f32(a.v, b.v)}; }
+NACRE_INLINE F32 mul_add(F32 a, F32 b, F32 c) { return {vfmaq_f32(c.v, a.v, b.v)}; }
+NACRE_INLINE F32 sqrt(F32 a) { return {vsqrtq_f32(a.v)}; }
+NACRE_INLINE F32 abs(F32 a) { return {vabsq_f32(a.v)}; }
+
+NACRE_INLINE I32 operator+(I32 a, I32 b) { return {vaddq_s32(a.v, b.v)}; }
+NACRE_INLINE I32 operator-(I32 a, I32 b) { return {vsubq_s32(a.v, b.v)}; }
+NACRE_INLINE I32 operator&(I32 a, I32 b) { return {vandq_s32(a.v, b.v)}; }
+NACRE_INLINE I32 operator|(I32 a, I32 b) { return {vorrq_s32(a.v, b.v)}; }
+template <int bits>
+NACRE_INLINE I32 shift_left(I32 a) {
+  return {vshlq_n_s32(a.v, bits)};
+}
+template <int bits>
+NACRE_INLINE I32 shift_right(I32 a) {
+  return {vshrq_n_s32(a.v, bits)};
+}
+
+NACRE_INLINE I32 as_int(F32 a) { return {vreinterpretq_s32_f32(a.v)}; }
+NACRE_INLINE F32 as_float(I32 a) { return {vreinterpretq_f32_s32(a.v)}; }
+NACRE_INLINE F32 to_float(I32 a) { return {vcvtq_f32_s32(a.v)}; }
+
+NACRE_INLINE Mask operator<(F32 a, F32 b) { return {vcltq_f32(a.v, b.v)}; }
+NACRE_INLINE Mask operator<=(F32 a, F32 b) { return {vcleq_f32(a.v, b.v)}; }
+NACRE_INLINE Mask operator==(F32 a, F32 b) { return {vceqq_f32(a.v, b.v)}; }
+NACRE_INLINE Mask operator<(I32 a, I32 b) { return {vcltq_s32(a.v, b.v)}; }
+NACRE_INLINE Mask operator==(I32 a, I32 b) { return {vceqq_s32(a.v, b.v)}; }
+NACRE_INLINE Mask operator&(Mask a, Mask b) { return {vandq_u32(a.v, b.v)}; }
+NACRE_INLINE Mask operator|(Mask a, Mask b) { return {vorrq_u32(a.v, b.v)}; }
+NACRE_INLINE Mask operator!(Mask a) { return {vmvnq_u32(a.v)}; }
+NACRE_INLINE unsigned bits(Mask a) {
+  const int32_t places[4] = {0, 1, 2, 3};
+  return vaddvq_u32(vshlq_u32(vshrq_n_u32(a.v, 31), vld1q_s32(places)));
+}
+NACRE_INLINE Mask first_lanes(int count) {
+  const int32_t places[4] = {0, 1, 2, 3};
+  return load(places) < broadcast(count);
+}
+NACRE_INLINE F32 select(Mask m, F32 a, F32 b) { return {vbslq_f32(m.v, a.v, b.v)}; }
+NACRE_INLINE I32 select(Mask m, I32 a, I32 b) { return {vbslq_s32(m.v, a.v, b.v)}; }
+NACRE_INLINE F32 add_where(Mask m, F32 a, F32 b) { return select(m, a + b, a); }
+NACRE_INLINE F32 sub_where(Mask m, F32 a, F32 b) { return select(m, a - b, a); }
+NACRE_INLINE I32 add_where(Mask m, I32 a, I32 b) { return select(m, a + b, a); }
+// Those of NEON give NaN where either is.
+NACRE_INLINE F32 min(F32 a, F32 b) { return select(a < b, a, b); }
+NACRE_INLINE F32 max(F32 a, F32 b) { return select(b < a, a, b); }
+// That of NEON saturates, and gives 0 of NaN.
+NACRE_INLINE I32 truncate(F32 a) {
+  const Mask fits = (broadcast(-2147483648.0F) <= a) & (a < broadcast(2147483648.0F));
+  return select(fits, I32{vcvtq_s32_f32(a.v)}, broadcast(INT32_MIN));
+}
+NACRE_INLINE void store_interleaved(float* p, F32 x, F32 y, F32 z) { vst3q_f32(p, {{x.v, y.v, z.v}}); }
+
+#else  // plain loops, which a compiler may make vectors of
 
 constexpr int lanes = 4;
 struct Mask {
@@ -460,6 +545,10 @@ NACRE_INLINE float sum_lanes(const F32 (&v)[16 / lanes]) {
   const __m128 four = _mm_add_ps(_mm256_castps256_ps128(eight), _mm256_extractf128_ps(eight, 1));
 #elif defined(NACRE_SSE2)
   const __m128 four = ((v[0] + v[2]) + (v[1] + v[3])).v;
+#elif defined(NACRE_NEON)
+  const float32x4_t four = ((v[0] + v[2]) + (v[1] + v[3])).v;
+  const float32x2_t two = vadd_f32(vget_low_f32(four), vget_high_f32(four));
+  return vget_lane_f32(two, 0) + vget_lane_f32(two, 1);
 #else
   const F32 four = (v[0] + v[2]) + (v[1] + v[3]);
   return (four.v[0] + four.v[2]) + (four.v[1] + four.v[3]);
