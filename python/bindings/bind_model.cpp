@@ -182,6 +182,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("cloud", &Model::cloud, py::return_value_policy::reference_internal)
       .def("cloud_in_camera", &Model::cloud_in_camera)
       .def_property_readonly("noise", &Model::noise)
+      .def_property_readonly("noise_factor", &Model::noise_factor)
       .def_property_readonly("num_frames", [](const Model& model) { return model.frames().size(); })
       .def("report", [](const Model& model, std::size_t i) { return model.frames()[i]; })  // i < num_frames
       .def_property_readonly("spacing", &Model::spacing);

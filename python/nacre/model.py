@@ -284,9 +284,21 @@ class Model(ExchangeablePoints, Checkpointed):
 
     @property
     def noise(self) -> NoiseModel:
-        """The noise of the depth: as given, or measured from the frames so far."""
+        """The noise of the depth: as given, or measured from the images so far."""
         with self._lock:
             return mirrored(NoiseModel, self._core.noise)
+
+    @property
+    def noise_factor(self) -> float:
+        """
+        By how much registered frames are noisier than one image shows: at least 1.
+
+        Neighbouring pixels share errors, those of stereo cameras above all, which show in residuals between
+        frames alone. Gates and spacing follow. 1 where ``depth.noise`` or ``registration.final_distance`` is
+        given.
+        """
+        with self._lock:
+            return self._core.noise_factor
 
     def in_camera(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
         """Return points and normals in the newest registered camera's frame, as the paper keeps its model."""

@@ -35,7 +35,10 @@ class Model {
   PointModel cloud_in_camera() const;         ///< in the newest registered camera's frame
   /// One report per frame that was added. Where a later frame closed a loop, the poses are the corrected ones.
   FrameReports frames() const;
-  NoiseModel noise() const;  ///< given, or measured from the frames so far
+  NoiseModel noise() const;  ///< given, or measured from the images so far
+  /// By how much the frames registered so far are noisier than that: errors that neighbouring pixels share do not show in
+  /// one image. At least 1; 1 where the noise is given.
+  double noise_factor() const;
   double spacing() const;    ///< [m]; 0 before the first frame
 
   /// All that the model knows, as bytes; a model that is loaded from them goes on to the same bits. `note`: bytes of

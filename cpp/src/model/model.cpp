@@ -26,6 +26,7 @@ const ModelOptions& Model::given_options() const { return pipeline_->given; }
 const PointModel& Model::cloud() const { return pipeline_->cloud; }
 FrameReports Model::frames() const { return FrameReports(pipeline_->history); }
 NoiseModel Model::noise() const { return pipeline_->noise(); }
+double Model::noise_factor() const { return pipeline_->known_noise_factor(); }
 double Model::spacing() const { return pipeline_->spacing; }
 
 PointModel Model::cloud_in_camera() const {

@@ -17,6 +17,7 @@
 #include "model/object_views.hpp"
 #include "model/wlop_fusion.hpp"
 #include "outlines/refinement.hpp"
+#include "tracking/limits.hpp"
 
 namespace nacre {
 namespace {
@@ -122,6 +123,19 @@ void Pipeline::observe(const ColorsRef& colors, FrameReport& report) {
   observer.look_at(frame, colors, options.num_threads);
   now.depth = frame.points.col(2);
   now.sigma = frame.sigma;
+  noise_factor = 1.0;
+  set_noise_factor(known_noise_factor());
+}
+
+// Noise and gate are given, or learned from registered frames.
+bool Pipeline::learns_noise() const { return !options.depth.noise && !(options.registration.final_distance > 0.0); }
+
+double Pipeline::known_noise_factor() const { return learns_noise() ? residual_noise.factor() : 1.0; }
+
+void Pipeline::set_noise_factor(double factor) {
+  frame.sigma *= static_cast<float>(factor / noise_factor);
+  now.sigma = frame.sigma;
+  noise_factor = factor;
 }
 
 // Where the camera is. A lost one is reported where it was last.
@@ -154,13 +168,41 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
-  const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
-  result = track({frame, camera, observer, now}, {cloud, spacing, before, oldest_frame},
-                 {guesses(extras), was_lost() || jumped(), elsewhere(region_report)}, hypothesis, options);
+  result = track_frame({guesses(extras), was_lost() || jumped(), elsewhere(region_report)});
   const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
   if (is_determined && !result.is_on_plane) {
     refine_by_outlines(result.alignment, outline, loops.outlines_near(result.alignment.target_from_source),
                        options.num_threads);
+  }
+  return result;
+}
+
+// Until frames have told how noisy the camera is, a frame that is lost may be noisier where it is expected; elsewhere
+// it is looked for with the noise that is known.
+TrackingResult Pipeline::track_frame(TrackingPrior prior) {
+  const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
+  const CurrentFrame current{frame, camera, observer, now};
+  const TrackingTarget target{cloud, spacing, before, oldest_frame};
+  TrackingResult result;
+  if (learns_noise() && !residual_noise.is_known()) {
+    TrackingOptions nearby = options;
+    nearby.relocalise = false;
+    const auto is_found = [&] {
+      return !result.is_lost() && (noise_factor == known_noise_factor() || result.expectation == Expectation::expected);
+    };
+    for (double factor = noise_factor; factor <= tracking_limits::largest_noise_factor && !is_found(); factor *= 2.0) {
+      set_noise_factor(factor);
+      result = track(current, target, {prior.guesses, prior.was_lost, {}}, hypothesis, nearby);
+    }
+    if (!is_found()) {
+      set_noise_factor(known_noise_factor());
+      result = {};
+    }
+  }
+  if (result.is_lost()) result = track(current, target, std::move(prior), hypothesis, options);
+  if (learns_noise() && result.decision == Decision::accepted && !result.is_on_plane) {
+    residual_noise.add(noise_factor * result.alignment.residual_sigmas);
+    set_noise_factor(residual_noise.factor());
   }
   return result;
 }

@@ -11,6 +11,7 @@
 #include "nacre/model_options.hpp"
 #include "tracking/object_view.hpp"
 #include "tracking/relocalisation_filter.hpp"
+#include "tracking/residual_noise.hpp"
 #include "tracking/tracking.hpp"
 
 namespace nacre {
@@ -29,6 +30,8 @@ struct Pipeline {
   DepthView now;                      // of the newest, from the origin: where the camera is, is to be found
   std::vector<OutlinePoint> outline;  // of the newest
   DepthView before;                   // of the newest frame that was fused
+  ResidualNoise residual_noise;       // of registered frames, against what images show
+  double noise_factor = 1.0;          // of the newest frame
   PlaceHypothesis hypothesis;         // while the camera is lost
   std::vector<ObjectView> views;      // of an object that stands on a plane, from different directions
   double spacing = 0.0;
@@ -37,6 +40,7 @@ struct Pipeline {
   Pipeline(const Camera& camera_in, const ModelOptions& options_in);
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
+  double known_noise_factor() const;  // of the frames so far
   NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
 
  private:
@@ -57,6 +61,9 @@ struct Pipeline {
   bool jumped() const;
   bool keeps_key_frames() const { return options.loop_closure && options.fusion_method == FusionMethod::fuse; }
   TrackingResult register_frame(const FrameExtras& extras, const RegionReport& region_report);
+  bool learns_noise() const;
+  void set_noise_factor(double factor);
+  TrackingResult track_frame(TrackingPrior prior);
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   RelocalisationPlaces elsewhere(const RegionReport& region_report) const;
   std::optional<ObjectView> view_of_object(const RegionReport& region_report) const;

@@ -216,6 +216,7 @@ std::vector<Pair> IcpTarget::match(const IcpSource& source, std::int64_t count, 
               pair.agreement = (1.0 - part) * (1.0 - part);
             }
           }
+          if (source.noise.size() > 0) pair.noise = static_cast<double>(source.noise[i]);
           double variance = 0.0;
           if (from.sigma.size() > 0) variance += static_cast<double>(from.sigma[i]) * from.sigma[i];
           if (cloud_.sigma.size() > 0) variance += static_cast<double>(cloud_.sigma[match]) * cloud_.sigma[match];

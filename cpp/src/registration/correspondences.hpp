@@ -30,6 +30,7 @@ struct IcpSource {
   // For each sample, or empty: how far a match may be along the surface, and across it, when the gate is at its
   // smallest [m]. What is near along the surface of a sparse target, but beyond its rim, matches nothing.
   Values reach, largest_residual;
+  Values noise;  // standard deviation of each sample along its residual [m], or empty
 
   IcpSource(const AlignCloud& cloud, const AlignOptions& options);
   IcpSource few() const;  // those of the first level alone

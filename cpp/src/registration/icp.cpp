@@ -95,6 +95,12 @@ double residual_ratio_of(const std::vector<Pair>& pairs, Metric metric) {
   return std::sqrt(squares / static_cast<double>(pairs.size()));
 }
 
+// NaN where the source has no noise.
+double residual_sigmas_of(const std::vector<Pair>& pairs, Metric metric) {
+  return mad_to_sigma *
+         median_of(pairs, [&](const Pair& pair) { return std::abs(residual(pair, metric)) / pair.noise; });
+}
+
 // Of pairs in the order of space. Noise is independent from one to the next; the error of a surface that is bent
 // another way is not: what neighbours lie off by on average, in units of what noise and the
 // model's resolution explain.
@@ -157,6 +163,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   }
   if (pairs.size() < least_pairs(schedule.num_samples())) return result;
   result.misfit = misfit_of(pairs, options.method);
+  result.residual_sigmas = residual_sigmas_of(pairs, options.method);
   weight_pairs(pairs, options.method, options.robust, resolution);
   const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, along, options.num_threads);
   result.size_difference = size_difference(pairs, options.method);

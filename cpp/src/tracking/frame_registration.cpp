@@ -57,6 +57,7 @@ PointsInView FrameRegistration::in_view(const Pose& world_from_camera) const {
 IcpSource FrameRegistration::gated(const PointsInView& view, const IcpTarget& target) const {
   IcpSource source = source_;
   const auto count = static_cast<Eigen::Index>(source.cloud.rows.size());
+  source.noise.resize(count);
   source.reach.resize(count);
   source.largest_residual.resize(count);
   const double set = options_.registration.final_distance;
@@ -66,6 +67,7 @@ IcpSource FrameRegistration::gated(const PointsInView& view, const IcpTarget& ta
   const double largest = tracking_limits::largest_reach * std::min(target.diameter(), extent);
   for (Eigen::Index i = 0; i < count; ++i) {
     const float sigma = noise_[source.cloud.rows[static_cast<std::size_t>(i)]];
+    source.noise[i] = sigma;
     const double apart = spacing_at(points(i, 2), sigma, now_.camera, target_.spacing);
     const double along = tracking_limits::reach_spacings * view.thinning * apart;
     const double across = std::max(tracking_limits::residual_spacings * apart,

@@ -45,5 +45,10 @@ constexpr double first_turn_gate = 0.25;  // [size] tuned: of the search's start
 constexpr double least_view_overlap = 0.1;  // [1] tuned: with the view that agrees most; dog
 constexpr double least_view_consistency = 0.75;  // [1] tuned: with all views; dog
 
+constexpr double noise_per_residual = 1.376;  // [1] derived: standard deviation by median absolute value, of Laplace's distribution; test_residual_noise
+constexpr double largest_noise_factor = 16.0;  // [1] budget: of the noise that is tried until it is known; d435-t265-shelf
+constexpr double most_noise_frames = 100.0;  // [frames] tuned: a frame counts at least so much: drift is followed; test_residual_noise
+constexpr double enough_noise_frames = 5.0;  // [frames] tuned: that tell how noisy registered frames are; pairs
+
 }  // namespace nacre::tracking_limits
 // clang-format on

@@ -58,6 +58,11 @@ struct PrivateState {
   }
 
   template <class Archive>
+  static void exchange(Archive& archive, ResidualNoise& noise) {
+    archive(noise.log_scale_, noise.count_);
+  }
+
+  template <class Archive>
   static void exchange(Archive& archive, FrameHistory::Chunk& chunk) {
     archive(chunk.poses, chunk.ends, chunk.bytes);
   }
@@ -99,6 +104,7 @@ struct PrivateState {
 
   // Whether what was read can be gone on with.
   static bool is_sound(const NoiseCalibration& calibration);
+  static bool is_sound(const ResidualNoise& noise);
   static bool is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options);
   static bool is_sound(const PoseGraph& graph);
   static bool is_sound(const LoopClosure& loops, std::size_t num_frames);

@@ -1,0 +1,24 @@
+#include "tracking/residual_noise.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "tracking/limits.hpp"
+
+namespace nacre {
+
+using namespace tracking_limits;
+
+void ResidualNoise::add(double residual_sigmas) {
+  if (!(residual_sigmas > 0.0)) return;
+  count_ = std::min(count_ + 1.0, most_noise_frames);
+  log_scale_ += (std::log(residual_sigmas) - log_scale_) / count_;
+}
+
+double ResidualNoise::factor() const {
+  return count_ > 0.0 ? std::clamp(noise_per_residual * std::exp(log_scale_), 1.0, largest_noise_factor) : 1.0;
+}
+
+bool ResidualNoise::is_known() const { return count_ >= enough_noise_frames; }
+
+}  // namespace nacre

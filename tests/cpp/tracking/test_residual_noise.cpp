@@ -1,0 +1,47 @@
+#include <cmath>
+
+#include "doctest/doctest.h"
+#include "tracking/residual_noise.hpp"
+
+using namespace nacre;
+
+TEST_CASE("frames of a camera as noisy as its images show, or less, change nothing") {
+  ResidualNoise noise;
+  CHECK(noise.factor() == 1.0);
+  for (int i = 0; i < 10; ++i) noise.add(0.5);
+  CHECK(noise.factor() == 1.0);
+}
+
+TEST_CASE("residuals of Laplace's distribution tell its standard deviation") {
+  ResidualNoise noise;
+  // Scale b: half of the absolute values are below b ln 2, the variance is 2 b^2.
+  const double b = 4.0, scale = 1.4826 * b * std::log(2.0);
+  noise.add(scale);
+  CHECK(noise.factor() == doctest::Approx(std::sqrt(2.0) * b).epsilon(1e-3));
+}
+
+TEST_CASE("the noise is known when some frames have told") {
+  ResidualNoise noise;
+  int frames = 0;
+  for (; !noise.is_known(); ++frames) noise.add(3.0);
+  CHECK(frames == 5);
+}
+
+TEST_CASE("a frame among many counts little, and drift is followed") {
+  ResidualNoise noise;
+  for (int i = 0; i < 1000; ++i) noise.add(2.0);
+  const double before = noise.factor();
+  noise.add(8.0);
+  CHECK(noise.factor() < 1.02 * before);
+  for (int i = 0; i < 500; ++i) noise.add(8.0);
+  CHECK(noise.factor() == doctest::Approx(4.0 * before).epsilon(0.02));
+}
+
+TEST_CASE("residuals that tell nothing are left out") {
+  ResidualNoise noise;
+  noise.add(3.0);
+  const double before = noise.factor();
+  noise.add(0.0);
+  noise.add(std::nan(""));
+  CHECK(noise.factor() == before);
+}

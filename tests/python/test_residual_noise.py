@@ -1,0 +1,89 @@
+"""Cameras whose neighbouring pixels err together, as those of stereo do: one image does not show it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+import test_loop_closure as loops
+
+import nacre
+
+Array = npt.NDArray[np.float64]
+
+CAMERA = nacre.Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
+
+
+def smooth_field(random: np.random.Generator, patch: int) -> Array:
+    """Return errors of about 1 that pixels within a patch share: bilinear between random values."""
+    rows, cols = np.mgrid[: CAMERA.height, : CAMERA.width] / patch
+    top, left = rows.astype(int), cols.astype(int)
+    grid = random.normal(size=(top.max() + 2, left.max() + 2)) * 1.5  # interpolation takes a third away
+    down, right = rows - top, cols - left
+    upper = grid[top, left] * (1 - right) + grid[top, left + 1] * right
+    lower = grid[top + 1, left] * (1 - right) + grid[top + 1, left + 1] * right
+    return np.asarray(upper * (1 - down) + lower * down)
+
+
+def turned(angle: float) -> Array:
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.array([[cos, 0, sin, 0], [0, 1, 0, 0], [-sin, 0, cos, 0], [0, 0, 0, 1]])
+
+
+@pytest.fixture(scope="module")
+def exact() -> list[tuple[Array, Array]]:
+    """Return images and poses of a camera that turns in a room."""
+    room = loops.furnished_room()
+    poses = [turned(0.02 * i) for i in range(8)]
+    return [(np.asarray(room.simulate_depth(CAMERA, pose), np.float64), pose) for pose in poses]
+
+
+def track(model: nacre.Model, exact: list[tuple[Array, Array]], shared: float) -> tuple[list[str], float]:
+    """
+    Add frames whose errors, at 1 m, are 1 mm for each pixel and ``shared`` for its patch; the room has 2 m.
+
+    Returns the states of the frames and the greatest error of those that are tracked [m].
+    """
+    random = np.random.default_rng(7)
+    states, greatest = [], 0.0
+    for depth, truth in exact:
+        error = shared * smooth_field(random, 24) + 0.001 * random.normal(size=depth.shape)
+        report = model.add_frame(depth + error * depth**2)
+        states.append(report.status)
+        if report.status == "TRACKED":
+            greatest = max(greatest, float(np.linalg.norm(report.world_from_camera[:3, 3] - truth[:3, 3])))
+    return states, greatest
+
+
+def test_where_images_show_all_the_noise_nothing_is_added(exact: list[tuple[Array, Array]]) -> None:
+    model = nacre.Model(CAMERA)
+    states, error = track(model, exact, 0.0)
+    assert states == 8 * ["TRACKED"]
+    assert error < 0.002
+    assert model.noise_factor == 1.0
+
+
+@pytest.mark.parametrize("shared", [0.004, 0.008])
+def test_noise_that_neighbours_share_is_learned(exact: list[tuple[Array, Array]], shared: float) -> None:
+    model = nacre.Model(CAMERA)
+    states, error = track(model, exact, shared)
+    assert states == 8 * ["TRACKED"]
+    assert error < 4 * shared  # what a patch is off by at 2 m
+    # Residuals have the errors of both sides.
+    assert model.noise_factor == pytest.approx(np.sqrt(2) * shared / 0.001, rel=0.4)
+
+
+def test_noise_that_is_given_is_believed(exact: list[tuple[Array, Array]]) -> None:
+    model = nacre.Model(CAMERA, depth={"noise": nacre.NoiseModel(0.0, 0.001, 0.0, 0.0)})
+    states, _ = track(model, exact, 0.008)
+    assert "LOST" in states
+    assert model.noise_factor == 1.0
+
+
+def test_what_was_learned_is_kept(exact: list[tuple[Array, Array]], tmp_path: Path) -> None:
+    model = nacre.Model(CAMERA)
+    track(model, exact, 0.004)
+    model.save(tmp_path / "model")
+    assert nacre.Model.load(tmp_path / "model").noise_factor == model.noise_factor > 1.0
