@@ -36,10 +36,10 @@ class Model {
   /// One report per frame that was added. Where a later frame closed a loop, the poses are the corrected ones.
   FrameReports frames() const;
   NoiseModel noise() const;  ///< given, or measured from the images so far
-  /// By how much the frames registered so far are noisier than that: errors that neighbouring pixels share do not show in
-  /// one image. At least 1; 1 where the noise is given.
+  /// By how much the frames registered so far are noisier than that: errors that neighbouring pixels share do not show
+  /// in one image. At least 1; 1 where the noise is given.
   double noise_factor() const;
-  double spacing() const;    ///< [m]; 0 before the first frame
+  double spacing() const;  ///< [m]; 0 before the first frame
 
   /// All that the model knows, as bytes; a model that is loaded from them goes on to the same bits. `note`: bytes of
   /// the caller's to keep with it. Read by every nacre with the same checkpoint_format, on every machine. To replace a
