@@ -10,6 +10,7 @@
 #include "base/statistics.hpp"
 #include "camera/ray_table.hpp"
 #include "depth/cleaning.hpp"
+#include "depth/cracks.hpp"
 #include "depth/edges.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/limits.hpp"
@@ -136,12 +137,16 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
   return clean_depth(depth, camera, options, mask, nullptr, report, nullptr, num_threads);
 }
 
-DepthImage clean_depth(const DepthRef& depth, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
+DepthImage clean_depth(const DepthRef& measured, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
                        NoiseCalibration* calibration, DepthReport* report, MaskImage* labels, int num_threads) {
   options.check();
-  require_camera_size("depth", depth.rows(), depth.cols(), camera);
+  require_camera_size("depth", measured.rows(), measured.cols(), camera);
   if (mask.size() > 0) require_camera_size("mask", mask.rows(), mask.cols(), camera);
-  require_plausible_median(depth);
+  require_plausible_median(measured);
+  DepthImage filled;
+  const bool is_cracked = has_cracks(measured, camera);
+  if (is_cracked) filled = fill_cracks(measured, camera);
+  const DepthRef& depth = is_cracked ? DepthRef(filled) : measured;
 
   // The tests see every measurement, so that range and mask do not make edges where there are none.
   const PlanarImage image(depth, camera, num_threads);

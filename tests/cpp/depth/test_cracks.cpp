@@ -1,0 +1,59 @@
+#include "depth/cracks.hpp"
+#include "depth_images.hpp"
+#include "doctest/doctest.h"
+
+using namespace nacre_test;
+
+namespace {
+
+// As a coarse image leaves it that was moved into a finer one: every third row and column is missing.
+DepthImage cracked(const DepthImage& whole) {
+  DepthImage depth = whole;
+  for (Eigen::Index v = 1; v < depth.rows(); v += 3) depth.row(v).setConstant(missing);
+  for (Eigen::Index u = 1; u < depth.cols(); u += 3) depth.col(u).setConstant(missing);
+  return depth;
+}
+
+}  // namespace
+
+TEST_CASE("cracks in a plane are filled with the plane itself") {
+  for (const Camera& camera : {pinhole, orthographic}) {
+    for (const double slant : {0.0, 0.4, 0.8}) {
+      const DepthImage whole = render(camera, slanted_plane(1.5, slant, 0.8));
+      const DepthImage depth = cracked(whole);
+      REQUIRE(has_cracks(depth, camera));
+      const DepthImage filled = fill_cracks(depth, camera);
+      for (Eigen::Index v = 1; v + 1 < whole.rows(); ++v) {
+        for (Eigen::Index u = 1; u + 1 < whole.cols(); ++u) {
+          REQUIRE(filled(v, u) == doctest::Approx(whole(v, u)).epsilon(1e-5));
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("a crack between two surfaces stays") {
+  DepthImage depth = render(pinhole, slanted_plane(1.5, 0.0, 0.0));
+  const Eigen::Index edge = 3 * (depth.cols() / 6) + 1;
+  depth.rightCols(depth.cols() - edge) += 0.5F;
+  const DepthImage filled = fill_cracks(cracked(depth), pinhole);
+  CHECK(std::isnan(filled(5, edge)));
+  CHECK(filled(5, edge + 3) == doctest::Approx(2.0));
+}
+
+TEST_CASE("images as sensors make them have no cracks") {
+  DepthImage depth = render(pinhole, slanted_plane(1.5, 0.4, 0.8));
+  CHECK_FALSE(has_cracks(depth, pinhole));
+  for (Eigen::Index v = 0; v < depth.rows(); v += 5) {
+    for (Eigen::Index u = v % 7; u < depth.cols(); u += 7) depth(v, u) = missing;  // single pixels
+  }
+  CHECK_FALSE(has_cracks(depth, pinhole));
+  for (const double part : {0.3, 0.5, 0.83}) {
+    DepthImage noisy = render(pinhole, slanted_plane(1.5, 0.4, 0.8));
+    for (Eigen::Index i = 0; i < noisy.size(); ++i) {
+      if (random_uniform(7, static_cast<std::uint64_t>(i)) < part) noisy.data()[i] = missing;
+    }
+    CHECK_FALSE(has_cracks(noisy, pinhole));
+  }
+  CHECK_FALSE(has_cracks(DepthImage::Constant(height, width, missing), pinhole));
+}
