@@ -45,7 +45,7 @@ def room():
     """Views of a furnished room, 6 degrees apart, with the noise of structured light; and their poses."""
     rng = np.random.default_rng(0)
     furniture = []
-    for _ in range(40):
+    for _ in range(30):  # which leave enough of the floor to be seen
         angle, distance = rng.uniform(-math.pi, math.pi), rng.uniform(1.0, 2.6)
         x, z = distance * math.sin(angle), distance * math.cos(angle)
         a, b = rng.uniform(0.08, 0.3, 2)

@@ -100,16 +100,15 @@ def test_seeing_through_the_model_speaks_against_a_pose() -> None:
     assert report.reason.startswith("registration score ")
 
 
-def test_a_surface_where_the_camera_saw_through_before_speaks_against_a_pose() -> None:
-    """The same the other way round: what is new would have hidden the wall."""
+def test_something_that_comes_before_the_camera_does_not_lose_it() -> None:
     x, y = flat_grid()
     wall = relief() + 0.1
     front = 0.3 + 0.004 * np.cos(170 * x + 2) * np.sin(130 * y + 60 * x)
     model = nacre.Model(FLAT, relocalise=False)
     model.add_frame(wall)
     report = model.add_frame(np.where(x < 0, front, wall))
-    assert 0.1 < report.consistency < 0.9
-    assert report.status == "LOST"
+    assert report.status == "TRACKED"
+    np.testing.assert_allclose(report.world_from_camera, np.eye(4), atol=1e-4)
 
 
 @pytest.mark.parametrize("index", [0, 1, 3])
