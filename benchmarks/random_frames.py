@@ -126,7 +126,7 @@ PARAMETERS: dict[str, Any] = {
     "region.max_z": _one_of(math.inf, 0.5, 2.0),
     "region.min_object": _between(0.0001, 1.0),
     "region.plane_margin": _one_of(0.0, 1e-9, 0.01, 1e9),
-    "registration.method": _one_of("symmetric", "point_to_plane", "point_to_point"),
+    "registration.method": _one_of("symmetric", "point_to_plane", "point_to_point", "paper"),
     "registration.max_iterations": _whole(1, 60),
     "registration.max_distance": _one_of(0.0, 1e-9, 0.01, 1e9),
     "registration.final_distance": _one_of(0.0, 1e-9, 0.01, 1e9),

@@ -8,7 +8,8 @@ void bind_registration(py::module_& m) {
   py::enum_<Metric>(m, "Metric")
       .value("point_to_point", Metric::point_to_point)
       .value("point_to_plane", Metric::point_to_plane)
-      .value("symmetric", Metric::symmetric);
+      .value("symmetric", Metric::symmetric)
+      .value("paper", Metric::paper);
 
   py::class_<AlignOptions>(m, "AlignOptions")
       .def(py::init<>())

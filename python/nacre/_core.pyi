@@ -385,9 +385,12 @@ class Metric:
       point_to_plane
 
       symmetric
+
+      paper
     """
 
     __members__: typing.ClassVar[dict[str, Metric]]
+    paper: typing.ClassVar[Metric]
     point_to_plane: typing.ClassVar[Metric]
     point_to_point: typing.ClassVar[Metric]
     symmetric: typing.ClassVar[Metric]

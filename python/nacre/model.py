@@ -49,7 +49,7 @@ class Model(ExchangeablePoints, Checkpointed):
     camera : Camera
         Of all frames.
     preset : "default" or "paper"
-        Where the parameters start from.
+        Where the parameters start from: what measures best, or the 2010 paper's algorithm and numbers, alone.
     parameters : ModelParameters, optional
         Takes the place of the preset.
     depth_scale : float

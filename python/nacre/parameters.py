@@ -12,7 +12,7 @@ from nacre._internal.core_options import from_core
 from nacre.noise import NoiseModel, NoiseName, as_noise
 
 EdgeTest = Literal["inverse_depth", "gradient", "none"]
-Method = Literal["point_to_point", "point_to_plane", "symmetric"]
+Method = Literal["point_to_point", "point_to_plane", "symmetric", "paper"]
 Preset = Literal["default", "paper"]
 
 
@@ -224,7 +224,7 @@ class ModelParameters:
 
     @classmethod
     def preset(cls, name: Preset) -> ModelParameters:
-        """Return "default" (what measures best) or "paper" (every number of the 2010 paper)."""
+        """Return "default" (what measures best) or "paper" (the 2010 paper's algorithm, alone)."""
         if not isinstance(name, str):
             raise TypeError(f"preset must be 'default' or 'paper', got {name!r}")
         return from_core(cls, _core.ModelOptions.preset(name))

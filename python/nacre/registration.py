@@ -167,8 +167,11 @@ def align(
         bottle) and nothing else; gain and offset between the two clouds are found along the way.
     initial : (4, 4), optional
         First guess of ``target_from_source``; the identity by default.
-    method : "symmetric", "point_to_plane" or "point_to_point"
-        What a pair costs: Rusinkiewicz 2019; Chen and Medioni 1992; Besl and McKay 1992.
+    method : "symmetric", "point_to_plane", "point_to_point" or "paper"
+        What a pair costs: Rusinkiewicz 2019; Chen and Medioni 1992; Besl and McKay 1992. ``"paper"`` is point
+        to plane as Blackburn, Kubacki and Stratton 2010 iterate it: every iteration draws its own
+        ``sample_fraction``, and ``max_distance`` is along the target's normal and stays; ``final_distance``,
+        ``gate_decay``, ``robust``, ``max_points``, ``coarse_samples``, sigmas and colours are not used.
     max_iterations : int
         Largest number of steps on the shapes; what colours decide takes a few more.
     max_distance : float

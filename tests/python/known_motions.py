@@ -9,7 +9,7 @@ import numpy.typing as npt
 import nacre
 
 Array = npt.NDArray[Any]
-METHODS = ["symmetric", "point_to_plane", "point_to_point"]
+METHODS = ["symmetric", "point_to_plane", "point_to_point", "paper"]
 CENTER = np.array([0.0, 0.0, 0.4])  # of the clouds below [m]
 
 

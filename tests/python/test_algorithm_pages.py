@@ -35,8 +35,8 @@ CONSTANTS = [
     (
         "registration",
         "a quarter of the target's diameter",
-        "registration/icp.cpp",
-        "0.25 * target.diameter()",
+        "registration/limits.hpp",
+        "first_gate = 0.25",
     ),
     ("registration", "2.5 times the target's spacing", "registration/icp.cpp", "2.5 * target.spacing()"),
     ("registration", r"at least $4 s$", "registration/icp.cpp", "4.0 * residual_scale"),

@@ -148,6 +148,7 @@ def of_normals(num_threads: int) -> str:
 WORK: dict[str, Callable[[int], str]] = {
     "align symmetric": functools.partial(of_align, "symmetric"),
     "align point_to_plane": functools.partial(of_align, "point_to_plane"),
+    "align paper": functools.partial(of_align, "paper"),
     "align point_to_point": functools.partial(of_align, "point_to_point"),
     "consolidate wlop": functools.partial(of_consolidate, "wlop"),
     "consolidate wlop+": functools.partial(of_consolidate, "wlop+"),

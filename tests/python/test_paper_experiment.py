@@ -1,9 +1,10 @@
 """
 The experiment of Blackburn, Kubacki and Stratton 2010, on the built-in object.
 
-Twelve orthographic views of 1 mm pixels, every 30 degrees, each registered from the pose before.
+Twelve orthographic views of 1 mm pixels, every 30 degrees.
 """
 
+import dataclasses
 import functools
 from typing import Any
 
@@ -26,14 +27,21 @@ def truth() -> Any:
     return np.linalg.inv(poses[0]) @ poses
 
 
-@functools.cache
-def experiment(preset: Any, sigma: float, first_seed: int = 0) -> nacre.Model:
+def experiment(preset: Any, sigma: float, seed: int = 0) -> nacre.Model:
+    """Return the model after a turn; the seed draws the images, the 5 % of the points and the samples."""
     camera = nacre.default_camera(thing())
     assert camera.model == "orthographic"
     assert camera.pixel_size == 0.001
-    model = nacre.Model(camera, preset)
+    parameters = nacre.ModelParameters.preset(preset) if isinstance(preset, str) else preset
+    parameters = dataclasses.replace(
+        parameters,
+        registration=dataclasses.replace(parameters.registration, seed=seed),
+        wlop=dataclasses.replace(parameters.wlop, seed=seed),
+    )
+    model = nacre.Model(camera, parameters=parameters)
     for index, pose in enumerate(nacre.turntable_poses(thing())):
-        model.add_frame(thing().simulate_depth(camera, pose, noise=sigma, seed=first_seed + index))
+        noise = {"noise": sigma, "edge_mixing": float(sigma > 0), "seed": 100 * seed + index}
+        model.add_frame(thing().simulate_depth(camera, pose, **noise))
     return model
 
 
@@ -54,8 +62,8 @@ def surface_error(points: Any) -> float:
     return float(np.sqrt(np.mean(distances**2)))
 
 
-def completeness(points: Any) -> float:
-    """Return the part of what the cameras saw that has a model point within 3 mm."""
+def completeness(points: Any, radius: float = 0.003) -> float:
+    """Return the part of what the cameras saw that has a model point within a radius."""
     poses, camera = nacre.turntable_poses(thing()), nacre.default_camera(thing())
     seen = np.concatenate(
         [
@@ -64,7 +72,7 @@ def completeness(points: Any) -> float:
         ]
     )
     distances, _ = nacre.KdTree(points.astype(np.float64)).query(seen, k=1)
-    return float(np.mean(distances < 0.003))
+    return float(np.mean(distances < radius))
 
 
 def unevenness(points: Any) -> float:
@@ -74,22 +82,22 @@ def unevenness(points: Any) -> float:
 
 
 @pytest.mark.parametrize(
-    ("sigma", "first_seed", "angle", "shift", "rms"),
+    ("sigma", "seed", "angle", "shift", "rms"),
     [
         (0.0, 0, 0.06, 0.06e-3, 0.10e-3),
         (0.0005, 0, 0.4, 0.4e-3, 0.2e-3),
-        (0.0005, 100, 0.4, 0.4e-3, 0.2e-3),
-        (0.0005, 200, 0.4, 0.4e-3, 0.2e-3),
+        (0.0005, 1, 0.4, 0.4e-3, 0.2e-3),
+        (0.0005, 2, 0.4, 0.4e-3, 0.2e-3),
     ],
 )
-def test_default_preset(sigma: float, first_seed: int, angle: float, shift: float, rms: float) -> None:
+def test_default_preset(sigma: float, seed: int, angle: float, shift: float, rms: float) -> None:
     """
     The default preset tracks every frame, closely.
 
     Measured, without noise: 0.023 degrees, 0.024 mm, RMS 0.067 mm. With noise of 0.5 mm, for three seeds:
     0.18, 0.26, 0.21 degrees; 0.18, 0.26, 0.12 mm; RMS 0.14, 0.16, 0.13 mm. Completeness 0.94.
     """
-    model = experiment("default", sigma, first_seed)
+    model = experiment("default", sigma, seed)
     assert [report.status for report in model.frames] == ["TRACKED"] * 12
     angles, shifts = pose_errors(model)
     assert angles.max() < angle
@@ -101,19 +109,33 @@ def test_default_preset(sigma: float, first_seed: int, angle: float, shift: floa
     assert sigma == 0 or surface_error(model.points) < 0.5 * sigma
 
 
-@pytest.mark.parametrize("sigma", [0.0, 0.0005])
-def test_paper_preset_runs_to_its_end(sigma: float) -> None:
+@pytest.mark.parametrize(("sigma", "successes"), [(0.0, 19), (0.0005, 19)])
+def test_paper_preset(sigma: float, successes: int) -> None:
     """
-    The paper's numbers, literally, lose this object after two views; the figures are honest all the same.
+    The paper's algorithm, alone, completes the turn in at least 19 of 20.
 
-    Measured, without noise and with 0.5 mm: 46 and 35 degrees; 11 and 8 mm; RMS 13 and 7 mm.
+    No pose is more than 5 degrees off, and the model has the object's shape.
     """
-    model = experiment("paper", sigma)
-    assert len(model.frames) == 12
-    assert max(report.num_points for report in model.frames) <= 2000
-    angles, shifts = pose_errors(model)
-    assert np.isfinite(angles).all()
-    assert np.isfinite(shifts).all()
-    assert angles[0] == 0
-    assert np.isfinite(surface_error(model.points))
-    assert 0 < completeness(model.points) <= 1
+    runs = [experiment("paper", sigma, seed) for seed in range(20)]
+    assert all(len(model.frames) == 12 for model in runs)
+    assert max(report.num_points for model in runs for report in model.frames) == 2000
+    succeed = [
+        pose_errors(model)[0].max() < 5
+        and surface_error(model.points) < 0.002
+        and completeness(model.points, 0.008) > 0.85
+        for model in runs
+    ]
+    assert sum(succeed) >= successes
+
+
+def test_paper_preset_needs_what_the_paper_leaves_open() -> None:
+    """Every view from the last pose, Huang's theta, all normals matched: the turn is lost."""
+    preset = nacre.ModelParameters.preset("paper")
+    literal = dataclasses.replace(
+        preset,
+        predict_motion=False,
+        registration=dataclasses.replace(preset.registration, max_angle=np.pi),
+        wlop=dataclasses.replace(preset.wlop, theta="huang", normal_neighbors=3),
+    )
+    angles, _ = pose_errors(experiment(literal, 0.0))
+    assert angles.max() > 20

@@ -1,7 +1,6 @@
 """Parameters: the same defaults as in C++, the presets, changes by name, and the way there and back."""
 
 import dataclasses
-import math
 from typing import Any
 
 import pytest
@@ -126,31 +125,34 @@ def test_default_preset_is_the_default() -> None:
 
 
 PAPER: dict[str, Any] = {
+    # Printed.
     "depth.edge_test": "gradient",
-    "registration.method": "point_to_plane",
+    "registration.method": "paper",
     "registration.sample_fraction": 0.05,
     "registration.max_distance": 0.005,
-    "registration.final_distance": 0.005,
-    "registration.gate_decay": 1.0,
     "registration.max_iterations": 15,
     "registration.keep_best": True,
-    "registration.robust": False,
-    "registration.max_angle": math.pi,
-    "registration.max_points": 0,
-    "registration.max_samples": 0,
-    "registration.coarse_samples": 0,
-    "registration.weak_threshold": 0.0,
     "fusion_method": "wlop",
-    "wlop.theta": "huang",
+    "wlop.theta": "printed",
     "wlop.radius": 0.008,
     "wlop.mu": 0.4,
     "wlop.iterations": 10,
-    "wlop.normal_radius": 0.008,
     "max_points": 2000,
     "wlop.first_fraction": 0.5,
     "wlop.kept_fraction": 0.9,
     "wlop.new_fraction": 0.2,
-    "predict_motion": False,
+    # Left open.
+    "registration.max_angle": 0.6,
+    "wlop.normal_neighbors": 10,
+    "wlop.normal_radius": 0.01,
+    # What the paper does not have.
+    "registration.final_distance": 0.005,
+    "registration.gate_decay": 1.0,
+    "registration.robust": False,
+    "registration.max_points": 0,
+    "registration.max_samples": 0,
+    "registration.coarse_samples": 0,
+    "registration.weak_threshold": 0.0,
     "verify": False,
     "relocalise": False,
     "loop_closure": False,

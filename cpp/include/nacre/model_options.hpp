@@ -47,7 +47,8 @@ struct ModelOptions : TrackingOptions {
                          ///< new points are also at least a pixel and a half of their frame apart
   int max_points = 500000;  ///< the model never grows beyond: its spacing is widened instead
 
-  /// "default" (what measures best) or "paper" (every number of the 2010 paper); std::invalid_argument otherwise.
+  /// "default" (what measures best) or "paper" (the 2010 paper's algorithm and numbers, alone);
+  /// std::invalid_argument otherwise.
   static ModelOptions preset(const std::string& name);
   void check() const;
 };

@@ -13,7 +13,9 @@ namespace nacre {
 enum class Metric {
   point_to_point,  ///< |p - q|^2, Besl and McKay 1992
   point_to_plane,  ///< ((p - q) . n_q)^2, Chen and Medioni 1992; solved for small angles, applied by Rodrigues
-  symmetric        ///< ((p - q) . (n_p + n_q))^2, Rusinkiewicz 2019
+  symmetric,       ///< ((p - q) . (n_p + n_q))^2, Rusinkiewicz 2019
+  paper            ///< point_to_plane as Blackburn, Kubacki and Stratton 2010 iterate it: every iteration draws its own
+                   ///< sample_fraction, and max_distance is along the normal
 };
 
 /// How align works.

@@ -15,6 +15,7 @@
 #include "fusion/fuse.hpp"
 #include "model/limits.hpp"
 #include "model/object_views.hpp"
+#include "model/paper_loop.hpp"
 #include "model/wlop_fusion.hpp"
 #include "outlines/refinement.hpp"
 #include "tracking/limits.hpp"
@@ -168,6 +169,10 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
     result.alignment.overlap = result.consistency = 1.0;
     return result;
   }
+  if (options.registration.method == Metric::paper) {
+    return PaperLoop{options, static_cast<std::int32_t>(history.size())}.register_frame(
+        {frame, camera, observer, now}, {cloud, spacing, before, 0}, guesses(extras).front());
+  }
   result = track_frame({guesses(extras), was_lost() || jumped(), elsewhere(region_report)});
   const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
   if (is_determined && !result.is_on_plane) {
@@ -216,7 +221,8 @@ bool Pipeline::jumped() const {
 std::vector<Pose> Pipeline::guesses(const FrameExtras& extras) const {
   if (extras.guess) return {*extras.guess};
   const Pose last = history.registered_pose(0);
-  if (!options.predict_motion || history.num_registered() < 2 || was_lost() || jumped()) return {last};
+  const bool goes_on = options.registration.method == Metric::paper || !jumped();  // the paper's is a turntable
+  if (!options.predict_motion || history.num_registered() < 2 || was_lost() || !goes_on) return {last};
   const Pose predicted = last * (history.registered_pose(1).inverse() * last);
   return {orthonormal(predicted), last};
 }

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/parallel.hpp"
-#include "base/random.hpp"
+#include "model/paper_loop.hpp"
 #include "nacre/kdtree.hpp"
 #include "nacre/normals.hpp"
 #include "spatial/hash_grid.hpp"
@@ -31,46 +31,6 @@ PointModel to_world(const Frame& frame, const Pose& world_from_camera, std::int3
   result.observations.assign(result.points.size(), 1);
   result.free_space_violations.assign(result.points.size(), 0);
   return result;
-}
-
-// `count` points of a cloud, chosen by random numbers that depend on the seed and the point's number only.
-PointModel choose(const PointModel& cloud, double count, std::uint64_t seed) {
-  std::vector<std::pair<std::uint64_t, std::size_t>> keyed;
-  for (std::size_t i = 0; i < cloud.points.size(); ++i) keyed.emplace_back(random_bits(seed, i), i);
-  std::sort(keyed.begin(), keyed.end());
-  std::vector<std::uint8_t> flags(cloud.points.size(), 0);
-  const auto wanted = std::min(keyed.size(), static_cast<std::size_t>(std::lround(std::max(0.0, count))));
-  for (std::size_t k = 0; k < wanted; ++k) flags[keyed[k].second] = 1;
-  PointModel chosen = cloud;
-  chosen.keep(flags);
-  return chosen;
-}
-
-template <class Value>
-void append(std::vector<Value>& values, const std::vector<Value>& more) {
-  values.insert(values.end(), more.begin(), more.end());
-}
-
-void append(PointModel& model, const PointModel& more) {
-  append(model.points, more.points);
-  append(model.normals, more.normals);
-  append(model.confidence, more.confidence);
-  append(model.last_seen, more.last_seen);
-  append(model.observations, more.observations);
-  append(model.free_space_violations, more.free_space_violations);
-}
-
-// The paper's samples: most of the model, and new points in proportion to it; half of the first frame.
-PointModel paper_samples(const PointModel& model, const PointModel& fresh, const ModelOptions& options,
-                         std::uint64_t seed) {
-  PointModel samples;
-  if (model.size() == 0) {
-    samples = choose(fresh, options.wlop.first_fraction * static_cast<double>(fresh.size()), seed);
-  } else {
-    samples = choose(model, options.wlop.kept_fraction * static_cast<double>(model.size()), seed);
-    append(samples, choose(fresh, options.wlop.new_fraction * static_cast<double>(model.size()), seed + 1));
-  }
-  return samples.size() > options.max_points ? choose(samples, options.max_points, seed + 2) : samples;
 }
 
 // The repaired samples: the whole model, and the new points that it does not cover.
@@ -114,9 +74,8 @@ void consolidate_frame(PointModel& model, const Frame& frame, const Pose& world_
                        const ModelOptions& options, double spacing, std::int32_t frame_index) {
   const bool literal = options.fusion_method == FusionMethod::wlop;
   const PointModel fresh = to_world(frame, world_from_camera, frame_index);
-  const std::uint64_t seed = mix64(options.wlop.seed) + 16 * static_cast<std::uint64_t>(frame_index);
-  PointModel samples =
-      literal ? paper_samples(model, fresh, options, seed) : covering_samples(model, fresh, options, spacing);
+  PointModel samples = literal ? PaperLoop{options, frame_index}.samples(model, fresh)
+                               : covering_samples(model, fresh, options, spacing);
   PointModel points = model;
   append(points, fresh);
 

@@ -5,6 +5,7 @@
 #include "nacre/registration.hpp"
 #include "registration/color.hpp"
 #include "registration/icp.hpp"
+#include "registration/paper_icp.hpp"
 
 namespace nacre {
 
@@ -48,6 +49,7 @@ AlignResult align(const AlignCloud& source, const AlignCloud& target, const Pose
                   const AlignOptions& options) {
   options.check();
   require_rigid(initial, "initial");
+  if (options.method == Metric::paper) return align_as_in_paper(source, target, initial, options);
   const IcpTarget prepared_target(target, options);
   const IcpSource prepared_source(source, options);
   IcpResult result = align_to(prepared_target, prepared_source, initial, options);

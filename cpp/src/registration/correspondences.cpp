@@ -16,7 +16,7 @@ namespace nacre {
 namespace {
 
 bool needs_normals(const AlignOptions& options, bool is_target) {
-  return options.method == Metric::symmetric || (options.method == Metric::point_to_plane && is_target);
+  return options.method == Metric::symmetric || (options.method != Metric::point_to_point && is_target);
 }
 
 std::vector<std::int32_t> finite_rows(const PointsRef& points, const PointsRef& normals) {

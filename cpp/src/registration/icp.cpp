@@ -26,7 +26,7 @@ class Schedule {
  public:
   Schedule(const IcpTarget& target, const IcpSource& source, const AlignOptions& options)
       : options_(options), source_(source) {
-    first_ = options.max_distance > 0.0 ? options.max_distance : 0.25 * target.diameter();
+    first_ = options.max_distance > 0.0 ? options.max_distance : registration_limits::first_gate * target.diameter();
     smallest_ = options.final_distance > 0.0 ? options.final_distance : 2.5 * target.spacing();
     set_level(0);
     update_gate(0.0);

@@ -48,7 +48,7 @@ NormalEquations normal_equations(const std::vector<Pair>& pairs, Metric metric, 
         for (int axis = 0; axis < 3; ++axis)
           rows[num_rows++] = row_of(pair, pair.*weight, p / extent, Eigen::Vector3d::Unit(axis));
         sum.covariance.noalias() += pair.*weight * q * p.transpose();
-      } else if (metric == Metric::point_to_plane) {
+      } else if (metric == Metric::point_to_plane || metric == Metric::paper) {
         // Chen and Medioni 1992 with small angles: (p + a x p + t - q) . n = 0, q about p's centroid.
         rows[num_rows++] = row_of(pair, pair.*weight, p / extent, pair.normal);
       } else {

@@ -21,6 +21,7 @@ class Method(str, Enum):
     symmetric = "symmetric"
     point_to_plane = "point_to_plane"
     point_to_point = "point_to_point"
+    paper = "paper"
 
 
 def align(

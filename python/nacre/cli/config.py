@@ -35,7 +35,7 @@ PresetOption = Annotated[
     Preset | None,
     typer.Option(
         "--preset",
-        help="default: what measures best; paper: every number of the 2010 paper.",
+        help="default: what measures best; paper: the 2010 paper's algorithm and numbers, alone.",
         show_default="default",
     ),
 ]

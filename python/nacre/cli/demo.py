@@ -61,10 +61,12 @@ def demo(
         f"edge mixing {'on' if edge_mixing else 'off'}, "
         f"orthographic camera {camera.width} x {camera.height}, {1000 * camera.pixel_size:g} mm per pixel"
     )
-    start = "the previous pose"
+    start, of_paper = "the previous pose", parameters.registration.method == "paper"
     if parameters.predict_motion:
-        start += ", and from the one that continues the last motion"
-    terminal.say(f"{words}; preset {preset_name}\neach view is registered starting from {start}")
+        leads = "where the last motion leads"
+        start = leads if of_paper else f"{start}, and from {leads}"
+    alone = ": the algorithm of Blackburn, Kubacki and Stratton 2010, alone" if of_paper else ""
+    terminal.say(f"{words}; preset {preset_name}{alone}\neach view is registered starting from {start}")
     with interruptible() as stop:
         follow(terminal, Run(done, range(views), retry=False), stop)
     done.evaluate_trajectory()

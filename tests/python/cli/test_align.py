@@ -24,7 +24,7 @@ def clouds(tmp_path_factory):
     return folder, turn
 
 
-@pytest.mark.parametrize("method", ["symmetric", "point_to_plane", "point_to_point"])
+@pytest.mark.parametrize("method", ["symmetric", "point_to_plane", "point_to_point", "paper"])
 def test_finds_the_motion(clouds, tmp_path, method):
     folder, turn = clouds
     arguments = ("--method", method, "--max-iterations", 200)

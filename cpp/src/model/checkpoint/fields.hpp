@@ -37,7 +37,7 @@ void exchange(Archive& archive, RegionOptions& options) {
 
 template <class Archive>
 void exchange(Archive& archive, AlignOptions& options) {
-  archive.choice(options.method, Metric::symmetric);
+  archive.choice(options.method, Metric::paper);
   archive(options.max_iterations, options.max_distance, options.final_distance, options.gate_decay, options.max_angle,
           options.robust, options.sample_fraction, options.max_points, options.max_samples, options.coarse_samples,
           options.keep_best, options.weak_threshold, options.seed, options.num_threads);
