@@ -33,6 +33,11 @@ def figures(mesh: nacre.Mesh, small: bool = False):
         "registration": paper.registration,
         "model-noiseless": functools.partial(paper.growing, sigma=0.0),
         "model-noisy": functools.partial(paper.growing, sigma=paper.NOISE),
+        "paper-cleaning": functools.partial(paper.cleaning, preset="paper"),
+        "paper-normals": paper.paper_model_normals,
+        "paper-registration": functools.partial(paper.registration, preset="paper"),
+        "paper-model-noiseless": functools.partial(paper.growing, sigma=0.0, preset="paper", most=3.0),
+        "paper-model-noisy": functools.partial(paper.growing, sigma=paper.NOISE, preset="paper", most=3.0),
         **steps.FIGURES,
         **surfaces.FIGURES,
     }

@@ -12,10 +12,10 @@ NOISE = 0.0005  # [m]
 REASONS = {"edge": draw.RED, "slanted": draw.ORANGE, "isolated": draw.BLUE}
 
 
-def cleaning(table: Turntable, size):
+def cleaning(table: Turntable, size, preset="default"):
     """Figure 3: a depth image with edge noise, what is removed, and the points from the side."""
     depth = table.view(0, NOISE, 1.0)
-    labels = nacre.label_pixels(depth, table.camera)
+    labels = nacre.label_pixels(depth, table.camera, nacre.ModelParameters.preset(preset).depth)
     seen = np.isfinite(depth)
     v, u = np.nonzero(seen)
     pad = 6
@@ -64,15 +64,56 @@ def normals(table: Turntable, size):
     )
 
 
-def registration(table: Turntable, size):
+def paper_model_normals(table: Turntable, size):
+    """Figure 4 of the preset: the model after some views, whose rims have no normal."""
+    points, found = paper_model(table, 4)
+    known = np.isfinite(found).all(axis=1)
+    true = table.mesh.closest(moved(points, table.poses[0])).normals @ table.poses[0][:3, :3]
+    off = np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", true[known], found[known]), -1, 1)))
+    colors = np.full((len(points), 3), 205, np.uint8)
+    colors[known] = ((0.5 - 0.5 * found[known] * [-1, 1, 1]) * 255).astype(np.uint8)
+    errors = np.full((len(points), 3), 205, np.uint8)
+    errors[known] = draw.by_value(off, 0, 20)
+    more = {"view": draw.View.fit(points, size=size), "size": size}
+    return draw.sheet(
+        [
+            ("the model, shaded by the normals", draw.points_panel(points[known], found[known], **more)),
+            (f"{np.mean(~known):.0%} without (grey)", draw.points_panel(points, None, colors, **more)),
+            (
+                f"errors, 0 to 20 degrees, median {np.median(off):.1f}",
+                draw.points_panel(points, None, errors, **more),
+            ),
+        ]
+    )
+
+
+def paper_model(table: Turntable, num_views: int):
+    """Return the paper's model after some views, and its normals: of k points within epsilon, or NaN."""
+    model = nacre.Model(table.camera, "paper")
+    for k in range(num_views):
+        model.add_frame(table.view(k, NOISE, 1.0))
+    wlop = model.parameters.wlop
+    normals = nacre.estimate_normals(model.points, k=wlop.normal_neighbors, max_radius=wlop.normal_radius)
+    distances, _ = nacre.KdTree(model.points).query(model.points, k=wlop.normal_neighbors)
+    normals[~(distances[:, -1] <= wlop.normal_radius)] = np.nan
+    normals[np.einsum("ij,ij->i", normals, model.normals) < 0] *= -1
+    return model.points, normals
+
+
+def registration(table: Turntable, size, preset="default"):
     """Figure 5: two views 30 degrees apart, after so many iterations."""
-    target, target_normals = table.cloud(0, NOISE)
+    target, target_normals = table.cloud(0, NOISE) if preset == "default" else paper_model(table, 1)
     source, source_normals = table.cloud(1, NOISE)
+    paper = nacre.ModelParameters.preset("paper").registration
+    as_in_paper = {
+        name: getattr(paper, name)
+        for name in ("method", "max_distance", "max_angle", "sample_fraction", "keep_best")
+    }
     panels = []
     view = None
     size = (size[0], size[1] * 2 // 3)
     colors = draw.two_colors(target, source)
-    for iterations in (0, 1, 2, 40):
+    for iterations in (0, 1, 2, 40 if preset == "default" else paper.max_iterations):
         pose = np.eye(4)
         if iterations:
             result = nacre.align(
@@ -81,10 +122,11 @@ def registration(table: Turntable, size):
                 source_normals=source_normals,
                 target_normals=target_normals,
                 max_iterations=iterations,
+                **({} if preset == "default" else as_in_paper),
             )
             pose, iterations = result.target_from_source, result.iterations
         both = np.concatenate([target, moved(source, pose)])
-        facing = np.concatenate([target_normals, source_normals @ pose[:3, :3].T])
+        facing = np.concatenate([np.nan_to_num(target_normals), source_normals @ pose[:3, :3].T])
         view = view or draw.View.fit(both, "top", size=size)
         off = np.linalg.inv(table.truth(1)) @ pose
         angle = np.degrees(np.arccos(np.clip((np.trace(off[:3, :3]) - 1) / 2, -1, 1)))
@@ -97,9 +139,9 @@ def registration(table: Turntable, size):
     return draw.sheet(panels, columns=2)
 
 
-def growing(table: Turntable, sigma: float, size):
-    """Figures 6 and 7: the model after 1, 4 and all views, and its errors."""
-    model = nacre.Model(table.camera)
+def growing(table: Turntable, sigma: float, size, preset="default", most=0.5):
+    """Figures 6 and 7: the model after 1, 4 and all views, and its errors up to so many millimetres."""
+    model = nacre.Model(table.camera, preset)
     num_views = len(table.poses)
     shown = []
     for k in range(num_views):
@@ -110,8 +152,8 @@ def growing(table: Turntable, sigma: float, size):
         rms = 1e3 * np.sqrt(np.mean(errors**2))
         caption = f"{k + 1} view{'s' if k else ''}: {len(model.points)} points, RMS {rms:.2f} mm"
         shown.append((caption, model.points, model.normals, None))
-    colors = draw.by_value(1e3 * np.abs(errors), 0.0, 0.5)
-    shown.append(("distances from the object, 0 to 0.5 mm", model.points, model.normals, colors))
+    colors = draw.by_value(1e3 * np.abs(errors), 0.0, most)
+    shown.append((f"distances from the object, 0 to {most:g} mm", model.points, model.normals, colors))
     view = draw.View.fit(model.points, (-0.6, -0.4, -1), size=size)
     return draw.sheet(
         [(caption, draw.points_panel(*cloud, view=view, size=size)) for caption, *cloud in shown], columns=2
