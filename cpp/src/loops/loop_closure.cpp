@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/linear_algebra.hpp"
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
 #include "loops/limits.hpp"
@@ -262,7 +263,7 @@ PoseEdge LoopClosure::edge(int from, int to, const Pose& pose, const AlignResult
   if (alignment.information.trace() > 0.0) {
     Matrix6 information = alignment.information;
     information.diagonal().array() += 1e-12 * information.trace();
-    covariance = loops_limits::covariance_inflation * information.inverse();
+    covariance = loops_limits::covariance_inflation * inverse(information);
   }
   covariance.diagonal().head<3>().array() += error * error;
   covariance.diagonal().tail<3>().array() += error * error * depth * depth;
@@ -273,7 +274,7 @@ PoseEdge LoopClosure::edge(int from, int to, const Pose& pose, const AlignResult
   Matrix6 about_center = Matrix6::Zero();
   about_center.topLeftCorner<3, 3>() = about_center.bottomRightCorner<3, 3>() = pose.linear();
   about_center.bottomLeftCorner<3, 3>() = -pose.linear() * cross_matrix(center);
-  const Matrix6 information = about_center.transpose() * covariance.inverse() * about_center;
+  const Matrix6 information = about_center.transpose() * inverse(covariance) * about_center;
   return {from, to, pose_of(from).inverse() * pose, information, is_loop};
 }
 

@@ -1,11 +1,11 @@
 #include "outlines/occluding_edges.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 
+#include "base/linear_algebra.hpp"
 #include "base/parallel.hpp"
 #include "outlines/limits.hpp"
 
@@ -66,7 +66,7 @@ class OutlineSearch {
       products += row * row.transpose();
       sums += row * points[i].transpose();
     }
-    const Eigen::Matrix3d plane = products.topLeftCorner<3, 3>().ldlt().solve(sums.topRows<3>());
+    const Eigen::Matrix3d plane = solve_symmetric_columns(products.topLeftCorner<3, 3>(), sums.topRows<3>());
     const Eigen::Vector3d origin = plane.row(0), across = plane.row(1), down = plane.row(2);
     OutlinePoint found;
     found.point = origin;
@@ -82,7 +82,7 @@ class OutlineSearch {
     found.pixel = found.outward.dot(outwards);
 
     // Whether the surface bends towards its outline.
-    const Eigen::Matrix4d inverse = products.ldlt().solve(Eigen::Matrix4d::Identity());
+    const Eigen::Matrix4d inverse = solve_symmetric_columns(products, Eigen::Matrix4d::Identity());
     const Eigen::Vector3d bend = (inverse * sums).row(3);
     const double half = 0.25 * outlines_limits::window_radius * outlines_limits::window_radius,
                  sigma = static_cast<double>(sight_.sigma[v * width_ + u]);

@@ -1,9 +1,13 @@
 #include "registration/gauss_newton.hpp"
 
-#include "registration/weak_directions.hpp"
+#include "base/linear_algebra.hpp"
 
 namespace nacre {
 namespace {
+
+// Of and between the directions of a basis.
+using Amounts = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
+using Products = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6, 6>;
 
 Vector6 twist_row(const Eigen::Vector3d& lever, const Eigen::Vector3d& gradient, double extent) {
   Vector6 row;
@@ -15,25 +19,25 @@ Vector6 twist_row(const Eigen::Vector3d& lever, const Eigen::Vector3d& gradient,
 
 Vector6 gauss_newton_step(const std::vector<MotionRow>& rows, const TwistBasis& basis, double extent,
                           const Damping& damping) {
-  Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(basis.cols(), basis.cols());
-  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(basis.cols());
+  Products hessian = Products::Zero(basis.cols(), basis.cols());
+  Amounts gradient = Amounts::Zero(basis.cols());
   double weight = 0.0;
   for (const MotionRow& pair : rows) {
-    const Eigen::VectorXd row = basis.transpose() * twist_row(pair.lever, pair.gradient, extent);
+    const Amounts row = basis.transpose() * twist_row(pair.lever, pair.gradient, extent);
     hessian += pair.weight * row * row.transpose();
     gradient -= pair.weight * pair.residual * row;
     weight += pair.weight;
   }
   hessian.diagonal().array() += damping.of_trace * hessian.trace() + damping.of_weight * weight;
-  return basis * solve_normal_equations(hessian, gradient);
+  return basis * solve_symmetric(hessian, gradient);
 }
 
 Eigen::MatrixXd agreed_information(const std::vector<MotionRow>& rows, const TwistBasis& basis, double extent,
                                    double scale) {
-  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(basis.cols(), basis.cols());
+  Products sum = Products::Zero(basis.cols(), basis.cols());
   for (const MotionRow& pair : rows) {
-    const Eigen::VectorXd a = basis.transpose() * twist_row(pair.lever, pair.target_gradient, extent);
-    const Eigen::VectorXd b = basis.transpose() * twist_row(pair.lever, pair.source_gradient, extent);
+    const Amounts a = basis.transpose() * twist_row(pair.lever, pair.target_gradient, extent);
+    const Amounts b = basis.transpose() * twist_row(pair.lever, pair.source_gradient, extent);
     sum += 0.5 * pair.weight * scale * scale * (a * b.transpose() + b * a.transpose());
   }
   return sum;

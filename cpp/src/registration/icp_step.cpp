@@ -1,14 +1,13 @@
 #include "registration/icp_step.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/SVD>
 #include <cmath>
 
+#include "base/linear_algebra.hpp"
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "registration/limits.hpp"
 #include "registration/normal_equations.hpp"
-#include "registration/weak_directions.hpp"
 
 namespace nacre {
 namespace {
@@ -112,22 +111,22 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   const NormalEquations shape =
       weak_threshold > 0.0 ? normal_equations(pairs, metric, &Pair::agreement, p_mean, q_mean, extent, num_threads)
                            : equations;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(shape.hessian - shape.chance);
+  const Eigensystem eigen = eigensystem(shape.hessian - shape.chance);
   const double least = weak_threshold * sums.agreement;
-  const Eigen::Index num_weak = weak_threshold > 0.0 ? (eigen.eigenvalues().array() < least).count() : 0;
-  step.weak_directions = eigen.eigenvectors().leftCols(num_weak);
+  const Eigen::Index num_weak = weak_threshold > 0.0 ? (eigen.values.array() < least).count() : 0;
+  step.weak_directions = eigen.vectors.leftCols(num_weak);
   const bool is_free = num_weak == 0 && along.cols() == 0;
-  const TwistBasis sure = along.cols() > 0 ? along : TwistBasis(eigen.eigenvectors().rightCols(6 - num_weak));
+  const TwistBasis sure = along.cols() > 0 ? along : TwistBasis(eigen.vectors.rightCols(6 - num_weak));
   Matrix6 damped = equations.hessian;
   damped.diagonal().array() += registration_limits::step_damping * sums.weight;
   const Vector6 solution =
-      sure * solve_normal_equations(sure.transpose() * damped * sure, sure.transpose() * equations.gradient);
+      sure * solve_symmetric(sure.transpose() * damped * sure, sure.transpose() * equations.gradient);
   step.reduction = solution.dot(equations.hessian * solution);
   Vector6 scale;
   scale << extent, extent, extent, 1.0, 1.0, 1.0;
   step.hessian = scale.asDiagonal() * equations.hessian * scale.asDiagonal();
-  const Eigen::Matrix<double, 6, 6> axes = scale.asDiagonal() * eigen.eigenvectors();
-  step.shape = axes * eigen.eigenvalues().cwiseMax(0.0).asDiagonal() * axes.transpose();
+  const Eigen::Matrix<double, 6, 6> axes = scale.asDiagonal() * eigen.vectors;
+  step.shape = axes * Vector6(eigen.values.cwiseMax(0.0)).asDiagonal() * axes.transpose();
 
   const Eigen::Vector3d rotation_vector = solution.head<3>() / extent, translation = solution.tail<3>();
   if (metric == Metric::point_to_point && is_free) {

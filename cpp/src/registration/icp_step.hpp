@@ -9,7 +9,7 @@
 namespace nacre {
 
 // Twists, rotations in units of an extent, one a column: directions of a pose.
-using TwistBasis = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+using TwistBasis = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
 
 struct IcpStep {
   Pose motion = Pose::Identity();  // p <- motion * p

@@ -6,10 +6,9 @@
 namespace nacre {
 
 struct MotionBasis {
-  using Twists = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;  // (rotation, translation), one a column
   using Amounts = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6, 1>;
 
-  Twists twists;
+  TwistBasis twists;  // rotations in radians
   Eigen::Vector3d center;
 
   // Rotations by amounts of [m] at a distance of `extent` from the centre.

@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 
+#include "base/linear_algebra.hpp"
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "registration/icp.hpp"
@@ -69,7 +70,7 @@ struct JointEquations {
   explicit JointEquations(Eigen::Index size)
       : hessian(Eigen::MatrixXd::Zero(size, size)), chance(hessian), gradient(Eigen::VectorXd::Zero(size)) {}
 
-  void add(const Overlap& overlap, const MotionBasis::Twists& twists, Eigen::Index moved, Eigen::Index other) {
+  void add(const Overlap& overlap, const TwistBasis& twists, Eigen::Index moved, Eigen::Index other) {
     if (!(overlap.agreement > 0.0)) return;
     const Eigen::Index freedom = twists.cols(), i = freedom * moved, j = freedom * other;
     const MotionBasis::Amounts by_amounts = twists.transpose() * overlap.equations.gradient;
@@ -86,8 +87,7 @@ struct JointEquations {
     const Eigen::Index rest = hessian.rows() / count * (count - 1);
     const double least = weak_threshold > 0.0 ? weak_threshold * agreement / static_cast<double>(count) : -no_limit;
     const Eigen::MatrixXd sure = split_directions((hessian - chance).bottomRightCorner(rest, rest), least).sure;
-    const Eigen::MatrixXd matrix = sure.transpose() * hessian.bottomRightCorner(rest, rest) * sure;
-    return sure * solve_normal_equations(matrix, sure.transpose() * gradient.tail(rest));
+    return solve_symmetric_along(sure, hessian.bottomRightCorner(rest, rest), gradient.tail(rest));
   }
 
  private:

@@ -1,9 +1,9 @@
 #include "registration/scale_check.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
+#include "base/linear_algebra.hpp"
 #include "registration/limits.hpp"
 
 namespace nacre {
@@ -69,8 +69,7 @@ SizeDifference size_difference(const std::vector<Pair>& pairs, Metric metric) {
     mixed += row.size / row.weight * row.pose;
     gradient += row.right_side / row.weight * row.pose;
   }
-  const Eigen::LDLT<Matrix6> solver(hessian);
-  const Vector6 by_pose = solver.solve(mixed), motion = solver.solve(gradient);
+  const Vector6 by_pose = solve_for_twist(hessian, mixed), motion = solve_for_twist(hessian, gradient);
 
   // What the motion cannot do: the rest of the column, on which the rest of the right side is regressed.
   const auto rest = [&](const Row& row) { return row.size - row.pose.dot(by_pose); };

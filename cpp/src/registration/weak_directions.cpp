@@ -1,17 +1,13 @@
 #include "registration/weak_directions.hpp"
 
-#include <Eigen/Eigenvalues>
+#include "base/linear_algebra.hpp"
 
 namespace nacre {
 
 Directions split_directions(const Eigen::MatrixXd& information, double least) {
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(information);
-  const Eigen::Index num_weak = (eigen.eigenvalues().array() < least).count();
-  return {eigen.eigenvectors().leftCols(num_weak), eigen.eigenvectors().rightCols(information.cols() - num_weak)};
-}
-
-Eigen::VectorXd solve_normal_equations(const Eigen::MatrixXd& hessian, const Eigen::VectorXd& gradient) {
-  return hessian.ldlt().solve(gradient);
+  const Eigensystem eigen = eigensystem(information);
+  const Eigen::Index num_weak = (eigen.values.array() < least).count();
+  return {eigen.vectors.leftCols(num_weak), eigen.vectors.rightCols(information.cols() - num_weak)};
 }
 
 }  // namespace nacre
