@@ -5,6 +5,7 @@
 
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
+#include "registration/acceptance.hpp"
 #include "registration/icp.hpp"
 #include "tracking/limits.hpp"
 #include "tracking/points_in_view.hpp"
