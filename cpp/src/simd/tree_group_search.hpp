@@ -19,14 +19,17 @@ constexpr int most_candidates = 1024;  // their numbers take 10 bits of a key
 constexpr int most_near = 128;         // candidates within the radius of one query
 constexpr int32_t no_candidate = INT32_MAX;
 
-template <class T>
-struct GroupFrame {
-  T origin[3], scale;  // local = (p - origin) * scale, the scale a power of 2
-  float radius2;       // of the search
-  float reach2;        // beyond this from the queries' box, boxes and points are out
-  float margin;        // local squared distances up to radius2 are off by less
-  float half[3];       // of the queries' box, about 0
+struct LocalQueries {
+  float radius2;  // of the search
+  float reach2;   // beyond this from the queries' box, boxes and points are out
+  float margin;   // local squared distances up to radius2 are off by less
+  float half[3];  // of the queries' box, about 0
   alignas(64) float q[3][group_queries];
+};
+
+template <class T>
+struct GroupFrame : LocalQueries {
+  T origin[3], scale;  // local = (p - origin) * scale, the scale a power of 2
 };
 
 // The power of 2 that brings a square to 2^19 or up to four times that.

@@ -87,19 +87,18 @@ NACRE_INLINE int count_within(const float* d2, int size, float limit) {
 }
 
 // Ranks the candidates of the first queries: at least k of them, or all that are within the radius. Where `most` is too
-// few to hold the k-th and those as far away, the query is not ranked.
-template <int most, class T>
-NACRE_INLINE void rank_candidates(const GroupFrame<T>& frame, const Candidates& candidates, int size, int k,
-                                  Ranking& out) {
+// few to hold the k-th and those as far away, the query is not ranked. Not inline: once for all types of points.
+template <int most>
+static void rank_candidates(const LocalQueries& local, const Candidates& candidates, int size, int k, Ranking& out) {
   alignas(64) int32_t rows[group_queries][most + 16];
   alignas(64) float d2[most_candidates + 16];
   const float aim = 0.5F * static_cast<float>(k + most);
-  float limit = frame.radius2;
+  float limit = local.radius2;
   for (int query = 0; query < group_queries; ++query) {
     out.counts[query] = -1;
     int n = 0;
     if (query < size) {
-      const F32 x = broadcast(frame.q[0][query]), y = broadcast(frame.q[1][query]), z = broadcast(frame.q[2][query]);
+      const F32 x = broadcast(local.q[0][query]), y = broadcast(local.q[1][query]), z = broadcast(local.q[2][query]);
       for (int i = 0; i < candidates.count; i += lanes) {
         const F32 dx = load(candidates.p[0] + i) - x, dy = load(candidates.p[1] + i) - y;
         const F32 dz = load(candidates.p[2] + i) - z;
@@ -108,10 +107,10 @@ NACRE_INLINE void rank_candidates(const GroupFrame<T>& frame, const Candidates& 
         n += simd::NACRE_ISA::count(squared <= broadcast(limit));
       }
       // A limit that between k and `most` candidates are within; neighbouring queries have similar ones.
-      float too_small = 0.0F, too_large = frame.radius2;
+      float too_small = 0.0F, too_large = local.radius2;
       for (int pass = 0; pass < 12; ++pass) {
         if (n >= k && n <= most) break;
-        if (n < k && limit >= frame.radius2) break;
+        if (n < k && limit >= local.radius2) break;
         (n < k ? too_small : too_large) = limit;
         const float guess = limit * aim / static_cast<float>(n + 1);
         limit = guess > too_small && guess < too_large ? guess : 0.5F * (too_small + too_large);
@@ -132,7 +131,7 @@ NACRE_INLINE void rank_candidates(const GroupFrame<T>& frame, const Candidates& 
       }
       out.limits[query] = limit;
       limit *= aim / static_cast<float>(n + 1);
-      limit = limit < frame.radius2 ? limit : frame.radius2;
+      limit = limit < local.radius2 ? limit : local.radius2;
     }
     for (int i = n; i < most; i += lanes) store(rows[query] + i, broadcast(no_candidate));
   }
@@ -144,37 +143,34 @@ NACRE_INLINE void rank_candidates(const GroupFrame<T>& frame, const Candidates& 
   }
 }
 
-template <class T>
-NACRE_INLINE void rank_candidates(const GroupFrame<T>& frame, const Candidates& candidates, int size, int k,
+NACRE_INLINE void rank_candidates(const LocalQueries& local, const Candidates& candidates, int size, int k,
                                   Ranking& out) {
   if (k <= 8) {
-    rank_candidates<16>(frame, candidates, size, k, out);
+    rank_candidates<16>(local, candidates, size, k, out);
   } else if (k <= 20) {
-    rank_candidates<32>(frame, candidates, size, k, out);
+    rank_candidates<32>(local, candidates, size, k, out);
   } else if (k <= 44) {
-    rank_candidates<64>(frame, candidates, size, k, out);
+    rank_candidates<64>(local, candidates, size, k, out);
   } else {
-    rank_candidates<128>(frame, candidates, size, k, out);
+    rank_candidates<128>(local, candidates, size, k, out);
   }
 }
 
 // The first k of a query's ranking, and those that rounding may have put behind them; -1 where there is no ranking.
-template <class T>
-NACRE_INLINE int ranked_closely(const GroupFrame<T>& frame, const Ranking& ranking, int query, int k) {
+NACRE_INLINE int ranked_closely(const LocalQueries& local, const Ranking& ranking, int query, int k) {
   const int count = ranking.counts[query];
   if (count <= k) return count;
-  const float last = static_cast<float>((ranking.keys[k - 1][query] >> 10) + 1) + 2.0F * frame.margin;
+  const float last = static_cast<float>((ranking.keys[k - 1][query] >> 10) + 1) + 2.0F * local.margin;
   int close = k;
   while (close < count && static_cast<float>(ranking.keys[close][query] >> 10) <= last) ++close;
   return close;
 }
 
 // The local squared distance that no candidate of the query from a rank on is below, in spite of rounding.
-template <class T>
-NACRE_INLINE double beyond_rank(const GroupFrame<T>& frame, const Ranking& ranking, int query, int rank) {
+NACRE_INLINE double beyond_rank(const LocalQueries& local, const Ranking& ranking, int query, int rank) {
   const float next =
       rank < ranking.counts[query] ? static_cast<float>(ranking.keys[rank][query] >> 10) : ranking.limits[query];
-  return static_cast<double>(next - frame.margin);
+  return static_cast<double>(next - local.margin);
 }
 
 }  // namespace nacre::simd::NACRE_ISA
