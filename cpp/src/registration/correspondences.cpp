@@ -75,10 +75,7 @@ void sort_in_space(const Points& points, std::vector<std::int32_t>::iterator beg
                    std::vector<std::int32_t>::iterator end) {
   const std::vector<std::int32_t> rows(begin, end);
   const Points chosen = take_rows<Points>(points, rows);
-  SpatialOrder<float>(chosen.data(), chosen.rows(), 1)
-      .for_each_stretch(1, [&](std::int64_t first, const std::uint64_t* entries, std::int64_t count) {
-        for (std::int64_t i = 0; i < count; ++i) begin[first + i] = rows[SpatialOrder<float>::row(entries[i])];
-      });
+  for (const std::uint32_t row : spatial_order(chosen.data(), chosen.rows(), 1)) *begin++ = rows[row];
 }
 
 }  // namespace

@@ -154,7 +154,19 @@ void SpatialOrder<T>::sort_smaller(Entry* entries, std::int64_t count) {
   if (!all_equal) sort_entries(entries, count, simd::curve_bits);
 }
 
+template <class T>
+Buffer<std::uint32_t> spatial_order(const T* points, std::int64_t count, int num_threads) {
+  SpatialOrder<T> order(points, count, num_threads);
+  Buffer<std::uint32_t> rows(static_cast<std::size_t>(order.size()));
+  order.for_each_stretch(num_threads, [&](std::int64_t first, const std::uint64_t* entries, std::int64_t size) {
+    std::transform(entries, entries + size, rows.data() + first, SpatialOrder<T>::row);
+  });
+  return rows;
+}
+
 template class SpatialOrder<float>;
 template class SpatialOrder<double>;
+template Buffer<std::uint32_t> spatial_order(const float*, std::int64_t, int);
+template Buffer<std::uint32_t> spatial_order(const double*, std::int64_t, int);
 
 }  // namespace nacre

@@ -50,4 +50,8 @@ class SpatialOrder {
   std::vector<std::int64_t> stretches_;  // where each begins, and the end
 };
 
+// The rows of the whole order.
+template <class T>
+Buffer<std::uint32_t> spatial_order(const T* points, std::int64_t count, int num_threads);
+
 }  // namespace nacre

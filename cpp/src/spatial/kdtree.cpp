@@ -24,17 +24,6 @@ Tree make_tree(const Eigen::Ref<const PointMatrix<T>>& points, int num_threads) 
   return BlockTree<T>(Rows<T>(points).data(), points.rows(), num_threads);
 }
 
-// The finite queries in an order in which each is near the one before.
-template <class T>
-Buffer<std::uint32_t> visiting_order(const Rows<T>& queries, int num_threads) {
-  SpatialOrder<T> order(queries.data(), queries.size(), num_threads);
-  Buffer<std::uint32_t> rows(static_cast<std::size_t>(order.size()));
-  order.for_each_stretch(num_threads, [&](std::int64_t first, const std::uint64_t* entries, std::int64_t size) {
-    std::transform(entries, entries + size, rows.data() + first, SpatialOrder<T>::row);
-  });
-  return rows;
-}
-
 // Whether the queries are the points of the tree, row by row, and all of them: one that is not finite is not in it.
 template <class T>
 bool are_points_of(const BlockTree<T>& tree, const Rows<T>& queries, int num_threads) {
@@ -93,7 +82,7 @@ struct KdTree::Impl {
     require_distance("radius", radius);
     require(queries.size() < static_cast<std::int64_t>(no_id), "queries", "fewer than 2^32 - 1 points", queries.size());
     const double bound = squared_bound(radius);
-    const Buffer<std::uint32_t> order = visiting_order(queries, num_threads);
+    const Buffer<std::uint32_t> order = spatial_order(queries.data(), queries.size(), num_threads);
     const auto num_finite = static_cast<std::int64_t>(order.size());
     RadiusNeighbors result;
     result.offsets.assign(static_cast<std::size_t>(queries.size()) + 1, 0);
@@ -136,7 +125,8 @@ struct KdTree::Impl {
   static void answer(const BlockTree<T>& blocks, const simd::NearestTask& task, const Rows<Query>& queries,
                      int num_threads) {
     const bool in_tree_order = are_points_of(blocks, queries, num_threads);
-    const Buffer<std::uint32_t> order = in_tree_order ? Buffer<std::uint32_t>() : visiting_order(queries, num_threads);
+    const Buffer<std::uint32_t> order =
+        in_tree_order ? Buffer<std::uint32_t>() : spatial_order(queries.data(), queries.size(), num_threads);
     const std::int64_t num_finite = in_tree_order ? blocks.num_points() : static_cast<std::int64_t>(order.size());
     const std::int64_t per_block =
         queries_per_task(task.k, std::clamp<std::int64_t>(num_finite / 64 / 16 * 16, 128, 2048));
