@@ -8,6 +8,7 @@
 
 #include "base/parallel.hpp"
 #include "simd/wlop_block_bounds.hpp"
+#include "spatial/hilbert_order.hpp"
 
 namespace nacre {
 namespace {
@@ -26,20 +27,76 @@ float round_up(double x) {
   return rounded < largest ? static_cast<float>(std::max(rounded, -double{largest})) : largest;
 }
 
+template <class T>
+struct Place {
+  T point[3];
+  std::uint32_t row;
+};
+
+template <class T>
+bool is_near(const Place<T>& a, const Place<T>& b, double distance) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (!(std::abs(static_cast<double>(a.point[axis]) - static_cast<double>(b.point[axis])) <= distance)) return false;
+  }
+  return true;
+}
+
+// Halves along the longest side of the box, over and over, into blocks; all but the last are full.
+template <class T>
+void halve(Place<T>* first, Place<T>* last) {
+  const std::int64_t num_blocks = (last - first + PointBlocks::size - 1) / PointBlocks::size;
+  if (num_blocks <= 1) return;
+  int longest = 0;
+  T length = -1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto less = [axis](const Place<T>& a, const Place<T>& b) { return a.point[axis] < b.point[axis]; };
+    const auto ends = std::minmax_element(first, last, less);
+    if (!(ends.second->point[axis] - ends.first->point[axis] > length)) continue;
+    length = ends.second->point[axis] - ends.first->point[axis];
+    longest = axis;
+  }
+  Place<T>* const middle = first + num_blocks / 2 * PointBlocks::size;
+  std::nth_element(first, middle, last,
+                   [longest](const Place<T>& a, const Place<T>& b) { return a.point[longest] < b.point[longest]; });
+  halve(first, middle);
+  halve(middle, last);
+}
+
 }  // namespace
 
-template <class Cloud>
-PointBlocks::PointBlocks(const Cloud& points, CellOrder order, const Scaling& scaling, int num_threads)
-    : rows_(std::move(order.rows)) {
-  starts_.reserve(rows_.size() / size + rows_.size() / 64 + 2);
-  for (std::size_t i = 0; i < rows_.size();) {
-    starts_.push_back(static_cast<std::int32_t>(i));
-    const std::size_t last = std::min(rows_.size(), i + as_size(size));
-    const std::uint32_t cube = order.cubes[i];
-    for (++i; i < last && order.cubes[i] == cube;) ++i;
+template <class T>
+BlockRows block_rows(const Rows<T>& points, double longest, bool halved, int num_threads) {
+  SpatialOrder<T> order(points.data(), points.size(), num_threads);
+  BlockRows blocks;
+  blocks.rows.resize(as_size(order.size()));
+  std::vector<std::uint8_t> is_first(as_size(order.size()), 0);
+  order.for_each_stretch(num_threads, [&](std::int64_t first, const std::uint64_t* entries, std::int64_t count) {
+    std::vector<Place<T>> places(as_size(count));
+    for (std::int64_t i = 0; i < count; ++i) {
+      Place<T>& place = places[as_size(i)];
+      place.row = SpatialOrder<T>::row(entries[i]);
+      std::copy_n(points[place.row], 3, place.point);
+    }
+    if (halved) halve(places.data(), places.data() + count);
+    const Place<T>* begin = nullptr;
+    for (const Place<T>& place : places) {
+      const std::int64_t i = first + (&place - places.data());
+      blocks.rows[as_size(i)] = place.row;
+      if (begin != nullptr && &place - begin < PointBlocks::size && is_near(place, *begin, 0.5 * longest)) continue;
+      is_first[as_size(i)] = 1;
+      begin = &place;
+    }
+  });
+  for (std::size_t i = 0; i < is_first.size(); ++i) {
+    if (is_first[i] != 0) blocks.starts.push_back(static_cast<std::int32_t>(i));
   }
-  starts_.push_back(static_cast<std::int32_t>(rows_.size()));
+  blocks.starts.push_back(static_cast<std::int32_t>(is_first.size()));
+  return blocks;
+}
 
+template <class T>
+PointBlocks::PointBlocks(const Rows<T>& points, BlockRows blocks, const Scaling& scaling, int num_threads)
+    : rows_(std::move(blocks.rows)), starts_(std::move(blocks.starts)) {
   for (std::vector<float>& axis : axes_) axis.resize(as_size(num_readable()));
   origins_.resize(as_size(3 * num_blocks()));
   halves_.resize(as_size(3 * num_blocks()));
@@ -49,15 +106,12 @@ PointBlocks::PointBlocks(const Cloud& points, CellOrder order, const Scaling& sc
     levels_.emplace_back(as_size(num_nodes * simd::node_floats));
   }
 
-  using Scalar = typename Cloud::Scalar;
-  const Scalar* const data = points.data();
-  const std::int64_t stride = points.outerStride();
   parallel_for(num_blocks(), size * nodes_per_task, num_threads, [&](std::int64_t block) {
     const std::int64_t count = end(block) - begin(block);
     assert(count > 0);
     double places[3][size];
     for (std::int64_t i = 0; i < count; ++i) {
-      const Scalar* const point = data + row(begin(block) + i) * stride;
+      const T* const point = points[row(begin(block) + i)];
       for (int axis = 0; axis < 3; ++axis) {
         places[axis][i] = (static_cast<double>(point[axis]) - scaling.center[axis]) * scaling.scale;
       }
@@ -71,6 +125,15 @@ PointBlocks::PointBlocks(const Cloud& points, CellOrder order, const Scaling& sc
     }
   });
   refit(num_threads);
+}
+
+double PointBlocks::reach() const {
+  float reach = 0.0F;
+  if (levels_.empty()) return 0.0;
+  for (const float end : levels_.back()) {
+    if (std::abs(end) < infinity) reach = std::max(reach, std::abs(end));  // no box has infinity
+  }
+  return static_cast<double>(reach);
 }
 
 void PointBlocks::refit(int num_threads) {
@@ -153,7 +216,9 @@ simd::PairTargets PointBlocks::block(std::int64_t block) const {
   return targets;
 }
 
-template PointBlocks::PointBlocks(const PointsRef&, CellOrder, const Scaling&, int);
-template PointBlocks::PointBlocks(const PointsDoubleRef&, CellOrder, const Scaling&, int);
+template BlockRows block_rows(const Rows<float>&, double, bool, int);
+template BlockRows block_rows(const Rows<double>&, double, bool, int);
+template PointBlocks::PointBlocks(const Rows<float>&, BlockRows, const Scaling&, int);
+template PointBlocks::PointBlocks(const Rows<double>&, BlockRows, const Scaling&, int);
 
 }  // namespace nacre

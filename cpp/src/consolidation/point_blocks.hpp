@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "consolidation/cell_order.hpp"
+#include "base/point_rows.hpp"
 #include "simd/wlop_pair_sums.hpp"
 
 namespace nacre {
@@ -15,15 +15,24 @@ struct Scaling {
   double scale;
 };
 
+// Finite rows of a cloud in blocks, along the order in space. Block b has rows[starts[b]] to rows[starts[b + 1] - 1].
+struct BlockRows {
+  std::vector<std::uint32_t> rows;
+  std::vector<std::int32_t> starts;
+};
+
+// Blocks of which none is longer than `longest`. Halved stretches of the curve make more compact ones, and take longer.
+template <class T>
+BlockRows block_rows(const Rows<T>& points, double longest, bool halved, int num_threads);
+
 inline std::size_t as_size(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 class PointBlocks {
  public:
   static constexpr std::int64_t size = simd::block_size;
 
-  // Blocks of points in their order; a block never spans two cubes of it. Defined for Points and PointsDouble.
-  template <class Cloud>
-  PointBlocks(const Cloud& points, CellOrder order, const Scaling& scaling, int num_threads);
+  template <class T>
+  PointBlocks(const Rows<T>& points, BlockRows blocks, const Scaling& scaling, int num_threads);
 
   std::int64_t num_points() const { return static_cast<std::int64_t>(rows_.size()); }
   std::int64_t row(std::int64_t i) const { return rows_[static_cast<std::size_t>(i)]; }  // of the cloud
@@ -36,6 +45,8 @@ class PointBlocks {
   // Coordinates relative to the origin of the block.
   std::vector<float>& axis(int axis) { return axes_[axis]; }
   const std::vector<float>& axis(int axis) const { return axes_[axis]; }
+  // The largest coordinate.
+  double reach() const;
   // After the coordinates have changed.
   void refit(int num_threads);
 

@@ -18,8 +18,6 @@
 namespace nacre {
 namespace {
 
-constexpr double cells_a_radius = 4.0;
-
 // What makes a method, in the unit of length in which theta(r) = 2^(-r^2).
 struct Form {
   double scale = 1.0;                   // units a metre
@@ -294,21 +292,24 @@ class Projection {
 };
 
 template <class Cloud, class Matrix>
-Matrix project(const Cloud& samples, CellOrder sample_order, const Cloud& points, CellOrder point_order,
-               const CellLattice& lattice, const ConsolidateOptions& options, const ProjectionHints& hints,
-               const Cargo* cargo, int* iterations) {
+Matrix project(const Cloud& samples, const Cloud& points, const ConsolidateOptions& options,
+               const ProjectionHints& hints, const Cargo* cargo, int* iterations) {
   const Form form = form_of(options);
+  const Rows<typename Cloud::Scalar> point_rows(points), sample_rows(samples);
+  const double longest = 8.0 * options.radius;
+  BlockRows of_points = block_rows(point_rows, longest, false, options.num_threads);
+  Scaling scaling{Eigen::Vector3d::Zero(), form.scale};
+  if (!of_points.rows.empty()) scaling.center = point_rows.position(of_points.rows[of_points.rows.size() / 2]);
+  const PointBlocks point_blocks(point_rows, std::move(of_points), scaling, options.num_threads);
+  PointBlocks blocks(sample_rows, block_rows(sample_rows, longest, true, options.num_threads), scaling,
+                     options.num_threads);
   constexpr double farthest = 1e36;  // in the kernels' unit: what single precision can hold, with room to spare
   const int digits = static_cast<int>(std::floor(std::log10(farthest / (options.radius * form.scale))));
-  const double radii = lattice.reach / cells_a_radius;
+  const double radii = std::max(point_blocks.reach(), blocks.reach()) / (options.radius * form.scale);
   require(radii < std::pow(10.0, digits), "points", "within 1e" + std::to_string(digits) + " radii of their middle",
           radii);
-  const Scaling scaling{lattice.center, form.scale};
-  const PointBlocks point_blocks(points, std::move(point_order), scaling, options.num_threads);
-  halve_cubes(samples, sample_order, PointBlocks::size, options.num_threads);
-  const PointBlocks blocks(samples, std::move(sample_order), scaling, options.num_threads);
-  PointBlocks moved = blocks;
-  Projection projection(moved, point_blocks, options, form, hints);
+  const std::vector<float> first[3] = {blocks.axis(0), blocks.axis(1), blocks.axis(2)};
+  Projection projection(blocks, point_blocks, options, form, hints);
   for (int iteration = 0; iteration < options.iterations; ++iteration) {
     projection.move(iteration == 0, iteration + 1 == options.iterations ? cargo : nullptr);
     if (iterations != nullptr) *iterations = iteration + 1;
@@ -317,7 +318,7 @@ Matrix project(const Cloud& samples, CellOrder sample_order, const Cloud& points
   Matrix result = samples;
   parallel_for(blocks.num_points(), 16384, options.num_threads, [&](std::int64_t i) {
     for (int axis = 0; axis < 3; ++axis) {
-      const double way = static_cast<double>(moved.axis(axis)[as_size(i)]) - blocks.axis(axis)[as_size(i)];
+      const double way = static_cast<double>(blocks.axis(axis)[as_size(i)]) - first[axis][as_size(i)];
       auto& coordinate = result(blocks.row(i), axis);
       coordinate = static_cast<typename Matrix::Scalar>(static_cast<double>(coordinate) + way / form.scale);
     }
@@ -337,28 +338,14 @@ BasicConsolidated<Matrix> consolidate_cloud(const Cloud& points, const Consolida
   const auto count = static_cast<Eigen::Index>(result.sources.size());
   Matrix samples(count, 3);
   result.attributes.resize(count, attributes.cols());
-  std::vector<std::int32_t> sample_of(as_size(points.rows()), -1);
   for (Eigen::Index i = 0; i < count; ++i) {
     const std::int64_t source = result.sources[as_size(i)];
     samples.row(i) = points.row(source);
-    sample_of[as_size(source)] = static_cast<std::int32_t>(i);
     if (attributes.cols() > 0) result.attributes.row(i) = attributes.row(source);
   }
-  const CellLattice lattice = cell_lattice<Cloud>({&points}, options.radius / cells_a_radius, options.num_threads);
-  CellOrder order = cell_order(points, lattice, options.num_threads);
-  CellOrder sample_order;
-  sample_order.rows.reserve(as_size(count));
-  sample_order.cubes.reserve(as_size(count));
-  for (std::size_t i = 0; i < order.rows.size(); ++i) {
-    const std::int32_t sample = sample_of[order.rows[i]];
-    if (sample < 0) continue;
-    sample_order.rows.push_back(static_cast<std::uint32_t>(sample));
-    sample_order.cubes.push_back(order.cubes[i]);
-  }
   const Cargo cargo{attributes, result.attributes};
-  result.points =
-      project<Cloud, Matrix>(samples, std::move(sample_order), points, std::move(order), lattice, options,
-                             ProjectionHints(), attributes.cols() > 0 ? &cargo : nullptr, &result.iterations);
+  result.points = project<Cloud, Matrix>(samples, points, options, ProjectionHints(),
+                                         attributes.cols() > 0 ? &cargo : nullptr, &result.iterations);
   return result;
 }
 
@@ -382,11 +369,7 @@ Matrix project_cloud(const Cloud& samples, const Cloud& points, const Consolidat
           "one row per sample (" + std::to_string(samples.rows()) + ")", hints.sample_normals.rows());
   require(hints.frozen.empty() || static_cast<Eigen::Index>(hints.frozen.size()) == samples.rows(), "frozen",
           "one value per sample (" + std::to_string(samples.rows()) + ")", hints.frozen.size());
-  const CellLattice lattice =
-      cell_lattice<Cloud>({&points, &samples}, options.radius / cells_a_radius, options.num_threads);
-  return project<Cloud, Matrix>(samples, cell_order(samples, lattice, options.num_threads), points,
-                                cell_order(points, lattice, options.num_threads), lattice, options, hints, nullptr,
-                                nullptr);
+  return project<Cloud, Matrix>(samples, points, options, hints, nullptr, nullptr);
 }
 
 }  // namespace

@@ -5,6 +5,7 @@
 #include "base/random.hpp"
 #include "consolidation/point_blocks.hpp"
 #include "doctest/doctest.h"
+#include "nacre/types.hpp"
 #include "simd/wlop_pair_sums.hpp"
 
 using namespace nacre;
@@ -49,26 +50,20 @@ PointsDouble noisy_sheet(int count, std::uint64_t seed) {
 struct Scene {
   PointsDouble targets, points;
   std::vector<float> mass;
-  CellLattice lattice;
   PointBlocks target_blocks, point_blocks;
 
-  Scene(int num_targets, int num_points, double cell)
+  Scene(int num_targets, int num_points, double longest)
       : targets(noisy_sheet(num_targets, 1)),
         points(noisy_sheet(num_points, 2)),
-        lattice(make_lattice(cell)),
-        target_blocks(make_blocks(targets)),
-        point_blocks(make_blocks(points)) {
+        target_blocks(make_blocks(targets, longest)),
+        point_blocks(make_blocks(points, longest)) {
     mass.resize(static_cast<std::size_t>(point_blocks.num_readable()));
     for (std::size_t j = 0; j < mass.size(); ++j) mass[j] = static_cast<float>(0.5 + random_uniform(3, j));
   }
 
-  CellLattice make_lattice(double cell) const {
-    const PointsDoubleRef a(points), b(targets);
-    return cell_lattice<PointsDoubleRef>({&a, &b}, cell, 1);
-  }
-  PointBlocks make_blocks(const PointsDouble& cloud) const {
-    const PointsDoubleRef ref(cloud);
-    return {ref, cell_order(ref, lattice, 1), Scaling{lattice.center, 1.0}, 1};
+  static PointBlocks make_blocks(const PointsDouble& cloud, double longest) {
+    const Rows<double> rows(cloud);
+    return {rows, block_rows(rows, longest, false, 1), Scaling{Eigen::Vector3d(10.0, 10.0, 0.0), 1.0}, 1};
   }
 
   double weight(const simd::PairKernel& kernel, double r2, std::int64_t place, bool with_mass) const {
