@@ -10,6 +10,8 @@ namespace nacre::camera_limits {
 constexpr double view_turn = 0.2;  // [rad] tuned: turn that makes another view; test_loop_closure
 constexpr double view_shift = 0.15;  // [depth] tuned: shift that makes another view; test_loop_closure
 constexpr double least_point_pixels = 1.5;  // [pixel] tuned: between new points in their frame; bunny12 NN CoV
+constexpr float least_facing = 0.3F;  // [cosine] tuned: at which a surface should be seen; test_global_registration, dog
+constexpr double surface_spacings = 2.75;  // [spacing] tuned: across a surface, within which points are of it; teddy, test_deformation
 
 }  // namespace nacre::camera_limits
 // clang-format on

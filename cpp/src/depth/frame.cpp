@@ -1,6 +1,7 @@
 // Points and normals of a depth image: each normal is one linear fit over a window of the planar image.
 #include <cmath>
 
+#include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "camera/ray_table.hpp"
 #include "depth/inverse_depth_image.hpp"
@@ -16,7 +17,7 @@ simd::NormalRule normal_rule(const PlanarImage& image, const Camera& camera, con
   const Quadratic sigma = image.sigma(noise.local()), unit_slope = image.unit_slope();
   return {sigma,
           unit_slope,
-          sigma * (depth_limits::gate_sigmas * std::sqrt(2.0F)),
+          sigma * (base_limits::noise_sigmas * std::sqrt(2.0F)),
           unit_slope * depth_limits::gate_slope,
           depth_limits::slope_sigma,
           depth_limits::least_filled,

@@ -15,7 +15,6 @@ constexpr float slope_sigma = 0.07F;  // [1] tuned: a normal's window grows unti
 constexpr float least_filled = 0.4F;  // [1] tuned: part of a normal's window that must be measured; test_frame
 constexpr float least_spread = 0.02F;  // [1] tuned: of a full window's squared spread, both ways; test_frame
 constexpr float gate_slope = 5.67F;  // [1] derived: neighbours of one surface: a slant of 80 degrees; test_frame
-constexpr float gate_sigmas = 4.0F;  // [sigma] tuned: neighbours of one surface: allowance for noise; test_frame
 constexpr std::int64_t least_windows = 8;  // [windows] tuned: fewer do not tell an image's noise; test_depth
 constexpr double noise_quantile = 0.4;  // [1] tuned: of residuals: edges leave more over than noise; test_noise
 constexpr double least_noise = 1e-3;  // [pixel] tuned: sigma of a clean image, in sizes of a pixel; test_noise
@@ -37,7 +36,6 @@ constexpr double least_cracked = 0.15;  // [1] derived: cracks to measurements: 
 constexpr float nearest_median = 0.05F;  // [m] derived: nearer medians: a wrong depth_scale; test_depth
 constexpr float farthest_median = 50.0F;  // [m] derived: farther medians: a wrong depth_scale; test_depth
 constexpr std::int64_t most_probes = 8192;  // [pixels] budget: that tell an image's median depth; test_depth
-constexpr float view_sigmas = 4.0F;  // [sigma] derived: a point this far from a measurement contradicts it; test_loop_closure
 constexpr float view_systematic = 2.0F;  // [sigma] tuned: likewise, of the systematic error; teddy, rpy
 
 }  // namespace nacre::depth_limits

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/parallel.hpp"
+#include "camera/limits.hpp"
 #include "fusion/limits.hpp"
 #include "spatial/hash_grid.hpp"
 
@@ -30,7 +31,7 @@ void merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
   }
   std::vector<PointGrid> grids;
   for (int level = 0; level < fusion_limits::layer_levels; ++level) {
-    grids.emplace_back(std::ldexp(spacing, level) * std::hypot(1.0, fusion_limits::layer_thickness), old.size());
+    grids.emplace_back(std::ldexp(spacing, level) * std::hypot(1.0, camera_limits::surface_spacings), old.size());
     for (const std::size_t i : old) grids.back().add(model.points[i]);
   }
 
@@ -45,7 +46,7 @@ void merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
     while (level + 1 < fusion_limits::layer_levels && std::ldexp(spacing, level) < wanted) ++level;
     const double between = std::clamp(wanted, spacing, std::ldexp(spacing, level));
     const auto reach = static_cast<float>(between),
-               across = static_cast<float>(fusion_limits::layer_thickness * between);
+               across = static_cast<float>(camera_limits::surface_spacings * between);
     // The nearest along the surface, the older of two as near.
     std::size_t best = 0;
     float least = reach * reach;

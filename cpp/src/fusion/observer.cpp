@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "base/statistics.hpp"
 #include "depth/depth_view.hpp"
@@ -83,7 +84,7 @@ bool SurfaceObserver::may_observe(const Eigen::Vector3f& point, std::int32_t pix
   const Tile& tile =
       tiles_[static_cast<std::size_t>(pixel / width_ / tile_size * tiles_across_ + pixel % width_ / tile_size)];
   const float radius = support(sigma, static_cast<float>(camera_.footprint(point.z())));
-  const float reach = radius + std::max(radius, fusion_limits::offset_sigmas * sigma);
+  const float reach = radius + std::max(radius, base_limits::noise_sigmas * sigma);
   const bool is_in_range = point.z() > tile.nearest - reach && point.z() < tile.farthest + reach;
   const float largest_sum = static_cast<float>(PixelWindow::size * PixelWindow::size) * tile.largest_weight;
   return is_in_range && largest_sum > least_weight;
@@ -120,7 +121,7 @@ void SurfaceObserver::add(ObservationBlock& block, const Eigen::Vector3f& point,
   block.u_[i] = pixel % width_;
   block.v_[i] = pixel / width_;
   block.radius_[i] = radius;
-  block.largest_offset_[i] = std::max(radius, fusion_limits::offset_sigmas * sigma);
+  block.largest_offset_[i] = std::max(radius, base_limits::noise_sigmas * sigma);
   block.spacing_[i] = spacing;
   constexpr auto largest = static_cast<float>(simd::largest_window);
   block.window_[i] = static_cast<int>(std::ceil(std::min(largest, std::max(1.0F, reach / footprint))));

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/limits.hpp"
 #include "base/linear_algebra.hpp"
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
+#include "camera/limits.hpp"
 #include "loops/limits.hpp"
 #include "outlines/match.hpp"
 #include "registration/icp.hpp"
@@ -222,10 +224,10 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
   source.reach.resize(source.cloud.points.rows());
   source.largest_residual.resize(source.cloud.points.rows());
   for (Eigen::Index i = 0; i < source.reach.size(); ++i) {
-    const double noise = loops_limits::residual_sigmas *
-                         static_cast<double>(cloud.noise[source.cloud.rows[static_cast<std::size_t>(i)]]);
+    const double noise =
+        base_limits::noise_sigmas * static_cast<double>(cloud.noise[source.cloud.rows[static_cast<std::size_t>(i)]]);
     const double along = std::max(loops_limits::reach_spacings * target.spacing(), noise);
-    const double across = std::max(loops_limits::residual_spacings * frame.spacing, noise);
+    const double across = std::max(camera_limits::surface_spacings * frame.spacing, noise);
     source.reach[i] = static_cast<float>(std::min(along, largest));
     source.largest_residual[i] = static_cast<float>(std::min(across, largest));
   }
@@ -240,7 +242,7 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
   for (const int k : in_question) {
     const FrameCloud& other = key_frames_[static_cast<std::size_t>(k)].cloud;
     const VisibilityCounts counts = compare(other, pose.inverse() * pose_of(k), frame.view, camera_,
-                                            loops_limits::residual_spacings * frame.spacing / cloud.depth);
+                                            camera_limits::surface_spacings * frame.spacing / cloud.depth);
     seen += part_of(counts.agreeing, other);
     through += part_of(counts.seen_through, other);
   }
@@ -284,8 +286,8 @@ std::vector<Pose> LoopClosure::optimise(const Match& loop, double depth, std::in
   const std::size_t num_edges = graph_.edges().size();
   graph_.add_edge(
       edge(loop.key_frame, num_key_frames() - 1, loop.alignment.target_from_source, loop.alignment, depth, true));
-  const PoseGraphFit fit = graph_.optimise(loops_limits::most_normalized_error);
-  const bool is_closed = fit.converged && fit.largest_error <= loops_limits::most_normalized_error &&
+  const PoseGraphFit fit = graph_.optimise(base_limits::noise_sigmas);
+  const bool is_closed = fit.converged && fit.largest_error <= base_limits::noise_sigmas &&
                          std::all_of(fit.weights.begin() + static_cast<std::ptrdiff_t>(num_edges), fit.weights.end(),
                                      [](double weight) { return weight > 0.0; });
   if (!is_closed) {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <optional>
 
+#include "base/limits.hpp"
 #include "base/linear_algebra.hpp"
 #include "base/parallel.hpp"
 #include "outlines/limits.hpp"
@@ -74,7 +75,7 @@ class OutlineSearch {
     const Eigen::Vector3d sight_line =
         camera_.model() == Camera::Model::orthographic ? Eigen::Vector3d::UnitZ() : origin.normalized();
     if (found.normal.dot(sight_line) > 0.0) found.normal = -found.normal;
-    if (!(-found.normal.dot(sight_line) > outlines_limits::least_edge_facing)) return std::nullopt;
+    if (!(-found.normal.dot(sight_line) > outlines_limits::least_facing)) return std::nullopt;
     const Eigen::Vector3d along = across * -inward.y() + down * inward.x();
     found.outward = along.cross(found.normal).normalized();
     const Eigen::Vector3d outwards = -(across * inward.x() + down * inward.y());
@@ -111,7 +112,7 @@ class OutlineSearch {
   // they are not too many: others see a side of the same body at a grazing angle. None where the surface goes on.
   std::optional<double> surface_end(int u, int v, const Eigen::Vector3d& origin, const Eigen::Vector3d& across,
                                     const Eigen::Vector3d& down, const Eigen::Vector2d& direction) const {
-    const double off = outlines_limits::most_off * static_cast<double>(sight_.sigma[v * width_ + u]) +
+    const double off = base_limits::noise_sigmas * static_cast<double>(sight_.sigma[v * width_ + u]) +
                        0.5 * camera_.footprint(depth(u, v));
     double last = 0.0;
     for (double at = 0.5 * outlines_limits::smear_step; at < gap_; at += outlines_limits::smear_step) {

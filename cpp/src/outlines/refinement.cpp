@@ -8,6 +8,7 @@
 #include "base/statistics.hpp"
 #include "outlines/limits.hpp"
 #include "outlines/match.hpp"
+#include "registration/limits.hpp"
 
 namespace nacre {
 namespace {
@@ -33,7 +34,7 @@ OutlineEquations equations_of(const std::vector<OutlinePoint>& edges,
   const double certainty =
       1.0 / (sigma * sigma * outlines_limits::points_for_one * static_cast<double>(earlier.size()));
   for (const std::vector<OutlinePoint>& seen : earlier) {
-    const std::vector<int> nearest = nearest_edges(edges, seen, outlines_limits::refining_gate * pixel, num_threads);
+    const std::vector<int> nearest = nearest_edges(edges, seen, outlines_limits::last_gate * pixel, num_threads);
     for (std::size_t i = 0; i < nearest.size(); ++i) {
       if (nearest[i] < 0) continue;
       const OutlinePoint &edge = edges[i], &other = seen[static_cast<std::size_t>(nearest[i])];
@@ -49,7 +50,7 @@ OutlineEquations equations_of(const std::vector<OutlinePoint>& edges,
     }
   }
   hessian.diagonal().tail<3>().array() +=
-      1.0 / (outlines_limits::shift_sigma * pixel * outlines_limits::shift_sigma * pixel);
+      1.0 / (outlines_limits::point_sigma * pixel * outlines_limits::point_sigma * pixel);
   const Eigen::Matrix<double, 6, 3> mixed = hessian.topRightCorner<6, 3>();
   const Eigen::Matrix<double, 6, 3> eliminated = mixed * hessian.bottomRightCorner<3, 3>().inverse();
   equations.hessian = hessian.topLeftCorner<6, 6>() - eliminated * mixed.transpose();
@@ -61,18 +62,18 @@ OutlineEquations equations_of(const std::vector<OutlinePoint>& edges,
 
 void refine_by_outlines(IcpResult& result, const std::vector<OutlinePoint>& outline,
                         const std::vector<std::vector<OutlinePoint>>& earlier, int num_threads) {
-  if (outline.size() < outlines_limits::least_refining || earlier.empty()) return;
+  if (outline.size() < outlines_limits::least_matches || earlier.empty()) return;
   const Pose start = result.target_from_source;
   const double pixel = median_pixel(outline);
   const Matrix6 shape = result.shape_information / outlines_limits::pairs_for_one;
   Vector6 twist = Vector6::Zero();
   OutlineEquations equations;
-  for (int iteration = 0; iteration < outlines_limits::most_refinements; ++iteration) {
+  for (int iteration = 0; iteration < registration_limits::most_steps; ++iteration) {
     const std::vector<OutlinePoint> edges = moved(outline, motion_about(result.center, twist) * start);
     equations = equations_of(edges, earlier, result.center, pixel, num_threads);
     const double mean_square = equations.squares / static_cast<double>(equations.count);
     const bool lie_on_each_other = std::sqrt(mean_square) <= outlines_limits::largest_rms * pixel || iteration == 0;
-    if (equations.count < outlines_limits::least_refining || !lie_on_each_other) return;
+    if (equations.count < outlines_limits::least_matches || !lie_on_each_other) return;
     const Vector6 step = -solve_for_twist(equations.hessian + shape, equations.gradient + shape * twist);
     if (!step.allFinite()) return;
     twist += step;

@@ -98,7 +98,7 @@ class EdgeSearch : public OpenDirectionSearch {
         const std::vector<MotionRow> pairs = match(result.target_from_source, result.center, gate);
         if (pairs.empty()) return start;
         step(pairs, open, result);
-        gate = std::max(smallest_gate(), gate * outlines_limits::gate_decay);
+        gate = std::max(smallest_gate(), gate * registration_limits::gate_decay);
       }
       if (!return_to_surface(target_, source_, held_, result)) return start;
     }

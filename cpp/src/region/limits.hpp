@@ -15,7 +15,6 @@ constexpr int most_cells = 20000;  // [cells] budget: of an image seen coarsely;
 constexpr int largest_step = 12;  // [pixel] budget: side of a cell; benchmarks
 constexpr float least_cosine = 0.9F;  // [cosine] tuned: between normals of one plane, as measured; test_region
 constexpr float bend = 0.008F;  // [1] tuned: of a plane, as a part of its distance; dog
-constexpr float plane_sigmas = 4.0F;  // [sigma] tuned: margin of a plane: noise; test_region
 constexpr float plane_pixels = 2.0F;  // [pixel] tuned: margin of a plane: pixels; test_region
 constexpr double least_plane = 0.1;  // [1] tuned: part of the points that a supporting plane holds; test_region
 constexpr int num_hypotheses = 160;  // [planes] budget: from one point and normal each; test_region

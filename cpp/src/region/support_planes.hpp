@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <vector>
 
+#include "base/limits.hpp"
 #include "nacre/region.hpp"
 #include "region/coarse_frame.hpp"
 #include "region/limits.hpp"
@@ -23,7 +24,7 @@ class PlaneCut {
   bool has_normal(const Eigen::Vector3f& normal) const { return normal.dot(normal_) > region_limits::least_cosine; }
   // 4 standard deviations and 2 pixels [m].
   float margin(float sigma, float pixel) const {
-    return margin_ > 0.0F ? margin_ : region_limits::plane_sigmas * sigma + region_limits::plane_pixels * pixel;
+    return margin_ > 0.0F ? margin_ : base_limits::noise_sigmas * sigma + region_limits::plane_pixels * pixel;
   }
 
   // 1: before the plane, 0: on it, -1: behind it.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
@@ -38,7 +39,7 @@ class ColorSearch : public OpenDirectionSearch {
     fit.extent = extent_of(fit.rows);
     fit.noise = noise_;
     distance_noise_ = std::max(geometric.rmse, 0.1 * target_.spacing());
-    fit.agrees = fit.rows.size() >= registration_limits::least_color_pairs &&
+    fit.agrees = fit.rows.size() >= registration_limits::least_points &&
                  fit.result.num_inliers > registration_limits::still_matching * geometric.num_inliers &&
                  correlation_ >= registration_limits::least_correlation;
     return fit;
@@ -81,18 +82,18 @@ class ColorSearch : public OpenDirectionSearch {
       rows.push_back(pair);
       values.push_back(value);
     }
-    if (rows.size() >= registration_limits::least_color_pairs) weigh(values, rows);
+    if (rows.size() >= registration_limits::least_points) weigh(values, rows);
     return rows;
   }
 
   IcpResult run(const IcpResult& start, const TwistBasis* only) {
     IcpResult result = start;
     for (const ColorLevel& level : levels_) {
-      for (int i = 0; i < registration_limits::most_color_steps; ++i) {
+      for (int i = 0; i < registration_limits::most_steps; ++i) {
         const TwistBasis open = only != nullptr ? *only : TwistBasis(result.weak_directions);
         if (open.cols() == 0) break;
         const std::vector<MotionRow> rows = match(level, result.target_from_source, result.center);
-        if (rows.size() < registration_limits::least_color_pairs) break;
+        if (rows.size() < registration_limits::least_points) break;
         const double size = step(rows, open, result);
         if (!return_to_surface(target_, source_, held_, result)) return start;
         if (size < registration_limits::small_color_step * target_.spacing()) break;
@@ -140,8 +141,8 @@ class ColorSearch : public OpenDirectionSearch {
   // Moves the pose along the open directions; returns how far, root mean square over the pairs [m].
   double step(const std::vector<MotionRow>& rows, const TwistBasis& open, IcpResult& result) const {
     const double extent = extent_of(rows);
-    Vector6 twist = gauss_newton_step(rows, open, extent,
-                                      {registration_limits::color_damping, registration_limits::color_trace_damping});
+    Vector6 twist =
+        gauss_newton_step(rows, open, extent, {base_limits::damping, registration_limits::color_trace_damping});
     const double longest = registration_limits::longest_color_step * target_.spacing(), length = twist.norm();
     if (length > longest) twist *= longest / length;
     const double size = twist.norm();

@@ -5,6 +5,7 @@
 
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
+#include "camera/limits.hpp"
 #include "registration/icp.hpp"
 #include "registration/limits.hpp"
 #include "registration/rotation_grid.hpp"
@@ -41,7 +42,7 @@ ViewAgreement ask(const IcpSource& source, const SearchSide& onto, const Pose& p
     if (seen == FreeSpace::Seen::hidden) {
       const Eigen::Vector3d normal = pose.linear() * source.cloud.normals.row(i).transpose().cast<double>();
       const double facing = normal.dot((onto.seen->viewpoint() - point).normalized());
-      if (facing > registration_limits::least_facing && !source.cloud.has_estimated_normals) agreement.occluded += 1.0;
+      if (facing > camera_limits::least_facing && !source.cloud.has_estimated_normals) agreement.occluded += 1.0;
     }
   }
   for (double* part : {&agreement.agree, &agreement.seen_through, &agreement.occluded, &agreement.beyond}) {
@@ -52,7 +53,9 @@ ViewAgreement ask(const IcpSource& source, const SearchSide& onto, const Pose& p
 
 }  // namespace
 
-bool is_enough(const SearchSide& side) { return side.all.cloud.points.rows() >= registration_limits::least_points; }
+bool is_enough(const SearchSide& side) {
+  return static_cast<std::size_t>(side.all.cloud.points.rows()) >= registration_limits::least_points;
+}
 
 SearchSide::SearchSide(const GlobalCloud& cloud_in, const GlobalAlignOptions& options, bool is_noisy)
     : cloud(cloud_in, options, is_noisy),
@@ -89,7 +92,7 @@ std::vector<SearchCandidate> GlobalSearch::run() const {
 
 SearchCandidate GlobalSearch::start_from(int number) const {
   AlignOptions icp = icp_options(options_);
-  icp.max_distance = registration_limits::first_search_gate * size_;
+  icp.max_distance = registration_limits::first_gate * size_;
   icp.final_distance = registration_limits::coarse_gate * size_;
   icp.max_iterations = 12;
   icp.weak_threshold = 0.0;

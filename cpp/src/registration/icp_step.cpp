@@ -3,6 +3,7 @@
 #include <Eigen/SVD>
 #include <cmath>
 
+#include "base/limits.hpp"
 #include "base/linear_algebra.hpp"
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
@@ -118,7 +119,7 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   const bool is_free = num_weak == 0 && along.cols() == 0;
   const TwistBasis sure = along.cols() > 0 ? along : TwistBasis(eigen.vectors.rightCols(6 - num_weak));
   Matrix6 damped = equations.hessian;
-  damped.diagonal().array() += registration_limits::step_damping * sums.weight;
+  damped.diagonal().array() += base_limits::damping * sums.weight;
   const Vector6 solution =
       sure * solve_symmetric(sure.transpose() * damped * sure, sure.transpose() * equations.gradient);
   step.reduction = solution.dot(equations.hessian * solution);

@@ -124,7 +124,7 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
   for (std::size_t i = 0; i < views.size(); ++i) see_the_same[i * views.size() + i] = 0;
   std::vector<std::vector<std::uint32_t>> nearest(see_the_same.size());
   double gate = registration_limits::first_view_gate;
-  for (int iteration = 0; iteration < registration_limits::most_view_steps; ++iteration) {
+  for (int iteration = 0; iteration < registration_limits::most_steps; ++iteration) {
     std::vector<Overlap> overlaps(see_the_same.size());
     parallel_for(count * count, 1, num_threads, [&](std::int64_t index) {
       const auto k = static_cast<std::size_t>(index), i = k / views.size(), j = k % views.size();
@@ -144,7 +144,7 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
       pose = orthonormal(motions.apply(solution.segment(freedom * (k - 1), freedom)) * pose);
     }
     if (gate == registration_limits::last_view_gate && solution.norm() < registration_limits::still) break;
-    gate = std::max(registration_limits::last_view_gate, registration_limits::view_decay * gate);
+    gate = std::max(registration_limits::last_view_gate, registration_limits::gate_decay * gate);
   }
   return poses;
 }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/limits.hpp"
 #include "base/linear_algebra.hpp"
 #include "registration/limits.hpp"
 
@@ -30,12 +31,11 @@ struct Row {
 
 std::vector<Row> sum_neighbours(const std::vector<Pair>& pairs, Metric metric, const Eigen::Vector3d& center,
                                 double extent) {
-  std::vector<Row> rows((pairs.size() + registration_limits::scale_cell_pairs - 1) /
-                        registration_limits::scale_cell_pairs);
+  std::vector<Row> rows((pairs.size() + registration_limits::cell_pairs - 1) / registration_limits::cell_pairs);
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     const Pair& pair = pairs[i];
     const Eigen::Vector3d p = (pair.p - center) / extent, difference = pair.q - pair.p;
-    Row& row = rows[i / registration_limits::scale_cell_pairs];
+    Row& row = rows[i / registration_limits::cell_pairs];
     if (metric == Metric::point_to_point) {
       for (int axis = 0; axis < 3; ++axis) row.add(pair.weight, p, difference, Eigen::Vector3d::Unit(axis));
     } else {
@@ -62,7 +62,7 @@ SizeDifference size_difference(const std::vector<Pair>& pairs, Metric metric) {
 
   const std::vector<Row> rows = sum_neighbours(pairs, metric, center, extent);
   if (rows.size() < registration_limits::least_scale_rows) return {};
-  Matrix6 hessian = Matrix6::Identity() * registration_limits::scale_damping * weight;
+  Matrix6 hessian = Matrix6::Identity() * base_limits::damping * weight;
   Vector6 mixed = Vector6::Zero(), gradient = Vector6::Zero();
   for (const Row& row : rows) {
     hessian.noalias() += row.pose * row.pose.transpose() / row.weight;
@@ -73,7 +73,7 @@ SizeDifference size_difference(const std::vector<Pair>& pairs, Metric metric) {
 
   // What the motion cannot do: the rest of the column, on which the rest of the right side is regressed.
   const auto rest = [&](const Row& row) { return row.size - row.pose.dot(by_pose); };
-  double information = registration_limits::scale_damping * weight, slope = 0.0, noise = 0.0;
+  double information = base_limits::damping * weight, slope = 0.0, noise = 0.0;
   for (const Row& row : rows) {
     information += rest(row) * rest(row) / row.weight;
     slope += rest(row) * (row.right_side - row.pose.dot(motion)) / row.weight;

@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/limits.hpp"
 #include "base/statistics.hpp"
+#include "camera/limits.hpp"
 #include "camera/point_spacing.hpp"
 #include "camera/view_distance.hpp"
 #include "registration/color.hpp"
@@ -70,8 +72,8 @@ IcpSource FrameRegistration::gated(const PointsInView& view, const IcpTarget& ta
     source.noise[i] = sigma;
     const double apart = spacing_at(points(i, 2), sigma, now_.camera, target_.spacing);
     const double along = tracking_limits::reach_spacings * view.thinning * apart;
-    const double across = std::max(tracking_limits::residual_spacings * apart,
-                                   tracking_limits::residual_sigmas * static_cast<double>(sigma));
+    const double across =
+        std::max(camera_limits::surface_spacings * apart, base_limits::noise_sigmas * static_cast<double>(sigma));
     source.reach[i] = static_cast<float>(set > 0.0 ? set : std::min(along, largest));
     source.largest_residual[i] = static_cast<float>(set > 0.0 ? set : std::min(across, largest));
   }

@@ -14,8 +14,6 @@ constexpr double far_from_guess = 1.75;  // [view_distance] tuned: where a regis
 constexpr std::size_t most_target_points = 30000;  // [points] budget: that a frame is registered to; benchmarks
 constexpr double largest_reach = 0.03;  // [size] tuned: of matches, in diameters of the smaller surface; bunny12
 constexpr double reach_spacings = 1.5;  // [spacing] tuned: of matches along the surface; scans
-constexpr double residual_spacings = 2.75;  // [spacing] tuned: of matches across the surface; teddy
-constexpr double residual_sigmas = 4.0;  // [sigma] derived: likewise, where noise is larger; teddy
 constexpr double narrow_gate = 4.0;  // [reach] tuned: of matches at first, from a guess that is about right; teddy
 constexpr double margin_spacings = 3.0;  // [spacing] tuned: by which a point seen through is before the surface; teddy
 constexpr std::int64_t least_judged = 20;  // [points] derived: that tell a part of all; test_tracking
@@ -32,22 +30,18 @@ constexpr double largest_gap = 0.2;  // [view_distance] tuned: between a place a
 constexpr double least_followed = 0.5;  // [1] tuned: overlap of a lost frame with the one before; test_relocalisation_filter
 constexpr Eigen::Index least_object_samples = 100;  // [points] tuned: of an object on a plane; test_region
 constexpr Eigen::Index most_object_samples = 2000;  // [points] budget: likewise; dog
-constexpr double largest_tolerance = 0.03;  // [size] tuned: to which two views of an object agree; dog
 constexpr double body_depth = 0.9;  // [radius] tuned: from what is seen of an object to its middle; dog
-constexpr float least_cosine_to_camera = 0.3F;  // [cosine] tuned: at which a surface should be seen; dog
 constexpr int num_turns = 72;  // [1] budget: from which the search on the plane starts; dog
 constexpr std::size_t num_turn_candidates = 10;  // [motions] budget: of them, that are refined; dog
 constexpr Eigen::Index coarse_turn_samples = 300;  // [points] budget: of the search's start; dog
 constexpr Eigen::Index climb_samples = 800;  // [points] budget: of its refinement; dog
 constexpr double same_turn = 0.15;  // [rad] tuned: closer motions on the plane are the same; dog
 constexpr double same_shift = 0.08;  // [size] tuned: likewise; dog
-constexpr double first_turn_gate = 0.25;  // [size] tuned: of the search's start; dog
 constexpr double least_view_overlap = 0.1;  // [1] tuned: with the view that agrees most; dog
 constexpr double least_view_consistency = 0.75;  // [1] tuned: with all views; dog
 
 constexpr double noise_per_residual = 1.376;  // [1] derived: standard deviation by median absolute value, of Laplace's distribution; test_residual_noise
 constexpr double largest_noise_factor = 16.0;  // [1] budget: of the noise that is tried until it is known; d435-t265-shelf
-constexpr double most_noise_frames = 100.0;  // [frames] tuned: a frame counts at least so much: drift is followed; test_residual_noise
 constexpr double enough_noise_frames = 5.0;  // [frames] tuned: that tell how noisy registered frames are; pairs
 
 }  // namespace nacre::tracking_limits

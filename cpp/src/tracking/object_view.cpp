@@ -6,6 +6,7 @@
 
 #include "base/random.hpp"
 #include "base/statistics.hpp"
+#include "camera/limits.hpp"
 #include "depth/depth_view.hpp"
 #include "region/limits.hpp"
 #include "region/support_planes.hpp"
@@ -36,7 +37,7 @@ std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& regio
   }
   view.size = static_cast<double>((view.points.colwise().maxCoeff() - view.points.colwise().minCoeff()).norm());
   view.tolerance =
-      std::min(static_cast<double>(median_of(std::move(errors))), tracking_limits::largest_tolerance * view.size);
+      std::min(static_cast<double>(median_of(std::move(errors))), tracking_limits::largest_reach * view.size);
   view.depth = frame.points.col(2);
   view.region = region;
   view.support = support;
@@ -71,12 +72,11 @@ ViewAgreement look_at(const ObjectView& moved, const ObjectView& seen, const Pos
   visit_points_in_view(
       moved.points, moved.normals, 0, count, projection, [&](const PointProjection::Block& block, int i) {
         const float behind = seen.depth[block.pixel[i]] - block.z[i];
-        const float margin = 2.0F * tolerance / std::max(block.facing[i], tracking_limits::least_cosine_to_camera);
+        const float margin = 2.0F * tolerance / std::max(block.facing[i], camera_limits::least_facing);
         const Visibility is = visibility(behind, margin);
         if (is == Visibility::unknown) return;
         if (is == Visibility::seen_through) through += 1.0F;
-        if (!(block.facing[i] > tracking_limits::least_cosine_to_camera) || seen.region.data()[block.pixel[i]] == 0)
-          return;
+        if (!(block.facing[i] > camera_limits::least_facing) || seen.region.data()[block.pixel[i]] == 0) return;
         if (is == Visibility::occluded) hidden += 1.0F;
         const float ratio = behind * block.facing[i] / tolerance;
         agree += std::max(0.0F, 1.0F - ratio * ratio);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "depth/limits.hpp"
 #include "tracking/limits.hpp"
 
 namespace nacre {
@@ -11,7 +12,7 @@ using namespace tracking_limits;
 
 void ResidualNoise::add(double residual_sigmas) {
   if (!(residual_sigmas > 0.0)) return;
-  count_ = std::min(count_ + 1.0, most_noise_frames);
+  count_ = std::min(count_ + 1.0, depth_limits::most_frames);
   log_scale_ += (std::log(residual_sigmas) - log_scale_) / count_;
 }
 

@@ -7,6 +7,7 @@
 #include "base/se3.hpp"
 #include "registration/acceptance.hpp"
 #include "registration/icp.hpp"
+#include "registration/limits.hpp"
 #include "tracking/limits.hpp"
 #include "tracking/points_in_view.hpp"
 
@@ -51,7 +52,7 @@ class TurntableSearch {
                             Eigen::Vector3d::UnitZ())
               .toRotationMatrix();
       candidates[static_cast<std::size_t>(i)] = align(few_, plane_ * turn * ground_frame_.inverse(),
-                                                      gates(tracking_limits::first_turn_gate * frame_.size, 3.0, 14));
+                                                      gates(registration_limits::first_gate * frame_.size, 3.0, 14));
     });
     candidates = different(std::move(candidates), tracking_limits::num_turn_candidates);
     parallel_for(static_cast<std::int64_t>(candidates.size()), 1, num_threads_, [&](std::int64_t i) {

@@ -1,0 +1,218 @@
+"""
+Recordings that are run in one process, in seconds: what `numbers.py` and developers look at after a change.
+
+Each case is a list of depth images with the true poses, where they are known. The table of `tracking.py` has the
+same recordings whole, through the command line, beside peers.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import nacre
+
+Array = npt.NDArray[Any]
+DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
+
+SMALL = {"homer": ("homer.obj", 0.2), "spot": ("spot.obj", 0.1), "fandisk": ("libigl_fandisk.off", 0.03)}
+# Recordings, the step between their frames, and how many.
+REAL = {
+    "teddy": ("tum-fr3-teddy", 1, 200),
+    "rpy": ("tum-fr1-rpy", 1, 100),
+    "d435": ("d435-t265-shelf", 1, 300),
+    "robot": ("realsense-robot-objects", 1, 48),
+    "sr300": ("sr300-shelf", 1, 50),
+    "apc": ("apc-shelf-f200", 1, 15),
+    "iphone": ("iphone-lidar-office-a", 1, 300),
+    "boxcan": ("truedepth-boxcan", 1, 40),
+    "cabinet": ("tum-fr3-cabinet-kf", 1, 58),
+    "icl": ("icl-livingroom-loop-fast", 1, 300),
+    "door": ("record3d-door", 1, 300),
+    "scans": ("stanford-bunny/data", 1, 10),
+    "teddy-5": ("tum-fr3-teddy", 5, 40),
+    "rpy-5": ("tum-fr1-rpy", 5, 20),
+    "d435-5": ("d435-t265-shelf", 5, 60),
+    "icl-2": ("icl-livingroom-loop-fast", 2, 150),
+}
+
+
+@dataclass
+class Case:
+    """Depth images [m] of one camera, in turn."""
+
+    name: str
+    camera: nacre.Camera
+    depths: list[Array]
+    colors: list[Array | None]
+    truths: list[Array | None]  # world_from_camera
+    mesh: nacre.Mesh | None = None  # in the frame of the truths
+    options: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Figures:
+    """
+    What became of a case.
+
+    A frame is right within 2 % of the median depth and 3 degrees of the truth, after the rigid motion that makes most
+    frames right.
+    """
+
+    frames: int
+    claimed: int  # tracked or relocalised
+    right: int
+    weak: int
+    ate: float  # [mm] of the claimed, root mean square
+    angle: float  # [degrees] greatest of the claimed
+    rms: float  # [mm] of the model's points from the mesh
+    points: int
+    milliseconds: float  # of a frame, median
+
+    def __str__(self) -> str:
+        """One line."""
+        return (
+            f"{self.claimed:4d} of {self.frames:3d} right {self.right:3d} weak {self.weak:2d}  ATE {self.ate:8.2f} mm"
+            f"  {self.angle:7.3f} deg  RMS {self.rms:6.3f} mm  {self.points:7d} points  {self.milliseconds:6.1f} ms"
+        )
+
+
+def turntable(name: str, mesh: nacre.Mesh, views: int, *, kinect: bool, seed: int) -> Case:
+    """Return an object on a turntable, with mixed pixels at its edges."""
+    camera = nacre.Camera(320, 240, 262.5, 262.5, 159.5, 119.5) if kinect else nacre.default_camera(mesh)
+    place: dict[str, Any] = {"distance": 0.5} if kinect else {}
+    poses = nacre.turntable_poses(mesh, views, 2 * math.pi / views, camera=camera, **place)
+    noise: Any = "kinect" if kinect else 0.0005
+    depths = [
+        mesh.simulate_depth(camera, pose, noise=noise, edge_mixing=1.0, seed=1000 * seed + i)
+        for i, pose in enumerate(poses)
+    ]
+    return Case(name, camera, depths, [None] * views, list(poses), mesh)
+
+
+def object_mesh(name: str) -> nacre.Mesh:
+    """Return one of the meshes, at the size of an object."""
+    if name == "object":
+        return nacre.built_in_object()
+    if name == "bunny":
+        return nacre.read_mesh(DATA / "stanford-bunny" / "reconstruction" / "bun_zipper.ply")
+    file, scale = SMALL[name]
+    mesh = nacre.read_mesh(DATA / "meshes" / file)
+    return nacre.Mesh(scale * mesh.vertices, mesh.triangles)
+
+
+def recorded(name: str, *, every: int = 1, most: int | None = None) -> Case:
+    """Return a real recording, or every so many of its frames."""
+    folder, step, count = REAL[name]
+    sequence = nacre.open_sequence(DATA / folder)
+    indices = range(0, len(sequence), step)[:count][::every][:most]
+    frames = [sequence[i] for i in indices]
+    return Case(
+        name,
+        sequence.camera,
+        [frame.depth for frame in frames],
+        [frame.color for frame in frames],
+        [frame.truth for frame in frames],
+    )
+
+
+def make(name: str, seed: int = 0, *, most: int | None = None) -> Case:
+    """Return a case by name: one of REAL, or bunny12, spot-kinect36 and the like."""
+    if name in REAL:
+        return recorded(name, most=most)
+    shape, _, rest = name.partition("-")
+    kinect = rest.startswith("kinect")
+    shape = shape.rstrip("0123456789")
+    views = int((rest if kinect else name).lstrip("abcdefghijklmnopqrstuvwxyz"))
+    return turntable(name, object_mesh(shape), views, kinect=kinect, seed=seed)
+
+
+def angle_between(a: Array, b: Array) -> float:
+    """Return the angle of the rotation between two [degrees]."""
+    return math.degrees(math.acos(min(1.0, max(-1.0, (np.trace(a.T @ b) - 1) / 2))))
+
+
+def best_fit(poses: Array, truths: Array, shift: float, turn: float) -> tuple[Array, Array, Array]:
+    """Return the motion that makes most poses right; with it, their shifts and turns [degrees]."""
+    best: tuple[int, float, Array] = (-1, math.inf, np.eye(4))
+
+    def errors(motion: Array) -> tuple[Array, Array]:
+        moved = motion @ poses
+        shifts = np.linalg.norm(moved[:, :3, 3] - truths[:, :3, 3], axis=1)
+        cosines = (np.einsum("nij,nij->n", moved[:, :3, :3], truths[:, :3, :3]) - 1) / 2
+        return shifts, np.degrees(np.arccos(np.clip(cosines, -1, 1)))
+
+    def consider(motion: Array) -> Array:
+        nonlocal best
+        shifts, turns = errors(motion)
+        right = (shifts < shift) & (turns < turn)
+        rank = (int(right.sum()), -float(np.mean(np.minimum(shifts / shift, 1) + np.minimum(turns / turn, 1))))
+        if rank > (best[0], -best[1]):
+            best = (rank[0], -rank[1], motion)
+        return right
+
+    for k in range(0, len(poses), max(1, len(poses) // 60)):
+        right = consider(truths[k] @ np.linalg.inv(poses[k]))
+        for _ in range(3):
+            if right.sum() < 3:
+                break
+            p, q = poses[right], truths[right]
+            u, _, vt = np.linalg.svd(np.einsum("nij,nkj->ik", q[:, :3, :3], p[:, :3, :3]))
+            motion = np.eye(4)
+            motion[:3, :3] = u @ np.diag([1, 1, np.linalg.det(u @ vt)]) @ vt
+            motion[:3, 3] = np.mean(q[:, :3, 3] - p[:, :3, 3] @ motion[:3, :3].T, axis=0)
+            right = consider(motion)
+    return best[2], *errors(best[2])
+
+
+def run(case: Case, *, num_threads: int = 1, preset: str = "default", **options: Any) -> tuple[Figures, nacre.Model]:
+    """Run a case; options as those of `nacre.Model`."""
+    model = nacre.Model(case.camera, preset, num_threads=num_threads, **{**case.options, **options})
+    for depth, color in zip(case.depths, case.colors, strict=True):
+        model.add_frame(depth, color=color)
+    return measure(case, model), model
+
+
+def measure(case: Case, model: nacre.Model) -> Figures:
+    """Return the figures of a case that has been run."""
+    status = [report.status for report in model.frames]
+    claimed = [i for i, s in enumerate(status) if s in ("TRACKED", "RELOCALISED")]
+    known = [i for i in claimed if case.truths[i] is not None]
+    right, ate, angle, rms = 0, math.nan, math.nan, math.nan
+    if known:
+        poses = np.array([model.frames[i].world_from_camera for i in known])
+        truths = np.array([case.truths[i] for i in known])
+        depth = float(np.median([np.nanmedian(image) for image in case.depths[:: max(1, len(case.depths) // 20)]]))
+        motion, shifts, turns = best_fit(poses, truths, 0.02 * depth, 3.0)
+        right = int(np.sum((shifts < 0.02 * depth) & (turns < 3.0)))
+        ate, angle = 1e3 * float(np.sqrt(np.mean(shifts**2))), float(turns.max())
+        if case.mesh is not None:
+            points = np.asarray(model.points, float) @ motion[:3, :3].T + motion[:3, 3]
+            rms = 1e3 * float(np.sqrt(np.mean(case.mesh.distance(points) ** 2)))
+    times = float(np.median([report.milliseconds["total"] for report in model.frames]))
+    return Figures(
+        len(status), len(claimed), right, status.count("WEAK"), ate, angle, rms, len(model.points), times
+    )
+
+
+def main() -> None:
+    """Run the cases that are named, with settings: cases.py d435 robot spacing=0.01."""
+    import sys
+
+    settings = dict(word.split("=") for word in sys.argv[1:] if "=" in word)
+    names = [word for word in sys.argv[1:] if "=" not in word]
+    options = {key: json.loads(value) for key, value in settings.items()}
+    most = options.pop("most", None)
+    for name in names:
+        figures, _ = run(make(name, options.pop("seed", 0), most=most), **options)
+        print(f"{name:16}{figures}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,12 @@
+// Numbers that decide in many places.
+// Each line: [unit] kind: meaning; what guards it. Kinds: derived, budget, tuned; docs/numbers.md shows them all.
+#pragma once
+
+// clang-format off
+namespace nacre::base_limits {
+
+constexpr float noise_sigmas = 4.0F;  // [sigma] derived: what noise does not reach, but for 1 of 16 000; test_frame, test_fusion
+constexpr double damping = 1e-9;  // [1] derived: of the mean information, so that there always is a solution; test_icp
+
+}  // namespace nacre::base_limits
+// clang-format on
