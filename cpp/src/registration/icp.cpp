@@ -27,7 +27,8 @@ class Schedule {
   Schedule(const IcpTarget& target, const IcpSource& source, const AlignOptions& options)
       : options_(options), source_(source) {
     first_ = options.max_distance > 0.0 ? options.max_distance : registration_limits::first_gate * target.diameter();
-    smallest_ = options.final_distance > 0.0 ? options.final_distance : 2.5 * target.spacing();
+    smallest_ = options.final_distance > 0.0 ? options.final_distance
+                                             : registration_limits::last_gate_spacings * target.spacing();
     set_level(0);
     update_gate(0.0);
   }
@@ -44,7 +45,7 @@ class Schedule {
     if (shrinking) return true;
     const bool is_last = level_ + 1 == source_.levels.size();
     if (at_rest && is_last) return false;
-    if (!is_last && (at_rest || iterations_at_level_ >= 8)) set_level(level_ + 1);
+    if (!is_last && (at_rest || iterations_at_level_ >= registration_limits::most_level_steps)) set_level(level_ + 1);
     return true;
   }
 
@@ -59,16 +60,18 @@ class Schedule {
   }
 
   void update_gate(double residual_scale) {
-    const double smallest = std::min(
-        first_, options_.final_distance > 0.0 ? options_.final_distance : std::max(smallest_, 4.0 * residual_scale));
+    const double smallest =
+        std::min(first_, options_.final_distance > 0.0
+                             ? options_.final_distance
+                             : std::max(smallest_, registration_limits::last_gate_sigmas * residual_scale));
     const double decayed = first_ * std::pow(options_.gate_decay, iteration_);
     gate_.distance = std::max(smallest, decayed);
     at_smallest_ = options_.gate_decay >= 1.0 || decayed <= smallest;
     gate_.is_smallest = at_smallest_;
-    // Normals of a source that is still far off may differ by a third more.
-    const double widening = options_.gate_decay < 1.0 ? gate_.distance / first_ / 3.0 : 0.0;
+    const double widening =
+        options_.gate_decay < 1.0 ? gate_.distance / first_ / registration_limits::angle_narrowing : 0.0;
     const double angle = options_.max_angle * (1.0 + widening);
-    gate_.cos_angle = angle < 3.14159 ? std::cos(angle) : -2.0;  // every angle passes, rounding or not
+    gate_.cos_angle = angle < registration_limits::any_angle ? std::cos(angle) : -2.0;
   }
 
   const AlignOptions& options_;
@@ -133,7 +136,8 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
 
   Schedule schedule(target, source, options);
   std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
-  const double resolution = std::max(1e-3 * target.spacing(), 1e-9);
+  const double resolution =
+      std::max(registration_limits::still_spacings * target.spacing(), registration_limits::least_resolution);
   Pose pose = initial, best_pose = initial;
   double best_rmse = std::numeric_limits<double>::infinity();
   bool at_rest = false;
@@ -150,8 +154,9 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
     }
     pose = step.motion * pose;
     result.iterations = iteration + 1;
-    // At rest where the step is a fifth of what the residuals' noise leaves uncertain in each of six unknowns.
-    const bool is_small = step.size < resolution || step.reduction < 6.0 * 0.04 * scale * scale;
+    // Of six unknowns.
+    const bool is_small =
+        step.size < resolution || step.reduction < 6.0 * registration_limits::still_uncertainty * scale * scale;
     at_rest = !schedule.advance(is_small, scale);
   }
 

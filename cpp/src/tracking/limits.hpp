@@ -37,6 +37,15 @@ constexpr Eigen::Index coarse_turn_samples = 300;  // [points] budget: of the se
 constexpr Eigen::Index climb_samples = 800;  // [points] budget: of its refinement; dog
 constexpr double same_turn = 0.15;  // [rad] tuned: closer motions on the plane are the same; dog
 constexpr double same_shift = 0.08;  // [size] tuned: likewise; dog
+constexpr double coarse_turn_gate = 3.0;  // [tolerance] tuned: at its end; dog
+constexpr int most_coarse_turn_steps = 14;  // [steps] budget: of each turn; dog
+constexpr double refined_turn_gate = 4.0;  // [tolerance] tuned: of the candidates that are refined; dog
+constexpr double last_refined_turn_gate = 2.0;  // [tolerance] tuned: at their end, and where the best one settles; dog
+constexpr double settled_turn_gate = 1.0;  // [tolerance] derived: where it has settled; dog
+constexpr int most_turn_steps = 30;  // [steps] budget: of both; dog
+constexpr double least_climb_step = 0.1;  // [tolerance] budget: of the search by outlines, halved until then; dog
+constexpr int most_climb_rounds = 8;  // [rounds] budget: with steps of one length; dog
+constexpr double climb_lever = 3.0;  // [1/size] derived: turns by what shifts a point at a third of the size as far; dog
 constexpr double least_view_overlap = 0.1;  // [1] tuned: with the view that agrees most; dog
 constexpr double least_view_consistency = 0.75;  // [1] tuned: with all views; dog
 

@@ -51,13 +51,17 @@ class TurntableSearch {
           Eigen::AngleAxisd(static_cast<double>(i) * 2.0 * static_cast<double>(EIGEN_PI) / tracking_limits::num_turns,
                             Eigen::Vector3d::UnitZ())
               .toRotationMatrix();
-      candidates[static_cast<std::size_t>(i)] = align(few_, plane_ * turn * ground_frame_.inverse(),
-                                                      gates(registration_limits::first_gate * frame_.size, 3.0, 14));
+      candidates[static_cast<std::size_t>(i)] =
+          align(few_, plane_ * turn * ground_frame_.inverse(),
+                gates(registration_limits::first_gate * frame_.size, tracking_limits::coarse_turn_gate,
+                      tracking_limits::most_coarse_turn_steps));
     });
     candidates = different(std::move(candidates), tracking_limits::num_turn_candidates);
     parallel_for(static_cast<std::int64_t>(candidates.size()), 1, num_threads_, [&](std::int64_t i) {
       Candidate& candidate = candidates[static_cast<std::size_t>(i)];
-      candidate = climb(align(source_, candidate.alignment.target_from_source, gates(4.0 * frame_.tolerance, 2.0, 30)));
+      candidate = climb(align(source_, candidate.alignment.target_from_source,
+                              gates(tracking_limits::refined_turn_gate * frame_.tolerance,
+                                    tracking_limits::last_refined_turn_gate, tracking_limits::most_turn_steps)));
     });
     const std::size_t num_refined = candidates.size();
     return different(std::move(candidates), num_refined);
@@ -67,7 +71,8 @@ class TurntableSearch {
   IcpResult settle(const Candidate& candidate) const {
     const IcpResult settled =
         align_along(motions_on_plane(normal_), target_, source_, candidate.alignment.target_from_source,
-                    gates(2.0 * frame_.tolerance, 1.0, 30));
+                    gates(tracking_limits::last_refined_turn_gate * frame_.tolerance,
+                          tracking_limits::settled_turn_gate, tracking_limits::most_turn_steps));
     return settled.status != AlignStatus::too_few_pairs ? settled : candidate.alignment;
   }
 
@@ -116,9 +121,9 @@ class TurntableSearch {
     if (best.alignment.status == AlignStatus::too_few_pairs) return best;
     score(best, tracking_limits::climb_samples);
     const Eigen::Vector3d axes[] = {normal_, plane_.linear().col(0), plane_.linear().col(1)};
-    for (double step = frame_.tolerance; step > 0.1 * frame_.tolerance; step *= 0.5) {
+    for (double step = frame_.tolerance; step > tracking_limits::least_climb_step * frame_.tolerance; step *= 0.5) {
       bool is_better = true;
-      for (int round = 0; round < 8 && is_better; ++round) {
+      for (int round = 0; round < tracking_limits::most_climb_rounds && is_better; ++round) {
         is_better = false;
         for (int direction = 0; direction < 6; ++direction) {
           const Eigen::Vector3d& axis = axes[direction / 2];
@@ -127,7 +132,8 @@ class TurntableSearch {
           Pose& pose = next.alignment.target_from_source;
           if (direction < 2) {
             const Eigen::Vector3d center = pose * frame_.center();
-            pose = Eigen::Translation3d(center) * Eigen::AngleAxisd(3.0 * length / frame_.size, axis) *
+            pose = Eigen::Translation3d(center) *
+                   Eigen::AngleAxisd(tracking_limits::climb_lever * length / frame_.size, axis) *
                    Eigen::Translation3d(-center) * pose;
           } else {
             pose.pretranslate(length * axis);
