@@ -11,6 +11,7 @@
 
 #include "base/check.hpp"
 #include "base/parallel.hpp"
+#include "consolidation/limits.hpp"
 #include "consolidation/point_blocks.hpp"
 #include "nacre/consolidation.hpp"
 #include "spatial/subset.hpp"
@@ -44,18 +45,18 @@ Form form_of(const ConsolidateOptions& options) {
   const double reach = h * form.scale;
   simd::PairKernel theta{};
   theta.decay = 0;
-  theta.reach2 = static_cast<float>(std::min(reach * reach, 126.0));
+  theta.reach2 = static_cast<float>(std::min(reach * reach, consolidation_limits::most_reach2));
   theta.skip2 = -1.0F;
   form.density = form.first_attraction = form.attraction = form.repulsion = theta;
   form.attraction.decay = form.repulsion.decay = 1;
-  // 1 / r has no value at 0: points at a sample's place draw it as if they were a millionth of h away.
-  form.attraction.softening2 = static_cast<float>(1e-12 * reach * reach);
-  form.repulsion.skip2 = static_cast<float>(1e-10 * reach * reach);
+  form.attraction.softening2 = static_cast<float>(consolidation_limits::same_place2 * reach * reach);
+  form.repulsion.skip2 = static_cast<float>(consolidation_limits::least_repelling2 * reach * reach);
   if (options.method == ConsolidationMethod::wlop_plus) {
-    form.attraction.softening2 = form.repulsion.softening2 = static_cast<float>(4e-4 * reach * reach);
+    form.attraction.softening2 = form.repulsion.softening2 =
+        static_cast<float>(consolidation_limits::softening2 * reach * reach);
     form.tangential = true;
-    form.least_repulsion = static_cast<float>(0.1 / reach);
-    form.longest_step = static_cast<float>(0.25 * reach);
+    form.least_repulsion = static_cast<float>(consolidation_limits::least_repulsion / reach);
+    form.longest_step = static_cast<float>(consolidation_limits::longest_step * reach);
   } else if (options.method == ConsolidationMethod::cgal) {
     // As CGAL 5.5 behaves: a point does not attract a sample at its place, a sample counts itself twice, and one
     // neighbour alone does not repel.
@@ -159,8 +160,8 @@ class Projection {
       const auto mark = [](void* is_near, std::int32_t near_block) {
         static_cast<std::atomic<bool>*>(is_near)[near_block].store(true, std::memory_order_relaxed);
       };
-      simd::visit_blocks()(1.00001F * form_.density.reach2, samples_.block(block), points_.view(nullptr).tree, mark,
-                           is_near_.get());
+      simd::visit_blocks()(consolidation_limits::box_rounding * form_.density.reach2, samples_.block(block),
+                           points_.view(nullptr).tree, mark, is_near_.get());
     });
     std::vector<std::int64_t> fresh;
     for (std::int64_t block = 0; block < points_.num_blocks(); ++block) {
@@ -253,7 +254,7 @@ class Projection {
     const auto list = [](void* blocks, std::int32_t near_block) {
       static_cast<std::vector<std::int32_t>*>(blocks)->push_back(near_block);
     };
-    simd::visit_blocks()(1.00001F * attraction.reach2, targets, points.tree, list, &near);
+    simd::visit_blocks()(consolidation_limits::box_rounding * attraction.reach2, targets, points.tree, list, &near);
     std::vector<float> weights(near.size() * as_size(size));
     for (int k = 0; k < targets.count; ++k) {
       if (is_frozen(samples_.begin(block) + k)) continue;
@@ -296,15 +297,15 @@ Matrix project(const Cloud& samples, const Cloud& points, const ConsolidateOptio
                const ProjectionHints& hints, const Cargo* cargo, int* iterations) {
   const Form form = form_of(options);
   const Rows<typename Cloud::Scalar> point_rows(points), sample_rows(samples);
-  const double longest = 8.0 * options.radius;
+  const double longest = consolidation_limits::longest_block * options.radius;
   BlockRows of_points = block_rows(point_rows, longest, false, options.num_threads);
   Scaling scaling{Eigen::Vector3d::Zero(), form.scale};
   if (!of_points.rows.empty()) scaling.center = point_rows.position(of_points.rows[of_points.rows.size() / 2]);
   const PointBlocks point_blocks(point_rows, std::move(of_points), scaling, options.num_threads);
   PointBlocks blocks(sample_rows, block_rows(sample_rows, longest, true, options.num_threads), scaling,
                      options.num_threads);
-  constexpr double farthest = 1e36;  // in the kernels' unit: what single precision can hold, with room to spare
-  const int digits = static_cast<int>(std::floor(std::log10(farthest / (options.radius * form.scale))));
+  const int digits =
+      static_cast<int>(std::floor(std::log10(consolidation_limits::most_distant / (options.radius * form.scale))));
   const double radii = std::max(point_blocks.reach(), blocks.reach()) / (options.radius * form.scale);
   require(radii < std::pow(10.0, digits), "points", "within 1e" + std::to_string(digits) + " radii of their middle",
           radii);

@@ -8,6 +8,7 @@
 
 #include "base/check.hpp"
 #include "base/parallel.hpp"
+#include "simulation/limits.hpp"
 
 namespace nacre {
 
@@ -17,12 +18,6 @@ using Eigen::Array4f;
 using Eigen::Vector3f;
 using std::int64_t;
 
-constexpr int max_radius = 40;          // [pixels]
-constexpr float min_radius = 0.75f;     // [pixels]: disks of neighbouring pixels meet
-constexpr float reverse_radius = 0.7f;  // of a front's: reverse sides must not stick out at rims
-constexpr float least_tilt = 0.2f;      // disks seen more from the side are drawn as if this steep
-constexpr float outline_step = 6.0f;    // [pixels]: larger steps in depth are outlines
-constexpr double max_depth = 1e30;      // [pixels]: farther points are left out
 constexpr int rows_per_block = 16;
 constexpr int points_per_block = 4096;
 
@@ -54,12 +49,13 @@ Disk project(const PictureView& view, const Eigen::Vector3d& point, const Vector
   const double scale = view.metres_per_pixel * ratio;
   const double depth =
       parallel ? local.z() / scale : view.distance / view.metres_per_pixel * std::log(std::max(ratio, 1e-3));
-  const double column = std::floor(local.x() / scale + view.width / 2.0) + max_radius;
-  const double row = std::floor(local.y() / scale + view.height / 2.0) + max_radius;
+  const double column = std::floor(local.x() / scale + view.width / 2.0) + simulation_limits::max_radius;
+  const double row = std::floor(local.y() / scale + view.height / 2.0) + simulation_limits::max_radius;
 
   Disk disk;
-  const bool inside = ratio > 1e-3 && column >= 0 && column < view.width + 2 * max_radius && row >= 0 &&
-                      row < view.height + 2 * max_radius && std::abs(depth) < max_depth;
+  const bool inside = ratio > 1e-3 && column >= 0 && column < view.width + 2 * simulation_limits::max_radius &&
+                      row >= 0 && row < view.height + 2 * simulation_limits::max_radius &&
+                      std::abs(depth) < simulation_limits::max_depth;
   if (!inside) return disk;
   disk.row = static_cast<std::int32_t>(row);
   disk.column = static_cast<std::int32_t>(column);
@@ -70,8 +66,10 @@ Disk project(const PictureView& view, const Eigen::Vector3d& point, const Vector
   const double length = facing.norm();
   disk.normal =
       length > 0.0 && std::isfinite(length) ? Vector3f((facing / length).cast<float>()) : Vector3f(0.0f, 0.0f, -1.0f);
-  const float wanted = (disk.is_reverse() ? reverse_radius : 1.0f) * static_cast<float>(radius / scale);
-  disk.radius = std::min(std::max(min_radius, wanted), static_cast<float>(max_radius));
+  const float wanted =
+      (disk.is_reverse() ? simulation_limits::reverse_radius : 1.0f) * static_cast<float>(radius / scale);
+  disk.radius =
+      std::min(std::max(simulation_limits::min_radius, wanted), static_cast<float>(simulation_limits::max_radius));
   return disk;
 }
 
@@ -93,7 +91,8 @@ struct DiskRows {
 };
 
 DiskRows nearest_per_pixel(const std::vector<Disk>& all, const ColorsRef& colors, const PictureView& view) {
-  const int64_t width = view.width + 2 * max_radius, height = view.height + 2 * max_radius;
+  const int64_t width = view.width + 2 * simulation_limits::max_radius,
+                height = view.height + 2 * simulation_limits::max_radius;
   std::vector<std::int32_t> nearest(static_cast<std::size_t>(width * height), -1);
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (all[i].row < 0) continue;
@@ -157,7 +156,7 @@ class Canvas {
   template <class Body>
   static void for_disks(const DiskRows& rows, int64_t begin, int64_t end, Body&& body) {
     const std::size_t first = rows.row_begin[static_cast<std::size_t>(begin)];
-    const std::size_t last = rows.row_begin[static_cast<std::size_t>(end + 2 * max_radius)];
+    const std::size_t last = rows.row_begin[static_cast<std::size_t>(end + 2 * simulation_limits::max_radius)];
     for (std::size_t i = first; i < last; ++i) body(rows.disks[i]);
   }
 
@@ -165,9 +164,9 @@ class Canvas {
   template <class Body>
   void for_pixels(const Disk& disk, int64_t begin, int64_t end, Body&& body) {
     const auto reach = static_cast<int64_t>(disk.radius);
-    const int64_t row = disk.row - max_radius, column = disk.column - max_radius;
-    const float tilt =
-        disk.is_reverse() ? std::max(disk.normal.z(), least_tilt) : std::min(disk.normal.z(), -least_tilt);
+    const int64_t row = disk.row - simulation_limits::max_radius, column = disk.column - simulation_limits::max_radius;
+    const float tilt = disk.is_reverse() ? std::max(disk.normal.z(), simulation_limits::least_tilt)
+                                         : std::min(disk.normal.z(), -simulation_limits::least_tilt);
     const float slope_x = -disk.normal.x() / tilt, slope_y = -disk.normal.y() / tilt;
     const float squared_radius = disk.radius * disk.radius, per_square = 1.0f / squared_radius;
     const float a = 1.0f + slope_x * slope_x;
@@ -277,7 +276,7 @@ class Canvas {
     const Pixel& pixel = pixels_[index(u, v)];
     const auto differs = [&](const Pixel& other) {
       if (pixel.is_covered() != other.is_covered()) return true;
-      return pixel.is_covered() && std::abs(other.depth - pixel.depth) > outline_step;
+      return pixel.is_covered() && std::abs(other.depth - pixel.depth) > simulation_limits::outline_step;
     };
     return differs(clamped(u - 1, v)) || differs(clamped(u + 1, v)) || differs(clamped(u, v - 1)) ||
            differs(clamped(u, v + 1));

@@ -9,6 +9,7 @@
 #include "base/parallel.hpp"
 #include "base/pose_check.hpp"
 #include "base/random.hpp"
+#include "simulation/limits.hpp"
 
 namespace nacre {
 namespace {
@@ -138,7 +139,7 @@ std::vector<std::uint8_t> find_edges(const View& view, const Hits& hits, double 
 // The mean depth of a square of rays around pixel (u, v), weighted by a tent; NaN where all see the background. A tent
 // is a box (the blur) over a box (the pixel, where the image is sampled down).
 double mixed_depth(const View& view, int u, int v, double radius, double background) {
-  constexpr int rays_per_radius = 4;
+  using simulation_limits::rays_per_radius;
   double sum = 0.0, sum_weights = 0.0;
   bool any = false;
   for (int row = -rays_per_radius; row < rays_per_radius; ++row) {
@@ -161,7 +162,7 @@ void mix_edges(const View& view, const MeshTree& mesh, const Hits& hits, const S
   double background = options.background_depth;
   if (background == 0.0) {
     for (const MeshTree::Hit& hit : hits) background = std::max(background, hit.distance);
-    background += 0.1 * (mesh.upper() - mesh.lower()).norm();
+    background += simulation_limits::background_room * (mesh.upper() - mesh.lower()).norm();
   }
   const std::vector<std::uint8_t> edges = find_edges(view, hits, options.edge_mixing, options.num_threads);
   parallel_for(view.num_pixels(), 64, options.num_threads, [&](std::int64_t i) {
