@@ -139,7 +139,7 @@ STRUCTURE = (
 )
 STRUCTURE += " version_at bytes_per_pixel none any nothing missing largest infinity nan reach step kWordBits"
 STRUCTURE += " unknown never no_limit step_block equation_block cloud_block phi"
-STRUCTURE += " kBorder kOverhang kRadius kStep num_bins rows_per_block points_per_block nodes_per_task"
+STRUCTURE += " kBorder kOverhang kRadius kStep num_bins band_rows points_per_block nodes_per_task"
 STRUCTURE += " dropout_stream log2_e"
 
 

@@ -28,6 +28,6 @@ Eigen::VectorXd solve_symmetric_along(const Eigen::MatrixXd& directions,
          solve_symmetric(directions.transpose() * matrix * directions, directions.transpose() * right_side);
 }
 
-Matrix6 inverse(const Matrix6& matrix) { return Eigen::MatrixXd(matrix).inverse(); }
+Matrix6 inverse(const Matrix6& matrix) { return matrix.inverse(); }
 
 }  // namespace nacre

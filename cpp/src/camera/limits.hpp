@@ -12,6 +12,7 @@ constexpr double view_shift = 0.15;  // [depth] tuned: shift that makes another 
 constexpr double least_point_pixels = 1.5;  // [pixel] tuned: between new points in their frame; bunny12 NN CoV
 constexpr float least_facing = 0.3F;  // [cosine] tuned: at which a surface should be seen; test_global_registration, dog
 constexpr double surface_spacings = 2.75;  // [spacing] tuned: across a surface, within which points are of it; teddy, test_deformation
+constexpr double new_direction = 0.35;  // [rad] tuned: between views from different sides, and from a guess to a place that was not expected; dog, teddy-cut, pairs
 
 }  // namespace nacre::camera_limits
 // clang-format on

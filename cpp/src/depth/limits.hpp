@@ -9,7 +9,6 @@
 namespace nacre::depth_limits {
 
 constexpr float crease_slope = 3.0F;  // [1] tuned: a crease of a smaller bend is kept; test_planar_edges
-constexpr float step_sigmas = 3.0F;  // [sigma] tuned: allowance for noise in steepness and links; test_depth
 constexpr float lateral_sigma = 0.8F;  // [pixel] derived: a pixel looks aside (Nguyen et al. 2012, fig. 7); test_depth
 constexpr float slope_sigma = 0.07F;  // [1] tuned: a normal's window grows until its slope is this certain; test_frame
 constexpr float least_filled = 0.4F;  // [1] tuned: part of a normal's window that must be measured; test_frame
@@ -37,6 +36,7 @@ constexpr float nearest_median = 0.05F;  // [m] derived: nearer medians: a wrong
 constexpr float farthest_median = 50.0F;  // [m] derived: farther medians: a wrong depth_scale; test_depth
 constexpr std::int64_t most_probes = 8192;  // [pixels] budget: that tell an image's median depth; test_depth
 constexpr float view_systematic = 2.0F;  // [sigma] tuned: likewise, of the systematic error; teddy, rpy
+constexpr float step_sigmas = 3.0F;  // [sigma] tuned: allowance for noise in steepness and links; test_depth
 
 }  // namespace nacre::depth_limits
 // clang-format on

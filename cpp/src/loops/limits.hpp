@@ -15,7 +15,6 @@ constexpr std::size_t most_key_frames = 500;  // [views] budget: about 80 kB eac
 constexpr std::size_t most_candidates = 4;  // [views] budget: that a frame is registered to at once; room
 constexpr int verified_nodes = 12;  // [nodes] tuned: of the trajectory: what was seen since is taken to be in place; room, teddy
 constexpr double least_overlap = 0.3;  // [1] tuned: of a frame and a key frame; room
-constexpr Eigen::Index least_points = 100;  // [points] tuned: of a frame, for a loop; room
 constexpr double largest_reach = 0.05;  // [size] tuned: of matches, in diameters of the key frames' surface; room
 constexpr double reach_spacings = 2.5;  // [spacing] tuned: of matches along the key frames' surface; room
 constexpr double search_radius = 0.12;  // [depth] tuned: drift that is looked for; room

@@ -215,7 +215,7 @@ IcpTarget LoopClosure::target_of(const std::vector<int>& key_frames, const Align
 // Registers a frame to key frames. None where nothing speaks for it.
 std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, const FrameCloud& cloud,
                                                      const std::vector<int>& in_question) const {
-  if (in_question.empty() || cloud.points.rows() < loops_limits::least_points) return std::nullopt;
+  if (in_question.empty() || cloud.points.rows() < base_limits::least_points) return std::nullopt;
   AlignOptions align_options = options_.registration;
   align_options.max_samples = align_options.max_points = 0;
   const IcpTarget target = target_of(in_question, align_options);

@@ -8,13 +8,10 @@
 // clang-format off
 namespace nacre::model_limits {
 
-constexpr std::size_t least_pixels = 100;  // [pixels] tuned: a frame with fewer cannot be registered; test_failure
 constexpr double coarsening = 1.25;  // [1] budget: of the spacing, when the model reaches its largest size; test_model
 constexpr double spacing_pixels = 2.0;  // [pixel] tuned: between points, on the nearer surfaces; bunny12 points
 constexpr std::size_t most_outline_points = 800;  // [points] budget: of a frame's outline, for loops; room
-constexpr double largest_turn = 0.7;  // [rad] tuned: of a motion that goes on, not of any order; scans
 constexpr std::size_t most_key_poses = 8;  // [poses] budget: that a lost camera is looked for around; test_failure
-constexpr double view_angle = 0.35;  // [rad] tuned: between views in different directions; dog, teddy-cut
 constexpr std::int64_t patience = 8;  // [frames] budget: lost, until the search is made at every so many; test_failure
 constexpr std::size_t most_object_views = 24;  // [views] budget: of an object that turns on a plane; dog
 

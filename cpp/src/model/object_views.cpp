@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/se3.hpp"
+#include "camera/limits.hpp"
 #include "model/limits.hpp"
 #include "registration/multiview.hpp"
 
@@ -11,7 +12,7 @@ namespace nacre {
 bool is_new_direction(const std::vector<ObjectView>& views, const Pose& world_from_camera) {
   return views.size() < model_limits::most_object_views &&
          std::all_of(views.begin(), views.end(), [&](const ObjectView& view) {
-           return angle_between(view.world_from_camera, world_from_camera) > model_limits::view_angle;
+           return angle_between(view.world_from_camera, world_from_camera) > camera_limits::new_direction;
          });
 }
 

@@ -6,8 +6,10 @@
 #include <limits>
 
 #include "base/check.hpp"
+#include "base/limits.hpp"
 #include "base/pose_check.hpp"
 #include "base/se3.hpp"
+#include "camera/limits.hpp"
 #include "camera/point_spacing.hpp"
 #include "depth/cleaning.hpp"
 #include "fusion/attribute_fusion.hpp"
@@ -156,7 +158,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   TrackingResult result;
   result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
   outline.clear();
-  if (frame.valid.size() < model_limits::least_pixels) {
+  if (frame.valid.size() < base_limits::least_points) {
     const std::string count = "only " + std::to_string(frame.valid.size()) + " pixels of the frame are usable";
     result.reason = region_report.reason.empty() ? count : region_report.reason;
     return result;
@@ -215,7 +217,7 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior) {
 // Whether the camera's last motion was none that goes on: views far apart, in any order.
 bool Pipeline::jumped() const {
   if (history.num_registered() < 2) return false;
-  return angle_between(history.registered_pose(1), history.registered_pose(0)) > model_limits::largest_turn;
+  return angle_between(history.registered_pose(1), history.registered_pose(0)) > options.registration.max_angle;
 }
 
 std::vector<Pose> Pipeline::guesses(const FrameExtras& extras) const {
@@ -233,7 +235,7 @@ static std::vector<Pose> key_poses(const FrameHistory& history) {
   for (std::size_t age = 0; age < history.num_registered() && chosen.size() < model_limits::most_key_poses; ++age) {
     const Pose pose = history.registered_pose(age);
     const bool is_new = std::all_of(chosen.begin(), chosen.end(), [&](const Pose& other) {
-      return angle_between(other, pose) > model_limits::view_angle;
+      return angle_between(other, pose) > camera_limits::new_direction;
     });
     if (is_new) chosen.push_back(pose);
   }

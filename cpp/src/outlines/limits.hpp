@@ -8,8 +8,6 @@
 // clang-format off
 namespace nacre::outlines_limits {
 
-constexpr double like_cosine = 0.75;  // [1] tuned: between outlines that match, and between their surfaces; fandisk12, room
-constexpr double least_facing = 0.5;  // [1] tuned: cosine at which a surface near an edge is asked; fandisk12, room
 constexpr double look_within = 3.0;  // [pixel] derived: nearer to an edge, pixels see both of its sides; fandisk12, room
 constexpr double look_beyond = 5.0;  // [pixel] tuned: beyond an edge, where the surface must not continue; fandisk12, room
 constexpr double least_distance = 2.0;  // [pixel] tuned: between surfaces that differ; fandisk12, room
@@ -19,7 +17,6 @@ constexpr double least_offset = 0.25;  // [radius] derived: of the window's pixe
 constexpr double most_offset = 0.65;  // [radius] derived: likewise; a corner of 90 degrees has 0.6; test_occluding_edges
 constexpr double least_filled = 0.18;  // [1] derived: part of the window that shows the surface; a corner of 90 degrees has 0.25; test_occluding_edges
 constexpr double most_slope = 3.0;  // [1] tuned: of depth along a surface, in sizes of a pixel; test_occluding_edges
-constexpr std::size_t least_matches = 25;  // [pairs] tuned: of outlines that decide a direction; fandisk12, wall
 constexpr int num_rounds = 4;  // [rounds] budget: of steps along the outline, each then back onto the surface; fandisk12, room
 constexpr int least_steps = 4;  // [steps] budget: in each round; fandisk12, room
 constexpr double step_damping = 1e-3;  // [1] derived: of the information, where few rows determine a direction; fandisk12
@@ -36,6 +33,9 @@ constexpr double points_for_one = 4.0;  // [points] tuned: neighbors on an outli
 constexpr double pairs_for_one = 30.0;  // [pairs] tuned: so do pairs of surface points; fandisk12, room
 constexpr double smear_step = 0.5;  // [pixel] budget: between places that are asked across an edge; test_occluding_edges
 constexpr double most_smeared = 2.5;  // [pixel] tuned: of an edge, over which depth falls off; test_occluding_edges
+constexpr double like_cosine = 0.75;  // [1] tuned: between outlines that match, and between their surfaces; fandisk12, room
+constexpr double least_facing = 0.5;  // [1] tuned: cosine at which a surface near an edge is asked, or may end there; fandisk12, room
+constexpr std::size_t least_matches = 25;  // [pairs] tuned: of outlines that decide a direction; fandisk12, wall
 
 }  // namespace nacre::outlines_limits
 // clang-format on

@@ -69,8 +69,10 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
            << ", consistency " << consistency << ", residuals " << ratio << " of the largest that match";
     if (bent > 1.0) reason << ", bent " << bent << " times as much as true matches may be";
   } else if (options.verify && alignment.weak_directions.cols() > 0) {
-    acceptance.decision = Decision::undetermined;
+    // Where the camera was says nothing of a far place, and cannot stand in for what is open there.
+    if (expectation != Expectation::unexpected) acceptance.decision = Decision::undetermined;
     reason << alignment.weak_directions.cols() << " direction(s) of the pose are not determined";
+    if (expectation == Expectation::unexpected) reason << ", far from all guesses";
   } else {
     acceptance.decision = Decision::accepted;
     acceptance.is_clear_cut = options.verify && acceptance.score >= clear_cut_score * options.min_score;

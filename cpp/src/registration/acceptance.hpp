@@ -51,6 +51,9 @@ struct Acceptance {
 // residuals tell counts as much as the normals agree: see normal_information. Where only a plane of the one fits a
 // plane of the other it is 0.
 //
+// Directions that the source leaves open (weak) are taken from a guess; far from all guesses there is none, and the
+// pose is rejected.
+//
 // A source that is clearly larger or smaller than what it fits is lost: its depth is wrong, or it is another thing.
 //
 // A registration score of min_score is enough where everything speaks for the place; without `verify` whatever matches

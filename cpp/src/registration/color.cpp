@@ -39,7 +39,7 @@ class ColorSearch : public OpenDirectionSearch {
     fit.extent = extent_of(fit.rows);
     fit.noise = noise_;
     distance_noise_ = std::max(geometric.rmse, 0.1 * target_.spacing());
-    fit.agrees = fit.rows.size() >= registration_limits::least_points &&
+    fit.agrees = fit.rows.size() >= base_limits::least_points &&
                  fit.result.num_inliers > registration_limits::still_matching * geometric.num_inliers &&
                  correlation_ >= registration_limits::least_correlation;
     return fit;
@@ -82,7 +82,7 @@ class ColorSearch : public OpenDirectionSearch {
       rows.push_back(pair);
       values.push_back(value);
     }
-    if (rows.size() >= registration_limits::least_points) weigh(values, rows);
+    if (rows.size() >= base_limits::least_points) weigh(values, rows);
     return rows;
   }
 
@@ -93,7 +93,7 @@ class ColorSearch : public OpenDirectionSearch {
         const TwistBasis open = only != nullptr ? *only : TwistBasis(result.weak_directions);
         if (open.cols() == 0) break;
         const std::vector<MotionRow> rows = match(level, result.target_from_source, result.center);
-        if (rows.size() < registration_limits::least_points) break;
+        if (rows.size() < base_limits::least_points) break;
         const double size = step(rows, open, result);
         if (!return_to_surface(target_, source_, held_, result)) return start;
         if (size < registration_limits::small_color_step * target_.spacing()) break;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "camera/limits.hpp"
@@ -53,9 +54,7 @@ ViewAgreement ask(const IcpSource& source, const SearchSide& onto, const Pose& p
 
 }  // namespace
 
-bool is_enough(const SearchSide& side) {
-  return static_cast<std::size_t>(side.all.cloud.points.rows()) >= registration_limits::least_points;
-}
+bool is_enough(const SearchSide& side) { return side.all.cloud.points.rows() >= base_limits::least_points; }
 
 SearchSide::SearchSide(const GlobalCloud& cloud_in, const GlobalAlignOptions& options, bool is_noisy)
     : cloud(cloud_in, options, is_noisy),

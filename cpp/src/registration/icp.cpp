@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "base/limits.hpp"
 #include "base/statistics.hpp"
 #include "registration/limits.hpp"
 #include "registration/scale_check.hpp"
@@ -60,10 +61,9 @@ class Schedule {
   }
 
   void update_gate(double residual_scale) {
-    const double smallest =
-        std::min(first_, options_.final_distance > 0.0
-                             ? options_.final_distance
-                             : std::max(smallest_, registration_limits::last_gate_sigmas * residual_scale));
+    const double smallest = std::min(first_, options_.final_distance > 0.0
+                                                 ? options_.final_distance
+                                                 : std::max(smallest_, base_limits::noise_sigmas * residual_scale));
     const double decayed = first_ * std::pow(options_.gate_decay, iteration_);
     gate_.distance = std::max(smallest, decayed);
     at_smallest_ = options_.gate_decay >= 1.0 || decayed <= smallest;

@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 
+#include "base/limits.hpp"
 #include "base/linear_algebra.hpp"
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
@@ -31,7 +32,7 @@ std::vector<Pair> match(const IcpSource& source, const IcpTarget& target, const 
   std::vector<Pair> pairs =
       target.match(source, source.cloud.points.rows(), world_from_target.inverse() * world_from_source,
                    {gate, registration_limits::view_cosine, false}, nearest);
-  if (pairs.size() < registration_limits::least_view_pairs) return {};
+  if (pairs.size() < base_limits::least_points) return {};
   weight_pairs(pairs, Metric::symmetric, true, 0.05 * tolerance);
   for (Pair& pair : pairs) {
     // Beyond a view's rim, matches only continue it: the farther along the surface, the less they count.
@@ -132,7 +133,7 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
       const std::vector<Pair> pairs =
           match(sides[i]->source, sides[j]->target, poses[i], poses[j], gate * tolerance, tolerance, nearest[k]);
       overlaps[k] = Overlap(pairs, motions.center);
-      if (gate == registration_limits::last_view_gate && pairs.empty()) see_the_same[k] = 0;
+      if (gate == 1.0 && pairs.empty()) see_the_same[k] = 0;
     });
     JointEquations equations(freedom * count);
     for (Eigen::Index k = 0; k < count * count; ++k) {
@@ -143,8 +144,8 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
       Pose& pose = poses[static_cast<std::size_t>(k)];
       pose = orthonormal(motions.apply(solution.segment(freedom * (k - 1), freedom)) * pose);
     }
-    if (gate == registration_limits::last_view_gate && solution.norm() < registration_limits::still) break;
-    gate = std::max(registration_limits::last_view_gate, registration_limits::gate_decay * gate);
+    if (gate == 1.0 && solution.norm() < registration_limits::still) break;
+    gate = std::max(1.0, registration_limits::gate_decay * gate);
   }
   return poses;
 }

@@ -18,7 +18,7 @@ using Eigen::Array4f;
 using Eigen::Vector3f;
 using std::int64_t;
 
-constexpr int rows_per_block = 16;
+constexpr int band_rows = 16;
 constexpr int points_per_block = 4096;
 
 struct Disk {
@@ -121,7 +121,7 @@ class Canvas {
         pixels_(static_cast<std::size_t>(width_ * height_)) {}
 
   void draw(const DiskRows& rows) {
-    parallel_blocks(height_, rows_per_block, num_threads_, [&](int64_t, int64_t begin, int64_t end) {
+    parallel_blocks(height_, band_rows, num_threads_, [&](int64_t, int64_t begin, int64_t end) {
       for_disks(rows, begin, end, [&](const Disk& disk) { draw_depth(disk, begin, end); });
       for_disks(rows, begin, end, [&](const Disk& disk) { blend(disk, begin, end); });
     });
@@ -135,7 +135,7 @@ class Canvas {
       colors[at] = pixels_[at].is_covered() ? color_of(pixels_[at], cavity[at], has_colors) : Array4f::Zero();
     });
     Picture picture(size(), 4);
-    parallel_for(height_, rows_per_block, num_threads_, [&](int64_t v) {
+    parallel_for(height_, band_rows, num_threads_, [&](int64_t v) {
       for (int64_t u = 0; u < width_; ++u) {
         Array4f color = is_outline(u, v) ? blurred(colors, u, v) : colors[index(u, v)];
         if (color[3] > 0.0f) color.head<3>() /= color[3];
@@ -247,11 +247,11 @@ class Canvas {
 
   // Replaces each pixel by the sum over the square of 2 radius + 1 pixels around it.
   void sum_boxes(std::vector<DepthSum>& image, int64_t radius) const {
-    parallel_blocks(height_, rows_per_block, num_threads_, [&](int64_t, int64_t begin, int64_t end) {
+    parallel_blocks(height_, band_rows, num_threads_, [&](int64_t, int64_t begin, int64_t end) {
       std::vector<DepthSum> line(static_cast<std::size_t>(width_));
       for (int64_t v = begin; v < end; ++v) sum_line(image, index(0, v), 1, line, radius);
     });
-    parallel_blocks(width_, rows_per_block, num_threads_, [&](int64_t, int64_t begin, int64_t end) {
+    parallel_blocks(width_, band_rows, num_threads_, [&](int64_t, int64_t begin, int64_t end) {
       std::vector<DepthSum> line(static_cast<std::size_t>(height_));
       for (int64_t u = begin; u < end; ++u)
         sum_line(image, index(u, 0), static_cast<std::size_t>(width_), line, radius);

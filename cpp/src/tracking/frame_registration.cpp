@@ -44,7 +44,7 @@ TrackingResult FrameRegistration::from(const Pose& guess, Gate gate, Expectation
   determine_open_directions(view, target, source, align_options, result.alignment);
   const Pose& pose = result.alignment.target_from_source;
   result.consistency = consistency(view, pose);
-  const bool is_far = view_distance(guess, pose, depth_) > tracking_limits::far_from_guess;
+  const bool is_far = view_distance(guess, pose, depth_) > camera_limits::new_direction / camera_limits::view_turn;
   result.expectation = is_far ? Expectation::unexpected : expectation;
   result.test(options_);
   return result;
@@ -122,7 +122,7 @@ std::vector<Pose> FrameRegistration::around(const Pose& world_from_camera) const
   if (view.points.rows() == 0) return poses;
   const Eigen::Vector3d center = view.points.colwise().mean().transpose().cast<double>();
   for (int axis = 0; axis < 3; ++axis) {
-    for (const double angle : {-tracking_limits::turn_around, tracking_limits::turn_around}) {
+    for (const double angle : {-options_.registration.max_angle, options_.registration.max_angle}) {
       Pose turn = Pose::Identity();
       turn.linear() = Eigen::AngleAxisd(angle, world_from_camera.linear().col(axis)).toRotationMatrix();
       turn.translation() = center - turn.linear() * center;

@@ -10,33 +10,24 @@
 // clang-format off
 namespace nacre::tracking_limits {
 
-constexpr double far_from_guess = 1.75;  // [view_distance] tuned: where a registration ends, a place that was not expected; pairs
 constexpr std::size_t most_target_points = 30000;  // [points] budget: that a frame is registered to; benchmarks
 constexpr double largest_reach = 0.03;  // [size] tuned: of matches, in diameters of the smaller surface; bunny12
 constexpr double reach_spacings = 1.5;  // [spacing] tuned: of matches along the surface; scans
 constexpr double narrow_gate = 4.0;  // [reach] tuned: of matches at first, from a guess that is about right; teddy
 constexpr double margin_spacings = 3.0;  // [spacing] tuned: by which a point seen through is before the surface; teddy
-constexpr std::int64_t least_judged = 20;  // [points] derived: that tell a part of all; test_tracking
 constexpr std::size_t last_outline_points = 2000;  // [points] budget: of the last view's outline; room
 constexpr std::size_t outline_points = 600;  // [points] budget: of the frame's outline; room
 constexpr std::size_t most_bright_points = 100000;  // [points] budget: of a frame's colours; test_color_registration
-constexpr double turn_around = 0.75;  // [rad] tuned: about each axis, of cameras around an earlier one; test_failure
 constexpr std::size_t num_finalists = 3;  // [guesses] budget: of those around earlier poses that are registered in full; test_failure
-constexpr int finalist_samples = 300;  // [points] budget: by which they are chosen; test_failure
-constexpr int finalist_steps = 15;  // [steps] budget: likewise; test_failure
 constexpr double largest_search_residual = 0.6;  // [tolerance] tuned: of a place found anywhere: less is believed of a frame than of two clouds; pairs
 constexpr double least_new_view = 0.1;  // [view_distance] tuned: between views of a place that count: noise makes no new view; test_relocalisation_filter
 constexpr double largest_gap = 0.2;  // [view_distance] tuned: between a place as registered and as followed; test_relocalisation_filter
 constexpr double least_followed = 0.5;  // [1] tuned: overlap of a lost frame with the one before; test_relocalisation_filter
-constexpr Eigen::Index least_object_samples = 100;  // [points] tuned: of an object on a plane; test_region
 constexpr Eigen::Index most_object_samples = 2000;  // [points] budget: likewise; dog
 constexpr double body_depth = 0.9;  // [radius] tuned: from what is seen of an object to its middle; dog
 constexpr int num_turns = 72;  // [1] budget: from which the search on the plane starts; dog
 constexpr std::size_t num_turn_candidates = 10;  // [motions] budget: of them, that are refined; dog
 constexpr Eigen::Index coarse_turn_samples = 300;  // [points] budget: of the search's start; dog
-constexpr Eigen::Index climb_samples = 800;  // [points] budget: of its refinement; dog
-constexpr double same_turn = 0.15;  // [rad] tuned: closer motions on the plane are the same; dog
-constexpr double same_shift = 0.08;  // [size] tuned: likewise; dog
 constexpr double coarse_turn_gate = 3.0;  // [tolerance] tuned: at its end; dog
 constexpr int most_coarse_turn_steps = 14;  // [steps] budget: of each turn; dog
 constexpr double refined_turn_gate = 4.0;  // [tolerance] tuned: of the candidates that are refined; dog
@@ -52,6 +43,7 @@ constexpr double least_view_consistency = 0.75;  // [1] tuned: with all views; d
 constexpr double noise_per_residual = 1.376;  // [1] derived: standard deviation by median absolute value, of Laplace's distribution; test_residual_noise
 constexpr double largest_noise_factor = 16.0;  // [1] budget: of the noise that is tried until it is known; d435-t265-shelf
 constexpr double enough_noise_frames = 5.0;  // [frames] tuned: that tell how noisy registered frames are; pairs
+constexpr std::int64_t least_judged = 20;  // [points] derived: that tell a part of all; test_tracking
 
 }  // namespace nacre::tracking_limits
 // clang-format on

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/limits.hpp"
 #include "base/random.hpp"
 #include "base/statistics.hpp"
 #include "camera/limits.hpp"
@@ -19,7 +20,7 @@ std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& regio
   for (Eigen::Index i = 0; i < samples.points.rows(); ++i) {
     if (samples.points.row(i).allFinite() && samples.normals.row(i).allFinite()) rows.push_back(i);
   }
-  if (static_cast<Eigen::Index>(rows.size()) < tracking_limits::least_object_samples) return std::nullopt;
+  if (static_cast<Eigen::Index>(rows.size()) < base_limits::least_points) return std::nullopt;
   for (std::size_t i = rows.size(); i > 1; --i) std::swap(rows[i - 1], rows[random_bits(seed, i) % i]);
   rows.resize(std::min(rows.size(), static_cast<std::size_t>(tracking_limits::most_object_samples)));
 

@@ -15,8 +15,8 @@ std::vector<Pose> most_promising(const PointModel& model, const IcpSource& sourc
                                  const AlignOptions& options) {
   const IcpTarget whole(AlignCloud(as_rows(model.points), as_rows(model.normals)), options);
   AlignOptions coarse = options;
-  coarse.max_samples = coarse.coarse_samples = tracking_limits::finalist_samples;
-  coarse.max_iterations = tracking_limits::finalist_steps;
+  coarse.max_samples = coarse.coarse_samples = tracking_limits::coarse_turn_samples;
+  coarse.max_iterations = tracking_limits::most_coarse_turn_steps;
   const IcpSource few(AlignCloud(source.cloud.points, source.cloud.normals, source.cloud.sigma), coarse);
 
   std::vector<std::pair<double, Pose>> candidates;

@@ -119,7 +119,7 @@ class TurntableSearch {
   // and Jeeves 1961 on the score, in which outlines count.
   Candidate climb(Candidate best) const {
     if (best.alignment.status == AlignStatus::too_few_pairs) return best;
-    score(best, tracking_limits::climb_samples);
+    score(best, registration_limits::view_samples);
     const Eigen::Vector3d axes[] = {normal_, plane_.linear().col(0), plane_.linear().col(1)};
     for (double step = frame_.tolerance; step > tracking_limits::least_climb_step * frame_.tolerance; step *= 0.5) {
       bool is_better = true;
@@ -138,7 +138,7 @@ class TurntableSearch {
           } else {
             pose.pretranslate(length * axis);
           }
-          score(next, tracking_limits::climb_samples);
+          score(next, registration_limits::view_samples);
           if (next.score <= best.score) continue;
           best = next;
           is_better = true;
@@ -159,8 +159,8 @@ class TurntableSearch {
       const Pose& pose = candidate.alignment.target_from_source;
       const auto is_known = [&](const Candidate& other) {
         const Pose& other_pose = other.alignment.target_from_source;
-        return angle_between(pose, other_pose) < tracking_limits::same_turn &&
-               (pose * middle - other_pose * middle).norm() < tracking_limits::same_shift * frame_.size;
+        return angle_between(pose, other_pose) < registration_limits::same_turn &&
+               (pose * middle - other_pose * middle).norm() < registration_limits::same_shift * frame_.size;
       };
       if (std::none_of(kept.begin(), kept.end(), is_known)) kept.push_back(candidate);
     }
