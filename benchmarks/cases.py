@@ -1,15 +1,19 @@
+#!/usr/bin/env python
 """
-Recordings that are run in one process, in seconds: what `numbers.py` and developers look at after a change.
+Run recordings in this process, in seconds: what to look at after a change.
 
-Each case is a list of depth images with the true poses, where they are known. The table of `tracking.py` has the
-same recordings whole, through the command line, beside peers.
+Each case is a list of depth images with the true poses, where they are known. The table of `tracking.py`
+has more of them, through the command line, beside peers.
+
+    python benchmarks/cases.py bunny12 spot-kinect36 cabinet d435 most=60 spacing=0.01
 """
 
 from __future__ import annotations
 
 import json
 import math
-from dataclasses import dataclass, field
+import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +57,6 @@ class Case:
     colors: list[Array | None]
     truths: list[Array | None]  # world_from_camera
     mesh: nacre.Mesh | None = None  # in the frame of the truths
-    options: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -61,8 +64,8 @@ class Figures:
     """
     What became of a case.
 
-    A frame is right within 2 % of the median depth and 3 degrees of the truth, after the rigid motion that makes most
-    frames right.
+    A frame is right within 2 % of the median depth and 3 degrees of the truth, after the rigid motion that
+    makes most frames right.
     """
 
     frames: int
@@ -78,8 +81,9 @@ class Figures:
     def __str__(self) -> str:
         """One line."""
         return (
-            f"{self.claimed:4d} of {self.frames:3d} right {self.right:3d} weak {self.weak:2d}  ATE {self.ate:8.2f} mm"
-            f"  {self.angle:7.3f} deg  RMS {self.rms:6.3f} mm  {self.points:7d} points  {self.milliseconds:6.1f} ms"
+            f"{self.claimed:4d} of {self.frames:3d} right {self.right:3d} weak {self.weak:2d}"
+            f"  ATE {self.ate:8.2f} mm  {self.angle:7.3f} deg  RMS {self.rms:6.3f} mm"
+            f"  {self.points:7d} points  {self.milliseconds:6.1f} ms"
         )
 
 
@@ -152,7 +156,10 @@ def best_fit(poses: Array, truths: Array, shift: float, turn: float) -> tuple[Ar
         nonlocal best
         shifts, turns = errors(motion)
         right = (shifts < shift) & (turns < turn)
-        rank = (int(right.sum()), -float(np.mean(np.minimum(shifts / shift, 1) + np.minimum(turns / turn, 1))))
+        rank = (
+            int(right.sum()),
+            -float(np.mean(np.minimum(shifts / shift, 1) + np.minimum(turns / turn, 1))),
+        )
         if rank > (best[0], -best[1]):
             best = (rank[0], -rank[1], motion)
         return right
@@ -171,9 +178,9 @@ def best_fit(poses: Array, truths: Array, shift: float, turn: float) -> tuple[Ar
     return best[2], *errors(best[2])
 
 
-def run(case: Case, *, num_threads: int = 1, preset: str = "default", **options: Any) -> tuple[Figures, nacre.Model]:
+def run(case: Case, *, num_threads: int = 1, **options: Any) -> tuple[Figures, nacre.Model]:
     """Run a case; options as those of `nacre.Model`."""
-    model = nacre.Model(case.camera, preset, num_threads=num_threads, **{**case.options, **options})
+    model = nacre.Model(case.camera, num_threads=num_threads, **options)
     for depth, color in zip(case.depths, case.colors, strict=True):
         model.add_frame(depth, color=color)
     return measure(case, model), model
@@ -188,7 +195,9 @@ def measure(case: Case, model: nacre.Model) -> Figures:
     if known:
         poses = np.array([model.frames[i].world_from_camera for i in known])
         truths = np.array([case.truths[i] for i in known])
-        depth = float(np.median([np.nanmedian(image) for image in case.depths[:: max(1, len(case.depths) // 20)]]))
+        depth = float(
+            np.median([np.nanmedian(image) for image in case.depths[:: max(1, len(case.depths) // 20)]])
+        )
         motion, shifts, turns = best_fit(poses, truths, 0.02 * depth, 3.0)
         right = int(np.sum((shifts < 0.02 * depth) & (turns < 3.0)))
         ate, angle = 1e3 * float(np.sqrt(np.mean(shifts**2))), float(turns.max())
@@ -203,8 +212,6 @@ def measure(case: Case, model: nacre.Model) -> Figures:
 
 def main() -> None:
     """Run the cases that are named, with settings: cases.py d435 robot spacing=0.01."""
-    import sys
-
     settings = dict(word.split("=") for word in sys.argv[1:] if "=" in word)
     names = [word for word in sys.argv[1:] if "=" not in word]
     options = {key: json.loads(value) for key, value in settings.items()}

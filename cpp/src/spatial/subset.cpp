@@ -10,7 +10,7 @@
 namespace nacre {
 namespace {
 
-constexpr std::int64_t rows_at_once = 8192;
+constexpr std::int64_t rows_per_block = 8192;
 constexpr int bin_bits = 12;
 
 std::size_t as_size(std::int64_t i) { return static_cast<std::size_t>(i); }
@@ -62,7 +62,7 @@ class Draw {
 
   std::vector<std::int64_t> lowest(std::int64_t count) const {
     // How many tickets have which first bits?
-    const std::int64_t num_blocks = (points_.rows() + rows_at_once - 1) / rows_at_once;
+    const std::int64_t num_blocks = (points_.rows() + rows_per_block - 1) / rows_per_block;
     std::vector<std::vector<std::int32_t>> histograms(as_size(num_blocks));
     for_rows([&](std::int64_t block, std::int64_t begin, std::int64_t end) {
       std::vector<std::int32_t>& histogram = histograms[as_size(block)];
@@ -128,7 +128,7 @@ class Draw {
 
   template <class Body>
   void for_rows(Body&& body) const {
-    parallel_blocks(points_.rows(), rows_at_once, num_threads_, body);
+    parallel_blocks(points_.rows(), rows_per_block, num_threads_, body);
   }
 
   const Cloud& points_;
