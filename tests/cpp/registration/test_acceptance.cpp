@@ -60,6 +60,15 @@ TEST_CASE("the more speaks for a place, the less is asked of the frame") {
   CHECK(tested(faint, Expectation::near_lost).decision == Decision::rejected);
 }
 
+TEST_CASE("what a pose leaves open is taken from a guess, which a far place does not have") {
+  const auto open = [](Registration& result) { result.alignment.weak_directions.resize(6, 1); };
+  CHECK(tested(open, Expectation::expected).decision == Decision::undetermined);
+  CHECK(tested(open, Expectation::near_lost).decision == Decision::undetermined);
+  const Acceptance far = tested(open, Expectation::unexpected);
+  CHECK(far.decision == Decision::rejected);
+  CHECK(far.reason.find("1 direction(s) of the pose are not determined, far from all guesses") == 0);
+}
+
 TEST_CASE("what is bent more than noise explains has a lower score, and is said to be") {
   const Acceptance result = tested([](Registration& bent) { bent.alignment.misfit = 2.0; });
   CHECK(result.decision == Decision::rejected);
