@@ -1,4 +1,4 @@
-// Eigen's solvers, which take long to compile, compiled once. For problems that are solved a few times in a frame.
+// Eigen's solvers, which take long to compile, compiled once. For problems that are small or rare: their memory is allocated.
 #pragma once
 
 #include "nacre/types.hpp"
