@@ -1,4 +1,5 @@
-// Eigen's solvers, which take long to compile, compiled once. For problems that are small or rare: their memory is allocated.
+// Eigen's solvers, which take long to compile, compiled once. For problems that are small or rare: their memory is
+// allocated.
 #pragma once
 
 #include "nacre/types.hpp"
