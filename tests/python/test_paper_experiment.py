@@ -109,16 +109,14 @@ def test_default_preset(sigma: float, seed: int, angle: float, shift: float, rms
     assert sigma == 0 or surface_error(model.points) < 0.5 * sigma
 
 
-@pytest.mark.parametrize(("sigma", "successes"), [(0.0, 19), (0.0005, 18)])
-def test_paper_preset(sigma: float, successes: int) -> None:
+@pytest.mark.parametrize("sigma", [0.0, 0.0005])
+def test_paper_preset(sigma: float) -> None:
     """
-    The paper's algorithm, alone, completes the turn in at least 19 of 20, of noisy views in 18.
-
-    Measured by ``benchmarks/paper.py``: 60 of 60, and 59 of 60.
+    The paper's algorithm, alone, completes the turn in at least 57 of 60: 95 %.
 
     No pose is more than 5 degrees off, and the model has the object's shape.
     """
-    runs = [experiment("paper", sigma, seed) for seed in range(20)]
+    runs = [experiment("paper", sigma, seed) for seed in range(60)]
     assert all(len(model.frames) == 12 for model in runs)
     assert max(report.num_points for model in runs for report in model.frames) == 2000
     succeed = [
@@ -127,7 +125,7 @@ def test_paper_preset(sigma: float, successes: int) -> None:
         and completeness(model.points, 0.008) > 0.85
         for model in runs
     ]
-    assert sum(succeed) >= successes
+    assert sum(succeed) >= 57
 
 
 def test_paper_preset_needs_what_the_paper_leaves_open() -> None:
