@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 
 namespace nacre {
 
@@ -15,8 +14,6 @@ Eigen::VectorXd solve_symmetric(const Eigen::MatrixXd& matrix, const Eigen::Vect
   return matrix.ldlt().solve(right_side);
 }
 
-Vector6 solve_for_twist(const Matrix6& matrix, const Vector6& right_side) { return matrix.ldlt().solve(right_side); }
-
 Eigen::MatrixXd solve_symmetric_columns(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right_sides) {
   return matrix.ldlt().solve(right_sides);
 }
@@ -27,7 +24,5 @@ Eigen::VectorXd solve_symmetric_along(const Eigen::MatrixXd& directions,
   return directions *
          solve_symmetric(directions.transpose() * matrix * directions, directions.transpose() * right_side);
 }
-
-Matrix6 inverse(const Matrix6& matrix) { return matrix.inverse(); }
 
 }  // namespace nacre

@@ -15,14 +15,11 @@ Eigensystem eigensystem(const Eigen::MatrixXd& symmetric);
 
 // Solutions of symmetric, positive semidefinite equations.
 Eigen::VectorXd solve_symmetric(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& right_side);
-Vector6 solve_for_twist(const Matrix6& matrix, const Vector6& right_side);
 // The same for several right sides, one a column.
 Eigen::MatrixXd solve_symmetric_columns(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& right_sides);
 // The solution among the combinations of directions, one a column.
 Eigen::VectorXd solve_symmetric_along(const Eigen::MatrixXd& directions,
                                       const Eigen::Ref<const Eigen::MatrixXd>& matrix,
                                       const Eigen::Ref<const Eigen::VectorXd>& right_side);
-
-Matrix6 inverse(const Matrix6& matrix);
 
 }  // namespace nacre

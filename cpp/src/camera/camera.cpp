@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "base/check.hpp"
+#include "base/numbers.hpp"
 #include "base/pose_check.hpp"
 #include "camera/ray_table.hpp"
 
@@ -32,7 +33,7 @@ double turning_point(const Camera::Distortion& k) {
   for (double r2 = 0.0; r2 < reach; r2 += step) {
     if (growth(r2) <= 0.0) return r2;
   }
-  return std::numeric_limits<double>::infinity();
+  return infinity<double>;
 }
 
 // The inverse of distort by Newton's method, which converges from one side below the turning point; NaN beyond it.

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "simd/wlop_block_bounds.hpp"
 #include "spatial/hilbert_order.hpp"
@@ -13,7 +14,7 @@
 namespace nacre {
 namespace {
 
-constexpr float infinity = std::numeric_limits<float>::infinity(), largest = std::numeric_limits<float>::max();
+constexpr float largest = std::numeric_limits<float>::max();
 constexpr std::int64_t nodes_per_task = 4;
 
 // The nearest float that is not greater, or not smaller, within a unit in the last place. Finite, for infinities would
@@ -131,7 +132,7 @@ double PointBlocks::reach() const {
   float reach = 0.0F;
   if (levels_.empty()) return 0.0;
   for (const float end : levels_.back()) {
-    if (std::abs(end) < infinity) reach = std::max(reach, std::abs(end));  // no box has infinity
+    if (std::abs(end) < infinity<float>) reach = std::max(reach, std::abs(end));  // no box has infinity
   }
   return static_cast<double>(reach);
 }
@@ -155,8 +156,8 @@ void PointBlocks::fit_node(std::int64_t node) {
   simd::fit_blocks()(axes, starts, fit);
 
   float* const boxes = levels_[0].data() + node * simd::node_floats;
-  std::fill(boxes, boxes + 3 * size, infinity);
-  std::fill(boxes + 3 * size, boxes + 6 * size, -infinity);
+  std::fill(boxes, boxes + 3 * size, infinity<float>);
+  std::fill(boxes + 3 * size, boxes + 6 * size, -infinity<float>);
   for (std::int64_t block = first; block < last; ++block) {
     const std::int64_t i = block - first;
     for (int axis = 0; axis < 3; ++axis) {
@@ -180,8 +181,8 @@ void PointBlocks::fit_upper_levels() {
         const float* const lower = from + axis * size;
         const float* const upper = lower + 3 * size;
         const bool exists = child < num_children;
-        to[axis * size] = exists ? *std::min_element(lower, lower + size) : infinity;
-        to[(3 + axis) * size] = exists ? *std::max_element(upper, upper + size) : -infinity;
+        to[axis * size] = exists ? *std::min_element(lower, lower + size) : infinity<float>;
+        to[(3 + axis) * size] = exists ? *std::max_element(upper, upper + size) : -infinity<float>;
       }
     }
   }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "base/numbers.hpp"
 #include "base/point_rows.hpp"
 #include "simd/wlop_pair_sums.hpp"
 
@@ -24,8 +25,6 @@ struct BlockRows {
 // Blocks of which none is longer than `longest`. Halved stretches of the curve make more compact ones, and take longer.
 template <class T>
 BlockRows block_rows(const Rows<T>& points, double longest, bool halved, int num_threads);
-
-inline std::size_t as_size(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 class PointBlocks {
  public:

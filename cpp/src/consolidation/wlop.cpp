@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "base/check.hpp"
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "consolidation/limits.hpp"
 #include "consolidation/point_blocks.hpp"
@@ -31,7 +32,7 @@ struct Form {
   float least_neighbors = 0.0F;         // fewer do not repel
   bool tangential = false;              // whether samples repel each other along the surface only
   float least_repulsion = 0.0F;         // lower bound of the sum that the repulsion is divided by
-  float longest_step = std::numeric_limits<float>::infinity();
+  float longest_step = infinity<float>;
 };
 
 Form form_of(const ConsolidateOptions& options) {

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <sstream>
 
 #include "base/check.hpp"
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "base/statistics.hpp"
 #include "camera/ray_table.hpp"
@@ -62,7 +62,7 @@ ByteImage mark_edges(const DepthRef& depth, const PlanarImage& image, const Wind
 // The nearest floats that are not beyond a limit.
 float round_up(double limit) {
   const auto rounded = static_cast<float>(limit);
-  return rounded < limit ? std::nextafter(rounded, std::numeric_limits<float>::infinity()) : rounded;
+  return rounded < limit ? std::nextafter(rounded, infinity<float>) : rounded;
 }
 float round_down(double limit) {
   const auto rounded = static_cast<float>(limit);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "depth/limits.hpp"
 #include "simd/depth_edges.hpp"
@@ -46,7 +47,7 @@ class SlopeRows {
   }
 
   void fill(int row) {
-    constexpr float none = std::numeric_limits<float>::infinity();
+    constexpr float none = infinity<float>;
     const auto cols = static_cast<std::size_t>(fits_.cols);
     std::fill(around_.begin(), around_.end(), none);
     for (int r = std::max(row - 1, 0); r <= std::min(row + 1, fits_.rows - 1); ++r) {

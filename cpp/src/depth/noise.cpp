@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "base/check.hpp"
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "depth/limits.hpp"
 #include "depth/window_fits.hpp"
@@ -91,7 +92,7 @@ WindowFits fit_windows(const PlanarImage& image, const Camera& camera, int num_t
     values->resize(static_cast<std::size_t>(fits.cols) * static_cast<std::size_t>(fits.rows));
   }
   // A step that no sensor's unit of depth explains is an edge: the worst, Kinect v1, has half of this.
-  constexpr float any = std::numeric_limits<float>::infinity();
+  constexpr float any = infinity<float>;
   const bool pinhole = camera.model() == Camera::Model::pinhole;
   const simd::WindowRule rule = {image.sigma(sensor_prior(camera)), image.unit_slope(),
                                  pinhole ? std::sqrt(12.0F) : any, pinhole ? any : depth_limits::largest_step};

@@ -265,7 +265,7 @@ PoseEdge LoopClosure::edge(int from, int to, const Pose& pose, const AlignResult
   if (alignment.information.trace() > 0.0) {
     Matrix6 information = alignment.information;
     information.diagonal().array() += 1e-12 * information.trace();
-    covariance = loops_limits::covariance_inflation * inverse(information);
+    covariance = loops_limits::covariance_inflation * solve_symmetric_columns(information, Matrix6::Identity());
   }
   covariance.diagonal().head<3>().array() += error * error;
   covariance.diagonal().tail<3>().array() += error * error * depth * depth;
@@ -276,7 +276,8 @@ PoseEdge LoopClosure::edge(int from, int to, const Pose& pose, const AlignResult
   Matrix6 about_center = Matrix6::Zero();
   about_center.topLeftCorner<3, 3>() = about_center.bottomRightCorner<3, 3>() = pose.linear();
   about_center.bottomLeftCorner<3, 3>() = -pose.linear() * cross_matrix(center);
-  const Matrix6 information = about_center.transpose() * inverse(covariance) * about_center;
+  const Matrix6 information =
+      about_center.transpose() * solve_symmetric_columns(covariance, Matrix6::Identity()) * about_center;
   return {from, to, pose_of(from).inverse() * pose, information, is_loop};
 }
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "base/check.hpp"
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "mesh/triangle_bvh.hpp"
 
@@ -14,7 +15,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr std::int64_t block_size = 1024;
 
@@ -50,7 +50,7 @@ class PreparedRay {
       enter = enter < from ? from : enter;
       leave = to < leave ? to : leave;
     }
-    return enter <= leave ? enter : infinity;
+    return enter <= leave ? enter : infinity<double>;
   }
 
   // The distance to a triangle in units of |direction|; not positive where it is missed.
@@ -175,7 +175,7 @@ MeshTree::Hit MeshTree::cast(const Vector3d& origin, const Vector3d& direction) 
   if (!origin.allFinite() || !direction.allFinite() || direction.isZero(0.0)) return {};
   const PreparedRay ray(origin, direction);
   Hit hit;
-  double nearest = infinity;
+  double nearest = infinity<double>;
   impl_->bvh.walk([&](const BvhNode& node) { return ray.entry(node, nearest); }, [&] { return nearest; },
                   [&](std::int32_t first, std::int32_t count) {
                     for (std::int32_t i = first; i < first + count; ++i) {
@@ -192,7 +192,7 @@ MeshTree::Hit MeshTree::cast(const Vector3d& origin, const Vector3d& direction) 
 MeshTree::Closest MeshTree::closest(const Vector3d& point) const {
   if (!point.allFinite()) return {Vector3d::Constant(nan), -1, nan};
   Closest best;
-  double nearest = infinity;
+  double nearest = infinity<double>;
   const auto box_distance = [&](const BvhNode& node) {
     const Vector3d outside = (node.corners[0].cast<double>() - point)
                                  .cwiseMax(point - node.corners[1].cast<double>())

@@ -6,15 +6,16 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <utility>
 #include <vector>
+
+#include "base/numbers.hpp"
 
 namespace nacre {
 
 struct Box {
-  Eigen::Vector3f lower = Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity());
-  Eigen::Vector3f upper = Eigen::Vector3f::Constant(-std::numeric_limits<float>::infinity());
+  Eigen::Vector3f lower = Eigen::Vector3f::Constant(infinity<float>);
+  Eigen::Vector3f upper = Eigen::Vector3f::Constant(-infinity<float>);
 
   void extend(const Box& other) {
     lower = lower.cwiseMin(other.lower);
@@ -58,7 +59,7 @@ class Bvh {
     std::array<std::pair<double, std::int32_t>, max_depth + 1> stack;
     std::size_t size = 0;
     const double root = entry(nodes_[0]);
-    if (root < infinity) stack[size++] = {root, 0};
+    if (root < infinity<double>) stack[size++] = {root, 0};
     while (size > 0) {
       const auto [bound, index] = stack[--size];
       if (bound > limit()) continue;
@@ -70,13 +71,12 @@ class Bvh {
       std::pair<double, std::int32_t> near{entry(nodes_[static_cast<std::size_t>(node.first)]), node.first};
       std::pair<double, std::int32_t> far{entry(nodes_[static_cast<std::size_t>(node.first) + 1]), node.first + 1};
       if (far.first < near.first) std::swap(near, far);
-      if (far.first < infinity) stack[size++] = far;
-      if (near.first < infinity) stack[size++] = near;
+      if (far.first < infinity<double>) stack[size++] = far;
+      if (near.first < infinity<double>) stack[size++] = near;
     }
   }
 
  private:
-  static constexpr double infinity = std::numeric_limits<double>::infinity();
   static constexpr int num_bins = 16;
   static constexpr int max_leaf = 8;
   static constexpr int sah_depth = 32;  // below it nodes are halved, which ends after 31 more levels
@@ -89,7 +89,7 @@ class Bvh {
   struct Split {
     int axis = -1;  // none
     int bin = 0;    // the items of the bins 0 to this go left
-    double cost = infinity;
+    double cost = infinity<double>;
   };
 
   static int bin_of(const Box& box, const Box& centers, int axis) {
@@ -116,7 +116,7 @@ class Bvh {
       for (std::size_t b = 0; b + 1 < num_bins; ++b) {
         sum.box.extend(bins[b].box);
         sum.count += bins[b].count;
-        left_cost[b] = sum.count > 0 ? sum.count * sum.box.half_area() : infinity;
+        left_cost[b] = sum.count > 0 ? sum.count * sum.box.half_area() : infinity<double>;
       }
       sum = {};
       for (std::size_t b = num_bins - 1; b > 0; --b) {

@@ -74,7 +74,7 @@ void refine_by_outlines(IcpResult& result, const std::vector<OutlinePoint>& outl
     const double mean_square = equations.squares / static_cast<double>(equations.count);
     const bool lie_on_each_other = std::sqrt(mean_square) <= outlines_limits::largest_rms * pixel || iteration == 0;
     if (equations.count < outlines_limits::least_matches || !lie_on_each_other) return;
-    const Vector6 step = -solve_for_twist(equations.hessian + shape, equations.gradient + shape * twist);
+    const Vector6 step = -solve_symmetric(equations.hessian + shape, equations.gradient + shape * twist);
     if (!step.allFinite()) return;
     twist += step;
     if (step.head<3>().norm() < 1e-5 && step.tail<3>().norm() < 1e-3 * pixel) break;

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "base/check.hpp"
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "nacre/region.hpp"
@@ -161,7 +162,7 @@ void draw_group(const Frame& frame, const CoarseFrame& coarse, const Camera& cam
 // The plane to which the lower end of a thing is nearest.
 int support_of(const Frame& frame, const MaskImage& mask, const std::vector<SupportPlane>& planes) {
   int support = -1;
-  double least = std::numeric_limits<double>::infinity();
+  double least = infinity<double>;
   for (std::size_t k = 0; k < planes.size(); ++k) {
     std::vector<double> heights;
     for (Eigen::Index row = 0; row < mask.size(); ++row) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "base/point_rows.hpp"
 #include "base/random.hpp"
@@ -53,7 +54,7 @@ double median_spacing(const BlockTree<float>& tree) {
   std::vector<double> distances;
   for (std::int64_t slot = 0; slot < tree.num_points(); slot += step) {
     Found found[2];
-    FewNearest nearest(2, std::numeric_limits<double>::infinity(), found);
+    FewNearest nearest(2, infinity<double>, found);
     tree.search(tree.position(static_cast<std::uint32_t>(slot)), nearest);
     if (nearest.finish() == 2) distances.push_back(std::sqrt(found[1].d2));
   }
@@ -61,7 +62,7 @@ double median_spacing(const BlockTree<float>& tree) {
 }
 
 double bounding_diameter(const PointsRef& points) {
-  Eigen::Vector3f low = Eigen::Vector3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
+  Eigen::Vector3f low = Eigen::Vector3f::Constant(infinity<float>), high = -low;
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
     const Eigen::Vector3f p = points.row(i).transpose();
     low = low.cwiseMin(p);

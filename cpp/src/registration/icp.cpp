@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "base/limits.hpp"
+#include "base/numbers.hpp"
 #include "base/statistics.hpp"
 #include "registration/limits.hpp"
 #include "registration/scale_check.hpp"
@@ -13,12 +14,12 @@ namespace nacre {
 namespace {
 
 template <class Value>
-double median_of(const std::vector<Pair>& pairs, Value&& value) {
+double median_over(const std::vector<Pair>& pairs, Value&& value) {
   const std::size_t step = (pairs.size() + registration_limits::scale_probes - 1) / registration_limits::scale_probes;
   std::vector<double> values;
   values.reserve(registration_limits::scale_probes);
   for (std::size_t i = 0; i < pairs.size(); i += step) values.push_back(value(pairs[i]));
-  return nacre::median_of(std::move(values));
+  return median_of(std::move(values));
 }
 
 // How many points and which gate an iteration uses. The gate starts wide and shrinks to the accuracy of the data, with
@@ -101,7 +102,7 @@ double residual_ratio_of(const std::vector<Pair>& pairs, Metric metric) {
 // NaN where the source has no noise.
 double residual_sigmas_of(const std::vector<Pair>& pairs, Metric metric) {
   return mad_to_sigma *
-         median_of(pairs, [&](const Pair& pair) { return std::abs(residual(pair, metric)) / pair.noise; });
+         median_over(pairs, [&](const Pair& pair) { return std::abs(residual(pair, metric)) / pair.noise; });
 }
 
 // Of pairs in the order of space. Noise is independent from one to the next; the error of a surface that is bent
@@ -139,7 +140,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   const double resolution =
       std::max(registration_limits::still_spacings * target.spacing(), registration_limits::least_resolution);
   Pose pose = initial, best_pose = initial;
-  double best_rmse = std::numeric_limits<double>::infinity();
+  double best_rmse = infinity<double>;
   bool at_rest = false;
 
   for (int iteration = 0; iteration < options.max_iterations && !at_rest; ++iteration) {
@@ -190,10 +191,10 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
 }  // namespace
 
 double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double floor) {
-  const double median_weight = median_of(pairs, [](const Pair& pair) { return pair.weight; });
+  const double median_weight = median_over(pairs, [](const Pair& pair) { return pair.weight; });
   for (Pair& pair : pairs) pair.weight /= median_weight;
   const auto whitened = [&](const Pair& pair) { return std::abs(residual(pair, metric)) * std::sqrt(pair.weight); };
-  const double scale = std::max(floor, mad_to_sigma * median_of(pairs, whitened));
+  const double scale = std::max(floor, mad_to_sigma * median_over(pairs, whitened));
   if (robust) {
     for (Pair& pair : pairs) {
       const double agreement = robust_weight(whitened(pair), scale);

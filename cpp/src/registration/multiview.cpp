@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <memory>
 
 #include "base/limits.hpp"
 #include "base/linear_algebra.hpp"
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "registration/icp.hpp"
@@ -17,7 +17,7 @@
 namespace nacre {
 namespace {
 
-constexpr double no_limit = std::numeric_limits<double>::infinity();
+constexpr double no_limit = infinity<double>;
 
 struct Side {
   IcpSource source;

@@ -3,6 +3,7 @@
 
 #include <limits>
 
+#include "base/numbers.hpp"
 #include "nacre/registration.hpp"
 
 namespace nacre {
@@ -14,8 +15,8 @@ struct Pair {
   Eigen::Vector3d half_difference;  // of the two points' normals; NaN where only one is known
   double weight;
   double agreement = 1.0;  // the part of the weight that says how well the two points match, at most 1
-  double noise = std::numeric_limits<double>::quiet_NaN();            // of p: a standard deviation [m]
-  double largest_residual = std::numeric_limits<double>::infinity();  // that a match may have [m]
+  double noise = std::numeric_limits<double>::quiet_NaN();  // of p: a standard deviation [m]
+  double largest_residual = infinity<double>;               // that a match may have [m]
 };
 
 inline double residual(const Pair& pair, Metric metric) {

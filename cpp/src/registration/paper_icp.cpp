@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "base/numbers.hpp"
 #include "base/random.hpp"
 #include "nacre/kdtree.hpp"
 #include "nacre/normals.hpp"
@@ -22,7 +23,7 @@ Points known_or_estimated(const AlignCloud& cloud, int num_threads) {
 }
 
 double diameter(const PointsRef& points) {
-  Eigen::Array3f low = Eigen::Array3f::Constant(std::numeric_limits<float>::infinity()), high = -low;
+  Eigen::Array3f low = Eigen::Array3f::Constant(infinity<float>), high = -low;
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
     if (!points.row(i).allFinite()) continue;
     low = low.min(points.row(i).transpose().array());
@@ -72,7 +73,7 @@ class PaperIcp {
   struct Iterate {
     Pose pose = Pose::Identity();
     std::vector<Pair> pairs;
-    double rmse = std::numeric_limits<double>::infinity();
+    double rmse = infinity<double>;
     int iteration = 0;
     bool is_at_rest = false;
   };

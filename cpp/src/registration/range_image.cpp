@@ -2,16 +2,12 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
+#include "base/numbers.hpp"
 #include "registration/limits.hpp"
 
 namespace nacre {
-namespace {
-
-constexpr float infinity = std::numeric_limits<float>::infinity();
-
-}  // namespace
+namespace {}  // namespace
 
 FreeSpace::FreeSpace(const PointsRef& points, const Eigen::Vector3d& viewpoint) : viewpoint_(viewpoint) {
   std::vector<Eigen::Vector3d> finite;
@@ -33,7 +29,7 @@ FreeSpace::FreeSpace(const PointsRef& points, const Eigen::Vector3d& viewpoint) 
 
   std::vector<Projection> projections;
   projections.reserve(finite.size());
-  Eigen::Vector2d low = Eigen::Vector2d::Constant(infinity), high = -low;
+  Eigen::Vector2d low = Eigen::Vector2d::Constant(infinity<float>), high = -low;
   double squares = 0.0;
   for (const Eigen::Vector3d& point : finite) {
     projections.push_back(project(point));
@@ -55,7 +51,7 @@ FreeSpace::FreeSpace(const PointsRef& points, const Eigen::Vector3d& viewpoint) 
 
 void FreeSpace::fill_cells(const std::vector<Projection>& projections) {
   struct Range {
-    float nearest = infinity, farthest = -infinity;
+    float nearest = infinity<float>, farthest = -infinity<float>;
   };
   std::vector<Range> single(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   for (const Projection& projection : projections) {
@@ -72,7 +68,7 @@ void FreeSpace::fill_cells(const std::vector<Projection>& projections) {
       for (int v = -registration_limits::uncertain_cells; v <= registration_limits::uncertain_cells; ++v) {
         for (int u = -registration_limits::uncertain_cells; u <= registration_limits::uncertain_cells; ++u) {
           const Range& range = single[static_cast<std::size_t>((row + v) * width_ + column + u)];
-          if (!(range.nearest < infinity)) continue;
+          if (!(range.nearest < infinity<float>)) continue;
           cell.is_reached = true;
           if (std::max(std::abs(u), std::abs(v)) > 1) continue;
           ++filled;

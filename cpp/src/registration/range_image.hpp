@@ -1,9 +1,9 @@
 // What is known about the space in front of a cloud, behind it and beside it, that was seen from one place.
 #pragma once
 
-#include <limits>
 #include <vector>
 
+#include "base/numbers.hpp"
 #include "nacre/types.hpp"
 
 namespace nacre {
@@ -34,7 +34,7 @@ class FreeSpace {
   };
   // What is known of a cell from its own points and those around it.
   struct Cell {
-    float nearest = std::numeric_limits<float>::infinity(), farthest = -nearest;
+    float nearest = infinity<float>, farthest = -nearest;
     bool is_known = false, is_reached = false;
   };
 

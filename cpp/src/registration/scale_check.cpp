@@ -70,7 +70,7 @@ SizeDifference size_difference(const std::vector<Pair>& pairs, Metric metric) {
     mixed += row.size / row.weight * row.pose;
     gradient += row.right_side / row.weight * row.pose;
   }
-  const Vector6 by_pose = solve_for_twist(hessian, mixed), motion = solve_for_twist(hessian, gradient);
+  const Vector6 by_pose = solve_symmetric(hessian, mixed), motion = solve_symmetric(hessian, gradient);
 
   // What the motion cannot do: the rest of the column, on which the rest of the right side is regressed.
   const auto rest = [&](const RowSum& row) { return row.size - row.pose.dot(by_pose); };

@@ -1,16 +1,16 @@
 // Is a source as large as what it was registered to?
 #pragma once
 
-#include <limits>
 #include <vector>
 
+#include "base/numbers.hpp"
 #include "registration/icp_step.hpp"
 
 namespace nacre {
 
 struct SizeDifference {
   double relative = 0.0;  // by which the source would have to grow to fit better
-  double sigma = std::numeric_limits<double>::infinity();
+  double sigma = infinity<double>;
 };
 
 // Of pairs in the order of space, at rest: their least squares with one more unknown, a factor of the source about any

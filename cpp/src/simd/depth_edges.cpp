@@ -7,8 +7,6 @@
 namespace nacre::simd::NACRE_ISA {
 namespace {
 
-constexpr int chunk = 64;  // pixels
-
 struct Found {
   Mask edge, slanted;
 };

@@ -10,8 +10,6 @@
 namespace nacre::simd::NACRE_ISA {
 namespace {
 
-constexpr int chunk = 64;  // pixels
-
 NACRE_INLINE void select_values(const float* values, const uint8_t* keep, int count, float* kept) {
   for (int i = 0; i < count; ++i) kept[i] = values[i] + (keep[i] != 0 ? 0.0F : NAN);
 }

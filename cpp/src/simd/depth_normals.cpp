@@ -12,9 +12,8 @@ namespace {
 
 constexpr int group = 16;  // pixels that go the same way, whatever the number of lanes
 constexpr int parts = group / lanes;
-constexpr int chunk = 64;  // pixels that are written together
 
-constexpr float largest_misfit = 2.0F;  // of a plane: squared residuals per degree of freedom, in variances
+constexpr float largest_plane_misfit = 2.0F;  // of a plane: squared residuals per degree of freedom, in variances
 
 constexpr float full_window(int radius) { return static_cast<float>((2 * radius + 1) * (2 * radius + 1)); }
 // Sum of du^2 over a full window.
@@ -204,7 +203,7 @@ NACRE_INLINE bool fit_complete(const ColumnSums<radius>& columns, float group_or
     const F32 at_u = uw * per_spread, at_v = vw * per_spread;
     const F32 misfit =
         (ww - w * w * per_pixel - uw * at_u - vw * at_v) * broadcast(1.0F / (full_window(radius) - 3.0F));
-    const Mask is_plane = misfit <= broadcast(largest_misfit) * g.pixels[part].variance;
+    const Mask is_plane = misfit <= broadcast(largest_plane_misfit) * g.pixels[part].variance;
     if (any(has_radius<radius>(g, part) & (!(complete & is_plane)))) return false;
     planes[part] = {w * per_pixel - own, at_u, at_v, misfit};
   }
@@ -230,20 +229,21 @@ NACRE_INLINE Planes fit_members(const float* pixel, ptrdiff_t stride, const Grou
   const Moments below = sum_members<radius, -radius, radius>(pixel, stride, p, 1, radius);
   const Moments all = above + level + below;
   Planes best = fitted(all);
-  const Mask is_rough = has_radius<radius>(g, part) & (best.misfit > broadcast(largest_misfit) * p.variance);
+  const Mask is_rough = has_radius<radius>(g, part) & (best.misfit > broadcast(largest_plane_misfit) * p.variance);
   if (!any(is_rough)) return best;
   const Moments left = sum_members<radius, -radius, -1>(pixel, stride, p, -radius, radius);
   const Moments column = sum_members<radius, 0, 0>(pixel, stride, p, -radius, radius);
   const Planes sides[] = {fitted(left + column), fitted(all - left), fitted(above + level), fitted(level + below)};
   for (const Planes& side : sides) {
-    const Mask is_plane = side.misfit <= broadcast(largest_misfit) * p.variance;
+    const Mask is_plane = side.misfit <= broadcast(largest_plane_misfit) * p.variance;
     best = chosen(is_rough & (side.at_u == side.at_u) & is_plane & (side.misfit < best.misfit), side, best);
   }
   return best;
 }
 
 template <int radius>
-NACRE_INLINE void fit_radius(const PlanarRow& row, const NormalRule& rule, int begin, Group* groups, int num_groups) {
+NACRE_INLINE void fit_windows_of(const PlanarRow& row, const NormalRule& rule, int begin, Group* groups,
+                                 int num_groups) {
   ColumnSums<radius> columns[chunk / group];
   bool wanted[chunk / group], complete[chunk / group];
   for (int k = 0; k < num_groups; ++k) {
@@ -348,10 +348,10 @@ int fit_normals(const PlanarRow& row, const NormalRule& rule, const RayRow& rays
         groups[k].planes[part] = {missing, missing, missing, missing};
       }
     }
-    fit_radius<2>(row, rule, begin, groups, num_groups);
-    fit_radius<3>(row, rule, begin, groups, num_groups);
-    fit_radius<4>(row, rule, begin, groups, num_groups);
-    fit_radius<5>(row, rule, begin, groups, num_groups);
+    fit_windows_of<2>(row, rule, begin, groups, num_groups);
+    fit_windows_of<3>(row, rule, begin, groups, num_groups);
+    fit_windows_of<4>(row, rule, begin, groups, num_groups);
+    fit_windows_of<5>(row, rule, begin, groups, num_groups);
     for (int i = 0; i < count; i += lanes) {
       const Group& g = groups[i / group];
       const int part = i % group / lanes, u = begin + i, left = count - i;

@@ -8,7 +8,7 @@
 namespace nacre::simd::NACRE_ISA {
 namespace {
 
-constexpr int chunk = 64, margin = side_depth, pitch = chunk + 2 * margin + lanes;
+constexpr int margin = side_depth, pitch = chunk + 2 * margin + lanes;
 constexpr int num_rows = 2 * side_depth + 1, side_size = side_depth * (2 * side_reach + 1);
 constexpr float least_members = 0.5F * side_size;
 constexpr float largest_misfit = 1.5F;  // squared residuals per degree of freedom, in variances

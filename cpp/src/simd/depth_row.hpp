@@ -10,6 +10,7 @@ struct Quadratic {
   float constant, linear, square;
 };
 
+constexpr int chunk = 64;                 // pixels that are written together
 constexpr int largest_normal_window = 5;  // pixels on each side
 
 // One row of it; NaN where there is no measurement.

@@ -12,11 +12,11 @@ constexpr int tile = 16;  // windows
 constexpr int columns = 96;
 static_assert(columns >= fit_step * (tile - 1) + 2 * fit_radius + 1);
 
-struct ColumnSums {
+struct ColumnMoments {
   double one[columns], v[columns], vv[columns], squares[columns];  // of the value times 1, v, v^2 - 4; of its square
 };
 
-NACRE_INLINE void sum_columns(const float* first, ptrdiff_t stride, double origin, ColumnSums& sums) {
+NACRE_INLINE void sum_moments(const float* first, ptrdiff_t stride, double origin, ColumnMoments& sums) {
   for (int i = 0; i < columns; ++i) {
     const float* const p = first + i;
     const double a = p[-3 * stride] - origin, b = p[-2 * stride] - origin, c = p[-stride] - origin;
@@ -33,7 +33,7 @@ NACRE_INLINE double sum(const double* c) { return ((c[0] + c[6]) + (c[1] + c[5])
 NACRE_INLINE double sum_u(const double* c) { return 3.0 * (c[6] - c[0]) + 2.0 * (c[5] - c[1]) + (c[4] - c[2]); }
 
 // Orthogonal polynomials on -3..3: 1, u, v, u v, u^2 - 4, v^2 - 4. The quadratic ones take up smooth curvature.
-NACRE_INLINE void fit(const ColumnSums& sums, double* left_over, double* gradient) {
+NACRE_INLINE void fit(const ColumnMoments& sums, double* left_over, double* gradient) {
   for (int j = 0; j < tile; ++j) {
     const int i = fit_step * j;
     const double* const one = sums.one + i;
@@ -116,8 +116,8 @@ NACRE_INLINE void describe(const float* centre, ptrdiff_t stride, const WindowRu
   // About a value of the tile, so that plateaus leave nothing over.
   float origin = 0.0F;
   for (int j = tile - 1; j >= 0; --j) origin = middle[j] == middle[j] ? middle[j] : origin;
-  ColumnSums sums;
-  sum_columns(centre - fit_radius, stride, origin, sums);
+  ColumnMoments sums;
+  sum_moments(centre - fit_radius, stride, origin, sums);
   double left_over[tile], gradient[tile];
   fit(sums, left_over, gradient);
   float smallest_step[columns], step[tile];

@@ -10,12 +10,12 @@
 namespace nacre::simd::NACRE_ISA {
 namespace {
 
-constexpr int width = 16;
+constexpr int keys_at_once = 16;
 constexpr int axis_bits = curve_bits / 3;
 
 template <class T>
-NACRE_INLINE void widen_by_16(const T* points, T (&lo)[3][width], T (&hi)[3][width]) {
-  for (int i = 0; i < width; ++i) {
+NACRE_INLINE void widen_by_16(const T* points, T (&lo)[3][keys_at_once], T (&hi)[3][keys_at_once]) {
+  for (int i = 0; i < keys_at_once; ++i) {
     const T x = points[3 * i], y = points[3 * i + 1], z = points[3 * i + 2];
     const bool finite = (x - x) + (y - y) + (z - z) == 0;
     lo[0][i] = finite && x < lo[0][i] ? x : lo[0][i];
@@ -29,23 +29,23 @@ NACRE_INLINE void widen_by_16(const T* points, T (&lo)[3][width], T (&hi)[3][wid
 
 template <class T>
 void widen(const T* points, int64_t count, CurveBox<T>& box) {
-  T lo[3][width], hi[3][width];
+  T lo[3][keys_at_once], hi[3][keys_at_once];
   for (int axis = 0; axis < 3; ++axis) {
-    for (int i = 0; i < width; ++i) {
+    for (int i = 0; i < keys_at_once; ++i) {
       lo[axis][i] = box.lo[axis];
       hi[axis][i] = box.hi[axis];
     }
   }
   int64_t start = 0;
-  for (; start + width <= count; start += width) widen_by_16(points + 3 * start, lo, hi);
+  for (; start + keys_at_once <= count; start += keys_at_once) widen_by_16(points + 3 * start, lo, hi);
   if (start < count) {
-    T rest[3 * width];
+    T rest[3 * keys_at_once];
     for (T& missing : rest) missing = NAN;
     memcpy(rest, points + 3 * start, 3 * static_cast<size_t>(count - start) * sizeof(T));
     widen_by_16(rest, lo, hi);
   }
   for (int axis = 0; axis < 3; ++axis) {
-    for (int i = 0; i < width; ++i) {
+    for (int i = 0; i < keys_at_once; ++i) {
       box.lo[axis] = lo[axis][i] < box.lo[axis] ? lo[axis][i] : box.lo[axis];
       box.hi[axis] = hi[axis][i] > box.hi[axis] ? hi[axis][i] : box.hi[axis];
     }
@@ -104,26 +104,26 @@ uint32_t key_of(const T* point, const CurveCube<T>& cube) {
 
 template <class T>
 NACRE_INLINE void keys_of_16(const T* points, const CurveCube<T>& cube, uint32_t* keys) {
-  uint32_t cell[3][width], invalid[width];
-  for (int i = 0; i < width; ++i) invalid[i] = 0;
+  uint32_t cell[3][keys_at_once], invalid[keys_at_once];
+  for (int i = 0; i < keys_at_once; ++i) invalid[i] = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    for (int i = 0; i < width; ++i) {
+    for (int i = 0; i < keys_at_once; ++i) {
       const T v = points[3 * i + axis];
       invalid[i] |= v - v == 0 ? 0U : no_key;
       cell[axis][i] = cell_of(v, cube.lo[axis], cube.cells_per_unit);
     }
   }
   hilbert(cell[0], cell[1], cell[2], keys);
-  for (int i = 0; i < width; ++i) keys[i] |= invalid[i];
+  for (int i = 0; i < keys_at_once; ++i) keys[i] |= invalid[i];
 }
 
 template <class T>
 void keys_of(const T* points, int64_t count, const CurveCube<T>& cube, uint32_t* keys) {
   int64_t start = 0;
-  for (; start + width <= count; start += width) keys_of_16(points + 3 * start, cube, keys + start);
+  for (; start + keys_at_once <= count; start += keys_at_once) keys_of_16(points + 3 * start, cube, keys + start);
   if (start == count) return;
-  T rest[3 * width] = {};
-  uint32_t rest_keys[width];
+  T rest[3 * keys_at_once] = {};
+  uint32_t rest_keys[keys_at_once];
   const size_t left = static_cast<size_t>(count - start);
   memcpy(rest, points + 3 * start, 3 * left * sizeof(T));
   keys_of_16(rest, cube, rest_keys);

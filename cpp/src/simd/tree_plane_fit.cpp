@@ -10,7 +10,7 @@
 namespace nacre::simd::NACRE_ISA {
 namespace {
 
-constexpr int width = 16;
+constexpr int fits = 16;  // neighbourhoods at once
 constexpr int ranks_at_once = 16;
 
 // A neighbourhood is a line where the sum of the products of its variances is below this share of their sum's square:
@@ -24,14 +24,14 @@ constexpr double space_share = 0.22;
 
 // Sums over a neighbourhood of steps from the point itself, which keep their digits however far the origin is.
 struct Sums {
-  alignas(64) double x[width], y[width], z[width], xx[width], xy[width], xz[width], yy[width], yz[width], zz[width];
+  alignas(64) double x[fits], y[fits], z[fits], xx[fits], xy[fits], xz[fits], yy[fits], yz[fits], zz[fits];
 };
 
 template <class T>
 NACRE_INLINE void add_steps(const BlockTreeView<T>& tree, const Neighborhoods& in, int first, int end, Sums& sums) {
   // Steps are taken one by one, and added when the last of them are in memory.
-  alignas(64) T steps[ranks_at_once][3][width];
-  for (int i = 0; i < width; ++i) {
+  alignas(64) T steps[ranks_at_once][3][fits];
+  for (int i = 0; i < fits; ++i) {
     const T x = static_cast<T>(in.p[0][i]), y = static_cast<T>(in.p[1][i]), z = static_cast<T>(in.p[2][i]);
     const uint32_t* const slots = in.slots + static_cast<ptrdiff_t>(i) * in.stride;
     const int last = in.counts[i] < end ? in.counts[i] : end;
@@ -39,7 +39,7 @@ NACRE_INLINE void add_steps(const BlockTreeView<T>& tree, const Neighborhoods& i
     for (; rank < last; ++rank) {
       const PointBlock<T>& block = tree.blocks[slots[rank] / block_points];
       const uint32_t lane = slots[rank] % block_points;
-      T(*const step)[width] = steps[rank - first];
+      T(*const step)[fits] = steps[rank - first];
       step[0][i] = block.p[0][lane] - x;
       step[1][i] = block.p[1][lane] - y;
       step[2][i] = block.p[2][lane] - z;
@@ -49,7 +49,7 @@ NACRE_INLINE void add_steps(const BlockTreeView<T>& tree, const Neighborhoods& i
     }
   }
   for (int rank = 0; rank < end - first; ++rank) {
-    for (int i = 0; i < width; ++i) {
+    for (int i = 0; i < fits; ++i) {
       const double x = steps[rank][0][i], y = steps[rank][1][i], z = steps[rank][2][i];
       sums.x[i] += x;
       sums.y[i] += y;
@@ -66,12 +66,12 @@ NACRE_INLINE void add_steps(const BlockTreeView<T>& tree, const Neighborhoods& i
 
 // Covariance matrices, divided by their traces, and what the least eigenvalue is computed from.
 struct Shapes {
-  alignas(64) double xx[width], xy[width], xz[width], yy[width], yz[width], zz[width];
-  alignas(64) double minors[width], determinant[width], least[width];
+  alignas(64) double xx[fits], xy[fits], xz[fits], yy[fits], yz[fits], zz[fits];
+  alignas(64) double minors[fits], determinant[fits], least[fits];
 };
 
-NACRE_INLINE void shapes_of(const Sums& s, const int (&counts)[width], Shapes& out) {
-  for (int i = 0; i < width; ++i) {
+NACRE_INLINE void shapes_of(const Sums& s, const int (&counts)[fits], Shapes& out) {
+  for (int i = 0; i < fits; ++i) {
     const double share = 1.0 / counts[i];
     const double xx = s.xx[i] - s.x[i] * s.x[i] * share, yy = s.yy[i] - s.y[i] * s.y[i] * share;
     const double zz = s.zz[i] - s.z[i] * s.z[i] * share;
@@ -90,10 +90,10 @@ NACRE_INLINE void shapes_of(const Sums& s, const int (&counts)[width], Shapes& o
 // below, where the cubic has no extremum; towards a double root each halves the distance. A lane that has arrived stays
 // where it is, whatever the others do.
 NACRE_INLINE void find_least_variances(Shapes& s) {
-  alignas(64) double v[width] = {}, moves[width];
-  for (int i = 0; i < width; ++i) moves[i] = 1;
+  alignas(64) double v[fits] = {}, moves[fits];
+  for (int i = 0; i < fits; ++i) moves[i] = 1;
   for (int pass = 0; pass < 50; ++pass) {
-    for (int i = 0; i < width; ++i) {
+    for (int i = 0; i < fits; ++i) {
       const double slope = (3 * v[i] - 2) * v[i] + s.minors[i];
       const double step = (((v[i] - 1) * v[i] + s.minors[i]) * v[i] - s.determinant[i]) / slope;
       const double next = v[i] - step;
@@ -101,15 +101,15 @@ NACRE_INLINE void find_least_variances(Shapes& s) {
       moves[i] = fabs(step) >= 1e-15 && next <= space_share ? moves[i] : 0;
     }
     double any = 0;
-    for (int i = 0; i < width; ++i) any = moves[i] > any ? moves[i] : any;
+    for (int i = 0; i < fits; ++i) any = moves[i] > any ? moves[i] : any;
     if (!(any > 0)) break;
   }
-  for (int i = 0; i < width; ++i) s.least[i] = v[i];
+  for (int i = 0; i < fits; ++i) s.least[i] = v[i];
 }
 
 // c - v I has its eigenvector in its kernel, so that every column of its adjugate is a multiple of it.
-NACRE_INLINE void normals_of(const Shapes& s, const int (&counts)[width], double (&normals)[3][width]) {
-  for (int i = 0; i < width; ++i) {
+NACRE_INLINE void normals_of(const Shapes& s, const int (&counts)[fits], double (&normals)[3][fits]) {
+  for (int i = 0; i < fits; ++i) {
     const double a = s.xx[i] - s.least[i], d = s.yy[i] - s.least[i], f = s.zz[i] - s.least[i];
     const double b = s.xy[i], c = s.xz[i], e = s.yz[i];
     const double xx = d * f - e * e, yy = a * f - c * c, zz = a * d - b * b;
@@ -125,7 +125,7 @@ NACRE_INLINE void normals_of(const Shapes& s, const int (&counts)[width], double
 }
 
 template <class T>
-void fit_planes(const BlockTreeView<T>& tree, const Neighborhoods& in, double (&normals)[3][width]) {
+void fit_planes(const BlockTreeView<T>& tree, const Neighborhoods& in, double (&normals)[3][fits]) {
   int most = 0;
   for (const int count : in.counts) most = count > most ? count : most;
   Sums sums = {};

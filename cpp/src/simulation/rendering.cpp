@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "base/check.hpp"
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "simulation/limits.hpp"
 
@@ -32,7 +33,7 @@ struct Disk {
 };
 
 struct Pixel {
-  float depth = std::numeric_limits<float>::infinity();
+  float depth = infinity<float>;
   float weight = 0.0f;
   bool reverse = false;
   Vector3f normal = Vector3f::Zero();

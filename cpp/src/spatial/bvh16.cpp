@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "spatial/hilbert_order.hpp"
 
@@ -9,7 +10,7 @@ namespace nacre {
 namespace {
 
 template <class T>
-struct Box {
+struct Bounds {
   T lo[3], hi[3];
   std::uint32_t first_id;
 };
@@ -34,8 +35,8 @@ T greater(T a, T b) {
 }
 
 template <class T>
-Box<T> box_of(const PointBlock<T>& block) {
-  Box<T> box;
+Bounds<T> box_of(const PointBlock<T>& block) {
+  Bounds<T> box;
   for (int axis = 0; axis < 3; ++axis) {
     box.lo[axis] = fold_lanes(block.p[axis], lesser<T>);
     box.hi[axis] = fold_lanes(block.p[axis], greater<T>);
@@ -45,8 +46,8 @@ Box<T> box_of(const PointBlock<T>& block) {
 }
 
 template <class T>
-Box<T> box_of(const BoxGroup<T>& group) {
-  Box<T> box;
+Bounds<T> box_of(const BoxGroup<T>& group) {
+  Bounds<T> box;
   for (int axis = 0; axis < 3; ++axis) {
     box.lo[axis] = fold_lanes(group.lo[axis], lesser<T>);
     box.hi[axis] = fold_lanes(group.hi[axis], greater<T>);
@@ -67,13 +68,13 @@ constexpr std::int64_t groups_for(std::int64_t children) { return (children + gr
 // Fills groups with the boxes of the level below.
 template <class T, class Child>
 void fill_groups(const Child* children, std::int64_t num_children, BoxGroup<T>* groups, int num_threads) {
-  constexpr T inf = std::numeric_limits<T>::infinity();
+  constexpr T inf = infinity<T>;
   parallel_for(groups_for(num_children), 64, num_threads, [&](std::int64_t i) {
     BoxGroup<T>& group = groups[i];
     for (int lane = 0; lane < group_boxes; ++lane) {
       const std::int64_t child = i * group_boxes + lane;
-      const Box<T> box =
-          child < num_children ? box_of(children[child]) : Box<T>{{inf, inf, inf}, {-inf, -inf, -inf}, no_id};
+      const Bounds<T> box =
+          child < num_children ? box_of(children[child]) : Bounds<T>{{inf, inf, inf}, {-inf, -inf, -inf}, no_id};
       for (int axis = 0; axis < 3; ++axis) {
         group.lo[axis][lane] = box.lo[axis];
         group.hi[axis][lane] = box.hi[axis];

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "base/buffer.hpp"
+#include "base/numbers.hpp"
 #include "simd/tree_hilbert_keys.hpp"
 #include "simd/tree_layout.hpp"
 #include "simd/tree_near_points.hpp"
@@ -33,7 +34,7 @@ constexpr std::uint32_t no_id = std::numeric_limits<std::uint32_t>::max();
 inline double squared_bound(double distance) {
   double square = distance * distance;
   while (std::isfinite(square)) {
-    const double next = std::nextafter(square, std::numeric_limits<double>::infinity());
+    const double next = std::nextafter(square, infinity<double>);
     if (std::sqrt(next) > distance) break;
     square = next;
   }

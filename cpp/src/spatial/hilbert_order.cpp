@@ -4,6 +4,8 @@
 #include <limits>
 #include <utility>
 
+#include "base/numbers.hpp"
+
 namespace nacre {
 namespace {
 
@@ -29,7 +31,7 @@ void curve_keys(const double* points, std::int64_t count, const CurveCube<double
 
 template <class T>
 CurveBox<T> empty_box() {
-  constexpr T inf = std::numeric_limits<T>::infinity();
+  constexpr T inf = infinity<T>;
   return {{inf, inf, inf}, {-inf, -inf, -inf}};
 }
 

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "base/check.hpp"
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "base/point_rows.hpp"
 #include "spatial/bvh16.hpp"
@@ -149,7 +150,7 @@ struct KdTree::Impl {
       std::fill_n(task.indices + row * task.k, task.k, task.missing);
       if (task.distances != nullptr) std::fill_n(task.distances + row * task.k, task.k, infinity);
       if (task.float_distances != nullptr) {
-        std::fill_n(task.float_distances + row * task.k, task.k, std::numeric_limits<float>::infinity());
+        std::fill_n(task.float_distances + row * task.k, task.k, nacre::infinity<float>);
       }
     });
   }

@@ -6,6 +6,7 @@
 #include <type_traits>
 #include <vector>
 
+#include "base/numbers.hpp"
 #include "simd/tree_nearest_group.hpp"
 #include "spatial/bvh16.hpp"
 
@@ -29,7 +30,7 @@ inline void nearest_group(const BlockTreeView<double>& tree, const simd::Nearest
 inline void write_answer(const simd::NearestTask& task, std::uint32_t row, const Found* found, int count) {
   const std::int64_t start = static_cast<std::int64_t>(row) * task.k;
   for (int j = 0; j < task.k; ++j) {
-    const double distance = j < count ? std::sqrt(found[j].d2) : std::numeric_limits<double>::infinity();
+    const double distance = j < count ? std::sqrt(found[j].d2) : infinity<double>;
     task.indices[start + j] = j < count ? found[j].id : task.missing;
     if (task.distances != nullptr) {
       task.distances[start + j] = distance;

@@ -2,10 +2,10 @@
 
 #include <cmath>
 
+#include "base/numbers.hpp"
+
 namespace nacre {
 namespace {
-
-constexpr float infinity = std::numeric_limits<float>::infinity();
 
 float squared_distance(const BlockTree<float>& tree, std::uint32_t slot, float x, float y, float z) {
   const PointBlock<float>& block = tree.view().blocks[slot / block_points];
@@ -40,7 +40,7 @@ class NearestInFloat {
   }
 
   const BlockTree<float>& tree_;
-  float x_, y_, z_, d2_ = infinity;
+  float x_, y_, z_, d2_ = infinity<float>;
   std::uint32_t slot_ = no_slot;
   Found bound_ = {};
 };
@@ -100,13 +100,13 @@ class Search {
     std::int64_t left[16];
     int num_left = 0;
     for (int i = 0; i < size; ++i) {
-      const bool found = !group.crowded && group.squared_distance[i] < infinity;
+      const bool found = !group.crowded && group.squared_distance[i] < infinity<float>;
       if (found || (!group.crowded && radius2 >= largest2_)) {
         write(rows[i], found ? group.slot[i] : no_slot, group.squared_distance[i], group.next[i]);
       } else if (group.crowded || size == 1) {
         const NearestInFloat nearest = nearest_alone(rows[i]);
         const bool any = nearest.slot() != no_slot;
-        write(rows[i], nearest.slot(), any ? nearest.d2() : infinity, nearest.d2());
+        write(rows[i], nearest.slot(), any ? nearest.d2() : infinity<float>, nearest.d2());
       } else {
         left[num_left++] = rows[i];
       }
@@ -145,8 +145,8 @@ void find_nearest_points(const BlockTree<float>& tree, const NearestPoints& quer
                          std::int64_t end, double max_distance) {
   if (tree.num_points() == 0) {
     std::fill(queries.slots + begin, queries.slots + end, no_slot);
-    std::fill(queries.squared_distances + begin, queries.squared_distances + end, infinity);
-    if (queries.next != nullptr) std::fill(queries.next + begin, queries.next + end, infinity);
+    std::fill(queries.squared_distances + begin, queries.squared_distances + end, infinity<float>);
+    if (queries.next != nullptr) std::fill(queries.next + begin, queries.next + end, infinity<float>);
     return;
   }
   Search(tree, queries, max_distance)(begin, end);

@@ -4,6 +4,7 @@
 #include <cstring>
 #include <utility>
 
+#include "base/numbers.hpp"
 #include "base/parallel.hpp"
 #include "base/random.hpp"
 
@@ -12,8 +13,6 @@ namespace {
 
 constexpr std::int64_t rows_per_block = 8192;
 constexpr int bin_bits = 12;
-
-std::size_t as_size(std::int64_t i) { return static_cast<std::size_t>(i); }
 
 // Every finite row draws a ticket, and the lowest are taken.
 using Ticket = std::pair<std::uint64_t, std::int64_t>;

@@ -1,0 +1,15 @@
+// Names for what the standard library says at length.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+
+namespace nacre {
+
+template <class T>
+constexpr T infinity = std::numeric_limits<T>::infinity();
+
+inline std::size_t as_size(std::int64_t i) { return static_cast<std::size_t>(i); }
+
+}  // namespace nacre
