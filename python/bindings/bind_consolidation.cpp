@@ -46,11 +46,15 @@ auto project_samples(const Cloud& samples, const Cloud& points, const Consolidat
 }  // namespace
 
 void bind_consolidation(py::module_& m) {
-  py::enum_<nacre::ConsolidationMethod>(m, "ConsolidationMethod")
+  py::native_enum<nacre::ConsolidationMethod>(m, "ConsolidationMethod", "enum.Enum")
       .value("wlop", nacre::ConsolidationMethod::wlop)
       .value("wlop_plus", nacre::ConsolidationMethod::wlop_plus)
-      .value("cgal", nacre::ConsolidationMethod::cgal);
-  py::enum_<nacre::Theta>(m, "Theta").value("huang", nacre::Theta::huang).value("printed", nacre::Theta::printed);
+      .value("cgal", nacre::ConsolidationMethod::cgal)
+      .finalize();
+  py::native_enum<nacre::Theta>(m, "Theta", "enum.Enum")
+      .value("huang", nacre::Theta::huang)
+      .value("printed", nacre::Theta::printed)
+      .finalize();
 
   py::class_<ConsolidateOptions>(m, "ConsolidateOptions")
       .def(py::init<>())

@@ -24,10 +24,11 @@ std::pair<DepthImage, DepthReport> preprocess_depth(const DepthRef& depth, const
 }  // namespace
 
 void bind_depth(py::module_& m) {
-  py::enum_<EdgeTest>(m, "EdgeTest")
+  py::native_enum<EdgeTest>(m, "EdgeTest", "enum.Enum")
       .value("none", EdgeTest::none)
       .value("gradient", EdgeTest::gradient)
-      .value("inverse_depth", EdgeTest::inverse_depth);
+      .value("inverse_depth", EdgeTest::inverse_depth)
+      .finalize();
   py::class_<NoiseModel>(m, "NoiseModel")
       .def(py::init<>())
       .def_readwrite("constant", &NoiseModel::constant)

@@ -61,10 +61,11 @@ FrameReport add_frame(Model& model, const DepthRef& depth, const MaskRef& mask, 
 }  // namespace
 
 void bind_model(py::module_& m) {
-  py::enum_<FusionMethod>(m, "FusionMethod")
+  py::native_enum<FusionMethod>(m, "FusionMethod", "enum.Enum")
       .value("fuse", FusionMethod::fuse)
       .value("wlop", FusionMethod::wlop)
-      .value("wlop_plus", FusionMethod::wlop_plus);
+      .value("wlop_plus", FusionMethod::wlop_plus)
+      .finalize();
 
   py::class_<FusionOptions>(m, "FusionOptions")
       .def(py::init<>())

@@ -5,11 +5,12 @@
 using namespace nacre;
 
 void bind_registration(py::module_& m) {
-  py::enum_<Metric>(m, "Metric")
+  py::native_enum<Metric>(m, "Metric", "enum.Enum")
       .value("point_to_point", Metric::point_to_point)
       .value("point_to_plane", Metric::point_to_plane)
       .value("symmetric", Metric::symmetric)
-      .value("paper", Metric::paper);
+      .value("paper", Metric::paper)
+      .finalize();
 
   py::class_<AlignOptions>(m, "AlignOptions")
       .def(py::init<>())
