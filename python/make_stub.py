@@ -6,6 +6,7 @@ Write nacre/_core.pyi from the extension module that is installed.
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 import tempfile
@@ -30,6 +31,10 @@ def main() -> None:
         text = (Path(folder) / "nacre" / "_core.pyi").read_text()
     for written, meant in REPLACEMENTS:
         text = text.replace(written, meant)
+    # Enumerations: members as the typing specification writes them, and no constructor.
+    for name in re.findall(r"class (\w+)\(enum\.Enum\)", text):
+        text = re.sub(rf"    (\w+): typing\.ClassVar\[{name}\]", r"    \1 = ...", text)
+    text = re.sub(r"    @classmethod\n    def __new__\(cls, value\):\n( {8}.*\n)*", "", text)
     target.write_text("".join(line for line in text.splitlines(True) if not line.startswith("__all__")))
     subprocess.run(["ruff", "format", "--quiet", str(target)], check=True)
     subprocess.run(["ruff", "check", "--fix", "--quiet", str(target)], check=True)
