@@ -47,6 +47,12 @@ REAL = {
 }
 
 
+RIGHT_SHIFT = 0.02
+"""Of the median depth: a frame that is farther from the truth is wrong."""
+RIGHT_TURN = 3.0
+"""[degrees] Likewise."""
+
+
 @dataclass
 class Case:
     """Depth images [m] of one camera, in turn."""
@@ -186,6 +192,11 @@ def run(case: Case, *, num_threads: int = 1, **options: Any) -> tuple[Figures, n
     return measure(case, model), model
 
 
+def middle_depth(depths: list[Array]) -> float:
+    """Return the median depth of some of the images [m]."""
+    return float(np.median([np.nanmedian(image) for image in depths[:: max(1, len(depths) // 20)]]))
+
+
 def measure(case: Case, model: nacre.Model) -> Figures:
     """Return the figures of a case that has been run."""
     status = [report.status for report in model.frames]
@@ -195,11 +206,9 @@ def measure(case: Case, model: nacre.Model) -> Figures:
     if known:
         poses = np.array([model.frames[i].world_from_camera for i in known])
         truths = np.array([case.truths[i] for i in known])
-        depth = float(
-            np.median([np.nanmedian(image) for image in case.depths[:: max(1, len(case.depths) // 20)]])
-        )
-        motion, shifts, turns = best_fit(poses, truths, 0.02 * depth, 3.0)
-        right = int(np.sum((shifts < 0.02 * depth) & (turns < 3.0)))
+        largest = RIGHT_SHIFT * middle_depth(case.depths)
+        motion, shifts, turns = best_fit(poses, truths, largest, RIGHT_TURN)
+        right = int(np.sum((shifts < largest) & (turns < RIGHT_TURN)))
         ate, angle = 1e3 * float(np.sqrt(np.mean(shifts**2))), float(turns.max())
         if case.mesh is not None:
             points = np.asarray(model.points, float) @ motion[:3, :3].T + motion[:3, 3]

@@ -25,6 +25,11 @@ def parse() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=layout)
     add = parser.add_argument
     add("--only", nargs="+", metavar="NAME", default=[], help="these rows, such as bunny12 or teddy")
+    add(
+        "--real",
+        action="store_true",
+        help="real recordings, everybody untuned: frames claimed, right and wrong",
+    )
     add("--data", type=Path, default=ROOT.parent / "shared" / "data", help="folder of recordings and meshes")
     add("--output", type=Path, default=HERE / "results" / "tracking", help="folder of results.json")
     add("--work", type=Path, help="folder of simulated recordings and models (default: OUTPUT/work)")

@@ -11,6 +11,7 @@ from typing import Any
 from track import commands, page, pictures
 from track.figures import TAU, collect
 from track.peers import TITLES
+from track.right import right_frames
 from track.rows import Figures, Places, Row
 from track.table import BY_NAME, ROWS
 
@@ -46,7 +47,10 @@ def attempt(places: Places, row: Row, name: str, run: Any) -> Figures:
             arguments = [row.mesh(places), "--tau", TAU, "--scale", row.scale]
         known = any(frame["truth"] is not None for frame in report["frames"])
         evaluation = commands.evaluate(out, *arguments) if known or arguments else {}
-        return collect(evaluation, out, processor)
+        figures = collect(evaluation, out, processor)
+        return (
+            {**figures, **right_frames(row.recording(places), out)} if row.real and row.recording else figures
+        )
     except (RuntimeError, OSError, ValueError) as error:
         return {"failed": str(error)}
 
@@ -64,7 +68,7 @@ def main() -> int:
         print(f"there is no row {', '.join(unknown)}; there are {', '.join(BY_NAME)}", file=sys.stderr)
         return 2
     for row in ROWS:
-        if options["only"] and row.name not in options["only"]:
+        if row.name not in options["only"] if options["only"] else row.real != options["real"]:
             continue
         try:
             found = run_row(places, row, options["peers"])

@@ -88,6 +88,8 @@ class Row:
         Of the first contender.
     note : str
         Under the title.
+    real : bool
+        One of the recordings of ``--real``: how many of the claimed frames are right.
     measure : callable, optional
         ``measure(places, row)`` returns the contenders' figures by name; in place of all of the above.
     """
@@ -102,4 +104,5 @@ class Row:
     peers: tuple[str, ...] = ()
     goals: tuple[Goal, ...] = ()
     note: str = ""
+    real: bool = False
     measure: Callable[[Places, Row], dict[str, Figures]] | None = None

@@ -72,6 +72,7 @@ CONSTANTS = [
     ("noise", "Until five frames", "tracking/limits.hpp", "enough_noise_frames = 5.0"),
     ("noise", "4, 8 and 16 times", "tracking/limits.hpp", "largest_noise_factor = 16.0"),
     ("tracking", r"O\, C^{12}", "registration/limits.hpp", "relocalisation_consistency_power = 12.0"),
+    ("tracking", r"\frac{0.1}{\bar c}", "registration/limits.hpp", "wrong_contradiction = 0.1"),
     ("tracking", "| 4 | 1 | 0.005 | 5 |", "registration/limits.hpp", "size_sigma = 0.005"),
     ("tracking", "| 1.2 times as much | 4 | 1", "registration/limits.hpp", "doubtful_score = 1.2"),
     ("tracking", "| 8 | 0.5 | any | 3 |", "registration/limits.hpp", "far_consistency_power = 8.0"),

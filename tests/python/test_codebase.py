@@ -252,8 +252,8 @@ def test_the_stub_fits_the_extension_module() -> None:
         str(ROOT / "pyproject.toml"),
     ]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
-    # Stubs cannot say that pybind11 classes have a metaclass, that some have no constructor, and what pybind11 keeps
-    # in an enumeration.
+    # Stubs cannot say that pybind11 classes have a metaclass, that some have no constructor, and what
+    # pybind11 keeps in an enumeration.
     unsayable = (
         "is inconsistent, metaclass differs",
         '__init__ is inconsistent, stub does not have *args parameter "args"',

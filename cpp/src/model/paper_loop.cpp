@@ -72,7 +72,7 @@ TrackingResult PaperLoop::register_frame(const CurrentFrame& now, const Tracking
                               result.alignment.target_from_source, now.camera, {margin}, options.num_threads)
                           .consistency(tracking_limits::least_judged);
   result.consistency = std::isfinite(part) ? part : 0.0;
-  result.test(options);
+  result.test(options, target.usual_contradiction);
   return result;
 }
 

@@ -173,7 +173,8 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   }
   if (options.registration.method == Metric::paper) {
     return PaperLoop{options, static_cast<std::int32_t>(history.size())}.register_frame(
-        {frame, camera, observer, now}, {cloud, spacing, before, 0}, guesses(extras).front());
+        {frame, camera, observer, now}, {cloud, spacing, before, 0, usual_contradiction.mean()},
+        guesses(extras).front());
   }
   result = track_frame({guesses(extras), was_lost() || jumped(), elsewhere(region_report)});
   const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
@@ -189,7 +190,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
 TrackingResult Pipeline::track_frame(TrackingPrior prior) {
   const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
   const CurrentFrame current{frame, camera, observer, now};
-  const TrackingTarget target{cloud, spacing, before, oldest_frame};
+  const TrackingTarget target{cloud, spacing, before, oldest_frame, usual_contradiction.mean()};
   TrackingResult result;
   if (learns_noise() && !residual_noise.is_known()) {
     TrackingOptions nearby = options;
@@ -207,6 +208,9 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior) {
     }
   }
   if (result.is_lost()) result = track(current, target, std::move(prior), hypothesis, options);
+  if (result.decision == Decision::accepted && result.expectation == Expectation::expected) {
+    usual_contradiction.add(1.0 - result.consistency);
+  }
   if (learns_noise() && result.decision == Decision::accepted && !result.is_on_plane) {
     residual_noise.add(noise_factor * result.alignment.residual_sigmas);
     set_noise_factor(residual_noise.factor());

@@ -13,6 +13,7 @@
 #include "tracking/relocalisation_filter.hpp"
 #include "tracking/residual_noise.hpp"
 #include "tracking/tracking.hpp"
+#include "tracking/usual_contradiction.hpp"
 
 namespace nacre {
 
@@ -27,13 +28,14 @@ struct Pipeline {
   PointModel cloud;
   LoopClosure loops{camera, options};
   FrameHistory history;
-  DepthView now;                      // of the newest, from the origin: where the camera is, is to be found
-  std::vector<OutlinePoint> outline;  // of the newest
-  DepthView before;                   // of the newest frame that was fused
-  ResidualNoise residual_noise;       // of registered frames, against what images show
-  double noise_factor = 1.0;          // of the newest frame
-  PlaceHypothesis hypothesis;         // while the camera is lost
-  std::vector<ObjectView> views;      // of an object that stands on a plane, from different directions
+  DepthView now;                           // of the newest, from the origin: where the camera is, is to be found
+  std::vector<OutlinePoint> outline;       // of the newest
+  DepthView before;                        // of the newest frame that was fused
+  ResidualNoise residual_noise;            // of registered frames, against what images show
+  UsualContradiction usual_contradiction;  // likewise, between them and the model
+  double noise_factor = 1.0;               // of the newest frame
+  PlaceHypothesis hypothesis;              // while the camera is lost
+  std::vector<ObjectView> views;           // of an object that stands on a plane, from different directions
   double spacing = 0.0;
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
 

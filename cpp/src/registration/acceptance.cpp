@@ -32,6 +32,13 @@ Demands demands_on(const IcpResult& alignment, Expectation expectation) {
   }
 }
 
+// Of a right place to a wrong one; at most 1, and never 0.
+double likelihood_ratio(double contradiction, double usual) {
+  const double wrong = registration_limits::wrong_contradiction;
+  const double right = std::clamp(usual, registration_limits::least_ratio * wrong, wrong);
+  return std::min(1.0, wrong / right * std::exp(-contradiction * (1.0 / right - 1.0 / wrong)));
+}
+
 bool is_other_size(const SizeDifference& size, Expectation expectation) {
   using namespace registration_limits;
   const bool is_far = expectation == Expectation::unexpected;
@@ -57,9 +64,11 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
   const double bent = std::max(1.0, alignment.misfit / demands.largest_misfit);
   const double per_match = std::max(0.0, std::log(chance_ratio / ratio)) / (bent * bent);
   const double least = demands.score * options.min_score;
+  const double unlikely = likelihood_ratio(1.0 - consistency, options.usual_contradiction);
   acceptance.score = overlap * overlap * std::pow(consistency, demands.consistency_power) * per_match;
+  if (expectation == Expectation::unexpected) acceptance.score *= unlikely;
   acceptance.relocalisation_score = overlap * std::pow(consistency, relocalisation_consistency_power) * per_match /
-                                    (bent * bent) * alignment.normal_information;
+                                    (bent * bent) * alignment.normal_information * unlikely;
   if (options.verify && is_other_size(alignment.size_difference, expectation)) {
     acceptance.relocalisation_score = 0.0;
     reason << "the frame is " << 1.0 / (1.0 + alignment.size_difference.relative)

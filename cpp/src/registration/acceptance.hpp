@@ -22,6 +22,8 @@ enum class Expectation {
 struct AcceptanceOptions {
   double min_score;
   bool verify;
+  double
+      usual_contradiction;  // mean 1 - consistency of what has been accepted, or of wrong places where that is unknown
 };
 
 enum class Decision {
@@ -50,6 +52,10 @@ struct Acceptance {
 // against it (overlap, not its square), contradictions and misfit do the more (consistency^12, misfit^4), and what the
 // residuals tell counts as much as the normals agree: see normal_information. Where only a plane of the one fits a
 // plane of the other it is 0.
+//
+// Where the camera makes few contradictions, few are believed far from all guesses: taken as exponentially distributed,
+// with one mean where places are right, as has been seen, and another where they are wrong, both scores are multiplied
+// by the ratio of the two likelihoods where it speaks against the place.
 //
 // Directions that the source leaves open (weak) are taken from a guess; far from all guesses there is none, and the
 // pose is rejected.

@@ -51,6 +51,7 @@ constexpr double chance_ratio = 0.58;  // [1] derived: residuals to the largest 
 constexpr double least_ratio = 0.01;  // [1] tuned: data without noise is no more certain; test_acceptance
 constexpr double consistency_power = 4.0;  // [1] tuned: in the registration score; pairs
 constexpr double far_consistency_power = 8.0;  // [1] tuned: the same far from all guesses; pairs
+constexpr double wrong_contradiction = 0.1;  // [1] tuned: mean part of a wrong place that is seen through, where it fits; icl
 constexpr double far_misfit = 0.5;  // [1] tuned: far from all guesses, what bends more counts less; pairs
 constexpr double doubtful_score = 1.2;  // [min_score] tuned: asked after a loss, and far from all guesses; pairs
 constexpr double doubtful_plane_score = 4.0;  // [min_score] tuned: asked of a plane far from all guesses; pairs

@@ -46,7 +46,7 @@ TrackingResult FrameRegistration::from(const Pose& guess, Gate gate, Expectation
   result.consistency = consistency(view, pose);
   const bool is_far = view_distance(guess, pose, depth_) > camera_limits::new_direction / camera_limits::view_turn;
   result.expectation = is_far ? Expectation::unexpected : expectation;
-  result.test(options_);
+  result.test(options_, target_.usual_contradiction);
   return result;
 }
 

@@ -27,6 +27,7 @@ struct TrackingTarget {
   double spacing;              // of the model [m]
   const DepthView& last_view;  // what the camera saw when it was last registered
   std::int32_t oldest_frame;   // points that no later frame has seen may have drifted away: they are left out
+  double usual_contradiction;  // of registered frames: see AcceptanceOptions
 };
 
 class FrameRegistration {

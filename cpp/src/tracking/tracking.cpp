@@ -39,7 +39,7 @@ std::optional<TrackingResult> turned_on_plane(const TrackingTarget& target, cons
   result.alignment = fit->alignment;
   result.consistency = fit->consistency;
   result.expectation = Expectation::only_place;
-  result.test(options);
+  result.test(options, target.usual_contradiction);
   result.is_to_whole_model = result.is_on_plane = true;
   return result;
 }
@@ -60,14 +60,13 @@ TrackingResult around_key_poses(const FrameRegistration& registration, const Poi
 
 }  // namespace
 
-TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, TrackingPrior prior,
+TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, const TrackingPrior& prior,
                      PlaceHypothesis& hypothesis, const TrackingOptions& options) {
   FrameRegistration registration(now, target, options);
   const IcpSource& source = registration.source();
   TrackingResult best;
   best.alignment.target_from_source = prior.guesses.front();
   const std::optional<Pose> followed = hypothesis.predict(source, options.registration);
-  if (followed) prior.guesses.insert(prior.guesses.begin(), *followed);
 
   try_guesses(registration, prior, best);
   if (best.is_lost() && target.oldest_frame > 0) {
@@ -80,6 +79,9 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   registration.include_older_points();
   const RelocalisationPlaces& places = prior.elsewhere;
   if (const auto turned = turned_on_plane(target, now, places, options)) return *turned;
+  if (followed) {
+    keep_better(registration.from(*followed, FrameRegistration::Gate::narrow, Expectation::unexpected), best);
+  }
   const bool goes_on = followed && hypothesis.is_confirmed_by(best);
   if (!goes_on && places.key_poses) {
     keep_better(around_key_poses(registration, target.model, places.key_poses(), options), best);

@@ -28,7 +28,7 @@ struct TrackingPrior {
 
 // Tries the guesses until one registers the frame; when none does, searches elsewhere. Where no single registration is
 // convincing, `hypothesis` may become so over several frames.
-TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, TrackingPrior prior,
+TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, const TrackingPrior& prior,
                      PlaceHypothesis& hypothesis, const TrackingOptions& options);
 
 }  // namespace nacre

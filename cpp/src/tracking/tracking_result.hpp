@@ -16,8 +16,9 @@ struct TrackingResult : Acceptance {
   bool is_to_whole_model = false;                   // older points included
   bool is_on_plane = false;                         // found by the search on the plane
 
-  void test(const TrackingOptions& options) {
-    static_cast<Acceptance&>(*this) = accept(alignment, consistency, expectation, {options.min_score, options.verify});
+  void test(const TrackingOptions& options, double usual_contradiction) {
+    static_cast<Acceptance&>(*this) =
+        accept(alignment, consistency, expectation, {options.min_score, options.verify, usual_contradiction});
   }
 
   FrameStatus status() const {

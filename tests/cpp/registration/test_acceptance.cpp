@@ -3,6 +3,7 @@
 
 #include "doctest/doctest.h"
 #include "registration/acceptance.hpp"
+#include "registration/limits.hpp"
 
 using namespace nacre;
 
@@ -25,7 +26,7 @@ struct Registration {
 
 template <class Change>
 Acceptance tested(Change&& change, Expectation expectation = Expectation::expected,
-                  const AcceptanceOptions& options = {0.3, true}) {
+                  const AcceptanceOptions& options = {0.3, true, registration_limits::wrong_contradiction}) {
   Registration registration;
   change(registration);
   return accept(registration.alignment, registration.consistency, expectation, options);
@@ -109,7 +110,7 @@ TEST_CASE("too few matches, and no verification") {
         other.alignment.overlap = 0.01;
         other.alignment.size_difference = {0.5, 0.001};
       },
-      Expectation::expected, {0.3, false});
+      Expectation::expected, {0.3, false, registration_limits::wrong_contradiction});
   CHECK(result.decision == Decision::accepted);
   CHECK_FALSE(result.is_clear_cut);
 }
@@ -141,6 +142,19 @@ TEST_CASE("the best of a search is believed where it agrees and no other comes n
   negative.score = -0.1;
   CHECK(best_of({negative}).status == GlobalAlignStatus::not_found);
   CHECK(best_of({}).status == GlobalAlignStatus::not_found);
+}
+
+TEST_CASE("where the camera contradicts little, a far place that contradicts more is lost") {
+  const auto contradicts = [](Registration& registration) { registration.consistency = 0.95; };
+  const AcceptanceOptions exact{0.3, true, 0.001}, noisy{0.3, true, 0.05};
+  CHECK(tested(contradicts, Expectation::unexpected).decision == Decision::accepted);
+  CHECK(tested(contradicts, Expectation::unexpected, noisy).decision == Decision::accepted);
+  CHECK(tested(contradicts, Expectation::unexpected, exact).decision == Decision::rejected);
+  CHECK(tested(contradicts, Expectation::unexpected, exact).relocalisation_score < 1e-6);
+  // Near a guess the guess speaks for it; and what contradicts as little as ever is not held against the place.
+  CHECK(tested(contradicts, Expectation::expected, exact).decision == Decision::accepted);
+  const auto agrees = [](Registration& registration) { registration.consistency = 0.999; };
+  CHECK(tested(agrees, Expectation::unexpected, exact).score == tested(agrees, Expectation::unexpected).score);
 }
 
 TEST_CASE("views of a place add up, by how much they differ") {

@@ -108,8 +108,9 @@ void exchange(Archive& archive, CameraFields& fields) {
 // What of a model is neither given nor of the newest frame alone.
 template <class Archive>
 void exchange_state(Archive& archive, Pipeline& state) {
-  archive(state.options.fusion.reference_sigma, state.region, state.calibration, state.residual_noise, state.cloud,
-          state.loops, state.history, state.before, state.hypothesis, state.views, state.spacing, state.num_lost);
+  archive(state.options.fusion.reference_sigma, state.region, state.calibration, state.residual_noise,
+          state.usual_contradiction, state.cloud, state.loops, state.history, state.before, state.hypothesis,
+          state.views, state.spacing, state.num_lost);
 }
 
 // Space that the table of rays may take before a frame was fused: see load.
@@ -273,6 +274,11 @@ bool PrivateState::is_sound(const ResidualNoise& noise) {
   return std::isfinite(noise.log_scale_) && std::isfinite(noise.count_) && noise.count_ >= 0.0;
 }
 
+bool PrivateState::is_sound(const UsualContradiction& contradiction) {
+  return contradiction.mean_ >= 0.0 && contradiction.mean_ <= 1.0 && contradiction.count_ >= 1.0 &&
+         std::isfinite(contradiction.count_);
+}
+
 std::string save_checkpoint(Pipeline& pipeline, const std::string& note) {
   std::string bytes(header_size, '\0'), kept = note;
   StateWriter archive(bytes);
@@ -332,7 +338,8 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   }
   archive.require(PrivateState::is_sound(state.loops, num_frames), "the key frames contradict each other");
   archive.require(PrivateState::is_sound(state.hypothesis), "the place that is followed contradicts itself");
-  archive.require(PrivateState::is_sound(state.calibration) && PrivateState::is_sound(state.residual_noise),
+  archive.require(PrivateState::is_sound(state.calibration) && PrivateState::is_sound(state.residual_noise) &&
+                      PrivateState::is_sound(state.usual_contradiction),
                   "the noise is not finite");
   if (note != nullptr) *note = std::move(kept);
   return pipeline;

@@ -63,6 +63,11 @@ struct PrivateState {
   }
 
   template <class Archive>
+  static void exchange(Archive& archive, UsualContradiction& contradiction) {
+    archive(contradiction.mean_, contradiction.count_);
+  }
+
+  template <class Archive>
   static void exchange(Archive& archive, FrameHistory::Chunk& chunk) {
     archive(chunk.poses, chunk.ends, chunk.bytes);
   }
@@ -105,6 +110,7 @@ struct PrivateState {
   // Whether what was read can be gone on with.
   static bool is_sound(const NoiseCalibration& calibration);
   static bool is_sound(const ResidualNoise& noise);
+  static bool is_sound(const UsualContradiction& contradiction);
   static bool is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options);
   static bool is_sound(const PoseGraph& graph);
   static bool is_sound(const LoopClosure& loops, std::size_t num_frames);
