@@ -48,9 +48,9 @@ def attempt(places: Places, row: Row, name: str, run: Any) -> Figures:
         known = any(frame["truth"] is not None for frame in report["frames"])
         evaluation = commands.evaluate(out, *arguments) if known or arguments else {}
         figures = collect(evaluation, out, processor)
-        return (
-            {**figures, **right_frames(row.recording(places), out)} if row.real and row.recording else figures
-        )
+        if row.real and row.recording is not None:
+            figures |= right_frames(row.recording(places), out)
+        return figures
     except (RuntimeError, OSError, ValueError) as error:
         return {"failed": str(error)}
 
