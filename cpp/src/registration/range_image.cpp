@@ -7,7 +7,6 @@
 #include "registration/limits.hpp"
 
 namespace nacre {
-namespace {}  // namespace
 
 FreeSpace::FreeSpace(const PointsRef& points, const Eigen::Vector3d& viewpoint) : viewpoint_(viewpoint) {
   std::vector<Eigen::Vector3d> finite;
