@@ -25,23 +25,17 @@ T fold_lanes(const T (&lanes)[16], Fold fold) {
 }
 
 // Of NaN and a number, the number, if either comes first or second: unused lanes do not count.
-template <class T>
-T lesser(T a, T b) {
-  return !(b < a) && a == a ? a : b;
-}
-template <class T>
-T greater(T a, T b) {
-  return !(b > a) && a == a ? a : b;
-}
+constexpr auto lesser = [](auto a, auto b) { return !(b < a) && a == a ? a : b; };
+constexpr auto greater = [](auto a, auto b) { return !(b > a) && a == a ? a : b; };
 
 template <class T>
 Bounds<T> box_of(const PointBlock<T>& block) {
   Bounds<T> box;
   for (int axis = 0; axis < 3; ++axis) {
-    box.lo[axis] = fold_lanes(block.p[axis], lesser<T>);
-    box.hi[axis] = fold_lanes(block.p[axis], greater<T>);
+    box.lo[axis] = fold_lanes(block.p[axis], lesser);
+    box.hi[axis] = fold_lanes(block.p[axis], greater);
   }
-  box.first_id = fold_lanes(block.id, lesser<std::uint32_t>);
+  box.first_id = fold_lanes(block.id, lesser);
   return box;
 }
 
@@ -49,10 +43,10 @@ template <class T>
 Bounds<T> box_of(const BoxGroup<T>& group) {
   Bounds<T> box;
   for (int axis = 0; axis < 3; ++axis) {
-    box.lo[axis] = fold_lanes(group.lo[axis], lesser<T>);
-    box.hi[axis] = fold_lanes(group.hi[axis], greater<T>);
+    box.lo[axis] = fold_lanes(group.lo[axis], lesser);
+    box.hi[axis] = fold_lanes(group.hi[axis], greater);
   }
-  box.first_id = fold_lanes(group.first_id, lesser<std::uint32_t>);
+  box.first_id = fold_lanes(group.first_id, lesser);
   return box;
 }
 
