@@ -196,7 +196,8 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior) {
     TrackingOptions nearby = options;
     nearby.relocalise = false;
     const auto is_found = [&] {
-      return !result.is_lost() && (noise_factor == known_noise_factor() || result.expectation == Expectation::expected);
+      return !result.is_lost() &&
+             (noise_factor == known_noise_factor() || result.expectation != Expectation::unexpected);
     };
     for (double factor = noise_factor; factor <= tracking_limits::largest_noise_factor && !is_found(); factor *= 2.0) {
       set_noise_factor(factor);

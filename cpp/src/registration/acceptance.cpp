@@ -32,10 +32,16 @@ Demands demands_on(const IcpResult& alignment, Expectation expectation) {
   }
 }
 
+// Of places near a guess, how much more what they contradict speaks for one than for another.
+double consistency_weight(double contradiction, double usual) {
+  using namespace registration_limits;
+  return usual_weight * (usual + least_contradiction) / (contradiction + least_contradiction);
+}
+
 // Of a right place to a wrong one; at most 1, and never 0.
-double likelihood_ratio(double contradiction, double usual) {
+double likelihood_ratio(double contradiction, std::optional<double> usual) {
   const double wrong = registration_limits::wrong_contradiction;
-  const double right = std::clamp(usual, registration_limits::least_ratio * wrong, wrong);
+  const double right = std::clamp(usual.value_or(wrong), registration_limits::least_ratio * wrong, wrong);
   return std::min(1.0, wrong / right * std::exp(-contradiction * (1.0 / right - 1.0 / wrong)));
 }
 
@@ -65,7 +71,12 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
   const double per_match = std::max(0.0, std::log(chance_ratio / ratio)) / (bent * bent);
   const double least = demands.score * options.min_score;
   const double unlikely = likelihood_ratio(1.0 - consistency, options.usual_contradiction);
-  acceptance.score = overlap * overlap * std::pow(consistency, demands.consistency_power) * per_match;
+  const bool is_near = expectation == Expectation::expected || expectation == Expectation::near_lost;
+  const bool is_determined = alignment.weak_directions.cols() == 0;
+  const double consistent = is_near && is_determined && options.usual_contradiction
+                                ? consistency_weight(1.0 - consistency, *options.usual_contradiction)
+                                : std::pow(consistency, demands.consistency_power);
+  acceptance.score = overlap * overlap * consistent * per_match;
   if (expectation == Expectation::unexpected) acceptance.score *= unlikely;
   acceptance.relocalisation_score = overlap * std::pow(consistency, relocalisation_consistency_power) * per_match /
                                     (bent * bent) * alignment.normal_information * unlikely;
@@ -77,7 +88,7 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
     reason << "registration score " << acceptance.score << " is below " << least << ": overlap " << overlap
            << ", consistency " << consistency << ", residuals " << ratio << " of the largest that match";
     if (bent > 1.0) reason << ", bent " << bent << " times as much as true matches may be";
-  } else if (options.verify && alignment.weak_directions.cols() > 0) {
+  } else if (options.verify && !is_determined) {
     // Where the camera was says nothing of a far place, and cannot stand in for what is open there.
     if (expectation != Expectation::unexpected) acceptance.decision = Decision::undetermined;
     reason << alignment.weak_directions.cols() << " direction(s) of the pose are not determined";

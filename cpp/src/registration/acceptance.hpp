@@ -3,6 +3,7 @@
 // not on ICP's own opinion.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,8 +23,7 @@ enum class Expectation {
 struct AcceptanceOptions {
   double min_score;
   bool verify;
-  double
-      usual_contradiction;  // mean 1 - consistency of what has been accepted, or of wrong places where that is unknown
+  std::optional<double> usual_contradiction;  // mean 1 - consistency of what has been accepted, where it is known
 };
 
 enum class Decision {
@@ -45,8 +45,9 @@ struct Acceptance {
 // The registration score is what the matches tell against chance: for each a residual that is small among those that
 // would have matched, ln(0.58 / ratio), where chance gives a ratio of 0.58; times overlap^2, since any two surfaces
 // touch somewhere, and consistency^4, since true ones contradict nowhere; by misfit^2 where it is above 1, since a
-// shape that only resembles is bent another way. Far from all guesses there are many places that resemble:
-// consistency^8, misfit above half counts, and more is asked for, much more of a plane.
+// shape that only resembles is bent another way. Once it is known how much right places contradict, near a guess
+// the usual contradiction to this one takes the place of consistency^4. Far from all guesses there are many places that
+// resemble: consistency^8, misfit above half counts, and more is asked for, much more of a plane.
 //
 // The relocalisation score is that of a place that nothing but the source speaks for. New surface does not speak
 // against it (overlap, not its square), contradictions and misfit do the more (consistency^12, misfit^4), and what the

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/limits.hpp"
+#include "base/se3.hpp"
 #include "base/statistics.hpp"
 #include "camera/limits.hpp"
 #include "camera/point_spacing.hpp"
@@ -127,6 +128,34 @@ std::vector<Pose> FrameRegistration::around(const Pose& world_from_camera) const
       turn.linear() = Eigen::AngleAxisd(angle, world_from_camera.linear().col(axis)).toRotationMatrix();
       turn.translation() = center - turn.linear() * center;
       poses.push_back(turn * world_from_camera);
+    }
+  }
+  return poses;
+}
+
+bool FrameRegistration::may_be_beside(const TrackingResult& found, const Pose& guess) const {
+  if (found.is_lost()) return true;
+  const double distance = view_distance(guess, found.alignment.target_from_source, depth_);
+  return !found.is_clear_cut && distance * camera_limits::view_turn > 0.5 * tracking_limits::beside_turn;
+}
+
+std::vector<Pose> FrameRegistration::beside(const Pose& world_from_camera) const {
+  const PointsInView view = in_view(world_from_camera);
+  std::vector<Pose> poses;
+  if (view.points.rows() == 0) return poses;
+  const Eigen::Vector3d seen = view.points.colwise().mean().transpose().cast<double>();
+  const int most = static_cast<int>(tracking_limits::farthest_turn / tracking_limits::beside_turn);
+  for (const Eigen::Vector3d& center : {Eigen::Vector3d(world_from_camera.translation()), seen}) {
+    for (int i = -most; i <= most; ++i) {
+      for (int j = -most; j <= most; ++j) {
+        for (int k = -most; k <= most; ++k) {
+          const Eigen::Vector3d turn = tracking_limits::beside_turn * Eigen::Vector3d(i, j, k);
+          if (turn.norm() == 0.0 || turn.norm() > tracking_limits::farthest_turn) continue;
+          Vector6 motion = Vector6::Zero();
+          motion.head<3>() = turn;
+          poses.push_back(motion_about(center, motion) * world_from_camera);
+        }
+      }
     }
   }
   return poses;

@@ -27,7 +27,7 @@ struct TrackingTarget {
   double spacing;              // of the model [m]
   const DepthView& last_view;  // what the camera saw when it was last registered
   std::int32_t oldest_frame;   // points that no later frame has seen may have drifted away: they are left out
-  double usual_contradiction;  // of registered frames: see AcceptanceOptions
+  std::optional<double> usual_contradiction;  // of registered frames: see AcceptanceOptions
 };
 
 class FrameRegistration {
@@ -50,6 +50,11 @@ class FrameRegistration {
 
   // Cameras around what a known camera saw: it turned about each of its axes, one way and the other.
   std::vector<Pose> around(const Pose& world_from_camera) const;
+  // Cameras beside a known one, about as far apart as a registration finds its way: it turned about itself, or about
+  // what it saw.
+  std::vector<Pose> beside(const Pose& world_from_camera) const;
+  // Whether what was found from a guess is nearer to one beside it, and nothing rules those out.
+  bool may_be_beside(const TrackingResult& found, const Pose& guess) const;
 
  private:
   FrameRegistration(const CurrentFrame& now, const TrackingTarget& target, const TrackingOptions& options,

@@ -44,18 +44,24 @@ std::optional<TrackingResult> turned_on_plane(const TrackingTarget& target, cons
   return result;
 }
 
-// From every place where a camera has been, and around it: a few points each, then the best with all.
+// The best of many guesses: a few points each, then the most promising with all.
+TrackingResult best_of(const FrameRegistration& registration, const PointModel& model, const std::vector<Pose>& guesses,
+                       Expectation expectation, const TrackingOptions& options) {
+  TrackingResult best;
+  for (const Pose& candidate : most_promising(model, registration.source(), guesses, options.registration)) {
+    keep_better(registration.from(candidate, FrameRegistration::Gate::narrow, expectation), best);
+  }
+  return best;
+}
+
+// From every place where a camera has been, and around it.
 TrackingResult around_key_poses(const FrameRegistration& registration, const PointModel& model,
                                 const std::vector<Pose>& key_poses, const TrackingOptions& options) {
   std::vector<Pose> guesses;
   for (const Pose& key_pose : key_poses) {
     for (const Pose& guess : registration.around(key_pose)) guesses.push_back(guess);
   }
-  TrackingResult best;
-  for (const Pose& candidate : most_promising(model, registration.source(), guesses, options.registration)) {
-    keep_better(registration.from(candidate, FrameRegistration::Gate::narrow, Expectation::unexpected), best);
-  }
-  return best;
+  return best_of(registration, model, guesses, Expectation::unexpected, options);
 }
 
 }  // namespace
@@ -73,6 +79,10 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, cons
     registration.include_older_points();
     try_guesses(registration, prior, best);
     best.is_to_whole_model = true;
+  }
+  if (!prior.was_lost && registration.may_be_beside(best, prior.guesses.front())) {
+    const std::vector<Pose> beside = registration.beside(prior.guesses.back());
+    keep_better(best_of(registration, target.model, beside, Expectation::near_lost, options), best);
   }
   if (!best.is_lost()) return best;
 

@@ -1,6 +1,8 @@
 // Where a frame was registered to the model, and whether that is believed.
 #pragma once
 
+#include <optional>
+
 #include "nacre/tracking_options.hpp"
 #include "nacre/tracking_report.hpp"
 #include "registration/acceptance.hpp"
@@ -16,7 +18,7 @@ struct TrackingResult : Acceptance {
   bool is_to_whole_model = false;                   // older points included
   bool is_on_plane = false;                         // found by the search on the plane
 
-  void test(const TrackingOptions& options, double usual_contradiction) {
+  void test(const TrackingOptions& options, std::optional<double> usual_contradiction) {
     static_cast<Acceptance&>(*this) =
         accept(alignment, consistency, expectation, {options.min_score, options.verify, usual_contradiction});
   }

@@ -26,7 +26,7 @@ struct Registration {
 
 template <class Change>
 Acceptance tested(Change&& change, Expectation expectation = Expectation::expected,
-                  const AcceptanceOptions& options = {0.3, true, registration_limits::wrong_contradiction}) {
+                  const AcceptanceOptions& options = {0.3, true, std::nullopt}) {
   Registration registration;
   change(registration);
   return accept(registration.alignment, registration.consistency, expectation, options);
@@ -110,7 +110,7 @@ TEST_CASE("too few matches, and no verification") {
         other.alignment.overlap = 0.01;
         other.alignment.size_difference = {0.5, 0.001};
       },
-      Expectation::expected, {0.3, false, registration_limits::wrong_contradiction});
+      Expectation::expected, {0.3, false, std::nullopt});
   CHECK(result.decision == Decision::accepted);
   CHECK_FALSE(result.is_clear_cut);
 }
@@ -151,10 +151,24 @@ TEST_CASE("where the camera contradicts little, a far place that contradicts mor
   CHECK(tested(contradicts, Expectation::unexpected, noisy).decision == Decision::accepted);
   CHECK(tested(contradicts, Expectation::unexpected, exact).decision == Decision::rejected);
   CHECK(tested(contradicts, Expectation::unexpected, exact).relocalisation_score < 1e-6);
-  // Near a guess the guess speaks for it; and what contradicts as little as ever is not held against the place.
-  CHECK(tested(contradicts, Expectation::expected, exact).decision == Decision::accepted);
+  // What contradicts as little as ever is not held against the place.
   const auto agrees = [](Registration& registration) { registration.consistency = 0.999; };
   CHECK(tested(agrees, Expectation::unexpected, exact).score == tested(agrees, Expectation::unexpected).score);
+}
+
+TEST_CASE("near a guess, what contradicts is held against what right places contradict") {
+  const auto contradicts = [](Registration& registration) { registration.consistency = 0.93; };
+  const AcceptanceOptions exact{0.3, true, 0.0}, noisy{0.3, true, 0.07};
+  CHECK(tested(contradicts, Expectation::expected).decision == Decision::accepted);
+  CHECK(tested(contradicts, Expectation::expected, exact).score <
+        0.5 * tested(contradicts, Expectation::expected).score);
+  CHECK(tested(contradicts, Expectation::expected, noisy).score > tested(contradicts, Expectation::expected).score);
+  // Directions that are open say nothing of how it contradicts.
+  const auto open = [&](Registration& registration) {
+    contradicts(registration);
+    registration.alignment.weak_directions = Eigen::MatrixXd::Identity(6, 1);
+  };
+  CHECK(tested(open, Expectation::expected, exact).score == tested(open, Expectation::expected).score);
 }
 
 TEST_CASE("views of a place add up, by how much they differ") {

@@ -275,7 +275,7 @@ bool PrivateState::is_sound(const ResidualNoise& noise) {
 }
 
 bool PrivateState::is_sound(const UsualContradiction& contradiction) {
-  return contradiction.mean_ >= 0.0 && contradiction.mean_ <= 1.0 && contradiction.count_ >= 1.0 &&
+  return contradiction.mean_ >= 0.0 && contradiction.mean_ <= 1.0 && contradiction.count_ >= 0.0 &&
          std::isfinite(contradiction.count_);
 }
 

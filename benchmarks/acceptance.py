@@ -1,0 +1,139 @@
+#!/usr/bin/env python
+"""
+Registrations of real recordings, right and wrong: does the registration score tell them apart?
+
+From models of six frames with known poses, later frames are registered near and far, from the truth, from
+the last pose, from starts that are 10 and 20 degrees wrong, and frames of other places from the last pose.
+Whatever matches is taken. A registration is right within 3 % of the median depth and 3 degrees, wrong beyond
+twice that, and left out between, or where it leaves directions open.
+
+For each recording: the area under the ROC curve; the share of right ones and the number of wrong ones that
+reach `min_score`; and the score that 3 % of the wrong ones of all the other recordings reach, with the same
+figures.
+
+    python benchmarks/acceptance.py teddy rpy d435 robot sr300 iphone boxcan icl
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import cases
+import numpy as np
+import numpy.typing as npt
+
+import nacre
+
+Array = npt.NDArray[np.float64]
+
+SEED_FRAMES = 6
+STEPS = (1, 2, 3, 5, 8, 12, 20, 30, 45)
+WRONG_STARTS = (10.0, 20.0)
+"""[degrees] With shifts of 3 % of the depth for each 10 degrees."""
+RIGHT_SHIFT, RIGHT_TURN = 0.03, 3.0
+WRONG_SHARE = 0.03
+
+
+def turned(pose: Array, degrees: float, shift: float, rng: np.random.Generator) -> Array:
+    """Return a pose turned about a random axis, and shifted."""
+    x, y, z = rng.normal(size=3)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) / np.linalg.norm([x, y, z])
+    motion = np.eye(4)
+    angle = np.radians(degrees)
+    motion[:3, :3] += np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    motion[:3, 3] = shift * rng.normal(size=3)
+    return pose @ motion
+
+
+def starts(
+    case: cases.Case, last: int, now: Array, world: Array, rng: np.random.Generator
+) -> list[tuple[int, Array]]:
+    """Return frames and the guesses to register them from."""
+    depth = cases.middle_depth(case.depths)
+    found = []
+    for index in [last + step for step in STEPS if last + step < len(case.depths)]:
+        truth = case.truths[index]
+        if truth is None:
+            continue
+        found += [(index, world @ truth), (index, now)]
+        for degrees in WRONG_STARTS:
+            found.append((index, turned(world @ truth, degrees, 0.003 * degrees * depth, rng)))
+    elsewhere = rng.choice(len(case.depths), 3, replace=False)
+    return found + [(int(index), now) for index in elsewhere if case.truths[index] is not None]
+
+
+def registrations(name: str) -> tuple[Array, npt.NDArray[np.bool_]]:
+    """Return the scores of a recording's registrations, and which are right."""
+    case = cases.make(name)
+    rng = np.random.default_rng(7)
+    depth = cases.middle_depth(case.depths)
+    scores, right = [], []
+    anchors = np.unique(np.linspace(0, max(0, len(case.depths) - SEED_FRAMES - 3), 10).astype(int))
+    for first in anchors:
+        truths = case.truths[first : first + SEED_FRAMES]
+        if len(truths) < SEED_FRAMES or any(truth is None for truth in truths):
+            continue
+        model = nacre.Model(case.camera, num_threads=1, verify=False, relocalise=False, loop_closure=False)
+        for index in range(first, first + SEED_FRAMES):
+            model.add_frame(case.depths[index], color=case.colors[index], guess=case.truths[index])
+        last = first + SEED_FRAMES - 1
+        now = model.frames[-1].world_from_camera
+        world = now @ np.linalg.inv(case.truths[last])
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "model.nacre"
+            model.save(path)
+            for index, guess in starts(case, last, now, world, rng):
+                report = nacre.Model.load(path).add_frame(
+                    case.depths[index], color=case.colors[index], guess=guess
+                )
+                if report.status == "LOST" or len(report.weak_directions) > 0:
+                    continue
+                error = np.linalg.inv(world @ case.truths[index]) @ report.world_from_camera
+                turn = cases.angle_between(np.eye(3), error[:3, :3]) / RIGHT_TURN
+                shift = float(np.linalg.norm(error[:3, 3])) / depth / RIGHT_SHIFT
+                if not 1 < max(turn, shift) < 2:
+                    scores.append(report.score)
+                    right.append(max(turn, shift) <= 1)
+    return np.array(scores), np.array(right, bool)
+
+
+def area(scores: Array, right: npt.NDArray[np.bool_]) -> float:
+    """Return the area under the ROC curve: how often a right one has the higher score."""
+    a, b = scores[right][:, None], scores[~right][None, :]
+    return float(np.mean((a > b) + 0.5 * (a == b)))
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("recording", nargs="+", help=f"of {', '.join(cases.REAL)}")
+    names = parser.parse_args().recording
+    found = {}
+    for name in names:
+        found[name] = registrations(name)
+        print(f"{name}: {len(found[name][0])} registrations", file=sys.stderr, flush=True)
+    least = nacre.ModelParameters().min_score
+    print(
+        "| recording | right | wrong | area | right accepted | wrong accepted | score of the others | right | wrong |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|")
+    for name, (scores, right) in found.items():
+        others = [s[~r] for other, (s, r) in found.items() if other != name or len(found) == 1]
+        level = float(np.quantile(np.concatenate(others), 1 - WRONG_SHARE))
+        cells = [f"{area(scores, right):.3f}"]
+        for threshold in (least, level):
+            cells += [
+                f"{np.mean(scores[right] >= threshold):.2f}",
+                str(int(np.sum(scores[~right] >= threshold))),
+            ]
+        cells.insert(3, f"{level:.2f}")
+        print(f"| {name} | {right.sum()} | {(~right).sum()} | {' | '.join(cells)} |")
+
+
+if __name__ == "__main__":
+    main()
