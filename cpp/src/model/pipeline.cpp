@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "base/check.hpp"
 #include "base/limits.hpp"
@@ -199,16 +200,18 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior) {
       return !result.is_lost() &&
              (noise_factor == known_noise_factor() || result.expectation != Expectation::unexpected);
     };
+    RelocalisationPlaces elsewhere = std::exchange(prior.elsewhere, {});
     for (double factor = noise_factor; factor <= tracking_limits::largest_noise_factor && !is_found(); factor *= 2.0) {
       set_noise_factor(factor);
-      result = track(current, target, {prior.guesses, prior.was_lost, {}}, hypothesis, nearby);
+      result = track(current, target, prior, hypothesis, nearby);
     }
+    prior.elsewhere = std::move(elsewhere);
     if (!is_found()) {
       set_noise_factor(known_noise_factor());
       result = {};
     }
   }
-  if (result.is_lost()) result = track(current, target, std::move(prior), hypothesis, options);
+  if (result.is_lost()) result = track(current, target, prior, hypothesis, options);
   if (result.decision == Decision::accepted && result.expectation == Expectation::expected) {
     usual_contradiction.add(1.0 - result.consistency);
   }

@@ -144,13 +144,13 @@ std::vector<Pose> FrameRegistration::beside(const Pose& world_from_camera) const
   std::vector<Pose> poses;
   if (view.points.rows() == 0) return poses;
   const Eigen::Vector3d seen = view.points.colwise().mean().transpose().cast<double>();
-  const int most = static_cast<int>(tracking_limits::farthest_turn / tracking_limits::beside_turn);
+  const int most = static_cast<int>(camera_limits::new_direction / tracking_limits::beside_turn);
   for (const Eigen::Vector3d& center : {Eigen::Vector3d(world_from_camera.translation()), seen}) {
     for (int i = -most; i <= most; ++i) {
       for (int j = -most; j <= most; ++j) {
         for (int k = -most; k <= most; ++k) {
           const Eigen::Vector3d turn = tracking_limits::beside_turn * Eigen::Vector3d(i, j, k);
-          if (turn.norm() == 0.0 || turn.norm() > tracking_limits::farthest_turn) continue;
+          if (turn.norm() == 0.0 || turn.norm() > camera_limits::new_direction) continue;
           Vector6 motion = Vector6::Zero();
           motion.head<3>() = turn;
           poses.push_back(motion_about(center, motion) * world_from_camera);

@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/parallel.hpp"
 #include "registration/global_search.hpp"
 #include "registration/icp.hpp"
 #include "tracking/limits.hpp"
@@ -16,15 +17,16 @@ std::vector<Pose> most_promising(const PointModel& model, const IcpSource& sourc
   const IcpTarget whole(AlignCloud(as_rows(model.points), as_rows(model.normals)), options);
   AlignOptions coarse = options;
   coarse.max_samples = coarse.coarse_samples = tracking_limits::coarse_turn_samples;
+  coarse.num_threads = 1;
   coarse.max_iterations = tracking_limits::most_coarse_turn_steps;
   const IcpSource few(AlignCloud(source.cloud.points, source.cloud.normals, source.cloud.sigma), coarse);
 
-  std::vector<std::pair<double, Pose>> candidates;
-  candidates.reserve(guesses.size());
-  for (const Pose& guess : guesses) {
-    const AlignResult result = align_to(whole, few, guess, coarse);
-    candidates.emplace_back(result.overlap, result.target_from_source);
-  }
+  std::vector<std::pair<double, Pose>> candidates(guesses.size());
+  parallel_for(static_cast<std::int64_t>(guesses.size()), 1, options.num_threads, [&](std::int64_t i) {
+    const auto k = static_cast<std::size_t>(i);
+    const AlignResult result = align_to(whole, few, guesses[k], coarse);
+    candidates[k] = {result.overlap, result.target_from_source};
+  });
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const auto& a, const auto& b) { return a.first > b.first; });
   std::vector<Pose> best;

@@ -44,14 +44,24 @@ std::optional<TrackingResult> turned_on_plane(const TrackingTarget& target, cons
   return result;
 }
 
-// The best of many guesses: a few points each, then the most promising with all.
-TrackingResult best_of(const FrameRegistration& registration, const PointModel& model, const std::vector<Pose>& guesses,
-                       Expectation expectation, const TrackingOptions& options) {
+// Of several candidates.
+TrackingResult best_from(const FrameRegistration& registration, const std::vector<Pose>& candidates,
+                         Expectation expectation) {
   TrackingResult best;
-  for (const Pose& candidate : most_promising(model, registration.source(), guesses, options.registration)) {
+  for (const Pose& candidate : candidates) {
     keep_better(registration.from(candidate, FrameRegistration::Gate::narrow, expectation), best);
   }
   return best;
+}
+
+// Beside the last pose, as where the camera turned fast.
+TrackingResult beside(const FrameRegistration& registration, const PointModel& model, TrackingPrior& prior,
+                      const TrackingOptions& options) {
+  if (!prior.beside) {
+    prior.beside =
+        most_promising(model, registration.source(), registration.beside(prior.guesses.back()), options.registration);
+  }
+  return best_from(registration, *prior.beside, Expectation::near_lost);
 }
 
 // From every place where a camera has been, and around it.
@@ -61,12 +71,13 @@ TrackingResult around_key_poses(const FrameRegistration& registration, const Poi
   for (const Pose& key_pose : key_poses) {
     for (const Pose& guess : registration.around(key_pose)) guesses.push_back(guess);
   }
-  return best_of(registration, model, guesses, Expectation::unexpected, options);
+  return best_from(registration, most_promising(model, registration.source(), guesses, options.registration),
+                   Expectation::unexpected);
 }
 
 }  // namespace
 
-TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, const TrackingPrior& prior,
+TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, TrackingPrior& prior,
                      PlaceHypothesis& hypothesis, const TrackingOptions& options) {
   FrameRegistration registration(now, target, options);
   const IcpSource& source = registration.source();
@@ -81,8 +92,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, cons
     best.is_to_whole_model = true;
   }
   if (!prior.was_lost && registration.may_be_beside(best, prior.guesses.front())) {
-    const std::vector<Pose> beside = registration.beside(prior.guesses.back());
-    keep_better(best_of(registration, target.model, beside, Expectation::near_lost, options), best);
+    keep_better(beside(registration, target.model, prior, options), best);
   }
   if (!best.is_lost()) return best;
 

@@ -24,11 +24,12 @@ struct TrackingPrior {
   std::vector<Pose> guesses;  // world_from_camera, most trusted first
   bool was_lost;
   RelocalisationPlaces elsewhere;
+  std::optional<std::vector<Pose>> beside = std::nullopt;  // the last guess, once they have been looked for
 };
 
 // Tries the guesses until one registers the frame; when none does, searches elsewhere. Where no single registration is
 // convincing, `hypothesis` may become so over several frames.
-TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, const TrackingPrior& prior,
+TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, TrackingPrior& prior,
                      PlaceHypothesis& hypothesis, const TrackingOptions& options);
 
 }  // namespace nacre
