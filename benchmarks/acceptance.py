@@ -1,6 +1,6 @@
 #!/usr/bin/env python
 """
-Registrations of real recordings, right and wrong: does the registration score tell them apart?
+Measure how well the registration score tells right from wrong, on registrations of real recordings.
 
 From models of six frames with known poses, later frames are registered near and far, from the truth, from
 the last pose, from starts that are 10 and 20 degrees wrong, and frames of other places from the last pose.
@@ -86,12 +86,14 @@ def registrations(name: str) -> tuple[Array, npt.NDArray[np.bool_]]:
             path = Path(folder) / "model.nacre"
             model.save(path)
             for index, guess in starts(case, last, now, world, rng):
+                truth = case.truths[index]
+                assert truth is not None
                 report = nacre.Model.load(path).add_frame(
                     case.depths[index], color=case.colors[index], guess=guess
                 )
                 if report.status == "LOST" or len(report.weak_directions) > 0:
                     continue
-                error = np.linalg.inv(world @ case.truths[index]) @ report.world_from_camera
+                error = np.linalg.inv(world @ truth) @ report.world_from_camera
                 turn = cases.angle_between(np.eye(3), error[:3, :3]) / RIGHT_TURN
                 shift = float(np.linalg.norm(error[:3, 3])) / depth / RIGHT_SHIFT
                 if not 1 < max(turn, shift) < 2:
@@ -118,10 +120,10 @@ def main() -> None:
         found[name] = registrations(name)
         print(f"{name}: {len(found[name][0])} registrations", file=sys.stderr, flush=True)
     least = nacre.ModelParameters().min_score
-    print(
-        "| recording | right | wrong | area | right accepted | wrong accepted | score of the others | right | wrong |"
-    )
-    print("|---|---|---|---|---|---|---|---|---|")
+    columns = ["recording", "right", "wrong", "area", "right accepted", "wrong", "score of the others"]
+    columns += ["right accepted", "wrong"]
+    print(f"| {' | '.join(columns)} |")
+    print(f"|{'---|' * len(columns)}")
     for name, (scores, right) in found.items():
         others = [s[~r] for other, (s, r) in found.items() if other != name or len(found) == 1]
         level = float(np.quantile(np.concatenate(others), 1 - WRONG_SHARE))
