@@ -75,6 +75,17 @@ def test_noise_that_neighbours_share_is_learned(exact: list[tuple[Array, Array]]
     assert model.noise_factor == pytest.approx(np.sqrt(2) * shared / 0.001, rel=0.4)
 
 
+@pytest.mark.parametrize("step", [0.2, 0.3])
+@pytest.mark.parametrize("shared", [0.003, 0.006])
+def test_a_camera_of_unknown_noise_may_turn_fast(step: float, shared: float) -> None:
+    room = loops.furnished_room()
+    poses = [turned(step * i) for i in range(4)]
+    frames = [(np.asarray(room.simulate_depth(CAMERA, pose), np.float64), pose) for pose in poses]
+    states, error = track(nacre.Model(CAMERA), frames, shared)
+    assert states == 4 * ["TRACKED"]
+    assert error < 8 * shared  # twice what a patch is off by at 2 m
+
+
 def test_noise_that_is_given_is_believed(exact: list[tuple[Array, Array]]) -> None:
     model = nacre.Model(CAMERA, depth={"noise": nacre.NoiseModel(0.0, 0.001, 0.0, 0.0)})
     states, _ = track(model, exact, 0.008)
