@@ -44,24 +44,17 @@ std::optional<TrackingResult> turned_on_plane(const TrackingTarget& target, cons
   return result;
 }
 
-// Of several candidates.
-TrackingResult best_from(const FrameRegistration& registration, const std::vector<Pose>& candidates,
-                         Expectation expectation) {
-  TrackingResult best;
-  for (const Pose& candidate : candidates) {
-    keep_better(registration.from(candidate, FrameRegistration::Gate::narrow, expectation), best);
-  }
-  return best;
-}
-
-// Beside the last pose, as where the camera turned fast.
-TrackingResult beside(const FrameRegistration& registration, const PointModel& model, TrackingPrior& prior,
-                      const TrackingOptions& options) {
+// Beside the last pose, as where the camera turned fast. Directions that stay open could be those of any candidate.
+void try_beside(const FrameRegistration& registration, const PointModel& model, TrackingPrior& prior,
+                const TrackingOptions& options, TrackingResult& best) {
   if (!prior.beside) {
     prior.beside =
         most_promising(model, registration.source(), registration.beside(prior.guesses.back()), options.registration);
   }
-  return best_from(registration, *prior.beside, Expectation::near_lost);
+  for (const Pose& candidate : *prior.beside) {
+    const TrackingResult found = registration.from(candidate, FrameRegistration::Gate::narrow, Expectation::near_lost);
+    if (found.decision == Decision::accepted) keep_better(found, best);
+  }
 }
 
 // From every place where a camera has been, and around it.
@@ -71,8 +64,11 @@ TrackingResult around_key_poses(const FrameRegistration& registration, const Poi
   for (const Pose& key_pose : key_poses) {
     for (const Pose& guess : registration.around(key_pose)) guesses.push_back(guess);
   }
-  return best_from(registration, most_promising(model, registration.source(), guesses, options.registration),
-                   Expectation::unexpected);
+  TrackingResult best;
+  for (const Pose& candidate : most_promising(model, registration.source(), guesses, options.registration)) {
+    keep_better(registration.from(candidate, FrameRegistration::Gate::narrow, Expectation::unexpected), best);
+  }
+  return best;
 }
 
 }  // namespace
@@ -92,7 +88,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     best.is_to_whole_model = true;
   }
   if (!prior.was_lost && registration.may_be_beside(best, prior.guesses.front())) {
-    keep_better(beside(registration, target.model, prior, options), best);
+    try_beside(registration, target.model, prior, options, best);
   }
   if (!best.is_lost()) return best;
 
