@@ -145,7 +145,7 @@ def test_neighbours_and_normals_have_the_same_bits_on_every_instruction_set(inst
 def test_vector_objects_define_only_their_own_names(library_build: Path, run: Callable[..., str]) -> None:
     """An inline function compiled for AVX must not take the place of its namesake on a processor without."""
     for level, isa in (("v3", "avx2"), ("v4", "avx512")):
-        objects = list(library_build.rglob(f"*nacre_x86_64_{level}.dir/**/*.o"))
+        objects = list(library_build.rglob(f"*nacre_kernels_x86-64-{level}.dir/**/*.o"))
         assert objects
         for path in objects:
             for line in run("nm", "-C", "--defined-only", path).splitlines():

@@ -201,6 +201,7 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior) {
              (noise_factor == known_noise_factor() || result.expectation != Expectation::unexpected);
     };
     RelocalisationPlaces elsewhere = std::exchange(prior.elsewhere, {});
+    prior.elsewhere.beside = elsewhere.beside;
     for (double factor = noise_factor; factor <= tracking_limits::largest_noise_factor && !is_found(); factor *= 2.0) {
       set_noise_factor(factor);
       result = track(current, target, prior, hypothesis, nearby);
@@ -254,7 +255,8 @@ static std::vector<Pose> key_poses(const FrameHistory& history) {
 RelocalisationPlaces Pipeline::elsewhere(const RegionReport& region_report) const {
   if (!options.relocalise) return {};
   const bool everywhere = num_lost < model_limits::patience || num_lost % model_limits::patience == 0;
-  return {&views, [&] { return view_of_object(region_report); }, [this] { return key_poses(history); }, everywhere};
+  return {&views, [&] { return view_of_object(region_report); }, [this] { return key_poses(history); }, everywhere,
+          !was_lost() && !jumped()};
 }
 
 // Of the newest frame, where it shows an object that stands on a plane.

@@ -87,7 +87,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     try_guesses(registration, prior, best);
     best.is_to_whole_model = true;
   }
-  if (!prior.was_lost && registration.may_be_beside(best, prior.guesses.front())) {
+  if (prior.elsewhere.beside && registration.may_be_beside(best, prior.guesses.front())) {
     try_beside(registration, target.model, prior, options, best);
   }
   if (!best.is_lost()) return best;

@@ -17,6 +17,7 @@ struct RelocalisationPlaces {
   std::function<std::optional<ObjectView>()> view_of_frame;  // the same of the frame, made when it is needed
   std::function<std::vector<Pose>()> key_poses;              // and around them, likewise
   bool everywhere = false;
+  bool beside = false;  // the last guess
 };
 
 // What is known of the camera before the frame is registered.
@@ -24,7 +25,7 @@ struct TrackingPrior {
   std::vector<Pose> guesses;  // world_from_camera, most trusted first
   bool was_lost;
   RelocalisationPlaces elsewhere;
-  std::optional<std::vector<Pose>> beside = std::nullopt;  // the last guess, once they have been looked for
+  std::optional<std::vector<Pose>> beside = std::nullopt;  // the places beside the last guess, once they are known
 };
 
 // Tries the guesses until one registers the frame; when none does, searches elsewhere. Where no single registration is
