@@ -24,7 +24,7 @@ Demands demands_on(const IcpResult& alignment, Expectation expectation) {
     case Expectation::expected:
       return {1.0, consistency_power, 1.0};
     case Expectation::near_lost:
-      return {doubtful_score, consistency_power, 1.0};
+      return {doubtful_score, consistency_power, far_misfit};
     case Expectation::unexpected:
       return {is_plane ? doubtful_plane_score : doubtful_score, far_consistency_power, far_misfit};
     default:
