@@ -24,6 +24,8 @@ Demands demands_on(const IcpResult& alignment, Expectation expectation) {
     case Expectation::expected:
       return {1.0, consistency_power, 1.0};
     case Expectation::near_lost:
+      return {doubtful_score, consistency_power, 1.0};
+    case Expectation::beside:
       return {doubtful_score, consistency_power, far_misfit};
     case Expectation::unexpected:
       return {is_plane ? doubtful_plane_score : doubtful_score, far_consistency_power, far_misfit};
@@ -71,7 +73,8 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
   const double per_match = std::max(0.0, std::log(chance_ratio / ratio)) / (bent * bent);
   const double least = demands.score * options.min_score;
   const double unlikely = likelihood_ratio(1.0 - consistency, options.usual_contradiction);
-  const bool is_near = expectation == Expectation::expected || expectation == Expectation::near_lost;
+  const bool is_near = expectation == Expectation::expected || expectation == Expectation::near_lost ||
+                       expectation == Expectation::beside;
   const bool is_determined = alignment.weak_directions.cols() == 0;
   const double consistent = is_near && is_determined && options.usual_contradiction
                                 ? consistency_weight(1.0 - consistency, *options.usual_contradiction)

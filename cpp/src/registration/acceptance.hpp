@@ -15,7 +15,8 @@ namespace nacre {
 // What speaks for a place before anything is registered there: the less, the more is asked of the registration.
 enum class Expectation {
   expected,    // near a guess, from the frame before
-  near_lost,   // near the last pose, but frames have been lost since, or beside it
+  near_lost,   // near the last pose, but frames have been lost since
+  beside,      // at one of several places beside the last pose
   unexpected,  // far from all guesses
   only_place,  // of all places, which a search has compared, the only one: see accept_best
 };
@@ -47,8 +48,8 @@ struct Acceptance {
 // touch somewhere, and consistency^4, since true ones contradict nowhere; by misfit^2 where it is above 1, since a
 // shape that only resembles is bent another way. Once it is known how much right places contradict, near a guess
 // the usual contradiction to this one takes the place of consistency^4. After a
-// loss misfit above half counts, and more is asked for. Far from all guesses, where many places resemble, consistency^8,
-// too, and of a plane much more.
+// loss more is asked for; beside the last pose misfit above half counts, too. Far from all guesses, where many places
+// resemble, consistency^8, and of a plane much more.
 //
 // The relocalisation score is that of a place that nothing but the source speaks for. New surface does not speak
 // against it (overlap, not its square), contradictions and misfit do the more (consistency^12, misfit^4), and what the

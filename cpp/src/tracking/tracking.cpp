@@ -52,7 +52,7 @@ void try_beside(const FrameRegistration& registration, const PointModel& model, 
         most_promising(model, registration.source(), registration.beside(prior.guesses.back()), options.registration);
   }
   for (const Pose& candidate : *prior.beside) {
-    const TrackingResult found = registration.from(candidate, FrameRegistration::Gate::narrow, Expectation::near_lost);
+    const TrackingResult found = registration.from(candidate, FrameRegistration::Gate::narrow, Expectation::beside);
     if (found.decision == Decision::accepted) keep_better(found, best);
   }
 }

@@ -37,7 +37,8 @@ const auto as_it_is = [](Registration&) {};
 }  // namespace
 
 TEST_CASE("a good registration is tracked, wherever it is") {
-  for (const Expectation expectation : {Expectation::expected, Expectation::near_lost, Expectation::unexpected}) {
+  for (const Expectation expectation :
+       {Expectation::expected, Expectation::near_lost, Expectation::beside, Expectation::unexpected}) {
     const Acceptance result = tested(as_it_is, expectation);
     CHECK(result.decision == Decision::accepted);
     CHECK(result.is_clear_cut);
@@ -57,6 +58,10 @@ TEST_CASE("the more speaks for a place, the less is asked of the frame") {
     CHECK(tested(change, Expectation::near_lost).decision == Decision::accepted);
     CHECK(tested(change, Expectation::unexpected).decision == Decision::rejected);
   }
+  CHECK(tested(bent, Expectation::beside).decision == Decision::rejected);
+  CHECK(tested(plane, Expectation::beside).decision == Decision::accepted);
+  CHECK(tested(contradicted, Expectation::beside).decision == Decision::accepted);
+  CHECK(tested(faint, Expectation::beside).decision == Decision::rejected);
   CHECK(tested(faint, Expectation::expected).decision == Decision::accepted);
   CHECK(tested(faint, Expectation::near_lost).decision == Decision::rejected);
 }
