@@ -118,12 +118,11 @@ def error(report: nacre.FrameReport, first: Array, pose: Array) -> tuple[float, 
     return float(np.linalg.norm(off[:3, 3])), turn
 
 
-def unrelated(count: int, seed: int) -> dict[str, Any]:
-    """Count what is taken for tracked of pairs of views of different scenes."""
-    rng = np.random.default_rng(seed)
+def different_scenes(count: int, rng: np.random.Generator) -> list[Array]:
+    """Return a view of each of so many scenes: in turn round shapes, boxes and reliefs."""
     makers = (blob, boxes, relief)
     views = []
-    for i in range(max(6, min(150, count // 10))):
+    for i in range(count):
         mesh = makers[i % 3](rng)
         if makers[i % 3] is relief:
             pose = np.eye(4)
@@ -133,6 +132,13 @@ def unrelated(count: int, seed: int) -> dict[str, Any]:
                 mesh, rng.uniform(0, 6), distance=rng.uniform(0.25, 0.4), elevation=rng.uniform(-0.5, 1.0)
             )
         views.append(view(mesh, pose, i))
+    return views
+
+
+def unrelated(count: int, seed: int) -> dict[str, Any]:
+    """Count what is taken for tracked of pairs of views of different scenes."""
+    rng = np.random.default_rng(seed)
+    views = different_scenes(max(6, min(150, count // 10)), rng)
     told: Counter[str] = Counter()
     for _ in range(count):
         a, b = rng.choice(len(views), 2, replace=False)

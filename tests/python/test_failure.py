@@ -266,6 +266,16 @@ def test_the_measured_experiments(count: int) -> None:
     assert "fused wrongly" not in failures.kidnap(count, 1)
 
 
+def test_noise_that_residuals_do_not_show_joins_no_bumps() -> None:
+    import failures
+
+    views = failures.different_scenes(50, np.random.default_rng(3))
+    for first, second in [(44, 36), (38, 15), (20, 36)]:  # reliefs, and round shapes as large as their bumps
+        model = nacre.Model(failures.CAMERA)
+        model.add_frame(views[first])
+        assert model.add_frame(views[second]).status == "LOST"
+
+
 @pytest.mark.slow
 def test_smooth_shapes_that_have_nothing_in_common_are_never_tracked() -> None:
     import failures

@@ -187,8 +187,8 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
 }
 
 // Until frames have told how noisy the camera is, a frame that is lost may be noisier where it is expected; elsewhere
-// it is looked for with the noise that is known. What a noise that was tried finds is believed where residuals confirm
-// it.
+// it is looked for with the noise that is known. Before the second frame none has told: its residuals must show the
+// noise that was tried.
 TrackingResult Pipeline::track_frame(TrackingPrior prior) {
   const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
   const CurrentFrame current{frame, camera, observer, now};
@@ -200,7 +200,6 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior) {
     const auto is_found = [&] {
       if (result.is_lost()) return false;
       if (noise_factor == known_noise_factor()) return true;
-      // No frame has told before the second.
       const bool is_as_noisy =
           history.num_registered() > 1 || result.alignment.residual_sigmas >= tracking_limits::least_residual_sigmas;
       return is_as_noisy && result.expectation != Expectation::unexpected;

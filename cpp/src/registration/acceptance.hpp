@@ -47,9 +47,9 @@ struct Acceptance {
 // would have matched, ln(0.58 / ratio), where chance gives a ratio of 0.58; times overlap^2, since any two surfaces
 // touch somewhere, and consistency^4, since true ones contradict nowhere; by misfit^2 where it is above 1, since a
 // shape that only resembles is bent another way. Once it is known how much right places contradict, near a guess
-// the usual contradiction to this one takes the place of consistency^4. After a
-// loss more is asked for; beside the last pose misfit above half counts, too. Far from all guesses, where many places
-// resemble, consistency^8, and of a plane much more.
+// the usual contradiction to this one takes the place of consistency^4. After a loss more is asked for. Beside the last
+// pose misfit above half counts, too. Far from all guesses, where many places resemble, so does consistency^8, and of a
+// plane much more is asked for.
 //
 // The relocalisation score is that of a place that nothing but the source speaks for. New surface does not speak
 // against it (overlap, not its square), contradictions and misfit do the more (consistency^12, misfit^4), and what the
