@@ -8,10 +8,10 @@
 namespace nacre {
 namespace {
 
-constexpr std::align_val_t alignment{64};
+constexpr std::align_val_t cache_line{64};
 constexpr std::size_t most_kept = std::size_t{64} << 20;  // bytes a thread
 
-void release(const ScratchBlock& block) { ::operator delete(block.memory, alignment); }
+void release(const ScratchBlock& block) { ::operator delete(block.memory, cache_line); }
 
 // The blocks that a thread keeps, oldest first.
 class Store {
@@ -56,7 +56,7 @@ thread_local Store store;
 ScratchBlock take_scratch(std::size_t size) {
   const ScratchBlock kept = store.take(size);
   if (kept.memory != nullptr) return kept;
-  return {::operator new(size, alignment), size};
+  return {::operator new(size, cache_line), size};
 }
 
 void give_back_scratch(ScratchBlock block) noexcept {

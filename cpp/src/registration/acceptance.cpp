@@ -9,28 +9,28 @@
 namespace nacre {
 namespace {
 
-// What is asked of a registration. Far from all guesses there are many places, and some resemble: boxes' corners fit
-// corners, and of unrelated round shapes that match the misfit is 0.54 and more.
+// What is asked of a registration. Far from all guesses there are many places, and some resemble: of unrelated round
+// shapes that match the misfit is 0.54 and more, and three planes fit any three that meet at the same angles.
 struct Demands {
   double score;  // times min_score
   double consistency_power;
-  double largest_misfit;  // that does not lower the score
+  double largest_misfit;    // that does not lower the score
+  double least_off_planes;  // of the matches
 };
 
-Demands demands_on(const IcpResult& alignment, Expectation expectation) {
+Demands demands_on(Expectation expectation, bool is_continuous) {
   using namespace registration_limits;
-  const bool is_plane = alignment.normal_information < plane_information;
   switch (expectation) {
     case Expectation::expected:
-      return {1.0, consistency_power, 1.0};
+      return {1.0, consistency_power, 1.0, 0.0};
     case Expectation::near_lost:
-      return {doubtful_score, consistency_power, 1.0};
+      return {doubtful_score, consistency_power, 1.0, 0.0};
     case Expectation::beside:
-      return {doubtful_score, consistency_power, far_misfit};
+      return {doubtful_score, consistency_power, far_misfit, is_continuous ? 0.0 : least_off_planes};
     case Expectation::unexpected:
-      return {is_plane ? doubtful_plane_score : doubtful_score, far_consistency_power, far_misfit};
+      return {doubtful_score, far_consistency_power, far_misfit, least_off_planes};
     default:
-      return {0.0, consistency_power, 1.0};
+      return {0.0, consistency_power, 1.0, 0.0};
   }
 }
 
@@ -66,7 +66,7 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
     acceptance.reason = "too few points of the frame match the model";
     return acceptance;
   }
-  const Demands demands = demands_on(alignment, expectation);
+  const Demands demands = demands_on(expectation, options.usual_contradiction.has_value());
   const double overlap = alignment.overlap;
   const double ratio = std::max(least_ratio, alignment.residual_ratio);
   const double bent = std::max(1.0, alignment.misfit / demands.largest_misfit);
@@ -83,7 +83,10 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
   if (expectation == Expectation::unexpected) acceptance.score *= unlikely;
   acceptance.relocalisation_score = overlap * std::pow(consistency, relocalisation_consistency_power) * per_match /
                                     (bent * bent) * alignment.normal_information * unlikely;
-  if (options.verify && is_other_size(alignment.size_difference, expectation)) {
+  if (options.verify && alignment.off_planes < demands.least_off_planes) {
+    acceptance.relocalisation_score = 0.0;
+    reason << "three planes explain what matches, all but a part of " << alignment.off_planes;
+  } else if (options.verify && is_other_size(alignment.size_difference, expectation)) {
     acceptance.relocalisation_score = 0.0;
     reason << "the frame is " << 1.0 / (1.0 + alignment.size_difference.relative)
            << " times as large as the part of the model that it fits";

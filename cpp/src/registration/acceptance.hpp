@@ -48,13 +48,12 @@ struct Acceptance {
 // touch somewhere, and consistency^4, since true ones contradict nowhere; by misfit^2 where it is above 1, since a
 // shape that only resembles is bent another way. Once it is known how much right places contradict, near a guess
 // the usual contradiction to this one takes the place of consistency^4. After a loss more is asked for. Beside the last
-// pose misfit above half counts, too. Far from all guesses, where many places resemble, so does consistency^8, and of a
-// plane much more is asked for.
+// pose misfit above half counts, too; far from all guesses, where many places resemble, so does consistency^8. At
+// neither is a place believed whose matches all lie on three planes: see share_off_planes.
 //
 // The relocalisation score is that of a place that nothing but the source speaks for. New surface does not speak
 // against it (overlap, not its square), contradictions and misfit do the more (consistency^12, misfit^4), and what the
-// residuals tell counts as much as the normals agree: see normal_information. Where only a plane of the one fits a
-// plane of the other it is 0.
+// residuals tell counts as much as the normals agree: see normal_information.
 //
 // Where the camera makes few contradictions, few are believed far from all guesses: taken as exponentially distributed,
 // with one mean where places are right, as has been seen, and another where they are wrong, both scores are multiplied

@@ -7,6 +7,7 @@
 #include "base/limits.hpp"
 #include "base/numbers.hpp"
 #include "base/statistics.hpp"
+#include "registration/dominant_planes.hpp"
 #include "registration/limits.hpp"
 #include "registration/scale_check.hpp"
 
@@ -180,6 +181,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   result.rmse = last.rmse;
   result.residual_ratio = residual_ratio_of(pairs, options.method);
   result.normal_information = normal_information(pairs, options.method);
+  result.off_planes = share_off_planes(pairs, result.residual_ratio);
   result.center = last.center;
   const double variance = std::max(last.variance, resolution * resolution);
   result.information = last.hessian / variance;

@@ -12,6 +12,7 @@ struct IcpResult : AlignResult {
   double residual_ratio = std::numeric_limits<double>::quiet_NaN();  // residuals to the largest they may be, rms
   Matrix6 shape_information = Matrix6::Zero();                       // the part of it on which normals agree
   double normal_information = 0.0;                                   // see normal_information
+  double off_planes = 0.0;                                           // see share_off_planes
   double residual_sigmas =
       std::numeric_limits<double>::quiet_NaN();  // their scale, in standard deviations of the source
   double misfit = 0.0;  // what neighbouring residuals have in common, by what noise and resolution explain, rms

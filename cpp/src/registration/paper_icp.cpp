@@ -10,6 +10,7 @@
 #include "base/random.hpp"
 #include "nacre/kdtree.hpp"
 #include "nacre/normals.hpp"
+#include "registration/dominant_planes.hpp"
 #include "registration/limits.hpp"
 
 namespace nacre {
@@ -140,6 +141,7 @@ class PaperIcp {
     result.rmse = last.rmse;
     result.residual_ratio = last.rmse / gate_;
     result.normal_information = normal_information(best.pairs, Metric::point_to_plane);
+    result.off_planes = share_off_planes(best.pairs, result.residual_ratio);
     result.size_difference = size_difference(best.pairs, Metric::point_to_plane);
     result.center = last.center;
     const double variance = std::max(last.variance, 1e-18);

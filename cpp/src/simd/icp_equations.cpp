@@ -7,12 +7,12 @@
 namespace nacre::simd::NACRE_ISA {
 namespace {
 
-constexpr int width = 8;
-using Lanes = double[width];
+constexpr int row_width = 8;
+using Lanes = double[row_width];
 
 // c(n) = (lever x n, n)
 NACRE_INLINE void fill_row(const Lanes (&lever)[3], const Lanes (&normal)[3], Lanes (&row)[6]) {
-  for (int i = 0; i < width; ++i) {
+  for (int i = 0; i < row_width; ++i) {
     row[0][i] = lever[1][i] * normal[2][i] - lever[2][i] * normal[1][i];
     row[1][i] = lever[2][i] * normal[0][i] - lever[0][i] * normal[2][i];
     row[2][i] = lever[0][i] * normal[1][i] - lever[1][i] * normal[0][i];
@@ -26,9 +26,9 @@ NACRE_INLINE void add_product(const Lanes (&row)[6], const Lanes& weight, Lanes 
   int k = 0;
   for (int a = 0; a < 6; ++a) {
     Lanes weighted;
-    for (int i = 0; i < width; ++i) weighted[i] = weight[i] * row[a][i];
+    for (int i = 0; i < row_width; ++i) weighted[i] = weight[i] * row[a][i];
     for (int b = a; b < 6; ++b, ++k) {
-      for (int i = 0; i < width; ++i) sums[k][i] += weighted[i] * row[b][i];
+      for (int i = 0; i < row_width; ++i) sums[k][i] += weighted[i] * row[b][i];
     }
   }
 }
@@ -42,9 +42,9 @@ void sum_pair_equations(const PairRow* pairs, int64_t count, PairEquations& out)
   memset(hessian, 0, sizeof hessian);
   memset(chance, 0, sizeof chance);
   memset(gradient, 0, sizeof gradient);
-  for (int64_t first = 0; first < count; first += width) {
+  for (int64_t first = 0; first < count; first += row_width) {
     Lanes lever[3], normal[3], difference[3], right_side, weight, row[6];
-    for (int i = 0; i < width; ++i) {
+    for (int i = 0; i < row_width; ++i) {
       // Lanes past the end repeat a pair without weight.
       const bool is_pair = first + i < count;
       const PairRow& pair = pairs[is_pair ? first + i : first];
@@ -61,7 +61,7 @@ void sum_pair_equations(const PairRow* pairs, int64_t count, PairEquations& out)
     fill_row(lever, normal, row);
     add_product(row, weight, hessian);
     for (int a = 0; a < 6; ++a) {
-      for (int i = 0; i < width; ++i) gradient[a][i] += weight[i] * right_side[i] * row[a][i];
+      for (int i = 0; i < row_width; ++i) gradient[a][i] += weight[i] * right_side[i] * row[a][i];
     }
   }
   for (int k = 0; k < 21; ++k) {

@@ -46,7 +46,8 @@ TrackingResult FrameRegistration::from(const Pose& guess, Gate gate, Expectation
   const Pose& pose = result.alignment.target_from_source;
   result.consistency = consistency(view, pose);
   const bool is_far = view_distance(guess, pose, depth_) > camera_limits::new_direction / camera_limits::view_turn;
-  result.expectation = is_far ? Expectation::unexpected : expectation;
+  const bool has_jumped = expectation == Expectation::expected && target_.usual_contradiction;
+  result.expectation = !is_far ? expectation : has_jumped ? Expectation::beside : Expectation::unexpected;
   result.test(options_, target_.usual_contradiction);
   return result;
 }

@@ -19,6 +19,7 @@ struct Registration {
     alignment.overlap = 0.8;
     alignment.residual_ratio = 0.15;
     alignment.normal_information = 3.0;
+    alignment.off_planes = 0.5;
     alignment.misfit = 0.1;
     alignment.weak_directions.resize(6, 0);
   }
@@ -49,21 +50,33 @@ TEST_CASE("a good registration is tracked, wherever it is") {
 
 TEST_CASE("the more speaks for a place, the less is asked of the frame") {
   const auto bent = [](Registration& result) { result.alignment.misfit = 0.9; };
-  const auto plane = [](Registration& result) { result.alignment.normal_information = 0.01; };
   const auto contradicted = [](Registration& result) { result.consistency = 0.85; };
   const auto faint = [](Registration& result) { result.alignment.overlap = 0.49; };
-  const std::function<void(Registration&)> changes[] = {bent, plane, contradicted};
+  const std::function<void(Registration&)> changes[] = {bent, contradicted};
   for (const auto& change : changes) {
     CHECK(tested(change, Expectation::expected).decision == Decision::accepted);
     CHECK(tested(change, Expectation::near_lost).decision == Decision::accepted);
     CHECK(tested(change, Expectation::unexpected).decision == Decision::rejected);
   }
   CHECK(tested(bent, Expectation::beside).decision == Decision::rejected);
-  CHECK(tested(plane, Expectation::beside).decision == Decision::accepted);
   CHECK(tested(contradicted, Expectation::beside).decision == Decision::accepted);
   CHECK(tested(faint, Expectation::beside).decision == Decision::rejected);
   CHECK(tested(faint, Expectation::expected).decision == Decision::accepted);
   CHECK(tested(faint, Expectation::near_lost).decision == Decision::rejected);
+}
+
+TEST_CASE("matches that lie on three planes are believed near a guess, and beside the last pose of a known camera") {
+  const auto corner = [](Registration& result) { result.alignment.off_planes = 0.02; };
+  const AcceptanceOptions known{0.3, true, 0.0};
+  for (const Expectation near : {Expectation::expected, Expectation::near_lost, Expectation::only_place}) {
+    CHECK(tested(corner, near).decision == Decision::accepted);
+  }
+  CHECK(tested(corner, Expectation::beside).decision == Decision::rejected);
+  CHECK(tested(corner, Expectation::beside, known).decision == Decision::accepted);
+  const Acceptance far = tested(corner, Expectation::unexpected, known);
+  CHECK(far.decision == Decision::rejected);
+  CHECK(far.relocalisation_score == 0.0);
+  CHECK(far.reason == "three planes explain what matches, all but a part of 0.02");
 }
 
 TEST_CASE("what a pose leaves open is taken from a guess, which a far place does not have") {
