@@ -14,8 +14,8 @@ namespace {
 struct Demands {
   double score;  // times min_score
   double consistency_power;
-  double largest_misfit;    // that does not lower the score
-  double least_off_planes;  // of the matches
+  double largest_misfit;  // that does not lower the score
+  double off_planes;      // part of the matches below which they count less
 };
 
 Demands demands_on(Expectation expectation, bool is_continuous) {
@@ -26,9 +26,9 @@ Demands demands_on(Expectation expectation, bool is_continuous) {
     case Expectation::near_lost:
       return {doubtful_score, consistency_power, 1.0, 0.0};
     case Expectation::beside:
-      return {doubtful_score, consistency_power, far_misfit, is_continuous ? 0.0 : least_off_planes};
+      return {doubtful_score, consistency_power, far_misfit, is_continuous ? 0.0 : usual_off_planes};
     case Expectation::unexpected:
-      return {doubtful_score, far_consistency_power, far_misfit, least_off_planes};
+      return {doubtful_score, far_consistency_power, far_misfit, usual_off_planes};
     default:
       return {0.0, consistency_power, 1.0, 0.0};
   }
@@ -39,6 +39,9 @@ double consistency_weight(double contradiction, double usual) {
   using namespace registration_limits;
   return usual_weight * (usual + least_contradiction) / (contradiction + least_contradiction);
 }
+
+// Of what matches tell, the part that three planes do not explain.
+double part_beyond(double off_planes, double usual) { return usual > 0.0 ? std::min(1.0, off_planes / usual) : 1.0; }
 
 // Of a right place to a wrong one; at most 1, and never 0.
 double likelihood_ratio(double contradiction, std::optional<double> usual) {
@@ -79,14 +82,12 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
   const double consistent = is_near && is_determined && options.usual_contradiction
                                 ? consistency_weight(1.0 - consistency, *options.usual_contradiction)
                                 : std::pow(consistency, demands.consistency_power);
-  acceptance.score = overlap * overlap * consistent * per_match;
+  const double beyond_planes = part_beyond(alignment.off_planes, demands.off_planes);
+  acceptance.score = overlap * overlap * consistent * per_match * beyond_planes;
   if (expectation == Expectation::unexpected) acceptance.score *= unlikely;
   acceptance.relocalisation_score = overlap * std::pow(consistency, relocalisation_consistency_power) * per_match /
-                                    (bent * bent) * alignment.normal_information * unlikely;
-  if (options.verify && alignment.off_planes < demands.least_off_planes) {
-    acceptance.relocalisation_score = 0.0;
-    reason << "three planes explain what matches, all but a part of " << alignment.off_planes;
-  } else if (options.verify && is_other_size(alignment.size_difference, expectation)) {
+                                    (bent * bent) * alignment.normal_information * unlikely * beyond_planes;
+  if (options.verify && is_other_size(alignment.size_difference, expectation)) {
     acceptance.relocalisation_score = 0.0;
     reason << "the frame is " << 1.0 / (1.0 + alignment.size_difference.relative)
            << " times as large as the part of the model that it fits";
@@ -94,6 +95,7 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
     reason << "registration score " << acceptance.score << " is below " << least << ": overlap " << overlap
            << ", consistency " << consistency << ", residuals " << ratio << " of the largest that match";
     if (bent > 1.0) reason << ", bent " << bent << " times as much as true matches may be";
+    if (beyond_planes < 1.0) reason << ", all but " << alignment.off_planes << " on three planes";
   } else if (options.verify && !is_determined) {
     // Where the camera was says nothing of a far place, and cannot stand in for what is open there.
     if (expectation != Expectation::unexpected) acceptance.decision = Decision::undetermined;
@@ -119,7 +121,7 @@ bool PlaceOdds::is_for(double relocalisation_score) {
 bool PlaceOdds::is_enough(double relocalisation_score, Expectation expectation) const {
   using namespace registration_limits;
   return relocalisation_score >= (expectation == Expectation::unexpected ? enough_far : enough_alone) ||
-         (num_views_ > 1 && log_odds_ >= enough_together);
+         (num_views_ > 1 && log_odds_ >= enough_together && is_for(relocalisation_score));
 }
 
 SearchAcceptance accept_best(const std::vector<SearchFit>& fits, double min_overlap, double min_consistency,

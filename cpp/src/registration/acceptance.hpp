@@ -49,11 +49,11 @@ struct Acceptance {
 // shape that only resembles is bent another way. Once it is known how much right places contradict, near a guess
 // the usual contradiction to this one takes the place of consistency^4. After a loss more is asked for. Beside the last
 // pose misfit above half counts, too; far from all guesses, where many places resemble, so does consistency^8. At
-// neither is a place believed whose matches all lie on three planes: see share_off_planes.
+// both the score is the lower, the more of the matches lie on three planes: see share_off_planes.
 //
 // The relocalisation score is that of a place that nothing but the source speaks for. New surface does not speak
 // against it (overlap, not its square), contradictions and misfit do the more (consistency^12, misfit^4), and what the
-// residuals tell counts as much as the normals agree: see normal_information.
+// residuals tell counts as much as the normals agree (see normal_information) and as matches are off three planes.
 //
 // Where the camera makes few contradictions, few are believed far from all guesses: taken as exponentially distributed,
 // with one mean where places are right, as has been seen, and another where they are wrong, both scores are multiplied
@@ -74,7 +74,7 @@ class PlaceOdds {
  public:
   // A view with a relocalisation score, as far from those before as `novelty` says (1: another view altogether).
   void add(double relocalisation_score, double novelty);
-  // Whether there is enough to believe in the place, after this view.
+  // Whether there is enough to believe in the place, after this view: which speaks for it, too.
   bool is_enough(double relocalisation_score, Expectation expectation) const;
   bool is_against() const { return log_odds_ < 0.0; }
 
