@@ -106,6 +106,35 @@ def turntable(name: str, mesh: nacre.Mesh, views: int, *, kinect: bool, seed: in
     return Case(name, camera, depths, [None] * views, list(poses), mesh)
 
 
+def poster(views: int, *, colored: bool, seed: int) -> Case:
+    """Return a camera that moves along a printed wall, which leaves three directions to its colours."""
+    rng = np.random.default_rng(seed)
+    camera = nacre.Camera(320, 240, 262.5, 262.5, 159.5, 119.5)
+    wall = nacre.Mesh(np.array([[-4, -3, 0], [4, -3, 0], [4, 3, 0], [-4, 3, 0]], float), [[0, 2, 1], [0, 3, 2]])
+    waves = rng.normal(size=(30, 2)) * rng.uniform(10, 60, (30, 1))  # details of 5 to 30 cm
+    phases = rng.uniform(0, 2 * math.pi, 30)
+    depths, colors, truths = [], [], []
+    for i in range(views):
+        pose = np.eye(4)
+        a, b = 0.1 * math.sin(i / 9), 0.15 * math.sin(i / 7)
+        roll = np.array([[math.cos(a), -math.sin(a), 0], [math.sin(a), math.cos(a), 0], [0, 0, 1]])
+        yaw = np.array([[math.cos(b), 0, math.sin(b)], [0, 1, 0], [-math.sin(b), 0, math.cos(b)]])
+        pose[:3, :3] = yaw @ roll
+        pose[:3, 3] = (0.012 * i, 0.1 * math.sin(i / 11), -1.0 + 0.1 * math.sin(i / 13))
+        exact = wall.simulate_depth(camera, pose)
+        v, u = np.mgrid[0:240, 0:320]
+        rays = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(u.shape)], axis=-1)
+        points = (exact[..., None] * rays) @ pose[:3, :3].T + pose[:3, 3]
+        shade = sum(np.sin(points[..., :2] @ w + p) for w, p in zip(waves, phases, strict=True))
+        gain = 1 + 0.1 * math.sin(i / 5)  # the camera's exposure
+        value = gain * (120 + 10 * shade) + rng.normal(0, 3, shade.shape)
+        gray = np.clip(np.nan_to_num(value), 0, 255).astype(np.uint8)
+        depths.append(wall.simulate_depth(camera, pose, noise="kinect", seed=1000 * seed + i))
+        colors.append(np.repeat(gray[..., None], 3, axis=-1) if colored else None)
+        truths.append(pose)
+    return Case("poster", camera, depths, colors, truths, wall)
+
+
 def object_mesh(name: str) -> nacre.Mesh:
     """Return one of the meshes, at the size of an object."""
     if name == "object":
@@ -133,10 +162,12 @@ def recorded(name: str, *, every: int = 1, most: int | None = None) -> Case:
 
 
 def make(name: str, seed: int = 0, *, most: int | None = None) -> Case:
-    """Return a case by name: one of REAL, or bunny12, spot-kinect36 and the like."""
+    """Return a case by name: one of REAL, or bunny12, spot-kinect36, poster60, poster60-gray and the like."""
     if name in REAL:
         return recorded(name, most=most)
     shape, _, rest = name.partition("-")
+    if shape.startswith("poster"):
+        return poster(int(shape.removeprefix("poster")), colored=rest != "gray", seed=seed)
     kinect = rest.startswith("kinect")
     shape = shape.rstrip("0123456789")
     views = int((rest if kinect else name).lstrip("abcdefghijklmnopqrstuvwxyz"))

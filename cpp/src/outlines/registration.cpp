@@ -143,7 +143,7 @@ class EdgeSearch : public OpenDirectionSearch {
   }
 
   void step(const std::vector<MotionRow>& pairs, const TwistBasis& open, IcpResult& result) const {
-    Vector6 twist = gauss_newton_step(pairs, open, extent_, {outlines_limits::step_damping, 0.0});
+    Vector6 twist = gauss_newton_step(pairs, open, extent_, outlines_limits::step_damping);
     twist.head<3>() /= extent_;
     result.target_from_source = motion_about(result.center, twist) * result.target_from_source;
   }

@@ -15,22 +15,22 @@ struct Demands {
   double score;  // times min_score
   double consistency_power;
   double largest_misfit;  // that does not lower the score
-  double off_planes;      // part of the matches below which they count less
+  bool beyond_planes;     // whether matches count by what they tell beyond three planes
 };
 
 Demands demands_on(Expectation expectation, bool is_continuous) {
   using namespace registration_limits;
   switch (expectation) {
     case Expectation::expected:
-      return {1.0, consistency_power, 1.0, 0.0};
+      return {1.0, consistency_power, 1.0, false};
     case Expectation::near_lost:
-      return {doubtful_score, consistency_power, 1.0, 0.0};
+      return {doubtful_score, consistency_power, 1.0, false};
     case Expectation::beside:
-      return {doubtful_score, consistency_power, far_misfit, is_continuous ? 0.0 : usual_off_planes};
+      return {doubtful_score, consistency_power, far_misfit, !is_continuous};
     case Expectation::unexpected:
-      return {doubtful_score, far_consistency_power, far_misfit, usual_off_planes};
+      return {doubtful_score, far_consistency_power, far_misfit, true};
     default:
-      return {0.0, consistency_power, 1.0, 0.0};
+      return {0.0, consistency_power, 1.0, false};
   }
 }
 
@@ -40,8 +40,11 @@ double consistency_weight(double contradiction, double usual) {
   return usual_weight * (usual + least_contradiction) / (contradiction + least_contradiction);
 }
 
-// Of what matches tell, the part that three planes do not explain.
-double part_beyond(double off_planes, double usual) { return usual > 0.0 ? std::min(1.0, off_planes / usual) : 1.0; }
+// Of what matches tell, the part that three planes do not: what lies off them, and that all of a corner is there.
+double part_beyond_planes(const IcpResult& alignment) {
+  using namespace registration_limits;
+  return std::clamp(alignment.off_planes / usual_off_planes, std::pow(alignment.overlap, corner_overlap_power), 1.0);
+}
 
 // Of a right place to a wrong one; at most 1, and never 0.
 double likelihood_ratio(double contradiction, std::optional<double> usual) {
@@ -82,7 +85,7 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
   const double consistent = is_near && is_determined && options.usual_contradiction
                                 ? consistency_weight(1.0 - consistency, *options.usual_contradiction)
                                 : std::pow(consistency, demands.consistency_power);
-  const double beyond_planes = part_beyond(alignment.off_planes, demands.off_planes);
+  const double beyond_planes = demands.beyond_planes ? part_beyond_planes(alignment) : 1.0;
   acceptance.score = overlap * overlap * consistent * per_match * beyond_planes;
   if (expectation == Expectation::unexpected) acceptance.score *= unlikely;
   acceptance.relocalisation_score = overlap * std::pow(consistency, relocalisation_consistency_power) * per_match /

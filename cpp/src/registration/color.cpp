@@ -141,10 +141,7 @@ class ColorSearch : public OpenDirectionSearch {
   // Moves the pose along the open directions; returns how far, root mean square over the pairs [m].
   double step(const std::vector<MotionRow>& rows, const TwistBasis& open, IcpResult& result) const {
     const double extent = extent_of(rows);
-    Vector6 twist =
-        gauss_newton_step(rows, open, extent, {base_limits::damping, registration_limits::color_trace_damping});
-    const double longest = registration_limits::longest_color_step * target_.spacing(), length = twist.norm();
-    if (length > longest) twist *= longest / length;
+    Vector6 twist = gauss_newton_step(rows, open, extent, base_limits::damping);
     const double size = twist.norm();
     twist.head<3>() /= extent;
     result.target_from_source = motion_about(result.center, twist) * result.target_from_source;

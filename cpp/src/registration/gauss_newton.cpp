@@ -17,8 +17,7 @@ Vector6 twist_row(const Eigen::Vector3d& lever, const Eigen::Vector3d& gradient,
 
 }  // namespace
 
-Vector6 gauss_newton_step(const std::vector<MotionRow>& rows, const TwistBasis& basis, double extent,
-                          const Damping& damping) {
+Vector6 gauss_newton_step(const std::vector<MotionRow>& rows, const TwistBasis& basis, double extent, double damping) {
   Products hessian = Products::Zero(basis.cols(), basis.cols());
   Amounts gradient = Amounts::Zero(basis.cols());
   double weight = 0.0;
@@ -28,7 +27,7 @@ Vector6 gauss_newton_step(const std::vector<MotionRow>& rows, const TwistBasis& 
     gradient -= pair.weight * pair.residual * row;
     weight += pair.weight;
   }
-  hessian.diagonal().array() += damping.of_trace * hessian.trace() + damping.of_weight * weight;
+  hessian.diagonal().array() += damping * weight;
   return basis * solve_symmetric(hessian, gradient);
 }
 

@@ -15,13 +15,9 @@ struct MotionRow {
   double residual = 0.0, weight = 1.0;
 };
 
-struct Damping {
-  double of_weight, of_trace;  // added to the Hessian's diagonal
-};
-
-// The step along a basis: a twist, its rotation in units of the extent [m].
-Vector6 gauss_newton_step(const std::vector<MotionRow>& rows, const TwistBasis& basis, double extent,
-                          const Damping& damping);
+// The step along a basis: a twist, its rotation in units of the extent [m]. damping: added to the Hessian's diagonal,
+// for each unit of weight.
+Vector6 gauss_newton_step(const std::vector<MotionRow>& rows, const TwistBasis& basis, double extent, double damping);
 
 // Information on the directions of a basis that source and target agree on: noise cancels, as it does among normals
 // (registration/normal_equations.hpp). The residuals' weights are in units of scale^2.
