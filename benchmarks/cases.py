@@ -110,10 +110,13 @@ def poster(views: int, *, colored: bool, seed: int) -> Case:
     """Return a camera that moves along a printed wall, which leaves three directions to its colours."""
     rng = np.random.default_rng(seed)
     camera = nacre.Camera(320, 240, 262.5, 262.5, 159.5, 119.5)
-    wall = nacre.Mesh(np.array([[-4, -3, 0], [4, -3, 0], [4, 3, 0], [-4, 3, 0]], float), [[0, 2, 1], [0, 3, 2]])
+    corners = np.array([[-4, -3, 0], [4, -3, 0], [4, 3, 0], [-4, 3, 0]], float)
+    wall = nacre.Mesh(corners, np.array([[0, 2, 1], [0, 3, 2]]))
     waves = rng.normal(size=(30, 2)) * rng.uniform(10, 60, (30, 1))  # details of 5 to 30 cm
     phases = rng.uniform(0, 2 * math.pi, 30)
-    depths, colors, truths = [], [], []
+    depths: list[Array] = []
+    colors: list[Array | None] = []
+    truths: list[Array | None] = []
     for i in range(views):
         pose = np.eye(4)
         a, b = 0.1 * math.sin(i / 9), 0.15 * math.sin(i / 7)
