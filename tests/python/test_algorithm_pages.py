@@ -83,7 +83,6 @@ CONSTANTS = [
     ("noise", r"$m \ge 0.5$", "tracking/limits.hpp", "least_residual_sigmas = 0.5"),
     ("tracking", "| 8 | 0.5 | any | 3 |", "registration/limits.hpp", "far_consistency_power = 8.0"),
     ("tracking", r"f / 0.2", "registration/limits.hpp", "usual_off_planes = 0.2"),
-    ("tracking", "O^8", "registration/limits.hpp", "corner_overlap_power = 8.0"),
     ("tracking", r"\max(0.025,", "registration/limits.hpp", "other_size = 0.025"),
     ("tracking", "blocks $b$ of 32", "registration/limits.hpp", "cell_pairs = 32"),
     ("tracking", "0.58", "registration/limits.hpp", "chance_ratio = 0.58"),

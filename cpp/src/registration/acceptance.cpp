@@ -18,7 +18,7 @@ struct Demands {
   bool beyond_planes;     // whether matches count by what they tell beyond three planes
 };
 
-Demands demands_on(Expectation expectation, bool is_continuous) {
+Demands demands_on(Expectation expectation) {
   using namespace registration_limits;
   switch (expectation) {
     case Expectation::expected:
@@ -26,7 +26,7 @@ Demands demands_on(Expectation expectation, bool is_continuous) {
     case Expectation::near_lost:
       return {doubtful_score, consistency_power, 1.0, false};
     case Expectation::beside:
-      return {doubtful_score, consistency_power, far_misfit, !is_continuous};
+      return {doubtful_score, consistency_power, far_misfit, false};
     case Expectation::unexpected:
       return {doubtful_score, far_consistency_power, far_misfit, true};
     default:
@@ -40,10 +40,9 @@ double consistency_weight(double contradiction, double usual) {
   return usual_weight * (usual + least_contradiction) / (contradiction + least_contradiction);
 }
 
-// Of what matches tell, the part that three planes do not: what lies off them, and that all of a corner is there.
+// Of what matches tell, the part that three planes do not.
 double part_beyond_planes(const IcpResult& alignment) {
-  using namespace registration_limits;
-  return std::clamp(alignment.off_planes / usual_off_planes, std::pow(alignment.overlap, corner_overlap_power), 1.0);
+  return std::min(1.0, alignment.off_planes / registration_limits::usual_off_planes);
 }
 
 // Of a right place to a wrong one; at most 1, and never 0.
@@ -72,7 +71,7 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
     acceptance.reason = "too few points of the frame match the model";
     return acceptance;
   }
-  const Demands demands = demands_on(expectation, options.usual_contradiction.has_value());
+  const Demands demands = demands_on(expectation);
   const double overlap = alignment.overlap;
   const double ratio = std::max(least_ratio, alignment.residual_ratio);
   const double bent = std::max(1.0, alignment.misfit / demands.largest_misfit);

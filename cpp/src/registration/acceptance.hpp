@@ -48,9 +48,8 @@ struct Acceptance {
 // touch somewhere, and consistency^4, since true ones contradict nowhere; by misfit^2 where it is above 1, since a
 // shape that only resembles is bent another way. Once it is known how much right places contradict, near a guess
 // the usual contradiction to this one takes the place of consistency^4. After a loss more is asked for. Beside the last
-// pose misfit above half counts, too; far from all guesses, where many places resemble, so does consistency^8. At
-// both the score is the lower, the more of the matches lie on three planes (see share_off_planes), unless all of a
-// corner is there.
+// pose misfit above half counts, too; far from all guesses, where many places resemble, so does consistency^8, and the
+// score is the lower, the more of the matches lie on three planes: see share_off_planes.
 //
 // The relocalisation score is that of a place that nothing but the source speaks for. New surface does not speak
 // against it (overlap, not its square), contradictions and misfit do the more (consistency^12, misfit^4), and what the

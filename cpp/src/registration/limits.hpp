@@ -55,7 +55,6 @@ constexpr double usual_weight = 2.5;  // [1] tuned: of a place that contradicts 
 constexpr double far_misfit = 0.5;  // [1] tuned: beside the last pose, and far from all guesses, what bends more counts less; pairs
 constexpr double doubtful_score = 1.2;  // [min_score] tuned: asked after a loss, and far from all guesses; pairs
 constexpr double usual_off_planes = 0.2;  // [1] tuned: of the matches, that lie off three planes where the place is right; pairs, icl
-constexpr double corner_overlap_power = 8.0;  // [1] tuned: of the overlap of three planes that fit others: most of a wrong corner is not there; pairs, fandisk12
 constexpr std::size_t plane_pairs = 500;  // [pairs] budget: that tell what lies off three planes; test_dominant_planes
 constexpr std::size_t plane_probes = 20;  // [pairs] budget: of them, whose planes are tried; test_dominant_planes
 constexpr double clear_cut_score = 2.0;  // [min_score] tuned: no other guess needs to be tried; benchmarks
