@@ -14,7 +14,7 @@ namespace nacre {
 namespace {
 
 constexpr float nothing = std::numeric_limits<float>::quiet_NaN();
-constexpr int group = 3;  // channels that the kernel takes at once
+constexpr int planes_at_once = 3;  // channels that the kernel takes at once
 
 PointAttribute* find(PointModel& model, const std::string& name) {
   const auto found = std::find_if(model.attributes.begin(), model.attributes.end(),
@@ -50,7 +50,7 @@ AttributePlanes::AttributePlanes(const std::vector<FrameAttribute>& attributes, 
     num_planes_ += channels + (has_gaps ? 1 : 0);
   }
   if (parts_.empty()) return;
-  num_planes_ = (num_planes_ + group - 1) / group * group;
+  num_planes_ = (num_planes_ + planes_at_once - 1) / planes_at_once * planes_at_once;
   values_.assign(static_cast<std::size_t>(num_planes_ * plane_size_), 0.0F);
   parallel_for(camera.height(), 16, num_threads, [&](std::int64_t v) {
     for (const Part& part : parts_) {
@@ -70,7 +70,7 @@ AttributePlanes::AttributePlanes(const std::vector<FrameAttribute>& attributes, 
 }
 
 void AttributePlanes::observe(ObservationBlock& block, float* averages) const {
-  for (int plane = 0; plane < num_planes_; plane += group) {
+  for (int plane = 0; plane < num_planes_; plane += planes_at_once) {
     observer_.observe_planes(block, values_.data() + plane * plane_size_,
                              averages + plane * ObservationBlock::capacity);
   }

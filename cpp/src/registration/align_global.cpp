@@ -56,6 +56,7 @@ GlobalCloud::GlobalCloud(const PointsRef& points_in, const PointsRef& normals_in
 GlobalAcceptance accept_motion(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options,
                                double tolerance) {
   std::vector<SearchFit> fits;
+  fits.reserve(candidates.size());
   for (const SearchCandidate& candidate : candidates) {
     fits.push_back({candidate.score, std::max(candidate.forward.agree, candidate.backward.agree),
                     std::min(consistency_of(candidate.forward, options.outlines),

@@ -186,6 +186,7 @@ std::optional<PlaneFit> fit_on_plane(const PointModel& model, const std::vector<
   const TurntableSearch search(model, views, frame, camera, options);
   const std::vector<Candidate> candidates = search.run();
   std::vector<SearchFit> fits;
+  fits.reserve(candidates.size());
   for (const Candidate& candidate : candidates) {
     fits.push_back({candidate.score, candidate.overlap, candidate.agree / (candidate.agree + candidate.through), true});
   }
