@@ -8,9 +8,7 @@
 // clang-format off
 namespace nacre::outlines_limits {
 
-constexpr double look_within = 3.0;  // [pixel] derived: nearer to an edge, pixels see both of its sides; fandisk12, room
-constexpr double look_beyond = 5.0;  // [pixel] tuned: beyond an edge, where the surface must not continue; fandisk12, room
-constexpr double least_distance = 2.0;  // [pixel] tuned: between surfaces that differ; fandisk12, room
+constexpr double look_across = 3.0;  // [pixel] derived: from an edge, where it is asked what is there: nearer pixels see both of its sides; fandisk12, room
 constexpr int border_pixels = 3;  // [pixels] derived: of an image, where cleaning may have removed some; test_occluding_edges
 constexpr int window_radius = 6;  // [pixels] tuned: of the window that shows the surface; test_occluding_edges
 constexpr double least_offset = 0.25;  // [radius] derived: of the window's pixels from its center; a half window has 0.42; test_occluding_edges
@@ -25,7 +23,6 @@ constexpr double clear_agreement = 0.9;  // [1] tuned: no other start needs to b
 constexpr double last_gate = 4.0;  // [pixel] tuned: of matches, at last; fandisk12, room
 constexpr double least_agreement = 0.6;  // [1] tuned: part of the outlines that must match; wall
 constexpr double largest_ratio = 0.4;  // [1] derived: residuals to the gate, root mean square; chance gives 0.58; wall
-constexpr double least_information = 0.1;  // [1] tuned: per pair, for a direction to be known; wall, pipe
 constexpr double least_noise = 0.3;  // [pixel] derived: pixels are where they are to half of one; wall
 constexpr double largest_rms = 1.0;  // [pixel] tuned: of the residuals; outlines that move with the camera have 1.3 to 1.9; fandisk12, room
 constexpr double point_sigma = 0.5;  // [pixel] derived: of an outline's point; fandisk12, room
@@ -33,8 +30,6 @@ constexpr double points_for_one = 4.0;  // [points] tuned: neighbors on an outli
 constexpr double pairs_for_one = 30.0;  // [pairs] tuned: so do pairs of surface points; fandisk12, room
 constexpr double smear_step = 0.5;  // [pixel] budget: between places that are asked across an edge; test_occluding_edges
 constexpr double most_smeared = 2.5;  // [pixel] tuned: of an edge, over which depth falls off; test_occluding_edges
-constexpr double like_cosine = 0.75;  // [1] tuned: between outlines that match, and between their surfaces; fandisk12, room
-constexpr double least_facing = 0.5;  // [1] tuned: cosine at which a surface near an edge is asked, or may end there; fandisk12, room
 constexpr std::size_t least_matches = 25;  // [pairs] tuned: of outlines that decide a direction; fandisk12, wall
 
 }  // namespace nacre::outlines_limits

@@ -4,9 +4,12 @@
 #include <cmath>
 #include <optional>
 
+#include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "base/statistics.hpp"
+#include "camera/limits.hpp"
 #include "outlines/limits.hpp"
+#include "registration/limits.hpp"
 
 namespace nacre {
 namespace {
@@ -37,15 +40,15 @@ bool is_contradicted(const OutlinePoint& edge, const DepthView& view, const Came
                      double noise) {
   const bool is_orthographic = camera.model() == Camera::Model::orthographic;
   const Eigen::Vector3d sight_line = is_orthographic ? Eigen::Vector3d::UnitZ() : edge.point.normalized();
-  if (!(-edge.normal.dot(sight_line) > outlines_limits::least_facing)) return false;
-  const double tolerance = outlines_limits::least_distance * pixel + noise;
+  if (!(-edge.normal.dot(sight_line) > static_cast<double>(camera_limits::least_facing))) return false;
+  const double tolerance = pixel + base_limits::noise_sigmas * noise;
   const auto here =
-      distance_behind(view, camera, edge.point - outlines_limits::look_within * pixel * edge.outward, edge.normal);
+      distance_behind(view, camera, edge.point - outlines_limits::look_across * pixel * edge.outward, edge.normal);
   if (!here) return false;
   const Visibility inside = visibility(*here, tolerance);
   if (inside == Visibility::seen_through || inside == Visibility::unknown) return true;
   const auto beyond =
-      distance_behind(view, camera, edge.point + outlines_limits::look_beyond * pixel * edge.outward, edge.normal);
+      distance_behind(view, camera, edge.point + outlines_limits::look_across * pixel * edge.outward, edge.normal);
   return beyond && visibility(*beyond, tolerance) == Visibility::agrees;
 }
 
@@ -74,8 +77,8 @@ std::vector<int> nearest_edges(const std::vector<OutlinePoint>& outline, const s
     double least = gate * gate;
     for (std::size_t k = 0; k < others.size(); ++k) {
       const double squared = (others[k].point - edge.point).squaredNorm();
-      if (!(squared < least) || others[k].outward.dot(edge.outward) < outlines_limits::like_cosine ||
-          others[k].normal.dot(edge.normal) < outlines_limits::like_cosine) {
+      if (!(squared < least) || others[k].outward.dot(edge.outward) < registration_limits::view_cosine ||
+          others[k].normal.dot(edge.normal) < registration_limits::view_cosine) {
         continue;
       }
       least = squared;

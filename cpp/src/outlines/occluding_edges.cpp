@@ -75,7 +75,7 @@ class OutlineSearch {
     const Eigen::Vector3d sight_line =
         camera_.model() == Camera::Model::orthographic ? Eigen::Vector3d::UnitZ() : origin.normalized();
     if (found.normal.dot(sight_line) > 0.0) found.normal = -found.normal;
-    if (!(-found.normal.dot(sight_line) > outlines_limits::least_facing)) return std::nullopt;
+    if (!(-found.normal.dot(sight_line) > static_cast<double>(camera_limits::least_facing))) return std::nullopt;
     const Eigen::Vector3d along = across * -inward.y() + down * inward.x();
     found.outward = along.cross(found.normal).normalized();
     const Eigen::Vector3d outwards = -(across * inward.x() + down * inward.y());

@@ -58,11 +58,8 @@ class EdgeSearch : public OpenDirectionSearch {
 
   // Down to what leaves a direction no more uncertain than a pixel.
   Directions determined(const OpenFit& fit, const TwistBasis& open) const override {
-    double weight = 0.0;
-    for (const MotionRow& row : fit.rows) weight += row.weight;
     const double of_a_pixel = std::pow(fit.noise / (outlines_limits::least_noise * pixel_), 2);
-    const double least = std::max(of_a_pixel, outlines_limits::least_information * weight);
-    return split_directions(agreed_information(fit.rows, open, fit.extent, 1.0), least);
+    return split_directions(agreed_information(fit.rows, open, fit.extent, 1.0), of_a_pixel);
   }
 
  private:
