@@ -19,7 +19,6 @@ constexpr int num_rounds = 4;  // [rounds] budget: of steps along the outline, e
 constexpr int least_steps = 4;  // [steps] budget: in each round; fandisk12, room
 constexpr double step_damping = 1e-3;  // [1] derived: of the information, where few rows determine a direction; fandisk12
 constexpr double first_gate = 12.0;  // [pixel] tuned: of an object seen whole also a third of its size; fandisk12, room
-constexpr double clear_agreement = 0.9;  // [1] tuned: no other start needs to be tried; fandisk12, room
 constexpr double last_gate = 4.0;  // [pixel] tuned: of matches, at last; fandisk12, room
 constexpr double least_agreement = 0.6;  // [1] tuned: part of the outlines that must match; wall
 constexpr double largest_ratio = 0.4;  // [1] derived: residuals to the gate, root mean square; chance gives 0.58; wall

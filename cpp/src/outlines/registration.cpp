@@ -45,7 +45,6 @@ class EdgeSearch : public OpenDirectionSearch {
       const double agreement = agreement_from(geometric, first, nullptr).second;
       if (agreement > best) gate_ = first;
       best = std::max(best, agreement);
-      if (best > outlines_limits::clear_agreement) break;
     }
     return best >= outlines_limits::least_agreement;
   }
