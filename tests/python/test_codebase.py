@@ -135,7 +135,7 @@ DECIDING = ["camera", "depth", "simulation", "region", "registration", "outlines
 DECIDING += ["tracking", "loops", "model"]
 # What decides nothing about data: sizes of blocks and arrays, names of values.
 STRUCTURE = (
-    "block_size capacity border right_border tile_size size side radius shift group per_chunk nobody magic"
+    "block_size capacity border right_border tile_size size side radius shift group planes_at_once per_chunk nobody magic"
 )
 STRUCTURE += " version_at bytes_per_pixel none any nothing missing largest infinity nan reach step kWordBits"
 STRUCTURE += " unknown never no_limit step_block equation_block cloud_block phi"

@@ -9,6 +9,7 @@
 #include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "base/pose_check.hpp"
+#include "camera/limits.hpp"
 #include "camera/point_projection.hpp"
 #include "camera/point_spacing.hpp"
 #include "depth/depth_view.hpp"
@@ -95,8 +96,8 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
         view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin), points);
         const auto note_free_space_violation = [&](int j, float sigma) {
           const std::size_t i = first + static_cast<std::size_t>(j);
-          const float margin =
-              std::max(static_cast<float>(fusion_limits::margin_spacings * spacing), base_limits::noise_sigmas * sigma);
+          const float margin = std::max(static_cast<float>(camera_limits::surface_spacings * spacing),
+                                        base_limits::noise_sigmas * sigma);
           const bool is_confirmed = model.observations[i] >= options.min_observations;
           const Visibility is = visibility(frame.points(points.pixel[j], 2) - points.z[j], margin);
           const bool is_missed = is_confirmed ? observer.sees_through(points.point(j), points.pixel[j], margin)

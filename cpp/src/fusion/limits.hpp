@@ -12,7 +12,6 @@ constexpr float least_weight = 0.05F;  // [measurements] tuned: frontal: less ob
 constexpr float support_sigmas = 6.0F;  // [sigma] tuned: radius of pixels that speak of a point; bunny12 rms
 constexpr float least_support = 3.0F;  // [pixel] tuned: at least; bunny12 rms
 constexpr float largest_support = 4.0F;  // [pixel] budget: at most; bunny12 rms
-constexpr double margin_spacings = 2.0;  // [spacing] tuned: the same by the model's spacing; test_removal
 constexpr float insertion_pixels = 3.0F;  // [pixels] tuned: that a new point stands on, from the front; bunny12 NN CoV
 constexpr float insertion_weight = 1.0F;  // [measurements] tuned: and at least; bunny12 coverage
 constexpr float sheet_cosine = 0.3F;  // [cosine] tuned: between normals of one sheet; test_fusion

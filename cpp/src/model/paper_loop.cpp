@@ -6,6 +6,7 @@
 
 #include "base/point_rows.hpp"
 #include "base/random.hpp"
+#include "camera/limits.hpp"
 #include "nacre/kdtree.hpp"
 #include "nacre/normals.hpp"
 #include "registration/paper_icp.hpp"
@@ -67,7 +68,7 @@ TrackingResult PaperLoop::register_frame(const CurrentFrame& now, const Tracking
   TrackingResult result;
   result.alignment = align_as_in_paper(AlignCloud(source, source_normals),
                                        AlignCloud(as_rows(target.model.points), normals), guess, align_options);
-  const double margin = tracking_limits::margin_spacings * target.spacing;
+  const double margin = camera_limits::surface_spacings * target.spacing;
   const double part = compare(as_rows(target.model.points), as_rows(target.model.normals), now.view,
                               result.alignment.target_from_source, now.camera, {margin}, options.num_threads)
                           .consistency(tracking_limits::least_judged);

@@ -8,6 +8,7 @@
 #include "base/limits.hpp"
 #include "base/linear_algebra.hpp"
 #include "base/parallel.hpp"
+#include "camera/limits.hpp"
 #include "outlines/limits.hpp"
 
 namespace nacre {

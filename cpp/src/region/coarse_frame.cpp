@@ -43,8 +43,7 @@ CoarseFrame::CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef
 }
 
 bool are_linked(const Cell& a, const Cell& b, int steps) {
-  const float reach = region_limits::steepest * static_cast<float>(std::min(steps, region_limits::most_link_steps)) *
-                      std::min(a.footprint, b.footprint);
+  const float reach = region_limits::steepest * static_cast<float>(steps) * std::min(a.footprint, b.footprint);
   return (a.point - b.point).squaredNorm() < reach * reach;
 }
 

@@ -10,7 +10,6 @@ namespace nacre::region_limits {
 constexpr int image_border = 1;  // [cell] derived: cleaning leaves little at the very border; test_region
 constexpr float steepest = 3.0F;  // [1] tuned: slope up to which neighbouring cells hold together; test_region
 constexpr int link_reach = 3;  // [cells] tuned: across which cells are linked: noisy edges are missing; test_region
-constexpr int most_link_steps = 2;  // [cells] tuned: that the distance between linked cells may grow with; test_region
 constexpr int most_cells = 20000;  // [cells] budget: of an image seen coarsely; benchmarks
 constexpr int largest_step = 12;  // [pixel] budget: side of a cell; benchmarks
 constexpr float least_cosine = 0.9F;  // [cosine] tuned: between normals of one plane, as measured; test_region
@@ -21,7 +20,6 @@ constexpr int num_hypotheses = 160;  // [planes] budget: from one point and norm
 constexpr int num_refined = 6;  // [planes] budget: of them, the best; test_region
 constexpr int num_refinements = 5;  // [1] budget: least squares over a plane's cells, and its cells again; test_region
 constexpr std::size_t most_voters = 3000;  // [cells] budget: that choose between the planes; test_region
-constexpr float start_margin = 3.0F;  // [1] tuned: times the last one, for planes from one noisy normal; test_region
 constexpr std::size_t most_planes = 8;  // [planes] budget: in a frame; test_region
 constexpr double small_part = 0.3;  // [1] tuned: of a plane: what may hang on its back; test_region
 constexpr int num_candidates = 4;  // [planes] budget: tried before a frame is said to have no more; test_region

@@ -12,11 +12,6 @@
 namespace nacre {
 namespace {
 
-// The part of the first margin that counts at a refinement.
-float margin_factor(int refinement) {
-  return std::max(1.0F, region_limits::start_margin - static_cast<float>(refinement));
-}
-
 enum Side : std::uint8_t { on = 1, before, behind };
 
 struct Search {
@@ -26,25 +21,24 @@ struct Search {
 
   float pixel_of(const Cell& cell) const { return cell.footprint / static_cast<float>(frame.step); }
 
-  bool is_on(const PlaneCut& cut, const Cell& cell, float factor) const {
-    return std::abs(cut.height(cell.point)) < factor * cut.margin(cell.sigma, pixel_of(cell)) &&
-           cut.has_normal(cell.normal);
+  bool is_on(const PlaneCut& cut, const Cell& cell) const {
+    return std::abs(cut.height(cell.point)) < cut.margin(cell.sigma, pixel_of(cell)) && cut.has_normal(cell.normal);
   }
 
-  std::int64_t count(const SupportPlane& plane, const std::vector<int>& rows, float factor) const {
+  std::int64_t count(const SupportPlane& plane, const std::vector<int>& rows) const {
     const PlaneCut cut(plane, options.plane_margin);
-    return std::count_if(rows.begin(), rows.end(), [&](int i) { return is_on(cut, frame[i], factor); });
+    return std::count_if(rows.begin(), rows.end(), [&](int i) { return is_on(cut, frame[i]); });
   }
 
   // Least squares over the cells of a plane, weighted by 1 / sigma^2; false where they span none.
-  bool refine(SupportPlane& plane, const std::vector<int>& rows, float factor) const {
+  bool refine(SupportPlane& plane, const std::vector<int>& rows) const {
     const PlaneCut cut(plane, options.plane_margin);
     double sum = 0.0;
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     Eigen::Matrix3d square = Eigen::Matrix3d::Zero();
     for (const int i : rows) {
       const Cell& cell = frame[i];
-      if (!is_on(cut, cell, factor)) continue;
+      if (!is_on(cut, cell)) continue;
       const double spread = std::max(1e-5, static_cast<double>(cell.sigma)), weight = 1.0 / (spread * spread);
       const Eigen::Vector3d point = cell.point.cast<double>();
       sum += weight;
@@ -79,16 +73,16 @@ struct Search {
     };
     parallel_for(region_limits::num_hypotheses, 8, num_threads, [&](std::int64_t k) {
       const int number = static_cast<int>(k);
-      votes[static_cast<std::size_t>(k)] = {-count(hypothesis(number), voters, region_limits::start_margin), number};
+      votes[static_cast<std::size_t>(k)] = {-count(hypothesis(number), voters), number};
     });
     std::sort(votes.begin(), votes.end());
     std::vector<std::pair<std::int64_t, SupportPlane>> found(region_limits::num_refined);
     parallel_for(region_limits::num_refined, 1, num_threads, [&](std::int64_t k) {
       SupportPlane plane = hypothesis(votes[static_cast<std::size_t>(k)].second);
       for (int i = 0; i < region_limits::num_refinements; ++i) {
-        if (!refine(plane, voters, margin_factor(i))) return;
+        if (!refine(plane, voters)) return;
       }
-      found[static_cast<std::size_t>(k)] = {count(plane, rows, 1.0F), plane};
+      found[static_cast<std::size_t>(k)] = {count(plane, rows), plane};
     });
     const auto best =
         std::max_element(found.begin(), found.end(), [](const auto& a, const auto& b) { return a.first < b.first; });

@@ -98,7 +98,7 @@ void FrameRegistration::determine_open_directions(const PointsInView& view, cons
 
 // 0 where too few of the points are seen.
 double FrameRegistration::consistency(const PointsInView& view, const Pose& world_from_camera) const {
-  const double margin = tracking_limits::margin_spacings * target_.spacing;
+  const double margin = camera_limits::surface_spacings * target_.spacing;
   const double part =
       compare(view.points, view.normals, now_.view, world_from_camera, now_.camera, {margin}, options_.num_threads)
           .consistency(tracking_limits::least_judged);

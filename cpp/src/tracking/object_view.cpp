@@ -60,8 +60,7 @@ Eigen::Vector3d ObjectView::center() const {
   if (!(level.norm() > 1e-6 * middle.norm())) return middle;
   const Eigen::Vector3d away = level.normalized(), side = support.normal.cross(away);
   const Eigen::VectorXd across = (points.cast<double>().rowwise() - middle.transpose()) * side;
-  return middle +
-         tracking_limits::body_depth * std::sqrt(across.squaredNorm() / static_cast<double>(across.size())) * away;
+  return middle + std::sqrt(across.squaredNorm() / static_cast<double>(across.size())) * away;  // a radius
 }
 
 ViewAgreement look_at(const ObjectView& moved, const ObjectView& seen, const Pose& seen_from_moved,

@@ -53,15 +53,15 @@ class TurntableSearch {
               .toRotationMatrix();
       candidates[static_cast<std::size_t>(i)] =
           align(few_, plane_ * turn * ground_frame_.inverse(),
-                gates(registration_limits::first_gate * frame_.size, tracking_limits::coarse_turn_gate,
+                gates(registration_limits::first_gate * frame_.size, tracking_limits::turn_gate,
                       tracking_limits::most_coarse_turn_steps));
     });
     candidates = different(std::move(candidates), tracking_limits::num_turn_candidates);
     parallel_for(static_cast<std::int64_t>(candidates.size()), 1, num_threads_, [&](std::int64_t i) {
       Candidate& candidate = candidates[static_cast<std::size_t>(i)];
-      candidate = climb(align(source_, candidate.alignment.target_from_source,
-                              gates(tracking_limits::refined_turn_gate * frame_.tolerance,
-                                    tracking_limits::last_refined_turn_gate, tracking_limits::most_turn_steps)));
+      candidate =
+          climb(align(source_, candidate.alignment.target_from_source,
+                      gates(tracking_limits::turn_gate * frame_.tolerance, 1.0, tracking_limits::most_turn_steps)));
     });
     const std::size_t num_refined = candidates.size();
     return different(std::move(candidates), num_refined);
@@ -71,8 +71,7 @@ class TurntableSearch {
   IcpResult settle(const Candidate& candidate) const {
     const IcpResult settled =
         align_along(motions_on_plane(normal_), target_, source_, candidate.alignment.target_from_source,
-                    gates(tracking_limits::last_refined_turn_gate * frame_.tolerance,
-                          tracking_limits::settled_turn_gate, tracking_limits::most_turn_steps));
+                    gates(frame_.tolerance, 1.0, tracking_limits::most_turn_steps));
     return settled.status != AlignStatus::too_few_pairs ? settled : candidate.alignment;
   }
 
