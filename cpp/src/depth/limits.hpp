@@ -14,7 +14,6 @@ constexpr float slope_sigma = 0.07F;  // [1] tuned: a normal's window grows unti
 constexpr float least_filled = 0.4F;  // [1] tuned: part of a normal's window that must be measured; test_frame
 constexpr float least_spread = 0.02F;  // [1] tuned: of a full window's squared spread, both ways; test_frame
 constexpr float gate_slope = 5.67F;  // [1] derived: neighbours of one surface: a slant of 80 degrees; test_frame
-constexpr std::int64_t least_windows = 8;  // [windows] tuned: fewer do not tell an image's noise; test_depth
 constexpr double noise_quantile = 0.4;  // [1] tuned: of residuals: edges leave more over than noise; test_noise
 constexpr double least_noise = 1e-3;  // [pixel] tuned: sigma of a clean image, in sizes of a pixel; test_noise
 constexpr double unknown_noise = 0.1;  // [pixel] tuned: sigma of an orthographic image that shows nothing; test_noise
@@ -25,7 +24,7 @@ constexpr double smooth_bent = 0.0145;  // [1] derived: of smooth noise, what se
 constexpr double independent = 0.95;  // [1] tuned: bends by fits above which noise is independent; test_noise
 constexpr double most_shared = 0.85;  // [1] tuned: part of the variance that pixels may share; test_noise
 constexpr double most_frames = 100.0;  // [frames] tuned: a frame counts at least so much: drift is followed; test_noise
-constexpr std::size_t least_bin_windows = 40;  // [windows] tuned: of a frame at some depth; test_noise
+constexpr std::size_t least_windows = 40;  // [windows] tuned: of an image, and at some depth, that tell its noise; test_noise
 constexpr double prior_weight = 0.01;  // [1] tuned: of the prior's curve against all that was measured; test_noise
 constexpr double nearest_bin = 0.25;  // [m] derived: where the bins of depth begin; test_noise
 constexpr double bins_per_octave = 3.0;  // [1] derived: of depth; test_noise
@@ -35,7 +34,6 @@ constexpr double least_cracked = 0.15;  // [1] derived: cracks to measurements: 
 constexpr float nearest_median = 0.05F;  // [m] derived: nearer medians: a wrong depth_scale; test_depth
 constexpr float farthest_median = 50.0F;  // [m] derived: farther medians: a wrong depth_scale; test_depth
 constexpr std::int64_t most_probes = 8192;  // [pixels] budget: that tell an image's median depth; test_depth
-constexpr float view_systematic = 2.0F;  // [sigma] tuned: likewise, of the systematic error; teddy, rpy
 constexpr float step_sigmas = 3.0F;  // [sigma] tuned: allowance for noise in steepness and links; test_depth
 
 }  // namespace nacre::depth_limits

@@ -23,13 +23,11 @@ constexpr std::size_t most_voters = 3000;  // [cells] budget: that choose betwee
 constexpr std::size_t most_planes = 8;  // [planes] budget: in a frame; test_region
 constexpr double small_part = 0.3;  // [1] tuned: of a plane: what may hang on its back; test_region
 constexpr int num_candidates = 4;  // [planes] budget: tried before a frame is said to have no more; test_region
-constexpr double goes_on = 0.5;  // [sides] tuned: of a plane that the border cuts off: it goes on beyond; test_region
+constexpr double goes_on = 1.0;  // [sides] derived: of a plane that the border cuts off: it goes on beyond; test_region
 constexpr double same_thing = 0.25;  // [1] tuned: part of its pixels that a thing shares with the last one; test_region
-constexpr int contact_reach = 12;  // [pixel] tuned: between a thing and the plane that it stands on; test_region
-constexpr int adoption_reach = 24;  // [pixel] tuned: between parts of a thing that hide what joins them; test_region
+constexpr int contact_reach = 12;  // [pixel] tuned: between a thing and the plane that it stands on, or parts that hide what joins them; test_region
 constexpr float adoption_size = 0.75F;  // [1] tuned: of a thing's size: how far a contact may be; test_region
 constexpr double background = 4.0;  // [sides] tuned: what the border cuts more of is background; test_region
-constexpr double cut_off_weight = 2.0;  // [1] tuned: against things that the border cuts; test_region
 constexpr double lower_end = 0.02;  // [1] tuned: part of a thing's points that are its lower end; test_region
 
 }  // namespace nacre::region_limits

@@ -58,7 +58,7 @@ void adopt_floating(const CoarseFrame& frame, const std::vector<std::uint8_t>& s
   for (int i = 0; i < frame.size(); ++i) {
     const std::int32_t floating = groups.group[static_cast<std::size_t>(i)];
     if (floating < 0 || stands[static_cast<std::size_t>(floating)] != 0) continue;
-    frame.for_neighbours(i, region_limits::adoption_reach / frame.step, [&](int j, int) {
+    frame.for_neighbours(i, region_limits::contact_reach / frame.step, [&](int j, int) {
       const std::int32_t other = groups.group[static_cast<std::size_t>(j)];
       if (other < 0 || stands[static_cast<std::size_t>(other)] == 0) return;
       links[{floating, other}] += (frame[i].point - frame[j].point).norm() < extent_of(groups, other, frame[j]);
@@ -90,15 +90,6 @@ void leave_out_background(const CoarseFrame& frame, const CellGroups& groups, st
   }
 }
 
-// How large a group is: the longer the image's border cuts it, the less it counts, for the camera is aimed at others.
-std::vector<double> importance(const CoarseFrame& frame, const CellGroups& groups) {
-  std::vector<double> values;
-  const std::vector<std::int32_t> cut = border_cells(frame, groups.group, groups.size.size());
-  for (std::size_t g = 0; g < cut.size(); ++g)
-    values.push_back(groups.size[g] / (1.0 + region_limits::cut_off_weight * cut_off(cut[g], groups.size[g])));
-  return values;
-}
-
 // The group that shows what the last mask showed; else the largest; -1 where all are too small.
 std::int32_t choose_group(const CoarseFrame& frame, const CellGroups& groups, const std::vector<std::uint8_t>& eligible,
                           const MaskRef& previous, const RegionOptions& options) {
@@ -110,14 +101,13 @@ std::int32_t choose_group(const CoarseFrame& frame, const CellGroups& groups, co
     const std::int32_t group = groups.group[static_cast<std::size_t>(i)];
     if (group >= 0) ++shared[static_cast<std::size_t>(group)];
   }
-  const std::vector<double> sizes = importance(frame, groups);
   std::int32_t best = -1;
-  std::pair<std::int64_t, double> best_rank;  // shared cells where these are many, then all
+  std::pair<std::int64_t, std::int64_t> best_rank;  // shared cells where these are many, then all
   for (std::size_t g = 0; g < groups.size.size(); ++g) {
     if (eligible[g] == 0 || groups.size[g] < options.min_object * frame.size()) continue;
     const double smaller = static_cast<double>(std::min<std::int64_t>(groups.size[g], num_previous));
     const bool is_known = shared[g] > 0 && static_cast<double>(shared[g]) >= region_limits::same_thing * smaller;
-    const std::pair<std::int64_t, double> rank{is_known ? shared[g] : 0, sizes[g]};
+    const std::pair<std::int64_t, std::int64_t> rank{is_known ? shared[g] : 0, groups.size[g]};
     if (best >= 0 && rank <= best_rank) continue;
     best = static_cast<std::int32_t>(g);
     best_rank = rank;

@@ -38,7 +38,6 @@ std::vector<Pose> most_promising(const PointModel& model, const IcpSource& sourc
 
 std::optional<Pose> fit_anywhere(const PointModel& model, const IcpSource& source, const AlignOptions& options) {
   GlobalAlignOptions search_options;
-  search_options.max_residual = tracking_limits::largest_search_residual;
   search_options.seed = options.seed;
   search_options.num_threads = options.num_threads;
   const GlobalCloud frame(source.cloud.points, source.cloud.normals, Eigen::Vector3d::Zero());
