@@ -157,6 +157,18 @@ def test_numbers_that_decide_stand_in_limits(folder: str) -> None:
     assert limit_lines.numbers_of(CPP / folder / "limits.hpp")
 
 
+@pytest.mark.parametrize("folder", DECIDING)
+def test_each_number_is_guarded_by_something_that_exists(folder: str) -> None:
+    """A test, a case of benchmarks/cases.py, a row of docs/tracking.md, a kind of failures.py, or a path."""
+    known = {path.stem for kind in ("py", "cpp") for path in (ROOT / "tests").rglob(f"test_*.{kind}")}
+    for name in ("cases.py", "track/table.py", "failures.py"):
+        known |= set(re.findall(r"\"([\w-]+)\"", (ROOT / "benchmarks" / name).read_text(encoding="utf-8")))
+    simulated = re.compile(r"(bunny|homer|spot|fandisk)\d+|\w+-kinect\d+|poster\d+(-gray)?")
+    for number in limit_lines.numbers_of(CPP / folder / "limits.hpp"):
+        for guard in number.guard.split(", "):
+            assert guard in known or simulated.fullmatch(guard) or (ROOT / guard).exists(), number
+
+
 def test_the_tests_of_a_folder_are_in_a_folder_of_its_name() -> None:
     tests = (ROOT / "tests" / "cpp").rglob("test_*.cpp")
     assert {path.parent.name for path in tests} <= set(ORDER)

@@ -7,7 +7,7 @@ namespace nacre::base_limits {
 
 constexpr float noise_sigmas = 4.0F;  // [sigma] derived: what noise does not reach, but for 1 of 16 000; test_frame, test_fusion
 constexpr double damping = 1e-9;  // [1] derived: of the mean information, so that there always is a solution; test_icp
-constexpr int least_points = 50;  // [points] tuned: that decide anything; wall, test_failure
+constexpr int least_points = 50;  // [points] tuned: that decide anything; poster60-gray, test_failure
 
 }  // namespace nacre::base_limits
 // clang-format on

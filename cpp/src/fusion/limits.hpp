@@ -9,13 +9,13 @@ namespace nacre::fusion_limits {
 
 constexpr float least_facing = 0.1F;  // [cosine] tuned: surfaces seen at a smaller one are not judged; test_fusion
 constexpr float least_weight = 0.05F;  // [measurements] tuned: frontal: less observation is none; test_fusion
-constexpr float support_sigmas = 6.0F;  // [sigma] tuned: radius of pixels that speak of a point; bunny12 rms
-constexpr float least_support = 3.0F;  // [pixel] tuned: at least; bunny12 rms
-constexpr float largest_support = 4.0F;  // [pixel] budget: at most; bunny12 rms
-constexpr float insertion_pixels = 3.0F;  // [pixels] tuned: that a new point stands on, from the front; bunny12 NN CoV
-constexpr float insertion_weight = 1.0F;  // [measurements] tuned: and at least; bunny12 coverage
+constexpr float support_sigmas = 6.0F;  // [sigma] tuned: radius of pixels that speak of a point; bunny12
+constexpr float least_support = 3.0F;  // [pixel] tuned: at least; bunny12
+constexpr float largest_support = 4.0F;  // [pixel] budget: at most; bunny12
+constexpr float insertion_pixels = 3.0F;  // [pixels] tuned: that a new point stands on, from the front; bunny12
+constexpr float insertion_weight = 1.0F;  // [measurements] tuned: and at least; bunny12
 constexpr float sheet_cosine = 0.3F;  // [cosine] tuned: between normals of one sheet; test_fusion
-constexpr int squares_across = 8;  // [1] budget: of the index of pixels, in a reach; benchmarks
+constexpr int squares_across = 8;  // [1] budget: of the index of pixels, in a reach; benchmarks/run.py
 constexpr std::size_t sigma_probes = 5000;  // [pixels] budget: that tell a frame's median noise; test_fusion
 constexpr float least_coverage = 0.25F;  // [1] tuned: of a window, where only some pixels have values; test_attributes
 constexpr int layer_levels = 4;  // [1] budget: of spacing, each twice the one before; test_deformation

@@ -10,18 +10,18 @@
 // clang-format off
 namespace nacre::loops_limits {
 
-constexpr int key_frame_points = 3000;  // [points] budget: of the surface that a key frame keeps; room
+constexpr int key_frame_points = 3000;  // [points] budget: of the surface that a key frame keeps; test_loop_closure
 constexpr std::size_t most_key_frames = 500;  // [views] budget: about 80 kB each; test_loop_closure
-constexpr std::size_t most_candidates = 4;  // [views] budget: that a frame is registered to at once; room
-constexpr int verified_nodes = 12;  // [nodes] tuned: of the trajectory: what was seen since is taken to be in place; room, teddy
-constexpr double least_overlap = 0.3;  // [1] tuned: of a frame and a key frame; room
-constexpr double largest_reach = 0.05;  // [size] tuned: of matches, in diameters of the key frames' surface; room
-constexpr double reach_spacings = 2.5;  // [spacing] tuned: of matches along the key frames' surface; room
-constexpr double search_radius = 0.12;  // [depth] tuned: drift that is looked for; room
-constexpr double drift = 0.005;  // [rad, depth] tuned: standard deviation of a step between nodes; room
-constexpr double weak_drift = 10.0 * drift;  // [rad, depth] tuned: where the registration leaves a direction open; room
-constexpr double loop_error = 0.25 * drift;  // [rad, depth] tuned: standard deviation of a registration that closes a loop; room
-constexpr double covariance_inflation = 25.0;  // [1] tuned: of the covariance that a registration claims; room
+constexpr std::size_t most_candidates = 4;  // [views] budget: that a frame is registered to at once; test_loop_closure
+constexpr int verified_nodes = 12;  // [nodes] tuned: of the trajectory: what was seen since is taken to be in place; test_loop_closure, teddy
+constexpr double least_overlap = 0.3;  // [1] tuned: of a frame and a key frame; test_loop_closure
+constexpr double largest_reach = 0.05;  // [size] tuned: of matches, in diameters of the key frames' surface; test_loop_closure
+constexpr double reach_spacings = 2.5;  // [spacing] tuned: of matches along the key frames' surface; test_loop_closure
+constexpr double search_radius = 0.12;  // [depth] tuned: drift that is looked for; test_loop_closure
+constexpr double drift = 0.005;  // [rad, depth] tuned: standard deviation of a step between nodes; test_loop_closure
+constexpr double weak_drift = 10.0 * drift;  // [rad, depth] tuned: where the registration leaves a direction open; test_loop_closure
+constexpr double loop_error = 0.25 * drift;  // [rad, depth] tuned: standard deviation of a registration that closes a loop; test_loop_closure
+constexpr double covariance_inflation = 25.0;  // [1] tuned: of the covariance that a registration claims; test_loop_closure
 constexpr int least_loop_views = 3;  // [views] tuned: from view to view around a loop of views, at least; bunny12
 constexpr std::size_t most_loop_views = 64;  // [views] budget: adjusted at once; bunny12
 constexpr double loop_tolerance = 1.5;  // [spacing] tuned: to which views agree; bunny12

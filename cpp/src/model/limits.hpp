@@ -9,8 +9,8 @@
 namespace nacre::model_limits {
 
 constexpr double coarsening = 1.25;  // [1] budget: of the spacing, when the model reaches its largest size; test_model
-constexpr double spacing_pixels = 2.0;  // [pixel] tuned: between points, on the nearer surfaces; bunny12 points
-constexpr std::size_t most_outline_points = 800;  // [points] budget: of a frame's outline, for loops; room
+constexpr double spacing_pixels = 2.0;  // [pixel] tuned: between points, on the nearer surfaces; bunny12
+constexpr std::size_t most_outline_points = 800;  // [points] budget: of a frame's outline, for loops; fandisk12
 constexpr std::size_t most_key_poses = 8;  // [poses] budget: that a lost camera is looked for around; test_failure
 constexpr std::int64_t patience = 8;  // [frames] budget: lost, until the search is made at every so many; test_failure
 constexpr std::size_t most_object_views = 24;  // [views] budget: of an object that turns on a plane; dog

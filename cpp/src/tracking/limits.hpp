@@ -10,12 +10,12 @@
 // clang-format off
 namespace nacre::tracking_limits {
 
-constexpr std::size_t most_target_points = 30000;  // [points] budget: that a frame is registered to; benchmarks
+constexpr std::size_t most_target_points = 30000;  // [points] budget: that a frame is registered to; benchmarks/run.py
 constexpr double largest_reach = 0.03;  // [size] tuned: of matches, in diameters of the smaller surface; bunny12
 constexpr double reach_spacings = 1.5;  // [spacing] tuned: of matches along the surface; scans
 constexpr double narrow_gate = 4.0;  // [reach] tuned: of matches at first, from a guess that is about right; teddy
-constexpr std::size_t last_outline_points = 2000;  // [points] budget: of the last view's outline; room
-constexpr std::size_t outline_points = 600;  // [points] budget: of the frame's outline; room
+constexpr std::size_t last_outline_points = 2000;  // [points] budget: of the last view's outline; fandisk12
+constexpr std::size_t outline_points = 600;  // [points] budget: of the frame's outline; fandisk12
 constexpr std::size_t most_bright_points = 100000;  // [points] budget: of a frame's colours; test_color_registration
 constexpr std::size_t num_finalists = 3;  // [guesses] budget: of those around earlier poses that are registered in full; test_failure
 constexpr double beside_turn = 0.15;  // [rad] derived: between cameras beside a known one: a registration turns by as much; test_tracking
@@ -37,8 +37,8 @@ constexpr double least_view_consistency = 0.75;  // [1] tuned: with all views; d
 
 constexpr double noise_per_residual = 1.376;  // [1] derived: standard deviation by median absolute value, of Laplace's distribution; test_residual_noise
 constexpr double largest_noise_factor = 16.0;  // [1] budget: of the noise that is tried until it is known; d435-t265-shelf
-constexpr double least_residual_sigmas = 0.5;  // [sigma] derived: that confirm a noise that was tried: with half of it the frame had been lost; pairs
-constexpr double enough_frames = 5.0;  // [frames] tuned: that tell how noisy registered frames are, and what they contradict; pairs
+constexpr double least_residual_sigmas = 0.5;  // [sigma] derived: that confirm a noise that was tried: with half of it the frame had been lost; unrelated
+constexpr double enough_frames = 5.0;  // [frames] tuned: that tell how noisy registered frames are, and what they contradict; unrelated
 constexpr std::int64_t least_judged = 20;  // [points] derived: that tell a part of all; test_tracking
 
 }  // namespace nacre::tracking_limits
