@@ -13,6 +13,7 @@
 #include "registration/icp.hpp"
 #include "registration/limits.hpp"
 #include "registration/multiview.hpp"
+#include "tracking/limits.hpp"
 
 namespace nacre {
 namespace {
@@ -221,13 +222,13 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
   align_options.max_samples = align_options.max_points = 0;
   const IcpTarget target = target_of(in_question, align_options);
   IcpSource source(AlignCloud(cloud.points, cloud.normals, cloud.sigma), align_options);
-  const double largest = loops_limits::largest_reach * target.diameter();
+  const double largest = tracking_limits::largest_reach * target.diameter();
   source.reach.resize(source.cloud.points.rows());
   source.largest_residual.resize(source.cloud.points.rows());
   for (Eigen::Index i = 0; i < source.reach.size(); ++i) {
     const double noise =
         base_limits::noise_sigmas * static_cast<double>(cloud.noise[source.cloud.rows[static_cast<std::size_t>(i)]]);
-    const double along = std::max(loops_limits::reach_spacings * target.spacing(), noise);
+    const double along = std::max(tracking_limits::reach_spacings * target.spacing(), noise);
     const double across = std::max(camera_limits::surface_spacings * frame.spacing, noise);
     source.reach[i] = static_cast<float>(std::min(along, largest));
     source.largest_residual[i] = static_cast<float>(std::min(across, largest));
@@ -261,8 +262,7 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
 // itself, a step drifts, and a loop is as good as its samples.
 PoseEdge LoopClosure::edge(int from, int to, const Pose& pose, const AlignResult& alignment, double depth,
                            bool is_loop) const {
-  const bool is_weak = alignment.weak_directions.cols() > 0;
-  const double error = is_loop ? loops_limits::loop_error : is_weak ? loops_limits::weak_drift : loops_limits::drift;
+  const double error = is_loop ? loops_limits::loop_error : loops_limits::drift;
   Matrix6 covariance = Matrix6::Zero();
   if (alignment.information.trace() > 0.0) {
     Matrix6 information = alignment.information;
