@@ -5,6 +5,7 @@
 
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
+#include "camera/limits.hpp"
 #include "outlines/limits.hpp"
 #include "outlines/match.hpp"
 #include "registration/limits.hpp"
@@ -23,7 +24,8 @@ class EdgeSearch : public OpenDirectionSearch {
         options_(options),
         held_(options),
         edges_(moved(outlines.target, outlines.before.world_from_camera)) {
-    const double reach = options.final_distance > 0.0 ? options.final_distance : 2.5 * target.spacing();
+    const double reach =
+        options.final_distance > 0.0 ? options.final_distance : camera_limits::surface_spacings * target.spacing();
     held_.max_distance = reach;
     held_.max_iterations = 6;
     Eigen::AlignedBox3d box;
@@ -108,9 +110,7 @@ class EdgeSearch : public OpenDirectionSearch {
     fit.rows = match(fit.result.target_from_source, fit.result.center, smallest_gate());
     fit.extent = extent_;
     fit.noise = noise_;
-    const bool still_fits =
-        fit.result.num_inliers > registration_limits::still_matching * start.num_inliers && !fit.rows.empty();
-    const double agrees = still_fits ? agreement(fit.result.target_from_source, fit.rows) : 0.0;
+    const double agrees = fit.rows.empty() ? 0.0 : agreement(fit.result.target_from_source, fit.rows);
     return {std::move(fit), agrees};
   }
 

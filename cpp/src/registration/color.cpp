@@ -7,6 +7,7 @@
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
+#include "camera/limits.hpp"
 #include "registration/limits.hpp"
 #include "registration/open_directions.hpp"
 
@@ -39,9 +40,7 @@ class ColorSearch : public OpenDirectionSearch {
     fit.extent = extent_of(fit.rows);
     fit.noise = noise_;
     distance_noise_ = std::max(geometric.rmse, 0.1 * target_.spacing());
-    fit.agrees = fit.rows.size() >= base_limits::least_points &&
-                 fit.result.num_inliers > registration_limits::still_matching * geometric.num_inliers &&
-                 correlation_ >= registration_limits::least_correlation;
+    fit.agrees = fit.rows.size() >= base_limits::least_points && correlation_ >= registration_limits::least_correlation;
     return fit;
   }
 
@@ -55,7 +54,8 @@ class ColorSearch : public OpenDirectionSearch {
 
  private:
   Gate gate() const {
-    const double reach = options_.final_distance > 0.0 ? options_.final_distance : 2.5 * target_.spacing();
+    const double reach =
+        options_.final_distance > 0.0 ? options_.final_distance : camera_limits::surface_spacings * target_.spacing();
     return {reach, std::cos(std::min(options_.max_angle, 3.14)), true};
   }
 

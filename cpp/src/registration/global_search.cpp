@@ -92,7 +92,7 @@ std::vector<SearchCandidate> GlobalSearch::run() const {
 SearchCandidate GlobalSearch::start_from(int number) const {
   AlignOptions icp = icp_options(options_);
   icp.max_distance = registration_limits::first_gate * size_;
-  icp.final_distance = registration_limits::coarse_gate * size_;
+  icp.final_distance = registration_limits::search_gate * size_;
   icp.max_iterations = 12;
   icp.weak_threshold = 0.0;
   Pose guess = Pose::Identity();
@@ -106,7 +106,7 @@ SearchCandidate GlobalSearch::start_from(int number) const {
 
 void GlobalSearch::refine(SearchCandidate& candidate) const {
   AlignOptions icp = icp_options(options_);
-  icp.max_distance = registration_limits::refined_gate * size_;
+  icp.max_distance = registration_limits::search_gate * size_;
   candidate.alignment = align_to(target_.target, source_.all, candidate.alignment.target_from_source, icp);
   score(candidate, false, tolerance_);
 }

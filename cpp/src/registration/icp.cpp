@@ -7,6 +7,7 @@
 #include "base/limits.hpp"
 #include "base/numbers.hpp"
 #include "base/statistics.hpp"
+#include "camera/limits.hpp"
 #include "registration/dominant_planes.hpp"
 #include "registration/limits.hpp"
 #include "registration/scale_check.hpp"
@@ -30,8 +31,8 @@ class Schedule {
   Schedule(const IcpTarget& target, const IcpSource& source, const AlignOptions& options)
       : options_(options), source_(source) {
     first_ = options.max_distance > 0.0 ? options.max_distance : registration_limits::first_gate * target.diameter();
-    smallest_ = options.final_distance > 0.0 ? options.final_distance
-                                             : registration_limits::last_gate_spacings * target.spacing();
+    smallest_ =
+        options.final_distance > 0.0 ? options.final_distance : camera_limits::surface_spacings * target.spacing();
     set_level(0);
     update_gate(0.0);
   }
@@ -70,10 +71,7 @@ class Schedule {
     gate_.distance = std::max(smallest, decayed);
     at_smallest_ = options_.gate_decay >= 1.0 || decayed <= smallest;
     gate_.is_smallest = at_smallest_;
-    const double widening =
-        options_.gate_decay < 1.0 ? gate_.distance / first_ / registration_limits::angle_narrowing : 0.0;
-    const double angle = options_.max_angle * (1.0 + widening);
-    gate_.cos_angle = angle < registration_limits::any_angle ? std::cos(angle) : -2.0;
+    gate_.cos_angle = options_.max_angle < registration_limits::any_angle ? std::cos(options_.max_angle) : -2.0;
   }
 
   const AlignOptions& options_;
