@@ -41,7 +41,7 @@ VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, cons
               if (!(block.facing[i] > margin.least_facing)) return;
               const float measured = view.depth[block.pixel[i]];
               const float systematic = margin.with_systematic_error ? systematic_error(measured) : 0.0F;
-              const float error = base_limits::noise_sigmas * std::hypot(view.sigma[block.pixel[i]], systematic);
+              const float error = std::hypot(base_limits::noise_sigmas * view.sigma[block.pixel[i]], systematic);
               const float allowed = std::max(distance + part_of_depth * block.z[i], error) / block.facing[i];
               counts.add(visibility(measured - block.z[i], allowed));
             });
