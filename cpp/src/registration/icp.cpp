@@ -71,7 +71,10 @@ class Schedule {
     gate_.distance = std::max(smallest, decayed);
     at_smallest_ = options_.gate_decay >= 1.0 || decayed <= smallest;
     gate_.is_smallest = at_smallest_;
-    gate_.cos_angle = options_.max_angle < registration_limits::any_angle ? std::cos(options_.max_angle) : -2.0;
+    const double widening =
+        options_.gate_decay < 1.0 ? gate_.distance / first_ / registration_limits::angle_narrowing : 0.0;
+    const double angle = options_.max_angle * (1.0 + widening);
+    gate_.cos_angle = angle < registration_limits::any_angle ? std::cos(angle) : -2.0;
   }
 
   const AlignOptions& options_;

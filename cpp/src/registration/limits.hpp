@@ -16,6 +16,7 @@ constexpr double least_variance = 1e-3;  // [1] derived: of a normal's component
 constexpr double unknown_noise_bias = 0.008;  // [1] derived: noise bias of the Hessian where a normal's error is unknown: 5 degrees; test_icp, poster60-gray
 constexpr double first_gate = 0.25;  // [diameter] tuned: largest residual of the first iteration where none is given; test_icp
 constexpr int most_level_steps = 8;  // [steps] budget: before more points are taken; test_icp
+constexpr double angle_narrowing = 3.0;  // [1] tuned: normals may differ more by one part of so many while a source is far off; test_residual_noise
 constexpr double any_angle = 3.14159;  // [rad] derived: a largest angle that every pair passes, rounding or not; test_icp
 constexpr double still_spacings = 1e-3;  // [spacing] derived: a step that no data explains; test_icp
 constexpr double least_resolution = 1e-9;  // [m] derived: likewise, where points have no spacing; test_icp
