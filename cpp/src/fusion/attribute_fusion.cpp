@@ -76,9 +76,9 @@ void AttributePlanes::observe(ObservationBlock& block, float* averages) const {
   }
 }
 
-void fuse_attributes(PointModel& model, std::int64_t first, const Frame& frame, const Camera& camera,
-                     const SurfaceObserver& observer, const AttributePlanes& planes, const Pose& world_from_camera,
+void fuse_attributes(PointModel& model, std::int64_t first, const RegisteredFrame& now, const AttributePlanes& planes,
                      int num_threads) {
+  const SurfaceObserver& observer = now.observer;
   std::vector<PointAttribute*> targets;
   for (const AttributePlanes::Part& part : planes.parts()) {
     if (find(model, part.attribute->name) == nullptr) {
@@ -90,7 +90,7 @@ void fuse_attributes(PointModel& model, std::int64_t first, const Frame& frame, 
   }
   for (const AttributePlanes::Part& part : planes.parts()) targets.push_back(find(model, part.attribute->name));
 
-  const PointProjection view(camera, world_from_camera);
+  const PointProjection view(now.camera, now.world_from_camera);
   constexpr std::int64_t block_size = PointProjection::capacity;
   parallel_blocks(
       model.size() - first, block_size, num_threads, [&](std::int64_t, std::int64_t begin, std::int64_t end) {
@@ -100,9 +100,9 @@ void fuse_attributes(PointModel& model, std::int64_t first, const Frame& frame, 
         ObservationBlock block;
         std::size_t seen[block_size];
         for (int j = 0; j < static_cast<int>(end - begin); ++j) {
-          if (!is_observable(points, j, frame, observer)) continue;
+          if (!is_observable(points, j, now.frame, observer)) continue;
           seen[block.size()] = start + static_cast<std::size_t>(j);
-          observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma_at(frame, points.pixel[j]));
+          observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma_at(now.frame, points.pixel[j]));
         }
         if (block.size() == 0) return;
         std::vector<float> averages(static_cast<std::size_t>(planes.num_planes()) * ObservationBlock::capacity);

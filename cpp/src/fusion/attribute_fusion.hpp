@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "fusion/observer.hpp"
+#include "fusion/registered_frame.hpp"
 #include "nacre/fusion.hpp"
 
 namespace nacre {
@@ -40,8 +40,7 @@ class AttributePlanes {
 
 // Adds what a frame says about the attributes of the model's points from `first` on. Before the points themselves are
 // updated: their confidence is the weight of what is known already.
-void fuse_attributes(PointModel& model, std::int64_t first, const Frame& frame, const Camera& camera,
-                     const SurfaceObserver& observer, const AttributePlanes& planes, const Pose& world_from_camera,
+void fuse_attributes(PointModel& model, std::int64_t first, const RegisteredFrame& now, const AttributePlanes& planes,
                      int num_threads);
 
 }  // namespace nacre

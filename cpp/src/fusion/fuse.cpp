@@ -73,11 +73,13 @@ bool reaches_image(const PointProjection::Block& points, int i, const Camera& ca
 }
 
 // Moves the model's points by what the frame says about them.
-Known update(PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-             const Pose& world_from_camera, double spacing, std::int32_t frame_index, const FusionOptions& options,
+Known update(PointModel& model, const RegisteredFrame& now, double spacing, const FusionOptions& options,
              FusionReport& report, int num_threads) {
-  const PointProjection view(camera, world_from_camera);
-  const Eigen::Matrix3f world_rotation = world_from_camera.linear().cast<float>();
+  const Frame& frame = now.frame;
+  const Camera& camera = now.camera;
+  const SurfaceObserver& observer = now.observer;
+  const PointProjection view(camera, now.world_from_camera);
+  const Eigen::Matrix3f world_rotation = now.world_from_camera.linear().cast<float>();
   constexpr std::int64_t block_size = PointProjection::capacity;
   static_assert(PointProjection::capacity <= ObservationBlock::capacity);
   struct Cover {
@@ -137,7 +139,7 @@ Known update(PointModel& model, const Frame& frame, const Camera& camera, const 
             }
             model.confidence[i] =
                 std::min(model.confidence[i] + observed.weight, static_cast<float>(options.max_confidence));
-            model.last_seen[i] = frame_index;
+            model.last_seen[i] = now.index;
             count_up(model.observations[i]);
             model.free_space_violations[i] = 0;
             covers[static_cast<std::size_t>(number)].push_back({i, points.pixel[j], block.cover(k)});
@@ -167,8 +169,11 @@ int reach_of(const NewPoint& point, const Camera& camera) {
 }
 
 // The frame's surface where the model does not cover it, denoised.
-std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                                      const PixelSet& covered, double spacing, int num_threads) {
+std::vector<NewPoint> find_new_points(const RegisteredFrame& now, const PixelSet& covered, double spacing,
+                                      int num_threads) {
+  const Frame& frame = now.frame;
+  const Camera& camera = now.camera;
+  const SurfaceObserver& observer = now.observer;
   std::vector<std::vector<std::int32_t>> uncovered(static_cast<std::size_t>(frame.height));
   parallel_for(frame.height, 16, num_threads, [&](std::int64_t v) {
     const auto first = static_cast<std::int32_t>(v) * frame.width;
@@ -219,10 +224,11 @@ std::vector<NewPoint> find_new_points(const Frame& frame, const Camera& camera, 
 
 // Adds points, one after the other, where neither the model nor a point before stands for the surface. The covered
 // pixels rule most of them out at once, by what was measured; the others are compared as they are, without the noise.
-void insert(PointModel& model, const std::vector<NewPoint>& candidates, Known& known, const Frame& frame,
-            const Pose& world_from_camera, std::int32_t frame_index, bool with_colors, FusionReport& report) {
+void insert(PointModel& model, const std::vector<NewPoint>& candidates, Known& known, const RegisteredFrame& now,
+            bool with_colors, FusionReport& report) {
   if (candidates.empty()) return;
-  const Eigen::Isometry3f to_world(world_from_camera.cast<float>());
+  const Frame& frame = now.frame;
+  const Eigen::Isometry3f to_world(now.world_from_camera.cast<float>());
   int farthest = 0;
   for (const NewPoint& candidate : candidates) farthest = std::max(farthest, candidate.reach);
   PixelIndex points(frame.width, frame.height, std::max(1, farthest / fusion_limits::squares_across));
@@ -242,7 +248,7 @@ void insert(PointModel& model, const std::vector<NewPoint>& candidates, Known& k
     model.normals.push_back(normal);
     if (with_colors) model.colors.push_back(candidate.color);
     model.confidence.push_back(candidate.weight);
-    model.last_seen.push_back(frame_index);
+    model.last_seen.push_back(now.index);
     model.observations.push_back(1);
     model.free_space_violations.push_back(0);
     ++report.num_inserted;
@@ -296,27 +302,21 @@ void FusionOptions::check() const {
   require(reference_sigma >= 0.0, "reference_sigma", "0 (automatic) or positive metres", reference_sigma);
 }
 
-FusionReport fuse_observed(PointModel& model, const Frame& frame, const Camera& camera, const SurfaceObserver& observer,
-                           const Pose& world_from_camera, double spacing, std::int32_t frame_index,
-                           const FusionOptions& options, int num_threads,
-                           const std::vector<FrameAttribute>& attributes) {
+FusionReport fuse_observed(PointModel& model, const RegisteredFrame& now, double spacing, const FusionOptions& options,
+                           int num_threads, const std::vector<FrameAttribute>& attributes) {
   FusionReport report;
-  const bool with_colors = observer.has_colors() || !model.colors.empty();
+  const bool with_colors = now.observer.has_colors() || !model.colors.empty();
   if (with_colors) {
     model.colors.resize(model.points.size(), Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
   }
-  const AttributePlanes planes(attributes, observer, camera, num_threads);
+  const AttributePlanes planes(attributes, now.observer, now.camera, num_threads);
   const bool with_attributes = !attributes.empty() || !model.attributes.empty();
-  if (with_attributes) fuse_attributes(model, 0, frame, camera, observer, planes, world_from_camera, num_threads);
-  Known known =
-      update(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, report, num_threads);
-  const std::vector<NewPoint> candidates =
-      find_new_points(frame, camera, observer, known.covered, spacing, num_threads);
+  if (with_attributes) fuse_attributes(model, 0, now, planes, num_threads);
+  Known known = update(model, now, spacing, options, report, num_threads);
+  const std::vector<NewPoint> candidates = find_new_points(now, known.covered, spacing, num_threads);
   const std::int64_t num_known = model.size();
-  insert(model, candidates, known, frame, world_from_camera, frame_index, with_colors, report);
-  if (with_attributes) {
-    fuse_attributes(model, num_known, frame, camera, observer, planes, world_from_camera, num_threads);
-  }
+  insert(model, candidates, known, now, with_colors, report);
+  if (with_attributes) fuse_attributes(model, num_known, now, planes, num_threads);
   remove_violated(model, options, report);
   return report;
 }
@@ -333,7 +333,7 @@ FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, c
   check_attributes(attributes, camera, model);
   SurfaceObserver observer(camera, options);
   observer.look_at(frame, colors, num_threads);
-  return fuse_observed(model, frame, camera, observer, world_from_camera, spacing, frame_index, options, num_threads,
+  return fuse_observed(model, {frame, camera, observer, world_from_camera, frame_index}, spacing, options, num_threads,
                        attributes);
 }
 

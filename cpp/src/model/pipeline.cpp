@@ -335,7 +335,7 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
     const Stopwatch watch(report.milliseconds.fuse);
     if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
     if (options.fusion_method == FusionMethod::fuse) {
-      report.fusion = fuse_observed(cloud, frame, camera, observer, report.world_from_camera, spacing, index,
+      report.fusion = fuse_observed(cloud, {frame, camera, observer, report.world_from_camera, index}, spacing,
                                     options.fusion, options.num_threads, extras.attributes);
     } else {
       consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
