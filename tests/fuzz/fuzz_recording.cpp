@@ -138,10 +138,10 @@ NACRE_FUZZ_TARGET(bytes) {
   options.num_threads = 1;
   Model model(camera, options);
   double angle = 0.0, farther = 0.0;
-  // Frames that are not tracked take some twenty times as long.
+  // Frames that are not tracked take ten times as long.
   const int num_frames = 1 + bytes.byte() % 80;
   int num_hard = 0;
-  for (int index = 0; index < num_frames && num_hard < 4; ++index) {
+  for (int index = 0; index < num_frames && num_hard < 8; ++index) {
     const Event event = bytes.byte() < 160 ? Event::none : bytes.one_of<Event>(10);
     const Pose pose = scene.camera(angle, farther);
     simulation.seed = static_cast<std::uint64_t>(index);

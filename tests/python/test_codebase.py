@@ -155,7 +155,7 @@ def test_numbers_that_decide_stand_in_limits(folder: str) -> None:
     assert limit_lines.numbers_of(CPP / folder / "limits.hpp")
 
 
-@pytest.mark.parametrize("folder", DECIDING)
+@pytest.mark.parametrize("folder", ["base", *DECIDING])
 def test_each_number_is_guarded_by_something_that_exists(folder: str) -> None:
     """A test, a case of benchmarks/cases.py, a row of docs/tracking.md, a kind of failures.py, or a path."""
     known = {path.stem for kind in ("py", "cpp") for path in (ROOT / "tests").rglob(f"test_*.{kind}")}
