@@ -1,7 +1,9 @@
-// Cleaning of any image: what stays is what came, or fills a crack, and every pixel is counted once.
+// Cleaning of any image: what stays is what came, to half a coarse unit, or fills a gap, and every pixel is counted
+// once.
 #include <array>
 #include <cmath>
 
+#include "depth/coarse_depth.hpp"
 #include "options.hpp"
 
 NACRE_FUZZ_TARGET(bytes) {
@@ -15,12 +17,13 @@ NACRE_FUZZ_TARGET(bytes) {
   DepthReport report;
   const DepthImage clean = preprocess_depth(depth, camera, options, mask, &report, threads);
   NACRE_HOLDS(clean.rows() == depth.rows() && clean.cols() == depth.cols());
+  const float rounding = 0.56F * coarse_unit(depth);
   std::int64_t num_kept = 0;
   for (Eigen::Index i = 0; i < clean.size(); ++i) {
     if (std::isnan(clean.data()[i])) continue;
     const float measured = depth.data()[i];
     const bool may_be_filled = !(measured > 0.0F && std::isfinite(measured));
-    NACRE_HOLDS(clean.data()[i] > 0.0F && (clean.data()[i] == measured || may_be_filled));
+    NACRE_HOLDS(clean.data()[i] > 0.0F && (std::abs(clean.data()[i] - measured) <= rounding || may_be_filled));
     ++num_kept;
   }
   NACRE_HOLDS(num_kept == report.num_kept && report.num_pixels == clean.size());

@@ -118,6 +118,7 @@ class NoiseCalibration {
   static constexpr std::size_t num_bins = 18;  // of depth, a third of an octave each
 
   Camera camera_;
+  float unit_ = 0.0F;                  // that depth was rounded to [m]
   Mean local_, total_, fitted_;        // logarithms of factors of the sensor's prior
   std::array<Mean, num_bins> bins_{};  // likewise, of what surface fits leave over
 };

@@ -10,10 +10,10 @@
 #include "base/statistics.hpp"
 #include "camera/ray_table.hpp"
 #include "depth/cleaning.hpp"
-#include "depth/cracks.hpp"
 #include "depth/edges.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/limits.hpp"
+#include "depth/restored_depth.hpp"
 #include "depth/speckles.hpp"
 #include "depth/window_fits.hpp"
 #include "simd/depth_edges.hpp"
@@ -143,14 +143,12 @@ DepthImage clean_depth(const DepthRef& measured, const Camera& camera, const Dep
   require_camera_size("depth", measured.rows(), measured.cols(), camera);
   if (mask.size() > 0) require_camera_size("mask", mask.rows(), mask.cols(), camera);
   require_plausible_median(measured);
-  DepthImage filled;
-  const bool is_cracked = has_cracks(measured, camera);
-  if (is_cracked) filled = fill_cracks(measured, camera);
-  const DepthRef& depth = is_cracked ? DepthRef(filled) : measured;
+  const RestoredDepth restored(measured, camera, num_threads);
+  const DepthRef& depth = restored.image();
 
   // The tests see every measurement, so that range and mask do not make edges where there are none.
   const PlanarImage image(depth, camera, num_threads);
-  const WindowFits fits = fit_windows(image, camera, num_threads);
+  const WindowFits fits = fit_windows(image, camera, restored.unit(), num_threads);
   if (calibration != nullptr && !options.noise) calibration->add(image, fits, num_threads);
   const NoiseModel noise = options.noise            ? *options.noise
                            : calibration != nullptr ? calibration->model()

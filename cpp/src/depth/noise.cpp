@@ -8,7 +8,9 @@
 #include "base/check.hpp"
 #include "base/numbers.hpp"
 #include "base/parallel.hpp"
+#include "depth/coarse_depth.hpp"
 #include "depth/limits.hpp"
+#include "depth/restored_depth.hpp"
 #include "depth/window_fits.hpp"
 
 namespace nacre {
@@ -83,9 +85,10 @@ NoiseModel sensor_prior(const Camera& camera) {
   return camera.model() == Camera::Model::pinhole ? NoiseModel::kinect() : NoiseModel{1.0, 0.0, 0.0, 0.0};
 }
 
-WindowFits fit_windows(const PlanarImage& image, const Camera& camera, int num_threads) {
+WindowFits fit_windows(const PlanarImage& image, const Camera& camera, float unit, int num_threads) {
   const auto count = [](int size) { return std::max(0, (size - 2 * WindowFits::kRadius - 1) / WindowFits::kStep + 1); };
   WindowFits fits;
+  fits.unit = unit;
   fits.cols = image.width() > 2 * WindowFits::kRadius ? count(image.width()) : 0;
   fits.rows = image.height() > 2 * WindowFits::kRadius ? count(image.height()) : 0;
   for (std::vector<float>* const values : {&fits.residual, &fits.roughness, &fits.pixel, &fits.step, &fits.slope}) {
@@ -130,8 +133,10 @@ NoiseModel NoiseModel::stereo(double fx, double baseline, double disparity_sigma
 }
 
 NoiseModel estimate_noise(const DepthRef& depth, const Camera& camera, int num_threads) {
-  const PlanarImage image(depth, camera, num_threads);
-  return estimate_noise(fit_windows(image, camera, num_threads), camera, num_threads);
+  require_camera_size("depth", depth.rows(), depth.cols(), camera);
+  const RestoredDepth restored(depth, camera, num_threads);
+  const PlanarImage image(restored.image(), camera, num_threads);
+  return estimate_noise(fit_windows(image, camera, restored.unit(), num_threads), camera, num_threads);
 }
 
 std::optional<NoiseScale> measure_noise(const WindowFits& fits, int num_threads) {
@@ -167,7 +172,9 @@ NoiseModel scaled_prior(const Camera& camera, const NoiseScale& scale) {
 }
 
 NoiseModel estimate_noise(const WindowFits& fits, const Camera& camera, int num_threads) {
-  if (const std::optional<NoiseScale> scale = measure_noise(fits, num_threads)) return scaled_prior(camera, *scale);
+  if (const std::optional<NoiseScale> scale = measure_noise(fits, num_threads)) {
+    return with_unit(scaled_prior(camera, *scale), fits.unit);
+  }
   // Nothing to measure: the sensor's prior, or a tenth of a pixel.
   return camera.model() == Camera::Model::pinhole
              ? sensor_prior(camera)

@@ -3,7 +3,9 @@
 #include <cmath>
 #include <vector>
 
+#include "depth/coarse_depth.hpp"
 #include "depth/limits.hpp"
+#include "depth/restored_depth.hpp"
 #include "depth/window_fits.hpp"
 #include "nacre/depth.hpp"
 
@@ -37,11 +39,14 @@ struct CurveFit {
 NoiseCalibration::NoiseCalibration(const Camera& camera) : camera_(camera) {}
 
 void NoiseCalibration::add(const DepthRef& depth, int num_threads) {
-  const PlanarImage image(depth, camera_, num_threads);
-  add(image, fit_windows(image, camera_, num_threads), num_threads);
+  require_camera_size("depth", depth.rows(), depth.cols(), camera_);
+  const RestoredDepth restored(depth, camera_, num_threads);
+  const PlanarImage image(restored.image(), camera_, num_threads);
+  add(image, fit_windows(image, camera_, restored.unit(), num_threads), num_threads);
 }
 
 void NoiseCalibration::add(const PlanarImage& image, const WindowFits& fits, int num_threads) {
+  unit_ = std::max(unit_, fits.unit);
   const std::optional<NoiseScale> scale = measure_noise(fits, num_threads);
   if (!scale) return;
   const auto pool = [](Mean& mean, double value) {
@@ -75,7 +80,7 @@ void NoiseCalibration::add(const PlanarImage& image, const WindowFits& fits, int
 NoiseModel NoiseCalibration::model() const {
   if (local_.count == 0.0) return estimate_noise(WindowFits{}, camera_, 1);
   NoiseModel model = scaled_prior(camera_, {std::exp(local_.value), std::exp(total_.value)});
-  if (camera_.model() != Camera::Model::pinhole) return model;
+  if (camera_.model() != Camera::Model::pinhole) return with_unit(model, unit_);
 
   // The curve's shape, where the recording shows several depths: relative to what the fits leave over on the whole.
   const NoiseModel prior = sensor_prior(camera_);
@@ -87,7 +92,7 @@ NoiseModel NoiseCalibration::model() const {
     const double sigma = prior.sigma(z) * std::exp(bins_[bin].value - fitted_.value);
     fit.add(1.0 / sigma, (z - prior.offset) * (z - prior.offset) / sigma, bins_[bin].count);
   }
-  if (fit.weight == 0.0) return model;
+  if (fit.weight == 0.0) return with_unit(model, unit_);
   const double weight = depth_limits::prior_weight * fit.weight;
   fit.add(1.0 / prior.constant, 0.0, weight);
   fit.add(0.0, 1.0 / prior.quadratic, weight);
@@ -95,7 +100,7 @@ NoiseModel NoiseCalibration::model() const {
   const double scale = std::exp(total_.value);
   model.constant = scale * constant;
   model.quadratic = scale * quadratic;
-  return model;
+  return with_unit(model, unit_);
 }
 
 }  // namespace nacre

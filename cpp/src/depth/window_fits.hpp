@@ -14,6 +14,7 @@ struct WindowFits {
   static constexpr int kRadius = simd::fit_radius, kStep = simd::fit_step;
 
   int cols = 0, rows = 0;
+  float unit = 0.0F;  // that depth was rounded to, where it shows [m]
   // Of each window, row by row: see simd::WindowRow.
   std::vector<float> residual, roughness, pixel, step, slope;
 
@@ -22,7 +23,7 @@ struct WindowFits {
 };
 
 // Residuals, roughness, pixels and steps are in units of the noise of `sensor_prior`.
-WindowFits fit_windows(const PlanarImage& image, const Camera& camera, int num_threads);
+WindowFits fit_windows(const PlanarImage& image, const Camera& camera, float unit, int num_threads);
 
 // The Kinect's curve; for an orthographic camera a constant.
 NoiseModel sensor_prior(const Camera& camera);

@@ -51,6 +51,7 @@ struct PrivateState {
   }
   template <class Archive>
   static void exchange(Archive& archive, NoiseCalibration& calibration) {
+    archive(calibration.unit_);
     for (NoiseCalibration::Mean* mean : {&calibration.local_, &calibration.total_, &calibration.fitted_}) {
       exchange(archive, *mean);
     }

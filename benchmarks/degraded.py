@@ -1,0 +1,137 @@
+#!/usr/bin/env python3
+"""
+Make the images of real recordings worse, one way at a time, and see what is still tracked rightly.
+
+    python benchmarks/degraded.py teddy d435 robot iphone most=60
+
+writes a table of frames claimed and right, and of the trajectory's error, for each damage.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from cases import Case, Figures, make, run
+
+import nacre
+
+Depth = npt.NDArray[np.float32]
+
+
+def unchanged(case: Case) -> Case:
+    """Return the recording as it is."""
+    return case
+
+
+def noisier(times: float) -> Callable[[Case], Case]:
+    """Add noise, so many times as much as the first image has, independent from pixel to pixel."""
+
+    def change(case: Case) -> Case:
+        rng = np.random.default_rng(1)
+        noise = nacre.estimate_noise(case.depths[0], case.camera)
+
+        def add(depth: Depth) -> Depth:
+            sigma = noise.constant + noise.quadratic * (depth - noise.offset) ** 2
+            return (depth + times * sigma * rng.standard_normal(depth.shape)).astype(np.float32)
+
+        return each(case, add)
+
+    return change
+
+
+def missing(part: float) -> Callable[[Case], Case]:
+    """Take pixels away at random."""
+
+    def change(case: Case) -> Case:
+        rng = np.random.default_rng(1)
+        return each(case, lambda depth: np.where(rng.random(depth.shape) < part, np.float32(np.nan), depth))
+
+    return change
+
+
+def rounded(unit: float) -> Callable[[Case], Case]:
+    """Round depth to multiples of a unit [m]."""
+    return lambda case: each(case, lambda depth: np.round(depth / np.float32(unit)) * np.float32(unit))
+
+
+def every_pixel(step: int) -> Callable[[Case], Case]:
+    """Keep one pixel of so many, each way."""
+
+    def change(case: Case) -> Case:
+        smaller = each(case, lambda depth: np.ascontiguousarray(depth[::step, ::step]))
+        height, width = smaller.depths[0].shape
+        old = case.camera
+        camera = nacre.Camera(width, height, old.fx / step, old.fy / step, old.cx / step, old.cy / step)
+        return replace(smaller, camera=camera, colors=[None] * len(case.depths))
+
+    return change
+
+
+def enlarged(times: int) -> Callable[[Case], Case]:
+    """Repeat each pixel so many times, each way."""
+
+    def change(case: Case) -> Case:
+        larger = each(case, lambda depth: np.repeat(np.repeat(depth, times, axis=0), times, axis=1))
+        height, width = larger.depths[0].shape
+        old = case.camera
+        centre = [(c + 0.5) * times - 0.5 for c in (old.cx, old.cy)]
+        camera = nacre.Camera(width, height, old.fx * times, old.fy * times, *centre)
+        return replace(larger, camera=camera, colors=[None] * len(case.depths))
+
+    return change
+
+
+def wrong_focal_length(factor: float) -> Callable[[Case], Case]:
+    """Say a wrong focal length."""
+
+    def change(case: Case) -> Case:
+        old = case.camera
+        camera = nacre.Camera(old.width, old.height, old.fx * factor, old.fy * factor, old.cx, old.cy)
+        return replace(case, camera=camera)
+
+    return change
+
+
+def each(case: Case, change: Callable[[Depth], Depth]) -> Case:
+    """Change each image."""
+    return replace(case, depths=[change(np.asarray(depth, np.float32)) for depth in case.depths])
+
+
+DAMAGES: dict[str, Callable[[Case], Case]] = {
+    "as it is": unchanged,
+    **{f"{times} times its noise added": noisier(times) for times in (1, 2, 4, 8)},
+    **{f"{100 * part:.0f} % of the pixels missing": missing(part) for part in (0.1, 0.3, 0.5)},
+    **{f"rounded to {1000 * unit:.0f} mm": rounded(unit) for unit in (0.005, 0.01, 0.02, 0.05, 0.1)},
+    "every second pixel": every_pixel(2),
+    "every fourth pixel": every_pixel(4),
+    "pixels doubled": enlarged(2),
+    **{f"focal length {factor:+.0%}": wrong_focal_length(1 + factor) for factor in (-0.03, 0.03)},
+}
+
+
+def cell(figures: Figures) -> str:
+    """Return frames claimed and right, and the trajectory's error."""
+    error = f", {figures.ate:.1f} mm" if figures.claimed > 1 else ""
+    return f"{figures.claimed} / {figures.right}{error}"
+
+
+def main() -> None:
+    """Measure the recordings that are named, with settings as those of `cases.py`."""
+    settings: dict[str, Any] = dict(word.split("=") for word in sys.argv[1:] if "=" in word)
+    most = int(settings.pop("most", 60))
+    names = [word for word in sys.argv[1:] if "=" not in word] or ["teddy", "d435", "robot", "iphone"]
+    cases = [make(name, most=most) for name in names]
+    heads = [f"{name}, {len(case.depths)}" for name, case in zip(names, cases, strict=True)]
+    print(f"| frames | {' | '.join(heads)} |")
+    print("|---" * (len(heads) + 1) + "|")
+    for damage, change in DAMAGES.items():
+        print(f"| {damage} | {' | '.join(cell(run(change(case))[0]) for case in cases)} |", flush=True)
+
+
+if __name__ == "__main__":
+    main()

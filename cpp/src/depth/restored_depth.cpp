@@ -1,0 +1,23 @@
+#include "depth/restored_depth.hpp"
+
+#include "depth/coarse_depth.hpp"
+#include "depth/gaps.hpp"
+
+namespace nacre {
+namespace {
+
+DepthImage restore(const DepthRef& measured, const Camera& camera, float unit, int num_threads) {
+  DepthImage restored;
+  if (unit > 0.0F) restored = interpolate_plateaus(measured, unit, num_threads);
+  if (has_gaps(measured, camera)) restored = fill_gaps(unit > 0.0F ? DepthRef(restored) : measured, camera);
+  return restored;
+}
+
+}  // namespace
+
+RestoredDepth::RestoredDepth(const DepthRef& measured, const Camera& camera, int num_threads)
+    : unit_(coarse_unit(measured)),
+      own_(restore(measured, camera, unit_, num_threads)),
+      image_(own_.size() > 0 ? DepthRef(own_) : measured) {}
+
+}  // namespace nacre

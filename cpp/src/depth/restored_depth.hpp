@@ -1,0 +1,25 @@
+// A depth image without what its storage did to it: rounding to coarse units, and gaps one pixel wide.
+#pragma once
+
+#include "nacre/depth.hpp"
+
+namespace nacre {
+
+class RestoredDepth {
+ public:
+  // The measured depth must stay; it is the image itself where there is nothing to restore.
+  RestoredDepth(const DepthRef& measured, const Camera& camera, int num_threads);
+  RestoredDepth(const RestoredDepth&) = delete;
+  RestoredDepth& operator=(const RestoredDepth&) = delete;
+
+  const DepthRef& image() const { return image_; }
+  // That depth was rounded to, where it shows [m]; otherwise 0.
+  float unit() const { return unit_; }
+
+ private:
+  float unit_;
+  DepthImage own_;
+  DepthRef image_;
+};
+
+}  // namespace nacre
