@@ -118,7 +118,7 @@ def preprocess_depth(
     the depth range; outside the mask; at depth edges, where a pixel mixes two surfaces; on surfaces seen too
     steeply; isolated ones. What is kept has the value that it came with, but for two kinds of images: depth
     in units coarser than its noise is interpolated between its plateaus, by half a unit at most; and where
-    cracks, or half of the pixels missing at random, take surfaces apart, gaps one pixel wide are filled.
+    cracks or pixels missing at random riddle surfaces, gaps one pixel wide are filled.
 
     Parameters
     ----------

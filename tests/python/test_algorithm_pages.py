@@ -44,7 +44,6 @@ CONSTANTS = [
     ("registration", "at most 30 000", "tracking/limits.hpp", "most_target_points = 30000"),
     ("registration", "1.5 times the distance", "tracking/limits.hpp", "reach_spacings = 1.5"),
     ("registration", "2.75 times that", "camera/limits.hpp", "surface_spacings = 2.75"),
-    ("registration", "a correlation of 0.6", "registration/limits.hpp", "least_correlation = 0.6"),
     ("global", r"0.003\, D", "registration/limits.hpp", "least_tolerance = 0.003"),
     (
         "global",

@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include "base/limits.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/limits.hpp"
+#include "depth/window_fits.hpp"
 
 namespace nacre {
 namespace {
@@ -25,46 +25,23 @@ class OneSurface {
   bool is_pinhole_;
 };
 
-// Clusters of pixels that are measured with a lower probability than this are finite: site percolation.
-bool is_scattered(const DepthRef& depth) {
-  std::int64_t num_measured = 0, num_neighbours = 0;
-  for (Eigen::Index v = 0; v + 1 < depth.rows(); v += depth_limits::probed_rows) {
-    for (Eigen::Index u = 0; u + 1 < depth.cols(); ++u) {
-      if (!is_measurement(depth(v, u))) continue;
-      ++num_measured;
-      num_neighbours += is_measurement(depth(v, u + 1)) + is_measurement(depth(v + 1, u));
-    }
-  }
-  const double expected = 2.0 * depth_limits::percolation * static_cast<double>(num_measured);
-  const double sigma = std::sqrt(expected * (1.0 - depth_limits::percolation));
-  return static_cast<double>(num_neighbours) < expected - base_limits::noise_sigmas * sigma;
-}
+}  // namespace
 
-bool has_cracks(const DepthRef& depth, const Camera& camera) {
+bool has_gaps(const DepthRef& depth, const Camera& camera) {
   const OneSurface one_surface(camera);
-  // The middle of five missing pixels in a line, with the same surface on both sides of it.
-  const auto is_crack = [&](Eigen::Index v, Eigen::Index u, Eigen::Index down, Eigen::Index right) {
-    for (const Eigen::Index step : {-2, -1, 0, 1, 2}) {
-      if (is_measurement(depth(v + step * down, u + step * right))) return false;
-    }
-    return one_surface(depth(v - right, u - down), depth(v + right, u + down));
-  };
-  std::int64_t num_measured = 0, num_cracks = 0;
-  for (Eigen::Index v = 2; v + 2 < depth.rows(); v += depth_limits::probed_rows) {
-    for (Eigen::Index u = 2; u + 2 < depth.cols(); ++u) {
+  std::int64_t num_measured = 0, num_gaps = 0;
+  for (Eigen::Index v = 1; v + 1 < depth.rows(); v += depth_limits::probed_rows) {
+    for (Eigen::Index u = 1; u + 1 < depth.cols(); ++u) {
       if (is_measurement(depth(v, u))) {
         ++num_measured;
-      } else if (is_crack(v, u, 1, 0) || is_crack(v, u, 0, 1)) {
-        ++num_cracks;
+      } else if (one_surface(depth(v, u - 1), depth(v, u + 1)) || one_surface(depth(v - 1, u), depth(v + 1, u))) {
+        ++num_gaps;
       }
     }
   }
-  return static_cast<double>(num_cracks) > depth_limits::least_cracked * static_cast<double>(num_measured);
+  const std::int64_t side = 2 * WindowFits::kRadius + 1;
+  return num_gaps >= depth_limits::least_windows && side * side * num_gaps > num_measured;
 }
-
-}  // namespace
-
-bool has_gaps(const DepthRef& depth, const Camera& camera) { return is_scattered(depth) || has_cracks(depth, camera); }
 
 DepthImage fill_gaps(const DepthRef& depth, const Camera& camera) {
   const OneSurface one_surface(camera);

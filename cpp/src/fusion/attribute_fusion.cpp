@@ -116,7 +116,7 @@ void fuse_attributes(PointModel& model, std::int64_t first, const RegisteredFram
           for (std::size_t p = 0; p < targets.size(); ++p) {
             const AttributePlanes::Part& part = planes.parts()[p];
             const float coverage = part.coverage < 0 ? 1.0F : average(part.coverage);
-            if (!(coverage > fusion_limits::least_coverage)) continue;
+            if (!(coverage > 0.0F)) continue;
             const float gain = weight * coverage / (model.confidence[seen[k]] + weight * coverage);
             float* const value =
                 targets[p]->values.data() + seen[k] * static_cast<std::size_t>(targets[p]->num_channels);

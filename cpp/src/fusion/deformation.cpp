@@ -56,7 +56,7 @@ void merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
       const float offset = difference.dot(model.normals[j]);
       const float along = difference.squaredNorm() - offset * offset;
       if (std::abs(offset) < across && (along < least || (along == least && j < best)) &&
-          model.normals[i].dot(model.normals[j]) > fusion_limits::layer_cosine) {
+          model.normals[i].dot(model.normals[j]) > fusion_limits::sheet_cosine) {
         least = along;
         best = j;
       }

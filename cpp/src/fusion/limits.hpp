@@ -17,9 +17,7 @@ constexpr float insertion_weight = 1.0F;  // [measurements] tuned: and at least;
 constexpr float sheet_cosine = 0.3F;  // [cosine] tuned: between normals of one sheet; test_fusion
 constexpr int squares_across = 8;  // [1] budget: of the index of pixels, in a reach; benchmarks/run.py
 constexpr std::size_t sigma_probes = 5000;  // [pixels] budget: that tell a frame's median noise; test_fusion
-constexpr float least_coverage = 0.25F;  // [1] tuned: of a window, where only some pixels have values; test_attributes
 constexpr int layer_levels = 4;  // [1] budget: of spacing, each twice the one before; test_deformation
-constexpr float layer_cosine = 0.5F;  // [cosine] tuned: between normals of layers to merge; test_deformation
 constexpr float cover_sigmas = 3.0F;  // [sigma] tuned: a pixel nearer to a point's plane is its surface; test_fusion
 
 }  // namespace nacre::fusion_limits

@@ -77,8 +77,8 @@ std::vector<int> nearest_edges(const std::vector<OutlinePoint>& outline, const s
     double least = gate * gate;
     for (std::size_t k = 0; k < others.size(); ++k) {
       const double squared = (others[k].point - edge.point).squaredNorm();
-      if (!(squared < least) || others[k].outward.dot(edge.outward) < registration_limits::view_cosine ||
-          others[k].normal.dot(edge.normal) < registration_limits::view_cosine) {
+      if (!(squared < least) || others[k].outward.dot(edge.outward) < registration_limits::same_surface_cosine ||
+          others[k].normal.dot(edge.normal) < registration_limits::same_surface_cosine) {
         continue;
       }
       least = squared;

@@ -40,7 +40,7 @@ class ColorSearch : public OpenDirectionSearch {
     fit.extent = extent_of(fit.rows);
     fit.noise = noise_;
     distance_noise_ = std::max(geometric.rmse, 0.1 * target_.spacing());
-    fit.agrees = fit.rows.size() >= base_limits::least_points && correlation_ >= registration_limits::least_correlation;
+    fit.agrees = fit.rows.size() >= base_limits::least_points;
     return fit;
   }
 
@@ -127,15 +127,7 @@ class ColorSearch : public OpenDirectionSearch {
       values.push_back(std::abs(rows[i].residual));
     }
     noise_ = std::max(registration_limits::least_brightness_noise, mad_to_sigma * median_of(values));
-    double products = 0.0, target_squares = 0.0, source_squares = 0.0;
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      const double weight = rows[i].weight = robust_weight(rows[i].residual, noise_);
-      const double a = brightness[i].target - target_middle, b = brightness[i].source - source_middle;
-      products += weight * a * b;
-      target_squares += weight * a * a;
-      source_squares += weight * b * b;
-    }
-    correlation_ = products / std::sqrt(std::max(target_squares * source_squares, 1e-12));
+    for (MotionRow& row : rows) row.weight = robust_weight(row.residual, noise_);
   }
 
   // Moves the pose along the open directions; returns how far, root mean square over the pairs [m].
@@ -153,7 +145,7 @@ class ColorSearch : public OpenDirectionSearch {
   std::vector<ColorLevel> levels_;
   const AlignOptions& options_;
   AlignOptions held_;  // few steps within the last gate, weak directions held
-  double noise_ = 1.0, correlation_ = 0.0, distance_noise_ = 1.0;
+  double noise_ = 1.0, distance_noise_ = 1.0;
 };
 
 }  // namespace

@@ -46,12 +46,13 @@ void denoise(const PointsRef& all, const Points& all_normals, const std::vector<
   const Neighbors near =
       KdTree(all, num_threads)
           .query(PointsRef(points), registration_limits::mean_neighbors, KdTree::infinity, num_threads);
+  constexpr auto cosine = static_cast<float>(registration_limits::same_surface_cosine);
   parallel_for(points.rows(), cloud_block, num_threads, [&](std::int64_t i) {
     float sum = 0.0F, count = 0.0F;
     for (Eigen::Index k = 0; k < near.indices.cols(); ++k) {
       const std::int64_t row = near.indices(i, k);
       if (row >= all.rows()) break;
-      if (!(std::abs(all_normals.row(row).dot(normals.row(i))) > registration_limits::same_surface_cosine)) continue;
+      if (!(std::abs(all_normals.row(row).dot(normals.row(i))) > cosine)) continue;
       sum += (all.row(row) - all.row(rows[static_cast<std::size_t>(i)])).dot(normals.row(i));
       count += 1.0F;
     }

@@ -100,7 +100,7 @@ SearchCandidate GlobalSearch::start_from(int number) const {
   guess.translation() = target_.middle - guess.linear() * source_.middle;
   SearchCandidate candidate;
   candidate.alignment = align_to(target_.target, source_.few, guess, icp);
-  score(candidate, true, std::max(tolerance_, registration_limits::coarse_tolerance * size_));
+  score(candidate, true, std::max(tolerance_, registration_limits::search_gate * size_));
   return candidate;
 }
 
@@ -126,7 +126,7 @@ void GlobalSearch::score(SearchCandidate& candidate, bool with_few, double toler
 
 bool GlobalSearch::is_same(const Pose& a, const Pose& b) const {
   return angle_between(a, b) < registration_limits::same_turn &&
-         (a * source_.middle - b * source_.middle).norm() < registration_limits::same_shift * size_;
+         (a * source_.middle - b * source_.middle).norm() < registration_limits::search_gate * size_;
 }
 
 std::vector<SearchCandidate> GlobalSearch::best_different(std::vector<SearchCandidate> candidates,

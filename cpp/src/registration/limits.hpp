@@ -25,17 +25,14 @@ constexpr std::size_t least_pairs_of_paper_icp = 6;  // [pairs] derived: as many
 constexpr double rest_of_paper_icp = 1e-6;  // [1] derived: step, of the largest residual, that no data explains; test_paper_icp
 constexpr std::int64_t spacing_probes = 500;  // [points] budget: that tell a cloud's spacing; test_icp
 constexpr std::size_t least_scale_rows = 16;  // [rows] derived: for seven unknowns; test_scale_check
-constexpr double least_correlation = 0.6;  // [1] tuned: of the brightnesses, for them to be believed; test_color_registration
 constexpr double least_brightness_noise = 1.0;  // [1/255] derived: of the brightness: a step of its scale; test_color_registration
 constexpr double small_color_step = 0.01;  // [spacing] budget: of a search by color that has converged; test_color_registration
 constexpr int color_neighbors = 16;  // [points] budget: around a point, that show how brightness changes; test_color_registration
 constexpr int least_color_neighbors = 6;  // [points] derived: for three unknowns with some to spare; test_color_registration
 constexpr int mean_neighbors = 24;  // [points] tuned: that a noisy point is averaged with; test_global_registration
 constexpr Eigen::Index roughness_probes = 500;  // [points] budget: that tell a cloud's noise; test_global_registration
-constexpr double search_gate = 0.04;  // [size] tuned: at the end of the search, and of candidates that are refined; test_global_registration
-constexpr double coarse_tolerance = 0.02;  // [size] tuned: to which surfaces agree in the search; test_global_registration
+constexpr double search_gate = 0.04;  // [size] tuned: at the end of the search, and of candidates that are refined; closer shifts are the same; test_global_registration
 constexpr double least_tolerance = 0.003;  // [size] tuned: to which surfaces agree at the end, at least; test_global_registration
-constexpr double same_shift = 0.1;  // [size] tuned: closer motions are the same; test_global_registration
 constexpr double same_turn = 0.26;  // [rad] tuned: closer rotations are the same; test_global_registration
 constexpr double center_depth = 0.7;  // [radius] derived: from what is seen of an object to its center; a half sphere has 0.6; test_global_registration
 constexpr double points_per_cell = 6.0;  // [points] budget: of a cloud seen from a place; test_global_registration
@@ -63,14 +60,12 @@ constexpr double enough_alone = 1.3;  // [1] tuned: relocalisation score of a si
 constexpr double enough_far = 2.0;  // [1] tuned: the same far from all guesses; unrelated
 constexpr Eigen::Index view_samples = 800;  // [points] budget: of each view; bunny12
 constexpr double still = 1e-6;  // [rad, m] derived: motions of all views that have converged; bunny12
-constexpr double first_view_gate = 2.0;  // [tolerance] tuned: of matches, at first; bunny12
 constexpr int most_steps = 12;  // [steps] budget: of Gauss-Newton, by colours, by outlines, and of views together; bunny12, fandisk12
-constexpr double gate_decay = 0.8;  // [1] tuned: at each of its steps; bunny12, fandisk12
+constexpr double gate_decay = 0.8;  // [1] budget: of a registration by outlines, at each step; fandisk12
 constexpr double relocalisation_consistency_power = 12.0;  // [1] tuned: in the relocalisation score; unrelated, cabinet
 constexpr double size_sigmas = 5.0;  // [sigma] tuned: by which a size near a guess must differ; test_acceptance
 constexpr double far_size_sigmas = 3.0;  // [sigma] tuned: the same far from all guesses; unrelated
-constexpr float same_surface_cosine = 0.8F;  // [1] tuned: between the normals of neighbors on one surface; test_global_registration
-constexpr double view_cosine = 0.7;  // [1] tuned: between normals that match; bunny12
+constexpr double same_surface_cosine = 0.8;  // [1] tuned: between normals of neighbors on one surface, and of views that match; test_global_registration
 
 }  // namespace nacre::registration_limits
 // clang-format on

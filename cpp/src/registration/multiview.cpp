@@ -26,19 +26,18 @@ struct Side {
 
 // The pairs of two views, in the world; `nearest` as IcpTarget::match has it.
 std::vector<Pair> match(const IcpSource& source, const IcpTarget& target, const Pose& world_from_source,
-                        const Pose& world_from_target, double gate, double tolerance,
-                        std::vector<std::uint32_t>& nearest) {
+                        const Pose& world_from_target, double tolerance, std::vector<std::uint32_t>& nearest) {
   nearest.resize(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
   std::vector<Pair> pairs =
       target.match(source, source.cloud.points.rows(), world_from_target.inverse() * world_from_source,
-                   {gate, registration_limits::view_cosine, false}, nearest);
+                   {tolerance, registration_limits::same_surface_cosine, false}, nearest);
   if (pairs.size() < base_limits::least_points) return {};
   weight_pairs(pairs, Metric::symmetric, true, 0.05 * tolerance);
   for (Pair& pair : pairs) {
     // Beyond a view's rim, matches only continue it: the farther along the surface, the less they count.
     const double across = residual(pair, Metric::symmetric);
     const double along = (pair.p - pair.q).squaredNorm() - across * across;
-    const double part = std::max(0.0, 1.0 - along / (gate * gate));
+    const double part = std::max(0.0, 1.0 - along / (tolerance * tolerance));
     pair.weight *= part * part;
     pair.p = world_from_target * pair.p;
     pair.q = world_from_target * pair.q;
@@ -124,16 +123,15 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
   std::vector<std::uint8_t> see_the_same(views.size() * views.size(), 1);
   for (std::size_t i = 0; i < views.size(); ++i) see_the_same[i * views.size() + i] = 0;
   std::vector<std::vector<std::uint32_t>> nearest(see_the_same.size());
-  double gate = registration_limits::first_view_gate;
   for (int iteration = 0; iteration < registration_limits::most_steps; ++iteration) {
     std::vector<Overlap> overlaps(see_the_same.size());
     parallel_for(count * count, 1, num_threads, [&](std::int64_t index) {
       const auto k = static_cast<std::size_t>(index), i = k / views.size(), j = k % views.size();
       if (see_the_same[k] == 0) return;
       const std::vector<Pair> pairs =
-          match(sides[i]->source, sides[j]->target, poses[i], poses[j], gate * tolerance, tolerance, nearest[k]);
+          match(sides[i]->source, sides[j]->target, poses[i], poses[j], tolerance, nearest[k]);
       overlaps[k] = Overlap(pairs, motions.center);
-      if (gate == 1.0 && pairs.empty()) see_the_same[k] = 0;
+      if (pairs.empty()) see_the_same[k] = 0;
     });
     JointEquations equations(freedom * count);
     for (Eigen::Index k = 0; k < count * count; ++k) {
@@ -144,8 +142,7 @@ std::vector<Pose> adjust_views(const std::vector<AdjustableView>& views, const M
       Pose& pose = poses[static_cast<std::size_t>(k)];
       pose = orthonormal(motions.apply(solution.segment(freedom * (k - 1), freedom)) * pose);
     }
-    if (gate == 1.0 && solution.norm() < registration_limits::still) break;
-    gate = std::max(1.0, registration_limits::gate_decay * gate);
+    if (solution.norm() < registration_limits::still) break;
   }
   return poses;
 }

@@ -159,7 +159,7 @@ class TurntableSearch {
       const auto is_known = [&](const Candidate& other) {
         const Pose& other_pose = other.alignment.target_from_source;
         return angle_between(pose, other_pose) < registration_limits::same_turn &&
-               (pose * middle - other_pose * middle).norm() < registration_limits::same_shift * frame_.size;
+               (pose * middle - other_pose * middle).norm() < registration_limits::search_gate * frame_.size;
       };
       if (std::none_of(kept.begin(), kept.end(), is_known)) kept.push_back(candidate);
     }
