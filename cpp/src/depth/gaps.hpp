@@ -5,8 +5,8 @@
 
 namespace nacre {
 
-// Whether more than one is in each window that noise is measured on: rows and columns without a measurement, as in images
-// that were moved into a camera with finer pixels, or pixels missing at random.
+// Whether more than one is in each window that noise is measured on: rows and columns without a measurement, as in
+// images that were moved into a camera with finer pixels, or pixels missing at random.
 bool has_gaps(const DepthRef& depth, const Camera& camera);
 
 // A copy in which they have the mean inverse depth of the two sides (orthographic: the mean depth).
