@@ -8,7 +8,7 @@ namespace nacre {
 // The unit [m]; 0 where noise hides it.
 float coarse_unit(const DepthRef& depth);
 
-// A copy without plateaus, nowhere farther than half a unit from the depth.
+// A copy without plateaus, no farther from the depth than half a step between two of them.
 DepthImage interpolate_plateaus(const DepthRef& depth, float unit, int num_threads);
 
 // The noise of depth that was rounded to a unit.
