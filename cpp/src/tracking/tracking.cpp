@@ -13,14 +13,26 @@ void keep_better(const TrackingResult& found, TrackingResult& best) {
   if (found.rank() >= best.rank()) best = found;
 }
 
+// What a frame leaves open is held by where the camera was going: another guess would make it stand still, or leap.
+TrackingResult with_open_directions_held(TrackingResult found, const Pose& guess, const TrackingPrior& prior) {
+  const bool is_prediction = &guess == &prior.guesses.front() && !prior.was_lost;
+  if (found.decision == Decision::undetermined && !is_prediction) {
+    found.decision = Decision::rejected;
+    found.reason += ", and where the camera was going does not tell them";
+  }
+  return found;
+}
+
 // With a narrow gate first, which is safest.
 void try_guesses(const FrameRegistration& registration, const TrackingPrior& prior, TrackingResult& best) {
   using Gate = FrameRegistration::Gate;
-  const Expectation expectation = prior.was_lost ? Expectation::near_lost : Expectation::expected;
+  const bool is_doubtful = prior.was_lost || prior.was_weak || prior.jumped;
+  const Expectation expectation = is_doubtful ? Expectation::near_lost : Expectation::expected;
   for (const Gate gate : {Gate::narrow, Gate::wide}) {
     if (gate == Gate::wide && !(best.is_lost() && registration.has_automatic_gate())) return;
     for (const Pose& guess : prior.guesses) {
-      const TrackingResult result = registration.from(guess, gate, expectation);
+      const TrackingResult result =
+          with_open_directions_held(registration.from(guess, gate, expectation), guess, prior);
       keep_better(result, best);
       if (result.is_clear_cut) return;
     }

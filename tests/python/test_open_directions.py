@@ -1,0 +1,71 @@
+"""A camera that passes along a wall: who holds what the wall leaves open, and for how long."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import nacre
+
+Array = npt.NDArray[Any]
+
+CAMERA = nacre.Camera(160, 120, 150, 150, 79.5, 59.5)
+STEP = 0.05  # [m] between frames
+COVERED = -1
+
+
+def wall() -> nacre.Mesh:
+    """Return a wall a metre away, rough where x < 0.3 m and bare from there on."""
+    x, y = np.meshgrid(np.linspace(-1, 3, 401), np.linspace(-1, 1, 201))
+    rough = np.sin(19 * x) * np.cos(23 * y) + np.sin(11 * x + 17 * y) + np.cos(29 * x - 7 * y)
+    z = 1 - 0.02 * rough * np.clip((0.3 - x) / 0.1, 0, 1)
+    rows = np.arange(x.size).reshape(x.shape)
+    corner, right, below, last = rows[:-1, :-1], rows[:-1, 1:], rows[1:, :-1], rows[1:, 1:]
+    triangles = [
+        np.stack(three, axis=-1).reshape(-1, 3) for three in ((corner, below, right), (right, below, last))
+    ]
+    return nacre.Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), np.concatenate(triangles).astype(np.int32))
+
+
+def view(number: int) -> Array:
+    """Return what the camera sees after so many steps, with noise of half a millimetre."""
+    pose = np.eye(4)
+    pose[0, 3] = STEP * number
+    depth = wall().simulate_depth(CAMERA, pose)
+    return depth + np.random.default_rng(number).normal(0, 0.0005, depth.shape).astype(np.float32)
+
+
+def passed(numbers: list[int]) -> nacre.Model:
+    """Return what a model makes of some of the views."""
+    model = nacre.Model(CAMERA)
+    for number in numbers:
+        model.add_frame(view(number) if number != COVERED else np.zeros((120, 160), np.float32))
+    return model
+
+
+def steps(model: nacre.Model) -> Array:
+    """Return how far the camera has come, in steps."""
+    return np.array([report.world_from_camera[0, 3] / STEP for report in model.frames])
+
+
+def test_the_motion_goes_on_where_the_wall_leaves_it_open() -> None:
+    model = passed(list(range(24)))
+    assert {report.status for report in model.frames[:12]} == {"TRACKED"}
+    assert {report.status for report in model.frames[16:]} == {"WEAK"}
+    np.testing.assert_allclose(steps(model), np.arange(24), atol=0.1)
+
+
+def test_after_a_loss_nobody_knows_the_motion() -> None:
+    model = passed([*range(14), COVERED, *range(15, 22)])
+    assert {report.status for report in model.frames[14:]} == {"LOST"}
+    np.testing.assert_allclose(steps(model)[14:], steps(model)[13])
+
+
+def test_a_camera_that_turned_back_is_found_where_the_wall_is_rough() -> None:
+    there_and_back = [*range(18), *range(18, 5, -1)]
+    model = passed(there_and_back)
+    known = [i for i, report in enumerate(model.frames) if report.status in {"TRACKED", "RELOCALISED"}]
+    np.testing.assert_allclose(steps(model)[known], np.array(there_and_back)[known], atol=0.1)
+    assert model.frames[-1].status == "TRACKED"
