@@ -9,7 +9,8 @@ twice that, and left out between, or where it leaves directions open.
 
 For each recording: the area under the ROC curve; the share of right ones and the number of wrong ones that
 reach `min_score`; and the score that 3 % of the wrong ones of all the other recordings reach, with the same
-figures.
+figures. Then, for each frame that has something in common with the model, the best of its starts: how many
+are right and wrong by its score, and the greatest score of a wrong one of the other recordings.
 
     python benchmarks/acceptance.py teddy rpy d435 robot sr300 iphone boxcan icl
 """
@@ -17,8 +18,10 @@ figures.
 from __future__ import annotations
 
 import argparse
+import itertools
 import sys
 import tempfile
+from dataclasses import dataclass
 from pathlib import Path
 
 import cases
@@ -50,27 +53,43 @@ def turned(pose: Array, degrees: float, shift: float, rng: np.random.Generator) 
 
 def starts(
     case: cases.Case, last: int, now: Array, world: Array, rng: np.random.Generator
-) -> list[tuple[int, Array]]:
-    """Return frames and the guesses to register them from."""
+) -> list[tuple[int, Array, bool]]:
+    """Return frames, the guesses to register them from, and whether they come next."""
     depth = cases.middle_depth(case.depths)
     found = []
     for index in [last + step for step in STEPS if last + step < len(case.depths)]:
         truth = case.truths[index]
         if truth is None:
             continue
-        found += [(index, world @ truth), (index, now)]
+        found += [(index, world @ truth, True), (index, now, True)]
         for degrees in WRONG_STARTS:
-            found.append((index, turned(world @ truth, degrees, 0.003 * degrees * depth, rng)))
+            found.append((index, turned(world @ truth, degrees, 0.003 * degrees * depth, rng), True))
     elsewhere = rng.choice(len(case.depths), 3, replace=False)
-    return found + [(int(index), now) for index in elsewhere if case.truths[index] is not None]
+    return found + [(int(index), now, False) for index in elsewhere if case.truths[index] is not None]
 
 
-def registrations(name: str) -> tuple[Array, npt.NDArray[np.bool_]]:
-    """Return the scores of a recording's registrations, and which are right."""
+@dataclass(frozen=True)
+class Registrations:
+    """Of a recording: scores, which are right, and the number of the frame; -1 for one of another place."""
+
+    scores: Array
+    right: npt.NDArray[np.bool_]
+    frames: npt.NDArray[np.int64]
+
+    def best(self) -> Registrations:
+        """Return the best of each frame."""
+        order = np.argsort(-self.scores, kind="stable")
+        _, first = np.unique(self.frames[order], return_index=True)
+        rows = order[first][self.frames[order][first] >= 0]
+        return Registrations(self.scores[rows], self.right[rows], self.frames[rows])
+
+
+def registrations(name: str) -> Registrations:
+    """Register frames of a recording to models of others."""
     case = cases.make(name)
     rng = np.random.default_rng(7)
     depth = cases.middle_depth(case.depths)
-    scores, right = [], []
+    scores, right, frames = [], [], []
     anchors = np.unique(np.linspace(0, max(0, len(case.depths) - SEED_FRAMES - 3), 10).astype(int))
     for first in anchors:
         truths = case.truths[first : first + SEED_FRAMES]
@@ -85,7 +104,7 @@ def registrations(name: str) -> tuple[Array, npt.NDArray[np.bool_]]:
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "model.nacre"
             model.save(path)
-            for index, guess in starts(case, last, now, world, rng):
+            for index, guess, is_near in starts(case, last, now, world, rng):
                 truth = case.truths[index]
                 assert truth is not None
                 report = nacre.Model.load(path).add_frame(
@@ -99,7 +118,8 @@ def registrations(name: str) -> tuple[Array, npt.NDArray[np.bool_]]:
                 if not 1 < max(turn, shift) < 2:
                     scores.append(report.score)
                     right.append(max(turn, shift) <= 1)
-    return np.array(scores), np.array(right, bool)
+                    frames.append(1000 * int(first) + index if is_near else -1)
+    return Registrations(np.array(scores), np.array(right, bool), np.array(frames))
 
 
 def area(scores: Array, right: npt.NDArray[np.bool_]) -> float:
@@ -118,14 +138,15 @@ def main() -> None:
     found = {}
     for name in names:
         found[name] = registrations(name)
-        print(f"{name}: {len(found[name][0])} registrations", file=sys.stderr, flush=True)
+        print(f"{name}: {len(found[name].scores)} registrations", file=sys.stderr, flush=True)
     least = nacre.ModelParameters().min_score
     columns = ["recording", "right", "wrong", "area", "right accepted", "wrong", "score of the others"]
     columns += ["right accepted", "wrong"]
     print(f"| {' | '.join(columns)} |")
     print(f"|{'---|' * len(columns)}")
-    for name, (scores, right) in found.items():
-        others = [s[~r] for other, (s, r) in found.items() if other != name or len(found) == 1]
+    for name, of in found.items():
+        scores, right = of.scores, of.right
+        others = [o.scores[~o.right] for other, o in found.items() if other != name or len(found) == 1]
         level = float(np.quantile(np.concatenate(others), 1 - WRONG_SHARE))
         cells = [f"{area(scores, right):.3f}"]
         for threshold in (least, level):
@@ -135,6 +156,25 @@ def main() -> None:
             ]
         cells.insert(3, f"{level:.2f}")
         print(f"| {name} | {right.sum()} | {(~right).sum()} | {' | '.join(cells)} |")
+    print_best(found)
+
+
+def print_best(found: dict[str, Registrations]) -> None:
+    """Print how often the best of a frame's starts is right and wrong, by its score."""
+    least = nacre.ModelParameters().min_score
+    bounds = [0.0, 0.2 * least, 0.4 * least, least, np.inf]
+    best = {name: of.best() for name, of in found.items()}
+    heads = [f"{low:.2f} to {high:.2f}" for low, high in itertools.pairwise(bounds)]
+    print(f"\n| best of the starts | {' | '.join(heads)} | greatest wrong score of the others |")
+    print(f"|{'---|' * (len(heads) + 2)}")
+    for name, of in best.items():
+        cells = []
+        for low, high in itertools.pairwise(bounds):
+            inside = (of.scores >= low) & (of.scores < high)
+            cells.append(f"{np.sum(of.right[inside])} / {np.sum(~of.right[inside])}")
+        others = [o.scores[~o.right] for other, o in best.items() if other != name or len(best) == 1]
+        greatest = max((float(wrong.max()) for wrong in others if len(wrong) > 0), default=0.0)
+        print(f"| {name} | {' | '.join(cells)} | {greatest:.3f} |")
 
 
 if __name__ == "__main__":

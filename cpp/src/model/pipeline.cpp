@@ -174,7 +174,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   }
   if (options.registration.method == Metric::paper) {
     return PaperLoop{options, static_cast<std::int32_t>(history.size())}.register_frame(
-        {frame, camera, observer, now}, {cloud, spacing, before, 0, usual_contradiction.mean()},
+        {frame, camera, observer, now, noise_factor}, {cloud, spacing, before, 0, usual_contradiction.mean()},
         guesses(extras).front());
   }
   result = track_frame({guesses(extras), was_lost(), was_weak(), jumped(), elsewhere(region_report)});
@@ -191,7 +191,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
 // noise that was tried.
 TrackingResult Pipeline::track_frame(TrackingPrior prior) {
   const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
-  const CurrentFrame current{frame, camera, observer, now};
+  const CurrentFrame current{frame, camera, observer, now, noise_factor};
   const TrackingTarget target{cloud, spacing, before, oldest_frame, usual_contradiction.mean()};
   TrackingResult result;
   if (learns_noise() && !residual_noise.is_known()) {
@@ -212,8 +212,9 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior) {
     }
     prior.elsewhere = std::move(elsewhere);
     if (!is_found()) {
-      set_noise_factor(known_noise_factor());
-      result = {};
+      if (history.num_registered() == 1) prior.tried.clear();
+      result = only_near(prior, options, usual_contradiction.mean()).value_or(TrackingResult());
+      set_noise_factor(result.is_lost() ? known_noise_factor() : result.noise_factor);
     }
   }
   if (result.is_lost()) result = track(current, target, prior, hypothesis, options);

@@ -27,6 +27,8 @@ Demands demands_on(Expectation expectation) {
       return {doubtful_score, consistency_power, 1.0, false};
     case Expectation::beside:
       return {doubtful_score, consistency_power, far_misfit, false};
+    case Expectation::only_near:
+      return {only_near_score, consistency_power, far_misfit, false};
     case Expectation::unexpected:
       return {doubtful_score, far_consistency_power, far_misfit, true};
     default:
@@ -78,8 +80,7 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
   const double per_match = std::max(0.0, std::log(chance_ratio / ratio)) / (bent * bent);
   const double least = demands.score * options.min_score;
   const double unlikely = likelihood_ratio(1.0 - consistency, options.usual_contradiction);
-  const bool is_near = expectation == Expectation::expected || expectation == Expectation::near_lost ||
-                       expectation == Expectation::beside;
+  const bool is_near = expectation != Expectation::unexpected && expectation != Expectation::only_place;
   const bool is_determined = alignment.weak_directions.cols() == 0;
   const double consistent = is_near && is_determined && options.usual_contradiction
                                 ? consistency_weight(1.0 - consistency, *options.usual_contradiction)

@@ -41,6 +41,7 @@ TrackingResult FrameRegistration::from(const Pose& guess, Gate gate, Expectation
   }
 
   TrackingResult result;
+  result.noise_factor = now_.noise_factor;
   result.alignment = align_to(target, source, guess, align_options);
   determine_open_directions(view, target, source, align_options, result.alignment);
   const Pose& pose = result.alignment.target_from_source;

@@ -18,7 +18,8 @@ struct CurrentFrame {
   const Frame& frame;
   const Camera& camera;
   const SurfaceObserver& observer;
-  const DepthView& view;  // from the origin: where the camera is, is to be found
+  const DepthView& view;       // from the origin: where the camera is, is to be found
+  const double& noise_factor;  // of what the image shows, that the frame has
 };
 
 // What it is registered to.
@@ -47,6 +48,7 @@ class FrameRegistration {
 
   void include_older_points() { target_.oldest_frame = 0; }
   const IcpSource& source() const { return source_; }
+  double depth() const { return depth_; }
 
   // Cameras around what a known camera saw: it turned about each of its axes, one way and the other.
   std::vector<Pose> around(const Pose& world_from_camera) const;

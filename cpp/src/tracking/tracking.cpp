@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "camera/limits.hpp"
+#include "camera/view_distance.hpp"
 #include "tracking/limits.hpp"
 #include "tracking/relocalisation.hpp"
 #include "tracking/turntable_search.hpp"
@@ -24,7 +26,7 @@ TrackingResult with_open_directions_held(TrackingResult found, const Pose& guess
 }
 
 // With a narrow gate first, which is safest.
-void try_guesses(const FrameRegistration& registration, const TrackingPrior& prior, TrackingResult& best) {
+void try_guesses(const FrameRegistration& registration, TrackingPrior& prior, TrackingResult& best) {
   using Gate = FrameRegistration::Gate;
   const bool is_doubtful = prior.was_lost || prior.was_weak || prior.jumped;
   const Expectation expectation = is_doubtful ? Expectation::near_lost : Expectation::expected;
@@ -34,6 +36,7 @@ void try_guesses(const FrameRegistration& registration, const TrackingPrior& pri
       const TrackingResult result =
           with_open_directions_held(registration.from(guess, gate, expectation), guess, prior);
       keep_better(result, best);
+      prior.tried.push_back(result);
       if (result.is_clear_cut) return;
     }
   }
@@ -66,6 +69,7 @@ void try_beside(const FrameRegistration& registration, const PointModel& model, 
   for (const Pose& candidate : *prior.beside) {
     const TrackingResult found = registration.from(candidate, FrameRegistration::Gate::narrow, Expectation::beside);
     if (found.decision == Decision::accepted) keep_better(found, best);
+    prior.tried.push_back(found);
   }
 }
 
@@ -85,6 +89,27 @@ TrackingResult around_key_poses(const FrameRegistration& registration, const Poi
 
 }  // namespace
 
+std::optional<TrackingResult> only_near(const TrackingPrior& prior, const TrackingOptions& options,
+                                        std::optional<double> usual_contradiction) {
+  if (!options.relocalise || !prior.elsewhere.beside) return std::nullopt;
+  std::vector<TrackingResult> places = prior.tried;
+  for (TrackingResult& place : places) {
+    place.expectation = Expectation::only_near;
+    place.test(options, usual_contradiction);
+  }
+  const auto is_lower = [](const TrackingResult& a, const TrackingResult& b) { return a.score < b.score; };
+  const auto best = std::max_element(places.begin(), places.end(), is_lower);
+  if (best == places.end() || best->decision != Decision::accepted) return std::nullopt;
+  if (!PlaceOdds::is_for(best->relocalisation_score)) return std::nullopt;
+  const bool has_rival = std::any_of(places.begin(), places.end(), [&](const TrackingResult& other) {
+    return other.score > tracking_limits::largest_rival * best->score &&
+           camera_limits::view_turn *
+                   view_distance(other.alignment.target_from_source, best->alignment.target_from_source, prior.depth) >
+               tracking_limits::beside_turn;
+  });
+  return has_rival ? std::nullopt : std::optional(*best);
+}
+
 TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, TrackingPrior& prior,
                      PlaceHypothesis& hypothesis, const TrackingOptions& options) {
   FrameRegistration registration(now, target, options);
@@ -93,6 +118,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   best.alignment.target_from_source = prior.guesses.front();
   const std::optional<Pose> followed = hypothesis.predict(source, options.registration);
 
+  prior.depth = registration.depth();
   try_guesses(registration, prior, best);
   if (best.is_lost() && target.oldest_frame > 0) {
     registration.include_older_points();
@@ -101,6 +127,9 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   }
   if (prior.elsewhere.beside && registration.may_be_beside(best, prior.guesses.front())) {
     try_beside(registration, target.model, prior, options, best);
+    if (best.is_lost()) {
+      if (const auto only = only_near(prior, options, target.usual_contradiction)) return *only;
+    }
   }
   if (!best.is_lost()) return best;
 

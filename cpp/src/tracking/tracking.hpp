@@ -28,7 +28,14 @@ struct TrackingPrior {
   bool jumped;    // between the newest two: the next may be anywhere near
   RelocalisationPlaces elsewhere;
   std::optional<std::vector<Pose>> beside = std::nullopt;  // the places beside the last guess, once they are known
+  std::vector<TrackingResult> tried = {};                  // what was found from the guesses and beside them
+  double depth = 1.0;                                      // of the frame, the median [m]
 };
+
+// Of all places near the guesses that were tried, none of which was believed alone, the one that fits best: where no
+// other comes near it.
+std::optional<TrackingResult> only_near(const TrackingPrior& prior, const TrackingOptions& options,
+                                        std::optional<double> usual_contradiction);
 
 // Tries the guesses until one registers the frame; when none does, searches elsewhere. Where no single registration is
 // convincing, `hypothesis` may become so over several frames.

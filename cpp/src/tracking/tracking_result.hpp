@@ -15,6 +15,7 @@ struct TrackingResult : Acceptance {
   // did not see through before, whichever is smaller.
   double consistency = 0.0;
   Expectation expectation = Expectation::expected;  // of where it ended
+  double noise_factor = 1.0;                        // of the frame's noise, with which it was found
   bool is_to_whole_model = false;                   // older points included
   bool is_on_plane = false;                         // found by the search on the plane
 
