@@ -5,7 +5,7 @@ Run recordings in this process, in seconds: what to look at after a change.
 Each case is a list of depth images with the true poses, where they are known. The table of `tracking.py`
 has more of them, through the command line, beside peers.
 
-    python benchmarks/cases.py bunny12 spot-kinect36 cabinet d435 most=60 spacing=0.01
+    python benchmarks/cases.py bunny12 spot-kinect36 cabinet d435 every=3 most=60 spacing=0.01
 """
 
 from __future__ import annotations
@@ -164,10 +164,10 @@ def recorded(name: str, *, every: int = 1, most: int | None = None) -> Case:
     )
 
 
-def make(name: str, seed: int = 0, *, most: int | None = None) -> Case:
+def make(name: str, seed: int = 0, *, every: int = 1, most: int | None = None) -> Case:
     """Return a case by name: one of REAL, or bunny12, spot-kinect36, poster60, poster60-gray and the like."""
     if name in REAL:
-        return recorded(name, most=most)
+        return recorded(name, every=every, most=most)
     shape, _, rest = name.partition("-")
     if shape.startswith("poster"):
         return poster(int(shape.removeprefix("poster")), colored=rest != "gray", seed=seed)
@@ -258,9 +258,10 @@ def main() -> None:
     settings = dict(word.split("=") for word in sys.argv[1:] if "=" in word)
     names = [word for word in sys.argv[1:] if "=" not in word]
     options = {key: json.loads(value) for key, value in settings.items()}
-    most = options.pop("most", None)
+    taken = {key: options.pop(key) for key in ("every", "most") if key in options}
+    seed = options.pop("seed", 0)
     for name in names:
-        figures, _ = run(make(name, options.pop("seed", 0), most=most), **options)
+        figures, _ = run(make(name, seed, **taken), **options)
         print(f"{name:16}{figures}", flush=True)
 
 
