@@ -177,7 +177,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
         {frame, camera, observer, now, noise_factor}, {cloud, spacing, before, 0, usual_contradiction.mean()},
         guesses(extras).front());
   }
-  result = track_frame({guesses(extras), was_lost(), was_weak(), jumped(), elsewhere(region_report)});
+  result = track_frame({guesses(extras), was_lost(), jumped(), elsewhere(region_report)});
   const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
   if (is_determined && !result.is_on_plane) {
     refine_by_outlines(result.alignment, outline, loops.outlines_near(result.alignment.target_from_source),
@@ -228,8 +228,6 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior) {
   return result;
 }
 
-bool Pipeline::was_weak() const { return history.size() > 0 && history.back().status == FrameStatus::weak; }
-
 // Whether the camera's last motion was none that goes on: views far apart, in any order.
 bool Pipeline::jumped() const {
   if (history.num_registered() < 2) return false;
@@ -263,7 +261,7 @@ RelocalisationPlaces Pipeline::elsewhere(const RegionReport& region_report) cons
   if (!options.relocalise) return {};
   const bool everywhere = num_lost < model_limits::patience || num_lost % model_limits::patience == 0;
   return {&views, [&] { return view_of_object(region_report); }, [this] { return key_poses(history); }, everywhere,
-          !was_lost() && !was_weak() && !jumped()};
+          !was_lost() && !jumped()};
 }
 
 // Of the newest frame, where it shows an object that stands on a plane.

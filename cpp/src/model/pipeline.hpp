@@ -60,7 +60,6 @@ struct Pipeline {
 
   // What they need.
   bool was_lost() const { return num_lost > 0; }
-  bool was_weak() const;
   bool jumped() const;
   bool keeps_key_frames() const { return options.loop_closure && options.fusion_method == FusionMethod::fuse; }
   TrackingResult register_frame(const FrameExtras& extras, const RegionReport& region_report);

@@ -28,8 +28,7 @@ TrackingResult with_open_directions_held(TrackingResult found, const Pose& guess
 // With a narrow gate first, which is safest.
 void try_guesses(const FrameRegistration& registration, TrackingPrior& prior, TrackingResult& best) {
   using Gate = FrameRegistration::Gate;
-  const bool is_doubtful = prior.was_lost || prior.was_weak || prior.jumped;
-  const Expectation expectation = is_doubtful ? Expectation::near_lost : Expectation::expected;
+  const Expectation expectation = prior.was_lost || prior.jumped ? Expectation::near_lost : Expectation::expected;
   for (const Gate gate : {Gate::narrow, Gate::wide}) {
     if (gate == Gate::wide && !(best.is_lost() && registration.has_automatic_gate())) return;
     for (const Pose& guess : prior.guesses) {

@@ -24,8 +24,7 @@ struct RelocalisationPlaces {
 struct TrackingPrior {
   std::vector<Pose> guesses;  // world_from_camera, most trusted first
   bool was_lost;
-  bool was_weak;  // what was open of the newest pose has been drifting since
-  bool jumped;    // between the newest two: the next may be anywhere near
+  bool jumped;  // between the newest two: the next may be anywhere near
   RelocalisationPlaces elsewhere;
   std::optional<std::vector<Pose>> beside = std::nullopt;  // the places beside the last guess, once they are known
   std::vector<TrackingResult> tried = {};                  // what was found from the guesses and beside them

@@ -21,7 +21,7 @@ TrackingResult found_at(double angle, double overlap) {
 }
 
 TrackingPrior with_tried(std::vector<TrackingResult> tried) {
-  TrackingPrior prior{{Pose::Identity()}, false, false, false, {}};
+  TrackingPrior prior{{Pose::Identity()}, false, false, {}};
   prior.elsewhere.beside = true;
   prior.tried = std::move(tried);
   return prior;
