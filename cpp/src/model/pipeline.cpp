@@ -177,7 +177,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
         {frame, camera, observer, now, noise_factor}, {cloud, spacing, before, 0, usual_contradiction.mean()},
         guesses(extras).front());
   }
-  result = track_frame({guesses(extras), was_lost(), jumped(), elsewhere(region_report)});
+  result = track_frame({guesses(extras), was_lost(), jumped(), history.num_registered() > 1, elsewhere(region_report)});
   const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
   if (is_determined && !result.is_on_plane) {
     refine_by_outlines(result.alignment, outline, loops.outlines_near(result.alignment.target_from_source),
@@ -212,7 +212,6 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior) {
     }
     prior.elsewhere = std::move(elsewhere);
     if (!is_found()) {
-      if (history.num_registered() == 1) prior.tried.clear();
       result = only_near(prior, options, usual_contradiction.mean()).value_or(TrackingResult());
       set_noise_factor(result.is_lost() ? known_noise_factor() : result.noise_factor);
     }

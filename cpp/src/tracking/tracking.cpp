@@ -90,7 +90,7 @@ TrackingResult around_key_poses(const FrameRegistration& registration, const Poi
 
 std::optional<TrackingResult> only_near(const TrackingPrior& prior, const TrackingOptions& options,
                                         std::optional<double> usual_contradiction) {
-  if (!options.relocalise || !prior.elsewhere.beside) return std::nullopt;
+  if (!options.relocalise || !prior.has_moved || !prior.elsewhere.beside) return std::nullopt;
   std::vector<TrackingResult> places = prior.tried;
   for (TrackingResult& place : places) {
     place.expectation = Expectation::only_near;

@@ -24,7 +24,8 @@ struct RelocalisationPlaces {
 struct TrackingPrior {
   std::vector<Pose> guesses;  // world_from_camera, most trusted first
   bool was_lost;
-  bool jumped;  // between the newest two: the next may be anywhere near
+  bool jumped;     // between the newest two: the next may be anywhere near
+  bool has_moved;  // two frames or more are registered: it is a recording, not a pair of images
   RelocalisationPlaces elsewhere;
   std::optional<std::vector<Pose>> beside = std::nullopt;  // the places beside the last guess, once they are known
   std::vector<TrackingResult> tried = {};                  // what was found from the guesses and beside them

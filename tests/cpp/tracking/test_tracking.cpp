@@ -21,7 +21,7 @@ TrackingResult found_at(double angle, double overlap) {
 }
 
 TrackingPrior with_tried(std::vector<TrackingResult> tried) {
-  TrackingPrior prior{{Pose::Identity()}, false, false, {}};
+  TrackingPrior prior{{Pose::Identity()}, false, false, true, {}};
   prior.elsewhere.beside = true;
   prior.tried = std::move(tried);
   return prior;
@@ -62,5 +62,11 @@ TEST_CASE("a place that resembles is not believed because no other does") {
 TEST_CASE("where nothing was tried beside the last pose, nothing is the only place") {
   TrackingPrior prior = with_tried({found_at(0.3, 0.45)});
   prior.elsewhere.beside = false;
+  CHECK_FALSE(only(prior).has_value());
+}
+
+TEST_CASE("of two images nobody knows that they show the same") {
+  TrackingPrior prior = with_tried({found_at(0.3, 0.45)});
+  prior.has_moved = false;
   CHECK_FALSE(only(prior).has_value());
 }
