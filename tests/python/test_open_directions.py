@@ -63,6 +63,15 @@ def test_after_a_loss_nobody_knows_the_motion() -> None:
     np.testing.assert_allclose(steps(model)[14:], steps(model)[13])
 
 
+def test_after_a_loss_a_guess_that_is_given_tells_the_motion() -> None:
+    model = passed([*range(14), COVERED])
+    guess = np.eye(4)
+    guess[0, 3] = STEP * 15
+    report = model.add_frame(view(15), guess=guess)
+    assert report.status == "WEAK"
+    np.testing.assert_allclose(steps(model)[-1], 15, atol=0.1)
+
+
 def test_a_camera_that_turned_back_is_found_where_the_wall_is_rough() -> None:
     there_and_back = [*range(18), *range(18, 5, -1)]
     model = passed(there_and_back)

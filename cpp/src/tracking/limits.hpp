@@ -19,7 +19,6 @@ constexpr std::size_t outline_points = 600;  // [points] budget: of the frame's 
 constexpr std::size_t most_bright_points = 100000;  // [points] budget: of a frame's colours; test_color_registration
 constexpr std::size_t num_finalists = 3;  // [guesses] budget: of those around earlier poses that are registered in full; test_failure
 constexpr double beside_turn = 0.15;  // [rad] derived: between cameras beside a known one: a registration turns by as much; test_tracking
-constexpr double largest_rival = 0.7;  // [1] tuned: score of the next place near the last pose, of the best one's; benchmarks/acceptance.py
 constexpr double least_new_view = 0.1;  // [view_distance] tuned: between views of a place that count: noise makes no new view; test_relocalisation_filter
 constexpr double largest_gap = 0.2;  // [view_distance] tuned: between a place as registered and as followed; test_relocalisation_filter
 constexpr double least_followed = 0.5;  // [1] tuned: overlap of a lost frame with the one before; test_relocalisation_filter

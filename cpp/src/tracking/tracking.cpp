@@ -4,6 +4,7 @@
 
 #include "camera/limits.hpp"
 #include "camera/view_distance.hpp"
+#include "nacre/global_registration.hpp"
 #include "tracking/limits.hpp"
 #include "tracking/relocalisation.hpp"
 #include "tracking/turntable_search.hpp"
@@ -17,7 +18,7 @@ void keep_better(const TrackingResult& found, TrackingResult& best) {
 
 // What a frame leaves open is held by where the camera was going: another guess would make it stand still, or leap.
 TrackingResult with_open_directions_held(TrackingResult found, const Pose& guess, const TrackingPrior& prior) {
-  const bool is_prediction = &guess == &prior.guesses.front() && !prior.was_lost;
+  const bool is_prediction = prior.is_predicted && &guess == &prior.guesses.front();
   if (found.decision == Decision::undetermined && !is_prediction) {
     found.decision = Decision::rejected;
     found.reason += ", and where the camera was going does not tell them";
@@ -28,12 +29,11 @@ TrackingResult with_open_directions_held(TrackingResult found, const Pose& guess
 // With a narrow gate first, which is safest.
 void try_guesses(const FrameRegistration& registration, TrackingPrior& prior, TrackingResult& best) {
   using Gate = FrameRegistration::Gate;
-  const Expectation expectation = prior.was_lost || prior.jumped ? Expectation::near_lost : Expectation::expected;
   for (const Gate gate : {Gate::narrow, Gate::wide}) {
     if (gate == Gate::wide && !(best.is_lost() && registration.has_automatic_gate())) return;
     for (const Pose& guess : prior.guesses) {
       const TrackingResult result =
-          with_open_directions_held(registration.from(guess, gate, expectation), guess, prior);
+          with_open_directions_held(registration.from(guess, gate, prior.expectation), guess, prior);
       keep_better(result, best);
       prior.tried.push_back(result);
       if (result.is_clear_cut) return;
@@ -101,7 +101,7 @@ std::optional<TrackingResult> only_near(const TrackingPrior& prior, const Tracki
   if (best == places.end() || best->decision != Decision::accepted) return std::nullopt;
   if (!PlaceOdds::is_for(best->relocalisation_score)) return std::nullopt;
   const bool has_rival = std::any_of(places.begin(), places.end(), [&](const TrackingResult& other) {
-    return other.score > tracking_limits::largest_rival * best->score &&
+    return other.score > GlobalAlignOptions().max_rivalry * best->score &&
            camera_limits::view_turn *
                    view_distance(other.alignment.target_from_source, best->alignment.target_from_source, prior.depth) >
                tracking_limits::beside_turn;

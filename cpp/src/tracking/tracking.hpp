@@ -23,9 +23,9 @@ struct RelocalisationPlaces {
 // What is known of the camera before the frame is registered.
 struct TrackingPrior {
   std::vector<Pose> guesses;  // world_from_camera, most trusted first
-  bool was_lost;
-  bool jumped;     // between the newest two: the next may be anywhere near
-  bool has_moved;  // two frames or more are registered: it is a recording, not a pair of images
+  Expectation expectation;    // of the guesses
+  bool is_predicted;          // the first guess is where the camera was going, or was given
+  bool has_moved;             // two frames or more are registered: it is a recording, not a pair of images
   RelocalisationPlaces elsewhere;
   std::optional<std::vector<Pose>> beside = std::nullopt;  // the places beside the last guess, once they are known
   std::vector<TrackingResult> tried = {};                  // what was found from the guesses and beside them
