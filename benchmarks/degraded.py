@@ -22,6 +22,9 @@ import nacre
 
 Depth = npt.NDArray[np.float32]
 
+STILL_FRAMES = 10  # before somebody walks through the image
+FRAMES_TO_PASS = 45
+
 
 def unchanged(case: Case) -> Case:
     """Return the recording as it is."""
@@ -97,6 +100,40 @@ def wrong_focal_length(factor: float) -> Callable[[Case], Case]:
     return change
 
 
+def passed_by(part: float) -> Callable[[Case], Case]:
+    """Let somebody walk through the image, there and back: a cylinder that fills so much of its width."""
+
+    def change(case: Case) -> Case:
+        camera = case.camera
+        seen = [np.where(np.asarray(depth) > 0, depth, np.nan) for depth in case.depths]
+        distance = 0.6 * np.nanmedian(seen[0])
+        radius = 0.5 * part * distance * camera.width / camera.fx
+        slope = (np.arange(camera.width) - camera.cx) / camera.fx
+        farthest = 0.5 * (1 + part) * distance * camera.width / camera.fx
+        noise, rng = nacre.estimate_noise(case.depths[0], camera), np.random.default_rng(1)
+
+        def cylinder(frame: int) -> Depth:
+            time = (frame - STILL_FRAMES) / FRAMES_TO_PASS
+            if time < 0:
+                return np.full(camera.width, np.inf, np.float32)
+            centre = farthest * (1 - 4 * abs((time / 2) % 1 - 0.5))
+            # (s z - centre)^2 + (z - distance)^2 = radius^2, the nearer of both z
+            a, b, c = slope**2 + 1, slope * centre + distance, centre**2 + distance**2 - radius**2
+            inside = b**2 - a * c
+            return np.where(inside > 0, (b - np.sqrt(np.abs(inside))) / a, np.inf).astype(np.float32)
+
+        def add(frame: int, depth: Depth) -> Depth:
+            row = cylinder(frame)[None]
+            before = np.isfinite(row) & ~(depth < row)
+            seen = np.where(before, row, depth)
+            sigma = noise.constant + noise.quadratic * (seen - noise.offset) ** 2
+            return np.where(before, seen + sigma * rng.standard_normal(depth.shape), depth).astype(np.float32)
+
+        return replace(case, depths=[add(i, depth) for i, depth in enumerate(seen)])
+
+    return change
+
+
 def each(case: Case, change: Callable[[Depth], Depth]) -> Case:
     """Change each image."""
     return replace(case, depths=[change(np.asarray(depth, np.float32)) for depth in case.depths])
@@ -110,6 +147,7 @@ DAMAGES: dict[str, Callable[[Case], Case]] = {
     "every second pixel": every_pixel(2),
     "every fourth pixel": every_pixel(4),
     "pixels doubled": enlarged(2),
+    **{f"somebody passing, {100 * part:.0f} % wide": passed_by(part) for part in (0.15, 0.3, 0.45)},
     **{f"focal length {factor:+.0%}": wrong_focal_length(1 + factor) for factor in (-0.03, 0.03)},
 }
 

@@ -137,6 +137,7 @@ void bind_model(py::module_& m) {
       .def_readonly("corrects_earlier", &FrameReport::corrects_earlier)
       .def_readonly("depth", &FrameReport::depth)
       .def_readonly("region", &FrameReport::region)
+      .def_readonly("num_moving", &FrameReport::num_moving)
       .def_property_readonly("num_updated", [](const FrameReport& report) { return report.fusion.num_updated; })
       .def_property_readonly("num_inserted", [](const FrameReport& report) { return report.fusion.num_inserted; })
       .def_property_readonly("num_removed", [](const FrameReport& report) { return report.fusion.num_removed; })

@@ -60,6 +60,8 @@ class FrameReport(Value):
         Pixels that were removed, by reason.
     region : RegionReport
         What was left out of the rest.
+    num_moving : int
+        Pixels that were left out after that, since what they show moved before the scene.
     num_updated, num_inserted, num_removed : int
         Points of the model that the frame moved, added and removed.
     num_points : int
@@ -87,6 +89,7 @@ class FrameReport(Value):
     corrects_earlier: bool
     depth: DepthReport
     region: RegionReport
+    num_moving: int
     num_updated: int
     num_inserted: int
     num_removed: int
@@ -105,7 +108,7 @@ class FrameReport(Value):
         depth = {name.removeprefix("num_"): number for name, number in asdict(self.depth).items()}
         for name in ("pixels", "invalid", "kept"):
             del depth[name]
-        return {**depth, "outside": self.region.num_outside}
+        return {**depth, "outside": self.region.num_outside, "moving": self.num_moving}
 
     def as_dict(self) -> dict[str, Any]:
         """Return every figure but ``information`` under its name; reports in it as dictionaries."""

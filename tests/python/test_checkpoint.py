@@ -195,8 +195,8 @@ def test_a_bit_that_flipped_is_found(saved: bytes, tmp_path: Path) -> None:
 
 
 def test_another_format_says_who_wrote_it(saved: bytes, tmp_path: Path) -> None:
-    error = refused(saved[:8] + struct.pack("<I", 7) + saved[12:], tmp_path / "newer")
-    assert "checkpoint format 7" in error.reason
+    error = refused(saved[:8] + struct.pack("<I", 99) + saved[12:], tmp_path / "newer")
+    assert "checkpoint format 99" in error.reason
     assert nacre.__version__ in error.reason
 
 

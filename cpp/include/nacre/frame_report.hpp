@@ -41,6 +41,7 @@ struct FrameReport : TrackingReport {
   bool corrects_earlier = false;           ///< whether it changed poses of earlier frames
   DepthReport depth;
   RegionReport region;
+  std::int64_t num_moving = 0;  ///< pixels that were left out, since what they show moved before the scene
   FusionReport fusion;
   std::int64_t num_points = 0;  ///< of the model, after the frame
   double spacing = 0.0;         ///< of the model [m]

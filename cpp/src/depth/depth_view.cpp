@@ -27,26 +27,30 @@ double VisibilityCounts::consistency(std::int64_t least) const {
                          : std::numeric_limits<double>::quiet_NaN();
 }
 
+Visibility visibility_in(const DepthView& view, const PointProjection::Block& block, int i,
+                         const VisibilityMargin& margin, float sigma) {
+  if (!(block.facing[i] > margin.least_facing)) return Visibility::unknown;
+  const std::int32_t pixel = block.pixel[i];
+  const float measured = view.depth[pixel];
+  const float systematic = margin.with_systematic_error ? systematic_error(measured) : 0.0F;
+  const float noise = base_limits::noise_sigmas * std::hypot(view.sigma[pixel], sigma);
+  const float surface = static_cast<float>(margin.distance) + static_cast<float>(margin.part_of_depth) * block.z[i];
+  return visibility(measured - block.z[i], std::max(surface, std::hypot(noise, systematic)) / block.facing[i]);
+}
+
 VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, const DepthView& view,
                          const Pose& points_from_camera, const Camera& camera, const VisibilityMargin& margin,
                          int num_threads) {
   const PointProjection projection(camera, points_from_camera);
-  const auto distance = static_cast<float>(margin.distance), part_of_depth = static_cast<float>(margin.part_of_depth);
-  return block_reduce(
-      points.rows(), PointProjection::capacity, num_threads, VisibilityCounts{},
-      [&](std::int64_t begin, std::int64_t end) {
-        VisibilityCounts counts;
-        visit_points_in_view(
-            points, normals, begin, end - begin, projection, [&](const PointProjection::Block& block, int i) {
-              if (!(block.facing[i] > margin.least_facing)) return;
-              const float measured = view.depth[block.pixel[i]];
-              const float systematic = margin.with_systematic_error ? systematic_error(measured) : 0.0F;
-              const float error = std::hypot(base_limits::noise_sigmas * view.sigma[block.pixel[i]], systematic);
-              const float allowed = std::max(distance + part_of_depth * block.z[i], error) / block.facing[i];
-              counts.add(visibility(measured - block.z[i], allowed));
-            });
-        return counts;
-      });
+  return block_reduce(points.rows(), PointProjection::capacity, num_threads, VisibilityCounts{},
+                      [&](std::int64_t begin, std::int64_t end) {
+                        VisibilityCounts counts;
+                        visit_points_in_view(points, normals, begin, end - begin, projection,
+                                             [&](const PointProjection::Block& block, int i) {
+                                               counts.add(visibility_in(view, block, i, margin));
+                                             });
+                        return counts;
+                      });
 }
 
 }  // namespace nacre

@@ -52,6 +52,10 @@ struct VisibilityMargin {
   float least_facing = 0.3F;          // cosine between normal and viewing direction
 };
 
+// What a view says of one of a block of oriented points that are in its image; sigma: of the point [m].
+Visibility visibility_in(const DepthView& view, const PointProjection::Block& block, int i,
+                         const VisibilityMargin& margin, float sigma = 0.0F);
+
 // Of oriented points, as a camera at a pose in their frame sees them: what it measured there says of each.
 VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, const DepthView& view,
                          const Pose& points_from_camera, const Camera& camera, const VisibilityMargin& margin,

@@ -12,6 +12,7 @@
 #include "base/se3.hpp"
 #include "camera/limits.hpp"
 #include "camera/point_spacing.hpp"
+#include "camera/view_distance.hpp"
 #include "depth/cleaning.hpp"
 #include "fusion/attribute_fusion.hpp"
 #include "fusion/deformation.hpp"
@@ -81,6 +82,7 @@ FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras
     keep_region(report);
     observe(extras.colors, report);
     const TrackingResult tracking = locate(extras, report);
+    if (report.status == FrameStatus::tracked) leave_out_moving(tracking, extras.colors, report);
     if (report.status != FrameStatus::lost) close_loops(tracking, extras.keep_guess, report);
     if (report.status == FrameStatus::tracked) {
       if (was_lost()) report.status = FrameStatus::relocalised;
@@ -123,6 +125,7 @@ void Pipeline::keep_region(FrameReport& report) {
 // Makes the frame ready to be asked about points.
 void Pipeline::observe(const ColorsRef& colors, FrameReport& report) {
   const Stopwatch watch(report.milliseconds.back_project);
+  cells = StillScene::cells_of(frame, camera);
   if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
   observer.look_at(frame, colors, options.num_threads);
   now.depth = frame.points.col(2);
@@ -174,8 +177,8 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   }
   if (options.registration.method == Metric::paper) {
     return PaperLoop{options, static_cast<std::int32_t>(history.size())}.register_frame(
-        {frame, camera, observer, now, noise_factor}, {cloud, spacing, before, 0, usual_contradiction.mean()},
-        guesses(extras).front());
+        {frame, cells, camera, observer, now, noise_factor},
+        {cloud, spacing, before, still_scene, 0, usual_contradiction.mean()}, guesses(extras).front());
   }
   const Expectation expectation = was_lost() || jumped() ? Expectation::near_lost : Expectation::expected;
   const bool is_predicted = !was_lost() || extras.guess.has_value();
@@ -194,8 +197,8 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
 // noise that was tried.
 TrackingResult Pipeline::track_frame(TrackingPrior prior) {
   const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
-  const CurrentFrame current{frame, camera, observer, now, noise_factor};
-  const TrackingTarget target{cloud, spacing, before, oldest_frame, usual_contradiction.mean()};
+  const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
+  const TrackingTarget target{cloud, spacing, before, still_scene, oldest_frame, usual_contradiction.mean()};
   TrackingResult result;
   if (learns_noise() && !residual_noise.is_known()) {
     TrackingOptions nearby = options;
@@ -299,7 +302,25 @@ void Pipeline::move_all(const std::vector<Pose>& corrections, FrameReport& repor
   history.move(corrections);
   move_points(cloud, corrections, options.num_threads);
   report.world_from_camera = corrections.back() * report.world_from_camera;
+  still_scene.move(corrections.back());
   turn_uncertainty(report, corrections.back().linear());
+}
+
+// What moves before the scene is no part of it.
+void Pipeline::leave_out_moving(const TrackingResult& tracking, const ColorsRef& colors, FrameReport& report) {
+  const Stopwatch watch(report.milliseconds.registration);
+  const double margin = camera_limits::surface_spacings * spacing;
+  const MaskImage still =
+      tracking.moving > 0.0 ? still_scene.still_region(cells, report.world_from_camera, margin) : MaskImage();
+  still_scene.add(cells, still, report.world_from_camera, margin);
+  if (still.size() == 0) return;
+  const auto num_inside = static_cast<std::int64_t>(frame.valid.size());
+  nacre::keep_region(still, frame);
+  report.num_moving = num_inside - static_cast<std::int64_t>(frame.valid.size());
+  for (Eigen::Index i = 0; i < still.size(); ++i) {
+    if (still.data()[i] == 0) now.depth[i] = now.measured[i] = std::numeric_limits<float>::quiet_NaN();
+  }
+  observer.look_at(frame, colors, options.num_threads);
 }
 
 // Where the camera comes back to what it saw before, model and poses are corrected.

@@ -12,6 +12,7 @@
 #include "tracking/object_view.hpp"
 #include "tracking/relocalisation_filter.hpp"
 #include "tracking/residual_noise.hpp"
+#include "tracking/still_scene.hpp"
 #include "tracking/tracking.hpp"
 #include "tracking/usual_contradiction.hpp"
 
@@ -28,6 +29,8 @@ struct Pipeline {
   PointModel cloud;
   LoopClosure loops{camera, options};
   FrameHistory history;
+  StillScene still_scene{camera};
+  CoarseFrame cells;                       // of the newest frame
   DepthView now;                           // of the newest, from the origin: where the camera is, is to be found
   std::vector<OutlinePoint> outline;       // of the newest
   DepthView before;                        // of the newest frame that was fused
@@ -52,6 +55,7 @@ struct Pipeline {
   void keep_region(FrameReport& report);
   void observe(const ColorsRef& colors, FrameReport& report);
   TrackingResult locate(const FrameExtras& extras, FrameReport& report);
+  void leave_out_moving(const TrackingResult& tracking, const ColorsRef& colors, FrameReport& report);
   void close_loops(const TrackingResult& tracking, bool is_given, FrameReport& report);
   void keep_view(const FrameReport& report);
   void adjust_views(FrameReport& report);

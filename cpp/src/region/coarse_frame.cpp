@@ -7,29 +7,61 @@
 #include "region/limits.hpp"
 
 namespace nacre {
-CoarseFrame::CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef& mask) {
-  while ((frame.width / step) * (frame.height / step) > region_limits::most_cells &&
-         step < region_limits::largest_step) {
-    ++step;
+namespace {
+
+int side_of_cells(int width, int height, const CellBudget& budget) {
+  int side = 1;
+  while ((width / side) * (height / side) > budget.most_cells && side < budget.largest_step) ++side;
+  return side;
+}
+
+struct Offset {
+  int u, v;
+  int rank() const { return u * u + v * v; }
+};
+
+// From the corner of a cell to its pixels, in half pixels from its middle: the nearest first.
+std::vector<Offset> pixels_of_cell(int side) {
+  std::vector<Offset> pixels;
+  for (int v = 0; v < side; ++v) {
+    for (int u = 0; u < side; ++u) pixels.push_back({2 * u - side + 1, 2 * v - side + 1});
   }
+  std::stable_sort(pixels.begin(), pixels.end(), [](const Offset& a, const Offset& b) { return a.rank() < b.rank(); });
+  for (Offset& pixel : pixels) pixel = {(pixel.u + side - 1) / 2, (pixel.v + side - 1) / 2};
+  return pixels;
+}
+
+}  // namespace
+
+Camera coarse_camera(const Camera& camera, const CellBudget& budget) {
+  const int side = side_of_cells(camera.width(), camera.height(), budget);
+  const int width = (camera.width() + side - 1) / side, height = (camera.height() + side - 1) / side;
+  if (camera.model() == Camera::Model::orthographic) {
+    return Camera::orthographic(width, height, side * camera.pixel_size());
+  }
+  const auto middle = [&](double pixel) { return (pixel - 0.5 * (side - 1)) / side; };
+  return Camera::pinhole(width, height, camera.fx() / side, camera.fy() / side, middle(camera.cx()),
+                         middle(camera.cy()), camera.distortion(), DepthKind::z);
+}
+
+CoarseFrame::CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef& mask, const CellBudget& budget)
+    : step(side_of_cells(frame.width, frame.height, budget)) {
   width = (frame.width + step - 1) / step;
   height = (frame.height + step - 1) / step;
   cells.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  const std::vector<Offset> pixels = pixels_of_cell(step);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
       Cell& cell = cells[static_cast<std::size_t>(y * width + x)];
       // The pixel nearest to the middle, one with a normal before all without.
-      int best = std::numeric_limits<int>::max();
-      for (int v = y * step; v < std::min(frame.height, (y + 1) * step); ++v) {
-        for (int u = x * step; u < std::min(frame.width, (x + 1) * step); ++u) {
-          const int row = v * frame.width + u;
-          if (!(frame.points(row, 2) > 0.0F) || (mask.size() > 0 && mask(v, u) == 0)) continue;
-          const int du = 2 * (u - x * step) - step + 1, dv = 2 * (v - y * step) - step + 1;
-          const int rank = du * du + dv * dv + (std::isfinite(frame.normals(row, 0)) ? 0 : 8 * step * step);
-          if (rank >= best) continue;
-          best = rank;
-          cell.pixel = row;
-        }
+      for (const Offset& pixel : pixels) {
+        const int u = x * step + pixel.u, v = y * step + pixel.v;
+        if (u >= frame.width || v >= frame.height) continue;
+        const int row = v * frame.width + u;
+        if (!(frame.points(row, 2) > 0.0F) || (mask.size() > 0 && mask(v, u) == 0)) continue;
+        const bool has_normal = std::isfinite(frame.normals(row, 0));
+        if (has_normal || !cell.has_point()) cell.pixel = row;
+        if (has_normal) break;
       }
       if (!cell.has_point()) continue;
       cell.point = frame.points.row(cell.pixel).transpose();

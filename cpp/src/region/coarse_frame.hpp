@@ -8,6 +8,7 @@
 #include "nacre/camera.hpp"
 #include "nacre/depth.hpp"
 #include "nacre/types.hpp"
+#include "region/limits.hpp"
 
 namespace nacre {
 
@@ -20,12 +21,18 @@ struct Cell {
   bool has_point() const { return pixel >= 0; }
 };
 
+struct CellBudget {
+  int most_cells = region_limits::most_cells;      // of an image
+  int largest_step = region_limits::largest_step;  // [pixels]
+};
+
 struct CoarseFrame {
   int width = 0, height = 0;
   int step = 1;  // [pixels]
   std::vector<Cell> cells;
 
-  CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef& mask);
+  CoarseFrame() = default;
+  CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef& mask, const CellBudget& budget = {});
   int size() const { return static_cast<int>(cells.size()); }
   const Cell& operator[](int i) const { return cells[static_cast<std::size_t>(i)]; }
 
@@ -46,6 +53,9 @@ struct CoarseFrame {
     }
   }
 };
+
+// A camera of whose pixels each sees a cell of a frame.
+Camera coarse_camera(const Camera& camera, const CellBudget& budget);
 
 // Connected cells: groups[i] is the number of cell i's group, -1 outside of all.
 struct CellGroups {

@@ -74,7 +74,7 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
     return acceptance;
   }
   const Demands demands = demands_on(expectation);
-  const double overlap = alignment.overlap;
+  const double overlap = alignment.overlap * (1.0 - options.moving);
   const double ratio = std::max(least_ratio, alignment.residual_ratio);
   const double bent = std::max(1.0, alignment.misfit / demands.largest_misfit);
   const double per_match = std::max(0.0, std::log(chance_ratio / ratio)) / (bent * bent);
@@ -86,7 +86,7 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
                                 ? consistency_weight(1.0 - consistency, *options.usual_contradiction)
                                 : std::pow(consistency, demands.consistency_power);
   const double beyond_planes = demands.beyond_planes ? part_beyond_planes(alignment) : 1.0;
-  acceptance.score = overlap * overlap * consistent * per_match * beyond_planes;
+  acceptance.score = overlap * alignment.overlap * consistent * per_match * beyond_planes;
   if (expectation == Expectation::unexpected) acceptance.score *= unlikely;
   acceptance.relocalisation_score = overlap * std::pow(consistency, relocalisation_consistency_power) * per_match /
                                     (bent * bent) * alignment.normal_information * unlikely * beyond_planes;

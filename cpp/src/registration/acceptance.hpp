@@ -26,6 +26,7 @@ struct AcceptanceOptions {
   double min_score;
   bool verify;
   std::optional<double> usual_contradiction;  // mean 1 - consistency of what has been accepted, where it is known
+  double moving = 0.0;                        // part of the source that is left out, since it moves
 };
 
 enum class Decision {

@@ -132,6 +132,20 @@ IcpSource IcpSource::few() const {
   return source;
 }
 
+IcpSource IcpSource::part(const std::vector<std::uint8_t>& is_in) const {
+  IcpSource source = *this;
+  std::vector<std::int32_t> kept;
+  std::int64_t i = 0;
+  for (std::size_t level = 0; level < levels.size(); ++level) {
+    for (; i < levels[level]; ++i) {
+      if (is_in[static_cast<std::size_t>(i)] != 0) kept.push_back(static_cast<std::int32_t>(i));
+    }
+    source.levels[level] = static_cast<std::int64_t>(kept.size());
+  }
+  source.cloud.keep(kept);
+  return source;
+}
+
 IcpTarget::IcpTarget(const AlignCloud& cloud, const AlignOptions& options)
     : options_(options),
       cloud_(cloud, options, true),

@@ -29,10 +29,57 @@ FrameRegistration::FrameRegistration(const CurrentFrame& now, const TrackingTarg
 
 TrackingResult FrameRegistration::from(const Pose& guess, Gate gate, Expectation expectation) const {
   const PointsInView view = in_view(guess);
+  const TrackingResult whole = registered({source_, view, 0.0}, guess, guess, gate, expectation);
+  if (expectation != Expectation::expected && expectation != Expectation::near_lost) return whole;
+  // Where something moves, what stays is registered, too; the better of both tells whether it does.
+  TrackingResult best = whole;
+  for (const Pose& pose : {guess, whole.alignment.target_from_source}) {
+    const auto still = still_at(pose, view);
+    if (!still) continue;
+    const TrackingResult found =
+        registered({still->samples, view.part(still->points), still->moving}, pose, guess, gate, expectation);
+    if (found.rank() > best.rank() && still_at(found.alignment.target_from_source, view)) best = found;
+    if (!best.is_lost()) break;
+  }
+  return best;
+}
+
+// For each point of the camera's frame, whether a region of its image shows it: an empty one is all of it.
+std::vector<std::uint8_t> FrameRegistration::shows(const MaskImage& region, const Points& points) const {
+  std::vector<std::uint8_t> found(static_cast<std::size_t>(points.rows()), 1);
+  if (region.size() == 0) return found;
+  const PointProjection projection(now_.camera, Pose::Identity());
+  for (Eigen::Index first = 0; first < points.rows(); first += PointProjection::capacity) {
+    const auto count = std::min<Eigen::Index>(PointProjection::capacity, points.rows() - first);
+    visit_points_in_view(points, points, first, count, projection, [&](const PointProjection::Block& block, int k) {
+      found[static_cast<std::size_t>(first + k)] = region.data()[block.pixel[k]];
+    });
+  }
+  return found;
+}
+
+std::optional<FrameRegistration::Still> FrameRegistration::still_at(const Pose& pose, const PointsInView& view) const {
+  const double margin = camera_limits::surface_spacings * target_.spacing;
+  const MaskImage still = target_.still_scene.still_region(now_.cells, pose, margin);
+  std::vector<std::int32_t> points = still_points(view.points, view.normals, now_.view, pose, now_.camera, margin);
+  if (still.size() == 0 && static_cast<Eigen::Index>(points.size()) == view.points.rows()) return std::nullopt;
+  IcpSource samples = source_.part(shows(still, source_.cloud.points));
+  if (std::min(samples.cloud.rows.size(), points.size()) < base_limits::least_points) return std::nullopt;
+  const auto part = [](std::size_t left, std::size_t all) {
+    return static_cast<double>(left) / static_cast<double>(all);
+  };
+  const double left = part(samples.cloud.rows.size(), source_.cloud.rows.size()) *
+                      part(points.size(), static_cast<std::size_t>(view.points.rows()));
+  return Still{std::move(samples), std::move(points), 1.0 - left};
+}
+
+TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
+                                             Expectation expectation) const {
+  const PointsInView& view = surfaces.view;
   AlignOptions align_options = options_.registration;
   align_options.max_points = 0;  // the view is thin enough
   const IcpTarget target(AlignCloud(view.points, view.normals), align_options);
-  const IcpSource source = gated(view, target);
+  const IcpSource source = gated(surfaces.samples, view, target);
   if (!(align_options.final_distance > 0.0)) {
     align_options.final_distance = source.reach.size() > 0 ? static_cast<double>(median_of(source.reach)) : 0.0;
   }
@@ -42,7 +89,8 @@ TrackingResult FrameRegistration::from(const Pose& guess, Gate gate, Expectation
 
   TrackingResult result;
   result.noise_factor = now_.noise_factor;
-  result.alignment = align_to(target, source, guess, align_options);
+  result.moving = surfaces.moving;
+  result.alignment = align_to(target, source, start, align_options);
   determine_open_directions(view, target, source, align_options, result.alignment);
   const Pose& pose = result.alignment.target_from_source;
   result.consistency = consistency(view, pose);
@@ -59,8 +107,7 @@ PointsInView FrameRegistration::in_view(const Pose& world_from_camera) const {
 
 // A match may be about as far along the surface as the model's points are apart, and as far across it as noise and the
 // shape between the points take it.
-IcpSource FrameRegistration::gated(const PointsInView& view, const IcpTarget& target) const {
-  IcpSource source = source_;
+IcpSource FrameRegistration::gated(IcpSource source, const PointsInView& view, const IcpTarget& target) const {
   const auto count = static_cast<Eigen::Index>(source.cloud.rows.size());
   source.noise.resize(count);
   source.reach.resize(count);

@@ -7,8 +7,10 @@
 #include "fusion/observer.hpp"
 #include "nacre/fusion.hpp"
 #include "outlines/registration.hpp"
+#include "region/coarse_frame.hpp"
 #include "tracking/frame_samples.hpp"
 #include "tracking/points_in_view.hpp"
+#include "tracking/still_scene.hpp"
 #include "tracking/tracking_result.hpp"
 
 namespace nacre {
@@ -16,6 +18,7 @@ namespace nacre {
 // The newest frame.
 struct CurrentFrame {
   const Frame& frame;
+  const CoarseFrame& cells;
   const Camera& camera;
   const SurfaceObserver& observer;
   const DepthView& view;       // from the origin: where the camera is, is to be found
@@ -27,7 +30,8 @@ struct TrackingTarget {
   const PointModel& model;
   double spacing;              // of the model [m]
   const DepthView& last_view;  // what the camera saw when it was last registered
-  std::int32_t oldest_frame;   // points that no later frame has seen may have drifted away: they are left out
+  const StillScene& still_scene;
+  std::int32_t oldest_frame;  // points that no later frame has seen may have drifted away: they are left out
   std::optional<double> usual_contradiction;  // of registered frames: see AcceptanceOptions
 };
 
@@ -61,8 +65,24 @@ class FrameRegistration {
  private:
   FrameRegistration(const CurrentFrame& now, const TrackingTarget& target, const TrackingOptions& options,
                     const FrameSamples& samples);
+  // What is held against each other: all that frame and model show, or what stays where others move.
+  struct Surfaces {
+    const IcpSource& samples;
+    const PointsInView& view;
+    double moving;  // part that is left out
+  };
+  // What stays, as seen from a pose; nothing where nothing moves.
+  struct Still {
+    IcpSource samples;
+    std::vector<std::int32_t> points;  // of the view
+    double moving;                     // part that does not
+  };
+  std::vector<std::uint8_t> shows(const MaskImage& region, const Points& points) const;
+  std::optional<Still> still_at(const Pose& world_from_camera, const PointsInView& view) const;
+  TrackingResult registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
+                            Expectation expectation) const;
   PointsInView in_view(const Pose& world_from_camera) const;
-  IcpSource gated(const PointsInView& view, const IcpTarget& target) const;
+  IcpSource gated(IcpSource source, const PointsInView& view, const IcpTarget& target) const;
   void determine_open_directions(const PointsInView& view, const IcpTarget& target, const IcpSource& gated,
                                  const AlignOptions& options, IcpResult& result) const;
   double consistency(const PointsInView& view, const Pose& world_from_camera) const;

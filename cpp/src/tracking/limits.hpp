@@ -35,6 +35,15 @@ constexpr double climb_lever = 3.0;  // [1/size] derived: turns by what shifts a
 constexpr double least_view_overlap = 0.1;  // [1] tuned: with the view that agrees most; dog
 constexpr double least_view_consistency = 0.75;  // [1] tuned: with all views; dog
 
+constexpr int most_cells = 5000;  // [cells] budget: of an image in which things move; benchmarks/run.py
+constexpr int largest_cell = 24;  // [pixel] budget: their side; benchmarks/run.py
+constexpr Eigen::Index most_judged_points = 8000;  // [points] budget: of the model, that tell what has moved away; benchmarks/run.py
+constexpr double least_in_view = 0.85;  // [1] tuned: of a frame, in the image of the scene, until that is renewed; test_moving_things
+constexpr double most_moving = 0.67;  // [1] tuned: part of a frame: what most of it shows is the scene; test_moving_things
+constexpr double least_step = 0.05;  // [depth] tuned: between a thing that moves and what is behind; test_moving_things
+constexpr int least_around = 5;  // [cells] tuned: of nine, a cell and those around it, that are judged; test_moving_things
+constexpr double least_core = 0.01;  // [1] tuned: part of the image where a thing, and around it, was seen through; test_moving_things
+constexpr int squares_across = 40;  // [1] tuned: of an image, three of which a thing is large, that has moved away; test_moving_things
 constexpr double noise_per_residual = 1.376;  // [1] derived: standard deviation by median absolute value, of Laplace's distribution; test_residual_noise
 constexpr double largest_noise_factor = 16.0;  // [1] budget: of the noise that is tried until it is known; d435-t265-shelf
 constexpr double least_residual_sigmas = 0.5;  // [sigma] derived: that confirm a noise that was tried: with half of it the frame had been lost; unrelated

@@ -11,16 +11,16 @@
 namespace nacre {
 namespace {
 
-using Rows = std::vector<std::uint32_t>;
+using RowsOfBlock = std::vector<std::uint32_t>;
 
 // Of each block of the model's points.
-std::vector<Rows> rows_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera,
-                               std::int32_t oldest_frame, int num_threads) {
+std::vector<RowsOfBlock> rows_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera,
+                                      std::int32_t oldest_frame, int num_threads) {
   constexpr std::int64_t block_size = PointProjection::capacity;
   const PointProjection projection(camera, world_from_camera);
   const auto width = static_cast<float>(camera.width()), height = static_cast<float>(camera.height());
   const float margin_u = width / 3.0F, margin_v = height / 3.0F;
-  std::vector<Rows> found(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
+  std::vector<RowsOfBlock> found(static_cast<std::size_t>((model.size() + block_size - 1) / block_size));
   parallel_blocks(
       model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
         const auto first = static_cast<std::size_t>(begin);
@@ -44,9 +44,9 @@ std::vector<Rows> rows_in_view(const PointModel& model, const Camera& camera, co
 
 PointsInView points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera,
                             std::int32_t oldest_frame, int num_threads) {
-  const std::vector<Rows> found = rows_in_view(model, camera, world_from_camera, oldest_frame, num_threads);
+  const std::vector<RowsOfBlock> found = rows_in_view(model, camera, world_from_camera, oldest_frame, num_threads);
   std::size_t num_found = 0;
-  for (const Rows& rows : found) num_found += rows.size();
+  for (const RowsOfBlock& rows : found) num_found += rows.size();
   const std::size_t step = (num_found + tracking_limits::most_target_points - 1) / tracking_limits::most_target_points;
   const auto count = static_cast<Eigen::Index>(step > 0 ? num_found / step : 0);
   PointsInView view{Points(count, 3), Points(count, 3), Values(model.colors.empty() ? 0 : count),
@@ -55,7 +55,7 @@ PointsInView points_in_view(const PointModel& model, const Camera& camera, const
   const auto is_chosen = [&](std::size_t index) { return index % step == random_bits(0, index / step) % step; };
   std::size_t index = 0;
   Eigen::Index k = 0;
-  for (const Rows& rows : found) {
+  for (const RowsOfBlock& rows : found) {
     for (const std::uint32_t row : rows) {
       if (k == count || !is_chosen(index++)) continue;
       view.points.row(k) = model.points[row].transpose();

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "base/point_rows.hpp"
 #include "camera/point_projection.hpp"
 #include "nacre/fusion.hpp"
 
@@ -18,6 +19,11 @@ struct PointsInView {
   Points points, normals;  // world frame
   Values brightness;       // empty where the model has no colours
   double thinning = 1.0;   // how much farther apart the points are than the model's
+
+  PointsInView part(const std::vector<std::int32_t>& rows) const {
+    return {take_rows<Points>(points, rows), take_rows<Points>(normals, rows), take_rows<Values>(brightness, rows),
+            thinning};
+  }
 };
 
 // Points in the image widened by a third on each side, turned away from the camera by at most 120 degrees, and last

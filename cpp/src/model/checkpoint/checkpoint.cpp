@@ -109,8 +109,8 @@ void exchange(Archive& archive, CameraFields& fields) {
 template <class Archive>
 void exchange_state(Archive& archive, Pipeline& state) {
   archive(state.options.fusion.reference_sigma, state.region, state.calibration, state.residual_noise,
-          state.usual_contradiction, state.cloud, state.loops, state.history, state.before, state.hypothesis,
-          state.views, state.spacing, state.num_lost);
+          state.usual_contradiction, state.cloud, state.loops, state.history, state.before, state.still_scene,
+          state.hypothesis, state.views, state.spacing, state.num_lost);
 }
 
 // Space that the table of rays may take before a frame was fused: see load.
@@ -257,6 +257,16 @@ bool PrivateState::is_sound(const LoopClosure& loops, std::size_t num_frames) {
   return loops.trajectory_.empty() == loops.key_frames_.empty();
 }
 
+bool PrivateState::is_sound(const StillScene& scene) {
+  const Eigen::Index num_cells = static_cast<Eigen::Index>(scene.camera_.width()) * scene.camera_.height();
+  const auto is_sound = [&](const DepthView& view) {
+    return view.depth.size() == num_cells && view.sigma.size() == num_cells && view.measured.size() == 0;
+  };
+  if (scene.scene_.depth.size() == 0) return scene.all_.depth.size() == 0 && scene.moved_.empty();
+  return is_sound(scene.scene_) && is_sound(scene.all_) &&
+         (scene.moved_.empty() || static_cast<Eigen::Index>(scene.moved_.size()) == num_cells);
+}
+
 bool PrivateState::is_sound(const PlaceHypothesis& hypothesis) {
   return !hypothesis.before_ || hypothesis.before_->normals.rows() == 0 ||
          hypothesis.before_->normals.rows() == hypothesis.before_->points.rows();
@@ -338,6 +348,7 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
     archive.require(is_sound(view, state.camera, num_frames), "a view of the object contradicts the camera");
   }
   archive.require(PrivateState::is_sound(state.loops, num_frames), "the key frames contradict each other");
+  archive.require(PrivateState::is_sound(state.still_scene), "the still scene has another size than the camera");
   archive.require(PrivateState::is_sound(state.hypothesis), "the place that is followed contradicts itself");
   archive.require(PrivateState::is_sound(state.calibration) && PrivateState::is_sound(state.residual_noise) &&
                       PrivateState::is_sound(state.usual_contradiction),

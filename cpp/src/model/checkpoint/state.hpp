@@ -7,6 +7,7 @@
 #include "model/frame_history.hpp"
 #include "tracking/object_view.hpp"
 #include "tracking/relocalisation_filter.hpp"
+#include "tracking/still_scene.hpp"
 
 namespace nacre {
 
@@ -108,6 +109,11 @@ struct PrivateState {
     archive(hypothesis.place_, hypothesis.before_, hypothesis.motion_, hypothesis.depth_);
   }
 
+  template <class Archive>
+  static void exchange(Archive& archive, StillScene& scene) {
+    archive(scene.scene_, scene.all_, scene.moved_);
+  }
+
   // Whether what was read can be gone on with.
   static bool is_sound(const NoiseCalibration& calibration);
   static bool is_sound(const ResidualNoise& noise);
@@ -116,6 +122,7 @@ struct PrivateState {
   static bool is_sound(const PoseGraph& graph);
   static bool is_sound(const LoopClosure& loops, std::size_t num_frames);
   static bool is_sound(const PlaceHypothesis& hypothesis);
+  static bool is_sound(const StillScene& scene);
 };
 
 template <class Archive, class T>
