@@ -12,6 +12,7 @@ constexpr double coarsening = 1.25;  // [1] budget: of the spacing, when the mod
 constexpr double spacing_pixels = 2.0;  // [pixel] tuned: between points, on the nearer surfaces; bunny12
 constexpr std::size_t most_outline_points = 800;  // [points] budget: of a frame's outline, for loops; fandisk12
 constexpr std::size_t most_key_poses = 8;  // [poses] budget: that a lost camera is looked for around; test_failure
+constexpr std::int64_t search_interval = 4;  // [frames] budget: lost, of which one is searched for around earlier poses, or everywhere; test_failure
 constexpr std::int64_t patience = 8;  // [frames] budget: lost, until the search is made at every so many; test_failure
 constexpr std::size_t most_object_views = 24;  // [views] budget: of an object that turns on a plane; dog
 

@@ -91,7 +91,9 @@ FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras
       fuse_frame(extras, report);
       remember_view(report);
     }
-    num_lost = report.status == FrameStatus::lost && history.num_registered() > 0 ? num_lost + 1 : 0;
+    const bool is_lost = report.status == FrameStatus::lost && history.num_registered() > 0;
+    num_lost = is_lost ? num_lost + 1 : 0;
+    num_vain = is_lost ? num_vain + (frame.valid.size() >= base_limits::least_points) : 0;
     report.num_points = cloud.size();
     report.spacing = spacing;
   }
@@ -261,12 +263,16 @@ static std::vector<Pose> key_poses(const FrameHistory& history) {
   return chosen;
 }
 
-// Around some poses; and everywhere, but not at every frame where that has been to no avail.
+// Around some poses, and everywhere: but not at every frame where that has been to no avail.
 RelocalisationPlaces Pipeline::elsewhere(const RegionReport& region_report) const {
   if (!options.relocalise) return {};
-  const bool everywhere = num_lost < model_limits::patience || num_lost % model_limits::patience == 0;
-  return {&views, [&] { return view_of_object(region_report); }, [this] { return key_poses(history); }, everywhere,
-          !was_lost() && !jumped()};
+  RelocalisationPlaces places;
+  places.views = &views;
+  places.view_of_frame = [&] { return view_of_object(region_report); };
+  if (num_vain % model_limits::search_interval == 0) places.key_poses = [this] { return key_poses(history); };
+  places.everywhere = places.key_poses && (num_vain < model_limits::patience || num_vain % model_limits::patience == 0);
+  places.beside = !was_lost() && !jumped();
+  return places;
 }
 
 // Of the newest frame, where it shows an object that stands on a plane.

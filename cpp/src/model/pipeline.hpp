@@ -41,6 +41,7 @@ struct Pipeline {
   std::vector<ObjectView> views;           // of an object that stands on a plane, from different directions
   double spacing = 0.0;
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
+  std::int64_t num_vain = 0;  // of them, those that showed something
 
   Pipeline(const Camera& camera_in, const ModelOptions& options_in);
 

@@ -30,7 +30,8 @@ FrameRegistration::FrameRegistration(const CurrentFrame& now, const TrackingTarg
 TrackingResult FrameRegistration::from(const Pose& guess, Gate gate, Expectation expectation) const {
   const PointsInView view = in_view(guess);
   const TrackingResult whole = registered({source_, view, 0.0}, guess, guess, gate, expectation);
-  if (expectation != Expectation::expected && expectation != Expectation::near_lost) return whole;
+  const bool is_near = expectation == Expectation::expected || expectation == Expectation::near_lost;
+  if (!is_near || gate == Gate::wide) return whole;
   // Where something moves, what stays is registered, too; the better of both tells whether it does.
   TrackingResult best = whole;
   for (const Pose& pose : {guess, whole.alignment.target_from_source}) {
@@ -38,7 +39,10 @@ TrackingResult FrameRegistration::from(const Pose& guess, Gate gate, Expectation
     if (!still) continue;
     const TrackingResult found =
         registered({still->samples, view.part(still->points), still->moving}, pose, guess, gate, expectation);
-    if (found.rank() > best.rank() && still_at(found.alignment.target_from_source, view)) best = found;
+    const bool is_better = best.is_lost()
+                               ? found.rank() > best.rank()
+                               : !found.is_lost() && best.score < tracking_limits::clearly_better * found.score;
+    if (is_better && still_at(found.alignment.target_from_source, view)) best = found;
     if (!best.is_lost()) break;
   }
   return best;

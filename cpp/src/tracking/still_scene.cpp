@@ -271,16 +271,21 @@ std::vector<std::int32_t> still_points(const PointsRef& points, const PointsRef&
   });
   std::vector<std::uint8_t> is_gone(squares.size(), 0);
   for (std::size_t i = 0; i < counts.size(); ++i) {
-    int num_gone = 0, num_judged = 0;
+    int gone_around = 0, judged_around = 0;
     visit_around(static_cast<int>(i), squares.across, squares.down, [&](std::size_t j) {
-      num_judged += counts[j].judged > 0;
-      num_gone += 2 * counts[j].through > counts[j].judged;
+      judged_around += counts[j].judged > 0;
+      gone_around += 2 * counts[j].through > counts[j].judged;
     });
-    if (num_gone < num_judged || num_judged < tracking_limits::least_around) continue;
+    if (gone_around < judged_around || judged_around < tracking_limits::least_around) continue;
     visit_around(static_cast<int>(i), squares.across, squares.down, [&](std::size_t j) { is_gone[j] = 1; });
   }
+  int num_gone = 0, num_judged = 0;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    num_judged += counts[i].judged;
+    num_gone += is_gone[i] != 0 ? counts[i].judged : 0;
+  }
   std::vector<std::uint8_t> stays(static_cast<std::size_t>(points.rows()), 1);
-  if (std::find(is_gone.begin(), is_gone.end(), 1) != is_gone.end()) {
+  if (num_gone > 0 && num_gone < tracking_limits::most_gone * num_judged) {
     visit_some_in_view(points, normals, 1, projection, [&](Eigen::Index i, const PointProjection::Block& block, int k) {
       stays[static_cast<std::size_t>(i)] = is_gone[squares.at(block.pixel[k])] == 0;
     });

@@ -110,7 +110,7 @@ template <class Archive>
 void exchange_state(Archive& archive, Pipeline& state) {
   archive(state.options.fusion.reference_sigma, state.region, state.calibration, state.residual_noise,
           state.usual_contradiction, state.cloud, state.loops, state.history, state.before, state.still_scene,
-          state.hypothesis, state.views, state.spacing, state.num_lost);
+          state.hypothesis, state.views, state.spacing, state.num_lost, state.num_vain);
 }
 
 // Space that the table of rays may take before a frame was fused: see load.
@@ -341,6 +341,8 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   archive.require(num_frames == 0 || state.history.back().num_points == state.cloud.size(),
                   "the newest report has another number of points");
   archive.require(is_within(state.num_lost, num_frames + 1), "more frames are lost than there are");
+  archive.require(is_within(state.num_vain, static_cast<std::size_t>(state.num_lost) + 1),
+                  "more frames were searched for than are lost");
   const bool is_spaced = state.spacing > 0.0 || state.cloud.size() == 0;
   archive.require(is_spaced && state.spacing >= given.spacing && state.spacing < farthest_place,
                   "the spacing is not a distance between the points");
