@@ -46,7 +46,7 @@ VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, cons
                       [&](std::int64_t begin, std::int64_t end) {
                         VisibilityCounts counts;
                         visit_points_in_view(points, normals, begin, end - begin, projection,
-                                             [&](const PointProjection::Block& block, int i) {
+                                             [&](auto, const PointProjection::Block& block, int i) {
                                                counts.add(visibility_in(view, block, i, margin));
                                              });
                         return counts;

@@ -61,7 +61,8 @@ VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, cons
                          const Pose& points_from_camera, const Camera& camera, const VisibilityMargin& margin,
                          int num_threads);
 
-// Calls visit(block, i) for each of the first `count` points that is in the image of a camera at a pose in their frame.
+// Calls visit(i, block, k) for each of `count` points i, from the first on, that is in the image of a camera at a pose
+// in their frame: the k-th of a block.
 template <class Visit>
 void visit_points_in_view(const PointsRef& points, const PointsRef& normals, Eigen::Index first, Eigen::Index count,
                           const PointProjection& projection, Visit&& visit) {
@@ -69,8 +70,8 @@ void visit_points_in_view(const PointsRef& points, const PointsRef& normals, Eig
   for (Eigen::Index begin = first; begin < first + count; begin += PointProjection::capacity) {
     const auto size = static_cast<int>(std::min<Eigen::Index>(PointProjection::capacity, first + count - begin));
     projection.project(points.data() + 3 * begin, normals.data() + 3 * begin, size, block);
-    for (int i = 0; i < size; ++i) {
-      if (block.inside[i]) visit(block, i);
+    for (int k = 0; k < size; ++k) {
+      if (block.inside[k]) visit(begin + k, block, k);
     }
   }
 }

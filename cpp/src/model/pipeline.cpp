@@ -12,7 +12,6 @@
 #include "base/se3.hpp"
 #include "camera/limits.hpp"
 #include "camera/point_spacing.hpp"
-#include "camera/view_distance.hpp"
 #include "depth/cleaning.hpp"
 #include "fusion/attribute_fusion.hpp"
 #include "fusion/deformation.hpp"

@@ -53,6 +53,8 @@ struct Acceptance {
 // pose misfit above half counts, too; far from all guesses, where many places resemble, so does consistency^8, and the
 // score is the lower, the more of the matches lie on three planes: see share_off_planes.
 //
+// What is left out, since it moves, tells nothing: both scores count as much as is left.
+//
 // The relocalisation score is that of a place that nothing but the source speaks for. New surface does not speak
 // against it (overlap, not its square), contradictions and misfit do the more (consistency^12, misfit^4), and what the
 // residuals tell counts as much as the normals agree (see normal_information) and as matches are off three planes.

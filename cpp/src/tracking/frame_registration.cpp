@@ -53,12 +53,9 @@ std::vector<std::uint8_t> FrameRegistration::shows(const MaskImage& region, cons
   std::vector<std::uint8_t> found(static_cast<std::size_t>(points.rows()), 1);
   if (region.size() == 0) return found;
   const PointProjection projection(now_.camera, Pose::Identity());
-  for (Eigen::Index first = 0; first < points.rows(); first += PointProjection::capacity) {
-    const auto count = std::min<Eigen::Index>(PointProjection::capacity, points.rows() - first);
-    visit_points_in_view(points, points, first, count, projection, [&](const PointProjection::Block& block, int k) {
-      found[static_cast<std::size_t>(first + k)] = region.data()[block.pixel[k]];
-    });
-  }
+  visit_points_in_view(points, points, 0, points.rows(), projection, [&](auto i, const auto& block, int k) {
+    found[static_cast<std::size_t>(i)] = region.data()[block.pixel[k]];
+  });
   return found;
 }
 

@@ -46,6 +46,7 @@ constexpr double least_step = 0.05;  // [depth] tuned: between a thing that move
 constexpr int least_around = 5;  // [cells] tuned: of nine, a cell and those around it, that are judged; test_moving_things
 constexpr double least_core = 0.01;  // [1] tuned: part of the image where a thing, and around it, was seen through; test_moving_things
 constexpr int squares_across = 40;  // [1] tuned: of an image, three of which a thing is large, that has moved away; test_moving_things
+
 constexpr double noise_per_residual = 1.376;  // [1] derived: standard deviation by median absolute value, of Laplace's distribution; test_residual_noise
 constexpr double largest_noise_factor = 16.0;  // [1] budget: of the noise that is tried until it is known; d435-t265-shelf
 constexpr double least_residual_sigmas = 0.5;  // [sigma] derived: that confirm a noise that was tried: with half of it the frame had been lost; unrelated

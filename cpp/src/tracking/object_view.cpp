@@ -70,7 +70,7 @@ ViewAgreement look_at(const ObjectView& moved, const ObjectView& seen, const Pos
   const auto tolerance = static_cast<float>(std::max(moved.tolerance, seen.tolerance));
   float agree = 0.0F, through = 0.0F, hidden = 0.0F;
   visit_points_in_view(
-      moved.points, moved.normals, 0, count, projection, [&](const PointProjection::Block& block, int i) {
+      moved.points, moved.normals, 0, count, projection, [&](auto, const PointProjection::Block& block, int i) {
         const float behind = seen.depth[block.pixel[i]] - block.z[i];
         const float margin = 2.0F * tolerance / std::max(block.facing[i], camera_limits::least_facing);
         const Visibility is = visibility(behind, margin);

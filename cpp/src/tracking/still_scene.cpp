@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <limits>
 
-#include "base/limits.hpp"
 #include "tracking/limits.hpp"
 
 namespace nacre {
@@ -31,12 +30,9 @@ void visit_cells_in_view(const CoarseFrame& cells, const PointProjection& projec
     points.row(i) = cells[i].point.transpose();
     normals.row(i) = cells[i].normal.transpose();
   }
-  for (int first = 0; first < cells.size(); first += PointProjection::capacity) {
-    const int count = std::min(PointProjection::capacity, cells.size() - first);
-    visit_points_in_view(points, normals, first, count, projection, [&](const PointProjection::Block& block, int k) {
-      if (cells[first + k].has_point()) visit(first + k, block, k);
-    });
-  }
+  visit_points_in_view(points, normals, 0, cells.size(), projection, [&](Eigen::Index i, const auto& block, int k) {
+    if (cells[static_cast<int>(i)].has_point()) visit(static_cast<int>(i), block, k);
+  });
 }
 
 // What a view says of each cell of a frame.
@@ -66,15 +62,12 @@ template <class IsChosen>
 void show_from(const DepthView& other, const Camera& camera, IsChosen&& is_chosen, DepthView& view) {
   const PointProjection projection(camera, other.world_from_camera.inverse() * view.world_from_camera);
   const Points points = points_of(other, camera);
-  for (Eigen::Index first = 0; first < points.rows(); first += PointProjection::capacity) {
-    const auto count = std::min<Eigen::Index>(PointProjection::capacity, points.rows() - first);
-    visit_points_in_view(points, points, first, count, projection, [&](const PointProjection::Block& block, int k) {
-      const std::int32_t pixel = block.pixel[k];
-      if (!is_chosen(pixel) || view.depth[pixel] < block.z[k]) return;
-      view.depth[pixel] = block.z[k];
-      view.sigma[pixel] = other.sigma[first + k];
-    });
-  }
+  visit_points_in_view(points, points, 0, points.rows(), projection, [&](Eigen::Index i, const auto& block, int k) {
+    const std::int32_t pixel = block.pixel[k];
+    if (!is_chosen(pixel) || view.depth[pixel] < block.z[k]) return;
+    view.depth[pixel] = block.z[k];
+    view.sigma[pixel] = other.sigma[i];
+  });
 }
 
 // visit(j) for a cell and those beside it, of so many across and down.
@@ -202,16 +195,12 @@ void StillScene::forget_what_left(const DepthView& now, double margin) {
   const Points points = points_of(scene_, camera_), towards_camera = -points.rowwise().normalized();
   std::vector<std::uint8_t> has_left(static_cast<std::size_t>(points.rows()), 0);
   const PointProjection projection(camera_, scene_.world_from_camera.inverse() * now.world_from_camera);
-  for (Eigen::Index first = 0; first < points.rows(); first += PointProjection::capacity) {
-    const auto count = std::min<Eigen::Index>(PointProjection::capacity, points.rows() - first);
-    const auto look = [&](const PointProjection::Block& block, int k) {
-      const float sigma = scene_.sigma[first + k];
-      if (visibility_in(now, block, k, of_surface(margin), sigma) != Visibility::seen_through) return;
-      has_left[static_cast<std::size_t>(first + k)] = 1;
-      scene_.depth[first + k] = unknown;
-    };
-    visit_points_in_view(points, towards_camera, first, count, projection, look);
-  }
+  const auto look = [&](Eigen::Index i, const PointProjection::Block& block, int k) {
+    if (visibility_in(now, block, k, of_surface(margin), scene_.sigma[i]) != Visibility::seen_through) return;
+    has_left[static_cast<std::size_t>(i)] = 1;
+    scene_.depth[i] = unknown;
+  };
+  visit_points_in_view(points, towards_camera, 0, points.rows(), projection, look);
   if (std::find(has_left.begin(), has_left.end(), 1) == has_left.end()) return;
   show_from(now, camera_, [&](std::int32_t i) { return has_left[static_cast<std::size_t>(i)] != 0; }, scene_);
 }
@@ -234,21 +223,11 @@ struct Squares {
   }
 };
 
-// visit(i, block, k) for the points i that are in a camera's image, one of every `step`.
-template <class Visit>
-void visit_some_in_view(const PointsRef& points, const PointsRef& normals, Eigen::Index step,
-                        const PointProjection& projection, Visit&& visit) {
-  constexpr Eigen::Index capacity = PointProjection::capacity;
-  Points some(capacity, 3), their_normals(capacity, 3);
-  for (Eigen::Index first = 0; first < points.rows(); first += step * capacity) {
-    const Eigen::Index count = std::min(capacity, (points.rows() - first + step - 1) / step);
-    for (Eigen::Index i = 0; i < count; ++i) {
-      some.row(i) = points.row(first + i * step);
-      their_normals.row(i) = normals.row(first + i * step);
-    }
-    visit_points_in_view(some, their_normals, 0, count, projection,
-                         [&](const PointProjection::Block& block, int k) { visit(first + k * step, block, k); });
-  }
+// One of every `step` rows.
+Points some_of(const PointsRef& points, Eigen::Index step) {
+  Points some((points.rows() + step - 1) / step, 3);
+  for (Eigen::Index i = 0; i < some.rows(); ++i) some.row(i) = points.row(i * step);
+  return some;
 }
 
 }  // namespace
@@ -262,7 +241,8 @@ std::vector<std::int32_t> still_points(const PointsRef& points, const PointsRef&
   };
   std::vector<Count> counts(squares.size());
   const Eigen::Index step = std::max<Eigen::Index>(1, points.rows() / tracking_limits::most_judged_points);
-  visit_some_in_view(points, normals, step, projection, [&](auto, const PointProjection::Block& block, int k) {
+  const Points some = some_of(points, step), their_normals = some_of(normals, step);
+  visit_points_in_view(some, their_normals, 0, some.rows(), projection, [&](auto, const auto& block, int k) {
     const Visibility is = visibility_in(view, block, k, of_surface(margin));
     if (is != Visibility::agrees && is != Visibility::seen_through) return;
     Count& count = counts[squares.at(block.pixel[k])];
@@ -286,7 +266,7 @@ std::vector<std::int32_t> still_points(const PointsRef& points, const PointsRef&
   }
   std::vector<std::uint8_t> stays(static_cast<std::size_t>(points.rows()), 1);
   if (num_gone > 0 && num_gone < tracking_limits::most_gone * num_judged) {
-    visit_some_in_view(points, normals, 1, projection, [&](Eigen::Index i, const PointProjection::Block& block, int k) {
+    visit_points_in_view(points, normals, 0, points.rows(), projection, [&](auto i, const auto& block, int k) {
       stays[static_cast<std::size_t>(i)] = is_gone[squares.at(block.pixel[k])] == 0;
     });
   }
