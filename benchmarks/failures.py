@@ -175,6 +175,33 @@ def related(count: int, seed: int) -> dict[str, Any]:
     return {"pairs": count, **told}
 
 
+def starts(count: int, seed: int) -> dict[str, Any]:
+    """Give a model three views far apart of one object, or, in turn, one of another scene before two of it."""
+    rng = np.random.default_rng(seed)
+    told: Counter[str] = Counter()
+    for trial in range(count):
+        others = [(blob, boxes)[trial % 2](rng) for _ in range(2)]
+        meshes = [others[0 if trial % 4 < 2 else 1], others[0], others[0]]
+        angle, distance, elevation = rng.uniform(0, 6), rng.uniform(0.25, 0.4), rng.uniform(-0.3, 0.8)
+        further = rng.choice([-1, 1]) * math.radians(rng.uniform(25, 60))
+        steps = (0.0, further, 2.0 * further if trial % 4 < 2 else further + math.radians(3))
+        poses = [
+            look(mesh, angle + step, distance=distance, elevation=elevation)
+            for mesh, step in zip(meshes, steps, strict=True)
+        ]
+        model = nacre.Model(CAMERA, num_threads=1)
+        for i, (mesh, pose) in enumerate(zip(meshes, poses, strict=True)):
+            model.add_frame(view(mesh, pose, 3 * trial + i))
+        claimed = [i for i, frame in enumerate(model.frames) if frame.status in {"TRACKED", "RELOCALISED"}]
+        for i in claimed[1:]:
+            metres, degrees = error(model.frames[i], poses[claimed[0]], poses[i])
+            is_right = metres < 0.005 and degrees < 1.5 and meshes[claimed[0]] is meshes[i]
+            told["right" if is_right else "wrong"] += 1
+        kind = "one object" if trial % 4 < 2 else "another before"
+        told[f"{kind}, {len(claimed)} claimed"] += 1
+    return {"triples": count, **told}
+
+
 def recovery(count: int, seed: int) -> dict[str, Any]:
     """Cover the camera for 30 frames, and let it come back nearby."""
     mesh = nacre.built_in_object()
@@ -280,11 +307,12 @@ def garbage(count: int, seed: int, every: int = 100) -> dict[str, Any]:
 EXPERIMENTS = {
     "unrelated": unrelated,
     "related": related,
+    "starts": starts,
     "recovery": recovery,
     "kidnap": kidnap,
     "garbage": garbage,
 }
-COUNTS = {"unrelated": 10000, "related": 1000, "recovery": 200, "kidnap": 200, "garbage": 1000}
+COUNTS = {"unrelated": 10000, "related": 1000, "starts": 1000, "recovery": 200, "kidnap": 200, "garbage": 1000}
 
 
 def main() -> int:

@@ -39,8 +39,8 @@ class FrameReport(Value):
     reason : str
         Why the frame is weak or lost; empty otherwise.
     world_from_camera : (4, 4) float64
-        The camera's pose; of a lost frame the last known one. Where a later frame closes a loop, the reports
-        in ``Model.frames`` have the corrected poses.
+        The camera's pose; of a lost frame the last known one. Where a later frame corrects earlier ones, the
+        reports in ``Model.frames`` have what is known then.
     num_inliers, overlap, rmse, information, weak_directions
         Of the registration; see :class:`nacre.AlignResult`.
     consistency : float
@@ -55,7 +55,8 @@ class FrameReport(Value):
     loop_distance : float
         Between the surfaces that the two saw, before the correction [m].
     corrects_earlier : bool
-        Whether it changed poses of earlier frames: a loop was closed, or the views of an object adjusted.
+        Whether it changed reports of earlier frames: a loop was closed, the views of an object adjusted, or the
+        model begun anew.
     depth : DepthReport
         Pixels that were removed, by reason.
     region : RegionReport

@@ -42,7 +42,8 @@ class Model(ExchangeablePoints, Checkpointed):
     A 3D model that grows with every depth frame.
 
     The world is the first camera's frame, unless the first frame comes with a guess of its pose. Frames that
-    cannot be registered change nothing.
+    cannot be registered change nothing. Where the first frame explains no other, three in a row that explain
+    each other begin the model anew, and the world is the first of them.
 
     Parameters
     ----------
@@ -256,7 +257,7 @@ class Model(ExchangeablePoints, Checkpointed):
         """
         (F, 4, 4) world_from_camera of every frame; NaN where the frame is lost.
 
-        Where a later frame closed a loop, the corrected poses.
+        Where a later frame corrected them, as they are known since.
         """
         with self._lock:
             poses = np.full((self._core.num_frames, 4, 4), np.nan)
@@ -269,7 +270,7 @@ class Model(ExchangeablePoints, Checkpointed):
     @property
     def frames(self) -> Sequence[FrameReport]:
         """
-        The reports of the frames that were added so far, with poses as corrected by later frames.
+        The reports of the frames that were added so far, as corrected by later frames.
 
         Each is made when it is asked for, since the model keeps of a frame only the few bytes that tell it.
         """

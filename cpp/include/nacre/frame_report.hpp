@@ -38,7 +38,7 @@ struct FrameReport : TrackingReport {
   std::optional<double> timestamp;         ///< [s], as given
   std::optional<std::int64_t> loop_frame;  ///< the earlier frame that this one closed a loop with
   double loop_distance = 0.0;              ///< between the surfaces that the two saw, before [m]
-  bool corrects_earlier = false;           ///< whether it changed poses of earlier frames
+  bool corrects_earlier = false;           ///< whether it changed reports of earlier frames
   DepthReport depth;
   RegionReport region;
   std::int64_t num_moving = 0;  ///< pixels that were left out, since what they show moved before the scene

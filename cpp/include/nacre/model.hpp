@@ -16,7 +16,8 @@ namespace nacre {
 struct Pipeline;
 
 /// A 3D model that grows with every depth frame. The world is the first camera's frame unless the first frame comes
-/// with a guess. Frames that cannot be registered change nothing.
+/// with a guess. Frames that cannot be registered change nothing; where the first explains no other, three frames in a
+/// row that explain each other begin the model anew.
 class Model {
  public:
   explicit Model(const Camera& camera, const ModelOptions& options = {});
@@ -33,7 +34,7 @@ class Model {
   const ModelOptions& given_options() const;  ///< as given
   const PointModel& cloud() const;            ///< in the world frame
   PointModel cloud_in_camera() const;         ///< in the newest registered camera's frame
-  /// One report per frame that was added. Where a later frame closed a loop, the poses are the corrected ones.
+  /// One report per frame that was added. Where a later frame corrected it, it says what is known since.
   FrameReports frames() const;
   NoiseModel noise() const;  ///< given, or measured from the images so far
   /// By how much the frames registered so far are noisier than that: errors that neighbouring pixels share do not show

@@ -14,6 +14,7 @@ constexpr std::size_t most_outline_points = 800;  // [points] budget: of a frame
 constexpr std::size_t most_key_poses = 8;  // [poses] budget: that a lost camera is looked for around; test_failure
 constexpr std::int64_t search_interval = 4;  // [frames] budget: lost, of which one is searched for around earlier poses, or everywhere; test_failure
 constexpr std::int64_t patience = 8;  // [frames] budget: lost, until the search is made at every so many; test_failure
+constexpr std::size_t start_frames = 3;  // [frames] derived: that begin a model anew: two, and one that confirms them; test_starts
 constexpr std::size_t most_object_views = 24;  // [views] budget: of an object that turns on a plane; dog
 
 }  // namespace nacre::model_limits

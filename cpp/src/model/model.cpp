@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "model/checkpoint/checkpoint.hpp"
+#include "model/new_start.hpp"
 #include "model/pipeline.hpp"
 #include "nacre/cancel.hpp"
 
@@ -17,7 +18,12 @@ Model& Model::operator=(Model&&) noexcept = default;
 
 FrameReport Model::add_frame(const DepthRef& depth, const FrameExtras& extras) {
   const CancelScope whole(nullptr);  // stopped halfway, the model would be neither the one nor the other
-  return pipeline_->add_frame(depth, extras);
+  FrameReport report = pipeline_->add_frame(depth, extras);
+  if (auto begun = begin_anew(*pipeline_, depth, extras)) {
+    pipeline_ = std::move(begun);
+    report = pipeline_->history.back();
+  }
+  return report;
 }
 
 const Camera& Model::camera() const { return pipeline_->camera; }

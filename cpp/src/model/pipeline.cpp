@@ -74,6 +74,7 @@ FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras
   FrameReport report;
   report.index = static_cast<std::int64_t>(history.size());
   report.timestamp = extras.timestamp;
+  report.corrects_earlier = is_trial && history.num_registered() == 2;
   {
     const Stopwatch total(report.milliseconds.total);
     const DepthImage clean = preprocess(depth, extras.mask, report);
@@ -184,7 +185,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   const Expectation expectation = was_lost() || jumped() ? Expectation::near_lost : Expectation::expected;
   const bool is_predicted = !was_lost() || extras.guess.has_value();
   result =
-      track_frame({guesses(extras), expectation, is_predicted, history.num_registered() > 1, elsewhere(region_report)});
+      track_frame({guesses(extras), expectation, is_predicted, history.num_registered() > 1 || is_trial, elsewhere(region_report)});
   const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
   if (is_determined && !result.is_on_plane) {
     refine_by_outlines(result.alignment, outline, loops.outlines_near(result.alignment.target_from_source),
@@ -204,12 +205,14 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior) {
   if (learns_noise() && !residual_noise.is_known()) {
     TrackingOptions nearby = options;
     nearby.relocalise = false;
+    const auto is_as_noisy = [&](const TrackingResult& found) {
+      return found.noise_factor == known_noise_factor() || history.num_registered() > 1 ||
+             found.alignment.residual_sigmas >= tracking_limits::least_residual_sigmas;
+    };
     const auto is_found = [&] {
       if (result.is_lost()) return false;
       if (noise_factor == known_noise_factor()) return true;
-      const bool is_as_noisy =
-          history.num_registered() > 1 || result.alignment.residual_sigmas >= tracking_limits::least_residual_sigmas;
-      return is_as_noisy && result.expectation != Expectation::unexpected;
+      return is_as_noisy(result) && result.expectation != Expectation::unexpected;
     };
     RelocalisationPlaces elsewhere = std::exchange(prior.elsewhere, {});
     prior.elsewhere.beside = elsewhere.beside;
@@ -219,6 +222,8 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior) {
     }
     prior.elsewhere = std::move(elsewhere);
     if (!is_found()) {
+      const auto is_too_quiet = [&](const TrackingResult& place) { return !is_as_noisy(place); };
+      prior.tried.erase(std::remove_if(prior.tried.begin(), prior.tried.end(), is_too_quiet), prior.tried.end());
       result = only_near(prior, options, usual_contradiction.mean()).value_or(TrackingResult());
       set_noise_factor(result.is_lost() ? known_noise_factor() : result.noise_factor);
     }

@@ -18,6 +18,13 @@
 
 namespace nacre {
 
+// A frame as it came.
+struct StartFrame {
+  DepthImage depth;
+  FrameExtras extras;
+  std::int64_t index = 0;
+};
+
 struct Pipeline {
   Camera camera;
   ModelOptions given;    // options as given
@@ -42,6 +49,8 @@ struct Pipeline {
   double spacing = 0.0;
   std::int64_t num_lost = 0;  // frames in a row, up to the newest
   std::int64_t num_vain = 0;  // of them, those that showed something
+  std::vector<StartFrame> start_frames;  // while the model holds one frame: the newest that may begin another
+  bool is_trial = false;                 // whether the third frame is to confirm the first two
 
   Pipeline(const Camera& camera_in, const ModelOptions& options_in);
 

@@ -37,6 +37,10 @@ _log = logging.getLogger("nacre.reconstruction")
 _RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
 
 
+def _renewed(record: FrameRecord, report: FrameReport) -> FrameRecord:
+    return dataclasses.replace(record, status=report.status, reason=report.reason, report=report)
+
+
 @dataclass
 class _Retry:
     """How far lost frames were gone over again."""
@@ -255,9 +259,7 @@ class Reconstruction(Checkpointed):
     def _take_corrected_poses(self) -> None:
         reports = self.model.frames
         self.frames[:] = [
-            record
-            if record.report is None
-            else dataclasses.replace(record, report=reports[record.report.index])
+            record if record.report is None else _renewed(record, reports[record.report.index])
             for record in self.frames
         ]
 

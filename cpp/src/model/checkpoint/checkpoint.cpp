@@ -7,6 +7,7 @@
 
 #include "base/random.hpp"
 #include "model/checkpoint/state.hpp"
+#include "model/limits.hpp"
 #include "nacre/version.hpp"
 
 namespace nacre {
@@ -110,7 +111,7 @@ template <class Archive>
 void exchange_state(Archive& archive, Pipeline& state) {
   archive(state.options.fusion.reference_sigma, state.region, state.calibration, state.residual_noise,
           state.usual_contradiction, state.cloud, state.loops, state.history, state.before, state.still_scene,
-          state.hypothesis, state.views, state.spacing, state.num_lost, state.num_vain);
+          state.hypothesis, state.views, state.spacing, state.num_lost, state.num_vain, state.start_frames);
 }
 
 // Space that the table of rays may take before a frame was fused: see load.
@@ -188,6 +189,14 @@ bool is_sound(const FrameReport& report, std::int64_t num_pixels, std::int64_t m
 
 bool is_image(const MaskImage& image, const Camera& camera) {
   return image.rows() == camera.height() && image.cols() == camera.width();
+}
+
+bool is_sound(const StartFrame& frame, const Camera& camera, std::size_t num_frames) {
+  const FrameExtras& extras = frame.extras;
+  const Eigen::Index num_pixels = static_cast<Eigen::Index>(camera.width()) * camera.height();
+  return is_within(frame.index, num_frames) && frame.depth.rows() == camera.height() &&
+         frame.depth.cols() == camera.width() && (extras.colors.rows() == 0 || extras.colors.rows() == num_pixels) &&
+         (extras.mask.size() == 0 || is_image(extras.mask, camera));
 }
 
 bool is_sound(const ObjectView& view, const Camera& camera, std::size_t num_frames) {
@@ -348,6 +357,13 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
                   "the spacing is not a distance between the points");
   for (const ObjectView& view : state.views) {
     archive.require(is_sound(view, state.camera, num_frames), "a view of the object contradicts the camera");
+  }
+  archive.require(state.start_frames.size() < model_limits::start_frames, "more frames may begin the model than do");
+  std::int64_t last_start = -1;
+  for (const StartFrame& frame : state.start_frames) {
+    archive.require(is_sound(frame, state.camera, num_frames) && frame.index > last_start,
+                    "a frame that may begin the model contradicts the camera");
+    last_start = frame.index;
   }
   archive.require(PrivateState::is_sound(state.loops, num_frames), "the key frames contradict each other");
   archive.require(PrivateState::is_sound(state.still_scene), "the still scene has another size than the camera");

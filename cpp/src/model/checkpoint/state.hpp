@@ -5,6 +5,7 @@
 #include "loops/loop_closure.hpp"
 #include "model/checkpoint/fields.hpp"
 #include "model/frame_history.hpp"
+#include "model/pipeline.hpp"
 #include "tracking/object_view.hpp"
 #include "tracking/relocalisation_filter.hpp"
 #include "tracking/still_scene.hpp"
@@ -42,6 +43,17 @@ void exchange(Archive& archive, KeyFrame& key_frame) {
 template <class Archive>
 void exchange(Archive& archive, PoseEdge& edge) {
   archive(edge.from, edge.to, edge.from_from_to, edge.information, edge.is_loop);
+}
+
+template <class Archive>
+void exchange(Archive& archive, FrameAttribute& attribute) {
+  archive(attribute.name, attribute.values);
+}
+
+template <class Archive>
+void exchange(Archive& archive, StartFrame& frame) {
+  FrameExtras& extras = frame.extras;
+  archive(frame.depth, frame.index, extras.colors, extras.attributes, extras.mask, extras.timestamp, extras.guess);
 }
 
 // Of classes that keep theirs to themselves.

@@ -1,0 +1,61 @@
+#include "model/new_start.hpp"
+
+#include <cstddef>
+#include <stdexcept>
+
+#include "base/limits.hpp"
+#include "model/limits.hpp"
+
+namespace nacre {
+namespace {
+
+// What became of a frame that the model no longer holds, or does not hold yet.
+FrameReport without_model(FrameReport report) {
+  if (report.status != FrameStatus::lost) {
+    static_cast<TrackingReport&>(report) = TrackingReport();
+    report.status = FrameStatus::lost;
+    report.reason = "no other frame fits it: the model begins with a later one";
+    report.fusion = FusionReport();
+  }
+  report.world_from_camera = Pose::Identity();
+  report.num_points = 0;
+  report.spacing = 0.0;
+  return report;
+}
+
+std::unique_ptr<Pipeline> begun_with(const std::vector<StartFrame>& frames, const Pipeline& model) {
+  auto begun = std::make_unique<Pipeline>(model.camera, model.given);
+  begun->is_trial = true;
+  for (const StartFrame& frame : frames) {
+    for (auto i = begun->history.size(); i < static_cast<std::size_t>(frame.index); ++i) {
+      begun->history.add(without_model(model.history[i]));
+    }
+    try {
+      if (begun->add_frame(frame.depth, frame.extras).status != FrameStatus::tracked) return nullptr;
+    } catch (const std::invalid_argument&) {  // attributes fit the model's, and not each other
+      return nullptr;
+    }
+  }
+  return begun;
+}
+
+}  // namespace
+
+std::unique_ptr<Pipeline> begin_anew(Pipeline& model, const DepthRef& depth, const FrameExtras& extras) {
+  const FrameReport newest = model.history.back();
+  const bool is_first = newest.status == FrameStatus::tracked && model.history.num_registered() == 1;
+  const bool is_wanted = model.options.relocalise && model.options.verify &&
+                         model.options.registration.method != Metric::paper && !(is_first && extras.guess);
+  std::vector<StartFrame>& frames = model.start_frames;
+  if (!is_wanted || (newest.status != FrameStatus::lost && !is_first)) frames.clear();
+  if (!is_wanted || (frames.empty() && !is_first) || model.frame.valid.size() < base_limits::least_points) {
+    return nullptr;
+  }
+  frames.push_back({depth, extras, newest.index});
+  if (frames.size() < model_limits::start_frames) return nullptr;
+  std::unique_ptr<Pipeline> begun = begun_with(frames, model);
+  frames.erase(frames.begin());
+  return begun;
+}
+
+}  // namespace nacre
