@@ -176,7 +176,7 @@ def related(count: int, seed: int) -> dict[str, Any]:
 
 
 def starts(count: int, seed: int) -> dict[str, Any]:
-    """Give a model three views far apart of one object, or, in turn, one of another scene before two of it."""
+    """Give a model three views far apart of one object, or one of another scene before two of it."""
     rng = np.random.default_rng(seed)
     told: Counter[str] = Counter()
     for trial in range(count):
@@ -312,7 +312,14 @@ EXPERIMENTS = {
     "kidnap": kidnap,
     "garbage": garbage,
 }
-COUNTS = {"unrelated": 10000, "related": 1000, "starts": 1000, "recovery": 200, "kidnap": 200, "garbage": 1000}
+COUNTS = {
+    "unrelated": 10000,
+    "related": 1000,
+    "starts": 1000,
+    "recovery": 200,
+    "kidnap": 200,
+    "garbage": 1000,
+}
 
 
 def main() -> int:

@@ -55,8 +55,8 @@ class FrameReport(Value):
     loop_distance : float
         Between the surfaces that the two saw, before the correction [m].
     corrects_earlier : bool
-        Whether it changed reports of earlier frames: a loop was closed, the views of an object adjusted, or the
-        model begun anew.
+        Whether it changed reports of earlier frames: a loop was closed, the views of an object adjusted, or
+        the model begun anew.
     depth : DepthReport
         Pixels that were removed, by reason.
     region : RegionReport

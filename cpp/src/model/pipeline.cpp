@@ -184,8 +184,8 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   }
   const Expectation expectation = was_lost() || jumped() ? Expectation::near_lost : Expectation::expected;
   const bool is_predicted = !was_lost() || extras.guess.has_value();
-  result =
-      track_frame({guesses(extras), expectation, is_predicted, history.num_registered() > 1 || is_trial, elsewhere(region_report)});
+  result = track_frame(
+      {guesses(extras), expectation, is_predicted, history.num_registered() > 1 || is_trial, elsewhere(region_report)});
   const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
   if (is_determined && !result.is_on_plane) {
     refine_by_outlines(result.alignment, outline, loops.outlines_near(result.alignment.target_from_source),

@@ -47,8 +47,8 @@ struct Pipeline {
   PlaceHypothesis hypothesis;              // while the camera is lost
   std::vector<ObjectView> views;           // of an object that stands on a plane, from different directions
   double spacing = 0.0;
-  std::int64_t num_lost = 0;  // frames in a row, up to the newest
-  std::int64_t num_vain = 0;  // of them, those that showed something
+  std::int64_t num_lost = 0;             // frames in a row, up to the newest
+  std::int64_t num_vain = 0;             // of them, those that showed something
   std::vector<StartFrame> start_frames;  // while the model holds one frame: the newest that may begin another
   bool is_trial = false;                 // whether the third frame is to confirm the first two
 
