@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -13,6 +14,8 @@ from nacre._internal import arrays
 from nacre._internal.core_options import to_core
 from nacre._internal.value_equality import Value
 from nacre.noise import NoiseModel, NoiseName, as_noise
+
+SensorName = Literal["none", "stereo", "structured_light", "time_of_flight", "phone_lidar"]
 
 _FARTHEST = 1e150  # [m]: beyond it squared distances overflow
 
@@ -173,12 +176,14 @@ class Mesh:
         camera: _core.Camera,
         world_from_camera: npt.ArrayLike,
         *,
+        sensor: SensorName = "none",
         noise: float | NoiseName | NoiseModel = 0.0,
         edge_mixing: float = 0.0,
         background_depth: float | None = None,
         quantization: float = 0.0,
         dropout: float = 0.0,
         seed: int = 0,
+        sensor_seed: int = 0,
         num_threads: int = 0,
     ) -> npt.NDArray[np.float32]:
         """
@@ -186,8 +191,8 @@ class Mesh:
 
         Parameters
         ----------
-        camera, world_from_camera, noise, edge_mixing, background_depth
-        quantization, dropout, seed, num_threads
+        camera, world_from_camera, sensor, noise, edge_mixing, background_depth
+        quantization, dropout, seed, sensor_seed, num_threads
             As in :func:`nacre.simulate_depth`.
 
         Returns
@@ -204,12 +209,14 @@ class Mesh:
         pose = arrays.as_pose("world_from_camera", world_from_camera).copy()
         pose[:3, 3] -= self._origin
         parameters = _Simulation(
+            sensor=sensor,
             noise=as_noise("noise", noise, camera) or NoiseModel(),
             edge_mixing=edge_mixing,
             background_depth=_background(background_depth),
             quantization=quantization,
             dropout=dropout,
             seed=seed,
+            sensor_seed=sensor_seed,
             num_threads=num_threads,
         )
         options = to_core(parameters, _core.SimulationOptions())
@@ -233,12 +240,14 @@ def built_in_object() -> Mesh:
 
 @dataclasses.dataclass(frozen=True)
 class _Simulation:
+    sensor: SensorName
     noise: NoiseModel
     edge_mixing: float
     background_depth: float
     quantization: float
     dropout: float
     seed: int
+    sensor_seed: int
     num_threads: int
 
 

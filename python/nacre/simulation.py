@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from nacre._core import Camera
 from nacre._internal import arrays
-from nacre.mesh import Mesh
+from nacre.mesh import Mesh, SensorName
 from nacre.noise import NoiseModel, NoiseName
 
 
@@ -20,20 +20,22 @@ def simulate_depth(
     camera: Camera,
     world_from_camera: npt.ArrayLike,
     *,
+    sensor: SensorName = "none",
     noise: float | NoiseName | NoiseModel = 0.0,
     edge_mixing: float = 0.0,
     background_depth: float | None = None,
     quantization: float = 0.0,
     dropout: float = 0.0,
     seed: int = 0,
+    sensor_seed: int = 0,
     num_threads: int = 0,
 ) -> npt.NDArray[np.float32]:
     """
     Return the depth image of a triangle mesh that a camera sees.
 
-    Without noise and edge mixing each pixel is exact: the first intersection of its ray with the mesh, from
-    either side. Several views of one mesh are faster with :meth:`nacre.Mesh.simulate_depth`, which keeps the
-    search tree.
+    Without a sensor, noise and edge mixing each pixel is exact: the first intersection of its ray with the
+    mesh, from either side. Several views of one mesh are faster with :meth:`nacre.Mesh.simulate_depth`, which
+    keeps the search tree.
 
     Parameters
     ----------
@@ -46,6 +48,10 @@ def simulate_depth(
         plane.
     world_from_camera : (4, 4) array_like
         The camera's pose in the frame of the vertices; OpenCV axes (x right, y down, z forward).
+    sensor : "none", "stereo", "structured_light", "time_of_flight" or "phone_lidar"
+        A kind of depth camera, with errors that neighbouring pixels and successive images share, steps in
+        disparity, holes, and pixels at edges that are wrong. Needs a pinhole camera, best with the sensor's
+        own focal length, since many of its errors are in pixels. See the page on the simulated camera.
     noise : float, "kinect", "stereo", "tof" or nacre.NoiseModel
         Standard deviation of Gaussian noise along the depth value, independent from pixel to pixel [m];
         "kinect" is that of structured light, 1.2 mm + 1.9 mm (z - 0.4 m)^2 [1]_.
@@ -62,15 +68,18 @@ def simulate_depth(
     dropout : float
         Part of the pixels that give no measurement, 0 to 1, at random.
     seed : int
-        Of noise and dropout. The same seed gives the same bits for any number of threads.
+        Of the image: another for each of a recording. The same seed gives the same bits for any number of
+        threads.
+    sensor_seed : int
+        Of the errors that all images of one sensor share.
     num_threads : int
         0: all.
 
     Returns
     -------
     (H, W) float32
-        [m]; NaN = nothing was seen. The steps come in the order edge mixing, noise, quantization, dropout;
-        depths that they make 0 or negative become NaN.
+        [m]; NaN = nothing was seen. The steps come in the order sensor or edge mixing, noise, quantization,
+        dropout; depths that they make 0 or negative become NaN.
 
     Raises
     ------
@@ -85,12 +94,14 @@ def simulate_depth(
     return Mesh(vertices, triangles).simulate_depth(
         camera,
         world_from_camera,
+        sensor=sensor,
         noise=noise,
         edge_mixing=edge_mixing,
         background_depth=background_depth,
         quantization=quantization,
         dropout=dropout,
         seed=seed,
+        sensor_seed=sensor_seed,
         num_threads=num_threads,
     )
 

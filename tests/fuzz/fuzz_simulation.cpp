@@ -16,6 +16,9 @@ NACRE_FUZZ_TARGET(bytes) {
   bytes.change(options.edge_mixing), bytes.change(options.background_depth), bytes.change(options.quantization);
   bytes.change(options.dropout);
   options.seed = bytes.byte();
+  if (camera.model() == Camera::Model::pinhole && options.edge_mixing == 0.0) {
+    options.sensor = static_cast<Sensor>(bytes.integer(0, 4));
+  }
   options.num_threads = bytes.threads();
   const DepthImage depth = simulate_depth(tree, camera, bytes.pose(), options);
   NACRE_HOLDS(depth.rows() == camera.height() && depth.cols() == camera.width());

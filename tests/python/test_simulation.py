@@ -188,9 +188,10 @@ def test_defaults_are_those_of_the_core():
         }
         noise = (options.noise.constant, options.noise.quadratic, options.noise.offset)
         assert (defaults.pop("noise"), 0, 0) == noise
+        assert defaults.pop("sensor") == options.sensor.name
         assert (defaults.pop("background_depth") or 0) == options.background_depth
         assert defaults == {name: getattr(options, name) for name in defaults}
-        assert len(defaults) == 5
+        assert len(defaults) == 6
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "base/numbers.hpp"
 #include "mesh/surface_nets.hpp"
 #include "nacre/mesh.hpp"
 
@@ -12,8 +13,6 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-
-constexpr double pi = 3.14159265358979323846;
 
 // The union of two shapes with a fillet of about radius k (Quilez, polynomial smooth minimum).
 double join(double a, double b, double k) {

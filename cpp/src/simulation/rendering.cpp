@@ -9,6 +9,7 @@
 #include "base/check.hpp"
 #include "base/numbers.hpp"
 #include "base/parallel.hpp"
+#include "simulation/box_sums.hpp"
 #include "simulation/limits.hpp"
 
 namespace nacre {
@@ -228,12 +229,12 @@ class Canvas {
     std::vector<float> factor(pixels_.size(), 1.0f);
     const int64_t reach = std::max<int64_t>(std::min(width_, height_) / 60, 2);
     for (const auto& [radius, strength] : {std::pair<int64_t, double>{reach, 0.30}, {3 * reach, 0.25}}) {
-      std::vector<DepthSum> sums(pixels_.size(), DepthSum::Zero());
+      PixelSums sums(pixels_.size(), PixelSum::Zero());
       for (std::size_t i = 0; i < pixels_.size(); ++i) {
-        if (pixels_[i].is_covered()) sums[i] = DepthSum(pixels_[i].depth, 1.0);
+        if (pixels_[i].is_covered()) sums[i] = PixelSum(pixels_[i].depth, 1.0);
       }
-      sum_boxes(sums, radius);
-      sum_boxes(sums, radius);  // two boxes make a tent, which leaves no visible border
+      sum_boxes(sums, width_, radius, num_threads_);
+      sum_boxes(sums, width_, radius, num_threads_);  // two boxes make a tent, which leaves no visible border
       parallel_for(size(), points_per_block, num_threads_, [&, r = radius, s = strength](int64_t i) {
         const auto at = static_cast<std::size_t>(i);
         if (!pixels_[at].is_covered()) return;
@@ -242,34 +243,6 @@ class Canvas {
       });
     }
     return factor;
-  }
-
-  using DepthSum = Eigen::Array2d;  // of depths, and how many
-
-  // Replaces each pixel by the sum over the square of 2 radius + 1 pixels around it.
-  void sum_boxes(std::vector<DepthSum>& image, int64_t radius) const {
-    parallel_blocks(height_, band_rows, num_threads_, [&](int64_t, int64_t begin, int64_t end) {
-      std::vector<DepthSum> line(static_cast<std::size_t>(width_));
-      for (int64_t v = begin; v < end; ++v) sum_line(image, index(0, v), 1, line, radius);
-    });
-    parallel_blocks(width_, band_rows, num_threads_, [&](int64_t, int64_t begin, int64_t end) {
-      std::vector<DepthSum> line(static_cast<std::size_t>(height_));
-      for (int64_t u = begin; u < end; ++u)
-        sum_line(image, index(u, 0), static_cast<std::size_t>(width_), line, radius);
-    });
-  }
-
-  static void sum_line(std::vector<DepthSum>& image, std::size_t first, std::size_t step, std::vector<DepthSum>& line,
-                       int64_t radius) {
-    const auto count = static_cast<int64_t>(line.size());
-    for (std::size_t i = 0; i < line.size(); ++i) line[i] = image[first + i * step];
-    DepthSum sum = DepthSum::Zero();
-    for (int64_t i = 0; i < std::min(radius, count); ++i) sum += line[static_cast<std::size_t>(i)];
-    for (int64_t i = 0; i < count; ++i) {
-      if (i + radius < count) sum += line[static_cast<std::size_t>(i + radius)];
-      if (i - radius > 0) sum -= line[static_cast<std::size_t>(i - radius - 1)];
-      image[first + static_cast<std::size_t>(i) * step] = sum;
-    }
   }
 
   // Whether depth jumps to a neighbor.

@@ -45,6 +45,14 @@ def simulate(
             metavar="METRES|kinect|stereo|tof", help="Standard deviation of the depth noise (metres)."
         ),
     ] = "0",
+    sensor: Annotated[
+        str,
+        typer.Option(
+            metavar="stereo|structured_light|time_of_flight|phone_lidar",
+            help="A kind of depth camera, with its errors.",
+            show_default=False,
+        ),
+    ] = "none",
     orthographic: Annotated[
         bool, typer.Option("--orthographic", help="Parallel rays instead of a pinhole camera.")
     ] = False,
@@ -77,7 +85,7 @@ def simulate(
     dropout: Annotated[
         float, typer.Option(min=0, max=1, help="Part of the pixels without measurement.")
     ] = 0.0,
-    seed: Annotated[int, typer.Option(min=0, help="Of noise and dropout.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of all that is random.")] = 0,
     scale: Annotated[
         float, typer.Option(help="Metres per unit of the mesh file: 0.001 for millimetres.")
     ] = 1.0,
@@ -99,7 +107,7 @@ def simulate(
 
     surface = _mesh(mesh, scale)
     camera = _camera(surface, orthographic, width, height, pixel_size, fx, fy, cx, cy)
-    amount = _noise(noise)
+    amount, kind = _noise(noise), _sensor(sensor, orthographic, edge_mixing)
     poses = nacre.turntable_poses(
         surface,
         views,
@@ -121,6 +129,7 @@ def simulate(
                 image = surface.simulate_depth(
                     camera,
                     pose,
+                    sensor=kind,
                     noise=amount,
                     edge_mixing=float(edge_mixing),
                     quantization=quantization,
@@ -172,6 +181,21 @@ def _noise(text: str) -> Any:
             f"--noise must be a length in metres or one of kinect, stereo, tof, got {text!r}", 2
         )
     return value
+
+
+def _sensor(name: str, orthographic: bool, edge_mixing: bool) -> Any:
+    from typing import get_args
+
+    from nacre.mesh import SensorName
+
+    kinds = get_args(SensorName)
+    if name not in kinds:
+        raise CommandError(f"--sensor must be one of {', '.join(kinds)}, got {name!r}", 2)
+    if name != "none" and orthographic:
+        raise CommandError("--sensor is for a pinhole camera; leave out --orthographic", 2)
+    if name != "none" and edge_mixing:
+        raise CommandError("--sensor mixes edges by itself; leave out --edge-mixing", 2)
+    return name
 
 
 def _camera(

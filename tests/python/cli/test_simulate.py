@@ -42,6 +42,15 @@ def test_pinhole_and_json(tmp_path):
     assert (camera.model, camera.fx, camera.fy, camera.cx) == ("pinhole", 150, 150, 79.5)
 
 
+def test_a_sensor(tmp_path):
+    views = ("--views", 2, "--step", 0, "--width", 160, "--height", 120, "--distance", 0.4)
+    run("simulate", "built-in", "-o", tmp_path / "r", *views, "--sensor", "stereo")
+    first, second = nacre.open_sequence(tmp_path / "r")
+    expected = nacre.built_in_object().simulate_depth(first.camera, first.truth, sensor="stereo", seed=0)
+    np.testing.assert_allclose(first.depth, expected, atol=2e-5)
+    assert np.nanstd(first.depth - second.depth) > 0.001
+
+
 def test_a_mesh_in_millimetres_is_told_and_scaled(tmp_path):
     mesh = nacre.built_in_object()
     path = tmp_path / "mm.ply"
@@ -55,6 +64,9 @@ def test_a_mesh_in_millimetres_is_told_and_scaled(tmp_path):
     ("arguments", "words"),
     [
         (["--noise", "foo"], "kinect"),
+        (["--sensor", "radar"], "--sensor must be one of none, stereo, structured_light"),
+        (["--sensor", "stereo", "--orthographic"], "--orthographic"),
+        (["--sensor", "stereo", "--edge-mixing"], "--edge-mixing"),
         (["--scale", "0"], "--scale"),
         (["--pixel-size", "0.001"], "--orthographic"),
         (["--orthographic", "--fx", "500"], "--fx"),
