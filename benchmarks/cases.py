@@ -46,6 +46,14 @@ REAL = {
     "icl-2": ("icl-livingroom-loop-fast", 2, 150),
 }
 
+SENSORS = {
+    "kinect": nacre.Camera(320, 240, 262.5, 262.5, 159.5, 119.5),
+    "stereo": nacre.Camera(640, 480, 615, 615, 319.5, 239.5),
+    "structured_light": nacre.Camera(640, 480, 525, 525, 319.5, 239.5),
+    "time_of_flight": nacre.Camera(512, 424, 365, 365, 255.5, 211.5),
+    "phone_lidar": nacre.Camera(256, 192, 178, 178, 127.5, 95.5),
+}
+"""The cameras of simulated sensors; "kinect": with independent noise."""
 
 RIGHT_SHIFT = 0.02
 """Of the median depth: a frame that is farther from the truth is wrong."""
@@ -93,15 +101,16 @@ class Figures:
         )
 
 
-def turntable(name: str, mesh: nacre.Mesh, views: int, *, kinect: bool, seed: int) -> Case:
-    """Return an object on a turntable, with mixed pixels at its edges."""
-    camera = nacre.Camera(320, 240, 262.5, 262.5, 159.5, 119.5) if kinect else nacre.default_camera(mesh)
-    place: dict[str, Any] = {"distance": 0.5} if kinect else {}
+def turntable(name: str, mesh: nacre.Mesh, views: int, *, sensor: str, seed: int) -> Case:
+    """Return an object on a turntable, seen by one of SENSORS, or by an orthographic camera."""
+    camera = SENSORS[sensor] if sensor else nacre.default_camera(mesh)
+    place: dict[str, Any] = {"distance": 0.5} if sensor else {}
     poses = nacre.turntable_poses(mesh, views, 2 * math.pi / views, camera=camera, **place)
-    noise: Any = "kinect" if kinect else 0.0005
+    errors: dict[str, Any] = {"noise": "kinect" if sensor else 0.0005, "edge_mixing": 1.0}
+    if sensor not in ("", "kinect"):
+        errors = {"sensor": sensor}
     depths = [
-        mesh.simulate_depth(camera, pose, noise=noise, edge_mixing=1.0, seed=1000 * seed + i)
-        for i, pose in enumerate(poses)
+        mesh.simulate_depth(camera, pose, **errors, seed=1000 * seed + i) for i, pose in enumerate(poses)
     ]
     return Case(name, camera, depths, [None] * views, list(poses), mesh)
 
@@ -165,16 +174,20 @@ def recorded(name: str, *, every: int = 1, most: int | None = None) -> Case:
 
 
 def make(name: str, seed: int = 0, *, every: int = 1, most: int | None = None) -> Case:
-    """Return a case by name: one of REAL, or bunny12, spot-kinect36, poster60, poster60-gray and the like."""
+    """
+    Return a case by name.
+
+    One of REAL, or bunny12, spot-kinect36, bunny-stereo24, poster60, poster60-gray and the like.
+    """
     if name in REAL:
         return recorded(name, every=every, most=most)
     shape, _, rest = name.partition("-")
     if shape.startswith("poster"):
         return poster(int(shape.removeprefix("poster")), colored=rest != "gray", seed=seed)
-    kinect = rest.startswith("kinect")
-    shape = shape.rstrip("0123456789")
-    views = int((rest if kinect else name).lstrip("abcdefghijklmnopqrstuvwxyz"))
-    return turntable(name, object_mesh(shape), views, kinect=kinect, seed=seed)
+    digits = "0123456789"
+    sensor = rest.rstrip(digits) if rest.rstrip(digits) in SENSORS else ""
+    views = int(name[len(name.rstrip(digits)) :])
+    return turntable(name, object_mesh(shape.rstrip(digits)), views, sensor=sensor, seed=seed)
 
 
 def angle_between(a: Array, b: Array) -> float:
