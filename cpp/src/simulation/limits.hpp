@@ -21,14 +21,14 @@ constexpr double hidden_margin = 1e-6;  // [distance] derived: before a point, f
 constexpr double broad_patch = 15.0;  // [pixel] tuned: of a triangulating sensor, over which it errs alike; benchmarks/sensors.py
 
 constexpr double stereo_baseline = 0.05;  // [m] derived: D435, Intel's data sheet 337029; test_sensors
-constexpr double stereo_step = 0.03125;  // [pixel] derived: of disparity: five bits, D4 ASIC, data sheet 337029; test_sensors
+constexpr double stereo_step = 0.03125;  // [pixel] derived: of disparity: D400, Grunnet-Jepsen et al. 2019; test_sensors
 constexpr double stereo_window = 4.5;  // [pixel] tuned: that errs alike, of a matching window; benchmarks/sensors.py
 constexpr double stereo_jitter = 0.25;  // [pixel] tuned: of the place that a window shows; benchmarks/sensors.py
 constexpr double stereo_rough = 0.002;  // [pixel] tuned: of disparity: of each pixel; benchmarks/sensors.py
 constexpr double stereo_fine = 0.018;  // [pixel] tuned: of each window; benchmarks/sensors.py
 constexpr double stereo_broad = 0.1;  // [pixel] tuned: of a broad patch; benchmarks/sensors.py
 constexpr double stereo_fixed = 0.3;  // [1] tuned: part of the variance of windows and patches that all images share; benchmarks/sensors.py
-constexpr double stereo_ripple = 0.012;  // [pixel] tuned: amplitude of what repeats with each pixel of disparity; benchmarks/sensors.py
+constexpr double stereo_ripple = 0.012;  // [pixel] tuned: amplitude of what repeats with each pixel of disparity, Grunnet-Jepsen et al. 2019; benchmarks/sensors.py
 constexpr double stereo_range = 3.0;  // [m] tuned: where half the signal is left; benchmarks/sensors.py
 constexpr double stereo_least_signal = 0.25;  // [1] tuned: of a bright surface in front of the camera; benchmarks/sensors.py
 
