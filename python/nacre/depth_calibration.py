@@ -1,4 +1,4 @@
-"""A systematic error of depth cameras, found from a recording that was tracked."""
+"""Systematic errors of depth cameras, found from a recording that was tracked."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ _BLOCK = 4  # pixels, each way, whose inverse depths are averaged
 LEAST_TURN, _MOST_TURN = 0.1, 0.6  # between two views that are compared [rad]
 MOST_VIEWS = 24
 LEAST_VIEWS = 5  # those have enough pairs
-_STEPS = 8
-_LEAST_PART = 1e-4  # of the information on the tilt that the other unknowns leave; rounding leaves less
+_STEPS = 16
+_LARGEST_STEP = 0.1  # of the stretch
+_LEAST_PART = 1e-4  # of the information that the other unknowns leave; rounding leaves less
 _AT_REST = 0.1  # of a standard deviation
 _LEAST_PAIRS = 6
 _LEAST_SIGMAS = 7.0
 _LEAST_TILT = 0.002  # about the noise of the inverse depth of one pixel, structured light [1/m]
+_LEAST_FOCAL_ERROR = 0.04  # recordings whose focal length was calibrated, and depth was not, show up to 0.03
 _GATE = 0.05  # of the depth: surfaces that are farther apart are not the same
 _MOST_CHANGE = 0.5  # a correction that changes depth by more is none
 
@@ -35,7 +37,7 @@ Array = npt.NDArray[np.float64]
 @dataclass(frozen=True)
 class DepthCalibration:
     """
-    How the inverse depth of a camera is off from one side of the image to the other.
+    How the inverse depth of a camera is off from one side of the image to the other, and its focal length.
 
     Structured light and stereo measure a disparity along the image's rows, which is ``fx * baseline``
     times the inverse depth. Where pattern and camera, or the two cameras, do not fit each other quite in
@@ -50,17 +52,42 @@ class DepthCalibration:
         Its standard deviation, from how much pairs of views differ (1/m); infinite with fewer than two.
     num_pairs : int
         Pairs of views that it is from.
+    focal_scale : float
+        The focal length that makes the views agree best, by the camera's. Depth that is wrong by a factor
+        shows the same, inverted: a scene that is stretched along the camera's axis.
+    focal_sigma : float
+        Its standard deviation, likewise.
     """
 
     tilt: float
     sigma: float
     num_pairs: int
+    focal_scale: float = 1.0
+    focal_sigma: float = math.inf
 
     @property
     def is_significant(self) -> bool:
         """Whether the error matters (0.002 / m) and is beyond doubt (seven sigma, six pairs)."""
         is_sure = self.num_pairs >= _LEAST_PAIRS and abs(self.tilt) > _LEAST_SIGMAS * self.sigma
         return is_sure and abs(self.tilt) > _LEAST_TILT
+
+    @property
+    def has_wrong_focal_length(self) -> bool:
+        """Whether the camera's focal length is off by more than 4 %, beyond doubt (seven sigma, six pairs)."""
+        error = abs(self.focal_scale - 1.0)
+        is_sure = self.num_pairs >= _LEAST_PAIRS and error > _LEAST_SIGMAS * self.focal_sigma
+        return is_sure and error > _LEAST_FOCAL_ERROR
+
+    def focal_length_advice(self, camera: Camera) -> str:
+        """Return which focal length the camera seems to have; nothing where its own is not clearly wrong."""
+        if not self.has_wrong_focal_length:
+            return ""
+        fx, fy = (self.focal_scale * length for length in (camera.fx, camera.fy))
+        return (
+            f"views in different directions fit each other best with fx {fx:.0f} and fy {fy:.0f} pixels, "
+            f"{self.focal_scale:.2f} times what the camera says (sigma {self.focal_sigma:.3f}): "
+            "its focal length is wrong, or the depth by the inverse factor"
+        )
 
     def correct(self, depth: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.float32]:
         """
@@ -94,13 +121,12 @@ class DepthCalibration:
 
 def calibrate_depth(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera: Camera) -> DepthCalibration:
     """
-    Find the systematic error of depth that makes overlapping views agree best.
+    Find the systematic error of depth and the focal length that make overlapping views agree best.
 
-    Two views of one surface from different directions see it in different columns; what the tilt of the
-    inverse depth and their relative pose together explain is fitted to all pairs of successive views that
-    are 0.1 to 0.6 rad apart (point to plane, Gauss and Newton, robust; with a focal length of each pair's
-    own, which is not kept, as a wrong one would look like a tilt). Poses need to be about right only.
-    The idea, to calibrate depth by what overlaps in a recording, is that of Teichman, Miller and Thrun 2013.
+    Two views of one surface from different directions see it in different columns, stretched along different
+    axes; what the tilt of the inverse depth, a focal length and their relative pose together explain is fitted
+    to all pairs of successive views that are 0.1 to 0.6 rad apart (point to plane, Gauss and Newton, robust).
+    Poses need to be about right only. The idea, to calibrate depth by what overlaps in a recording, is that of Teichman, Miller and Thrun 2013.
 
     Parameters
     ----------
@@ -129,23 +155,25 @@ def calibrate_depth(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera
         for a, b in zip(chosen, chosen[step:], strict=False)
         if LEAST_TURN <= turn_between(a.pose, b.pose) <= _MOST_TURN
     ]
-    tilt, sigma = 0.0, math.inf
+    distortion = np.array([0.0, 1.0])  # the tilt, and by how much the scene is too narrow
     for _ in range(_STEPS):
-        found = [fit for pair in pairs if (fit := pair.step(tilt, camera)) is not None]
-        weight = sum(information for _, information in found)
-        if len(found) < 2 or not weight > 0.0:
+        found = [fit for pair in pairs if (fit := pair.linearised(distortion, camera)) is not None]
+        if len(found) < 2:
             return DepthCalibration(0.0, math.inf, len(found))
-        before = tilt
-        tilt = sum(information * value for value, information in found) / weight
+        covariance = np.linalg.inv(sum(information for information, _ in found))
+        step = -covariance @ sum(gradient for _, gradient in found)
         # From the scatter, as neighbours share their errors; two pairs share a view.
-        scatter = sum((information * (value - tilt)) ** 2 for value, information in found)
-        sigma = math.sqrt(2.0 * scatter) / weight
-        if abs(tilt - before) < _AT_REST * sigma:
+        left = np.array([gradient + information @ step for information, gradient in found])
+        sigmas = np.sqrt(2.0 * np.diag(covariance @ np.einsum("ni,nj->ij", left, left) @ covariance))
+        step *= min(1.0, _LARGEST_STEP / max(abs(float(step[1])), 1e-12))
+        distortion = distortion + step
+        if (np.abs(step) < _AT_REST * sigmas).all():
             break
         for pair in pairs:
-            pair.follow(tilt)
+            pair.follow(step)
+    (tilt, stretch), (sigma, stretch_sigma) = distortion.tolist(), sigmas.tolist()
     _log.info("depth is tilted by %.4f / m, sigma %.4f / m, by %d pairs of views", tilt, sigma, len(found))
-    return DepthCalibration(tilt, sigma, len(found))
+    return DepthCalibration(tilt, sigma, len(found), 1.0 / stretch, stretch_sigma / stretch**2)
 
 
 @dataclass(frozen=True)
@@ -157,23 +185,23 @@ class _View:
 
 
 class _Pair:
-    """Two views, their relative pose, and what they say of the tilt."""
+    """Two views, their relative pose, and what they say of tilt and stretch."""
 
     def __init__(self, first: _View, second: _View) -> None:
         self.first, self.second = first, second
         self.motion = np.linalg.inv(first.pose) @ second.pose
-        self._solution: tuple[Array, Array, float] | None = None
+        self._solution: Array | None = None
 
-    def step(self, tilt: float, camera: Camera) -> tuple[float, float] | None:
-        """Linearise at the pose and a tilt; return the tilt that fits best and its information."""
+    def linearised(self, distortion: Array, camera: Camera) -> tuple[Array, Array] | None:
+        """Return the information on tilt and stretch, and the gradient, which the pose leaves."""
         self._solution = None
-        target, source = _corrected(self.first.points, tilt), _corrected(self.second.points, tilt)
+        target, source = (_corrected(view.points, distortion) for view in (self.first, self.second))
         normals, source_normals = _normals(target).reshape(-1, 3), _normals(source).reshape(-1, 3)
         smooth = np.isfinite(source_normals[:, 0])
         source_normals = source_normals[smooth]
         rotation, shift = self.motion[:3, :3], self.motion[:3, 3]
         moved = _turned(source.reshape(-1, 3)[smooth], rotation) + shift
-        seen_by = _blocks_that_see(moved, camera)
+        seen_by = _blocks_that_see(moved / [distortion[1], distortion[1], 1.0], camera)
         matched = seen_by >= 0
         p, q, n = moved[matched], target.reshape(-1, 3)[seen_by[matched]], normals[seen_by[matched]]
         residual = np.einsum("ij,ij->i", q - p, n)
@@ -187,9 +215,8 @@ class _Pair:
         middle = 0.5 * (p + q)
         local = _turned(middle - shift, rotation.T)
         slope = np.einsum("ij,ij->i", n, middle * middle[:, :1] - _turned(local * local[:, :1], rotation))
-        # A wrong focal length would show as a tilt, too: each pair has its own, and it is forgotten.
         wide, wide_local = middle * [1.0, 1.0, 0.0], local * [1.0, 1.0, 0.0]
-        of_focal_length = np.einsum("ij,ij->i", n, wide - _turned(wide_local, rotation))
+        widening = np.einsum("ij,ij->i", n, wide - _turned(wide_local, rotation)) / distortion[1]
         rows_of_pose = -np.concatenate([np.cross(p, n), n], axis=1)
         depth = q[:, 2]
         noise = depth**2 / np.median(depth**2)
@@ -197,23 +224,21 @@ class _Pair:
         scale = 1.4826 * max(float(np.median(np.abs(whitened))), 1e-9)
         weight = 1.0 / (noise * scale * (1.0 + (whitened / (3.0 * scale)) ** 2)) ** 2
         # Sums by einsum: those of a BLAS depend on its threads.
-        rows = np.column_stack([rows_of_pose, of_focal_length, slope, residual])
+        rows = np.column_stack([rows_of_pose, slope, widening, residual])
         sums = np.einsum("n,ni,nj->ij", weight, rows, rows)
-        hessian = sums[:7, :7] + 1e-9 * np.trace(sums[:7, :7]) * np.eye(7)
-        of_slope, of_residual = np.linalg.solve(hessian, sums[:7, 7:]).T
-        information = float(sums[7, 7] - sums[:7, 7] @ of_slope)
-        gradient = float(sums[7, 8] - sums[:7, 7] @ of_residual)
-        if not information > _LEAST_PART * float(sums[7, 7]):
+        hessian = sums[:6, :6] + 1e-9 * np.trace(sums[:6, :6]) * np.eye(6)
+        solution = np.linalg.solve(hessian, sums[:6, 6:])
+        left = sums[6:8, 6:] - sums[6:8, :6] @ solution
+        if not (np.diag(left) > _LEAST_PART * np.diag(sums)[6:8]).all():
             return None
-        self._solution = (of_residual, of_slope, tilt)
-        return tilt - gradient / information, information
+        self._solution = solution
+        return left[:, :2], left[:, 2]
 
-    def follow(self, tilt: float) -> None:
-        """Take the pose that belongs to a tilt."""
+    def follow(self, step: Array) -> None:
+        """Take the pose that belongs to a step of tilt and stretch."""
         if self._solution is None:
             return
-        of_residual, of_slope, before = self._solution
-        twist = -of_residual - (tilt - before) * of_slope
+        twist = -self._solution @ [*step, 1.0]
         motion = np.eye(4)
         motion[:3, :3] = _rotation(twist[:3])
         motion[:3, 3] = twist[3:6]
@@ -246,9 +271,11 @@ def _average(depth: npt.NDArray[np.float32], rays: Array) -> Array:
     return points
 
 
-def _corrected(points: Array, tilt: float) -> Array:
-    """Return measured points without the tilt: 1 / z less tilt * x / z."""
-    return points / (1.0 - tilt * points[..., :1])
+def _corrected(points: Array, distortion: Array) -> Array:
+    """Return measured points without the tilt (1 / z less tilt * x / z), and stretched across the axis."""
+    tilt, stretch = distortion
+    corrected: Array = points / (1.0 - tilt * points[..., :1]) * [stretch, stretch, 1.0]
+    return corrected
 
 
 def _normals(points: Array) -> Array:

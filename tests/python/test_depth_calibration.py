@@ -109,6 +109,38 @@ def test_a_wrong_focal_length_is_not_taken_for_it(room):
     assert not nacre.calibrate_depth(zip(depths, poses, strict=True), camera).is_significant
 
 
+@pytest.mark.parametrize("factor", [0.8, 0.93, 1.07, 1.25])
+@pytest.mark.parametrize("tilt", [0.0, 0.02])
+def test_it_finds_the_focal_length(room, factor, tilt):
+    depths, poses = room
+    camera = nacre.Camera(width=320, height=240, fx=260 * factor, fy=260 * factor, cx=159.5, cy=119.5)
+    tilted = [depth / (1.0 + tilt * SIDE * depth) for depth in depths]
+    found = nacre.calibrate_depth(zip(tilted, poses, strict=True), camera)
+    assert found.has_wrong_focal_length
+    assert found.focal_scale * factor == pytest.approx(1.0, abs=0.005)
+    advice = found.focal_length_advice(camera)
+    assert f"fx {camera.fx * found.focal_scale:.0f} " in advice
+
+
+@pytest.mark.parametrize("factor", [0.97, 1.0, 1.03])
+def test_a_focal_length_that_is_about_right_is_no_cause_for_advice(room, factor):
+    depths, poses = room
+    camera = nacre.Camera(width=320, height=240, fx=260 * factor, fy=260 * factor, cx=159.5, cy=119.5)
+    found = nacre.calibrate_depth(zip(depths, poses, strict=True), camera)
+    assert not found.has_wrong_focal_length
+    assert found.focal_length_advice(camera) == ""
+
+
+def test_a_wrong_focal_length_is_told_once_by_a_reconstruction(room, caplog):
+    depths, _ = room
+    camera = nacre.Camera(width=320, height=240, fx=234, fy=234, cx=159.5, cy=119.5)
+    frames = [nacre.SequenceFrame(i, depth, camera, None, None, None) for i, depth in enumerate(depths)]
+    with caplog.at_level("WARNING", logger="nacre"):
+        done = nacre.reconstruct(frames, calibrate=True)
+    assert done.depth_calibration.focal_scale == pytest.approx(1 / 0.9, abs=0.01)
+    assert len([record for record in caplog.records if "focal length is wrong" in record.message]) == 1
+
+
 def test_a_recording_that_can_be_read_only_once_is_enough(room):
     depths, poses = room
     once = ((depth, matrix) for depth, matrix in zip(depths, poses, strict=True))

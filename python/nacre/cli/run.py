@@ -126,6 +126,8 @@ def _write(job: Job, stop: Interruption) -> dict[str, Any]:
     done = job.run.done
     done.evaluate_trajectory()
     feed, calibration = job.feed, done.depth_calibration
+    advice = "" if calibration is None else calibration.focal_length_advice(done.model.camera)
+    figures = {"camera": advice} if advice else {}
     return write_results(
         job.unfinished.out,
         done,
@@ -139,7 +141,7 @@ def _write(job: Job, stop: Interruption) -> dict[str, Any]:
             and dataclasses.asdict(calibration) | {"used": calibration.is_significant},
             "live": job.unfinished.live,
         },
-        figures=None if feed is None else dict(feed.rows),
+        figures=figures if feed is None else {**figures, **dict(feed.rows)},
         page=not stop.wanted,
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+
 import numpy as np
 import numpy.typing as npt
 
@@ -21,6 +23,8 @@ from nacre.parameters import ModelParameters, RegionParameters
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.saved_state import pose_from
+
+_log = logging.getLogger("nacre.reconstruction")
 
 
 def shows_one_scene(camera: Camera, parameters: ModelParameters) -> bool:
@@ -67,6 +71,8 @@ class DepthViews:
             frames = with_corrected_depth(done.sequence, calibration)
             done = Reconstruction(frames, Model(camera, parameters=done.model.parameters))
         done.depth_calibration = calibration
+        if advice := calibration.focal_length_advice(camera):
+            _log.warning(advice)
         return done
 
 

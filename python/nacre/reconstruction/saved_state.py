@@ -58,10 +58,11 @@ def record_from(state: Any, reports: Sequence[FrameReport]) -> FrameRecord:
 
 def calibration_from(state: Any) -> DepthCalibration:
     """Return a calibration of depth that was written as plain values; errors as in :func:`record_from`."""
-    tilt, sigma = as_number("tilt", state["tilt"]), as_length("sigma", state["sigma"])
-    if not math.isfinite(tilt):
-        raise ValueError(f"tilt must be finite, got {tilt}")
-    return DepthCalibration(tilt, sigma, as_count("num_pairs", state["num_pairs"]))
+    tilt, scale = as_number("tilt", state["tilt"]), as_number("focal_scale", state["focal_scale"])
+    if not (math.isfinite(tilt) and math.isfinite(scale)):
+        raise ValueError(f"tilt and focal_scale must be finite, got {tilt} and {scale}")
+    sigma, focal_sigma = (as_length(name, state[name]) for name in ("sigma", "focal_sigma"))
+    return DepthCalibration(tilt, sigma, as_count("num_pairs", state["num_pairs"]), scale, focal_sigma)
 
 
 def pose_from(values: Any) -> npt.NDArray[np.float64]:
