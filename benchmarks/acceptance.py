@@ -10,7 +10,9 @@ twice that, and left out between, or where it leaves directions open.
 For each recording: the area under the ROC curve; the share of right ones and the number of wrong ones that
 reach `min_score`; and the score that 3 % of the wrong ones of all the other recordings reach, with the same
 figures. Then, for each frame that has something in common with the model, the best of its starts: how many
-are right and wrong by its score, and the greatest score of a wrong one of the other recordings.
+are right and wrong by its score, and the greatest score of a wrong one of the other recordings. Last, the
+probability that the best is right, a logistic curve of the score's logarithm that is fitted to the other
+recordings, against how many are.
 
     python benchmarks/acceptance.py teddy rpy d435 robot sr300 iphone boxcan icl
 """
@@ -38,6 +40,8 @@ WRONG_STARTS = (10.0, 20.0)
 """[degrees] With shifts of 3 % of the depth for each 10 degrees."""
 RIGHT_SHIFT, RIGHT_TURN = 0.03, 3.0
 WRONG_SHARE = 0.03
+LEAST_SCORE = 1e-3
+"""Lower ones are taken for this: where nothing fits, how little does."""
 
 
 def turned(pose: Array, degrees: float, shift: float, rng: np.random.Generator) -> Array:
@@ -156,14 +160,15 @@ def main() -> None:
             ]
         cells.insert(3, f"{level:.2f}")
         print(f"| {name} | {right.sum()} | {(~right).sum()} | {' | '.join(cells)} |")
-    print_best(found)
+    best = {name: of.best() for name, of in found.items()}
+    print_best(best)
+    print_reliability(best)
 
 
-def print_best(found: dict[str, Registrations]) -> None:
+def print_best(best: dict[str, Registrations]) -> None:
     """Print how often the best of a frame's starts is right and wrong, by its score."""
     least = nacre.ModelParameters().min_score
     bounds = [0.0, 0.2 * least, 0.4 * least, least, np.inf]
-    best = {name: of.best() for name, of in found.items()}
     heads = [f"{low:.2f} to {high:.2f}" for low, high in itertools.pairwise(bounds)]
     print(f"\n| best of the starts | {' | '.join(heads)} | greatest wrong score of the others |")
     print(f"|{'---|' * (len(heads) + 2)}")
@@ -175,6 +180,49 @@ def print_best(found: dict[str, Registrations]) -> None:
         others = [o.scores[~o.right] for other, o in best.items() if other != name or len(best) == 1]
         greatest = max((float(wrong.max()) for wrong in others if len(wrong) > 0), default=0.0)
         print(f"| {name} | {' | '.join(cells)} | {greatest:.3f} |")
+
+
+def fitted(scores: Array, right: npt.NDArray[np.bool_]) -> tuple[float, float]:
+    """Return the score of even odds, and the power of it by which odds grow (maximum likelihood)."""
+    rows = np.column_stack([np.ones(len(scores)), np.log(np.maximum(scores, LEAST_SCORE))])
+    weights = np.zeros(2)
+    for _ in range(50):
+        told = 1 / (1 + np.exp(-rows @ weights))
+        curvature = rows.T @ (rows * (told * (1 - told))[:, None]) + 1e-6 * np.eye(2)
+        weights += np.linalg.solve(curvature, rows.T @ (right - told))
+    return float(np.exp(-weights[0] / weights[1])), float(weights[1])
+
+
+def print_reliability(best: dict[str, Registrations]) -> None:
+    """Print the probability that is told, with the recording left out, against how many are right."""
+    bounds = [0.0, 0.5, 0.8, 0.95, 0.99, 1.0]
+    heads = [f"{low:g} to {high:g}" for low, high in itertools.pairwise(bounds)]
+    print(f"\n| told probability | even odds at | power | {' | '.join(heads)} |")
+    print(f"|{'---|' * (len(heads) + 3)}")
+    told_by_others, was_right = [], []
+    for name, of in best.items():
+        others = [o for other, o in best.items() if other != name or len(best) == 1]
+        even, power = fitted(
+            np.concatenate([o.scores for o in others]), np.concatenate([o.right for o in others])
+        )
+        told = 1 / (1 + (even / np.maximum(of.scores, LEAST_SCORE)) ** power)
+        print(f"| {name} | {even:.3f} | {power:.2f} | {' | '.join(by_told(told, of.right, bounds))} |")
+        told_by_others.append(told)
+        was_right.append(of.right)
+    every = np.concatenate([o.scores for o in best.values()]), np.concatenate(was_right)
+    even, power = fitted(*every)
+    cells = by_told(np.concatenate(told_by_others), every[1], bounds)
+    print(f"| all | {even:.3f} | {power:.2f} | {' | '.join(cells)} |")
+
+
+def by_told(told: Array, right: npt.NDArray[np.bool_], bounds: list[float]) -> list[str]:
+    """Return for each range of probabilities how many are told on average, and how many are right."""
+    cells = []
+    for low, high in itertools.pairwise(bounds):
+        inside = (told >= low) & ((told < high) | (high == bounds[-1]))
+        count = int(inside.sum())
+        cells.append(f"{told[inside].sum():.1f} / {right[inside].sum()} of {count}" if count else "-")
+    return cells
 
 
 if __name__ == "__main__":

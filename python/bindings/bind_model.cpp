@@ -127,6 +127,7 @@ void bind_model(py::module_& m) {
       .def_readonly("overlap", &FrameReport::overlap)
       .def_readonly("consistency", &FrameReport::consistency)
       .def_readonly("score", &FrameReport::score)
+      .def_property_readonly("probability", &FrameReport::probability)
       .def_readonly("rmse", &FrameReport::rmse)
       .def_property_readonly("information",
                              [](const FrameReport& report) { return Eigen::Matrix<double, 6, 6>(report.information); })

@@ -73,7 +73,7 @@ class DepthCalibration:
 
     @property
     def has_wrong_focal_length(self) -> bool:
-        """Whether the camera's focal length is off by more than 4 %, beyond doubt (seven sigma, six pairs)."""
+        """Whether the focal length is off by more than 4 %, beyond doubt (seven sigma, six pairs)."""
         error = abs(self.focal_scale - 1.0)
         is_sure = self.num_pairs >= _LEAST_PAIRS and error > _LEAST_SIGMAS * self.focal_sigma
         return is_sure and error > _LEAST_FOCAL_ERROR
@@ -123,10 +123,11 @@ def calibrate_depth(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera
     """
     Find the systematic error of depth and the focal length that make overlapping views agree best.
 
-    Two views of one surface from different directions see it in different columns, stretched along different
-    axes; what the tilt of the inverse depth, a focal length and their relative pose together explain is fitted
-    to all pairs of successive views that are 0.1 to 0.6 rad apart (point to plane, Gauss and Newton, robust).
-    Poses need to be about right only. The idea, to calibrate depth by what overlaps in a recording, is that of Teichman, Miller and Thrun 2013.
+    Two views of one surface from different directions see it in different columns, stretched along
+    different axes; what the tilt of the inverse depth, a focal length and their relative pose together
+    explain is fitted to all pairs of successive views that are 0.1 to 0.6 rad apart (point to plane, Gauss
+    and Newton, robust). Poses need to be about right only. The idea, to calibrate depth by what overlaps in
+    a recording, is that of Teichman, Miller and Thrun 2013.
 
     Parameters
     ----------

@@ -50,6 +50,9 @@ class FrameReport(Value):
         overlap^2 and consistency^4 (consistency^8 far from all guesses); less where residuals of neighbours
         agree beyond what noise explains. Unrelated surfaces seldom reach 0.3; good registrations have 0.35 to
         3, those of an object that turned far on its plane less.
+    probability : float
+        That the registration is right, by its score; of a lost frame, that the best one was, which was not
+        taken. NaN where the pose came without a registration, as the first frame's.
     loop_frame : int or None
         The earlier frame that this one closed a loop with: model and poses were corrected.
     loop_distance : float
@@ -82,6 +85,7 @@ class FrameReport(Value):
     overlap: float
     consistency: float
     score: float
+    probability: float
     rmse: float
     information: npt.NDArray[np.float64]
     weak_directions: npt.NDArray[np.float64]

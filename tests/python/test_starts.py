@@ -155,3 +155,13 @@ def test_a_recording_tells_what_became_of_its_first_frames() -> None:
     done = nacre.reconstruct(frames, retry=False)
     assert [frame.status for frame in done.frames] == ["LOST", *["TRACKED"] * 4]
     assert done.num_tracked == 4
+
+
+def test_lost_frames_are_tried_again_only_where_the_model_has_grown_since() -> None:
+    wall, other = along_wall(4), another_scene()
+    order = [other, *wall, other]
+    frames = [nacre.SequenceFrame(i, view, CAMERA, None, None, None) for i, view in enumerate(order)]
+    done = nacre.reconstruction.Reconstruction(frames, nacre.Model(CAMERA))
+    list(done.run())
+    assert [frame.status for frame in done.frames] == ["LOST", *["TRACKED"] * 4, "LOST"]
+    assert [frame.index for frame in done.retry_lost()] == [0]

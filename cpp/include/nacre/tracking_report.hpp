@@ -30,6 +30,10 @@ struct TrackingReport {
   double rmse = 0.0;         ///< of the inliers, along the normals [m]
   Matrix6 information = Matrix6::Zero();                     ///< see AlignResult
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult
+
+  /// That the registration is right, by its score; of a lost frame, that the best one was, which was not taken. NaN where
+  /// the pose came without a registration.
+  double probability() const;
 };
 
 }  // namespace nacre

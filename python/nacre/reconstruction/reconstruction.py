@@ -41,6 +41,13 @@ def _renewed(record: FrameRecord, report: FrameReport) -> FrameRecord:
     return dataclasses.replace(record, status=report.status, reason=report.reason, report=report)
 
 
+def _fused_index(record: FrameRecord) -> int:
+    """Return which of the model's frames it is; -1 where it did not change the model."""
+    if record.report is None or _RANK[record.status] < _RANK["TRACKED"]:
+        return -1
+    return record.report.index
+
+
 @dataclass
 class _Retry:
     """How far lost frames were gone over again."""
@@ -135,27 +142,32 @@ class Reconstruction(Checkpointed):
         """
         Go over the lost frames again, while any of them is found, and yield each that was tried.
 
-        The model has grown since they were lost. A frame that is found now is RELOCALISED, and takes the
-        place of its lost record in ``frames``; so do WEAK ones of which the model now knows enough. Frames
-        that could not be read, that the model refused, or that the recording has no more, stay as they are.
+        Those, that is, since which the model has grown: to look at the same model twice tells nothing new. A
+        frame that is found now is RELOCALISED, and takes the place of its lost record in ``frames``; so do
+        WEAK ones of which the model now knows enough. Frames that could not be read, that the model refused,
+        or that the recording has no more, stay as they are.
         """
         if self._retry is None:
             if not self.counts["LOST"]:
                 return
             self._retry = _Retry()
         state = self._retry
+        newest_fused = max(map(_fused_index, self.frames), default=-1)
         while True:
             while state.place < len(self.frames):
                 before = self.frames[state.place]
                 is_there = before.index < len(self.sequence)  # a killed process may not have kept the newest
-                if before.report is None or before.status not in ("LOST", "WEAK") or not is_there:
+                is_open = before.status in ("LOST", "WEAK") and is_there
+                if before.report is None or not is_open or before.report.index > newest_fused:
                     state.place += 1
                     continue
                 record = self._add(before.index, before.world_from_camera)
                 if record.status == "TRACKED":
                     record = dataclasses.replace(record, status="RELOCALISED")
-                if _RANK[record.status] > _RANK[before.status]:
-                    state.found_any = True
+                is_better = _RANK[record.status] > _RANK[before.status]
+                state.found_any |= is_better
+                newest_fused = max(newest_fused, _fused_index(record))
+                if is_better or record.status == "LOST":
                     self.frames[state.place] = record
                 state.place += 1
                 yield self.frames[state.place - 1]

@@ -18,6 +18,7 @@ _COLUMNS = (
     ("Inliers", "num_inliers", "count"),
     ("Overlap", "overlap", "fraction"),
     ("Registration score", "score", "number"),
+    ("Probability", "probability", "fraction"),
     ("Residual", "rmse", "m"),
     ("Position error", "translation_error", "m"),
     ("Rotation error", "rotation_error", "rad"),

@@ -48,7 +48,9 @@ def forged(old: str, new: str) -> bytes:
     return with_note(SAVED_RUN, note.replace(old.encode(), new.encode(), 1))
 
 
-_CALIBRATION = '"depth_calibration": {"tilt": %s, "sigma": %s, "num_pairs": %s}'
+_CALIBRATION = (
+    '"depth_calibration": {"tilt": %s, "sigma": %s, "num_pairs": %s, "focal_scale": 1, "focal_sigma": 1}'
+)
 FORGED = {
     "run of no JSON": ('"run": {', '"run": {{', "does not say the depth_scale"),
     "run nested deep": ('"retry": null', '"retry": ' + "[" * 50_000, "does not say the depth_scale"),
@@ -84,7 +86,7 @@ FORGED = {
         "place must be an integer of at least 0",
     ),
     "retry of no flag": ('"retry": null', '"retry": {"place": 0, "found_any": 3}', "found_any must be True"),
-    "calibration nan": ('"depth_calibration": null', _CALIBRATION % ("NaN", 1, 9), "tilt must be finite"),
+    "calibration nan": ('"depth_calibration": null', _CALIBRATION % ("NaN", 1, 9), "tilt and focal_scale must be finite"),
     "calibration of negative sigma": (
         '"depth_calibration": null',
         _CALIBRATION % (1, -1, 9),

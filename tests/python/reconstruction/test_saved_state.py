@@ -62,14 +62,16 @@ def test_values_that_no_record_has_are_refused(change: dict[str, object], messag
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"tilt": math.nan}, "tilt must be finite"),
+        ({"tilt": math.nan}, "tilt and focal_scale must be finite"),
+        ({"focal_scale": math.inf}, "tilt and focal_scale must be finite"),
+        ({"focal_sigma": -1.0}, "focal_sigma must be at least 0"),
         ({"tilt": "much"}, "tilt must be a number"),
         ({"sigma": -1.0}, "sigma must be at least 0"),
         ({"num_pairs": math.inf}, "num_pairs must be an integer"),
     ],
 )
 def test_values_that_no_calibration_has_are_refused(change: dict[str, object], message: str) -> None:
-    good = {"tilt": 0.01, "sigma": math.inf, "num_pairs": 1}
+    good = {"tilt": 0.01, "sigma": math.inf, "num_pairs": 1, "focal_scale": 1.0, "focal_sigma": 0.1}
     assert calibration_from(json.loads(json.dumps(good))).tilt == 0.01
     with pytest.raises((ValueError, TypeError), match=message):
         calibration_from({**good, **change})
