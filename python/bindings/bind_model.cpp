@@ -47,7 +47,8 @@ py::dict milliseconds(const FrameReport& report) {
 
 FrameReport add_frame(Model& model, const DepthRef& depth, const MaskRef& mask, const ColorsRef& colors,
                       const std::vector<std::pair<std::string, Attributes>>& attributes,
-                      std::optional<double> timestamp, const std::optional<PoseMatrix>& guess, bool keep_guess) {
+                      std::optional<double> timestamp, const std::optional<PoseMatrix>& guess, bool keep_guess,
+                      bool search) {
   FrameExtras extras;
   extras.mask = mask;
   extras.colors = colors;
@@ -55,6 +56,7 @@ FrameReport add_frame(Model& model, const DepthRef& depth, const MaskRef& mask, 
   extras.timestamp = timestamp;
   if (guess) extras.guess = to_pose(*guess);
   extras.keep_guess = keep_guess;
+  extras.search = search;
   return model.add_frame(depth, extras);
 }
 

@@ -99,6 +99,7 @@ class Model(ExchangeablePoints, Checkpointed):
         attributes: Mapping[str, npt.ArrayLike] | None = None,
         guess: npt.ArrayLike | None = None,
         keep_guess: bool = False,
+        search: bool = True,
     ) -> FrameReport:
         """
         Clean a depth image, register it to the model and fuse it.
@@ -122,6 +123,9 @@ class Model(ExchangeablePoints, Checkpointed):
             A pose (world_from_camera) to start the registration from, in place of the last one.
         keep_guess : bool
             Take the guess for the pose, without registration.
+        search : bool
+            Whether a frame that is lost near its guess is looked for elsewhere, too, where ``relocalise`` is
+            on.
 
         Returns
         -------
@@ -150,9 +154,9 @@ class Model(ExchangeablePoints, Checkpointed):
         if timestamp is not None and not isinstance(timestamp, numbers.Real):
             raise TypeError(f"timestamp must be a number of seconds or None, got {timestamp!r}")
         time = None if timestamp is None else as_number("timestamp", timestamp)
-        keeps = as_flag("keep_guess", keep_guess)
+        flags = as_flag("keep_guess", keep_guess), as_flag("search", search)
         with self._lock:
-            return report_from(self._core.add_frame(image, pixels, colors, more, time, pose, keeps))
+            return report_from(self._core.add_frame(image, pixels, colors, more, time, pose, *flags))
 
     def _checkpoint(self, **more: Any) -> bytes:
         with self._lock:

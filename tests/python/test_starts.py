@@ -165,3 +165,29 @@ def test_lost_frames_are_tried_again_only_where_the_model_has_grown_since() -> N
     list(done.run())
     assert [frame.status for frame in done.frames] == ["LOST", *["TRACKED"] * 4, "LOST"]
     assert [frame.index for frame in done.retry_lost()] == [0]
+
+
+def test_a_frame_that_is_not_to_be_searched_for_is_looked_for_near_its_guess_alone() -> None:
+    wall = along_wall(9)
+    model = nacre.Model(CAMERA)
+    add_all(model, wall[:6])
+    far, near = np.eye(4), np.eye(4)
+    far[:3, :3] = [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]
+    near[0, 3] = STEP * 2
+    assert model.add_frame(wall[2], guess=far, search=False).status == "LOST"
+    report = model.add_frame(wall[2], guess=near, search=False)
+    assert report.status == "RELOCALISED"
+    assert abs(report.world_from_camera[0, 3] - near[0, 3]) < 0.001
+
+
+def test_where_the_camera_moves_on_lost_frames_are_found_from_those_beside_them() -> None:
+    wall = along_wall(12)
+    hidden = [view if i not in (4, 5, 6) else np.zeros_like(view) for i, view in enumerate(wall)]
+    frames = [nacre.SequenceFrame(i, view, CAMERA, None, None, None) for i, view in enumerate(hidden)]
+    done = nacre.reconstruction.Reconstruction(frames, nacre.Model(CAMERA))
+    list(done.run())
+    assert [frame.index for frame in done.frames if frame.status == "LOST"] == [4, 5, 6]
+    frames[4:7] = [nacre.SequenceFrame(i, wall[i], CAMERA, None, None, None) for i in (4, 5, 6)]
+    assert [frame.index for frame in done.retry_lost()] == [6, 5, 4]
+    assert [done.frames[i].status for i in (4, 5, 6)] == ["RELOCALISED"] * 3
+    assert np.abs(done.poses[:, 0, 3] - STEP * np.arange(12)).max() < 0.002

@@ -184,8 +184,10 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   }
   const Expectation expectation = was_lost() || jumped() ? Expectation::near_lost : Expectation::expected;
   const bool is_predicted = !was_lost() || extras.guess.has_value();
+  const bool has_moved = history.num_registered() > 1 || is_trial;
+  if (!extras.search) hypothesis.forget();
   result = track_frame(
-      {guesses(extras), expectation, is_predicted, history.num_registered() > 1 || is_trial, elsewhere(region_report)});
+      {guesses(extras), expectation, is_predicted, has_moved, elsewhere(region_report, extras.search)}, extras.search);
   const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
   if (is_determined && !result.is_on_plane) {
     refine_by_outlines(result.alignment, outline, loops.outlines_near(result.alignment.target_from_source),
@@ -197,14 +199,14 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
 // Until frames have told how noisy the camera is, a frame that is lost may be noisier where it is expected; elsewhere
 // it is looked for with the noise that is known. Before the second frame none has told: its residuals must show the
 // noise that was tried.
-TrackingResult Pipeline::track_frame(TrackingPrior prior) {
+TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
   const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
   const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
   const TrackingTarget target{cloud, spacing, before, still_scene, oldest_frame, usual_contradiction.mean()};
   TrackingResult result;
+  TrackingOptions nearby = options;
+  nearby.relocalise = false;
   if (learns_noise() && !residual_noise.is_known()) {
-    TrackingOptions nearby = options;
-    nearby.relocalise = false;
     const auto is_as_noisy = [&](const TrackingResult& found) {
       return found.noise_factor == known_noise_factor() || history.num_registered() > 1 ||
              found.alignment.residual_sigmas >= tracking_limits::least_residual_sigmas;
@@ -228,7 +230,7 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior) {
       set_noise_factor(result.is_lost() ? known_noise_factor() : result.noise_factor);
     }
   }
-  if (result.is_lost()) result = track(current, target, prior, hypothesis, options);
+  if (result.is_lost()) result = track(current, target, prior, hypothesis, may_search ? options : nearby);
   if (result.decision == Decision::accepted && result.expectation == Expectation::expected) {
     usual_contradiction.add(1.0 - result.consistency);
   }
@@ -268,14 +270,14 @@ static std::vector<Pose> key_poses(const FrameHistory& history) {
 }
 
 // Around some poses, and everywhere: but not at every frame where that has been to no avail.
-RelocalisationPlaces Pipeline::elsewhere(const RegionReport& region_report) const {
-  if (!options.relocalise) return {};
+RelocalisationPlaces Pipeline::elsewhere(const RegionReport& region_report, bool may_search) const {
   RelocalisationPlaces places;
+  places.beside = options.relocalise && (!may_search || (!was_lost() && !jumped()));
+  if (!options.relocalise || !may_search) return places;
   places.views = &views;
   places.view_of_frame = [&] { return view_of_object(region_report); };
   if (num_vain % model_limits::search_interval == 0) places.key_poses = [this] { return key_poses(history); };
   places.everywhere = places.key_poses && (num_vain < model_limits::patience || num_vain % model_limits::patience == 0);
-  places.beside = !was_lost() && !jumped();
   return places;
 }
 

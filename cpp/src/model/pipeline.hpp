@@ -79,9 +79,9 @@ struct Pipeline {
   TrackingResult register_frame(const FrameExtras& extras, const RegionReport& region_report);
   bool learns_noise() const;
   void set_noise_factor(double factor);
-  TrackingResult track_frame(TrackingPrior prior);
+  TrackingResult track_frame(TrackingPrior prior, bool may_search);
   std::vector<Pose> guesses(const FrameExtras& extras) const;
-  RelocalisationPlaces elsewhere(const RegionReport& region_report) const;
+  RelocalisationPlaces elsewhere(const RegionReport& region_report, bool may_search) const;
   std::optional<ObjectView> view_of_object(const RegionReport& region_report) const;
   void move_all(const std::vector<Pose>& corrections, FrameReport& report);
 };

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import collections.abc
 import dataclasses
+import itertools
 import logging
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -18,7 +19,7 @@ from nacre._internal.arrays import as_count, as_flag, stacked_poses
 from nacre._internal.checkpoint import Checkpointed
 from nacre.datasets.corrected import with_corrected_depth
 from nacre.datasets.sequence import SequenceFrame
-from nacre.depth_calibration import DepthCalibration
+from nacre.depth_calibration import DepthCalibration, turn_between
 from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result
@@ -52,7 +53,8 @@ def _fused_index(record: FrameRecord) -> int:
 class _Retry:
     """How far lost frames were gone over again."""
 
-    place: int = 0  # the next of the frames
+    are_apart: bool  # views: where the camera was does not tell where it is
+    step: int = 0  # of twice as many as there are frames
     found_any: bool = False  # since the first of them
 
 
@@ -142,39 +144,63 @@ class Reconstruction(Checkpointed):
         """
         Go over the lost frames again, while any of them is found, and yield each that was tried.
 
-        Those, that is, since which the model has grown: to look at the same model twice tells nothing new. A
-        frame that is found now is RELOCALISED, and takes the place of its lost record in ``frames``; so do
-        WEAK ones of which the model now knows enough. Frames that could not be read, that the model refused,
-        or that the recording has no more, stay as they are.
+        Those, that is, since which the model has grown: to look at the same model twice tells nothing new.
+        Where the camera moved on from frame to frame, they are looked for near the frame after, then near the
+        one before, where that is known; where views are far apart, everywhere. A frame that is found now is
+        RELOCALISED, and takes the place of its lost record in ``frames``; so do WEAK ones of which the model
+        now knows enough. Frames that could not be read, that the model refused, or that the recording has no
+        more, stay as they are.
         """
         if self._retry is None:
             if not self.counts["LOST"]:
                 return
-            self._retry = _Retry()
-        state = self._retry
+            self._retry = _Retry(self._views_are_far_apart())
+        state, count = self._retry, len(self.frames)
         newest_fused = max(map(_fused_index, self.frames), default=-1)
         while True:
-            while state.place < len(self.frames):
-                before = self.frames[state.place]
+            while state.step < 2 * count:  # from the last to the first, then back
+                is_back = state.step >= count
+                place = state.step - count if is_back else count - 1 - state.step
+                before = self.frames[place]
+                beside = self._predicted(place, -1 if is_back else 1)
                 is_there = before.index < len(self.sequence)  # a killed process may not have kept the newest
                 is_open = before.status in ("LOST", "WEAK") and is_there
-                if before.report is None or not is_open or before.report.index > newest_fused:
-                    state.place += 1
+                is_told = is_back if state.are_apart else beside is not None
+                if before.report is None or not (is_open and is_told) or before.report.index > newest_fused:
+                    state.step += 1
                     continue
-                record = self._add(before.index, before.world_from_camera)
+                guess = before.world_from_camera if state.are_apart else beside
+                record = self._add(before.index, guess, search=state.are_apart)
                 if record.status == "TRACKED":
                     record = dataclasses.replace(record, status="RELOCALISED")
                 is_better = _RANK[record.status] > _RANK[before.status]
                 state.found_any |= is_better
                 newest_fused = max(newest_fused, _fused_index(record))
                 if is_better or record.status == "LOST":
-                    self.frames[state.place] = record
-                state.place += 1
-                yield self.frames[state.place - 1]
+                    self.frames[place] = record
+                state.step += 1
+                yield self.frames[place]
             if not state.found_any:
                 break
-            self._retry = state = _Retry()
+            self._retry = state = _Retry(state.are_apart)
         self._retry = None
+
+    def _pose_at(self, place: int) -> npt.NDArray[np.float64] | None:
+        """Return the pose of a frame that is part of the model."""
+        if not 0 <= place < len(self.frames) or _fused_index(self.frames[place]) < 0:
+            return None
+        return self.frames[place].world_from_camera
+
+    def _predicted(self, place: int, side: int) -> npt.NDArray[np.float64] | None:
+        """Return where the camera was if it moved on from the frame on one side as it did before, or that pose."""
+        near, far = self._pose_at(place + side), self._pose_at(place + 2 * side)
+        return near if near is None or far is None else near @ np.linalg.inv(far) @ near
+
+    def _views_are_far_apart(self) -> bool:
+        """Say whether the camera turns farther from frame to frame than a registration reaches."""
+        poses = [self._pose_at(place) for place in range(len(self.frames))]
+        turns = [turn_between(a, b) for a, b in itertools.pairwise(poses) if a is not None and b is not None]
+        return not turns or float(np.median(turns)) > self.model.parameters.registration.max_angle
 
     def _checkpoint(self, **more: Any) -> bytes:
         retry = None if self._retry is None else dataclasses.asdict(self._retry)
@@ -225,7 +251,9 @@ class Reconstruction(Checkpointed):
             done.frames = [record_from(state, reports) for state in run["records"]]
             if run["retry"] is not None:
                 done._retry = _Retry(
-                    as_count("place", run["retry"]["place"]), as_flag("found_any", run["retry"]["found_any"])
+                    as_flag("are_apart", run["retry"]["are_apart"]),
+                    as_count("step", run["retry"]["step"]),
+                    as_flag("found_any", run["retry"]["found_any"]),
                 )
             if run["depth_calibration"] is not None:
                 done.depth_calibration = calibration = calibration_from(run["depth_calibration"])
@@ -235,7 +263,9 @@ class Reconstruction(Checkpointed):
             raise FileFormatError(path, f"it holds a model, but no run that can go on ({error})") from None
         return done, more
 
-    def _add(self, index: int, guess: npt.NDArray[np.float64] | None = None) -> FrameRecord:
+    def _add(
+        self, index: int, guess: npt.NDArray[np.float64] | None = None, *, search: bool = True
+    ) -> FrameRecord:
         try:
             frame = self.sequence[index]
         except (FileFormatError, OSError) as error:
@@ -248,6 +278,7 @@ class Reconstruction(Checkpointed):
                 mask=frame.mask,
                 timestamp=frame.timestamp,
                 guess=guess,
+                search=search,
                 attributes=frame.attributes,
             )
         except ValueError as error:

@@ -77,16 +77,24 @@ FORGED = {
     "error of a place that is none": ("2, 5]", "[], {}]", "no place in a file"),
     "retry at infinity": (
         '"retry": null',
-        '"retry": {"place": 1e999, "found_any": false}',
-        "place must be an integer",
+        '"retry": {"are_apart": true, "step": 1e999, "found_any": false}',
+        "step must be an integer",
     ),
     "retry before the first": (
         '"retry": null',
-        '"retry": {"place": -5, "found_any": false}',
-        "place must be an integer of at least 0",
+        '"retry": {"are_apart": true, "step": -5, "found_any": false}',
+        "step must be an integer of at least 0",
     ),
-    "retry of no flag": ('"retry": null', '"retry": {"place": 0, "found_any": 3}', "found_any must be True"),
-    "calibration nan": ('"depth_calibration": null', _CALIBRATION % ("NaN", 1, 9), "tilt and focal_scale must be finite"),
+    "retry of no flag": (
+        '"retry": null',
+        '"retry": {"are_apart": true, "step": 0, "found_any": 3}',
+        "found_any must be True",
+    ),
+    "calibration nan": (
+        '"depth_calibration": null',
+        _CALIBRATION % ("NaN", 1, 9),
+        "tilt and focal_scale must be finite",
+    ),
     "calibration of negative sigma": (
         '"depth_calibration": null',
         _CALIBRATION % (1, -1, 9),
