@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 NACRE = [sys.executable, "-c", "from nacre.cli import main; main()"]
-LIMIT = 1800.0
+LIMIT = 600.0
 """A program that takes longer [s] has failed."""
 
 
@@ -24,17 +24,21 @@ def nacre(*arguments: str | Path | float) -> str:
 def program(command: list[str], *arguments: str | Path | float) -> tuple[str, float]:
     """Run a program; return its standard output and the processor time that it took [s]."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    done = subprocess.run(
-        [*command, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=LIMIT,
-        env={**os.environ, "NO_COLOR": "1"},
-    )
+    try:
+        done = subprocess.run(
+            [*command, *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=LIMIT,
+            env={**os.environ, "NO_COLOR": "1"},
+        )
+    except subprocess.TimeoutExpired:
+        raise RuntimeError(f"not done in {LIMIT / 60:.0f} minutes") from None
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     if done.returncode:
-        raise RuntimeError((done.stderr or done.stdout).strip().splitlines()[-1][:300])
+        said = (done.stderr or done.stdout).strip().splitlines() or [f"ended with {done.returncode}"]
+        raise RuntimeError(said[-1][:300])
     return done.stdout, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 

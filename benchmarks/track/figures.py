@@ -40,6 +40,7 @@ FIGURES = [
     Figure("ate", "ATE RMSE [mm]", "absolute_trajectory_error.rmse", 1e3, 1),
     Figure("ate_max", "ATE, greatest [mm]", "absolute_trajectory_error.max", 1e3, 1),
     Figure("rpe", "RPE [mm]", "relative_pose_error.translation_rmse", 1e3, 1),
+    Figure("rpe_rotation", "RPE [deg]", "relative_pose_error.rotation_rmse", math.degrees(1), 2),
     Figure("rms", "model RMS [mm]", "surface_accuracy.rms", 1e3, 3),
     Figure("bias", "bias [mm]", "surface_accuracy.bias", 1e3, 3),
     Figure("complete", "seen surface covered [%]", "completeness.fraction.0", 100, 1),

@@ -218,17 +218,17 @@ UNTUNED = ("open3d_icp", "open3d_slam", "opencv_tsdf", "small_gicp_vgicp_eroded"
 ROWS += [
     Row(f"real-{name}", f"{name}, untuned", recording=found(name), peers=UNTUNED, real=True)
     for name in [
-        "d435-t265-shelf",
-        "realsense-robot-objects",
-        "apc-shelf-f200",
-        "sr300-shelf",
-        "iphone-lidar-office-a",
-        "record3d-door",
         "truedepth-boxcan",
+        "sr300-shelf",
+        "apc-shelf-f200",
         "tum-fr3-cabinet-kf",
-        "icl-livingroom-loop-fast",
-        "tum-fr3-teddy",
+        "realsense-robot-objects",
         "tum-fr1-rpy",
+        "tum-fr3-teddy",
+        "icl-livingroom-loop-fast",
+        "d435-t265-shelf",
+        "record3d-door",
+        "iphone-lidar-office-a",
     ]
 ]
 BY_NAME = {row.name: row for row in ROWS}
