@@ -244,8 +244,8 @@ def middle_depth(depths: list[Array]) -> float:
     return float(np.median([np.nanmedian(image) for image in depths[:: max(1, len(depths) // 20)]]))
 
 
-def measure(case: Case, model: nacre.Model) -> Figures:
-    """Return the figures of a case that has been run."""
+def measure(case: Case, model: Any) -> Figures:
+    """Return the figures of a case that has been run; the model is nacre's, or has its frames and points."""
     status = [report.status for report in model.frames]
     claimed = [i for i, s in enumerate(status) if s in ("TRACKED", "RELOCALISED")]
     known = [i for i in claimed if case.truths[i] is not None]

@@ -3,20 +3,26 @@
 Make the images of real recordings worse, one way at a time, and see what is still tracked rightly.
 
     python benchmarks/degraded.py teddy d435 robot iphone most=60
+    python benchmarks/degraded.py teddy d435 only="noise|missing|to 5 mm|focal" peers=opencv_tsdf
 
-writes a table of frames claimed and right, and of the trajectory's error, for each damage.
+writes a table of frames claimed and right, and of the trajectory's error, for each damage: of nacre, and of
+peers (see `track/peers/`) in an environment that has them, such as that of `tracking.py`.
 """
 
 from __future__ import annotations
 
+import re
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from cases import Case, Figures, make, run
+from cases import Case, Figures, make, measure, run
+from track import peers
 
 import nacre
 
@@ -152,6 +158,22 @@ DAMAGES: dict[str, Callable[[Case], Case]] = {
 }
 
 
+def run_peer(name: str, case: Case) -> Figures:
+    """Run a peer's loop; a frame that it fails on is lost."""
+    depths = [np.asarray(depth, np.float32) for depth in case.depths]
+    loop, frames = peers.make(name, case.camera, depths[0]), []
+    for depth in depths:
+        start = time.perf_counter()
+        try:
+            pose = loop.add(depth)
+        except RuntimeError:
+            pose = None
+        status = "LOST" if pose is None else "TRACKED"
+        spent = {"total": 1e3 * (time.perf_counter() - start)}
+        frames.append(SimpleNamespace(status=status, world_from_camera=pose, milliseconds=spent))
+    return measure(case, SimpleNamespace(frames=frames, points=[]))
+
+
 def cell(figures: Figures) -> str:
     """Return frames claimed and right, and the trajectory's error."""
     error = f", {figures.ate:.1f} mm" if figures.claimed > 1 else ""
@@ -161,14 +183,19 @@ def cell(figures: Figures) -> str:
 def main() -> None:
     """Measure the recordings that are named, with settings as those of `cases.py`."""
     settings: dict[str, Any] = dict(word.split("=") for word in sys.argv[1:] if "=" in word)
-    most = int(settings.pop("most", 60))
+    most, only = int(settings.get("most", 60)), settings.get("only", "")
+    others = settings["peers"].split(",") if "peers" in settings else []
     names = [word for word in sys.argv[1:] if "=" not in word] or ["teddy", "d435", "robot", "iphone"]
     cases = [make(name, most=most) for name in names]
     heads = [f"{name}, {len(case.depths)}" for name, case in zip(names, cases, strict=True)]
+    heads = [f"{head}{by}" for head in heads for by in ["", *(f": {peer}" for peer in others)]]
     print(f"| frames | {' | '.join(heads)} |")
     print("|---" * (len(heads) + 1) + "|")
-    for damage, change in DAMAGES.items():
-        print(f"| {damage} | {' | '.join(cell(run(change(case))[0]) for case in cases)} |", flush=True)
+    for damage in [damage for damage in DAMAGES if re.search(only, damage)]:
+        found = []
+        for case in map(DAMAGES[damage], cases):
+            found += [run(case)[0], *(run_peer(peer, case) for peer in others)]
+        print(f"| {damage} | {' | '.join(map(cell, found))} |", flush=True)
 
 
 if __name__ == "__main__":

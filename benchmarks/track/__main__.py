@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from track import commands, page, pictures
+from track import commands, page, pictures, real
 from track.figures import TAU, collect
 from track.peers import TITLES
 from track.right import right_frames
@@ -16,8 +16,8 @@ from track.rows import Figures, Places, Row
 from track.table import BY_NAME, ROWS
 
 
-def run_row(places: Places, row: Row, with_peers: bool) -> dict[str, Figures]:
-    """Return the figures of every contender, or why it has none."""
+def run_row(places: Places, row: Row, peers: list[str] | None) -> dict[str, Figures]:
+    """Return the figures of every contender, perhaps of some peers alone, or why it has none."""
     if row.measure is not None:
         return row.measure(places, row)
     assert row.recording is not None
@@ -27,7 +27,7 @@ def run_row(places: Places, row: Row, with_peers: bool) -> dict[str, Figures]:
         results[name] = attempt(
             places, row, name, lambda out, options=settings: commands.reconstruct(recording, out, *options)
         )
-    for peer in row.peers if with_peers else ():
+    for peer in [peer for peer in row.peers if peers is None or peer in peers]:
         results[TITLES[peer]] = attempt(
             places, row, peer, lambda out, name=peer: commands.run_peer(name, recording, out, row.voxel)
         )
@@ -55,6 +55,21 @@ def attempt(places: Places, row: Row, name: str, run: Any) -> Figures:
         return {"failed": str(error)}
 
 
+def write_page(
+    target: Path, places: Places, output: Path, results: dict[str, Any], *, only_real: bool
+) -> None:
+    """Write the page and its pictures; of a page that is there, perhaps only the real recordings' section."""
+    old = whole = target.read_text() if target.exists() else ""
+    if not (only_real and old):
+        drawn = pictures.write_all(places, output / "pictures")
+        shown = [name for name in drawn if name in page.PICTURES]
+        (target.parent / "images").mkdir(exist_ok=True)
+        for name in shown:
+            shutil.copy(output / "pictures" / name, target.parent / "images" / name)
+        whole = page.page(results, shown)
+    target.write_text(real.with_section(whole, results, old))
+
+
 def main() -> int:
     """Run what was asked for; results of other rows in ``results.json`` stay."""
     options = json.loads(sys.argv[1])
@@ -75,18 +90,14 @@ def main() -> int:
         except (FileNotFoundError, RuntimeError) as error:
             print(f"{row.name} is left out: {error}", file=sys.stderr)
             continue
-        kept = {} if options["peers"] else results.get(row.name, {}).get("contenders", {})
+        for figures in found.values():
+            figures["busy"] = options["busy"]
+        kept = {} if options["peers"] is None else results.get(row.name, {}).get("contenders", {})
         results[row.name] = {"date": commands.stamp(), "contenders": {**kept, **found}}
         file.write_text(json.dumps(results, indent=1) + "\n")
         print(page.section(row, results[row.name]))
     if options["page"]:
-        target = Path(options["page"])
-        drawn = pictures.write_all(places, output / "pictures")
-        shown = [name for name in drawn if name in page.PICTURES]
-        (target.parent / "images").mkdir(exist_ok=True)
-        for name in shown:
-            shutil.copy(output / "pictures" / name, target.parent / "images" / name)
-        target.write_text(page.page(results, shown))
+        write_page(Path(options["page"]), places, output, results, only_real=options["real"])
     missed = page.missed(results, [row for row in ROWS if not options["only"] or row.name in options["only"]])
     print("\n".join(missed) if missed else "every goal of these rows is reached")
     return 0

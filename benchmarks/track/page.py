@@ -24,7 +24,7 @@ def page(results: Mapping[str, Any], pictures: list[str]) -> str:
     """Return the whole page."""
     parts = [INTRODUCTION, summary(results)]
     parts += [f"![{PICTURES[name]}](images/{name})\n\n*{PICTURES[name]}.*\n" for name in pictures]
-    parts += [section(row, results[row.name]) for row in ROWS if row.name in results]
+    parts += [section(row, results[row.name]) for row in ROWS if row.name in results and not row.real]
     return "\n".join(parts)
 
 

@@ -216,19 +216,19 @@ ROWS = [
 ]
 UNTUNED = ("open3d_icp", "open3d_slam", "opencv_tsdf", "small_gicp_vgicp_eroded")
 ROWS += [
-    Row(f"real-{name}", f"{name}, untuned", recording=found(name), peers=UNTUNED, real=True)
-    for name in [
-        "truedepth-boxcan",
-        "sr300-shelf",
-        "apc-shelf-f200",
-        "tum-fr3-cabinet-kf",
-        "realsense-robot-objects",
-        "tum-fr1-rpy",
-        "tum-fr3-teddy",
-        "icl-livingroom-loop-fast",
-        "d435-t265-shelf",
-        "record3d-door",
-        "iphone-lidar-office-a",
-    ]
+    Row(f"real-{name}", f"{name}: {camera}", recording=found(name), peers=UNTUNED, real=True)
+    for name, camera in {
+        "truedepth-boxcan": "iPhone TrueDepth, once round a carton",
+        "sr300-shelf": "RealSense SR300 round a box",
+        "apc-shelf-f200": "RealSense F200 on a robot",
+        "tum-fr3-cabinet-kf": "Xtion, a cabinet from all sides",
+        "realsense-robot-objects": "RealSense D435 on a robot, out of order",
+        "tum-fr1-rpy": "Kinect, fast rotation",
+        "tum-fr3-teddy": "Xtion round a toy",
+        "icl-livingroom-loop-fast": "rendered, a room",
+        "d435-t265-shelf": "RealSense D435 in the hand",
+        "record3d-door": "iPhone LiDAR, a flat door",
+        "iphone-lidar-office-a": "iPhone LiDAR, an office",
+    }.items()
 ]
 BY_NAME = {row.name: row for row in ROWS}

@@ -69,6 +69,24 @@ def test_the_page_marks_what_is_missed() -> None:
     assert missed(results, [row]) == ["teddy misses ATE RMSE [mm] 30.0 (\N{LESS-THAN OR EQUAL TO} 12)"]
 
 
+def test_the_section_of_real_recordings_stays_in_the_page() -> None:
+    from track.real import TITLE, with_section
+
+    nacre = {"frames": 50, "claimed": 50, "right": 49, "wrong": 1, "far": 0, "ate": 3.0, "milliseconds": 20.0}
+    few = {**nacre, "claimed": 5, "right": 5, "ate": 0.1, "milliseconds": 9.0, "busy": True}
+    contenders = {"nacre": nacre, "few": few, "slow": {"failed": "not done in 10 minutes"}}
+    results = {"real-sr300-shelf": {"contenders": contenders}}
+    page = with_section("# Page\n\n## In short\n\nText\n\n## Bunny\n", results, "")
+    assert [line for line in page.splitlines() if line.startswith("## ")] == [
+        "## In short", f"## {TITLE}", "## Bunny"
+    ]  # fmt: skip
+    assert "| **49 / 50 / 0** | 5 / 5 / 0 | not done in 10 minutes |" in page
+    assert "| **3.0** | 0.1 | - |" in page  # few are no better
+    assert "| ~9.0 / - |" in page
+    assert with_section("# Page\n\n## In short\n\nText\n\n## Bunny\n", {}, page) == page
+    assert with_section(page, results, page) == page
+
+
 def test_erosion_takes_two_pixels() -> None:
     from track.peers import erode
 
