@@ -188,7 +188,9 @@ def main() -> None:
     names = [word for word in sys.argv[1:] if "=" not in word] or ["teddy", "d435", "robot", "iphone"]
     cases = [make(name, most=most) for name in names]
     heads = [f"{name}, {len(case.depths)}" for name, case in zip(names, cases, strict=True)]
-    heads = [f"{head}{by}" for head in heads for by in ["", *(f": {peer}" for peer in others)]]
+    if others:
+        titles = ["nacre", *(peers.TITLES[peer].partition(":")[0] for peer in others)]
+        heads = [f"{head}: {title}" for head in heads for title in titles]
     print(f"| frames | {' | '.join(heads)} |")
     print("|---" * (len(heads) + 1) + "|")
     for damage in [damage for damage in DAMAGES if re.search(only, damage)]:
