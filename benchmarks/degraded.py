@@ -6,7 +6,7 @@ Make the images of real recordings worse, one way at a time, and see what is sti
     python benchmarks/degraded.py teddy d435 only="noise|missing|to 5 mm|focal" peers=opencv_tsdf
 
 writes a table of frames claimed and right, and of the trajectory's error, for each damage: of nacre, and of
-peers (see `track/peers/`) in an environment that has them, such as that of `tracking.py`.
+peers (see `track/peers/`; `grid=0.01` [m], or twice a pixel) where they are installed, as by `tracking.py`.
 """
 
 from __future__ import annotations
@@ -158,10 +158,10 @@ DAMAGES: dict[str, Callable[[Case], Case]] = {
 }
 
 
-def run_peer(name: str, case: Case) -> Figures:
-    """Run a peer's loop; a frame that it fails on is lost."""
+def run_peer(name: str, case: Case, grid: float) -> Figures:
+    """Run a peer's loop with a grid [m]; a frame that it fails on is lost."""
     depths = [np.asarray(depth, np.float32) for depth in case.depths]
-    loop, frames = peers.make(name, case.camera, depths[0]), []
+    loop, frames = peers.make(name, case.camera, depths[0], grid), []
     for depth in depths:
         start = time.perf_counter()
         try:
@@ -183,7 +183,7 @@ def cell(figures: Figures) -> str:
 def main() -> None:
     """Measure the recordings that are named, with settings as those of `cases.py`."""
     settings: dict[str, Any] = dict(word.split("=") for word in sys.argv[1:] if "=" in word)
-    most, only = int(settings.get("most", 60)), settings.get("only", "")
+    most, only, grid = int(settings.get("most", 60)), settings.get("only", ""), float(settings.get("grid", 0))
     others = settings["peers"].split(",") if "peers" in settings else []
     names = [word for word in sys.argv[1:] if "=" not in word] or ["teddy", "d435", "robot", "iphone"]
     cases = [make(name, most=most) for name in names]
@@ -196,7 +196,7 @@ def main() -> None:
     for damage in [damage for damage in DAMAGES if re.search(only, damage)]:
         found = []
         for case in map(DAMAGES[damage], cases):
-            found += [run(case)[0], *(run_peer(peer, case) for peer in others)]
+            found += [run(case)[0], *(run_peer(peer, case, grid) for peer in others)]
         print(f"| {damage} | {' | '.join(map(cell, found))} |", flush=True)
 
 

@@ -17,13 +17,13 @@ from track.table import BY_NAME, ROWS
 
 
 def run_row(places: Places, row: Row, peers: list[str] | None) -> dict[str, Figures]:
-    """Return the figures of every contender, perhaps of some peers alone, or why it has none."""
+    """Return the figures of every contender, or of some peers, or of nacre alone, or why it has none."""
     if row.measure is not None:
         return row.measure(places, row)
     assert row.recording is not None
     recording = row.recording(places)
     results: dict[str, Figures] = {}
-    for name, settings in row.settings.items():
+    for name, settings in row.settings.items() if not peers else ():
         results[name] = attempt(
             places, row, name, lambda out, options=settings: commands.reconstruct(recording, out, *options)
         )
@@ -84,6 +84,8 @@ def main() -> int:
         return 2
     for row in ROWS:
         if row.name not in options["only"] if options["only"] else row.real != options["real"]:
+            continue
+        if options["peers"] and not set(options["peers"]) & set(row.peers):
             continue
         try:
             found = run_row(places, row, options["peers"])
