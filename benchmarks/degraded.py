@@ -176,7 +176,7 @@ def run_peer(name: str, case: Case, grid: float) -> Figures:
 
 def cell(figures: Figures) -> str:
     """Return frames claimed and right, and the trajectory's error."""
-    error = f", {figures.ate:.1f} mm" if figures.claimed > 1 else ""
+    error = f", {figures.ate:.1f} mm" if figures.claimed > 1 and np.isfinite(figures.ate) else ""
     return f"{figures.claimed} / {figures.right}{error}"
 
 

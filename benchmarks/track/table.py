@@ -214,7 +214,7 @@ ROWS = [
         measure=experiments.fusion_methods,
     ),
 ]
-UNTUNED = ("open3d_icp", "open3d_slam", "opencv_tsdf", "small_gicp_vgicp_eroded", "kiss_icp_eroded")
+UNTUNED = ("open3d_icp", "open3d_slam", "opencv_tsdf", "small_gicp_vgicp_eroded")
 ROWS += [
     Row(f"real-{name}", f"{name}: {camera}", recording=found(name), peers=UNTUNED, real=True)
     for name, camera in {

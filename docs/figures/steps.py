@@ -265,32 +265,31 @@ def neighbours(table: Turntable, size):
 
 
 def worse(table: Turntable, size):
-    """Draw the frames that are right in worse images, of all recordings of a table of docs/limits.md."""
+    """Draw how many frames of worse images are right, in all recordings of a table of docs/limits.md."""
     text = (Path(__file__).parents[1] / "limits.md").read_text(encoding="utf-8")
-    lines = [line for line in text.partition("### Beside peers")[2].splitlines() if line.startswith("|")]
-    heads, _, *rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    text = text.partition("### Beside peers")[2].partition("\n## ")[0]
+    lines = [line.strip("| ").split(" | ") for line in text.splitlines() if line.startswith("|")]
+    heads, _, *rows = lines
     names = list(dict.fromkeys(head.partition(": ")[2] for head in heads[1:]))
-    frames = sum(int(re.search(r"\d+(?=: nacre)", head)[0]) for head in heads[1 :: len(names)])
-
-    def curves(kind: str):
-        """Return a curve a contender, over the numbers before some words, from none on."""
-        found = [(float(re.match(r"\d*", row[0])[0] or 0), row) for row in rows if kind in row[0]]
-        x, chosen = zip((0.0, rows[0]), *found, strict=True)
-        right = np.array([[int(cell.split(" / ")[1].split(",")[0]) for cell in row[1:]] for row in chosen])
-        for k, name in enumerate(names):
-            y = 100 * right[:, k :: len(names)].sum(axis=1) / frames
-            yield draw.Curve(name, x, y, (draw.BLUE, draw.ORANGE, draw.GREEN)[k], "both")
-
-    axes = {
-        "times its noise added": "times the recording's noise added",
-        "% of the pixels missing": "% of pixels missing",
-    }
-    return draw.sheet(
-        [
-            ("", draw.chart(list(curves(kind)), x_label=label, y_label="right frames [%]", size=size))
-            for kind, label in axes.items()
+    colors = (draw.BLUE, draw.ORANGE, draw.GREEN, draw.PINK)
+    panels = []
+    for kind in ("times its noise added", "% of the pixels missing"):
+        chosen = [rows[0], *(row for row in rows if kind in row[0])]
+        x = [0.0, *(float(row[0].split()[0]) for row in chosen[1:])]
+        right = np.array([[int(re.search(r"/ (\d+)", cell)[1]) for cell in row[1:]] for row in chosen])
+        curves = [
+            draw.Curve(name, x, right[:, k :: len(names)].sum(axis=1), colors[k], "both")
+            for k, name in enumerate(names)
         ]
-    )
+        panels.append(
+            (
+                "",
+                draw.chart(
+                    curves, x_label=kind, y_label="right frames", limits=(0, x[-1], 0, 270), size=size
+                ),
+            )
+        )
+    return draw.sheet(panels)
 
 
 FIGURES = {
