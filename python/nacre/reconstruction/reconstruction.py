@@ -192,7 +192,7 @@ class Reconstruction(Checkpointed):
         return self.frames[place].world_from_camera
 
     def _predicted(self, place: int, side: int) -> npt.NDArray[np.float64] | None:
-        """Return where the camera was if it moved on from the frame on one side as it did before, or that pose."""
+        """Return where the camera was if it moved on from the frame on one side as it had; or that pose."""
         near, far = self._pose_at(place + side), self._pose_at(place + 2 * side)
         return near if near is None or far is None else near @ np.linalg.inv(far) @ near
 
