@@ -186,8 +186,8 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   const bool is_predicted = !was_lost() || extras.guess.has_value();
   const bool has_moved = history.num_registered() > 1 || is_trial;
   if (!extras.search) hypothesis.forget();
-  result = track_frame(
-      {guesses(extras), expectation, is_predicted, has_moved, elsewhere(region_report, extras.search)}, extras.search);
+  result = track_frame({guesses(extras), expectation, is_predicted, has_moved, elsewhere(region_report, extras.search)},
+                       extras.search);
   const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
   if (is_determined && !result.is_on_plane) {
     refine_by_outlines(result.alignment, outline, loops.outlines_near(result.alignment.target_from_source),
