@@ -31,8 +31,8 @@ struct TrackingReport {
   Matrix6 information = Matrix6::Zero();                     ///< see AlignResult
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult
 
-  /// That the registration is right, by its score; of a lost frame, that the best one was, which was not taken. NaN where
-  /// the pose came without a registration.
+  /// That the registration is right, by its score; of a lost frame, that the best one was, which was not taken. NaN
+  /// where the pose came without a registration.
   double probability() const;
 };
 
