@@ -24,7 +24,7 @@ struct FrameExtras {
   std::optional<double> timestamp;         ///< [s]
   std::optional<Pose> guess;               ///< world_from_camera to start the registration from
   bool keep_guess = false;                 ///< take the guess for the pose, without registration
-  bool search = true;                      ///< where relocalise is on: look elsewhere, too, for a frame lost near its guess
+  bool search = true;                      ///< look elsewhere, too, for a frame lost near its guess (relocalise)
 };
 
 /// Wall time of each step of the loop [ms].
