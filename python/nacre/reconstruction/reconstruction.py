@@ -197,10 +197,10 @@ class Reconstruction(Checkpointed):
         return near if near is None or far is None else near @ np.linalg.inv(far) @ near
 
     def _views_are_far_apart(self) -> bool:
-        """Say whether the camera turns farther from frame to frame than a registration reaches."""
+        """Say whether the camera ever turned farther from frame to frame than a registration reaches."""
         poses = [self._pose_at(place) for place in range(len(self.frames))]
         turns = [turn_between(a, b) for a, b in itertools.pairwise(poses) if a is not None and b is not None]
-        return not turns or float(np.median(turns)) > self.model.parameters.registration.max_angle
+        return not turns or max(turns) > self.model.parameters.registration.max_angle
 
     def _checkpoint(self, **more: Any) -> bytes:
         retry = None if self._retry is None else dataclasses.asdict(self._retry)
