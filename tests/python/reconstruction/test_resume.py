@@ -266,9 +266,9 @@ import sys, time
 from nacre.cli import main
 from nacre.reconstruction import Reconstruction
 add = Reconstruction._add
-def slow(self, *arguments):
+def slow(self, *arguments, **options):
     time.sleep({seconds})
-    return add(self, *arguments)
+    return add(self, *arguments, **options)
 Reconstruction._add = slow
 import nacre.report
 def page(data):
@@ -293,8 +293,8 @@ class TestSignals:
         running = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         if when == "results":
             assert running.stdout is not None
-            while "page" not in running.stdout.readline():
-                pass
+            while "page" not in (line := running.stdout.readline()):
+                assert line, "it ended before the page"
         while not (journal.exists() and len(read_journal(journal)[0]) >= 3):
             time.sleep(0.01)
         start = time.monotonic()
