@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -214,9 +215,9 @@ class TestRealTime:
 
         add = Reconstruction._add
 
-        def slowly(self: Reconstruction, index: int, guess: object = None) -> object:
+        def slowly(self: Reconstruction, *arguments: Any, **options: Any) -> object:
             time.sleep(0.05)
-            return add(self, index)
+            return add(self, *arguments, **options)
 
         monkeypatch.setattr(Reconstruction, "_add", slowly)
         write_wave(tmp_path / "r", 40, 0.001)
