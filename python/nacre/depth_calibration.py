@@ -79,7 +79,25 @@ class DepthCalibration:
         return is_sure and error > _LEAST_FOCAL_ERROR
 
     def focal_length_advice(self, camera: Camera) -> str:
-        """Return which focal length the camera seems to have; nothing where its own is not clearly wrong."""
+        """
+        Return which focal length a camera seems to have.
+
+        Parameters
+        ----------
+        camera : Camera
+            The pinhole camera that was calibrated.
+
+        Returns
+        -------
+        str
+            A sentence; empty where the camera's focal length is not clearly wrong.
+
+        Raises
+        ------
+        TypeError, ValueError
+            It is no camera, or no pinhole camera.
+        """
+        _check_camera(camera)
         if not self.has_wrong_focal_length:
             return ""
         fx, fy = (self.focal_scale * length for length in (camera.fx, camera.fy))

@@ -223,6 +223,9 @@ RECIPES: dict[str, Recipe] = {
     "nacre.depth_calibration.DepthCalibration.correct": Recipe(
         nacre.DepthCalibration(0.01, 0.001, 7).correct, {"depth": DEPTH, "camera": CAMERA}
     ),
+    "nacre.depth_calibration.DepthCalibration.focal_length_advice": Recipe(
+        nacre.DepthCalibration(0.01, 0.001, 7, 0.9, 0.001).focal_length_advice, {"camera": CAMERA}
+    ),
     "nacre.depth_calibration.calibrate_depth": Recipe(
         lambda depth, world_from_camera, camera: nacre.calibrate_depth(
             [(DEPTH, POSE), (depth, world_from_camera)], camera
@@ -324,7 +327,8 @@ RECIPES: dict[str, Recipe] = {
     "nacre.model.Model": Recipe(nacre.Model, {"camera": CAMERA, "preset": "paper", "depth_scale": 1000.0}),
     "nacre.model.Model.add_frame": Recipe(
         add_frame,
-        {"depth": DEPTH, "color": COLOR, "mask": MASK, "timestamp": 1.0, "guess": POSE, "keep_guess": False},
+        {"depth": DEPTH, "color": COLOR, "mask": MASK, "timestamp": 1.0}
+        | {"guess": POSE, "keep_guess": False, "search": True},
         _report,
         lists=("color",),
     ),
