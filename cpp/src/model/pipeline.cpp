@@ -74,7 +74,7 @@ FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras
   FrameReport report;
   report.index = static_cast<std::int64_t>(history.size());
   report.timestamp = extras.timestamp;
-  report.corrects_earlier = is_trial && history.num_registered() == 2;
+  report.corrects_earlier = is_trial && history.num_registered() == 2;  // see begin_anew: it confirms both
   {
     const Stopwatch total(report.milliseconds.total);
     const DepthImage clean = preprocess(depth, extras.mask, report);

@@ -72,7 +72,7 @@ class DepthViews:
             done = Reconstruction(frames, Model(camera, parameters=done.model.parameters))
         done.depth_calibration = calibration
         if advice := calibration.focal_length_advice(camera):
-            _log.warning(advice)
+            _log.warning("%s", advice)
         return done
 
 

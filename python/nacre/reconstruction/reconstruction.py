@@ -165,8 +165,8 @@ class Reconstruction(Checkpointed):
                 beside = self._predicted(place, -1 if is_back else 1)
                 is_there = before.index < len(self.sequence)  # a killed process may not have kept the newest
                 is_open = before.status in ("LOST", "WEAK") and is_there
-                is_told = is_back if state.are_apart else beside is not None
-                if before.report is None or not (is_open and is_told) or before.report.index > newest_fused:
+                is_due = is_back if state.are_apart else beside is not None
+                if before.report is None or not (is_open and is_due) or before.report.index > newest_fused:
                     state.step += 1
                     continue
                 guess = before.world_from_camera if state.are_apart else beside
