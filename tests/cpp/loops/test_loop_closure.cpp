@@ -3,6 +3,7 @@
 #include <cstring>
 #include <limits>
 
+#include "base/numbers.hpp"
 #include "base/random.hpp"
 #include "depth_images.hpp"
 #include "doctest/doctest.h"
@@ -17,7 +18,6 @@ using namespace nacre_test;
 
 namespace {
 
-constexpr double pi = 3.141592653589793;
 constexpr int frames_per_turn = 72;
 
 Mesh box(const Eigen::Vector3d& center, const Eigen::Vector3d& size, double turn) {

@@ -1,6 +1,7 @@
 #include <cmath>
 #include <utility>
 
+#include "base/numbers.hpp"
 #include "base/random.hpp"
 #include "base/se3.hpp"
 #include "doctest/doctest.h"
@@ -9,8 +10,6 @@
 using namespace nacre;
 
 namespace {
-
-constexpr double pi = 3.141592653589793;
 
 Vector6 random_twist(std::uint64_t seed, double size) {
   Vector6 twist;

@@ -3,6 +3,7 @@
 #include <limits>
 #include <map>
 
+#include "base/numbers.hpp"
 #include "base/random.hpp"
 #include "doctest/doctest.h"
 #include "nacre/model.hpp"
@@ -11,8 +12,6 @@
 using namespace nacre;
 
 namespace {
-
-constexpr double pi = 3.141592653589793;
 
 // The built-in object on a turntable, seen by an orthographic camera of 1 mm pixels.
 class Turntable {

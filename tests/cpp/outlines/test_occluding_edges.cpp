@@ -5,6 +5,7 @@
 #include <functional>
 #include <limits>
 
+#include "base/numbers.hpp"
 #include "base/random.hpp"
 #include "doctest/doctest.h"
 #include "nacre/model.hpp"
@@ -16,7 +17,7 @@ using namespace nacre;
 namespace {
 
 constexpr float missing = std::numeric_limits<float>::quiet_NaN();
-constexpr double pixel = 0.002, far_off = 0.6, noise = 0.0005, pi = 3.141592653589793;
+constexpr double pixel = 0.002, far_off = 0.6, noise = 0.0005;
 const Camera camera = Camera::orthographic(200, 160, pixel);
 
 // The height of a surface above the plane z = 0.6 m, over its own x and y; NaN where it ends.
