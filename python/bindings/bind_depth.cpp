@@ -1,9 +1,12 @@
 #include "bindings.hpp"
 #include "nacre/depth.hpp"
+#include "nacre/depth_calibration.hpp"
 
 namespace {
 
 using nacre::Camera;
+using nacre::DepthCalibration;
+using nacre::DepthCalibrator;
 using nacre::DepthImage;
 using nacre::DepthOptions;
 using nacre::DepthRef;
@@ -46,6 +49,28 @@ void bind_depth(py::module_& m) {
       .def("add", py::overload_cast<const DepthRef&, int>(&NoiseCalibration::add), py::arg("depth"),
            py::arg("num_threads"), ReleaseGil())
       .def("model", &NoiseCalibration::model);
+  py::class_<DepthCalibration>(m, "DepthCalibration")
+      .def(py::init([](double tilt, double sigma, int num_pairs, double focal_scale, double focal_sigma) {
+        return DepthCalibration{tilt, sigma, num_pairs, focal_scale, focal_sigma};
+      }))
+      .def_readonly("tilt", &DepthCalibration::tilt)
+      .def_readonly("sigma", &DepthCalibration::sigma)
+      .def_readonly("num_pairs", &DepthCalibration::num_pairs)
+      .def_readonly("focal_scale", &DepthCalibration::focal_scale)
+      .def_readonly("focal_sigma", &DepthCalibration::focal_sigma)
+      .def_property_readonly("is_significant", &DepthCalibration::is_significant)
+      .def_property_readonly("has_wrong_focal_length", &DepthCalibration::has_wrong_focal_length);
+  py::class_<DepthCalibrator>(m, "DepthCalibrator")
+      .def(py::init<const Camera&>(), py::arg("camera"))
+      .def("add", [](DepthCalibrator& views, const DepthRef& depth,
+                     const PoseMatrix& pose) { return views.add(depth, to_pose(pose)); })
+      .def("is_new_direction",
+           [](const DepthCalibrator& views, const PoseMatrix& pose) { return views.is_new_direction(to_pose(pose)); })
+      .def_property_readonly("has_enough", &DepthCalibrator::has_enough)
+      .def("fit", &DepthCalibrator::fit, py::arg("num_threads"), ReleaseGil());
+  m.def("correct_depth", &nacre::correct_depth, py::arg("depth"), py::arg("camera"), py::arg("tilt"),
+        py::arg("num_threads"), ReleaseGil());
+  m.def("can_calibrate_depth", &nacre::can_calibrate_depth, py::arg("camera"));
   py::class_<DepthOptions>(m, "DepthOptions")
       .def(py::init<>())
       .def_readwrite("edge_test", &DepthOptions::edge_test)
@@ -58,6 +83,7 @@ void bind_depth(py::module_& m) {
       .def_readwrite("max_slant", &DepthOptions::max_slant)
       .def_readwrite("max_missing", &DepthOptions::max_missing)
       .def_readwrite("min_component", &DepthOptions::min_component)
+      .def_readwrite("tilt", &DepthOptions::tilt)
       .def_readwrite("noise", &DepthOptions::noise);
   py::class_<DepthReport>(m, "DepthReport")
       .def_readonly("num_pixels", &DepthReport::num_pixels)

@@ -66,6 +66,7 @@ def preprocess_depth(
     max_slant: float = ...,
     max_missing: float = ...,
     min_component: int = ...,
+    tilt: float = ...,
     noise: Noise = ...,
     return_report: Literal[False] = ...,
     num_threads: int = ...,
@@ -87,6 +88,7 @@ def preprocess_depth(
     max_slant: float = ...,
     max_missing: float = ...,
     min_component: int = ...,
+    tilt: float = ...,
     noise: Noise = ...,
     return_report: Literal[True],
     num_threads: int = ...,
@@ -107,6 +109,7 @@ def preprocess_depth(
     max_slant: float = 1.3962634,
     max_missing: float = 0.6,
     min_component: int = 20,
+    tilt: float = 0.0,
     noise: Noise = None,
     return_report: bool = False,
     num_threads: int = 0,
@@ -153,6 +156,9 @@ def preprocess_depth(
         A pixel goes where more than this part of its 5 x 5 neighbours is missing.
     min_component : int
         Connected speckles of fewer pixels go.
+    tilt : float
+        A systematic error of a pinhole camera whose depth is along its axis, which is taken away first:
+        measured less true inverse depth, for each unit of x / z (1/m); see :func:`nacre.calibrate_depth`.
     noise : NoiseModel, float, "kinect", "stereo", "tof", "auto" or None
         The noise of the depth; a number is a constant standard deviation [m]; a name is that of a kind of
         sensor (see :class:`NoiseModel`); None and "auto" measure it from the image.
@@ -187,6 +193,7 @@ def preprocess_depth(
         max_slant=max_slant,
         max_missing=max_missing,
         min_component=min_component,
+        tilt=tilt,
         noise=as_noise("noise", noise, camera),
     )
     shape = (image.shape[0], image.shape[1])

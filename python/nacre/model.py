@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import numbers
 import os
 import threading
@@ -29,12 +30,15 @@ from nacre._internal.arrays import (
 from nacre._internal.checkpoint import Checkpointed, checkpoint_of, read_checkpoint
 from nacre._internal.core_options import from_core, mirrored, to_core, updated
 from nacre._internal.point_exchange import ExchangeablePoints
+from nacre.depth_calibration import DepthCalibration
 from nacre.frame_report import FrameReport, FrameReports, report_from
 from nacre.noise import NoiseModel
 from nacre.parameters import (
     ModelParameters,
     Preset,
 )
+
+_log = logging.getLogger("nacre.model")
 
 
 class Model(ExchangeablePoints, Checkpointed):
@@ -156,7 +160,13 @@ class Model(ExchangeablePoints, Checkpointed):
         time = None if timestamp is None else as_number("timestamp", timestamp)
         flags = as_flag("keep_guess", keep_guess), as_flag("search", search)
         with self._lock:
-            return report_from(self._core.add_frame(image, pixels, colors, more, time, pose, *flags))
+            before = self._core.tilt
+            report = report_from(self._core.add_frame(image, pixels, colors, more, time, pose, *flags))
+            if self._core.tilt != before:
+                _log.info(
+                    "frame %d: depth is tilted by %.4f / m, and is corrected", report.index, self._core.tilt
+                )
+            return report
 
     def _checkpoint(self, **more: Any) -> bytes:
         with self._lock:
@@ -286,6 +296,25 @@ class Model(ExchangeablePoints, Checkpointed):
         """Distance between neighbouring points [m]; 0 before the first frame."""
         with self._lock:
             return self._core.spacing
+
+    @property
+    def depth_calibration(self) -> DepthCalibration | None:
+        """
+        What views in different directions say of systematic errors of the depth, as it comes.
+
+        They are corrected where they are significant, at every sixth view in a new direction. None where that
+        is not asked for (``calibrate_depth``), or cannot be: for a region, or a camera whose depth is not
+        along the axis of a pinhole. To find them takes some tenths of a second.
+        """
+        with self._lock:
+            found = self._core.depth_calibration
+        return None if found is None else mirrored(DepthCalibration, found)
+
+    @property
+    def corrects_depth(self) -> bool:
+        """Whether a systematic error of the depth was found, and is corrected."""
+        with self._lock:
+            return self._core.tilt != self.parameters.depth.tilt
 
     @property
     def noise(self) -> NoiseModel:

@@ -35,6 +35,7 @@ class DepthParameters:
     max_slant: float = 1.3962634
     max_missing: float = 0.6
     min_component: int = 20
+    tilt: float = 0.0
     noise: NoiseModel | NoiseName | None = None
 
     def for_camera(self, camera: _core.Camera) -> DepthParameters:
@@ -182,6 +183,10 @@ class ModelParameters:
     fusion_method : "fuse", "wlop" or "wlop+"
         How a registered frame becomes part of the model: confidence-weighted fusion, the 2010 paper's WLOP of
         model and new points, or WLOP repaired for incremental use.
+    calibrate_depth : bool
+        Of a pinhole camera that sees one scene (no ``region``), depth along its axis: where views in several
+        directions show that its depth is systematically wrong, correct it from then on, and what was there
+        (:func:`nacre.calibrate_depth`).
     spacing : float
         Distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces. New
         points are also at least a pixel and a half apart in the frame that brings them.
@@ -212,6 +217,7 @@ class ModelParameters:
     fusion_method: Literal["fuse", "wlop", "wlop+"] = "fuse"
     fusion: FusionParameters = field(default_factory=FusionParameters)
     wlop: WlopParameters = field(default_factory=WlopParameters)
+    calibrate_depth: bool = True
     spacing: float = 0.0
     max_points: int = 500000
     predict_motion: bool = True

@@ -22,7 +22,7 @@ PUBLIC = {
     "spatial": ["kdtree", "normals"],
     "mesh": ["mesh"],
     "camera": ["camera"],
-    "depth": ["depth"],
+    "depth": ["depth", "depth_calibration"],
     "simulation": ["rendering", "simulation"],
     "region": ["region"],
     "registration": ["global_registration", "registration"],

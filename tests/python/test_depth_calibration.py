@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 
 import nacre
-from nacre.datasets.corrected import with_corrected_depth
-from nacre.reconstruction import Reconstruction
-from nacre.reconstruction.calibration import DepthViews
 
 CAMERA = nacre.Camera(width=320, height=240, fx=260, fy=260, cx=159.5, cy=119.5)
+CAMERA_SHAPE = (CAMERA.height, CAMERA.width)
 SIDE = ((np.arange(320) - 159.5) / 260)[None, :]
 DOWN = ((np.arange(240) - 119.5) / 260)[:, None]
 
@@ -136,7 +134,7 @@ def test_a_wrong_focal_length_is_told_once_by_a_reconstruction(room, caplog):
     camera = nacre.Camera(width=320, height=240, fx=234, fy=234, cx=159.5, cy=119.5)
     frames = [nacre.SequenceFrame(i, depth, camera, None, None, None) for i, depth in enumerate(depths)]
     with caplog.at_level("WARNING", logger="nacre"):
-        done = nacre.reconstruct(frames, calibrate=True)
+        done = nacre.reconstruct(frames)
     assert done.depth_calibration.focal_scale == pytest.approx(1 / 0.9, abs=0.01)
     assert len([record for record in caplog.records if "focal length is wrong" in record.message]) == 1
 
@@ -160,121 +158,116 @@ def reconstruct(recording, out, *more):
     return json.loads((out / "report.json").read_text())
 
 
-def test_reconstruct_corrects_what_it_finds(room, tmp_path):
-    depths, poses = room
-    wrong = [depth / (1.0 + 0.01 * SIDE * depth) for depth in depths]
-    nacre.write_recording(tmp_path / "recording", CAMERA, wrong, depth_scale=5000, poses=poses)
-    report = reconstruct(tmp_path / "recording", tmp_path / "out")
-    found = report["depth_calibration"]
-    assert found.pop("used")
-    assert found["tilt"] == pytest.approx(0.01, rel=0.1)
-    assert reconstruct(tmp_path / "recording", tmp_path / "o", "--no-calibrate")["depth_calibration"] is None
-
-    corrected = nacre.open_sequence(tmp_path / "recording").with_depth_calibration(
-        nacre.DepthCalibration(**found)
-    )
-    model = nacre.Model(CAMERA)
-    for frame in corrected:
-        model.add_frame(frame.depth)
-    assert [frame["status"] for frame in report["frames"]] == [frame.status for frame in model.frames]
-    assert report["num_points"] == len(model)
-
-
-def test_reconstruct_leaves_good_depth_alone(room, tmp_path):
-    depths, poses = room
-    nacre.write_recording(tmp_path / "recording", CAMERA, depths, depth_scale=5000, poses=poses)
-    report = reconstruct(tmp_path / "recording", tmp_path / "out")
-    assert report["depth_calibration"] is None or not report["depth_calibration"]["used"]
-    same = reconstruct(tmp_path / "recording", tmp_path / "same", "--no-calibrate")
-    assert (tmp_path / "same" / "trajectory.txt").read_text() == (
-        tmp_path / "out" / "trajectory.txt"
-    ).read_text()
-    assert report["num_tracked"] == same["num_tracked"]
-
-
 @pytest.fixture(scope="module")
 def wrong(room):
-    """The same views as frames, with depth that is wrong."""
-    depths, poses = room
-    return [
-        nacre.SequenceFrame(
-            i, (depth / (1.0 + 0.01 * SIDE * depth)).astype(np.float32), CAMERA, None, None, pose
-        )
-        for i, (depth, pose) in enumerate(zip(depths, poses, strict=True))
-    ]
+    """The same views, tilted."""
+    return [(depth / (1.0 + 0.01 * SIDE * depth)).astype(np.float32) for depth in room[0]]
+
+
+def grown(depths, poses=None, **changes):
+    """A model of these frames; the first pose given, where poses are."""
+    model = nacre.Model(CAMERA, **changes)
+    for i, depth in enumerate(depths):
+        first = poses is not None and i == 0
+        model.add_frame(depth, guess=poses[0] if first else None, keep_guess=first)
+    return model
 
 
 @pytest.fixture(scope="module")
-def corrected(wrong):
-    return nacre.reconstruct(wrong, calibrate=True)
+def corrected(room, wrong):
+    return grown(wrong, room[1])
 
 
-def test_one_call_corrects_what_it_finds(wrong, corrected):
-    assert corrected.depth_calibration.is_significant
+def test_a_model_corrects_what_it_finds(room, wrong, corrected):
+    """Points and poses that were there are moved: the surface lies where that of right depth does."""
+    depths, poses = room
+    assert corrected.corrects_depth
     assert corrected.depth_calibration.tilt == pytest.approx(0.01, rel=0.1)
-    right = corrected.depth_calibration.correct(wrong[5].depth, CAMERA)
-    np.testing.assert_array_equal(corrected.sequence[5].depth, right)
-    np.testing.assert_array_equal(corrected.sequence[4:6][1].depth, right)
-    assert len(corrected.frames) == len(wrong)
-    left = nacre.reconstruct(wrong)
+    left = grown(wrong, poses, calibrate_depth=False)
     assert left.depth_calibration is None
-    errors = [done.evaluation["absolute_trajectory_error"].rotation_rmse for done in (corrected, left)]
-    assert errors[0] < 0.5 * errors[1]
+    assert not left.corrects_depth
+    right = nacre.KdTree(grown(depths, poses).points)
+    off = {name: np.median(right.query(m.points, 1)[0]) for name, m in (("left", left), ("moved", corrected))}
+    assert off["moved"] < 0.5 * off["left"]
+    errors = {
+        name: np.linalg.norm(m.poses[:, :3, 3] - np.array(poses)[:, :3, 3], axis=1).max()
+        for name, m in (("left", left), ("moved", corrected))
+    }
+    assert errors["moved"] < 0.5 * errors["left"]
 
 
-def test_what_a_mask_leaves_out_does_not_count(wrong):
+def test_later_frames_say_that_they_corrected_earlier_ones(corrected):
+    assert next(i for i, frame in enumerate(corrected.frames) if frame.corrects_earlier) == 5
+    assert {frame.status for frame in corrected.frames} == {"TRACKED"}
+
+
+def test_what_is_known_of_a_camera_can_be_given(room, wrong, corrected):
+    """It is the same as right depth, and there is nothing left to correct."""
+    known = grown(wrong, room[1], depth=nacre.DepthParameters(tilt=0.01))
+    assert not known.corrects_depth
+    assert known.depth_calibration.tilt == pytest.approx(0.01, rel=0.1)
+    right = grown(room[0], room[1])
+    assert len(known) == pytest.approx(len(right), rel=0.01)
+    np.testing.assert_allclose(known.poses[:, :3, 3], right.poses[:, :3, 3], atol=2e-3)
+
+
+def test_cleaning_takes_a_tilt_away(room, wrong):
+    clean = nacre.preprocess_depth(wrong[0], CAMERA, tilt=0.01, noise="kinect")
+    right = nacre.preprocess_depth(room[0][0], CAMERA, noise="kinect")
+    both = np.isfinite(clean) & np.isfinite(right)
+    assert both.sum() > 0.99 * np.isfinite(right).sum()
+    np.testing.assert_allclose(clean[both], right[both], rtol=1e-5)
+    labels = nacre.label_pixels(wrong[0], CAMERA, nacre.DepthParameters(tilt=0.01, noise="kinect"))
+    np.testing.assert_array_equal(labels == 0, np.isfinite(clean))
+
+
+def test_good_depth_is_left_alone(room):
+    depths, poses = room
+    model = grown(depths, poses)
+    assert not model.depth_calibration.is_significant
+    assert not model.corrects_depth
+    same = grown(depths, poses, calibrate_depth=False)
+    np.testing.assert_array_equal(model.points, same.points)
+
+
+def test_any_number_of_threads_corrects_to_the_same_bits(room, wrong, corrected):
+    other = grown(wrong, room[1], num_threads=3)
+    np.testing.assert_array_equal(other.points, corrected.points)
+    np.testing.assert_array_equal(other.poses, corrected.poses)
+
+
+@pytest.mark.parametrize("before", [3, 7])
+def test_a_saved_model_goes_on_to_the_same_bits(room, wrong, corrected, tmp_path, before):
+    """Before the first correction, and after it."""
+    grown(wrong[:before], room[1]).save(tmp_path / "model")
+    model = nacre.Model.load(tmp_path / "model")
+    for depth in wrong[before:]:
+        model.add_frame(depth)
+    np.testing.assert_array_equal(model.points, corrected.points)
+    assert model.depth_calibration == corrected.depth_calibration
+    assert model.corrects_depth
+
+
+def test_what_a_mask_leaves_out_does_not_count(room, wrong):
     """Something that moves with the camera, over a third of the image."""
-    shown = np.ones(wrong[0].depth.shape, bool)
+    shown = np.ones(CAMERA_SHAPE, bool)
     shown[:, :100] = False
-    covered = [
-        dataclasses.replace(frame, depth=np.where(shown, frame.depth, np.float32(0.6)), mask=shown)
-        for frame in wrong
-    ]
-    views = DepthViews([(frame.index, frame.truth.ravel().tolist()) for frame in wrong])
-    found = views.calibrate(Reconstruction(covered, nacre.Model(CAMERA))).depth_calibration
-    seen = ((np.where(shown, frame.depth, np.float32(np.nan)), frame.truth) for frame in wrong)
-    assert found.is_significant
-    assert found == nacre.calibrate_depth(seen, CAMERA)
+    model = nacre.Model(CAMERA)
+    for i, (depth, matrix) in enumerate(zip(wrong, room[1], strict=True)):
+        covered = np.where(shown, depth, np.float32(0.6))
+        model.add_frame(covered, mask=shown, guess=matrix, keep_guess=i == 0)
+    assert model.depth_calibration.is_significant
+    assert model.depth_calibration.tilt == pytest.approx(0.01, rel=0.15)
 
 
-def test_one_call_does_what_the_command_does(wrong, tmp_path):
-    nacre.write_recording(tmp_path / "recording", CAMERA, (frame.depth for frame in wrong), depth_scale=5000)
+def test_reconstruct_tells_what_it_corrected(wrong, tmp_path):
+    nacre.write_recording(tmp_path / "recording", CAMERA, wrong, depth_scale=5000)
     report = reconstruct(tmp_path / "recording", tmp_path / "out")
-    done = nacre.reconstruct(tmp_path / "recording", calibrate=True)
+    done = nacre.reconstruct(tmp_path / "recording")
     assert report["depth_calibration"] == {**dataclasses.asdict(done.depth_calibration), "used": True}
+    assert done.depth_calibration.tilt == pytest.approx(0.01, rel=0.1)
     np.testing.assert_array_equal(nacre.read_points(tmp_path / "out" / "model.ply").points, done.model.points)
-
-
-def test_a_run_with_corrected_depth_goes_on_from_a_file(wrong, corrected, tmp_path):
-    told = []
-
-    def progress(frame):
-        told.append(frame.index)
-        return len(told) < len(wrong) + 3
-
-    done = nacre.reconstruct(wrong, calibrate=True, progress=progress)
-    assert done.cancelled
-    assert told == [*range(len(wrong)), 0, 1, 2]
-    done.save(tmp_path / "run")
-    other = Reconstruction.load(tmp_path / "run", wrong).complete()
-    assert other.depth_calibration == corrected.depth_calibration
-    np.testing.assert_array_equal(other.model.points, corrected.model.points)
-
-
-def test_a_run_that_is_cancelled_before_has_no_calibration(wrong):
-    done = nacre.reconstruct(wrong, calibrate=True, progress=lambda frame: frame.index < 5)
-    assert done.cancelled
-    assert len(done.frames) == 6
-    assert done.depth_calibration is None
-    assert "absolute_trajectory_error" in done.evaluation
-
-
-def test_a_frame_of_another_size_is_lost_after_a_correction(wrong, corrected):
-    small = dataclasses.replace(wrong[0], depth=wrong[0].depth[::2])
-    frames = with_corrected_depth([wrong[0], small], corrected.depth_calibration)
-    done = Reconstruction(frames, nacre.Model(CAMERA)).complete()
-    assert [frame.status for frame in done.frames] == ["TRACKED", "LOST"]
-    assert done.frames[1].refused
+    assert reconstruct(tmp_path / "recording", tmp_path / "o", "--no-calibrate")["depth_calibration"] is None
 
 
 @pytest.mark.parametrize(
@@ -283,12 +276,31 @@ def test_a_frame_of_another_size_is_lost_after_a_correction(wrong, corrected):
         (nacre.Camera.orthographic(320, 240, 0.01), {}),
         (nacre.Camera(320, 240, 260, 260, 159.5, 119.5, depth="radial"), {}),
         (CAMERA, {"region": {"object": True}}),
+        (CAMERA, {"preset": "paper"}),
     ],
 )
-def test_one_call_says_where_depth_cannot_be_calibrated(camera, changes):
-    frame = nacre.SequenceFrame(0, np.ones((240, 320), np.float32), camera, None, None, None)
-    with pytest.raises(ValueError, match="calibrate must be False for a region, or a camera"):
-        nacre.reconstruct([frame], calibrate=True, **changes)
+def test_a_model_that_does_not_see_one_scene_calibrates_nothing(camera, changes):
+    assert nacre.Model(camera, **changes).depth_calibration is None
+
+
+@pytest.mark.parametrize(
+    "camera",
+    [
+        nacre.Camera.orthographic(320, 240, 0.01),
+        nacre.Camera(320, 240, 260, 260, 159.5, 119.5, depth="radial"),
+    ],
+)
+def test_other_cameras_have_no_tilt(camera):
+    with pytest.raises(ValueError, match=r"tilt must be 0 unless the camera is a pinhole"):
+        nacre.Model(camera, depth={"tilt": 0.01})
+    with pytest.raises(ValueError, match="pinhole camera with depth along its axis"):
+        nacre.preprocess_depth(np.ones((240, 320), np.float32), camera, tilt=0.01)
+
+
+@pytest.mark.parametrize("tilt", [math.nan, math.inf])
+def test_a_tilt_is_finite(tilt):
+    with pytest.raises(ValueError, match="tilt must be a finite number"):
+        nacre.Model(CAMERA, depth={"tilt": tilt})
 
 
 def test_a_camera_that_does_not_turn_says_nothing(room):

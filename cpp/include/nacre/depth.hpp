@@ -62,6 +62,8 @@ struct DepthOptions {
   double max_slant = 1.3962634;     ///< inverse-depth test: steeper surfaces are removed [rad]; 80 degrees
   double max_missing = 0.6;         ///< a pixel goes where more than this part of its 5 x 5 neighbours is missing
   int min_component = 20;           ///< connected speckles of fewer pixels go
+  double tilt = 0.0;  ///< measured less true inverse depth, for each unit of x / z, which is taken away first [1/m]; a
+                      ///< Model finds it where it can (depth_calibration.hpp)
   std::optional<NoiseModel> noise;  ///< unset: measured from the image itself (estimate_noise); a Model measures it
                                     ///< from all images so far (NoiseCalibration)
 

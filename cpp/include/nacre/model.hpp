@@ -2,11 +2,13 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 
 #include "nacre/camera.hpp"
 #include "nacre/checkpoint.hpp"
+#include "nacre/depth_calibration.hpp"
 #include "nacre/frame_report.hpp"
 #include "nacre/model_options.hpp"
 #include "nacre/types.hpp"
@@ -36,6 +38,9 @@ class Model {
   PointModel cloud_in_camera() const;         ///< in the newest registered camera's frame
   /// One report per frame that was added. Where a later frame corrected it, it says what is known since.
   FrameReports frames() const;
+  /// What the views so far say of systematic errors of the depth as it comes. Where it is significant, depth is
+  /// corrected from then on, and what was there is moved. Unset where it cannot be calibrated, or is not to be.
+  std::optional<DepthCalibration> depth_calibration() const;
   NoiseModel noise() const;  ///< given, or measured from the images so far
   /// By how much the frames registered so far are noisier than that: errors that neighbouring pixels share do not show
   /// in one image. At least 1; 1 where the noise is given.

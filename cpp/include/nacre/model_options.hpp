@@ -43,6 +43,8 @@ struct ModelOptions : TrackingOptions {
   FusionMethod fusion_method = FusionMethod::fuse;
   FusionOptions fusion;
   WlopOptions wlop;
+  bool calibrate_depth = true;  ///< of a pinhole camera that looks at one scene, depth along its axis: find and correct
+                                ///< its systematic error (depth_calibration.hpp)
   double spacing = 0.0;  ///< distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces;
                          ///< new points are also at least a pixel and a half of their frame apart
   int max_points = 500000;  ///< the model never grows beyond: its spacing is widened instead

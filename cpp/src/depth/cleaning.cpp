@@ -16,6 +16,7 @@
 #include "depth/restored_depth.hpp"
 #include "depth/speckles.hpp"
 #include "depth/window_fits.hpp"
+#include "nacre/depth_calibration.hpp"
 #include "simd/depth_edges.hpp"
 #include "simd/depth_keep.hpp"
 
@@ -129,12 +130,26 @@ void DepthOptions::check() const {
   require(max_slant > 0.0 && max_slant < 1.5707963, "max_slant", "an angle between 0 and pi / 2", max_slant);
   require(max_missing >= 0.0 && max_missing <= 1.0, "max_missing", "a part between 0 and 1", max_missing);
   require(min_component >= 0, "min_component", "a number of pixels, at least 0", min_component);
+  require(std::isfinite(tilt), "tilt", "a finite number", tilt);
   if (noise) noise->check();
 }
 
+namespace {
+
+// A tilt is taken away first.
+DepthImage clean_straight(const DepthRef& depth, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
+                          DepthReport* report, MaskImage* labels, int num_threads) {
+  const auto clean = [&](const DepthRef& straight) {
+    return clean_depth(straight, camera, options, mask, nullptr, report, labels, num_threads);
+  };
+  return options.tilt == 0.0 ? clean(depth) : clean(correct_depth(depth, camera, options.tilt, num_threads));
+}
+
+}  // namespace
+
 DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const DepthOptions& options,
                             const MaskRef& mask, DepthReport* report, int num_threads) {
-  return clean_depth(depth, camera, options, mask, nullptr, report, nullptr, num_threads);
+  return clean_straight(depth, camera, options, mask, report, nullptr, num_threads);
 }
 
 DepthImage clean_depth(const DepthRef& measured, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
@@ -188,7 +203,7 @@ DepthImage clean_depth(const DepthRef& measured, const Camera& camera, const Dep
 MaskImage label_pixels(const DepthRef& depth, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
                        int num_threads) {
   MaskImage labels;
-  clean_depth(depth, camera, options, mask, nullptr, nullptr, &labels, num_threads);
+  clean_straight(depth, camera, options, mask, nullptr, &labels, num_threads);
   return labels;
 }
 

@@ -38,6 +38,23 @@ constexpr float nearest_median = 0.05F;  // [m] derived: nearer medians: a wrong
 constexpr float farthest_median = 50.0F;  // [m] derived: farther medians: a wrong depth_scale; test_depth
 constexpr std::int64_t most_probes = 8192;  // [pixels] budget: that tell an image's median depth; test_depth
 constexpr float step_sigmas = 3.0F;  // [sigma] tuned: allowance for noise in steepness and links; test_depth
+constexpr double most_blocks = 19200.0;  // [blocks] budget: of pixels that a view is averaged to, to calibrate depth; test_depth_calibration
+constexpr int most_views = 24;  // [views] budget: that depth is calibrated by; test_depth_calibration
+constexpr double least_turn = 0.1;  // [rad] tuned: between views that are compared; test_depth_calibration
+constexpr double most_turn = 0.6;  // [rad] tuned: between views that are compared; test_depth_calibration
+constexpr int most_calibration_steps = 16;  // [iterations] budget: of Gauss and Newton; test_depth_calibration
+constexpr double largest_stretch_step = 0.1;  // [1] budget: of the stretch, in one iteration; test_depth_calibration
+constexpr double least_part_left = 1e-4;  // [1] derived: of the information, that poses leave; rounding leaves less; test_depth_calibration
+constexpr double at_rest = 0.1;  // [sigma] derived: a smaller step changes nothing; test_depth_calibration
+constexpr std::int64_t least_matches = 200;  // [blocks] tuned: that two views must share; test_depth_calibration
+constexpr double same_surface = 0.05;  // [1] tuned: of the depth: surfaces farther apart are not the same; test_depth_calibration
+constexpr double same_facing = 0.85;  // [1] tuned: cosine between normals of one surface; test_depth_calibration
+constexpr double largest_block_step = 0.1;  // [1] tuned: of the depth, across two blocks of one surface; test_depth_calibration
+constexpr int least_pairs = 6;  // [pairs] tuned: of views, that make an error of depth sure; test_depth_calibration
+constexpr double sure_sigmas = 7.0;  // [sigma] tuned: an error of depth is beyond; test_depth_calibration
+constexpr double least_tilt = 0.002;  // [1/m] derived: noise of one pixel's inverse depth, structured light; test_depth_calibration
+constexpr double least_focal_error = 0.04;  // [1] tuned: calibrated cameras show up to 0.03; test_depth_calibration
+constexpr float largest_correction = 0.5F;  // [1] derived: of the depth: no calibration reaches; test_depth_calibration
 
 }  // namespace nacre::depth_limits
 // clang-format on

@@ -5,6 +5,7 @@
 
 #include "base/parallel.hpp"
 #include "camera/limits.hpp"
+#include "depth/tilt.hpp"
 #include "fusion/limits.hpp"
 #include "spatial/hash_grid.hpp"
 
@@ -19,6 +20,17 @@ void move_points(PointModel& model, const std::vector<Pose>& corrections, int nu
     const Eigen::Isometry3f& motion = motions[static_cast<std::size_t>(model.last_seen[i])];
     model.points[i] = motion * model.points[i];
     model.normals[i] = (motion.linear() * model.normals[i]).normalized();
+  });
+}
+
+void straighten_points(PointModel& model, const std::vector<Pose>& poses, double tilt, int num_threads) {
+  parallel_for(model.size(), 4096, num_threads, [&](std::int64_t k) {
+    const auto i = static_cast<std::size_t>(k);
+    const Eigen::Isometry3f pose(poses[static_cast<std::size_t>(model.last_seen[i])].cast<float>());
+    const SurfacePoint seen = {pose.inverse() * model.points[i], pose.linear().transpose() * model.normals[i]};
+    const SurfacePoint straight = without_tilt(seen, tilt);
+    model.points[i] = pose * straight.point;
+    model.normals[i] = pose.linear() * straight.normal;
   });
 }
 

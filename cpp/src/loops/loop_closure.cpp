@@ -8,6 +8,7 @@
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
 #include "camera/limits.hpp"
+#include "depth/tilt.hpp"
 #include "loops/limits.hpp"
 #include "outlines/match.hpp"
 #include "registration/icp.hpp"
@@ -186,6 +187,25 @@ LoopReport LoopClosure::close(const LoopFrame& frame, const Match& loop, const s
   report.distance = loop.distance;
   for (const int k : in_question) key_frames_[static_cast<std::size_t>(k)].last_verified = time() - 1;
   return report;
+}
+
+void LoopClosure::straighten(double tilt, const std::vector<Pose>& motions) {
+  for (KeyFrame& key_frame : key_frames_) {
+    Points &points = key_frame.cloud.points, &normals = key_frame.cloud.normals;
+    for (Eigen::Index i = 0; i < points.rows(); ++i) {
+      const SurfacePoint straight = without_tilt({points.row(i), normals.row(i)}, tilt);
+      points.row(i) = straight.point;
+      normals.row(i) = straight.normal;
+    }
+    for (OutlinePoint& outline : key_frame.outline) {
+      const SurfacePoint straight = without_tilt({outline.point.cast<float>(), outline.normal.cast<float>()}, tilt);
+      outline.point = straight.point.cast<double>();
+      outline.normal = straight.normal.cast<double>();
+      outline.outward = (outline.outward - outline.outward.dot(outline.normal) * outline.normal).normalized();
+    }
+  }
+  move(motions);
+  graph_.measure_edges();
 }
 
 void LoopClosure::move(const std::vector<Pose>& motions) {

@@ -38,6 +38,8 @@ class LoopClosure {
   LoopReport add_frame(const LoopFrame& now);
   // The frames have moved, each by its motion.
   void move(const std::vector<Pose>& motions);
+  // A tilt of the inverse depth is taken away from all that was seen; the frames move, each by its motion.
+  void straighten(double tilt, const std::vector<Pose>& motions);
 
   // The outlines of the oldest key frames that are near a pose, and verified (world frame).
   std::vector<std::vector<OutlinePoint>> outlines_near(const Pose& pose) const;

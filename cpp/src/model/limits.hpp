@@ -15,6 +15,7 @@ constexpr std::size_t most_key_poses = 8;  // [poses] budget: that a lost camera
 constexpr std::int64_t search_interval = 4;  // [frames] budget: lost, of which one is searched for around earlier poses, or everywhere; test_failure
 constexpr std::int64_t patience = 8;  // [frames] budget: lost, until the search is made at every so many; test_failure
 constexpr std::size_t start_frames = 3;  // [frames] derived: that begin a model anew: two, and one that confirms them; test_starts
+constexpr int calibration_interval = 6;  // [views] budget: in new directions, from one calibration of depth to the next; test_depth_calibration
 constexpr std::size_t most_object_views = 24;  // [views] budget: of an object that turns on a plane; dog
 
 }  // namespace nacre::model_limits

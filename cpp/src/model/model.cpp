@@ -31,6 +31,7 @@ const ModelOptions& Model::options() const { return pipeline_->options; }
 const ModelOptions& Model::given_options() const { return pipeline_->given; }
 const PointModel& Model::cloud() const { return pipeline_->cloud; }
 FrameReports Model::frames() const { return FrameReports(pipeline_->history); }
+std::optional<DepthCalibration> Model::depth_calibration() const { return pipeline_->depth_calibration(); }
 NoiseModel Model::noise() const { return pipeline_->noise(); }
 double Model::noise_factor() const { return pipeline_->known_noise_factor(); }
 double Model::spacing() const { return pipeline_->spacing; }

@@ -41,6 +41,7 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.registration.max_samples = 0;
   options.registration.weak_threshold = 0.0;
   options.relocalise = false;
+  options.calibrate_depth = false;
   options.denoise_samples = false;
   options.loop_closure = false;
   options.verify = false;

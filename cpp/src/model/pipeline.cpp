@@ -67,9 +67,18 @@ Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in)
   options.check();
   options.registration.num_threads = options.num_threads;
   spacing = options.spacing;
+  require(options.depth.tilt == 0.0 || can_calibrate_depth(camera), "depth.tilt",
+          "0 unless the camera is a pinhole with depth along its axis", options.depth.tilt);
+  const bool sees_one_scene = !options.region.is_limited();  // what turns before a camera is none with what is around
+  if (options.calibrate_depth && sees_one_scene && can_calibrate_depth(camera)) depth_views.emplace(camera);
 }
 
 FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras) {
+  if (options.depth.tilt == 0.0) return add_straight_frame(depth, extras);
+  return add_straight_frame(correct_depth(depth, camera, options.depth.tilt, options.num_threads), extras);
+}
+
+FrameReport Pipeline::add_straight_frame(const DepthRef& depth, const FrameExtras& extras) {
   check_extras(camera, extras, cloud);
   FrameReport report;
   report.index = static_cast<std::int64_t>(history.size());
@@ -90,6 +99,7 @@ FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras
       if (tracking.is_on_plane) adjust_views(report);
       fuse_frame(extras, report);
       remember_view(report);
+      calibrate_depth(report);
     }
     const bool is_lost = report.status == FrameStatus::lost && history.num_registered() > 0;
     num_lost = is_lost ? num_lost + 1 : 0;

@@ -7,6 +7,7 @@
 #include "fusion/observer.hpp"
 #include "loops/loop_closure.hpp"
 #include "model/frame_history.hpp"
+#include "nacre/depth_calibration.hpp"
 #include "nacre/frame_report.hpp"
 #include "nacre/model_options.hpp"
 #include "tracking/object_view.hpp"
@@ -33,6 +34,8 @@ struct Pipeline {
   SurfaceObserver observer{camera, options.fusion};
   MaskImage region;  // of the newest frame; empty where nothing is left out
   NoiseCalibration calibration{camera};
+  std::optional<DepthCalibrator> depth_views;   // where depth is to be calibrated
+  std::vector<std::int32_t> depth_view_frames;  // their numbers
   PointModel cloud;
   LoopClosure loops{camera, options};
   FrameHistory history;
@@ -55,10 +58,12 @@ struct Pipeline {
   Pipeline(const Camera& camera_in, const ModelOptions& options_in);
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
+  std::optional<DepthCalibration> depth_calibration() const;
   double known_noise_factor() const;  // of the frames so far
   NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
 
  private:
+  FrameReport add_straight_frame(const DepthRef& depth, const FrameExtras& extras);
   // The steps of the loop, in their order.
   DepthImage preprocess(const DepthRef& depth, const MaskRef& mask, FrameReport& report);
   void organise(const DepthRef& depth, const DepthImage& clean, FrameReport& report);
@@ -71,6 +76,7 @@ struct Pipeline {
   void adjust_views(FrameReport& report);
   void fuse_frame(const FrameExtras& extras, FrameReport& report);
   void remember_view(const FrameReport& report);
+  void calibrate_depth(FrameReport& report);
 
   // What they need.
   bool was_lost() const { return num_lost > 0; }
@@ -83,6 +89,8 @@ struct Pipeline {
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   RelocalisationPlaces elsewhere(const RegionReport& region_report, bool may_search) const;
   std::optional<ObjectView> view_of_object(const RegionReport& region_report) const;
+  std::vector<Pose> depth_view_poses() const;
+  void straighten(double tilt, FrameReport& report);
   void move_all(const std::vector<Pose>& corrections, FrameReport& report);
 };
 

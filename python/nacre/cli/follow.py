@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack, closing
 from typing import TYPE_CHECKING
 
-from nacre.cli.signals import Interruption, Stopped
+from nacre.cli.signals import Interruption
 from nacre.cli.terminal import CommandError, Terminal
 
 if TYPE_CHECKING:
@@ -19,26 +19,14 @@ def follow(
     terminal: Terminal, run: Run, stop: Interruption, listeners: Sequence[Callable[[Step], None]] = ()
 ) -> None:
     """Carry out a run until it ends or is stopped; listeners are told of every step, in their order."""
-    from nacre.reconstruction.runner import StageBegun
-
-    calibrates = False
-    try:
-        with closing(run.steps()) as steps, _Bars(terminal, run) as bars:
-            for step in steps:
-                calibrates = stop.ends_at_once = False
-                _refuse_a_wrong_recording(run.done, step)
-                for listener in listeners:
-                    listener(step)
-                bars.show(step)
-                if stop.wanted:
-                    break
-                # A calibration takes seconds, and has nothing to bring to its end.
-                calibrates = stop.ends_at_once = isinstance(step, StageBegun) and step.name == "calibration"
-    except Stopped:
-        if not calibrates:
-            raise
-    finally:
-        stop.ends_at_once = False
+    with closing(run.steps()) as steps, _Bars(terminal, run) as bars:
+        for step in steps:
+            _refuse_a_wrong_recording(run.done, step)
+            for listener in listeners:
+                listener(step)
+            bars.show(step)
+            if stop.wanted:
+                break
 
 
 class _Bars:
@@ -64,8 +52,7 @@ class _Bars:
         num_lost = done.counts["LOST"]
         if isinstance(step, StageBegun):
             self._bar.close()
-            if step.name != "calibration":
-                self._advance = self._bar.enter_context(self._terminal.progress(step.name, step.num_frames))
+            self._advance = self._bar.enter_context(self._terminal.progress(step.name, step.num_frames))
             self._num_lost = num_lost if step.name == "lost frames" else None
         elif isinstance(step, FrameDone) and self._advance is not None:
             if self._num_lost is not None:

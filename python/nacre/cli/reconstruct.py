@@ -113,12 +113,13 @@ def reconstruct(
         ),
     ] = None,
     calibrate: Annotated[
-        bool,
+        bool | None,
         typer.Option(
             "--calibrate/--no-calibrate",
             help="Where views in several directions show that depth is systematically wrong, correct it.",
+            show_default="on",
         ),
-    ] = True,
+    ] = None,
     attribute: Annotated[
         list[str] | None,
         typer.Option(
@@ -171,6 +172,7 @@ def reconstruct(
                 "depth.min_depth": min_depth,
                 "depth.max_depth": max_depth,
                 "loop_closure": loop_closure,
+                "calibrate_depth": calibrate,
             }
             sides = ("min_x", "max_x", "min_y", "max_y", "min_z", "max_z")
             more |= {f"region.{side}": value for side, value in zip(sides, box or (), strict=box is not None)}
@@ -189,7 +191,6 @@ def reconstruct(
                 every=every,
                 realtime=realtime,
                 retry=retry,
-                calibrate=calibrate,
                 preset=preset_name,
                 is_camera=is_camera(source),
             )
@@ -208,7 +209,6 @@ def _begun(
     import nacre
     from nacre.io.atomic import remove_leftovers
     from nacre.reconstruction import Reconstruction
-    from nacre.reconstruction.calibration import DepthViews, shows_one_scene
     from nacre.reconstruction.runner import Run
 
     out = unfinished.out
@@ -233,9 +233,7 @@ def _begun(
         terminal.say(
             f"{out} held an unfinished run, which --resume would have gone on with: it is begun again"
         )
-    calibrates = options.calibrate and options.preset != "paper" and feed is None
-    views = DepthViews() if calibrates and shows_one_scene(sequence.camera, parameters) else None
-    run = Run(done, indices, views=views, retry=options.retry)
+    run = Run(done, indices, retry=options.retry)
     unfinished.live = None if feed is None else feed.figures
     unfinished.begin(run, options.document(sequence))
     return Job(options, sequence, words, num_frames, run, unfinished, feed)

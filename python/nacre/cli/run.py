@@ -90,20 +90,13 @@ def _show(terminal: Terminal, job: Job, port: int) -> LiveView:
 
 def _run(terminal: Terminal, job: Job, stop: Interruption, live: LiveView | None) -> None:
     """Run the frames that are not done yet, and lost ones again."""
-    from nacre.reconstruction.runner import FrameDone, Restarted
+    from nacre.reconstruction.runner import FrameDone
 
     def note(step: Step) -> None:
         if isinstance(step, FrameDone):
             job.unfinished.add(step.frame)
             if live is not None:
                 live.add(step.frame)
-        elif isinstance(step, Restarted):
-            terminal.say(
-                f"depth is tilted by {step.calibration.tilt:.4f} (sigma {step.calibration.sigma:.4f}) per "
-                "metre: beginning again with corrected depth"
-            )
-            if live is not None:
-                live.begin_again(job.run.done)
 
     feed = job.feed
     if feed is None:
@@ -138,7 +131,7 @@ def _write(job: Job, stop: Interruption) -> dict[str, Any]:
             "preset": job.options.preset,
             "interrupted": stop.wanted,
             "depth_calibration": calibration
-            and dataclasses.asdict(calibration) | {"used": calibration.is_significant},
+            and dataclasses.asdict(calibration) | {"used": done.model.corrects_depth},
             "live": job.unfinished.live,
         },
         figures=figures if feed is None else {**figures, **dict(feed.rows)},

@@ -21,7 +21,6 @@ from nacre._internal import arrays
 from nacre._internal.value_equality import Value
 from nacre.datasets.listing import files, pair
 from nacre.datasets.sanity_check import depth_oddity
-from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError, printable
 from nacre.io.images import ATTRIBUTE_SUFFIXES, COLOR_SUFFIXES, read_attribute, read_color, read_depth
 from nacre.trajectory import Trajectory
@@ -275,16 +274,6 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
                 for s, image in zip(self._sources, images, strict=True)
             ]
         )
-
-    def with_depth_calibration(self, calibration: DepthCalibration) -> Sequence:
-        """Return the same recording with a systematic error of its depth corrected in every view."""
-
-        def load(path: Path) -> npt.NDArray[np.float32]:
-            depth = self._load_depth(path)
-            check_size(path, depth, self.camera)
-            return calibration.correct(depth, self.camera)
-
-        return self._with_sources(self._sources, load)
 
     def _with_sources(
         self,

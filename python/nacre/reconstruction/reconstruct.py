@@ -11,7 +11,6 @@ from nacre.datasets import Sequence as Recording
 from nacre.datasets import SequenceFrame, open_sequence
 from nacre.model import Model
 from nacre.parameters import ModelParameters, Preset
-from nacre.reconstruction.calibration import DepthViews, shows_one_scene
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.runner import Run
@@ -27,13 +26,10 @@ def reconstruct(
     parameters: ModelParameters | None = None,
     progress: Callable[[FrameRecord], bool | None] | None = None,
     retry: bool = True,
-    calibrate: bool = False,
     **changes: Any,
 ) -> Reconstruction:
     """
-    Run a recording through a new model.
-
-    With ``calibrate`` it does what ``nacre reconstruct`` does.
+    Run a recording through a new model, as ``nacre reconstruct`` does.
 
     Parameters
     ----------
@@ -49,11 +45,6 @@ def reconstruct(
         raise :class:`nacre.Cancelled`, ends the run; what is done is the result, whose ``cancelled`` says so.
     retry : bool
         Whether lost frames are tried again at the end.
-    calibrate : bool
-        Whether depth is corrected where views in several directions show that it is systematically wrong
-        (:func:`nacre.calibrate_depth`): all begins again then, and ``progress`` gets the first frames once
-        more. For one scene that stands still, seen by a pinhole camera with depth along its axis. A run that
-        is cancelled before is not calibrated when it goes on.
 
     Returns
     -------
@@ -87,13 +78,4 @@ def reconstruct(
         raise ValueError("source must have at least one frame, got none")
     of_all = frames.camera if isinstance(frames, Recording) else frames[0].camera
     model = Model(of_all, preset, parameters=parameters, **changes)
-    views = None
-    if calibrate:
-        if not shows_one_scene(of_all, model.parameters):
-            raise ValueError(
-                "calibrate must be False for a region, or a camera whose depth is not along the axis of a "
-                f"pinhole, got {calibrate!r}"
-            )
-        views = DepthViews()
-    run = Run(Reconstruction(frames, model), range(len(frames)), views=views, retry=retry)
-    return run.to_end(progress)
+    return Run(Reconstruction(frames, model), range(len(frames)), retry=retry).to_end(progress)

@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from nacre._internal.arrays import as_count, as_flag, stacked_poses
 from nacre._internal.checkpoint import Checkpointed
-from nacre.datasets.corrected import with_corrected_depth
 from nacre.datasets.sequence import SequenceFrame
 from nacre.depth_calibration import DepthCalibration, turn_between
 from nacre.errors import FileFormatError
@@ -26,7 +25,7 @@ from nacre.evaluation.result import Result
 from nacre.frame_report import FrameReport, count_statuses
 from nacre.model import Model
 from nacre.reconstruction.frame_record import FrameRecord
-from nacre.reconstruction.saved_state import calibration_from, record_from, record_state
+from nacre.reconstruction.saved_state import record_from, record_state
 from nacre.report.run_figures import run_dict, run_report
 from nacre.trajectory import Trajectory
 
@@ -79,8 +78,6 @@ class Reconstruction(Checkpointed):
         What is known beyond the trajectory's errors, by name; may be added to.
     cancelled : bool
         Whether a progress callback ended :meth:`complete` before its last frame.
-    depth_calibration : DepthCalibration or None
-        What the views told of the depth, where it was asked for; if significant, ``sequence`` is corrected.
     """
 
     def __init__(self, sequence: collections.abc.Sequence[SequenceFrame], model: Model) -> None:
@@ -89,7 +86,6 @@ class Reconstruction(Checkpointed):
         self.frames: list[FrameRecord] = []
         self.evaluation: dict[str, Result] = {}
         self.cancelled = False
-        self.depth_calibration: DepthCalibration | None = None
         self._retry: _Retry | None = None
 
     def __repr__(self) -> str:
@@ -204,11 +200,9 @@ class Reconstruction(Checkpointed):
 
     def _checkpoint(self, **more: Any) -> bytes:
         retry = None if self._retry is None else dataclasses.asdict(self._retry)
-        calibration = self.depth_calibration
         run = {
             "records": [record_state(record) for record in self.frames],
             "retry": retry,
-            "depth_calibration": None if calibration is None else dataclasses.asdict(calibration),
         }
         return self.model._checkpoint(run=run, **more)
 
@@ -224,7 +218,7 @@ class Reconstruction(Checkpointed):
         path : path-like
             The file.
         sequence : sequence of SequenceFrame
-            The same recording, as it was given: where the run corrects its depth, it is corrected again.
+            The same recording.
 
         Returns
         -------
@@ -255,10 +249,6 @@ class Reconstruction(Checkpointed):
                     as_count("step", run["retry"]["step"]),
                     as_flag("found_any", run["retry"]["found_any"]),
                 )
-            if run["depth_calibration"] is not None:
-                done.depth_calibration = calibration = calibration_from(run["depth_calibration"])
-                if calibration.is_significant:
-                    done.sequence = with_corrected_depth(sequence, calibration)
         except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
             raise FileFormatError(path, f"it holds a model, but no run that can go on ({error})") from None
         return done, more
@@ -305,6 +295,11 @@ class Reconstruction(Checkpointed):
             record if record.report is None else _renewed(record, reports[record.report.index])
             for record in self.frames
         ]
+
+    @property
+    def depth_calibration(self) -> DepthCalibration | None:
+        """What the frames say of systematic errors of the depth (:attr:`Model.depth_calibration`)."""
+        return self.model.depth_calibration
 
     @property
     def counts(self) -> dict[str, int]:

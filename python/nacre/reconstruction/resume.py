@@ -7,17 +7,15 @@ import os
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from nacre._internal.arrays import as_count, as_vector
+from nacre._internal.arrays import as_count
 from nacre.datasets.sequence import SequenceFrame
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer, remove_leftovers
 from nacre.io.folder_lock import lock_folder
 from nacre.io.json_files import read_json
-from nacre.reconstruction.calibration import DepthViews
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.journal import Journal, read_journal
 from nacre.reconstruction.reconstruction import Reconstruction
@@ -26,36 +24,6 @@ from nacre.reconstruction.runner import Run
 _FORMAT = 1
 _RARE = 50.0  # a checkpoint is written when so many times what the last one took has gone by: 2 % of the time
 _LEAST_SECONDS = 5.0
-
-
-@dataclass
-class Stage:
-    """
-    Where a run is.
-
-    Attributes
-    ----------
-    name : str
-        "views": frames, until there are enough views to calibrate depth; "frames": the rest, or all of them.
-        Lost frames are tried again when there are no more.
-    views : list of (index, pose)
-        That were chosen for the calibration; poses row by row.
-    live : mapping or None
-        What report.json says of a camera.
-    """
-
-    name: str = "frames"
-    views: list[tuple[int, list[float]]] = field(default_factory=list)
-    live: Mapping[str, Any] | None = None
-
-    @classmethod
-    def of(cls, state: Any) -> Stage:
-        """Return the stage that plain values tell."""
-        name, live = state["name"], state["live"]
-        if name not in ("views", "frames") or not (live is None or isinstance(live, dict)):
-            raise ValueError(f"no stage is {name!r} with live {live!r}")
-        views = [(as_count("view", i), as_vector("pose", pose, 16).tolist()) for i, pose in state["views"]]
-        return cls(name, views, live)
 
 
 class UnfinishedRun:
@@ -134,14 +102,14 @@ class UnfinishedRun:
         """Return the run as it was at the newest checkpoint; what is done again may be compared."""
         done, more = Reconstruction._load(self.checkpoint, sequence)
         try:
-            stage = Stage.of(more["stage"])
+            live = more["live"]
+            if not (live is None or isinstance(live, dict)):
+                raise ValueError(f"live must be an object or null, got {live!r}")
             num_frames = as_count("num_journaled", more["num_journaled"])
         except (KeyError, TypeError, ValueError) as error:
             raise FileFormatError(self.checkpoint, f"it is no run of nacre reconstruct ({error})") from None
-        self.live = stage.live
-        # Views that a killed process had no time to keep are not there any more.
-        views = DepthViews([view for view in stage.views if view[0] < len(sequence)])
-        self._run = Run(done, indices, views=views if stage.name == "views" else None, retry=retry)
+        self.live = live
+        self._run = Run(done, indices, retry=retry)
         self._journal = Journal(self.journal_path, num_frames, compare)
         return self._run
 
@@ -164,9 +132,7 @@ class UnfinishedRun:
         assert self._run is not None
         start = time.monotonic()
         self._journal.sync()
-        views = self._run.views
-        stage = Stage("frames", [], self.live) if views is None else Stage("views", views.chosen, self.live)
-        self._run.done._save(self.checkpoint, stage=asdict(stage), num_journaled=self._journal.num_frames)
+        self._run.done._save(self.checkpoint, live=self.live, num_journaled=self._journal.num_frames)
         now = time.monotonic()
         self._next = now + max(_LEAST_SECONDS, _RARE * (now - start))
         self._num_since = 0

@@ -8,9 +8,7 @@ from contextlib import closing
 from dataclasses import dataclass
 from typing import Literal
 
-from nacre.depth_calibration import DepthCalibration
 from nacre.progress import as_progress
-from nacre.reconstruction.calibration import DepthViews
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.reconstruction import Reconstruction
 
@@ -19,9 +17,9 @@ _log = logging.getLogger("nacre.reconstruction")
 
 @dataclass(frozen=True)
 class StageBegun:
-    """A stage begins, with so many frames to come; None: nobody knows, or there are none in it."""
+    """A stage begins, with so many frames to come; None: nobody knows."""
 
-    name: Literal["frames", "calibration", "lost frames"]
+    name: Literal["frames", "lost frames"]
     num_frames: int | None = None
 
 
@@ -32,14 +30,7 @@ class FrameDone:
     frame: FrameRecord
 
 
-@dataclass(frozen=True)
-class Restarted:
-    """Depth turned out to be systematically wrong: all begins again with corrected depth."""
-
-    calibration: DepthCalibration
-
-
-Step = StageBegun | FrameDone | Restarted
+Step = StageBegun | FrameDone
 
 
 class Run:
@@ -52,18 +43,13 @@ class Run:
         What there is already, of a run that goes on.
     indices : iterable of int
         The frames to run. Of a sequence, those that are done are left out; others are run as they come.
-    views : DepthViews, optional
-        Frames are run until there are enough of them; then depth is calibrated, and where it is wrong all
-        begins again. None: depth is right, or known to be wrong already.
     retry : bool
         Whether lost frames are tried again at the end.
 
     Attributes
     ----------
     done : Reconstruction
-        The run up to now; another one from :class:`Restarted` on.
-    views : DepthViews or None
-        None once depth is calibrated.
+        The run up to now.
     """
 
     def __init__(
@@ -71,28 +57,19 @@ class Run:
         done: Reconstruction,
         indices: Iterable[int],
         *,
-        views: DepthViews | None = None,
         retry: bool = True,
     ) -> None:
         self.done = done
-        self.views = views
         self._indices = indices
         self._retry = retry
 
     def steps(self) -> Generator[Step, None, None]:
         """Do one thing after the other, and yield each when it is done (a stage, when it begins)."""
-        if self.views is not None:
-            yield from self._frames_until_enough(self.views)
-            yield StageBegun("calibration")
-            calibrated = self.views.calibrate(self.done)
-            is_new = calibrated is not self.done
-            self.done, self.views = calibrated, None
-            if is_new and calibrated.depth_calibration is not None:
-                yield Restarted(calibrated.depth_calibration)
         yield from self._frames()
         if self._retry:
             yield StageBegun("lost frames", self.done.counts["LOST"] or None)
             yield from map(FrameDone, self.done.retry_lost())
+        self._warn_of_a_wrong_camera()
 
     def to_end(self, progress: Callable[[FrameRecord], bool | None] | None = None) -> Reconstruction:
         """Do all of it, as far as a callback wants the frames, and evaluate the trajectory."""
@@ -106,14 +83,10 @@ class Run:
         self.done.evaluate_trajectory()
         return self.done
 
-    def _frames_until_enough(self, views: DepthViews) -> Iterator[Step]:
-        if views.are_enough:
-            return
-        for step in self._frames():
-            enough = isinstance(step, FrameDone) and views.add(step.frame)
-            yield step
-            if enough:
-                break
+    def _warn_of_a_wrong_camera(self) -> None:
+        calibration = self.done.depth_calibration
+        if calibration is not None and (advice := calibration.focal_length_advice(self.done.model.camera)):
+            _log.warning("%s", advice)
 
     def _frames(self) -> Iterator[Step]:
         rest = self._indices

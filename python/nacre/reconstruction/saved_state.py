@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from nacre._internal.arrays import as_count, as_length, as_number, as_vector
-from nacre.depth_calibration import DepthCalibration
+from nacre._internal.arrays import as_count, as_number, as_vector
 from nacre.errors import FileFormatError
 from nacre.frame_report import FrameReport
 from nacre.reconstruction.frame_record import FrameRecord
@@ -54,15 +52,6 @@ def record_from(state: Any, reports: Sequence[FrameReport]) -> FrameRecord:
         None if truth is None else pose_from(truth),
         _error_from(state.get("error")),
     )
-
-
-def calibration_from(state: Any) -> DepthCalibration:
-    """Return a calibration of depth that was written as plain values; errors as in :func:`record_from`."""
-    tilt, scale = as_number("tilt", state["tilt"]), as_number("focal_scale", state["focal_scale"])
-    if not (math.isfinite(tilt) and math.isfinite(scale)):
-        raise ValueError(f"tilt and focal_scale must be finite, got {tilt} and {scale}")
-    sigma, focal_sigma = (as_length(name, state[name]) for name in ("sigma", "focal_sigma"))
-    return DepthCalibration(tilt, sigma, as_count("num_pairs", state["num_pairs"]), scale, focal_sigma)
 
 
 def pose_from(values: Any) -> npt.NDArray[np.float64]:

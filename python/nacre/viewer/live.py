@@ -37,11 +37,6 @@ class LiveView:
         self.viewer = Viewer(self.timeline, host=host, port=port, parameters=done.model.parameters.depth)
         self._next = 0.0
 
-    def begin_again(self, done: Reconstruction) -> None:
-        """Show another run from now on."""
-        self._done = done
-        self.timeline.clear()
-
     def add(self, record: FrameRecord) -> None:
         """Note a frame; show it if there is time."""
         self.timeline.add(ReportedFrame(**record.as_dict()))

@@ -128,11 +128,6 @@ class Timeline:
         """Append a frame."""
         self.frames.append(frame)
 
-    def clear(self) -> None:
-        """Forget the frames and the model."""
-        self.frames.clear()
-        self._snapshots.clear()
-
     def set_snapshot(self, cloud: Snapshot) -> None:
         """Note the model as it is after the last frame that was added."""
         place = len(self.frames) - 1

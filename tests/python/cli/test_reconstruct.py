@@ -204,33 +204,3 @@ def test_redwood_with_and_without_colour(recordings, tmp_path):
         assert run("reconstruct", source, "-o", tmp_path / name, "--last", 0, *options).code == 0
         cloud = nacre.read_points(tmp_path / name / "model.ply")
         assert (cloud.colors is not None) == (name == "color")
-
-
-def test_a_signal_ends_a_calibration_at_once_and_nothing_else(monkeypatch: pytest.MonkeyPatch) -> None:
-    import signal
-
-    from nacre.cli.follow import follow
-    from nacre.cli.signals import Interruption
-    from nacre.cli.terminal import Terminal
-    from nacre.reconstruction import Reconstruction
-    from nacre.reconstruction.calibration import DepthViews
-    from nacre.reconstruction.runner import Run, StageBegun
-
-    camera = nacre.Camera(24, 20, 30.0, 30.0, 11.5, 9.5)
-    blank = np.full((20, 24), np.nan, np.float32)
-    frames = [nacre.SequenceFrame(i, blank, camera, None, None, None) for i in range(2)]
-    stop = Interruption()
-    told = []
-
-    def calibrate(self: DepthViews, done: Reconstruction) -> Reconstruction:
-        stop.note(signal.SIGTERM)
-        raise AssertionError("it went on")
-
-    monkeypatch.setattr(DepthViews, "calibrate", calibrate)
-    run = Run(Reconstruction(frames, nacre.Model(camera)), range(2), views=DepthViews())
-    follow(Terminal(quiet=True), run, stop, [lambda step: told.append((step, stop.ends_at_once))])
-    assert [at_once for _, at_once in told] == [False] * 4
-    assert told[-1][0] == StageBegun("calibration")
-    assert stop.number == signal.SIGTERM
-    assert not stop.ends_at_once
-    assert run.views is not None  # it is resumed from here

@@ -48,9 +48,6 @@ def forged(old: str, new: str) -> bytes:
     return with_note(SAVED_RUN, note.replace(old.encode(), new.encode(), 1))
 
 
-_CALIBRATION = (
-    '"depth_calibration": {"tilt": %s, "sigma": %s, "num_pairs": %s, "focal_scale": 1, "focal_sigma": 1}'
-)
 FORGED = {
     "run of no JSON": ('"run": {', '"run": {{', "does not say the depth_scale"),
     "run nested deep": ('"retry": null', '"retry": ' + "[" * 50_000, "does not say the depth_scale"),
@@ -89,21 +86,6 @@ FORGED = {
         '"retry": null',
         '"retry": {"are_apart": true, "step": 0, "found_any": 3}',
         "found_any must be True",
-    ),
-    "calibration nan": (
-        '"depth_calibration": null',
-        _CALIBRATION % ("NaN", 1, 9),
-        "tilt and focal_scale must be finite",
-    ),
-    "calibration of negative sigma": (
-        '"depth_calibration": null',
-        _CALIBRATION % (1, -1, 9),
-        "sigma must be at least 0",
-    ),
-    "calibration of infinite pairs": (
-        '"depth_calibration": null',
-        _CALIBRATION % (1, 1, "1e999"),
-        "num_pairs must be an integer",
     ),
 }
 SAVED_RUNS = [

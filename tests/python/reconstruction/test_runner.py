@@ -1,18 +1,11 @@
 """The steps of a run, as who listens to one is told of them."""
 
 import numpy as np
-import pytest
-from test_depth_calibration import (
-    CAMERA,
-    SIDE,
-    room,  # noqa: F401  a fixture
-)
 from test_wide_views import view
 
 import nacre
 from nacre.reconstruction import Reconstruction
-from nacre.reconstruction.calibration import DepthViews
-from nacre.reconstruction.runner import FrameDone, Restarted, Run, StageBegun
+from nacre.reconstruction.runner import FrameDone, Run, StageBegun
 
 
 def frames(depths: list[np.ndarray], camera: nacre.Camera) -> list[nacre.SequenceFrame]:
@@ -41,17 +34,3 @@ def test_what_is_done_is_left_out_of_a_sequence_and_others_are_taken_as_they_com
     assert list(Run(done, range(2), retry=False).steps()) == []
     steps = Run(done, iter([2]), retry=False).steps()
     assert [short(step) for step in steps] == [StageBegun("frames"), 2]
-
-
-@pytest.mark.slow
-def test_wrong_depth_begins_again(room: tuple[list[np.ndarray], list[np.ndarray]]) -> None:  # noqa: F811
-    wrong = [depth / (1.0 + 0.01 * SIDE * depth) for depth in room[0]]
-    first = Reconstruction(frames(wrong, CAMERA), nacre.Model(CAMERA))
-    run = Run(first, range(len(wrong)), views=DepthViews())
-    steps = list(run.steps())
-    (again,) = (i for i, step in enumerate(steps) if isinstance(step, Restarted))
-    assert steps[again - 1] == StageBegun("calibration")
-    assert steps[again + 1] == StageBegun("frames", len(wrong))
-    assert run.done is not first
-    assert run.done.depth_calibration == steps[again].calibration  # type: ignore[union-attr]
-    assert len(run.done.frames) == len(wrong)

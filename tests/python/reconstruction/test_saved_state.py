@@ -11,7 +11,7 @@ import pytest
 
 from nacre.errors import FileFormatError
 from nacre.reconstruction import FrameRecord
-from nacre.reconstruction.saved_state import calibration_from, record_from, record_state
+from nacre.reconstruction.saved_state import record_from, record_state
 
 TRUTH = np.eye(4)
 GOOD = record_state(FrameRecord(3, 0.1, "LOST", "nothing was seen", None, TRUTH))
@@ -57,21 +57,3 @@ def test_a_record_comes_back_whole(error: Exception | None) -> None:
 def test_values_that_no_record_has_are_refused(change: dict[str, object], message: str) -> None:
     with pytest.raises((ValueError, TypeError), match=message):
         record_from({**GOOD, **change}, ())
-
-
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"tilt": math.nan}, "tilt and focal_scale must be finite"),
-        ({"focal_scale": math.inf}, "tilt and focal_scale must be finite"),
-        ({"focal_sigma": -1.0}, "focal_sigma must be at least 0"),
-        ({"tilt": "much"}, "tilt must be a number"),
-        ({"sigma": -1.0}, "sigma must be at least 0"),
-        ({"num_pairs": math.inf}, "num_pairs must be an integer"),
-    ],
-)
-def test_values_that_no_calibration_has_are_refused(change: dict[str, object], message: str) -> None:
-    good = {"tilt": 0.01, "sigma": math.inf, "num_pairs": 1, "focal_scale": 1.0, "focal_sigma": 0.1}
-    assert calibration_from(json.loads(json.dumps(good))).tilt == 0.01
-    with pytest.raises((ValueError, TypeError), match=message):
-        calibration_from({**good, **change})

@@ -157,12 +157,6 @@ def test_a_run_is_shown_while_it_grows(out: Path) -> None:
             live.show()
         first, last = (live.timeline.snapshots[i][1] for i in (0, -1))
         assert len(first.points) < len(last.points)
-        live.begin_again(done)
-        assert live.timeline.frames == []
-        assert live.timeline.snapshot_at(0) is None
-        for record in done.frames:
-            live.add(record)
-            live.show()
         live.finish()
         assert live.viewer.place == FRAMES - 1
         assert len(live.timeline.snapshots) == FRAMES

@@ -109,9 +109,11 @@ void exchange(Archive& archive, CameraFields& fields) {
 // What of a model is neither given nor of the newest frame alone.
 template <class Archive>
 void exchange_state(Archive& archive, Pipeline& state) {
-  archive(state.options.fusion.reference_sigma, state.region, state.calibration, state.residual_noise,
-          state.usual_contradiction, state.cloud, state.loops, state.history, state.before, state.still_scene,
-          state.hypothesis, state.views, state.spacing, state.num_lost, state.num_vain, state.start_frames);
+  archive(state.options.fusion.reference_sigma, state.options.depth.tilt, state.depth_view_frames, state.region,
+          state.calibration, state.residual_noise, state.usual_contradiction, state.cloud, state.loops, state.history,
+          state.before, state.still_scene, state.hypothesis, state.views, state.spacing, state.num_lost, state.num_vain,
+          state.start_frames);
+  if (state.depth_views) archive(*state.depth_views);
 }
 
 // Space that the table of rays may take before a frame was fused: see load.
@@ -290,6 +292,12 @@ bool PrivateState::is_sound(const NoiseCalibration& calibration) {
          std::all_of(calibration.bins_.begin(), calibration.bins_.end(), is_mean);
 }
 
+bool PrivateState::is_sound(const DepthCalibrator& calibrator) {
+  const std::vector<DepthCalibrator::View>& views = calibrator.views_;
+  return std::all_of(views.begin(), views.end(),
+                     [&](const DepthCalibrator::View& view) { return view.blocks.rows() == calibrator.num_blocks(); });
+}
+
 bool PrivateState::is_sound(const ResidualNoise& noise) {
   return std::isfinite(noise.log_scale_) && std::isfinite(noise.count_) && noise.count_ >= 0.0;
 }
@@ -366,6 +374,13 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
     last_start = frame.index;
   }
   archive.require(PrivateState::is_sound(state.loops, num_frames), "the key frames contradict each other");
+  const std::size_t num_views = state.depth_views ? static_cast<std::size_t>(state.depth_views->num_views()) : 0;
+  const bool is_tilted = state.depth_views.has_value() || state.options.depth.tilt == given.depth.tilt;
+  archive.require(is_tilted && std::isfinite(state.options.depth.tilt) && state.depth_view_frames.size() == num_views &&
+                      are_all(state.depth_view_frames, [&](auto frame) { return is_within(frame, num_frames); }) &&
+                      std::is_sorted(state.depth_view_frames.begin(), state.depth_view_frames.end()) &&
+                      (!state.depth_views || PrivateState::is_sound(*state.depth_views)),
+                  "the views that calibrate depth contradict the camera");
   archive.require(PrivateState::is_sound(state.still_scene), "the still scene has another size than the camera");
   archive.require(PrivateState::is_sound(state.hypothesis), "the place that is followed contradicts itself");
   archive.require(PrivateState::is_sound(state.calibration) && PrivateState::is_sound(state.residual_noise) &&

@@ -26,7 +26,8 @@ template <class Archive>
 void exchange(Archive& archive, DepthOptions& options) {
   archive.choice(options.edge_test, EdgeTest::inverse_depth);
   archive(options.min_depth, options.max_depth, options.gradient_threshold, options.edge_dilation, options.edge_sigmas,
-          options.planar_keep_sigmas, options.max_slant, options.max_missing, options.min_component, options.noise);
+          options.planar_keep_sigmas, options.max_slant, options.max_missing, options.min_component, options.tilt,
+          options.noise);
 }
 
 template <class Archive>
@@ -61,8 +62,9 @@ template <class Archive>
 void exchange(Archive& archive, ModelOptions& options) {
   archive(options.depth, options.region, options.registration);
   archive.choice(options.fusion_method, FusionMethod::wlop_plus);
-  archive(options.fusion, options.wlop, options.spacing, options.max_points, options.predict_motion, options.relocalise,
-          options.loop_closure, options.denoise_samples, options.verify, options.min_score, options.num_threads);
+  archive(options.fusion, options.wlop, options.calibrate_depth, options.spacing, options.max_points,
+          options.predict_motion, options.relocalise, options.loop_closure, options.denoise_samples, options.verify,
+          options.min_score, options.num_threads);
 }
 
 template <class Archive>

@@ -72,6 +72,15 @@ struct PrivateState {
   }
 
   template <class Archive>
+  static void exchange(Archive& archive, DepthCalibrator::View& view) {
+    archive(view.blocks, view.world_from_camera);
+  }
+  template <class Archive>
+  static void exchange(Archive& archive, DepthCalibrator& calibrator) {
+    archive(calibrator.views_);
+  }
+
+  template <class Archive>
   static void exchange(Archive& archive, ResidualNoise& noise) {
     archive(noise.log_scale_, noise.count_);
   }
@@ -128,6 +137,7 @@ struct PrivateState {
 
   // Whether what was read can be gone on with.
   static bool is_sound(const NoiseCalibration& calibration);
+  static bool is_sound(const DepthCalibrator& calibrator);
   static bool is_sound(const ResidualNoise& noise);
   static bool is_sound(const UsualContradiction& contradiction);
   static bool is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options);

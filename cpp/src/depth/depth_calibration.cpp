@@ -1,0 +1,320 @@
+#include "nacre/depth_calibration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "base/check.hpp"
+#include "base/linear_algebra.hpp"
+#include "base/parallel.hpp"
+#include "base/pose_check.hpp"
+#include "base/se3.hpp"
+#include "base/statistics.hpp"
+#include "camera/ray_table.hpp"
+#include "depth/inverse_depth_image.hpp"
+#include "depth/limits.hpp"
+
+namespace nacre {
+namespace {
+
+using PointBlocks = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+
+// What the camera measures wrongly: by so much the inverse depth is tilted, and the scene too narrow.
+struct Distortion {
+  double tilt = 0.0, stretch = 1.0;
+};
+
+void require_calibrable(const Camera& camera) {
+  if (!can_calibrate_depth(camera)) {
+    throw std::invalid_argument("camera: expected a pinhole camera with depth along its axis");
+  }
+}
+
+// Pixels, each way, whose inverse depths are averaged: an image has so many blocks at most.
+int block_side(const Camera& camera) {
+  const double pixels = static_cast<double>(camera.width()) * camera.height();
+  return std::max(1, static_cast<int>(std::ceil(std::sqrt(pixels / depth_limits::most_blocks))));
+}
+
+struct BlockGrid {
+  int side, columns, rows;
+
+  explicit BlockGrid(const Camera& camera)
+      : side(block_side(camera)), columns(camera.width() / side), rows(camera.height() / side) {}
+  std::int64_t size() const { return static_cast<std::int64_t>(columns) * rows; }
+};
+
+// One point for each block of pixels, from the means of their rays and of their inverse depths.
+Points average(const DepthRef& depth, const Camera& camera) {
+  const BlockGrid grid(camera);
+  Points blocks = Points::Constant(grid.size(), 3, std::numeric_limits<float>::quiet_NaN());
+  const double pixels = static_cast<double>(grid.side) * grid.side;
+  for (int row = 0; row < grid.rows; ++row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      double x = 0.0, y = 0.0, inverse = 0.0;
+      for (int v = row * grid.side; v < (row + 1) * grid.side; ++v) {
+        const simd::RayRow rays = camera.ray_table().row(v);
+        for (int u = column * grid.side; u < (column + 1) * grid.side; ++u) {
+          x += static_cast<double>(rays.x[u]);
+          y += static_cast<double>(rays.y != nullptr ? rays.y[u] : rays.row_y);
+          inverse += 1.0 / static_cast<double>(depth(v, u));
+        }
+      }
+      if (!(std::isfinite(inverse) && inverse > 0.0 && std::isfinite(x))) continue;
+      const double z = pixels / inverse;
+      blocks.row(static_cast<Eigen::Index>(row) * grid.columns + column) =
+          Eigen::RowVector3d(x / pixels * z, y / pixels * z, z).cast<float>();
+    }
+  }
+  return blocks;
+}
+
+// Measured points without the tilt (1 / z less tilt * x / z), and stretched across the axis.
+PointBlocks corrected(const Points& points, const Distortion& distortion) {
+  PointBlocks result = points.cast<double>();
+  for (Eigen::Index i = 0; i < result.rows(); ++i) {
+    result.row(i) /= 1.0 - distortion.tilt * result(i, 0);
+    result.row(i).head<2>() *= distortion.stretch;
+  }
+  return result;
+}
+
+// Normals from the neighbours to all sides, towards the camera; NaN beside steps.
+PointBlocks normals_of(const PointBlocks& points, const BlockGrid& grid) {
+  PointBlocks normals = PointBlocks::Constant(points.rows(), 3, std::numeric_limits<double>::quiet_NaN());
+  for (int row = 1; row + 1 < grid.rows; ++row) {
+    for (int column = 1; column + 1 < grid.columns; ++column) {
+      const Eigen::Index i = static_cast<Eigen::Index>(row) * grid.columns + column;
+      const Eigen::RowVector3d across = points.row(i + 1) - points.row(i - 1);
+      const Eigen::RowVector3d down = points.row(i + grid.columns) - points.row(i - grid.columns);
+      const double step = std::max(std::abs(across.z()), std::abs(down.z()));
+      if (!(step <= depth_limits::largest_block_step * points(i, 2))) continue;
+      normals.row(i) = down.cross(across).normalized();
+    }
+  }
+  return normals;
+}
+
+struct CorrectedView {
+  PointBlocks points, normals;
+};
+
+// What a pair of views says of tilt and stretch beside their relative pose.
+struct PairFit {
+  Eigen::Matrix2d information;
+  Eigen::Vector2d gradient;
+  Eigen::Matrix<double, 6, 3> response;  // less the twist, by tilt and stretch and as the residuals want it
+};
+
+std::optional<PairFit> linearise(const CorrectedView& target, const CorrectedView& source, const Pose& motion,
+                                 double stretch, const Camera& camera) {
+  using Row = Eigen::Matrix<double, 9, 1>;
+  const BlockGrid grid(camera);
+  std::vector<Row> rows;
+  std::vector<double> depths;
+  for (Eigen::Index i = 0; i < source.points.rows(); ++i) {
+    if (!source.normals.row(i).allFinite()) continue;
+    const Eigen::Vector3d local = source.points.row(i), p = motion * local;
+    const Eigen::Vector2d pixel = camera.project(Eigen::Vector3d(p.x() / stretch, p.y() / stretch, p.z()));
+    const double column = std::floor((pixel.x() + 0.5) / grid.side), line = std::floor((pixel.y() + 0.5) / grid.side);
+    if (!(column >= 0.0 && column < grid.columns && line >= 0.0 && line < grid.rows)) continue;
+    const auto seen = static_cast<Eigen::Index>(line) * grid.columns + static_cast<Eigen::Index>(column);
+    const Eigen::Vector3d q = target.points.row(seen), n = target.normals.row(seen);
+    const double residual = (q - p).dot(n);
+    const double facing = (motion.linear() * source.normals.row(i).transpose()).dot(n);
+    if (!(std::abs(residual) < depth_limits::same_surface * q.z() && facing > depth_limits::same_facing)) continue;
+    // Both derivatives at the middle of the two points: at the points themselves, their noise would favour whatever
+    // makes the scene smaller.
+    const Eigen::Vector3d middle = 0.5 * (p + q);
+    const Eigen::Vector3d there = motion.linear().transpose() * (middle - motion.translation());
+    const Eigen::Vector3d wide(middle.x(), middle.y(), 0.0), wide_there(there.x(), there.y(), 0.0);
+    Row row;
+    row << -p.cross(n), -n, n.dot(middle * middle.x() - motion.linear() * (there * there.x())),
+        n.dot(wide - motion.linear() * wide_there) / stretch, residual;
+    rows.push_back(row);
+    depths.push_back(q.z());
+  }
+  if (static_cast<std::int64_t>(rows.size()) < depth_limits::least_matches) return std::nullopt;
+
+  std::vector<double> squares;
+  squares.reserve(depths.size());
+  for (const double depth : depths) squares.push_back(depth * depth);
+  const double middle_square = median_of(squares);
+  std::vector<double> whitened;
+  for (std::size_t i = 0; i < rows.size(); ++i) whitened.push_back(std::abs(rows[i](8)) * middle_square / squares[i]);
+  const double scale = std::max(mad_to_sigma * median_of(whitened), 1e-9);
+  Eigen::Matrix<double, 9, 9> sums = Eigen::Matrix<double, 9, 9>::Zero();
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const double noise = scale * squares[i] / middle_square;
+    sums += robust_weight(whitened[i], scale) / (noise * noise) * (rows[i] * rows[i].transpose());
+  }
+  Eigen::Matrix<double, 6, 6> hessian = sums.topLeftCorner<6, 6>();
+  hessian.diagonal().array() += 1e-9 * hessian.trace();
+  PairFit fit;
+  fit.response = solve_symmetric_columns(hessian, sums.topRightCorner<6, 3>());
+  const Eigen::Matrix<double, 2, 3> left = sums.block<2, 3>(6, 6) - sums.block<2, 6>(6, 0) * fit.response;
+  // Rounding leaves less of the information than this where the pose explains all.
+  if (!(left(0, 0) > depth_limits::least_part_left * sums(6, 6) &&
+        left(1, 1) > depth_limits::least_part_left * sums(7, 7))) {
+    return std::nullopt;
+  }
+  fit.information = left.leftCols<2>();
+  fit.gradient = left.col(2);
+  return fit;
+}
+
+Pose followed(const Pose& motion, const PairFit& fit, const Eigen::Vector3d& step) {
+  const Eigen::Matrix<double, 6, 1> twist = -fit.response * step;
+  return motion_about(Eigen::Vector3d::Zero(), twist) * motion;
+}
+
+struct ViewPair {
+  int first, second;
+  Pose motion;
+};
+
+}  // namespace
+
+bool DepthCalibration::is_significant() const {
+  return num_pairs >= depth_limits::least_pairs && std::abs(tilt) > depth_limits::sure_sigmas * sigma &&
+         std::abs(tilt) > depth_limits::least_tilt;
+}
+
+bool DepthCalibration::has_wrong_focal_length() const {
+  const double error = std::abs(focal_scale - 1.0);
+  return num_pairs >= depth_limits::least_pairs && error > depth_limits::sure_sigmas * focal_sigma &&
+         error > depth_limits::least_focal_error;
+}
+
+bool can_calibrate_depth(const Camera& camera) {
+  return camera.model() == Camera::Model::pinhole && camera.depth_kind() == DepthKind::z;
+}
+
+DepthImage correct_depth(const DepthRef& depth, const Camera& camera, double tilt, int num_threads) {
+  require_calibrable(camera);
+  require_camera_size("depth", depth.rows(), depth.cols(), camera);
+  DepthImage result(depth.rows(), depth.cols());
+  const auto per_depth = static_cast<float>(tilt);
+  parallel_for(depth.rows(), rows_per_block(depth.cols()), num_threads, [&](std::int64_t v) {
+    const float* const x = camera.ray_table().row(static_cast<int>(v)).x;
+    for (Eigen::Index u = 0; u < depth.cols(); ++u) {
+      const float z = depth(v, u), change = per_depth * x[u] * z;
+      result(v, u) = std::abs(change) < depth_limits::largest_correction ? z / (1.0F - change)
+                                                                         : std::numeric_limits<float>::quiet_NaN();
+    }
+  });
+  return result;
+}
+
+DepthCalibrator::DepthCalibrator(const Camera& camera) : camera_(camera) { require_calibrable(camera); }
+
+std::int64_t DepthCalibrator::num_blocks() const { return BlockGrid(camera_).size(); }
+
+bool DepthCalibrator::has_enough() const { return num_views() == depth_limits::most_views; }
+
+bool DepthCalibrator::is_new_direction(const Pose& world_from_camera) const {
+  return views_.empty() ||
+         angle_between(views_.back().world_from_camera, world_from_camera) >= depth_limits::least_turn;
+}
+
+bool DepthCalibrator::add(const DepthRef& depth, const Pose& world_from_camera) {
+  require_camera_size("depth", depth.rows(), depth.cols(), camera_);
+  require_rigid(world_from_camera, "world_from_camera");
+  if (!is_new_direction(world_from_camera) || has_enough()) return false;
+  views_.push_back({average(depth, camera_), world_from_camera});
+  return true;
+}
+
+DepthCalibration DepthCalibrator::fit(int num_threads) const {
+  std::vector<ViewPair> pairs;
+  for (int step = 1; step <= 2; ++step) {
+    for (int i = 0; i + step < num_views(); ++i) {
+      const Pose &a = views_[static_cast<std::size_t>(i)].world_from_camera,
+                 &b = views_[static_cast<std::size_t>(i + step)].world_from_camera;
+      const double turn = angle_between(a, b);
+      if (turn >= depth_limits::least_turn && turn <= depth_limits::most_turn) {
+        pairs.push_back({i, i + step, a.inverse() * b});
+      }
+    }
+  }
+  Distortion distortion;
+  std::vector<CorrectedView> views(views_.size());
+  std::vector<std::optional<PairFit>> fits(pairs.size());
+  DepthCalibration result;
+  for (int iteration = 0; iteration < depth_limits::most_calibration_steps; ++iteration) {
+    parallel_for(num_views(), 1, num_threads, [&](std::int64_t k) {
+      const auto i = static_cast<std::size_t>(k);
+      views[i].points = corrected(views_[i].blocks, distortion);
+      views[i].normals = normals_of(views[i].points, BlockGrid(camera_));
+    });
+    parallel_for(static_cast<std::int64_t>(pairs.size()), 1, num_threads, [&](std::int64_t k) {
+      const auto i = static_cast<std::size_t>(k);
+      fits[i] =
+          linearise(views[static_cast<std::size_t>(pairs[i].first)], views[static_cast<std::size_t>(pairs[i].second)],
+                    pairs[i].motion, distortion.stretch, camera_);
+    });
+    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+    result = {};
+    for (const std::optional<PairFit>& fit : fits) {
+      if (!fit) continue;
+      information += fit->information;
+      gradient += fit->gradient;
+      ++result.num_pairs;
+    }
+    if (result.num_pairs < 2) return result;
+    const Eigen::Matrix2d covariance = information.inverse();
+    Eigen::Vector2d step = -covariance * gradient;
+    // From the scatter, as neighbours share their errors; two pairs share a view.
+    Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+    for (const std::optional<PairFit>& fit : fits) {
+      if (!fit) continue;
+      const Eigen::Vector2d left = fit->gradient + fit->information * step;
+      scatter += left * left.transpose();
+    }
+    const Eigen::Array2d sigmas = (2.0 * (covariance * scatter * covariance).diagonal().array()).sqrt();
+    step *= std::min(1.0, depth_limits::largest_stretch_step / std::max(std::abs(step(1)), 1e-12));
+    distortion.tilt += step(0);
+    distortion.stretch += step(1);
+    result.tilt = distortion.tilt;
+    result.sigma = sigmas(0);
+    result.focal_scale = 1.0 / distortion.stretch;
+    result.focal_sigma = sigmas(1) / (distortion.stretch * distortion.stretch);
+    if ((step.array().abs() < depth_limits::at_rest * sigmas).all()) break;
+    for (std::size_t i = 0; i < pairs.size(); ++i) {
+      if (fits[i]) pairs[i].motion = followed(pairs[i].motion, *fits[i], {step(0), step(1), 1.0});
+    }
+  }
+  return result;
+}
+
+void DepthCalibrator::set_poses(const std::vector<Pose>& world_from_camera) {
+  for (std::size_t i = 0; i < views_.size(); ++i) views_[i].world_from_camera = world_from_camera[i];
+}
+
+std::vector<Pose> DepthCalibrator::correct(double tilt, int num_threads) {
+  std::vector<CorrectedView> views(views_.size());
+  parallel_for(num_views(), 1, num_threads, [&](std::int64_t k) {
+    const auto i = static_cast<std::size_t>(k);
+    views[i].points = corrected(views_[i].blocks, {tilt, 1.0});
+    views[i].normals = normals_of(views[i].points, BlockGrid(camera_));
+    views_[i].blocks = views[i].points.cast<float>();
+  });
+  std::vector<Pose> motions(views_.size(), Pose::Identity());
+  parallel_for(num_views() - 1, 1, num_threads, [&](std::int64_t k) {
+    const auto i = static_cast<std::size_t>(k);
+    Pose motion = views_[i].world_from_camera.inverse() * views_[i + 1].world_from_camera;
+    const std::optional<PairFit> fit = linearise(views[i], views[i + 1], motion, 1.0, camera_);
+    motions[i + 1] = fit ? followed(motion, *fit, {0.0, 0.0, 1.0}) : motion;
+  });
+  std::vector<Pose> poses;
+  for (std::size_t i = 0; i < views_.size(); ++i) {
+    poses.push_back(i == 0 ? views_[0].world_from_camera : orthonormal(poses.back() * motions[i]));
+  }
+  set_poses(poses);
+  return poses;
+}
+
+}  // namespace nacre
