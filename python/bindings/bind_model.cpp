@@ -45,12 +45,13 @@ py::dict milliseconds(const FrameReport& report) {
   return result;
 }
 
-FrameReport add_frame(Model& model, const DepthRef& depth, const MaskRef& mask, const ColorsRef& colors,
-                      const std::vector<std::pair<std::string, Attributes>>& attributes,
+FrameReport add_frame(Model& model, const DepthRef& depth, const MaskRef& mask, const MaskRef& confidence,
+                      const ColorsRef& colors, const std::vector<std::pair<std::string, Attributes>>& attributes,
                       std::optional<double> timestamp, const std::optional<PoseMatrix>& guess, bool keep_guess,
                       bool search) {
   FrameExtras extras;
   extras.mask = mask;
+  extras.confidence = confidence;
   extras.colors = colors;
   for (const auto& [name, values] : attributes) extras.attributes.push_back({name, values});
   extras.timestamp = timestamp;

@@ -835,14 +835,15 @@ class Model:
         self,
         arg0: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
         arg1: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, n]", "flags.c_contiguous"],
-        arg2: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 3]", "flags.c_contiguous"],
-        arg3: collections.abc.Sequence[
+        arg2: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, n]", "flags.c_contiguous"],
+        arg3: typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 3]", "flags.c_contiguous"],
+        arg4: collections.abc.Sequence[
             tuple[str, typing.Annotated[numpy.typing.ArrayLike, numpy.float32, "[m, n]"]]
         ],
-        arg4: typing.SupportsFloat | typing.SupportsIndex | None,
-        arg5: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] | None,
-        arg6: bool,
+        arg5: typing.SupportsFloat | typing.SupportsIndex | None,
+        arg6: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"] | None,
         arg7: bool,
+        arg8: bool,
     ) -> FrameReport: ...
     def cloud_in_camera(self) -> PointModel: ...
     def report(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> FrameReport: ...

@@ -21,6 +21,7 @@ from nacre._internal.arrays import (
     as_camera,
     as_depth,
     as_flag,
+    as_levels,
     as_mask,
     as_number,
     as_pose,
@@ -100,6 +101,7 @@ class Model(ExchangeablePoints, Checkpointed):
         mask: npt.ArrayLike | None = None,
         timestamp: float | None = None,
         *,
+        confidence: npt.ArrayLike | None = None,
         attributes: Mapping[str, npt.ArrayLike] | None = None,
         guess: npt.ArrayLike | None = None,
         keep_guess: bool = False,
@@ -120,6 +122,9 @@ class Model(ExchangeablePoints, Checkpointed):
             Pixels where it is 0 are not used.
         timestamp : float, optional
             [s], kept in the report.
+        confidence : (H, W) integer or bool, optional
+            How sure the camera is of each pixel, 0 to 255, in levels of its own. What each is worth the
+            residuals of registered frames tell: pixels of less sure levels weigh less.
         attributes : mapping of str to (H, W) or (H, W, C) real, optional
             Anything else that pixels have (an intensity, a temperature, class probabilities), by name; NaN
             is no value. Fused along with the points, as colours are, where ``fusion_method`` is "fuse".
@@ -145,6 +150,7 @@ class Model(ExchangeablePoints, Checkpointed):
         """
         image = as_depth("depth", depth, self._depth_scale)
         pixels = as_mask("mask", mask, image.shape)
+        sure = as_levels("confidence", confidence, image.shape)
         colors = np.zeros((0, 3), np.uint8)
         if color is not None:
             array = as_array("color", color)
@@ -161,7 +167,7 @@ class Model(ExchangeablePoints, Checkpointed):
         flags = as_flag("keep_guess", keep_guess), as_flag("search", search)
         with self._lock:
             before = self._core.tilt
-            report = report_from(self._core.add_frame(image, pixels, colors, more, time, pose, *flags))
+            report = report_from(self._core.add_frame(image, pixels, sure, colors, more, time, pose, *flags))
             if self._core.tilt != before:
                 _log.info(
                     "frame %d: depth is tilted by %.4f / m, and is corrected", report.index, self._core.tilt

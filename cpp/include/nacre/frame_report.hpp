@@ -21,6 +21,8 @@ struct FrameExtras {
   Colors colors;                           ///< height * width rows, row by row; empty: none
   std::vector<FrameAttribute> attributes;  ///< fused along with the points where fusion_method is fuse
   MaskImage mask;                          ///< pixels of the object, see MaskImage
+  MaskImage confidence;                    ///< how sure the camera is of each pixel: levels of its own, whose worth
+                                           ///< registered frames tell; empty: all alike
   std::optional<double> timestamp;         ///< [s]
   std::optional<Pose> guess;               ///< world_from_camera to start the registration from
   bool keep_guess = false;                 ///< take the guess for the pose, without registration

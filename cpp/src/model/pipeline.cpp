@@ -51,10 +51,16 @@ double spacing_for(const Frame& frame, const Camera& camera) {
   return model_limits::spacing_pixels * camera.footprint(*quartile);
 }
 
+bool is_image_of(const Camera& camera, const MaskImage& image) {
+  return image.rows() == camera.height() && image.cols() == camera.width();
+}
+
 void check_extras(const Camera& camera, const FrameExtras& extras, const PointModel& model) {
   const Eigen::Index pixels = static_cast<Eigen::Index>(camera.width()) * camera.height();
   require(extras.colors.rows() == 0 || extras.colors.rows() == pixels, "colors", "one row per pixel",
           extras.colors.rows());
+  require(extras.confidence.size() == 0 || is_image_of(camera, extras.confidence), "confidence", "one value per pixel",
+          extras.confidence.size());
   check_attributes(extras.attributes, camera, model);
   require(!extras.keep_guess || extras.guess.has_value(), "keep_guess", "used with a guess", "no guess");
   if (extras.guess) require_rigid(*extras.guess, "guess");
@@ -89,12 +95,13 @@ FrameReport Pipeline::add_straight_frame(const DepthRef& depth, const FrameExtra
     const DepthImage clean = preprocess(depth, extras.mask, report);
     organise(depth, clean, report);
     keep_region(report);
-    observe(extras.colors, report);
+    observe(extras, report);
     const TrackingResult tracking = locate(extras, report);
     if (report.status == FrameStatus::tracked) leave_out_moving(tracking, extras.colors, report);
     if (report.status != FrameStatus::lost) close_loops(tracking, extras.keep_guess, report);
     if (report.status == FrameStatus::tracked) {
       if (was_lost()) report.status = FrameStatus::relocalised;
+      confidence_noise.add(extras.confidence, frame, cloud, report.world_from_camera, camera);
       if (options.relocalise) keep_view(report);
       if (tracking.is_on_plane) adjust_views(report);
       fuse_frame(extras, report);
@@ -135,11 +142,12 @@ void Pipeline::keep_region(FrameReport& report) {
 }
 
 // Makes the frame ready to be asked about points.
-void Pipeline::observe(const ColorsRef& colors, FrameReport& report) {
+void Pipeline::observe(const FrameExtras& extras, FrameReport& report) {
   const Stopwatch watch(report.milliseconds.back_project);
+  confidence_noise.scale(extras.confidence, frame);
   cells = StillScene::cells_of(frame, camera);
   if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
-  observer.look_at(frame, colors, options.num_threads);
+  observer.look_at(frame, extras.colors, options.num_threads);
   now.depth = frame.points.col(2);
   now.sigma = frame.sigma;
   noise_factor = 1.0;

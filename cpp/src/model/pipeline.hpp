@@ -10,6 +10,7 @@
 #include "nacre/depth_calibration.hpp"
 #include "nacre/frame_report.hpp"
 #include "nacre/model_options.hpp"
+#include "tracking/confidence_noise.hpp"
 #include "tracking/object_view.hpp"
 #include "tracking/relocalisation_filter.hpp"
 #include "tracking/residual_noise.hpp"
@@ -44,6 +45,7 @@ struct Pipeline {
   DepthView now;                           // of the newest, from the origin: where the camera is, is to be found
   std::vector<OutlinePoint> outline;       // of the newest
   DepthView before;                        // of the newest frame that was fused
+  ConfidenceNoise confidence_noise;        // of registered frames
   ResidualNoise residual_noise;            // of registered frames, against what images show
   UsualContradiction usual_contradiction;  // likewise, between them and the model
   double noise_factor = 1.0;               // of the newest frame
@@ -68,7 +70,7 @@ struct Pipeline {
   DepthImage preprocess(const DepthRef& depth, const MaskRef& mask, FrameReport& report);
   void organise(const DepthRef& depth, const DepthImage& clean, FrameReport& report);
   void keep_region(FrameReport& report);
-  void observe(const ColorsRef& colors, FrameReport& report);
+  void observe(const FrameExtras& extras, FrameReport& report);
   TrackingResult locate(const FrameExtras& extras, FrameReport& report);
   void leave_out_moving(const TrackingResult& tracking, const ColorsRef& colors, FrameReport& report);
   void close_loops(const TrackingResult& tracking, bool is_given, FrameReport& report);

@@ -196,6 +196,18 @@ def as_mask(name: str, value: npt.ArrayLike | None, shape: tuple[int, int]) -> n
     return as_rows(array != 0, np.uint8)
 
 
+def as_levels(name: str, value: npt.ArrayLike | None, shape: tuple[int, int]) -> npt.NDArray[np.uint8]:
+    """Return an image of levels as (H, W) uint8; an empty array for None."""
+    if value is None:
+        return np.zeros((0, 0), dtype=np.uint8)
+    array = as_real(name, value)
+    if array.shape != shape:
+        raise ValueError(f"{name} must have the depth image's shape {shape}, got {array.shape}")
+    if array.dtype.kind not in "bui" or (array.size and not (array.min() >= 0 and array.max() <= 255)):
+        raise ValueError(f"{name} must be of integers from 0 to 255, got {array.dtype}")
+    return as_rows(array, np.uint8)
+
+
 def as_attributes(
     name: str, value: Mapping[str, npt.ArrayLike] | None, shape: tuple[int, int]
 ) -> list[tuple[str, npt.NDArray[np.float32]]]:

@@ -73,14 +73,14 @@ def _camera(source: Path) -> tuple[dict[str, Any], Rows]:
         camera.close()
     figures = {
         "kind": "camera", "name": camera.name, "serial": camera.serial, "depth_scale": camera.depth_scale,
-        "color": frame.color is not None, "confidence": frame.mask is not None,
+        "color": frame.color is not None, "confidence": frame.confidence is not None,
     }  # fmt: skip
     return figures, [
         ("camera", f"{camera.name}, serial number {camera.serial}"),
         ("depth", describe_camera(camera.camera)),
         ("depth scale", f"{camera.depth_scale:g} stored units per metre"),
         ("colour", "yes" if frame.color is not None else "no"),
-        ("confidence", "yes" if frame.mask is not None else "no"),
+        ("confidence", "yes" if frame.confidence is not None else "no"),
     ]
 
 

@@ -1,8 +1,8 @@
 """
-The plain recording: camera.json, depth/, optionally color/, mask/, groundtruth.txt and timestamps.txt.
+The plain recording: camera.json, depth/; color/, mask/, confidence/, groundtruth.txt, timestamps.txt if any.
 
-Colour images and masks (black: not used) have the stems of the depth images, as have images of anything else
-that pixels have, in attributes/NAME/.
+Colour images, masks (black: not used) and how sure the camera is of its pixels (0 to 255; 0: not used) have
+the stems of the depth images, as have images of anything else that pixels have, in attributes/NAME/.
 
 ``timestamps.txt`` has one time [s] for each depth image, in name order. Without it the time is its index.
 """
@@ -37,7 +37,7 @@ from nacre.io.raw import excerpt
 from nacre.io.trajectories import write_trajectory
 
 FORMAT = "plain"
-LAYOUT = "camera.json and depth/, optionally color/, mask/, groundtruth.txt and timestamps.txt"
+LAYOUT = "camera.json and depth/, optionally color/, mask/, confidence/, groundtruth.txt and timestamps.txt"
 
 _LARGEST_STORED = 65534
 
@@ -59,6 +59,7 @@ def read(folder: Path, given: Overrides) -> Sequence:
         )
     colors = {path.stem: path for path in files(folder / "color", COLOR_SUFFIXES)}
     masks = {path.stem: path for path in files(folder / "mask", COLOR_SUFFIXES)}
+    confidence = {path.stem: path for path in files(folder / "confidence", COLOR_SUFFIXES)}
     attributes = {
         inside.name: {path.stem: path for path in files(inside, ATTRIBUTE_SUFFIXES)}
         for inside in sorted((folder / "attributes").glob("*/"))
@@ -80,6 +81,7 @@ def read(folder: Path, given: Overrides) -> Sequence:
                 poses[i],
                 masks.get(path.stem),
                 {name: images[path.stem] for name, images in attributes.items() if path.stem in images},
+                confidence.get(path.stem),
             )
             for i, path in enumerate(depth)
         ],

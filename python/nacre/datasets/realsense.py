@@ -163,14 +163,17 @@ class RealSense:
         stored = np.asanyarray(measured.get_data())
         depth = stored / np.float32(self.depth_scale)
         depth[(stored == 0) | (stored == 65535)] = np.nan
-        color = mask = None
+        color = mask = sure = None
         if frames.get_color_frame():
             color = np.array(self._align.process(frames).get_color_frame().get_data(), np.uint8)
         confidence = frames.first_or_default(rs.stream.confidence)
         if confidence:
             values = np.asanyarray(confidence.get_data())
-            mask = values > 0 if values.shape == stored.shape else None
-        return SequenceFrame(index, depth, self.camera, 1e-3 * measured.get_timestamp(), color, None, mask)
+            if values.shape == stored.shape:
+                sure = np.clip(values, 0, 255).astype(np.uint8)
+                mask = sure > 0
+        time = 1e-3 * measured.get_timestamp()
+        return SequenceFrame(index, depth, self.camera, time, color, None, mask, confidence=sure)
 
 
 def _library() -> Any:

@@ -59,9 +59,9 @@ def read(path: Path, given: Overrides) -> Sequence:
     """
     Open a recording of Record3D.
 
-    Pixels of the lowest confidence are not used. Colours are brought to the size of the depth images. The
-    camera is the median of those of the frames, which differ by the stabilisation of the lens; the poses
-    are the phone's estimate, not a truth.
+    Pixels of the lowest confidence are not used, others by what it is worth. Colours are brought to the size
+    of the depth images. The camera is the median of those of the frames, which differ by the stabilisation of
+    the lens; the poses are the phone's estimate, not a truth.
     """
     if not recognise(path):
         holds = f"; the folder holds {describe(path)}" if path.is_dir() else ""
@@ -81,7 +81,7 @@ def read(path: Path, given: Overrides) -> Sequence:
             path / name,
             _there(path, names, f"rgbd/{number}.jpg", f"rgb/{number}.jpg", f"rgb/{number}.png"),
             told.time(number),
-            mask=_there(path, names, f"rgbd/{number}.conf"),
+            confidence=_there(path, names, f"rgbd/{number}.conf"),
         )
         for index, (number, name) in enumerate(sorted(depth.items()))
     ]
@@ -95,7 +95,7 @@ def read(path: Path, given: Overrides) -> Sequence:
         estimate=told.trajectory(sorted(depth)),
         load_depth=images.depth,
         load_color=images.color,
-        load_mask=images.is_sure,
+        load_confidence=images.confidence,
     )
 
 
@@ -212,9 +212,9 @@ class _Images:
         """Read a colour image."""
         return self.files.color(self.files.name_of(place), self.size)
 
-    def is_sure(self, place: Path) -> npt.NDArray[np.bool_]:
-        """Read where a pixel's confidence is not the lowest."""
-        return self.files.plane(self.files.name_of(place), np.uint8, self.size) > 0
+    def confidence(self, place: Path) -> npt.NDArray[np.uint8]:
+        """Read how sure the camera is of its pixels."""
+        return self.files.plane(self.files.name_of(place), np.uint8, self.size)
 
 
 class _Metadata:

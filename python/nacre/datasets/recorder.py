@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import threading
 from collections import deque
@@ -19,6 +20,7 @@ from nacre.io.cameras import write_camera
 from nacre.io.images import write_color_jpeg, write_color_png, write_depth_png
 
 _MOST_UNWRITTEN = 16
+_OPTIONAL = ("color", "mask", "confidence")
 
 
 class GrowingRecording(Sequence):
@@ -51,7 +53,7 @@ class GrowingRecording(Sequence):
         super().__init__(
             folder, format=plain.FORMAT, camera=camera, depth_scale=depth_scale, sources=(), name=name
         )
-        for inside in ("depth", "color", "mask"):
+        for inside in ("depth", *_OPTIONAL):
             (folder / inside).mkdir(parents=True, exist_ok=True)
         write_camera(folder / "camera.json", camera, depth_scale)
         self._newest: SequenceFrame | None = None
@@ -71,13 +73,12 @@ class GrowingRecording(Sequence):
             None if frame.color is None else self.path / "color" / f"{name}.jpg",
             frame.timestamp,
             mask=None if frame.mask is None else self.path / "mask" / f"{name}.png",
+            confidence=None if frame.confidence is None else self.path / "confidence" / f"{name}.png",
         )
         self._unwritten.append(self._writer.submit(self._write, frame, source))
         self._settle(_MOST_UNWRITTEN)
         self._grown.append(source)
-        self._newest = SequenceFrame(
-            index, frame.depth, self.camera, frame.timestamp, frame.color, None, frame.mask
-        )
+        self._newest = dataclasses.replace(frame, index=index, camera=self.camera, truth=None, attributes={})
         return index
 
     def close(self) -> None:
@@ -89,7 +90,7 @@ class GrowingRecording(Sequence):
         if self._grown and self.has_timestamps:
             with atomic_writer(self.path / "timestamps.txt") as stream:
                 stream.write("".join(f"{source.timestamp!r}\n" for source in self._grown).encode())
-        for inside in ("color", "mask"):
+        for inside in _OPTIONAL:
             folder = self.path / inside
             if folder.is_dir() and not any(folder.iterdir()):
                 folder.rmdir()
@@ -109,6 +110,8 @@ class GrowingRecording(Sequence):
         if source.mask is not None and frame.mask is not None:
             white = np.repeat(frame.mask[..., None], 3, axis=2).astype(np.uint8) * 255
             write_color_png(source.mask, white)
+        if source.confidence is not None and frame.confidence is not None:
+            write_color_png(source.confidence, np.repeat(frame.confidence[..., None], 3, axis=2))
         stored = np.rint(np.nan_to_num(frame.depth) * self.depth_scale)
         write_depth_png(source.depth, np.where(stored < 65535, stored, 0).astype(np.uint16), fast=True)
         if source.timestamp is not None:
@@ -129,7 +132,7 @@ class GrowingRecording(Sequence):
 def mend(path: str | os.PathLike[str]) -> None:
     """Take back the view that a killed process was writing to a :class:`GrowingRecording`."""
     folder = Path(path)
-    for inside in ("", "depth", "color", "mask"):
+    for inside in ("", "depth", *_OPTIONAL):
         remove_leftovers(folder / inside)
     times = folder / "timestamps.txt"
     if not times.exists():

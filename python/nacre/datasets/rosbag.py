@@ -65,8 +65,8 @@ def read(path: Path, given: Overrides) -> Sequence:
 
     The depth topic is the one that is aligned to the colours, if there is one. Images of 16 bits are
     millimetres unless a RealSense recording tells its depth units, or the caller does. Where there is a topic
-    of confidence, pixels whose confidence is 0 are not used. Colours of a camera with other intrinsics do not
-    lie over the depth images, and are left out.
+    of confidence, pixels whose confidence is 0 are not used, others by what it is worth. Colours of a camera
+    with other intrinsics do not lie over the depth images, and are left out.
     """
     if not recognise(path):
         holds = f"; the folder holds {describe(path)}" if path.is_dir() else ""
@@ -81,12 +81,12 @@ def read(path: Path, given: Overrides) -> Sequence:
         camera=camera,
         depth_scale=bag.depth_scale,
         sources=[
-            FrameSource(i, bag.place(bag.depth_topic, time), color, 1e-9 * time, mask=mask)
-            for i, (time, color, mask) in enumerate(zip(bag.times, colors, confidence, strict=True))
+            FrameSource(i, bag.place(bag.depth_topic, time), color, 1e-9 * time, confidence=sure)
+            for i, (time, color, sure) in enumerate(zip(bag.times, colors, confidence, strict=True))
         ],
         load_depth=bag.depth,
         load_color=bag.color,
-        load_mask=bag.is_sure,
+        load_confidence=bag.confidence,
     )
 
 
@@ -237,12 +237,12 @@ class _Bag(OpenFile):
         image = image if image.ndim == 3 else image[..., None]
         return np.ascontiguousarray(image[..., CHANNELS[message.encoding]])
 
-    def is_sure(self, place: Path) -> npt.NDArray[np.bool_]:
-        """Read where an image of confidence is not 0."""
+    def confidence(self, place: Path) -> npt.NDArray[np.uint8]:
+        """Read how sure the camera is of its pixels."""
         message = self._message(place)
         if not hasattr(message, "encoding"):
-            return np.asarray(decode_color(bytes(message.data), place).any(axis=2), np.bool_)
-        return np.asarray(pixels(message, place) > 0, np.bool_)
+            return decode_color(bytes(message.data), place).max(axis=2)
+        return np.clip(pixels(message, place), 0, 255).astype(np.uint8)
 
     def _depth_scale(self) -> float:
         for connection in self._file.connections:

@@ -29,7 +29,12 @@ _log = logging.getLogger(__name__)
 
 DepthLoader = Callable[[Path], npt.NDArray[np.float32]]
 ColorLoader = Callable[[Path], npt.NDArray[np.uint8]]
-MaskLoader = Callable[[Path], npt.NDArray[np.bool_]]
+ConfidenceLoader = Callable[[Path], npt.NDArray[np.uint8]]
+
+
+def load_confidence(path: Path) -> npt.NDArray[np.uint8]:
+    """Read how sure a camera is of its pixels."""
+    return np.ascontiguousarray(read_color(path)[..., 0])
 
 
 def load_mask(path: Path) -> npt.NDArray[np.bool_]:
@@ -60,6 +65,8 @@ class SequenceFrame(Value):
         The pixels of interest, where the recording says so.
     attributes : dict of str to (H, W) or (H, W, C) float32
         Whatever else the recording has for each pixel, by name.
+    confidence : (H, W) uint8 or None
+        How sure the camera is of each pixel, in levels of its own; 0 is not of interest.
     """
 
     index: int
@@ -70,13 +77,16 @@ class SequenceFrame(Value):
     truth: npt.NDArray[np.float64] | None
     mask: npt.NDArray[np.bool_] | None = None
     attributes: Mapping[str, npt.NDArray[np.float32]] = field(default_factory=dict)
+    confidence: npt.NDArray[np.uint8] | None = None
 
     def __repr__(self) -> str:
         height, width = self.depth.shape
         parts = [f"index={self.index}", f"depth={width}x{height}"]
         if self.timestamp is not None:
             parts.append(f"timestamp={self.timestamp!r}")
-        parts += [name for name in ("color", "truth", "mask") if getattr(self, name) is not None]
+        parts += [
+            name for name in ("color", "truth", "mask", "confidence") if getattr(self, name) is not None
+        ]
         parts += self.attributes
         return f"SequenceFrame({', '.join(parts)})"
 
@@ -97,6 +107,7 @@ class FrameSource:
     truth: npt.NDArray[np.float64] | None = None
     mask: Path | None = None
     attributes: Mapping[str, Path] = field(default_factory=dict)
+    confidence: Path | None = None
 
 
 class Sequence(collections.abc.Sequence[SequenceFrame]):
@@ -136,7 +147,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         estimate: Trajectory | None = None,
         load_depth: DepthLoader | None = None,
         load_color: ColorLoader = read_color,
-        load_mask: MaskLoader = load_mask,
+        load_confidence: ConfidenceLoader = load_confidence,
         name: str | None = None,
     ) -> None:
         self.path = path
@@ -149,7 +160,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         self._sources: collections.abc.Sequence[FrameSource] = tuple(sources)
         self._load_depth = load_depth or partial(load_depth_metres, depth_scale=depth_scale)
         self._load_color = load_color
-        self._load_mask = load_mask
+        self._load_confidence = load_confidence
 
     def __len__(self) -> int:
         return len(self._sources)
@@ -208,7 +219,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         """
         files, times = hashlib.sha256(), hashlib.sha256()
         for source in self._sources:
-            given = (source.depth, source.color, source.mask, *source.attributes.values())
+            given = (source.depth, source.color, source.mask, source.confidence, *source.attributes.values())
             for path in (path for path in given if path is not None):
                 try:
                     found = path.stat()
@@ -238,8 +249,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         if not any(masks):
             raise FileFormatError(Path(folder), "no image here is named as a depth image of the recording is")
         return self._with_sources(
-            [dataclasses.replace(s, mask=mask) for s, mask in zip(self._sources, masks, strict=True)],
-            load_mask=load_mask,
+            [dataclasses.replace(s, mask=mask) for s, mask in zip(self._sources, masks, strict=True)]
         )
 
     def with_attribute(self, name: str, folder: str | os.PathLike[str]) -> Sequence:
@@ -275,12 +285,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
             ]
         )
 
-    def _with_sources(
-        self,
-        sources: collections.abc.Sequence[FrameSource],
-        load_depth: DepthLoader | None = None,
-        load_mask: MaskLoader | None = None,
-    ) -> Sequence:
+    def _with_sources(self, sources: collections.abc.Sequence[FrameSource]) -> Sequence:
         return Sequence(
             self.path,
             format=self.format,
@@ -289,9 +294,9 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
             sources=sources,
             truth=self.truth,
             estimate=self.estimate,
-            load_depth=load_depth or self._load_depth,
+            load_depth=self._load_depth,
             load_color=self._load_color,
-            load_mask=load_mask or self._load_mask,
+            load_confidence=self._load_confidence,
             name=self.name,
         )
 
@@ -304,13 +309,26 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
             check_size(source.color, color, self.camera)
         mask = None
         if source.mask is not None:
-            mask = _named(self._load_mask, source.mask)
+            mask = _named(load_mask, source.mask)
             check_size(source.mask, mask, self.camera)
+        confidence = None
+        if source.confidence is not None:
+            confidence = _named(self._load_confidence, source.confidence)
+            check_size(source.confidence, confidence, self.camera)
+            mask = confidence > 0 if mask is None else mask & (confidence > 0)
         attributes = {name: _named(read_attribute, path) for name, path in source.attributes.items()}
         for name, path in source.attributes.items():
             check_size(path, attributes[name], self.camera)
         return SequenceFrame(
-            source.index, depth, self.camera, source.timestamp, color, source.truth, mask, attributes
+            source.index,
+            depth,
+            self.camera,
+            source.timestamp,
+            color,
+            source.truth,
+            mask,
+            attributes,
+            confidence,
         )
 
 

@@ -46,8 +46,8 @@ def read(folder: Path, given: Overrides) -> Sequence:
     """
     Open a folder of this format.
 
-    Pixels of the lowest confidence are not used. The odometry is the phone's estimate, not a truth; the
-    colours are a video, which is not read.
+    Pixels of the lowest confidence are not used, others by what it is worth. The odometry is the phone's
+    estimate, not a truth; the colours are a video, which is not read.
     """
     depth = files(folder / "depth", DEPTH_SUFFIXES)
     if not depth:
@@ -63,7 +63,7 @@ def read(folder: Path, given: Overrides) -> Sequence:
         camera=given.camera or _camera(folder / "camera_matrix.csv", depth[0]),
         depth_scale=given.scale_or(DEPTH_SCALE),
         sources=[
-            FrameSource(i, path, timestamp=times[i], mask=confidence[i]) for i, path in enumerate(depth)
+            FrameSource(i, path, timestamp=times[i], confidence=confidence[i]) for i, path in enumerate(depth)
         ],
         estimate=estimate,
     )

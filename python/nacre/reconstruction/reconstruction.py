@@ -266,6 +266,7 @@ class Reconstruction(Checkpointed):
                 frame.depth,
                 color=frame.color,
                 mask=frame.mask,
+                confidence=frame.confidence,
                 timestamp=frame.timestamp,
                 guess=guess,
                 search=search,

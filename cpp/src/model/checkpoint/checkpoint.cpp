@@ -110,9 +110,9 @@ void exchange(Archive& archive, CameraFields& fields) {
 template <class Archive>
 void exchange_state(Archive& archive, Pipeline& state) {
   archive(state.options.fusion.reference_sigma, state.options.depth.tilt, state.depth_view_frames, state.region,
-          state.calibration, state.residual_noise, state.usual_contradiction, state.cloud, state.loops, state.history,
-          state.before, state.still_scene, state.hypothesis, state.views, state.spacing, state.num_lost, state.num_vain,
-          state.start_frames);
+          state.calibration, state.confidence_noise, state.residual_noise, state.usual_contradiction, state.cloud,
+          state.loops, state.history, state.before, state.still_scene, state.hypothesis, state.views, state.spacing,
+          state.num_lost, state.num_vain, state.start_frames);
   if (state.depth_views) archive(*state.depth_views);
 }
 
@@ -198,7 +198,8 @@ bool is_sound(const StartFrame& frame, const Camera& camera, std::size_t num_fra
   const Eigen::Index num_pixels = static_cast<Eigen::Index>(camera.width()) * camera.height();
   return is_within(frame.index, num_frames) && frame.depth.rows() == camera.height() &&
          frame.depth.cols() == camera.width() && (extras.colors.rows() == 0 || extras.colors.rows() == num_pixels) &&
-         (extras.mask.size() == 0 || is_image(extras.mask, camera));
+         (extras.mask.size() == 0 || is_image(extras.mask, camera)) &&
+         (extras.confidence.size() == 0 || is_image(extras.confidence, camera));
 }
 
 bool is_sound(const ObjectView& view, const Camera& camera, std::size_t num_frames) {
@@ -298,6 +299,12 @@ bool PrivateState::is_sound(const DepthCalibrator& calibrator) {
                      [&](const DepthCalibrator::View& view) { return view.blocks.rows() == calibrator.num_blocks(); });
 }
 
+bool PrivateState::is_sound(const ConfidenceNoise& noise) {
+  return std::all_of(noise.levels_.begin(), noise.levels_.end(), [](const ConfidenceNoise::Level& level) {
+    return std::isfinite(level.log_scale) && std::isfinite(level.count) && level.count >= 0.0;
+  });
+}
+
 bool PrivateState::is_sound(const ResidualNoise& noise) {
   return std::isfinite(noise.log_scale_) && std::isfinite(noise.count_) && noise.count_ >= 0.0;
 }
@@ -383,8 +390,8 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
                   "the views that calibrate depth contradict the camera");
   archive.require(PrivateState::is_sound(state.still_scene), "the still scene has another size than the camera");
   archive.require(PrivateState::is_sound(state.hypothesis), "the place that is followed contradicts itself");
-  archive.require(PrivateState::is_sound(state.calibration) && PrivateState::is_sound(state.residual_noise) &&
-                      PrivateState::is_sound(state.usual_contradiction),
+  archive.require(PrivateState::is_sound(state.calibration) && PrivateState::is_sound(state.confidence_noise) &&
+                      PrivateState::is_sound(state.residual_noise) && PrivateState::is_sound(state.usual_contradiction),
                   "the noise is not finite");
   if (note != nullptr) *note = std::move(kept);
   return pipeline;

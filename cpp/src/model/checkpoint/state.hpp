@@ -53,7 +53,8 @@ void exchange(Archive& archive, FrameAttribute& attribute) {
 template <class Archive>
 void exchange(Archive& archive, StartFrame& frame) {
   FrameExtras& extras = frame.extras;
-  archive(frame.depth, frame.index, extras.colors, extras.attributes, extras.mask, extras.timestamp, extras.guess);
+  archive(frame.depth, frame.index, extras.colors, extras.attributes, extras.mask, extras.confidence, extras.timestamp,
+          extras.guess);
 }
 
 // Of classes that keep theirs to themselves.
@@ -78,6 +79,11 @@ struct PrivateState {
   template <class Archive>
   static void exchange(Archive& archive, DepthCalibrator& calibrator) {
     archive(calibrator.views_);
+  }
+
+  template <class Archive>
+  static void exchange(Archive& archive, ConfidenceNoise& noise) {
+    for (ConfidenceNoise::Level& level : noise.levels_) archive(level.log_scale, level.count);
   }
 
   template <class Archive>
@@ -138,6 +144,7 @@ struct PrivateState {
   // Whether what was read can be gone on with.
   static bool is_sound(const NoiseCalibration& calibration);
   static bool is_sound(const DepthCalibrator& calibrator);
+  static bool is_sound(const ConfidenceNoise& noise);
   static bool is_sound(const ResidualNoise& noise);
   static bool is_sound(const UsualContradiction& contradiction);
   static bool is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options);
