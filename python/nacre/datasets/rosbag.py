@@ -241,8 +241,8 @@ class _Bag(OpenFile):
         """Read how sure the camera is of its pixels."""
         message = self._message(place)
         if not hasattr(message, "encoding"):
-            return decode_color(bytes(message.data), place).max(axis=2)
-        return np.clip(pixels(message, place), 0, 255).astype(np.uint8)
+            return np.asarray(decode_color(bytes(message.data), place).max(axis=2), np.uint8)
+        return np.asarray(np.clip(pixels(message, place), 0, 255), np.uint8)
 
     def _depth_scale(self) -> float:
         for connection in self._file.connections:
