@@ -191,6 +191,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("depth_calibration", &Model::depth_calibration)
       .def_property_readonly("tilt", [](const Model& model) { return model.options().depth.tilt; })
       .def_property_readonly("noise", &Model::noise)
+      .def_property_readonly("depth_unit", &Model::depth_unit)
       .def_property_readonly("noise_factor", &Model::noise_factor)
       .def_property_readonly("num_frames", [](const Model& model) { return model.frames().size(); })
       .def("report", [](const Model& model, std::size_t i) { return model.frames()[i]; })  // i < num_frames

@@ -329,6 +329,16 @@ class Model(ExchangeablePoints, Checkpointed):
             return mirrored(NoiseModel, self._core.noise)
 
     @property
+    def depth_unit(self) -> float:
+        """
+        The step that depth comes in [m]; 0 where noise hides it.
+
+        What is flat within a step cannot be told from what is not: poses and surfaces may be off by as much.
+        """
+        with self._lock:
+            return self._core.depth_unit
+
+    @property
     def noise_factor(self) -> float:
         """
         By how much registered frames are noisier than one image shows: at least 1.

@@ -111,6 +111,8 @@ class NoiseCalibration {
 
   /// Before anything was added, what estimate_noise says of an empty image.
   NoiseModel model() const;
+  /// That depth comes in [m]; 0 where noise hides it.
+  double unit() const { return static_cast<double>(unit_); }
 
  private:
   friend struct PrivateState;

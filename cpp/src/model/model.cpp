@@ -33,6 +33,7 @@ const PointModel& Model::cloud() const { return pipeline_->cloud; }
 FrameReports Model::frames() const { return FrameReports(pipeline_->history); }
 std::optional<DepthCalibration> Model::depth_calibration() const { return pipeline_->depth_calibration(); }
 NoiseModel Model::noise() const { return pipeline_->noise(); }
+double Model::depth_unit() const { return pipeline_->calibration.unit(); }
 double Model::noise_factor() const { return pipeline_->known_noise_factor(); }
 double Model::spacing() const { return pipeline_->spacing; }
 

@@ -119,8 +119,8 @@ def _write(job: Job, stop: Interruption) -> dict[str, Any]:
     done = job.run.done
     done.evaluate_trajectory()
     feed, calibration = job.feed, done.depth_calibration
-    advice = "" if calibration is None else calibration.focal_length_advice(done.model.camera)
-    figures = {"camera": advice} if advice else {}
+    advice = done.advice
+    figures = {"camera": "; ".join(advice)} if advice else {}
     return write_results(
         job.unfinished.out,
         done,
@@ -129,6 +129,7 @@ def _write(job: Job, stop: Interruption) -> dict[str, Any]:
         document={
             "recording": describe_recording(job.sequence),
             "preset": job.options.preset,
+            "advice": advice,
             "interrupted": stop.wanted,
             "depth_calibration": calibration
             and dataclasses.asdict(calibration) | {"used": done.model.corrects_depth},

@@ -303,6 +303,18 @@ class Reconstruction(Checkpointed):
         return self.model.depth_calibration
 
     @property
+    def advice(self) -> list[str]:
+        """What the frames say is wrong with the camera as it was given, or with its depth; sentences."""
+        calibration, unit = self.depth_calibration, self.model.depth_unit
+        told = [] if calibration is None else [calibration.focal_length_advice(self.model.camera)]
+        if unit > self.model.spacing > 0.0:
+            told.append(
+                f"depth comes in steps of {1e3 * unit:.3g} mm, coarser than its noise and than the model's "
+                "points are apart: poses and surfaces may be off by as much"
+            )
+        return [sentence for sentence in told if sentence]
+
+    @property
     def counts(self) -> dict[str, int]:
         """How many frames have each status."""
         return count_statuses(self.frames)

@@ -69,7 +69,8 @@ class Run:
         if self._retry:
             yield StageBegun("lost frames", self.done.counts["LOST"] or None)
             yield from map(FrameDone, self.done.retry_lost())
-        self._warn_of_a_wrong_camera()
+        for sentence in self.done.advice:
+            _log.warning("%s", sentence)
 
     def to_end(self, progress: Callable[[FrameRecord], bool | None] | None = None) -> Reconstruction:
         """Do all of it, as far as a callback wants the frames, and evaluate the trajectory."""
@@ -82,11 +83,6 @@ class Run:
                     break
         self.done.evaluate_trajectory()
         return self.done
-
-    def _warn_of_a_wrong_camera(self) -> None:
-        calibration = self.done.depth_calibration
-        if calibration is not None and (advice := calibration.focal_length_advice(self.done.model.camera)):
-            _log.warning("%s", advice)
 
     def _frames(self) -> Iterator[Step]:
         rest = self._indices

@@ -1,6 +1,7 @@
 """The steps of a run, as who listens to one is told of them."""
 
 import numpy as np
+import pytest
 from test_wide_views import view
 
 import nacre
@@ -34,3 +35,18 @@ def test_what_is_done_is_left_out_of_a_sequence_and_others_are_taken_as_they_com
     assert list(Run(done, range(2), retry=False).steps()) == []
     steps = Run(done, iter([2]), retry=False).steps()
     assert [short(step) for step in steps] == [StageBegun("frames"), 2]
+
+
+def test_coarse_depth_is_said(caplog: pytest.LogCaptureFixture) -> None:
+    camera = nacre.default_camera(nacre.built_in_object())
+    fine = [view(angle) for angle in (0, 15, 30)]
+    coarse = [np.round(depth / 0.005).astype(np.float32) * np.float32(0.005) for depth in fine]
+    with caplog.at_level("WARNING", logger="nacre"):
+        good = nacre.reconstruct(frames(fine, camera))
+        assert good.advice == []
+        assert not caplog.records
+        done = nacre.reconstruct(frames(coarse, camera))
+    assert done.model.depth_unit == pytest.approx(0.005, rel=1e-5)
+    (sentence,) = done.advice
+    assert sentence.startswith("depth comes in steps of 5 mm")
+    assert [record.message for record in caplog.records] == [sentence]
