@@ -41,7 +41,7 @@ class Model {
   /// What the views so far say of systematic errors of the depth as it comes. Where it is significant, depth is
   /// corrected from then on, and what was there is moved. Unset where it cannot be calibrated, or is not to be.
   std::optional<DepthCalibration> depth_calibration() const;
-  NoiseModel noise() const;  ///< given, or measured from the images so far
+  NoiseModel noise() const;   ///< given, or measured from the images so far
   double depth_unit() const;  ///< that depth comes in [m]; 0 where noise hides it
   /// By how much the frames registered so far are noisier than that: errors that neighbouring pixels share do not show
   /// in one image. At least 1; 1 where the noise is given.
