@@ -317,10 +317,17 @@ def test_a_wall_says_nothing():
 
 
 def test_an_error_that_does_not_matter_is_left_alone():
-    assert nacre.DepthCalibration(0.003, 0.0001, 6).is_significant
-    assert not nacre.DepthCalibration(0.001, 0.0001, 6).is_significant
-    assert not nacre.DepthCalibration(0.003, 0.001, 6).is_significant
-    assert not nacre.DepthCalibration(0.003, 0.0001, 5).is_significant
+    assert nacre.DepthCalibration(0.003, 0.0001, 20).is_significant
+    assert not nacre.DepthCalibration(0.001, 0.0001, 20).is_significant
+    assert not nacre.DepthCalibration(0.003, 0.001, 20).is_significant
+
+
+@pytest.mark.parametrize(("num_pairs", "quantile"), [(9, 67.2), (21, 11.32), (45, 6.95), (10**6, 5.0)])
+def test_few_pairs_must_be_surer(num_pairs, quantile):
+    """Student's t of (pairs - 1) / 2 degrees of freedom, where a Gaussian's tail begins at five sigma."""
+    assert nacre.DepthCalibration(1.02 * quantile, 1.0, num_pairs).is_significant
+    assert not nacre.DepthCalibration(0.95 * quantile, 1.0, num_pairs).is_significant
+    assert not nacre.DepthCalibration(1e3, 1e-3, 1).is_significant
 
 
 def test_correction_is_of_inverse_depth():

@@ -170,6 +170,17 @@ Pose followed(const Pose& motion, const PairFit& fit, const Eigen::Vector3d& ste
   return motion_about(Eigen::Vector3d::Zero(), twist) * motion;
 }
 
+// Whether a value is so many of its standard deviations from 0 that chance is ruled out, when these are known from the
+// scatter of some pairs of views: two pairs share a view, and two values are fitted. Student's distribution, by the
+// Gaussian's quantile that belongs to it (Wallace 1959).
+bool is_beyond_doubt(double sigmas, int num_pairs) {
+  const double freedom = 0.5 * (num_pairs - 1);
+  if (!(freedom > 0.0)) return false;
+  const double gaussian =
+      (8.0 * freedom + 1.0) / (8.0 * freedom + 3.0) * std::sqrt(freedom * std::log1p(sigmas * sigmas / freedom));
+  return gaussian > depth_limits::sure_sigmas;
+}
+
 struct ViewPair {
   int first, second;
   Pose motion;
@@ -178,14 +189,12 @@ struct ViewPair {
 }  // namespace
 
 bool DepthCalibration::is_significant() const {
-  return num_pairs >= depth_limits::least_pairs && std::abs(tilt) > depth_limits::sure_sigmas * sigma &&
-         std::abs(tilt) > depth_limits::least_tilt;
+  return is_beyond_doubt(tilt / sigma, num_pairs) && std::abs(tilt) > depth_limits::least_tilt;
 }
 
 bool DepthCalibration::has_wrong_focal_length() const {
   const double error = std::abs(focal_scale - 1.0);
-  return num_pairs >= depth_limits::least_pairs && error > depth_limits::sure_sigmas * focal_sigma &&
-         error > depth_limits::least_focal_error;
+  return is_beyond_doubt(error / focal_sigma, num_pairs) && error > depth_limits::least_focal_error;
 }
 
 bool can_calibrate_depth(const Camera& camera) {
