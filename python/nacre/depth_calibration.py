@@ -49,12 +49,12 @@ class DepthCalibration:
 
     @property
     def is_significant(self) -> bool:
-        """Whether the error matters (0.002 / m) and is beyond doubt (as five sigma of many pairs are)."""
+        """Whether the error matters (0.002 / m) and is beyond doubt (as five sigma of many pairs)."""
         return _core.DepthCalibration(*astuple(self)).is_significant
 
     @property
     def has_wrong_focal_length(self) -> bool:
-        """Whether the focal length is off by more than 4 %, beyond doubt (as five sigma of many pairs are)."""
+        """Whether the focal length is off by more than 4 %, as five sigma of many pairs are."""
         return _core.DepthCalibration(*astuple(self)).has_wrong_focal_length
 
     def focal_length_advice(self, camera: Camera) -> str:
