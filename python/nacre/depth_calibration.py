@@ -35,8 +35,8 @@ class DepthCalibration:
     num_pairs : int
         Pairs of views that it is from.
     focal_scale : float
-        The focal length that makes the views agree best, by the camera's. Depth that is wrong by a factor
-        shows the same, inverted: a scene that is stretched along the camera's axis.
+        The focal length that makes the views agree best, by the camera's: a wrong one stretches the scene
+        along the camera's axis. Depth that is wrong by a factor shows in nothing.
     focal_sigma : float
         Its standard deviation, likewise.
     """
@@ -83,7 +83,7 @@ class DepthCalibration:
         return (
             f"views in different directions fit each other best with fx {fx:.0f} and fy {fy:.0f} pixels, "
             f"{self.focal_scale:.2f} times what the camera says (sigma {self.focal_sigma:.3f}): "
-            "its focal length is wrong, or the depth by the inverse factor"
+            "its focal length is wrong"
         )
 
     def correct(self, depth: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.float32]:

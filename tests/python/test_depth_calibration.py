@@ -139,6 +139,19 @@ def test_a_wrong_focal_length_is_told_once_by_a_reconstruction(room, caplog):
     assert len([record for record in caplog.records if "focal length is wrong" in record.message]) == 1
 
 
+def test_depth_that_is_wrong_by_a_factor_shows_in_nothing(room):
+    """The whole scene is larger."""
+    depths, poses = room
+    larger = []
+    for matrix in poses:
+        larger.append(matrix.copy())
+        larger[-1][:3, 3] *= 1.25
+    right = nacre.calibrate_depth(zip(depths, poses, strict=True), CAMERA)
+    found = nacre.calibrate_depth(zip((1.25 * d for d in depths), larger, strict=True), CAMERA)
+    assert found.focal_scale == pytest.approx(right.focal_scale, abs=1e-3)
+    assert not found.is_significant
+
+
 def test_a_recording_that_can_be_read_only_once_is_enough(room):
     depths, poses = room
     once = ((depth, matrix) for depth, matrix in zip(depths, poses, strict=True))

@@ -19,8 +19,7 @@ struct DepthCalibration {
   double tilt = 0.0;  ///< measured less true inverse depth, for each unit of x / z [1/m]
   double sigma = std::numeric_limits<double>::infinity();  ///< standard deviation, from how much pairs of views differ
   int num_pairs = 0;                                       ///< of views that it is from
-  double focal_scale = 1.0;  ///< the focal length that makes the views agree best, by the camera's; depth that is wrong
-                             ///< by a factor shows the same, inverted
+  double focal_scale = 1.0;  ///< the focal length that makes the views agree best, by the camera's
   double focal_sigma = std::numeric_limits<double>::infinity();  ///< its standard deviation, likewise
 
   bool is_significant() const;          ///< whether the tilt matters, and is beyond doubt
