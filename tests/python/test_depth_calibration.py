@@ -276,6 +276,7 @@ def test_what_a_mask_leaves_out_does_not_count(room, wrong):
 def test_reconstruct_tells_what_it_corrected(wrong, tmp_path):
     nacre.write_recording(tmp_path / "recording", CAMERA, wrong, depth_scale=5000)
     report = reconstruct(tmp_path / "recording", tmp_path / "out")
+    assert "its inverse is tilted by 0.0" in (tmp_path / "out" / "report.html").read_text()
     done = nacre.reconstruct(tmp_path / "recording")
     assert report["depth_calibration"] == {**dataclasses.asdict(done.depth_calibration), "used": True}
     assert done.depth_calibration.tilt == pytest.approx(0.01, rel=0.1)

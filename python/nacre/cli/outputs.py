@@ -78,6 +78,15 @@ def _write_pictures(folder: Path, page: str) -> None:
         _write(folder / f"{_PICTURE_NAMES.get(name, name)}.png", as_png(base64.b64decode(data)))
 
 
+def depth_rows(done: Reconstruction) -> list[tuple[str, str]]:
+    """Return what there is to tell of a systematic error of the depth that was corrected."""
+    if not done.model.corrects_depth:
+        return []
+    found = done.model.depth_calibration
+    assert found is not None
+    return [("depth corrected", f"its inverse is tilted by {found.tilt:.4f} ± {found.sigma:.4f} per metre")]
+
+
 def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
     """Return what a person wants to know of a run, in words."""
     import numpy as np

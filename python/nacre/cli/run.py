@@ -11,7 +11,7 @@ import typer
 
 from nacre.cli.follow import follow
 from nacre.cli.live_feed import LiveFeed
-from nacre.cli.outputs import describe_recording, file_rows, trajectory_rows, write_results
+from nacre.cli.outputs import depth_rows, describe_recording, file_rows, trajectory_rows, write_results
 from nacre.cli.run_options import RunOptions
 from nacre.cli.signals import Interruption, Stopped
 from nacre.cli.terminal import CommandError, Terminal, table, to_json
@@ -67,7 +67,7 @@ def carry_out(terminal: Terminal, job: Job, stop: Interruption, port: int | None
     job.unfinished.remove()
     if terminal.json:
         print(to_json(report))
-    rows = [] if job.feed is None else job.feed.rows
+    rows = depth_rows(job.run.done) + ([] if job.feed is None else job.feed.rows)
     terminal.say(table([*trajectory_rows(job.run.done), *rows, *file_rows(job.unfinished.out)]))
     if live is not None:
         live.finish()
@@ -120,7 +120,9 @@ def _write(job: Job, stop: Interruption) -> dict[str, Any]:
     done.evaluate_trajectory()
     feed, calibration = job.feed, done.depth_calibration
     advice = done.advice
-    figures = {"camera": "; ".join(advice)} if advice else {}
+    figures = dict(depth_rows(done))
+    if advice:
+        figures["camera"] = "; ".join(advice)
     return write_results(
         job.unfinished.out,
         done,
