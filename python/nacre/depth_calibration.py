@@ -153,17 +153,6 @@ def calibrate_depth(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera
     return mirrored(DepthCalibration, calibrator.fit(0))
 
 
-def can_calibrate(camera: Camera) -> bool:
-    """Say whether the depth of a camera can be calibrated: pinhole, with depth along its axis."""
-    return _core.can_calibrate_depth(camera)
-
-
-def turn_between(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> float:
-    """Return the angle between the directions of two poses [rad]."""
-    trace = float(np.sum(a[:3, :3] * b[:3, :3]))
-    return math.acos(min(1.0, max(-1.0, 0.5 * (trace - 1.0))))
-
-
 def _checked(depth: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.float32]:
     image = as_depth("depth", depth)
     if image.shape != (camera.height, camera.width):
@@ -173,5 +162,5 @@ def _checked(depth: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.float32]:
 
 def _check_camera(camera: Camera) -> None:
     as_camera("camera", camera)
-    if not can_calibrate(camera):
+    if not _core.can_calibrate_depth(camera):
         raise ValueError(f"camera: expected a pinhole camera with depth along its axis, got {camera!r}")

@@ -92,6 +92,7 @@ class Model(ExchangeablePoints, Checkpointed):
         self.parameters = replace(parameters, depth=parameters.depth.for_camera(camera))
         self._depth_scale = as_scale("depth_scale", depth_scale)
         self._core = _core.Model(camera, to_core(self.parameters, _core.ModelOptions()))
+        self._calibration: tuple[int, DepthCalibration | None] | None = None  # by so many frames
         self._lock = threading.RLock()  # the handler of a signal may come into a call
 
     def add_frame(
@@ -313,8 +314,12 @@ class Model(ExchangeablePoints, Checkpointed):
         along the axis of a pinhole. To find them takes some tenths of a second.
         """
         with self._lock:
-            found = self._core.depth_calibration
-        return None if found is None else mirrored(DepthCalibration, found)
+            num_frames = self._core.num_frames
+            if self._calibration is None or self._calibration[0] != num_frames:
+                found = self._core.depth_calibration
+                known = None if found is None else mirrored(DepthCalibration, found)
+                self._calibration = num_frames, known
+            return self._calibration[1]
 
     @property
     def corrects_depth(self) -> bool:

@@ -60,6 +60,13 @@ Matrix6 adjoint(const Pose& pose) {
   return matrix;
 }
 
+Pose blend(const Pose& a, const Pose& b, double part, const Eigen::Vector3d& pivot) {
+  Pose pose = Pose::Identity();
+  pose.linear() = Eigen::Quaterniond(a.linear()).slerp(part, Eigen::Quaterniond(b.linear())).toRotationMatrix();
+  pose.translation() = (1.0 - part) * (a * pivot) + part * (b * pivot) - pose.linear() * pivot;
+  return pose;
+}
+
 Pose orthonormal(const Pose& pose) {
   Pose result = pose;
   result.linear() = Eigen::Quaterniond(pose.linear()).normalized().toRotationMatrix();

@@ -25,6 +25,9 @@ Vector6 log_motion(const Pose& pose);
 // pose * exp_twist(t) = exp_twist(adjoint(pose) * t) * pose
 Matrix6 adjoint(const Pose& pose);
 
+// Between two motions; the pivot goes along a straight line.
+Pose blend(const Pose& a, const Pose& b, double part, const Eigen::Vector3d& pivot);
+
 // Rotations that rounding has worn become rotations again.
 Pose orthonormal(const Pose& pose);
 

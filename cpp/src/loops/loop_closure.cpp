@@ -36,14 +36,6 @@ double rms_extent(const Points& points) {
   return std::sqrt((points.cast<double>().rowwise() - middle).rowwise().squaredNorm().mean());
 }
 
-// Between two motions; the pivot goes along a straight line.
-Pose blend(const Pose& a, const Pose& b, double part, const Eigen::Vector3d& pivot) {
-  Pose pose = Pose::Identity();
-  pose.linear() = Eigen::Quaterniond(a.linear()).slerp(part, Eigen::Quaterniond(b.linear())).toRotationMatrix();
-  pose.translation() = (1.0 - part) * (a * pivot) + part * (b * pivot) - pose.linear() * pivot;
-  return pose;
-}
-
 double part_of(std::int64_t count, const FrameCloud& cloud) {
   return static_cast<double>(count) / static_cast<double>(std::max<Eigen::Index>(1, cloud.points.rows()));
 }

@@ -13,20 +13,18 @@ namespace {
 
 // Of every frame, from those of some frames: between two of them in proportion.
 std::vector<Pose> interpolated(const std::vector<Pose>& corrections, const std::vector<std::int32_t>& frames,
-                               std::size_t num_frames) {
+                               const std::vector<Pose>& poses) {
   std::vector<Pose> all;
-  for (std::size_t k = 0; k < num_frames; ++k) {
+  for (std::size_t k = 0; k < poses.size(); ++k) {
     const auto after = std::lower_bound(frames.begin(), frames.end(), static_cast<std::int32_t>(k));
     const auto next = static_cast<std::size_t>(after - frames.begin());
     if (after == frames.end() || next == 0) {
       all.push_back(corrections[std::min(next, corrections.size() - 1)]);
       continue;
     }
-    const Pose &from = corrections[next - 1], &to = corrections[next];
     const double part = static_cast<double>(static_cast<std::int32_t>(k) - frames[next - 1]) /
                         static_cast<double>(frames[next] - frames[next - 1]);
-    const Vector6 twist = part * log_motion(from.inverse() * to);
-    all.push_back(from * exp_twist(twist));
+    all.push_back(blend(corrections[next - 1], corrections[next], part, poses[k].translation()));
   }
   return all;
 }
@@ -80,7 +78,7 @@ void Pipeline::straighten(double tilt, FrameReport& report) {
   for (std::size_t i = 0; i < straight.size(); ++i) {
     corrections.push_back(straight[i] * poses[static_cast<std::size_t>(depth_view_frames[i])].inverse());
   }
-  corrections = interpolated(corrections, depth_view_frames, poses.size());
+  corrections = interpolated(corrections, depth_view_frames, poses);
   straighten_points(cloud, poses, tilt, options.num_threads);
   move_all(corrections, report);
   loops.straighten(tilt, corrections);

@@ -13,6 +13,7 @@
 #include "camera/limits.hpp"
 #include "camera/point_spacing.hpp"
 #include "depth/cleaning.hpp"
+#include "depth/inverse_depth_image.hpp"
 #include "fusion/attribute_fusion.hpp"
 #include "fusion/deformation.hpp"
 #include "fusion/fuse.hpp"
@@ -51,16 +52,12 @@ double spacing_for(const Frame& frame, const Camera& camera) {
   return model_limits::spacing_pixels * camera.footprint(*quartile);
 }
 
-bool is_image_of(const Camera& camera, const MaskImage& image) {
-  return image.rows() == camera.height() && image.cols() == camera.width();
-}
-
 void check_extras(const Camera& camera, const FrameExtras& extras, const PointModel& model) {
   const Eigen::Index pixels = static_cast<Eigen::Index>(camera.width()) * camera.height();
   require(extras.colors.rows() == 0 || extras.colors.rows() == pixels, "colors", "one row per pixel",
           extras.colors.rows());
-  require(extras.confidence.size() == 0 || is_image_of(camera, extras.confidence), "confidence", "one value per pixel",
-          extras.confidence.size());
+  const MaskImage& confidence = extras.confidence;
+  if (confidence.size() > 0) require_camera_size("confidence", confidence.rows(), confidence.cols(), camera);
   check_attributes(extras.attributes, camera, model);
   require(!extras.keep_guess || extras.guess.has_value(), "keep_guess", "used with a guess", "no guess");
   if (extras.guess) require_rigid(*extras.guess, "guess");

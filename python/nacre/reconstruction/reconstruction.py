@@ -6,6 +6,7 @@ import collections.abc
 import dataclasses
 import itertools
 import logging
+import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -18,7 +19,7 @@ import numpy.typing as npt
 from nacre._internal.arrays import as_count, as_flag, stacked_poses
 from nacre._internal.checkpoint import Checkpointed
 from nacre.datasets.sequence import SequenceFrame
-from nacre.depth_calibration import DepthCalibration, turn_between
+from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result
@@ -39,6 +40,12 @@ _RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
 
 def _renewed(record: FrameRecord, report: FrameReport) -> FrameRecord:
     return dataclasses.replace(record, status=report.status, reason=report.reason, report=report)
+
+
+def _turn_between(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> float:
+    """Return the angle between the directions of two poses [rad]."""
+    trace = float(np.sum(a[:3, :3] * b[:3, :3]))
+    return math.acos(min(1.0, max(-1.0, 0.5 * (trace - 1.0))))
 
 
 def _fused_index(record: FrameRecord) -> int:
@@ -195,7 +202,7 @@ class Reconstruction(Checkpointed):
     def _views_are_far_apart(self) -> bool:
         """Say whether the camera ever turned farther from frame to frame than a registration reaches."""
         poses = [self._pose_at(place) for place in range(len(self.frames))]
-        turns = [turn_between(a, b) for a, b in itertools.pairwise(poses) if a is not None and b is not None]
+        turns = [_turn_between(a, b) for a, b in itertools.pairwise(poses) if a is not None and b is not None]
         return not turns or max(turns) > self.model.parameters.registration.max_angle
 
     def _checkpoint(self, **more: Any) -> bytes:
