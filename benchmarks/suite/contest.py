@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
@@ -34,8 +34,10 @@ Turn = Callable[[Contender, bool], dict[str, Any]]
 class Workers:
     """One process per peer, with one number of threads, started when it is first needed."""
 
-    def __init__(self, threads: int) -> None:
+    def __init__(self, threads: int, environments: Mapping[str, Mapping[str, str]] | None = None) -> None:
+        """``environments``: what is set for some of the processes."""
         self.threads = threads
+        self.environments = environments or {}
         self._processes: dict[str, subprocess.Popen[str]] = {}
 
     def __enter__(self) -> Workers:
@@ -45,10 +47,12 @@ class Workers:
         for peer in list(self._processes):
             self._stop(peer)
 
-    def turn(self, workload: str, folder: str, contender: Contender, first: bool) -> dict[str, Any]:
-        """Let a contender take a turn."""
+    def turn(
+        self, workload: str, folder: str, contender: Contender, first: bool, process: str | None = None
+    ) -> dict[str, Any]:
+        """Let a contender take a turn, in its peer's process unless another one is named."""
         command = {"workload": workload, "data": folder, "contender": contender.name, "first": first}
-        return self.ask(contender.peer, command)
+        return self.ask(process or contender.peer, command)
 
     def ask(self, peer: str, command: dict[str, Any]) -> dict[str, Any]:
         """Send a command to the peer's process, and wait for what it says."""
@@ -71,15 +75,15 @@ class Workers:
         return {"failed": f"the process ended: {signal.Signals(-code).name if code < 0 else code}"}
 
     def _start(self, peer: str) -> subprocess.Popen[str]:
-        count = str(self.threads)
-        names = ("OMP", "OPENBLAS", "MKL", "NUMEXPR")
+        threads = {f"{name}_NUM_THREADS": str(self.threads) for name in ("OMP", "OPENBLAS", "MKL", "NUMEXPR")}
         self._processes[peer] = subprocess.Popen(
-            [sys.executable, "-m", "suite.worker", count],
+            [sys.executable, "-m", "suite.worker", str(self.threads)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            env={**os.environ, **{f"{name}_NUM_THREADS": count for name in names}},
+            cwd=Path(__file__).resolve().parents[1],
+            env={**os.environ, **threads, **self.environments.get(peer, {})},
         )
         return self._processes[peer]
 
@@ -139,7 +143,7 @@ def run(
             start = time.perf_counter()
             results = []
             with tempfile.TemporaryDirectory(prefix="nacre-benchmark-") as folder:
-                error = _save(workload, Path(folder))
+                error = _save_or_say(workload, Path(folder))
                 for team in teams:
                     if not workload.most_threads_only or team.threads == max(thread_counts):
                         turn: Turn = partial(team.turn, workload.name, folder)
@@ -150,10 +154,15 @@ def run(
             yield workload, results
 
 
-def _save(workload: Workload, folder: Path) -> str | None:
+def save(workload: Workload, folder: Path) -> None:
+    """Write the data of a workload for the workers to read."""
+    for key, array in workload.data().items():
+        np.save(folder / f"{key}.npy", array)
+
+
+def _save_or_say(workload: Workload, folder: Path) -> str | None:
     try:
-        for key, array in workload.data().items():
-            np.save(folder / f"{key}.npy", array)
+        save(workload, folder)
     except Exception as error:
         return f"no data: {type(error).__name__}: {error}"
     return None

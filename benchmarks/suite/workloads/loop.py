@@ -218,7 +218,7 @@ WORKLOADS = [
         note=f"{SWAY} The noise of structured light, mixed pixels at edges.",
     ),
 ]
-for _name, _voxel in {"tum-fr1-rpy": 0.008, "tum-fr3-teddy": 0.01}.items():
+for _name, _voxel in {"tum-fr1-rpy": 0.008, "tum-fr3-teddy": 0.01, "d435-t265-shelf": 0.01}.items():
     if DATA in os.environ and (Path(os.environ[DATA]) / _name).is_dir():
         _work = workload(
             f"loop-{_name}",
