@@ -44,7 +44,7 @@ def parse() -> argparse.Namespace:
     add("--threads", type=int, default=min(2, len(os.sched_getaffinity(0))))
     add("--turns", type=int, default=5, help="of each (default: 5)")
     add("--data", type=Path, help="folder of real recordings, for the loop-* workloads that need it")
-    add("--builds", type=Path, default=HERE / ".compare", help="folder of what is built")
+    add("--builds", type=Path, default=ROOT / "build" / "compare", help="folder of what is built")
     add("--built", type=json.loads, help=argparse.SUPPRESS)  # where; what follows needs the environment
     add("--run", metavar="NAME", help=argparse.SUPPRESS)  # a recording, with the nacre that can be imported
     return parser.parse_args()

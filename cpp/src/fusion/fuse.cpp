@@ -73,8 +73,8 @@ bool reaches_image(const PointProjection::Block& points, int i, const Camera& ca
 }
 
 // Moves the model's points by what the frame says about them.
-Known update(PointModel& model, const RegisteredFrame& now, double spacing, const FusionOptions& options,
-             FusionReport& report, int num_threads) {
+Known update(PointModel& model, const RegisteredFrame& now, const ImageTiles& tiles, double spacing,
+             const FusionOptions& options, FusionReport& report, int num_threads) {
   const Frame& frame = now.frame;
   const Camera& camera = now.camera;
   const SurfaceObserver& observer = now.observer;
@@ -89,7 +89,7 @@ Known update(PointModel& model, const RegisteredFrame& now, double spacing, cons
   };
   const auto num_blocks = static_cast<std::size_t>((model.size() + block_size - 1) / block_size);
   std::vector<std::vector<Cover>> covers(num_blocks);
-  std::vector<std::vector<Known::Point>> beside(num_blocks);  // the image
+  std::vector<std::vector<Known::Point>> beside(num_blocks);  // what is looked at
 
   parallel_blocks(
       model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
@@ -113,6 +113,11 @@ Known update(PointModel& model, const RegisteredFrame& now, double spacing, cons
             beside[static_cast<std::size_t>(number)].push_back({first + static_cast<std::size_t>(j), points.pixel[j]});
           }
           if (!points.inside[j] || !(points.facing[j] > fusion_limits::least_facing)) continue;
+          const InTiles is_in_tiles = tiles(points.pixel[j] % frame.width, points.pixel[j] / frame.width);
+          if (is_in_tiles == InTiles::beside) {
+            beside[static_cast<std::size_t>(number)].push_back({first + static_cast<std::size_t>(j), points.pixel[j]});
+          }
+          if (is_in_tiles != InTiles::yes) continue;
           const float measured_sigma = frame.sigma[points.pixel[j]];
           const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
           if (!observer.may_observe(points.point(j), points.pixel[j], sigma,
@@ -169,8 +174,8 @@ int reach_of(const NewPoint& point, const Camera& camera) {
 }
 
 // The frame's surface where the model does not cover it, denoised.
-std::vector<NewPoint> find_new_points(const RegisteredFrame& now, const PixelSet& covered, double spacing,
-                                      int num_threads) {
+std::vector<NewPoint> find_new_points(const RegisteredFrame& now, const ImageTiles& tiles, const PixelSet& covered,
+                                      double spacing, int num_threads) {
   const Frame& frame = now.frame;
   const Camera& camera = now.camera;
   const SurfaceObserver& observer = now.observer;
@@ -178,6 +183,7 @@ std::vector<NewPoint> find_new_points(const RegisteredFrame& now, const PixelSet
   parallel_for(frame.height, 16, num_threads, [&](std::int64_t v) {
     const auto first = static_cast<std::int32_t>(v) * frame.width;
     for (int u = 0; u < frame.width; ++u) {
+      if (tiles(u, static_cast<int>(v)) != InTiles::yes) continue;
       if (observer.weight(u, static_cast<int>(v)) > 0.0F && !covered.contains(u, static_cast<int>(v))) {
         uncovered[static_cast<std::size_t>(v)].push_back(first + u);
       }
@@ -302,8 +308,9 @@ void FusionOptions::check() const {
   require(reference_sigma >= 0.0, "reference_sigma", "0 (automatic) or positive metres", reference_sigma);
 }
 
-FusionReport fuse_observed(PointModel& model, const RegisteredFrame& now, double spacing, const FusionOptions& options,
-                           int num_threads, const std::vector<FrameAttribute>& attributes) {
+FusionReport fuse_observed(PointModel& model, const RegisteredFrame& now, const ImageTiles& tiles, double spacing,
+                           const FusionOptions& options, int num_threads,
+                           const std::vector<FrameAttribute>& attributes) {
   FusionReport report;
   const bool with_colors = now.observer.has_colors() || !model.colors.empty();
   if (with_colors) {
@@ -311,12 +318,12 @@ FusionReport fuse_observed(PointModel& model, const RegisteredFrame& now, double
   }
   const AttributePlanes planes(attributes, now.observer, now.camera, num_threads);
   const bool with_attributes = !attributes.empty() || !model.attributes.empty();
-  if (with_attributes) fuse_attributes(model, 0, now, planes, num_threads);
-  Known known = update(model, now, spacing, options, report, num_threads);
-  const std::vector<NewPoint> candidates = find_new_points(now, known.covered, spacing, num_threads);
+  if (with_attributes) fuse_attributes(model, 0, now, tiles, planes, num_threads);
+  Known known = update(model, now, tiles, spacing, options, report, num_threads);
+  const std::vector<NewPoint> candidates = find_new_points(now, tiles, known.covered, spacing, num_threads);
   const std::int64_t num_known = model.size();
   insert(model, candidates, known, now, with_colors, report);
-  if (with_attributes) fuse_attributes(model, num_known, now, planes, num_threads);
+  if (with_attributes) fuse_attributes(model, num_known, now, tiles, planes, num_threads);
   remove_violated(model, options, report);
   return report;
 }
@@ -333,8 +340,8 @@ FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, c
   check_attributes(attributes, camera, model);
   SurfaceObserver observer(camera, options);
   observer.look_at(frame, colors, num_threads);
-  return fuse_observed(model, {frame, camera, observer, world_from_camera, frame_index}, spacing, options, num_threads,
-                       attributes);
+  return fuse_observed(model, {frame, camera, observer, world_from_camera, frame_index}, ImageTiles(), spacing, options,
+                       num_threads, attributes);
 }
 
 void thin(PointModel& model, double spacing) {

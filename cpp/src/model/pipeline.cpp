@@ -386,8 +386,10 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
     const Stopwatch watch(report.milliseconds.fuse);
     if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
     if (options.fusion_method == FusionMethod::fuse) {
-      report.fusion = fuse_observed(cloud, {frame, camera, observer, report.world_from_camera, index}, spacing,
-                                    options.fusion, options.num_threads, extras.attributes);
+      const RegisteredFrame now_fused{frame, camera, observer, report.world_from_camera, index};
+      const ImageTiles tiles = turns.next(cloud, now_fused, spacing, options.fusion, options.num_threads);
+      report.fusion =
+          fuse_observed(cloud, now_fused, tiles, spacing, options.fusion, options.num_threads, extras.attributes);
     } else {
       consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
     }
