@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "nacre/camera.hpp"
@@ -56,6 +57,11 @@ class DepthCalibrator {
 
   /// What the views say, num_pairs 0 or 1 and no error where that is nothing.
   DepthCalibration fit(int num_threads = 0) const;
+  /// The same in parts, for a loop that must not wait: begins with the views that are there, unless there is nothing to
+  /// fit; each step is one iteration, the last of which returns what the views say.
+  void begin_fit();
+  bool is_fitting() const { return fit_.has_value(); }
+  std::optional<DepthCalibration> step(int num_threads = 0);
 
   /// Where the views were taken, as far as is known since.
   void set_poses(const std::vector<Pose>& world_from_camera);
@@ -69,8 +75,21 @@ class DepthCalibrator {
     Points blocks;  // a point for each block of pixels, NaN where there is none; camera frame
     Pose world_from_camera;
   };
+  struct Pair {
+    std::int32_t first, second;  // views
+    Pose motion;                 // first_from_second
+  };
+  struct Fit {
+    std::int32_t iteration = 0;
+    double tilt = 0.0, stretch = 1.0;
+    std::vector<Pair> pairs;
+  };
+  Fit begun() const;
+  std::optional<DepthCalibration> iterate(Fit& fit, int num_threads) const;
+
   Camera camera_;
   std::vector<View> views_;
+  std::optional<Fit> fit_;
 };
 
 }  // namespace nacre

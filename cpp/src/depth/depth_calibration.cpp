@@ -181,11 +181,6 @@ bool is_beyond_doubt(double sigmas, int num_pairs) {
   return gaussian > depth_limits::sure_sigmas;
 }
 
-struct ViewPair {
-  int first, second;
-  Pose motion;
-};
-
 }  // namespace
 
 bool DepthCalibration::is_significant() const {
@@ -237,66 +232,85 @@ bool DepthCalibrator::add(const DepthRef& depth, const Pose& world_from_camera) 
 }
 
 DepthCalibration DepthCalibrator::fit(int num_threads) const {
-  std::vector<ViewPair> pairs;
+  Fit fit = begun();
+  for (;;) {
+    const std::optional<DepthCalibration> found = iterate(fit, num_threads);
+    if (found) return *found;
+  }
+}
+
+void DepthCalibrator::begin_fit() { fit_ = begun(); }
+
+std::optional<DepthCalibration> DepthCalibrator::step(int num_threads) {
+  std::optional<DepthCalibration> found = iterate(fit_.value(), num_threads);
+  if (found) fit_.reset();
+  return found;
+}
+
+DepthCalibrator::Fit DepthCalibrator::begun() const {
+  Fit fit;
   for (int step = 1; step <= 2; ++step) {
     for (int i = 0; i + step < num_views(); ++i) {
       const Pose &a = views_[static_cast<std::size_t>(i)].world_from_camera,
                  &b = views_[static_cast<std::size_t>(i + step)].world_from_camera;
       const double turn = angle_between(a, b);
       if (turn >= depth_limits::least_turn && turn <= depth_limits::most_turn) {
-        pairs.push_back({i, i + step, a.inverse() * b});
+        fit.pairs.push_back({i, i + step, a.inverse() * b});
       }
     }
   }
-  Distortion distortion;
+  return fit;
+}
+
+// The views' result where they are at rest, or may not come to it.
+std::optional<DepthCalibration> DepthCalibrator::iterate(Fit& fit, int num_threads) const {
+  const Distortion distortion{fit.tilt, fit.stretch};
   std::vector<CorrectedView> views(views_.size());
-  std::vector<std::optional<PairFit>> fits(pairs.size());
+  parallel_for(num_views(), 1, num_threads, [&](std::int64_t k) {
+    const auto i = static_cast<std::size_t>(k);
+    views[i].points = corrected(views_[i].blocks, distortion);
+    views[i].normals = normals_of(views[i].points, BlockGrid(camera_));
+  });
+  std::vector<std::optional<PairFit>> fits(fit.pairs.size());
+  parallel_for(static_cast<std::int64_t>(fits.size()), 1, num_threads, [&](std::int64_t k) {
+    const Pair& pair = fit.pairs[static_cast<std::size_t>(k)];
+    fits[static_cast<std::size_t>(k)] =
+        linearise(views[static_cast<std::size_t>(pair.first)], views[static_cast<std::size_t>(pair.second)],
+                  pair.motion, distortion.stretch, camera_);
+  });
   DepthCalibration result;
-  for (int iteration = 0; iteration < depth_limits::most_calibration_steps; ++iteration) {
-    parallel_for(num_views(), 1, num_threads, [&](std::int64_t k) {
-      const auto i = static_cast<std::size_t>(k);
-      views[i].points = corrected(views_[i].blocks, distortion);
-      views[i].normals = normals_of(views[i].points, BlockGrid(camera_));
-    });
-    parallel_for(static_cast<std::int64_t>(pairs.size()), 1, num_threads, [&](std::int64_t k) {
-      const auto i = static_cast<std::size_t>(k);
-      fits[i] =
-          linearise(views[static_cast<std::size_t>(pairs[i].first)], views[static_cast<std::size_t>(pairs[i].second)],
-                    pairs[i].motion, distortion.stretch, camera_);
-    });
-    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
-    Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
-    result = {};
-    for (const std::optional<PairFit>& fit : fits) {
-      if (!fit) continue;
-      information += fit->information;
-      gradient += fit->gradient;
-      ++result.num_pairs;
-    }
-    if (result.num_pairs < 2) return result;
-    const Eigen::Matrix2d covariance = information.inverse();
-    Eigen::Vector2d step = -covariance * gradient;
-    // From the scatter, as neighbours share their errors; two pairs share a view.
-    Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
-    for (const std::optional<PairFit>& fit : fits) {
-      if (!fit) continue;
-      const Eigen::Vector2d left = fit->gradient + fit->information * step;
-      scatter += left * left.transpose();
-    }
-    const Eigen::Array2d sigmas = (2.0 * (covariance * scatter * covariance).diagonal().array()).sqrt();
-    step *= std::min(1.0, depth_limits::largest_stretch_step / std::max(std::abs(step(1)), 1e-12));
-    distortion.tilt += step(0);
-    distortion.stretch += step(1);
-    result.tilt = distortion.tilt;
-    result.sigma = sigmas(0);
-    result.focal_scale = 1.0 / distortion.stretch;
-    result.focal_sigma = sigmas(1) / (distortion.stretch * distortion.stretch);
-    if ((step.array().abs() < depth_limits::at_rest * sigmas).all()) break;
-    for (std::size_t i = 0; i < pairs.size(); ++i) {
-      if (fits[i]) pairs[i].motion = followed(pairs[i].motion, *fits[i], {step(0), step(1), 1.0});
-    }
+  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+  Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+  for (const std::optional<PairFit>& pair : fits) {
+    if (!pair) continue;
+    information += pair->information;
+    gradient += pair->gradient;
+    ++result.num_pairs;
   }
-  return result;
+  if (result.num_pairs < 2) return result;
+  const Eigen::Matrix2d covariance = information.inverse();
+  Eigen::Vector2d step = -covariance * gradient;
+  // From the scatter, as neighbours share their errors; two pairs share a view.
+  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+  for (const std::optional<PairFit>& pair : fits) {
+    if (!pair) continue;
+    const Eigen::Vector2d left = pair->gradient + pair->information * step;
+    scatter += left * left.transpose();
+  }
+  const Eigen::Array2d sigmas = (2.0 * (covariance * scatter * covariance).diagonal().array()).sqrt();
+  step *= std::min(1.0, depth_limits::largest_stretch_step / std::max(std::abs(step(1)), 1e-12));
+  fit.tilt += step(0);
+  fit.stretch += step(1);
+  result.tilt = fit.tilt;
+  result.sigma = sigmas(0);
+  result.focal_scale = 1.0 / fit.stretch;
+  result.focal_sigma = sigmas(1) / (fit.stretch * fit.stretch);
+  const bool is_at_rest = (step.array().abs() < depth_limits::at_rest * sigmas).all();
+  if (is_at_rest || ++fit.iteration == depth_limits::most_calibration_steps) return result;
+  for (std::size_t i = 0; i < fits.size(); ++i) {
+    if (fits[i]) fit.pairs[i].motion = followed(fit.pairs[i].motion, *fits[i], {step(0), step(1), 1.0});
+  }
+  return std::nullopt;
 }
 
 void DepthCalibrator::set_poses(const std::vector<Pose>& world_from_camera) {
@@ -304,6 +318,7 @@ void DepthCalibrator::set_poses(const std::vector<Pose>& world_from_camera) {
 }
 
 std::vector<Pose> DepthCalibrator::correct(double tilt, int num_threads) {
+  fit_.reset();
   std::vector<CorrectedView> views(views_.size());
   parallel_for(num_views(), 1, num_threads, [&](std::int64_t k) {
     const auto i = static_cast<std::size_t>(k);

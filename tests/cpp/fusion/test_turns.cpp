@@ -13,10 +13,10 @@ using namespace nacre;
 
 namespace {
 
-constexpr int width = 512, height = 384, side = fusion_limits::tile_side;  // four by three tiles
-constexpr double spacing = 0.008;
+constexpr int side = fusion_limits::tile_side, width = 4 * side, height = 3 * side;
+constexpr double spacing = 0.012;
 const Camera& camera() {
-  static const Camera kept = Camera::pinhole(width, height, 400, 400, 255.5, 191.5);
+  static const Camera kept = Camera::pinhole(width, height, 200, 200, 0.5 * width - 0.5, 0.5 * height - 0.5);
   return kept;
 }
 

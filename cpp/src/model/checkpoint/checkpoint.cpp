@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "base/random.hpp"
+#include "depth/limits.hpp"
 #include "model/checkpoint/state.hpp"
 #include "model/limits.hpp"
 #include "nacre/version.hpp"
@@ -295,6 +296,16 @@ bool PrivateState::is_sound(const NoiseCalibration& calibration) {
 
 bool PrivateState::is_sound(const DepthCalibrator& calibrator) {
   const std::vector<DepthCalibrator::View>& views = calibrator.views_;
+  if (const std::optional<DepthCalibrator::Fit>& fit = calibrator.fit_) {
+    const auto is_of_views = [&](const DepthCalibrator::Pair& pair) {
+      return is_within(pair.first, views.size()) && is_within(pair.second, views.size());
+    };
+    const bool goes_on = fit->iteration >= 0 && fit->iteration < depth_limits::most_calibration_steps;
+    if (!goes_on || !std::isfinite(fit->tilt) || !(std::abs(fit->stretch) > 0.0) || !std::isfinite(fit->stretch) ||
+        !std::all_of(fit->pairs.begin(), fit->pairs.end(), is_of_views)) {
+      return false;
+    }
+  }
   return std::all_of(views.begin(), views.end(),
                      [&](const DepthCalibrator::View& view) { return view.blocks.rows() == calibrator.num_blocks(); });
 }

@@ -77,8 +77,16 @@ struct PrivateState {
     archive(view.blocks, view.world_from_camera);
   }
   template <class Archive>
+  static void exchange(Archive& archive, DepthCalibrator::Pair& pair) {
+    archive(pair.first, pair.second, pair.motion);
+  }
+  template <class Archive>
+  static void exchange(Archive& archive, DepthCalibrator::Fit& fit) {
+    archive(fit.iteration, fit.tilt, fit.stretch, fit.pairs);
+  }
+  template <class Archive>
   static void exchange(Archive& archive, DepthCalibrator& calibrator) {
-    archive(calibrator.views_);
+    archive(calibrator.views_, calibrator.fit_);
   }
 
   template <class Archive>
