@@ -96,14 +96,21 @@ Known update(PointModel& model, const RegisteredFrame& now, const ImageTiles& ti
         const auto first = static_cast<std::size_t>(begin);
         PointProjection::Block points;
         view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin), points);
+        const auto margin_at = [&](float sigma) {
+          return std::max(static_cast<float>(camera_limits::surface_spacings * spacing),
+                          base_limits::noise_sigmas * sigma);
+        };
+        const auto is_seen_through = [&](int j, float sigma) {
+          const float margin = margin_at(sigma);
+          return frame.points(points.pixel[j], 2) - points.z[j] > margin &&
+                 observer.sees_through(points.point(j), points.pixel[j], margin);
+        };
         const auto note_free_space_violation = [&](int j, float sigma) {
           const std::size_t i = first + static_cast<std::size_t>(j);
-          const float margin = std::max(static_cast<float>(camera_limits::surface_spacings * spacing),
-                                        base_limits::noise_sigmas * sigma);
           const bool is_confirmed = model.observations[i] >= options.min_observations;
-          const Visibility is = visibility(frame.points(points.pixel[j], 2) - points.z[j], margin);
-          const bool is_missed = is_confirmed ? observer.sees_through(points.point(j), points.pixel[j], margin)
-                                              : is == Visibility::agrees || is == Visibility::seen_through;
+          const Visibility is = visibility(frame.points(points.pixel[j], 2) - points.z[j], margin_at(sigma));
+          const bool is_missed =
+              is_confirmed ? is_seen_through(j, sigma) : is == Visibility::agrees || is == Visibility::seen_through;
           if (is_missed) count_up(model.free_space_violations[i]);
         };
         ObservationBlock block;
@@ -117,9 +124,12 @@ Known update(PointModel& model, const RegisteredFrame& now, const ImageTiles& ti
           if (is_in_tiles == InTiles::beside) {
             beside[static_cast<std::size_t>(number)].push_back({first + static_cast<std::size_t>(j), points.pixel[j]});
           }
-          if (is_in_tiles != InTiles::yes) continue;
           const float measured_sigma = frame.sigma[points.pixel[j]];
           const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
+          if (is_in_tiles != InTiles::yes) {
+            if (is_seen_through(j, sigma)) count_up(model.free_space_violations[first + static_cast<std::size_t>(j)]);
+            continue;
+          }
           if (!observer.may_observe(points.point(j), points.pixel[j], sigma,
                                     fusion_limits::least_weight * observer.frontal_weight(sigma))) {
             note_free_space_violation(j, sigma);
@@ -305,6 +315,7 @@ void FusionOptions::check() const {
   require(min_observations >= 0 && min_observations <= 255, "min_observations", "0 to 255 frames", min_observations);
   require(max_free_space_violations >= 1 && max_free_space_violations <= 255, "max_free_space_violations", "1 to 255",
           max_free_space_violations);
+  require(turns >= 1 && turns <= 255, "turns", "1 to 255 frames", turns);
   require(reference_sigma >= 0.0, "reference_sigma", "0 (automatic) or positive metres", reference_sigma);
 }
 

@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <vector>
 
+#include "fusion/limits.hpp"
+
 namespace nacre {
 
 // Where a pixel is: in a tile of the set, beside one, or neither.
@@ -15,18 +17,15 @@ class ImageTiles {
   // All of an image.
   ImageTiles() = default;
   // Those that `is_member` holds for, row by row; so many pixels around count as beside them.
-  ImageTiles(int width, int height, int side, const std::vector<std::uint8_t>& is_member, int border)
-      : across_((width + square - 1) / square),
-        squares_(static_cast<std::size_t>(across_) * static_cast<std::size_t>((height + square - 1) / square)) {
-    const int down = static_cast<int>(squares_.size()) / across_, reach = (border + square - 1) / square;
-    const int tiles_across = (width + side - 1) / side;
-    const auto in_tile = [&](int x, int y) {
-      return is_member[static_cast<std::size_t>(y * square / side * tiles_across + x * square / side)] != 0;
-    };
+  ImageTiles(int width, int height, const std::vector<std::uint8_t>& is_member, int border)
+      : across_(squares_in(width)),
+        squares_(static_cast<std::size_t>(across_) * static_cast<std::size_t>(squares_in(height))) {
+    const int per_tile = fusion_limits::tile_side / fusion_limits::tile_square;
+    const int down = squares_in(height), reach = squares_in(border), tiles_across = (across_ + per_tile - 1) / per_tile;
     for (int y = 0; y < down; ++y) {
       for (int x = 0; x < across_; ++x) {
-        if (in_tile(x, y)) at(x, y) = InTiles::yes;
-        if (!in_tile(x, y)) continue;
+        if (is_member[static_cast<std::size_t>(y / per_tile * tiles_across + x / per_tile)] == 0) continue;
+        at(x, y) = InTiles::yes;
         for (int v = std::max(0, y - reach); v <= std::min(down - 1, y + reach); ++v) {
           for (int u = std::max(0, x - reach); u <= std::min(across_ - 1, x + reach); ++u) {
             at(u, v) = std::max(at(u, v), InTiles::beside);
@@ -38,11 +37,12 @@ class ImageTiles {
 
   InTiles operator()(int u, int v) const {
     if (squares_.empty()) return InTiles::yes;
-    return squares_[static_cast<std::size_t>(v / square * across_ + u / square)];
+    return squares_[static_cast<std::size_t>(v / fusion_limits::tile_square * across_ +
+                                             u / fusion_limits::tile_square)];
   }
 
  private:
-  static constexpr int square = 16;  // [pixels] tiles are a multiple of it
+  static int squares_in(int pixels) { return (pixels + fusion_limits::tile_square - 1) / fusion_limits::tile_square; }
   InTiles& at(int x, int y) { return squares_[static_cast<std::size_t>(y * across_ + x)]; }
 
   int across_ = 0;

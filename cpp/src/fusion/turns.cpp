@@ -62,7 +62,7 @@ class ConfirmedSquares {
   }
 
  private:
-  static constexpr int side = 8;  // [pixels]
+  static constexpr int side = fusion_limits::known_square;
   std::atomic<bool>& at(int u, int v) { return confirmed_[static_cast<std::size_t>(v / side * across_ + u / side)]; }
   const std::atomic<bool>& at(int u, int v) const {
     return confirmed_[static_cast<std::size_t>(v / side * across_ + u / side)];
@@ -96,7 +96,7 @@ ImageTiles FusionTurns::next(const PointModel& model, const RegisteredFrame& now
       const Tile tile = squares.tile(now, x * side, y * side);
       const bool has_turned =
           (here - seen_from_[i]).norm() > fusion_limits::other_direction * static_cast<double>(tile.nearest);
-      const bool is_its_turn = (x + 2 * y + turn_) % fusion_limits::turns == 0;
+      const bool is_its_turn = (x + 2 * y + turn_) % options.turns == 0;
       is_next[i] = is_its_turn || has_turned || tile.is_lacking;
       nearest = std::min(nearest, tile.nearest);
       if (is_next[i] != 0) seen_from_[i] = here;
@@ -106,7 +106,7 @@ ImageTiles FusionTurns::next(const PointModel& model, const RegisteredFrame& now
   const double reach =
       spacing / now.camera.footprint(static_cast<double>(nearest));  // of a point in the image [pixels]
   const int border = static_cast<int>(std::min(reach, static_cast<double>(std::max(frame.width, frame.height)))) + 1;
-  return {frame.width, frame.height, side, is_next, border};
+  return {frame.width, frame.height, is_next, border};
 }
 
 }  // namespace nacre

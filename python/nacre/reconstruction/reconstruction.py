@@ -10,7 +10,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from nacre._internal.arrays import as_count, as_flag, stacked_poses
 from nacre._internal.checkpoint import Checkpointed
+from nacre.datasets.read_ahead import read_ahead
 from nacre.datasets.sequence import SequenceFrame
 from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
@@ -138,8 +139,8 @@ class Reconstruction(Checkpointed):
         if indices is None:
             done = {frame.index for frame in self.frames}
             indices = [index for index in range(len(self.sequence)) if index not in done]
-        for index in indices:
-            record = self._add(index)
+        for index, read in read_ahead(self.sequence, indices):
+            record = self._add(index, read)
             self.frames.append(record)
             yield record
 
@@ -173,7 +174,8 @@ class Reconstruction(Checkpointed):
                     state.step += 1
                     continue
                 guess = before.world_from_camera if state.are_apart else beside
-                record = self._add(before.index, guess, search=state.are_apart)
+                read = partial(self.sequence.__getitem__, before.index)
+                record = self._add(before.index, read, guess, search=state.are_apart)
                 if record.status == "TRACKED":
                     record = dataclasses.replace(record, status="RELOCALISED")
                 is_better = _RANK[record.status] > _RANK[before.status]
@@ -261,10 +263,15 @@ class Reconstruction(Checkpointed):
         return done, more
 
     def _add(
-        self, index: int, guess: npt.NDArray[np.float64] | None = None, *, search: bool = True
+        self,
+        index: int,
+        read: Callable[[], SequenceFrame],
+        guess: npt.NDArray[np.float64] | None = None,
+        *,
+        search: bool = True,
     ) -> FrameRecord:
         try:
-            frame = self.sequence[index]
+            frame = read()
         except (FileFormatError, OSError) as error:
             _log.info("frame %d: skipped, it cannot be read: %s", index, error)
             return FrameRecord(index, None, "LOST", str(error), None, None, error)

@@ -57,7 +57,7 @@ TEST_CASE("what is known and seen from the same place has its turn once in so ma
   const Wall wall(-10.0);
   FusionTurns turns;
   std::multiset<std::pair<int, int>> all;
-  for (int i = 0; i < fusion_limits::turns; ++i) {
+  for (int i = 0; i < FusionOptions().turns; ++i) {
     const auto chosen = wall.next(turns, Pose::Identity(), 1 + i);
     CHECK(chosen.size() == 3);
     all.insert(chosen.begin(), chosen.end());
@@ -69,7 +69,7 @@ TEST_CASE("what is known and seen from the same place has its turn once in so ma
 TEST_CASE("what the model lacks has its turn in every frame") {
   const Wall wall(0.0);
   FusionTurns turns;
-  for (int i = 0; i < fusion_limits::turns; ++i) {
+  for (int i = 0; i < FusionOptions().turns; ++i) {
     const auto chosen = wall.next(turns);
     for (int y = 0; y < 3; ++y) {
       for (int x = 0; x < 2; ++x) CHECK(chosen.count({x, y}) == 1);
@@ -82,7 +82,7 @@ TEST_CASE("what few frames have seen is no more known than what none has") {
   Wall wall(-10.0);
   std::fill(wall.model.observations.begin(), wall.model.observations.end(), std::uint8_t{1});
   FusionTurns turns;
-  for (int i = 0; i < fusion_limits::turns; ++i) CHECK(wall.next(turns).size() == 12);
+  for (int i = 0; i < FusionOptions().turns; ++i) CHECK(wall.next(turns).size() == 12);
 }
 
 TEST_CASE("what is seen from elsewhere has its turn at once, and then no more") {
@@ -96,11 +96,11 @@ TEST_CASE("what is seen from elsewhere has its turn at once, and then no more") 
 }
 
 TEST_CASE("beside tiles are the pixels within the reach of a point, and an image without tiles is all in them") {
-  const ImageTiles tiles(256, 256, 128, {1, 0, 0, 0}, 10);
-  CHECK(tiles(127, 127) == InTiles::yes);
-  CHECK(tiles(137, 0) == InTiles::beside);
-  CHECK(tiles(137, 137) == InTiles::beside);
-  CHECK(tiles(144, 0) == InTiles::no);
+  const ImageTiles tiles(2 * side, 2 * side, {1, 0, 0, 0}, 10);
+  CHECK(tiles(side - 1, side - 1) == InTiles::yes);
+  CHECK(tiles(side + 9, 0) == InTiles::beside);
+  CHECK(tiles(side + 9, side + 9) == InTiles::beside);
+  CHECK(tiles(side + 16, 0) == InTiles::no);
   CHECK(ImageTiles()(1000, 1000) == InTiles::yes);
 }
 
@@ -109,10 +109,31 @@ TEST_CASE("no point is put twice where a tile ends") {
   PointModel model = wall.model;
   const std::int64_t known = model.size();
   FusionTurns turns;
-  for (int i = 0; i < 2 * fusion_limits::turns; ++i) {
+  for (int i = 0; i < 2 * FusionOptions().turns; ++i) {
     const RegisteredFrame now{wall.frame, camera(), wall.observer, Pose::Identity(), 10 + i};
     const ImageTiles tiles = turns.next(model, now, spacing, wall.options, 2);
     fuse_observed(model, now, tiles, spacing, wall.options, 2, {});
   }
   CHECK(model.size() == known);
+}
+
+TEST_CASE("with one turn every frame is folded in whole") {
+  Wall wall(-10.0);
+  wall.options.turns = 1;
+  FusionTurns turns;
+  for (int i = 0; i < 3; ++i) CHECK(wall.next(turns).size() == 12);
+}
+
+TEST_CASE("what the camera sees through is noticed in every frame") {
+  const Wall wall(-10.0);
+  PointModel model = wall.model;
+  model.points[model.points.size() / 2 + 20] *= 0.5F;  // half way to the wall, within the image
+  const auto is_before = [](const Eigen::Vector3f& p) { return p.z() < 0.9F; };
+  FusionTurns turns;
+  for (int i = 0; i < wall.options.max_free_space_violations; ++i) {
+    CHECK(std::any_of(model.points.begin(), model.points.end(), is_before));
+    const RegisteredFrame now{wall.frame, camera(), wall.observer, Pose::Identity(), 10 + i};
+    fuse_observed(model, now, turns.next(model, now, spacing, wall.options, 2), spacing, wall.options, 2, {});
+  }
+  CHECK(std::none_of(model.points.begin(), model.points.end(), is_before));
 }
