@@ -7,6 +7,7 @@
 
 #include "base/limits.hpp"
 #include "base/parallel.hpp"
+#include "base/se3.hpp"
 #include "camera/limits.hpp"
 #include "camera/point_projection.hpp"
 #include "fusion/limits.hpp"
@@ -57,7 +58,7 @@ class ConfirmedSquares {
         found.nearest = std::min(found.nearest, now.frame.points(v * now.frame.width + u, 2));
       }
     }
-    found.is_lacking = missing > fusion_limits::lacking_part * measured;
+    found.is_lacking = missing >= fusion_limits::lacking_part * measured;  // where nothing is measured, too
     return found;
   }
 
@@ -85,7 +86,7 @@ ImageTiles FusionTurns::next(const PointModel& model, const RegisteredFrame& now
   constexpr int side = fusion_limits::tile_side;
   const Frame& frame = now.frame;
   const int across = (frame.width + side - 1) / side, down = (frame.height + side - 1) / side;
-  const Eigen::Vector3d here = now.world_from_camera.translation();
+  const Pose& here = now.world_from_camera;
   const ConfirmedSquares squares(model, now, spacing, options, num_threads);
   if (seen_from_.empty()) seen_from_.assign(num_tiles(now.camera), here);
   std::vector<std::uint8_t> is_next(seen_from_.size());
@@ -94,10 +95,12 @@ ImageTiles FusionTurns::next(const PointModel& model, const RegisteredFrame& now
     for (int x = 0; x < across; ++x) {
       const auto i = static_cast<std::size_t>(y * across + x);
       const Tile tile = squares.tile(now, x * side, y * side);
-      const bool has_turned =
-          (here - seen_from_[i]).norm() > fusion_limits::other_direction * static_cast<double>(tile.nearest);
+      const auto depth = static_cast<double>(tile.nearest);
+      const double moved = (here.translation() - seen_from_[i].translation()).norm();
+      // By a tile: what was folded in then was something else.
+      const bool has_turned = angle_between(here, seen_from_[i]) * depth > side * now.camera.footprint(depth);
       const bool is_its_turn = (x + 2 * y + turn_) % options.turns == 0;
-      is_next[i] = is_its_turn || has_turned || tile.is_lacking;
+      is_next[i] = is_its_turn || has_turned || moved > fusion_limits::other_direction * depth || tile.is_lacking;
       nearest = std::min(nearest, tile.nearest);
       if (is_next[i] != 0) seen_from_[i] = here;
     }

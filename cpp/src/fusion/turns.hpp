@@ -23,7 +23,7 @@ class FusionTurns {
 
  private:
   friend struct PrivateState;
-  std::vector<Eigen::Vector3d> seen_from_;  // of each tile: where the camera was when it was folded in
+  std::vector<Pose> seen_from_;  // of each tile: where the camera was when it was folded in
   std::int64_t turn_ = 0;
 };
 

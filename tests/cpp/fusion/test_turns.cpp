@@ -95,6 +95,16 @@ TEST_CASE("what is seen from elsewhere has its turn at once, and then no more") 
   CHECK(wall.next(turns, aside).size() == 3);
 }
 
+TEST_CASE("what is seen after a turn by a tile has its turn at once") {
+  const Wall wall(-10.0);
+  FusionTurns turns;
+  wall.next(turns);
+  Pose turned = Pose::Identity();
+  turned.linear() = Eigen::AngleAxisd(1.01 * side / 200, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  CHECK(wall.next(turns, turned).size() == 12);
+  CHECK(wall.next(turns, turned).size() < 12);  // its corners are new
+}
+
 TEST_CASE("beside tiles are the pixels within the reach of a point, and an image without tiles is all in them") {
   const ImageTiles tiles(2 * side, 2 * side, {1, 0, 0, 0}, 10);
   CHECK(tiles(side - 1, side - 1) == InTiles::yes);

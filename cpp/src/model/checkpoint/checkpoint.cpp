@@ -322,7 +322,7 @@ bool PrivateState::is_sound(const ResidualNoise& noise) {
 
 bool PrivateState::is_sound(const FusionTurns& turns, const Camera& camera) {
   const bool is_finite = std::all_of(turns.seen_from_.begin(), turns.seen_from_.end(),
-                                     [](const Eigen::Vector3d& place) { return place.allFinite(); });
+                                     [](const Pose& pose) { return pose.matrix().allFinite(); });
   return is_finite && turns.turn_ >= 0 &&
          (turns.seen_from_.empty() || turns.seen_from_.size() == FusionTurns::num_tiles(camera));
 }
