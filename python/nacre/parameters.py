@@ -122,8 +122,8 @@ class FusionParameters:
         and did not find it.
     turns : int
         What the model knows, and the camera sees from where it was before, is folded in every so many frames,
-        a part of the image after the other; 1: all of it in every frame, for the last bit of accuracy from a
-        camera that stands still.
+        a part of the image after the other; 1: all of it in every frame. Frames whose pose is given
+        (``keep_guess``) are folded in whole.
     reference_sigma : float
         Noise of an observation of weight 1 [m]; 0: the frame's median.
     """

@@ -210,7 +210,7 @@ def test_a_model_corrects_what_it_finds(room, wrong, corrected):
 
 
 def test_later_frames_say_that_they_corrected_earlier_ones(corrected):
-    assert next(i for i, frame in enumerate(corrected.frames) if frame.corrects_earlier) == 6
+    assert next(i for i, frame in enumerate(corrected.frames) if frame.corrects_earlier) == 5
     assert {frame.status for frame in corrected.frames} == {"TRACKED"}
 
 

@@ -57,8 +57,8 @@ class DepthCalibrator {
 
   /// What the views say, num_pairs 0 or 1 and no error where that is nothing.
   DepthCalibration fit(int num_threads = 0) const;
-  /// The same in parts, for a loop that must not wait: begins with the views that are there, unless there is nothing to
-  /// fit; each step is one iteration, the last of which returns what the views say.
+  /// The same in parts, for a loop that must not wait: begins anew with the views that are there; each step is one
+  /// iteration, the last of which returns what they say.
   void begin_fit();
   bool is_fitting() const { return fit_.has_value(); }
   std::optional<DepthCalibration> step(int num_threads = 0);

@@ -11,7 +11,7 @@
 
 namespace nacre {
 
-// Images that follow each other fast, from about the same place, err alike: a surface that the model has confirmed
+// Images that follow each other fast, from about the same place, err alike: a surface that the model knows well
 // learns little from each of them. What of an image shows such a surface is folded in in turn, a tile after the other;
 // what the model lacks, and what the camera sees from another direction than before, at once.
 class FusionTurns {

@@ -56,27 +56,25 @@ std::optional<DepthCalibration> Pipeline::depth_calibration() const {
 }
 
 // From time to time, when the camera has looked in new directions. A frame has time for an iteration over as many views
-// as there will be at most, or for more over fewer; where each looks in a direction of its own, few would be left to
-// correct.
+// as there will be at most, or for more over fewer. Where each looks in a direction of its own few would be left to
+// correct: the first that can tell does.
 void Pipeline::calibrate_depth(FrameReport& report) {
   if (!depth_views) return;
   const Eigen::Map<const DepthImage> seen(before.depth.data(), camera.height(), camera.width());
   depth_views->set_poses(depth_view_poses());
   const bool is_view = depth_views->add(seen, report.world_from_camera);
+  const bool is_sparse = is_view && !depth_view_frames.empty() && depth_view_frames.back() == report.index - 1;
   if (is_view) depth_view_frames.push_back(static_cast<std::int32_t>(report.index));
-  const bool is_next = is_view && depth_views->num_views() % model_limits::calibration_interval == 0;
-  const std::size_t num_views = depth_view_frames.size();
-  const bool is_sparse = is_view && num_views > 1 && depth_view_frames[num_views - 2] == report.index - 1;
-  std::optional<DepthCalibration> found;
-  const int most_steps = is_next || is_sparse ? depth_limits::most_calibration_steps
-                                              : depth_limits::most_views / static_cast<int>(num_views);
-  for (int i = 0; i < most_steps && depth_views->is_fitting(); ++i) found = depth_views->step(options.num_threads);
-  if (found) {
+  if (is_view && depth_views->num_views() % model_limits::calibration_interval == 0) depth_views->begin_fit();
+  const int most_steps =
+      is_sparse ? depth_limits::most_calibration_steps : depth_limits::most_views / depth_views->num_views();
+  for (int i = 0; i < most_steps && depth_views->is_fitting(); ++i) {
+    std::optional<DepthCalibration> found = depth_views->step(options.num_threads);
+    if (!found) continue;
     const double corrected = options.depth.tilt - given.depth.tilt;
     found->tilt += corrected;
     if (found->is_significant()) straighten(found->tilt - corrected, report);
   }
-  if (is_next) depth_views->begin_fit();
 }
 
 void Pipeline::straighten(double tilt, FrameReport& report) {

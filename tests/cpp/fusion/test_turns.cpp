@@ -34,7 +34,7 @@ struct Wall {
     for (Eigen::Index i = 0; i < part.points.rows(); ++i) {
       if (static_cast<double>(part.points(i, 0)) < known_from) part.normals.row(i).setConstant(std::nanf(""));
     }
-    for (int i = 0; i < options.min_observations; ++i)
+    for (int i = 0; i < options.turns * options.min_observations; ++i)
       fuse(model, part, camera(), Pose::Identity(), spacing, i, options);
   }
 
@@ -80,7 +80,8 @@ TEST_CASE("what the model lacks has its turn in every frame") {
 
 TEST_CASE("what few frames have seen is no more known than what none has") {
   Wall wall(-10.0);
-  std::fill(wall.model.observations.begin(), wall.model.observations.end(), std::uint8_t{1});
+  std::fill(wall.model.observations.begin(), wall.model.observations.end(),
+            static_cast<std::uint8_t>(wall.options.turns * wall.options.min_observations - 1));
   FusionTurns turns;
   for (int i = 0; i < FusionOptions().turns; ++i) CHECK(wall.next(turns).size() == 12);
 }
@@ -90,19 +91,19 @@ TEST_CASE("what is seen from elsewhere has its turn at once, and then no more") 
   FusionTurns turns;
   wall.next(turns);
   Pose aside = Pose::Identity();
-  aside.translation().x() = 1.01 * fusion_limits::other_direction;
+  aside.translation().x() = 1.01 * fusion_limits::other_view;
   CHECK(wall.next(turns, aside).size() == 12);
   CHECK(wall.next(turns, aside).size() == 3);
 }
 
-TEST_CASE("what is seen after a turn by a tile has its turn at once") {
+TEST_CASE("what is seen after a turn of the camera has its turn at once") {
   const Wall wall(-10.0);
   FusionTurns turns;
   wall.next(turns);
   Pose turned = Pose::Identity();
-  turned.linear() = Eigen::AngleAxisd(1.01 * side / 200, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  turned.linear() = Eigen::AngleAxisd(1.01 * fusion_limits::other_view, Eigen::Vector3d::UnitZ()).toRotationMatrix();
   CHECK(wall.next(turns, turned).size() == 12);
-  CHECK(wall.next(turns, turned).size() < 12);  // its corners are new
+  CHECK(wall.next(turns, turned).size() == 3);
 }
 
 TEST_CASE("beside tiles are the pixels within the reach of a point, and an image without tiles is all in them") {

@@ -46,7 +46,7 @@ def test_points_that_are_never_confirmed_vanish() -> None:
     x, y = flat_grid()
     hill = np.hypot(x, y) < 0.012
     # Without its rim: the normals there lean towards the plain, which then moves the points instead.
-    model = nacre.Model(FLAT, spacing=0.002, depth={"planar_keep_sigmas": 0.0}, fusion={"turns": 1})
+    model = nacre.Model(FLAT, spacing=0.002, depth={"planar_keep_sigmas": 0.0})
     model.add_frame(np.where(hill, 0.297, 0.3), guess=np.eye(4), keep_guess=True)
     in_front = [int((model.points[:, 2] < 0.2975).sum())]
     for _ in range(4):

@@ -90,7 +90,7 @@ def test_spacing_of_the_first_frame_is_two_pixels() -> None:
 
 
 def test_confidence_grows_with_observations() -> None:
-    model = nacre.Model(FLAT, fusion={"turns": 1})
+    model = nacre.Model(FLAT)
     sums = []
     for _ in range(4):
         model.add_frame(relief(), guess=np.eye(4), keep_guess=True)
