@@ -75,7 +75,6 @@ void bind_model(py::module_& m) {
       .def_readwrite("max_confidence", &FusionOptions::max_confidence)
       .def_readwrite("min_observations", &FusionOptions::min_observations)
       .def_readwrite("max_free_space_violations", &FusionOptions::max_free_space_violations)
-      .def_readwrite("turns", &FusionOptions::turns)
       .def_readwrite("reference_sigma", &FusionOptions::reference_sigma);
 
   py::class_<WlopOptions>(m, "WlopOptions")

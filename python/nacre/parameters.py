@@ -120,10 +120,6 @@ class FusionParameters:
     max_free_space_violations : int
         A point that a camera saw through so often goes; an unconfirmed one also where cameras looked so often
         and did not find it.
-    turns : int
-        What the model knows, and the camera sees from where it was before, is folded in every so many frames,
-        a part of the image after the other; 1: all of it in every frame. Frames whose pose is given
-        (``keep_guess``) are folded in whole.
     reference_sigma : float
         Noise of an observation of weight 1 [m]; 0: the frame's median.
     """
@@ -131,7 +127,6 @@ class FusionParameters:
     max_confidence: float = 1e6
     min_observations: int = 3
     max_free_space_violations: int = 3
-    turns: int = 4
     reference_sigma: float = 0.0
 
 

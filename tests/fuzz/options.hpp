@@ -63,7 +63,6 @@ inline FusionOptions fusion_options(Bytes& bytes) {
   FusionOptions options;
   bytes.change(options.support), bytes.change(options.max_angle), bytes.change(options.max_confidence);
   bytes.change(options.min_observations, -1, 300), bytes.change(options.max_free_space_violations, -1, 300);
-  bytes.change(options.turns, -1, 300);
   bytes.change(options.reference_sigma);
   return options;
 }

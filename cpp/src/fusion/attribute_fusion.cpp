@@ -76,8 +76,8 @@ void AttributePlanes::observe(ObservationBlock& block, float* averages) const {
   }
 }
 
-void fuse_attributes(PointModel& model, std::int64_t first, const RegisteredFrame& now, const ImageTiles& tiles,
-                     const AttributePlanes& planes, int num_threads) {
+void fuse_attributes(PointModel& model, std::int64_t first, const RegisteredFrame& now, const AttributePlanes& planes,
+                     int num_threads) {
   const SurfaceObserver& observer = now.observer;
   std::vector<PointAttribute*> targets;
   for (const AttributePlanes::Part& part : planes.parts()) {
@@ -101,8 +101,6 @@ void fuse_attributes(PointModel& model, std::int64_t first, const RegisteredFram
         std::size_t seen[block_size];
         for (int j = 0; j < static_cast<int>(end - begin); ++j) {
           if (!is_observable(points, j, now.frame, observer)) continue;
-          const int u = points.pixel[j] % now.frame.width, v = points.pixel[j] / now.frame.width;
-          if (tiles(u, v) != InTiles::yes) continue;
           seen[block.size()] = start + static_cast<std::size_t>(j);
           observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma_at(now.frame, points.pixel[j]));
         }

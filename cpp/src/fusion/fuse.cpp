@@ -73,8 +73,8 @@ bool reaches_image(const PointProjection::Block& points, int i, const Camera& ca
 }
 
 // Moves the model's points by what the frame says about them.
-Known update(PointModel& model, const RegisteredFrame& now, const ImageTiles& tiles, double spacing,
-             const FusionOptions& options, FusionReport& report, int num_threads) {
+Known update(PointModel& model, const RegisteredFrame& now, double spacing, const FusionOptions& options,
+             FusionReport& report, int num_threads) {
   const Frame& frame = now.frame;
   const Camera& camera = now.camera;
   const SurfaceObserver& observer = now.observer;
@@ -89,28 +89,21 @@ Known update(PointModel& model, const RegisteredFrame& now, const ImageTiles& ti
   };
   const auto num_blocks = static_cast<std::size_t>((model.size() + block_size - 1) / block_size);
   std::vector<std::vector<Cover>> covers(num_blocks);
-  std::vector<std::vector<Known::Point>> beside(num_blocks);  // what is looked at
+  std::vector<std::vector<Known::Point>> beside(num_blocks);  // the image
 
   parallel_blocks(
       model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
         const auto first = static_cast<std::size_t>(begin);
         PointProjection::Block points;
         view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin), points);
-        const auto margin_at = [&](float sigma) {
-          return std::max(static_cast<float>(camera_limits::surface_spacings * spacing),
-                          base_limits::noise_sigmas * sigma);
-        };
-        const auto is_seen_through = [&](int j, float sigma) {
-          const float margin = margin_at(sigma);
-          return frame.points(points.pixel[j], 2) - points.z[j] > margin &&
-                 observer.sees_through(points.point(j), points.pixel[j], margin);
-        };
         const auto note_free_space_violation = [&](int j, float sigma) {
           const std::size_t i = first + static_cast<std::size_t>(j);
+          const float margin = std::max(static_cast<float>(camera_limits::surface_spacings * spacing),
+                                        base_limits::noise_sigmas * sigma);
           const bool is_confirmed = model.observations[i] >= options.min_observations;
-          const Visibility is = visibility(frame.points(points.pixel[j], 2) - points.z[j], margin_at(sigma));
-          const bool is_missed =
-              is_confirmed ? is_seen_through(j, sigma) : is == Visibility::agrees || is == Visibility::seen_through;
+          const Visibility is = visibility(frame.points(points.pixel[j], 2) - points.z[j], margin);
+          const bool is_missed = is_confirmed ? observer.sees_through(points.point(j), points.pixel[j], margin)
+                                              : is == Visibility::agrees || is == Visibility::seen_through;
           if (is_missed) count_up(model.free_space_violations[i]);
         };
         ObservationBlock block;
@@ -120,16 +113,8 @@ Known update(PointModel& model, const RegisteredFrame& now, const ImageTiles& ti
             beside[static_cast<std::size_t>(number)].push_back({first + static_cast<std::size_t>(j), points.pixel[j]});
           }
           if (!points.inside[j] || !(points.facing[j] > fusion_limits::least_facing)) continue;
-          const InTiles is_in_tiles = tiles(points.pixel[j] % frame.width, points.pixel[j] / frame.width);
-          if (is_in_tiles == InTiles::beside) {
-            beside[static_cast<std::size_t>(number)].push_back({first + static_cast<std::size_t>(j), points.pixel[j]});
-          }
           const float measured_sigma = frame.sigma[points.pixel[j]];
           const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
-          if (is_in_tiles != InTiles::yes) {
-            if (is_seen_through(j, sigma)) count_up(model.free_space_violations[first + static_cast<std::size_t>(j)]);
-            continue;
-          }
           if (!observer.may_observe(points.point(j), points.pixel[j], sigma,
                                     fusion_limits::least_weight * observer.frontal_weight(sigma))) {
             note_free_space_violation(j, sigma);
@@ -184,8 +169,8 @@ int reach_of(const NewPoint& point, const Camera& camera) {
 }
 
 // The frame's surface where the model does not cover it, denoised.
-std::vector<NewPoint> find_new_points(const RegisteredFrame& now, const ImageTiles& tiles, const PixelSet& covered,
-                                      double spacing, int num_threads) {
+std::vector<NewPoint> find_new_points(const RegisteredFrame& now, const PixelSet& covered, double spacing,
+                                      int num_threads) {
   const Frame& frame = now.frame;
   const Camera& camera = now.camera;
   const SurfaceObserver& observer = now.observer;
@@ -193,7 +178,6 @@ std::vector<NewPoint> find_new_points(const RegisteredFrame& now, const ImageTil
   parallel_for(frame.height, 16, num_threads, [&](std::int64_t v) {
     const auto first = static_cast<std::int32_t>(v) * frame.width;
     for (int u = 0; u < frame.width; ++u) {
-      if (tiles(u, static_cast<int>(v)) != InTiles::yes) continue;
       if (observer.weight(u, static_cast<int>(v)) > 0.0F && !covered.contains(u, static_cast<int>(v))) {
         uncovered[static_cast<std::size_t>(v)].push_back(first + u);
       }
@@ -315,13 +299,11 @@ void FusionOptions::check() const {
   require(min_observations >= 0 && min_observations <= 255, "min_observations", "0 to 255 frames", min_observations);
   require(max_free_space_violations >= 1 && max_free_space_violations <= 255, "max_free_space_violations", "1 to 255",
           max_free_space_violations);
-  require(turns >= 1 && turns <= 255, "turns", "1 to 255 frames", turns);
   require(reference_sigma >= 0.0, "reference_sigma", "0 (automatic) or positive metres", reference_sigma);
 }
 
-FusionReport fuse_observed(PointModel& model, const RegisteredFrame& now, const ImageTiles& tiles, double spacing,
-                           const FusionOptions& options, int num_threads,
-                           const std::vector<FrameAttribute>& attributes) {
+FusionReport fuse_observed(PointModel& model, const RegisteredFrame& now, double spacing, const FusionOptions& options,
+                           int num_threads, const std::vector<FrameAttribute>& attributes) {
   FusionReport report;
   const bool with_colors = now.observer.has_colors() || !model.colors.empty();
   if (with_colors) {
@@ -329,12 +311,12 @@ FusionReport fuse_observed(PointModel& model, const RegisteredFrame& now, const 
   }
   const AttributePlanes planes(attributes, now.observer, now.camera, num_threads);
   const bool with_attributes = !attributes.empty() || !model.attributes.empty();
-  if (with_attributes) fuse_attributes(model, 0, now, tiles, planes, num_threads);
-  Known known = update(model, now, tiles, spacing, options, report, num_threads);
-  const std::vector<NewPoint> candidates = find_new_points(now, tiles, known.covered, spacing, num_threads);
+  if (with_attributes) fuse_attributes(model, 0, now, planes, num_threads);
+  Known known = update(model, now, spacing, options, report, num_threads);
+  const std::vector<NewPoint> candidates = find_new_points(now, known.covered, spacing, num_threads);
   const std::int64_t num_known = model.size();
   insert(model, candidates, known, now, with_colors, report);
-  if (with_attributes) fuse_attributes(model, num_known, now, tiles, planes, num_threads);
+  if (with_attributes) fuse_attributes(model, num_known, now, planes, num_threads);
   remove_violated(model, options, report);
   return report;
 }
@@ -351,8 +333,8 @@ FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, c
   check_attributes(attributes, camera, model);
   SurfaceObserver observer(camera, options);
   observer.look_at(frame, colors, num_threads);
-  return fuse_observed(model, {frame, camera, observer, world_from_camera, frame_index}, ImageTiles(), spacing, options,
-                       num_threads, attributes);
+  return fuse_observed(model, {frame, camera, observer, world_from_camera, frame_index}, spacing, options, num_threads,
+                       attributes);
 }
 
 void thin(PointModel& model, double spacing) {

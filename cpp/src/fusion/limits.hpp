@@ -19,10 +19,6 @@ constexpr int squares_across = 8;  // [1] budget: of the index of pixels, in a r
 constexpr std::size_t sigma_probes = 5000;  // [pixels] budget: that tell a frame's median noise; test_fusion
 constexpr int layer_levels = 4;  // [1] budget: of spacing, each twice the one before; test_deformation
 constexpr float cover_sigmas = 3.0F;  // [sigma] tuned: a pixel nearer to a point's plane is its surface; test_fusion
-constexpr int tile_side = 64;  // [pixels] budget: of what is folded in in turn; benchmarks/compare.py
-constexpr int known_square = 8;  // [pixels] budget: that one confirmed point makes known; tiles are a multiple of it; test_turns
-constexpr double other_view = 0.03;  // [focal length] tuned: motion of what is seen in the image, that shows it anew; test_residual_noise, spot-kinect120
-constexpr double lacking_part = 0.15;  // [1] budget: of a tile that is not known, which is folded in at once; benchmarks/compare.py
 
 }  // namespace nacre::fusion_limits
 // clang-format on

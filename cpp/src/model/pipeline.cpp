@@ -386,12 +386,8 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
     const Stopwatch watch(report.milliseconds.fuse);
     if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
     if (options.fusion_method == FusionMethod::fuse) {
-      const RegisteredFrame registered{frame, camera, observer, report.world_from_camera, index};
-      const ImageTiles tiles = extras.keep_guess  // fusion is all that is asked for
-                                   ? ImageTiles()
-                                   : turns.next(cloud, registered, spacing, options.fusion, options.num_threads);
-      report.fusion =
-          fuse_observed(cloud, registered, tiles, spacing, options.fusion, options.num_threads, extras.attributes);
+      report.fusion = fuse_observed(cloud, {frame, camera, observer, report.world_from_camera, index}, spacing,
+                                    options.fusion, options.num_threads, extras.attributes);
     } else {
       consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
     }

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "fusion/observer.hpp"
-#include "fusion/turns.hpp"
 #include "loops/loop_closure.hpp"
 #include "model/frame_history.hpp"
 #include "nacre/depth_calibration.hpp"
@@ -52,7 +51,6 @@ struct Pipeline {
   double noise_factor = 1.0;               // of the newest frame
   PlaceHypothesis hypothesis;              // while the camera is lost
   std::vector<ObjectView> views;           // of an object that stands on a plane, from different directions
-  FusionTurns turns;
   double spacing = 0.0;
   std::int64_t num_lost = 0;             // frames in a row, up to the newest
   std::int64_t num_vain = 0;             // of them, those that showed something

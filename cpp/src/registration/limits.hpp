@@ -49,7 +49,6 @@ constexpr double usual_weight = 2.5;  // [1] tuned: of a place that contradicts 
 constexpr double far_misfit = 0.5;  // [1] tuned: beside the last pose, and far from all guesses, what bends more counts less; unrelated
 constexpr double doubtful_score = 1.2;  // [min_score] tuned: asked after a loss, and far from all guesses; unrelated
 constexpr double only_near_score = 0.4;  // [min_score] tuned: of the best of many places near the last pose, where no other comes near: of 55 with more, below min_score, 52 are right; benchmarks/acceptance.py
-constexpr double nearly_score = 0.8;  // [min_score] tuned: of such a place that needs no relocalisation score: right in 24 of 25; d435-t265-shelf
 constexpr double usual_off_planes = 0.2;  // [1] tuned: of the matches, that lie off three planes where the place is right; unrelated, icl
 constexpr std::size_t plane_pairs = 500;  // [pairs] budget: that tell what lies off three planes; test_dominant_planes
 constexpr std::size_t plane_probes = 20;  // [pairs] budget: of them, whose planes are tried; test_dominant_planes

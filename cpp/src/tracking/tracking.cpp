@@ -5,7 +5,6 @@
 #include "camera/limits.hpp"
 #include "camera/view_distance.hpp"
 #include "nacre/global_registration.hpp"
-#include "registration/limits.hpp"
 #include "tracking/limits.hpp"
 #include "tracking/relocalisation.hpp"
 #include "tracking/turntable_search.hpp"
@@ -100,8 +99,7 @@ std::optional<TrackingResult> only_near(const TrackingPrior& prior, const Tracki
   const auto is_lower = [](const TrackingResult& a, const TrackingResult& b) { return a.score < b.score; };
   const auto best = std::max_element(places.begin(), places.end(), is_lower);
   if (best == places.end() || best->decision != Decision::accepted) return std::nullopt;
-  const bool is_nearly_accepted = best->score >= registration_limits::nearly_score * options.min_score;
-  if (!is_nearly_accepted && !PlaceOdds::is_for(best->relocalisation_score)) return std::nullopt;
+  if (!PlaceOdds::is_for(best->relocalisation_score)) return std::nullopt;
   const bool has_rival = std::any_of(places.begin(), places.end(), [&](const TrackingResult& other) {
     return other.score > GlobalAlignOptions().max_rivalry * best->score &&
            camera_limits::view_turn *

@@ -83,7 +83,6 @@ def test_illegal_parameters() -> None:
         ({"registration.max_iterations": 0}, "max_iterations must be at least 1, got 0"),
         ({"fusion.max_confidence": 0.0}, "max_confidence must be positive, got 0"),
         ({"fusion.min_observations": -1}, "min_observations must be .* got -1"),
-        ({"fusion.turns": 0}, "turns must be 1 to 255 frames, got 0"),
         ({"fusion.max_free_space_violations": 256}, "max_free_space_violations must be 1 to 255, got 256"),
         ({"fusion.reference_sigma": -0.5}, "reference_sigma must be .* got -0.5"),
         ({"wlop.radius": 0.0}, "radius must be .* got 0"),

@@ -112,8 +112,8 @@ template <class Archive>
 void exchange_state(Archive& archive, Pipeline& state) {
   archive(state.options.fusion.reference_sigma, state.options.depth.tilt, state.depth_view_frames, state.region,
           state.calibration, state.confidence_noise, state.residual_noise, state.usual_contradiction, state.cloud,
-          state.turns, state.loops, state.history, state.before, state.still_scene, state.hypothesis, state.views,
-          state.spacing, state.num_lost, state.num_vain, state.start_frames);
+          state.loops, state.history, state.before, state.still_scene, state.hypothesis, state.views, state.spacing,
+          state.num_lost, state.num_vain, state.start_frames);
   if (state.depth_views) archive(*state.depth_views);
 }
 
@@ -320,13 +320,6 @@ bool PrivateState::is_sound(const ResidualNoise& noise) {
   return std::isfinite(noise.log_scale_) && std::isfinite(noise.count_) && noise.count_ >= 0.0;
 }
 
-bool PrivateState::is_sound(const FusionTurns& turns, const Camera& camera) {
-  const bool is_finite = std::all_of(turns.seen_from_.begin(), turns.seen_from_.end(),
-                                     [](const Pose& pose) { return pose.matrix().allFinite(); });
-  return is_finite && turns.turn_ >= 0 &&
-         (turns.seen_from_.empty() || turns.seen_from_.size() == FusionTurns::num_tiles(camera));
-}
-
 bool PrivateState::is_sound(const UsualContradiction& contradiction) {
   return contradiction.mean_ >= 0.0 && contradiction.mean_ <= 1.0 && contradiction.count_ >= 0.0 &&
          std::isfinite(contradiction.count_);
@@ -407,7 +400,6 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
                       (!state.depth_views || PrivateState::is_sound(*state.depth_views)),
                   "the views that calibrate depth contradict the camera");
   archive.require(PrivateState::is_sound(state.still_scene), "the still scene has another size than the camera");
-  archive.require(PrivateState::is_sound(state.turns, state.camera), "the turns of the image contradict the camera");
   archive.require(PrivateState::is_sound(state.hypothesis), "the place that is followed contradicts itself");
   archive.require(PrivateState::is_sound(state.calibration) && PrivateState::is_sound(state.confidence_noise) &&
                       PrivateState::is_sound(state.residual_noise) && PrivateState::is_sound(state.usual_contradiction),

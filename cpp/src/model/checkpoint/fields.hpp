@@ -47,7 +47,7 @@ void exchange(Archive& archive, AlignOptions& options) {
 template <class Archive>
 void exchange(Archive& archive, FusionOptions& options) {
   archive(options.support, options.max_angle, options.max_confidence, options.min_observations,
-          options.max_free_space_violations, options.turns, options.reference_sigma);
+          options.max_free_space_violations, options.reference_sigma);
 }
 
 template <class Archive>

@@ -105,11 +105,6 @@ struct PrivateState {
   }
 
   template <class Archive>
-  static void exchange(Archive& archive, FusionTurns& turns) {
-    archive(turns.seen_from_, turns.turn_);
-  }
-
-  template <class Archive>
   static void exchange(Archive& archive, FrameHistory::Chunk& chunk) {
     archive(chunk.poses, chunk.ends, chunk.bytes);
   }
@@ -160,7 +155,6 @@ struct PrivateState {
   static bool is_sound(const ConfidenceNoise& noise);
   static bool is_sound(const ResidualNoise& noise);
   static bool is_sound(const UsualContradiction& contradiction);
-  static bool is_sound(const FusionTurns& turns, const Camera& camera);
   static bool is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options);
   static bool is_sound(const PoseGraph& graph);
   static bool is_sound(const LoopClosure& loops, std::size_t num_frames);
