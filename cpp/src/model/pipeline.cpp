@@ -105,6 +105,7 @@ FrameReport Pipeline::add_straight_frame(const DepthRef& depth, const FrameExtra
       remember_view(report);
       calibrate_depth(report);
     }
+    odometry.end_frame(report.status, report.world_from_camera);
     const bool is_lost = report.status == FrameStatus::lost && history.num_registered() > 0;
     num_lost = is_lost ? num_lost + 1 : 0;
     num_vain = is_lost ? num_vain + (frame.valid.size() >= base_limits::least_points) : 0;
@@ -201,8 +202,9 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   const bool is_predicted = !was_lost() || extras.guess.has_value();
   const bool has_moved = history.num_registered() > 1 || is_trial;
   if (!extras.search) hypothesis.forget();
-  result = track_frame({guesses(extras), expectation, is_predicted, has_moved, elsewhere(region_report, extras.search)},
-                       extras.search);
+  result = track_frame(
+      {guesses(extras), expectation, is_predicted, has_moved, was_lost(), elsewhere(region_report, extras.search)},
+      extras.search);
   const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
   if (is_determined && !result.is_on_plane) {
     refine_by_outlines(result.alignment, outline, loops.outlines_near(result.alignment.target_from_source),
@@ -235,7 +237,7 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
     prior.elsewhere.beside = elsewhere.beside;
     for (double factor = noise_factor; factor <= tracking_limits::largest_noise_factor && !is_found(); factor *= 2.0) {
       set_noise_factor(factor);
-      result = track(current, target, prior, hypothesis, nearby);
+      result = track(current, target, prior, odometry, hypothesis, nearby);
     }
     prior.elsewhere = std::move(elsewhere);
     if (!is_found()) {
@@ -245,7 +247,7 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
       set_noise_factor(result.is_lost() ? known_noise_factor() : result.noise_factor);
     }
   }
-  if (result.is_lost()) result = track(current, target, prior, hypothesis, may_search ? options : nearby);
+  if (result.is_lost()) result = track(current, target, prior, odometry, hypothesis, may_search ? options : nearby);
   if (result.decision == Decision::accepted && result.expectation == Expectation::expected) {
     usual_contradiction.add(1.0 - result.consistency);
   }

@@ -49,6 +49,7 @@ struct Pipeline {
   ResidualNoise residual_noise;            // of registered frames, against what images show
   UsualContradiction usual_contradiction;  // likewise, between them and the model
   double noise_factor = 1.0;               // of the newest frame
+  FrameOdometry odometry;                  // up to the newest
   PlaceHypothesis hypothesis;              // while the camera is lost
   std::vector<ObjectView> views;           // of an object that stands on a plane, from different directions
   double spacing = 0.0;

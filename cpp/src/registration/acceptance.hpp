@@ -18,6 +18,7 @@ enum class Expectation {
   near_lost,   // near the last pose, but frames have been lost since
   beside,      // at one of several places beside the last pose
   only_near,   // of these and those near the guesses, the only one that comes near fitting
+  confirmed,   // where registration to the frame before leads, too
   unexpected,  // far from all guesses
   only_place,  // of all places, which a search has compared, the only one: see accept_best
 };

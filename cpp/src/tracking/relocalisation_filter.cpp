@@ -2,23 +2,19 @@
 
 #include <algorithm>
 
-#include "base/statistics.hpp"
 #include "camera/view_distance.hpp"
 #include "tracking/limits.hpp"
 
 namespace nacre {
-std::optional<Pose> PlaceHypothesis::predict(const IcpSource& frame, const AlignOptions& options) {
-  depth_ = median_depth(frame.cloud.points);
-  if (!place_ || !before_) return std::nullopt;
-  const IcpTarget target(AlignCloud(before_->points, before_->normals), options);
-  const IcpResult moved = align_to(target, frame, motion_, options);
-  if (!(moved.overlap >= tracking_limits::least_followed) || moved.weak_directions.cols() > 0) {
+
+std::optional<Pose> PlaceHypothesis::predict(const std::optional<Pose>& motion) {
+  if (!place_) return std::nullopt;
+  if (!motion) {
     forget();
     return std::nullopt;
   }
-  motion_ = moved.target_from_source;
-  place_->pose = place_->pose * motion_;
-  place_->followed = place_->followed * motion_;
+  place_->pose = place_->pose * *motion;
+  place_->followed = place_->followed * *motion;
   return place_->pose;
 }
 
@@ -32,7 +28,8 @@ bool PlaceHypothesis::is_confirmed_by(const TrackingResult& result) const {
          result.alignment.weak_directions.cols() == 0;
 }
 
-bool PlaceHypothesis::add(const TrackingResult& best, const IcpSource& frame) {
+bool PlaceHypothesis::add(const TrackingResult& best, double depth) {
+  depth_ = depth;
   const Pose& pose = best.alignment.target_from_source;
   const bool is_determined = best.alignment.weak_directions.cols() == 0;
   if (!is_near(best) || !is_determined) {
@@ -40,8 +37,6 @@ bool PlaceHypothesis::add(const TrackingResult& best, const IcpSource& frame) {
     if (!is_determined || !PlaceOdds::is_for(best.relocalisation_score)) return false;
     place_ = Place{pose, pose, {}, {}};
   }
-  before_ = Surface{frame.cloud.points, frame.cloud.normals};
-  depth_ = median_depth(frame.cloud.points);
   place_->pose = pose;
   double distance = 1.0;
   for (const Pose& view : place_->views) distance = std::min(distance, view_distance(view, pose, depth_));

@@ -1,6 +1,7 @@
 #include "tracking/tracking.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "camera/limits.hpp"
 #include "camera/view_distance.hpp"
@@ -24,6 +25,13 @@ TrackingResult with_open_directions_held(TrackingResult found, const Pose& guess
     found.reason += ", and where the camera was going does not tell them";
   }
   return found;
+}
+
+// A lost camera is looked for where the frames lead, before where it was last.
+void guess_where_followed(TrackingPrior& prior) {
+  if (!prior.followed || std::exchange(prior.guesses_followed, true)) return;
+  prior.guesses.insert(prior.guesses.begin(), prior.followed->world_from_camera);
+  prior.is_predicted = prior.followed->is_determined;
 }
 
 // With a narrow gate first, which is safest.
@@ -72,6 +80,24 @@ void try_beside(const FrameRegistration& registration, const PointModel& model, 
   }
 }
 
+// A place that the model alone says too little of, but to which the frame before leads, too.
+std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& registration, TrackingPrior& prior,
+                                                    const TrackingOptions& options,
+                                                    std::optional<double> usual_contradiction) {
+  if (!prior.has_moved || !prior.followed || !prior.followed->is_determined) return std::nullopt;
+  const Pose& followed = prior.followed->world_from_camera;
+  prior.tried.push_back(registration.from(followed, FrameRegistration::Gate::narrow, prior.expectation));
+  TrackingResult best;
+  for (TrackingResult place : prior.tried) {
+    const double distance = view_distance(followed, place.alignment.target_from_source, prior.depth);
+    if (distance > prior.followed->uncertainty + tracking_limits::least_new_view) continue;
+    place.expectation = Expectation::confirmed;
+    place.test(options, usual_contradiction);
+    if (place.decision == Decision::accepted) keep_better(place, best);
+  }
+  return best.is_lost() ? std::nullopt : std::optional(best);
+}
+
 // From every place where a camera has been, and around it.
 TrackingResult around_key_poses(const FrameRegistration& registration, const PointModel& model,
                                 const std::vector<Pose>& key_poses, const TrackingOptions& options) {
@@ -110,14 +136,22 @@ std::optional<TrackingResult> only_near(const TrackingPrior& prior, const Tracki
 }
 
 TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, TrackingPrior& prior,
-                     PlaceHypothesis& hypothesis, const TrackingOptions& options) {
+                     FrameOdometry& odometry, PlaceHypothesis& hypothesis, const TrackingOptions& options) {
   FrameRegistration registration(now, target, options);
   const IcpSource& source = registration.source();
+  const auto follow = [&] {
+    odometry.follow(source, now.view, now.camera, camera_limits::surface_spacings * target.spacing, options);
+    prior.followed = odometry.place();
+  };
+  odometry.look_at(source);
+  prior.depth = registration.depth();
+  if (prior.was_lost) {
+    follow();
+    guess_where_followed(prior);
+  }
+  const std::optional<Pose> followed = hypothesis.predict(odometry.motion());
   TrackingResult best;
   best.alignment.target_from_source = prior.guesses.front();
-  const std::optional<Pose> followed = hypothesis.predict(source, options.registration);
-
-  prior.depth = registration.depth();
   try_guesses(registration, prior, best);
   if (best.is_lost() && target.oldest_frame > 0) {
     registration.include_older_points();
@@ -131,23 +165,32 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     }
   }
   if (!best.is_lost()) return best;
+  follow();
+  if (const auto confirmed = confirmed_by_odometry(registration, prior, options, target.usual_contradiction)) {
+    return *confirmed;
+  }
 
   registration.include_older_points();
   const RelocalisationPlaces& places = prior.elsewhere;
   if (const auto turned = turned_on_plane(target, now, places, options)) return *turned;
+  const auto keep_if_possible = [&](TrackingResult found) {
+    if (odometry.allows(found.alignment.target_from_source)) keep_better(found, best);
+  };
   if (followed) {
-    keep_better(registration.from(*followed, FrameRegistration::Gate::narrow, Expectation::unexpected), best);
+    keep_if_possible(registration.from(*followed, FrameRegistration::Gate::narrow, Expectation::unexpected));
   }
   const bool goes_on = followed && hypothesis.is_confirmed_by(best);
   if (!goes_on && places.key_poses) {
-    keep_better(around_key_poses(registration, target.model, places.key_poses(), options), best);
+    keep_if_possible(around_key_poses(registration, target.model, places.key_poses(), options));
   }
   if (best.is_lost() && !goes_on && places.everywhere) {
     const std::optional<Pose> pose = fit_anywhere(target.model, source, options.registration);
-    if (pose) keep_better(registration.from(*pose, FrameRegistration::Gate::narrow, Expectation::unexpected), best);
+    if (pose) {
+      keep_if_possible(registration.from(*pose, FrameRegistration::Gate::narrow, Expectation::unexpected));
+    }
   }
   best.is_to_whole_model = true;
-  if (best.is_lost() && options.relocalise && options.verify && hypothesis.add(best, source)) {
+  if (best.is_lost() && options.relocalise && options.verify && hypothesis.add(best, prior.depth)) {
     best.decision = Decision::accepted;
     best.reason.clear();
   }

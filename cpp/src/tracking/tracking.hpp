@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "tracking/frame_odometry.hpp"
 #include "tracking/frame_registration.hpp"
 #include "tracking/object_view.hpp"
 #include "tracking/relocalisation_filter.hpp"
@@ -26,10 +27,13 @@ struct TrackingPrior {
   Expectation expectation;    // of the guesses
   bool is_predicted;          // the first guess is where the camera was going, or was given
   bool has_moved;             // two frames or more are registered: it is a recording, not a pair of images
+  bool was_lost;              // at the frame before
   RelocalisationPlaces elsewhere;
-  std::optional<std::vector<Pose>> beside = std::nullopt;  // the places beside the last guess, once they are known
-  std::vector<TrackingResult> tried = {};                  // what was found from the guesses and beside them
-  double depth = 1.0;                                      // of the frame, the median [m]
+  std::optional<std::vector<Pose>> beside = std::nullopt;       // the places beside the last guess, once they are known
+  std::vector<TrackingResult> tried = {};                       // what was found from the guesses and beside them
+  std::optional<FrameOdometry::Place> followed = std::nullopt;  // where the frames lead, once it is asked for
+  bool guesses_followed = false;                                // it is among the guesses
+  double depth = 1.0;                                           // of the frame, the median [m]
 };
 
 // Of all places near the guesses that were tried, none of which was believed alone, the one that fits best: where no
@@ -38,8 +42,9 @@ std::optional<TrackingResult> only_near(const TrackingPrior& prior, const Tracki
                                         std::optional<double> usual_contradiction);
 
 // Tries the guesses until one registers the frame; when none does, searches elsewhere. Where no single registration is
-// convincing, `hypothesis` may become so over several frames.
+// convincing, that to the frame before may confirm it, or `hypothesis` may become so over several frames. Nowhere is
+// the camera believed to be where the frames since it was lost cannot lead.
 TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, TrackingPrior& prior,
-                     PlaceHypothesis& hypothesis, const TrackingOptions& options);
+                     FrameOdometry& odometry, PlaceHypothesis& hypothesis, const TrackingOptions& options);
 
 }  // namespace nacre

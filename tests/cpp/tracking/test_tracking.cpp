@@ -21,7 +21,7 @@ TrackingResult found_at(double angle, double overlap) {
 }
 
 TrackingPrior with_tried(std::vector<TrackingResult> tried) {
-  TrackingPrior prior{{Pose::Identity()}, Expectation::expected, true, true, {}};
+  TrackingPrior prior{{Pose::Identity()}, Expectation::expected, true, true, false, {}};
   prior.elsewhere.beside = true;
   prior.tried = std::move(tried);
   return prior;

@@ -112,8 +112,8 @@ template <class Archive>
 void exchange_state(Archive& archive, Pipeline& state) {
   archive(state.options.fusion.reference_sigma, state.options.depth.tilt, state.depth_view_frames, state.region,
           state.calibration, state.confidence_noise, state.residual_noise, state.usual_contradiction, state.cloud,
-          state.loops, state.history, state.before, state.still_scene, state.hypothesis, state.views, state.spacing,
-          state.num_lost, state.num_vain, state.start_frames);
+          state.loops, state.history, state.before, state.still_scene, state.odometry, state.hypothesis, state.views,
+          state.spacing, state.num_lost, state.num_vain, state.start_frames);
   if (state.depth_views) archive(*state.depth_views);
 }
 
@@ -280,9 +280,11 @@ bool PrivateState::is_sound(const StillScene& scene) {
          (scene.moved_.empty() || static_cast<Eigen::Index>(scene.moved_.size()) == num_cells);
 }
 
-bool PrivateState::is_sound(const PlaceHypothesis& hypothesis) {
-  return !hypothesis.before_ || hypothesis.before_->normals.rows() == 0 ||
-         hypothesis.before_->normals.rows() == hypothesis.before_->points.rows();
+bool PrivateState::is_sound(const FrameOdometry& odometry) {
+  const auto& before = odometry.before_;
+  const bool has_normals = !before || before->normals.rows() == 0 || before->normals.rows() == before->points.rows();
+  return has_normals && odometry.largest_step_ >= 0.0 && std::isfinite(odometry.largest_step_) &&
+         (!odometry.path_ || odometry.path_->uncertainty >= 0.0);
 }
 
 bool PrivateState::is_sound(const NoiseCalibration& calibration) {
@@ -400,7 +402,7 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
                       (!state.depth_views || PrivateState::is_sound(*state.depth_views)),
                   "the views that calibrate depth contradict the camera");
   archive.require(PrivateState::is_sound(state.still_scene), "the still scene has another size than the camera");
-  archive.require(PrivateState::is_sound(state.hypothesis), "the place that is followed contradicts itself");
+  archive.require(PrivateState::is_sound(state.odometry), "the frame before contradicts itself");
   archive.require(PrivateState::is_sound(state.calibration) && PrivateState::is_sound(state.confidence_noise) &&
                       PrivateState::is_sound(state.residual_noise) && PrivateState::is_sound(state.usual_contradiction),
                   "the noise is not finite");

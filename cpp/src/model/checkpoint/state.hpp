@@ -136,12 +136,21 @@ struct PrivateState {
     archive(place.pose, place.followed, place.views, place.odds);
   }
   template <class Archive>
-  static void exchange(Archive& archive, PlaceHypothesis::Surface& surface) {
+  static void exchange(Archive& archive, PlaceHypothesis& hypothesis) {
+    archive(hypothesis.place_, hypothesis.depth_);
+  }
+
+  template <class Archive>
+  static void exchange(Archive& archive, FrameOdometry::Surface& surface) {
     archive(surface.points, surface.normals);
   }
   template <class Archive>
-  static void exchange(Archive& archive, PlaceHypothesis& hypothesis) {
-    archive(hypothesis.place_, hypothesis.before_, hypothesis.motion_, hypothesis.depth_);
+  static void exchange(Archive& archive, FrameOdometry::Path& path) {
+    archive(path.world_from_camera, path.uncertainty);
+  }
+  template <class Archive>
+  static void exchange(Archive& archive, FrameOdometry& odometry) {
+    archive(odometry.before_, odometry.path_, odometry.is_tracked_, odometry.motion_, odometry.largest_step_);
   }
 
   template <class Archive>
@@ -158,7 +167,7 @@ struct PrivateState {
   static bool is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options);
   static bool is_sound(const PoseGraph& graph);
   static bool is_sound(const LoopClosure& loops, std::size_t num_frames);
-  static bool is_sound(const PlaceHypothesis& hypothesis);
+  static bool is_sound(const FrameOdometry& odometry);
   static bool is_sound(const StillScene& scene);
 };
 

@@ -1,0 +1,139 @@
+#include "base/point_rows.hpp"
+#include "base/se3.hpp"
+#include "camera/view_distance.hpp"
+#include "depth_images.hpp"
+#include "doctest/doctest.h"
+#include "tracking/frame_odometry.hpp"
+#include "tracking/limits.hpp"
+
+using namespace nacre;
+using namespace nacre_test;
+
+namespace {
+
+using Relief = double (*)(double x, double y);  // z [m] of a surface, in the world
+
+double hills(double x, double y) { return 1.0 + 0.06 * std::sin(7.0 * x + 1.0) * std::cos(9.0 * y) + 0.05 * x * y; }
+double wall(double, double) { return 1.0; }
+
+// A camera that goes to the right by some centimetres a step, and turns a little.
+Pose camera_at(int step, double shift = 0.03) {
+  Pose pose = Pose::Identity();
+  pose.linear() = Eigen::AngleAxisd(0.01 * step, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  pose.translation().x() = shift * step;
+  return pose;
+}
+
+DepthImage seen_from(const Pose& world_from_camera, Relief relief) {
+  DepthImage depth(height, width);
+  for (Eigen::Index i = 0; i < depth.size(); ++i) {
+    const Ray ray = ray_of(pinhole, i);
+    const Eigen::Vector3d along =
+        world_from_camera.linear() * Eigen::Vector3d(ray.direction_x, ray.direction_y, ray.direction_z);
+    const Eigen::Vector3d& origin = world_from_camera.translation();
+    double z = 1.0;
+    for (int k = 0; k < 50; ++k) {
+      const Eigen::Vector3d p = origin + z * along;
+      z = (relief(p.x(), p.y()) - origin.z()) / along.z();
+    }
+    depth.data()[i] = static_cast<float>(z);
+  }
+  return depth;
+}
+
+struct Camcorder {
+  FrameOdometry odometry;
+
+  void see(const Pose& world_from_camera, Relief relief) {
+    const Frame frame = make_frame(seen_from(world_from_camera, relief), pinhole, NoiseModel{0.001, 0.0});
+    const TrackingOptions options;
+    const Points points = take_rows<Points>(frame.points, frame.valid);
+    const Points normals = take_rows<Points>(frame.normals, frame.valid);
+    const IcpSource source(AlignCloud(points, normals), options.registration);
+    odometry.look_at(source);
+    odometry.follow(source, {frame.points.col(2), frame.sigma}, pinhole, 0.01, options);
+  }
+  void see_and_register(int step, Relief relief, FrameStatus status = FrameStatus::tracked) {
+    see(camera_at(step), relief);
+    odometry.end_frame(status, camera_at(step));
+  }
+  void lose() { odometry.end_frame(FrameStatus::lost, Pose::Identity()); }
+};
+
+}  // namespace
+
+TEST_CASE("a lost camera is followed from where it was registered, and is less sure with every frame") {
+  Camcorder camera;
+  camera.see_and_register(0, hills);
+  camera.see_and_register(1, hills);
+  double uncertainty = 0.0;
+  for (int step = 2; step < 6; ++step) {
+    CAPTURE(step);
+    camera.see(camera_at(step), hills);
+    const auto place = camera.odometry.place();
+    REQUIRE(place.has_value());
+    CHECK(place->is_determined);
+    CHECK(view_distance(place->world_from_camera, camera_at(step), 1.0) < 0.05);
+    const double distance = view_distance(camera_at(step - 1), camera_at(step), 1.0);
+    CHECK(place->uncertainty - uncertainty ==
+          doctest::Approx(tracking_limits::odometry_error * distance).epsilon(0.05));
+    uncertainty = place->uncertainty;
+    camera.lose();
+  }
+  CHECK(camera.odometry.place() == std::nullopt);  // of the next frame nothing is known yet
+}
+
+TEST_CASE("it can have come to what is near, and not to what is far") {
+  Camcorder camera;
+  camera.see_and_register(0, hills);
+  CHECK(camera.odometry.allows(camera_at(100)));  // before anything is followed it may be anywhere
+  camera.see(camera_at(1), hills);
+  CHECK(camera.odometry.allows(camera_at(1)));
+  CHECK(camera.odometry.allows(camera_at(4)));
+  CHECK_FALSE(camera.odometry.allows(camera_at(10)));
+  Pose half_turn = camera_at(1);
+  half_turn.linear() = Eigen::AngleAxisd(pi, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  CHECK_FALSE(camera.odometry.allows(half_turn));
+}
+
+TEST_CASE("along a wall it may have gone as far as it ever went in a frame, and no motion is told") {
+  Camcorder camera;
+  camera.see_and_register(0, hills);
+  camera.see_and_register(3, hills);  // 0.09 m
+  camera.see_and_register(3, wall);
+  camera.see(camera_at(3), wall);
+  const auto place = camera.odometry.place();
+  REQUIRE(place.has_value());
+  CHECK_FALSE(place->is_determined);
+  CHECK_FALSE(camera.odometry.motion().has_value());
+  CHECK(place->uncertainty == doctest::Approx(view_distance(camera_at(0), camera_at(3), 1.0)).epsilon(0.05));
+}
+
+TEST_CASE("where directions were open when it was registered, it is unsure from the start") {
+  Camcorder camera;
+  camera.see_and_register(0, hills);
+  camera.see_and_register(1, hills);
+  camera.see_and_register(2, hills, FrameStatus::weak);
+  camera.see(camera_at(3), hills);
+  const double step = view_distance(camera_at(1), camera_at(2), 1.0);
+  REQUIRE(camera.odometry.place().has_value());
+  CHECK(camera.odometry.place()->uncertainty ==
+        doctest::Approx((1.0 + tracking_limits::odometry_error) * step).epsilon(0.05));
+  camera.odometry.end_frame(FrameStatus::tracked, camera_at(3));
+  camera.see(camera_at(4), hills);
+  CHECK(camera.odometry.place()->uncertainty < step);
+}
+
+TEST_CASE("after a frame that shows nothing, or something else, it may be anywhere") {
+  Camcorder nothing, other;
+  nothing.see_and_register(0, hills);
+  nothing.lose();
+  nothing.see(camera_at(1), hills);
+  CHECK_FALSE(nothing.odometry.place().has_value());
+  CHECK(nothing.odometry.allows(camera_at(100)));
+
+  other.see_and_register(0, hills);
+  other.see(camera_at(0), [](double x, double y) { return 2.5 + 0.5 * std::sin(20.0 * x) * std::sin(15.0 * y); });
+  CHECK_FALSE(other.odometry.place().has_value());
+  CHECK_FALSE(other.odometry.motion().has_value());
+}
