@@ -6,6 +6,7 @@
 #include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "base/statistics.hpp"
+#include "camera/ray_table.hpp"
 #include "depth/depth_view.hpp"
 #include "fusion/limits.hpp"
 
@@ -118,17 +119,24 @@ void SurfaceObserver::add(ObservationBlock& block, const Eigen::Vector3f& point,
   block.ray_y_[i] = ray.y();
   block.ray_z_[i] = ray.z();
   block.sigma_[i] = sigma;
-  block.u_[i] = pixel % width_;
-  block.v_[i] = pixel / width_;
   block.radius_[i] = radius;
   block.largest_offset_[i] = std::max(radius, base_limits::noise_sigmas * sigma);
   block.spacing_[i] = spacing;
-  constexpr auto largest = static_cast<float>(simd::largest_window);
-  block.window_[i] = static_cast<int>(std::ceil(std::min(largest, std::max(1.0F, reach / footprint))));
+  constexpr auto least = static_cast<float>(simd::paired_window), largest = static_cast<float>(simd::largest_window);
+  const int window = static_cast<int>(std::ceil(std::clamp(reach / footprint, least, largest)));
+  // As many pixels on each side of the point, which is beside the middle of its own.
+  const int u = pixel % width_, v = pixel / width_;
+  const simd::RayRow rays = camera_.ray_table().row(v);
+  const float ray_y = rays.y ? rays.y[u] : rays.row_y, depth = point.z() / rays.z[u];
+  const bool is_left = point.x() < rays.origin_x[u] + depth * rays.x[u];
+  const bool is_above = point.y() < rays.origin_y + depth * ray_y;
+  block.first_u_[i] = u - window + (is_left ? 0 : 1);
+  block.first_v_[i] = v - window + (is_above ? 0 : 1);
+  block.window_[i] = window;
 }
 
 PixelWindow ObservationBlock::cover(int i) const {
-  PixelWindow window{u_[i] - window_[i], v_[i] - window_[i], 2 * window_[i] + 1, {}};
+  PixelWindow window{first_u_[i], first_v_[i], 2 * window_[i], {}};
   std::copy_n(cover_rows_ + PixelWindow::size * i, window.num_rows, window.rows);
   return window;
 }
@@ -165,7 +173,7 @@ void SurfaceObserver::observe(ObservationBlock& b, const simd::SurfaceImage& ima
   }
   simd::observe_windows()(image,
                           {b.count_, b.x_, b.y_, b.z_, b.normal_x_, b.normal_y_, b.normal_z_, b.ray_x_, b.ray_y_,
-                           b.ray_z_, b.u_, b.v_, b.window_, b.radius_, b.largest_offset_},
+                           b.ray_z_, b.first_u_, b.first_v_, b.window_, b.radius_, b.largest_offset_},
                           least_cosine_,
                           {b.weight_, b.offset_, b.seen_normal_x_, b.seen_normal_y_, b.seen_normal_z_, channels[0],
                            channels[1], channels[2]},

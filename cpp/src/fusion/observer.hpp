@@ -19,7 +19,7 @@ struct Observation {
 
 // Some of the pixels around one.
 struct PixelWindow {
-  static constexpr int size = 2 * simd::largest_window + 1;
+  static constexpr int size = 2 * simd::largest_window;
   std::int32_t first_u, first_v;  // may lie outside of the image
   int num_rows;
   std::uint16_t rows[size];  // bit b: the pixel b to the right of first_u
@@ -51,7 +51,7 @@ class ObservationBlock {
   int count_ = 0;
   Column<float> x_, y_, z_, normal_x_, normal_y_, normal_z_, ray_x_, ray_y_, ray_z_, sigma_, spacing_, radius_,
       largest_offset_;
-  Column<std::int32_t> u_, v_, window_;
+  Column<std::int32_t> first_u_, first_v_, window_;  // as of simd::WindowQueries
   Column<float> cover_offset_;
   std::uint16_t cover_rows_[capacity * PixelWindow::size];
   Column<float> weight_, offset_, seen_normal_x_, seen_normal_y_, seen_normal_z_, red_, green_, blue_;

@@ -1,5 +1,6 @@
-// Each row of a window is one vector of 16 lanes, or the part of it that the window fills; sums are kept lane by lane,
-// so that every instruction set gives the same bits. About 45 operations a row.
+// Two rows of a window of eight pixels are a vector of 16 lanes, or one row of a wider one, or the part of it that the
+// window fills; sums are kept lane by lane, so that every instruction set gives the same bits. About 45 operations a
+// vector.
 #include "simd/fusion_window.hpp"
 
 #include "simd/vec.hpp"
@@ -24,13 +25,31 @@ struct Sums {
   F32 red[with_colors ? parts : 1], green[with_colors ? parts : 1], blue[with_colors ? parts : 1];
 };
 
+// Pixels of a window, a lane each: of one row,
+struct OneRow {
+  int64_t start;
+  Mask in_window;
+
+  NACRE_INLINE F32 operator()(const float* plane) const { return load(plane + start); }
+  NACRE_INLINE Mask within(Mask pixels) const { return pixels & in_window; }
+};
+
+// or part of two rows of eight.
+struct TwoRows {
+  int64_t start, stride;
+  int part;
+
+  NACRE_INLINE F32 operator()(const float* plane) const { return load_halves(plane + start, stride, part); }
+  NACRE_INLINE Mask within(Mask pixels) const { return pixels; }
+};
+
 // Returns which pixels show the point's own surface.
-template <bool with_colors>
-NACRE_INLINE unsigned add_pixels(const SurfaceImage& image, int64_t start, Mask in_window, const Point& p,
-                                 const Cover& cover, int part, Sums<with_colors>& sums) {
-  const F32 dx = load(image.x + start) - p.x, dy = load(image.y + start) - p.y, dz = load(image.z + start) - p.z;
-  const F32 nx = load(image.normal_x + start), ny = load(image.normal_y + start), nz = load(image.normal_z + start);
-  const F32 pixel_weight = load(image.weight + start);
+template <bool with_colors, class Pixels>
+NACRE_INLINE Mask add_pixels(const SurfaceImage& image, const Pixels& of, const Point& p, const Cover& cover, int part,
+                             Sums<with_colors>& sums) {
+  const F32 dx = of(image.x) - p.x, dy = of(image.y) - p.y, dz = of(image.z) - p.z;
+  const F32 nx = of(image.normal_x), ny = of(image.normal_y), nz = of(image.normal_z);
+  const F32 pixel_weight = of(image.weight);
 
   const F32 along = dx * p.normal_x + dy * p.normal_y + dz * p.normal_z;
   // Where the pixel's ray meets the tangent plane, from the point: the pixel's own noise has no part in its weight.
@@ -38,7 +57,7 @@ NACRE_INLINE unsigned add_pixels(const SurfaceImage& image, int64_t start, Mask 
   const F32 squared_across = across_x * across_x + across_y * across_y + across_z * across_z;
   const F32 cosine = nx * p.normal_x + ny * p.normal_y + nz * p.normal_z;
   const F32 offset = abs(along);
-  const Mask measured = in_window & (pixel_weight > broadcast(0.0F));
+  const Mask measured = of.within(pixel_weight > broadcast(0.0F));
   const Mask counts =
       measured & (squared_across < p.squared_radius) & (offset < p.largest_offset) & (cosine > p.least_cosine);
 
@@ -50,12 +69,12 @@ NACRE_INLINE unsigned add_pixels(const SurfaceImage& image, int64_t start, Mask 
   sums.normal_y[part] += w * ny;
   sums.normal_z[part] += w * nz;
   if constexpr (with_colors) {
-    sums.red[part] += w * load(image.red + start);
-    sums.green[part] += w * load(image.green + start);
-    sums.blue[part] += w * load(image.blue + start);
+    sums.red[part] += w * of(image.red);
+    sums.green[part] += w * of(image.green);
+    sums.blue[part] += w * of(image.blue);
   }
-  return bits(measured & (squared_across < cover.squared_spacing) & (offset < cover.largest_offset) &
-              (cosine > cover.least_cosine));
+  return measured & (squared_across < cover.squared_spacing) & (offset < cover.largest_offset) &
+         (cosine > cover.least_cosine);
 }
 
 template <bool with_colors>
@@ -74,15 +93,30 @@ void observe(const SurfaceImage& image, const WindowQueries& queries, float leas
                          broadcast(asked ? asked->least_cosine : 0.0F)};
     Sums<with_colors> sums;
     memset(static_cast<void*>(&sums), 0, sizeof sums);
-    const int window = queries.window[i], width = 2 * window + 1;
-    const int64_t first = (queries.pixel_v[i] - window) * image.stride + queries.pixel_u[i] - window;
-    for (int row = 0; row < width; ++row) {
-      unsigned covered = 0;
-      for (int part = 0; part < parts && part * lanes < width; ++part) {
-        const int64_t start = first + row * image.stride + part * lanes;
-        covered |= add_pixels(image, start, first_lanes(width - part * lanes), p, cover, part, sums) << (part * lanes);
+    const int width = 2 * queries.window[i];
+    const int64_t first = queries.first_v[i] * image.stride + queries.first_u[i];
+    uint16_t* const rows = asked ? asked->rows + 2 * largest_window * i : nullptr;
+    if (width == 8) {
+      for (int row = 0; row < width; row += 2) {
+        unsigned covered = 0;
+        for (int part = 0; part < parts; ++part) {
+          const TwoRows pixels = {first + row * image.stride, image.stride, part};
+          covered |= bits(add_pixels(image, pixels, p, cover, part, sums)) << (part * lanes);
+        }
+        if (asked) {
+          rows[row] = static_cast<uint16_t>(covered & 255U);
+          rows[row + 1] = static_cast<uint16_t>(covered >> 8U);
+        }
       }
-      if (asked) asked->rows[(2 * largest_window + 1) * i + row] = static_cast<uint16_t>(covered);
+    } else {
+      for (int row = 0; row < width; ++row) {
+        unsigned covered = 0;
+        for (int part = 0; part < parts && part * lanes < width; ++part) {
+          const OneRow pixels = {first + row * image.stride + part * lanes, first_lanes(width - part * lanes)};
+          covered |= bits(add_pixels(image, pixels, p, cover, part, sums)) << (part * lanes);
+        }
+        if (asked) rows[row] = static_cast<uint16_t>(covered);
+      }
     }
     const float weight = sum_lanes(sums.weight);
     const float scale = weight > 0.0F ? 1.0F / weight : 0.0F;

@@ -9,6 +9,7 @@
 namespace nacre::simd {
 
 constexpr int largest_window = 7;  // pixels on each side of a point: a row is at most 16 lanes
+constexpr int paired_window = 4;   // least, where two rows are 16
 
 // Planes of one row stride, from pixel (0, 0) on. Around the image is a border of zeros that windows may reach into:
 // largest_window rows above and below, as many pixels to the left, and 25 to the right.
@@ -47,8 +48,8 @@ struct WindowQueries {
   int count;
   const float *x, *y, *z, *normal_x, *normal_y, *normal_z;
   const float *ray_x, *ray_y, *ray_z;  // along the ray through the point, as far as takes it 1 along its normal
-  const int32_t *pixel_u, *pixel_v;    // inside the image
-  const int32_t* window;               // 1 to largest_window
+  const int32_t *first_u, *first_v;    // the first pixel of the window, which may lie in the border
+  const int32_t* window;               // paired_window to largest_window: half of its rows, and of its columns
   const float* radius;                 // of the support, along the surface [m]
   const float* largest_offset;         // along the normal [m]
 };
@@ -59,8 +60,8 @@ struct WindowSums {
   float *red, *green, *blue;              // divided by the weight; null without colours
 };
 
-// Which pixels of each window show the point's own surface: bit b of rows[9 i + r] is the pixel b to the right of the
-// window's left edge in its row r. Null where nobody asks.
+// Which pixels of each window show the point's own surface: bit b of rows[2 largest_window i + r] is the pixel b to the
+// right of the window's left edge in its row r. Null where nobody asks.
 struct WindowCover {
   const float* spacing;         // along the surface [m]
   const float* largest_offset;  // along the normal [m]

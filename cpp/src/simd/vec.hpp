@@ -534,6 +534,16 @@ NACRE_INLINE F32 inverse_sqrt(F32 a) {
 NACRE_INLINE bool all(Mask a) { return bits(a) == (1U << lanes) - 1U; }
 NACRE_INLINE bool any(Mask a) { return bits(a) != 0; }
 
+// Of 16 values, 8 from p and the 8 that are a stride farther: those of one part.
+NACRE_INLINE F32 load_halves(const float* p, ptrdiff_t stride, [[maybe_unused]] int part) {
+#if defined(__AVX512F__) && defined(__AVX512VL__)
+  const __m512d first = _mm512_castps_pd(_mm512_castps256_ps512(_mm256_loadu_ps(p)));
+  return {_mm512_castpd_ps(_mm512_insertf64x4(first, _mm256_castps_pd(_mm256_loadu_ps(p + stride)), 1))};
+#else
+  return load(p + (part * lanes < 8 ? part * lanes : stride + part * lanes - 8));
+#endif
+}
+
 // The sum of 16 values in a fixed order, whatever the number of lanes: i with i + 8, then i with i + 4, 2 and 1.
 NACRE_INLINE float sum_lanes(const F32 (&v)[16 / lanes]) {
 #if defined(__AVX512F__) && defined(__AVX512VL__)
