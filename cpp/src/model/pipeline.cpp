@@ -105,7 +105,7 @@ FrameReport Pipeline::add_straight_frame(const DepthRef& depth, const FrameExtra
       remember_view(report);
       calibrate_depth(report);
     }
-    odometry.end_frame(report.status, report.world_from_camera);
+    odometry.end_frame(report.status, report.world_from_camera, report.weak_directions);
     const bool is_lost = report.status == FrameStatus::lost && history.num_registered() > 0;
     num_lost = is_lost ? num_lost + 1 : 0;
     num_vain = is_lost ? num_vain + (frame.valid.size() >= base_limits::least_points) : 0;

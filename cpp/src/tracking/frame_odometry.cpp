@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "camera/limits.hpp"
 #include "camera/view_distance.hpp"
 #include "registration/acceptance.hpp"
 #include "registration/icp.hpp"
@@ -24,30 +25,61 @@ void FrameOdometry::follow(const IcpSource& frame, const DepthView& view, const 
   const double consistency =
       compare(before_->points, before_->normals, view, moved.target_from_source, camera, {margin}, options.num_threads)
           .consistency(tracking_limits::least_judged);
-  const Acceptance acceptance = accept(moved, consistency, Expectation::expected, {options.min_score, true, {}});
-  if (acceptance.decision == Decision::rejected) return;
-  const double distance = view_distance(Pose::Identity(), moved.target_from_source, depth_);
-  const bool is_determined = moved.weak_directions.cols() == 0;
-  step_ = Step{moved.target_from_source,
-               is_determined ? tracking_limits::odometry_error * distance : std::max(distance, largest_step_),
-               is_determined};
+  const auto is_believed = [&](Expectation expectation) {
+    return accept(moved, consistency, expectation, {options.min_score, true, {}}).decision != Decision::rejected;
+  };
+  if (is_believed(Expectation::expected)) {
+    step_ = Step{moved.target_from_source, moved.weak_directions};
+  } else if (is_believed(Expectation::confirmed)) {  // near there, but no direction is sure
+    step_ = Step{moved.target_from_source, Matrix6::Identity()};
+  }
+}
+
+void FrameOdometry::Uncertainty::add(double step, const WeakDirections& open, const Eigen::Matrix3d& rotation) {
+  const double error = tracking_limits::odometry_error * step;
+  shift += open.cols() > 0 ? step : error;
+  turn.diagonal().array() += error;
+  for (Eigen::Index i = 0; i < open.cols(); ++i) {
+    const Eigen::Vector3d axis = rotation * open.col(i).head<3>();
+    turn += step * axis * axis.transpose();
+  }
+}
+
+double FrameOdometry::reach(const Pose& motion) const {
+  return std::max(largest_step_, view_distance(Pose::Identity(), motion, depth_));
+}
+
+FrameOdometry::Uncertainty FrameOdometry::uncertainty() const {
+  Uncertainty sum = path_->uncertainty;
+  const bool is_open = step_->weak_directions.cols() > 0;
+  const double distance = is_open ? reach(step_->motion) : view_distance(Pose::Identity(), step_->motion, depth_);
+  sum.add(distance, step_->weak_directions, path_->world_from_camera.linear());
+  return sum;
 }
 
 std::optional<FrameOdometry::Place> FrameOdometry::place() const {
   if (!path_ || !step_) return std::nullopt;
-  return Place{path_->world_from_camera * step_->motion, path_->uncertainty + step_->uncertainty, step_->is_determined};
+  return Place{path_->world_from_camera * step_->motion, step_->weak_directions.cols() == 0};
 }
 
 std::optional<Pose> FrameOdometry::motion() const {
-  return step_ && step_->is_determined ? std::optional(step_->motion) : std::nullopt;
+  return step_ && step_->weak_directions.cols() == 0 ? std::optional(step_->motion) : std::nullopt;
 }
 
-bool FrameOdometry::allows(const Pose& world_from_camera) const {
+bool FrameOdometry::allows(const Pose& world_from_camera, double margin) const {
   const std::optional<Place> here = place();
-  return !here || view_distance(here->world_from_camera, world_from_camera, depth_) <= 1.0 + here->uncertainty;
+  if (!here) return true;
+  const Uncertainty most = uncertainty();
+  const Eigen::AngleAxisd turn(world_from_camera.linear() * here->world_from_camera.linear().transpose());
+  const double shift = (world_from_camera.translation() - here->world_from_camera.translation()).norm();
+  return std::abs(turn.angle()) <= camera_limits::view_turn * (margin + turn.axis().dot(most.turn * turn.axis())) &&
+         shift <= camera_limits::view_shift * depth_ * (margin + most.shift);
 }
 
-void FrameOdometry::end_frame(FrameStatus status, const Pose& world_from_camera) {
+void FrameOdometry::end_frame(FrameStatus status, const Pose& world_from_camera,
+                              const WeakDirections& weak_directions) {
+  std::optional<Path> followed;
+  if (const auto here = place()) followed = Path{here->world_from_camera, uncertainty()};
   const std::optional<Path> last = std::exchange(path_, std::nullopt);
   const std::optional<Step> step = std::exchange(step_, std::nullopt);
   const bool was_tracked = std::exchange(is_tracked_, false);
@@ -58,17 +90,19 @@ void FrameOdometry::end_frame(FrameStatus status, const Pose& world_from_camera)
   if (status == FrameStatus::lost) {
     if (!step) return;
     motion_ = step->motion;
-    if (last) path_ = Path{last->world_from_camera * motion_, last->uncertainty + step->uncertainty};
+    path_ = followed;
     return;
   }
   is_tracked_ = status != FrameStatus::weak;
-  path_ = Path{world_from_camera, 0.0};
+  path_ = Path{world_from_camera, {}};
   if (!last || status == FrameStatus::relocalised) return;
   motion_ = last->world_from_camera.inverse() * world_from_camera;
-  const double distance = view_distance(Pose::Identity(), motion_, depth_);
-  // Where directions are open the pose goes on as before, and is wrong by what that changes.
-  if (!is_tracked_) path_->uncertainty = last->uncertainty + std::max(distance, largest_step_);
-  if (was_tracked && is_tracked_) largest_step_ = std::max(largest_step_, distance);
+  if (!is_tracked_) {  // where directions are open the pose goes on as before, and is wrong by what that changes
+    path_->uncertainty = last->uncertainty;
+    path_->uncertainty.add(reach(motion_), weak_directions, Eigen::Matrix3d::Identity());
+  } else if (was_tracked) {
+    largest_step_ = reach(motion_);
+  }
 }
 
 }  // namespace nacre

@@ -13,10 +13,11 @@ namespace nacre {
 
 class FrameOdometry {
  public:
+  using WeakDirections = Eigen::Matrix<double, 6, Eigen::Dynamic>;
+
   // Where the frames lead.
   struct Place {
     Pose world_from_camera;
-    double uncertainty;  // how far from there the camera may be, in view distances
     bool is_determined;  // the last step left no direction open
   };
 
@@ -25,30 +26,40 @@ class FrameOdometry {
   // Registers the newest frame to the one before, once. margin: across a surface [m].
   void follow(const IcpSource& frame, const DepthView& view, const Camera& camera, double margin,
               const TrackingOptions& options);
-  // The newest frame is done with: it is registered there, or lost.
-  void end_frame(FrameStatus status, const Pose& world_from_camera);
+  // The newest frame is done with: it is registered there, or lost. weak_directions: as AlignResult has them.
+  void end_frame(FrameStatus status, const Pose& world_from_camera, const WeakDirections& weak_directions);
 
   // Of the newest frame; none where the frames since the camera was last registered could not be followed.
   std::optional<Place> place() const;
   // The newest frame's motion, camera before from camera now; none where it is not determined.
   std::optional<Pose> motion() const;
-  // Whether the camera can have come to a place.
-  bool allows(const Pose& world_from_camera) const;
+  // Whether the camera can have come to a place, as far as frames and a margin tell, in view distances.
+  bool allows(const Pose& world_from_camera, double margin = 1.0) const;
 
  private:
   friend struct PrivateState;
   struct Surface {
     Points points, normals;  // camera frame
   };
+  // How far a camera may be from where it is thought to be, in view distances: its turns about each axis of the world,
+  // or of the frame before, add up apart, since a wall that leaves shifts open still tells which way the camera looks.
+  struct Uncertainty {
+    double shift = 0.0;
+    Eigen::Matrix3d turn = Eigen::Matrix3d::Zero();
+
+    void add(double step, const WeakDirections& open, const Eigen::Matrix3d& rotation);
+  };
   struct Path {
     Pose world_from_camera;
-    double uncertainty;
+    Uncertainty uncertainty;
   };
   struct Step {
     Pose motion;
-    double uncertainty;
-    bool is_determined;
+    WeakDirections weak_directions;
   };
+  Uncertainty uncertainty() const;  // of the newest frame's place
+  // Of a motion, as long as it is, or as ever between tracked frames where directions are open.
+  double reach(const Pose& motion) const;
 
   std::optional<Surface> before_;   // the frame before
   std::optional<Path> path_;        // up to it

@@ -81,7 +81,8 @@ void try_beside(const FrameRegistration& registration, const PointModel& model, 
 }
 
 // A place that the model alone says too little of, but to which the frame before leads, too.
-std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& registration, TrackingPrior& prior,
+std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& registration,
+                                                    const FrameOdometry& odometry, TrackingPrior& prior,
                                                     const TrackingOptions& options,
                                                     std::optional<double> usual_contradiction) {
   if (!prior.has_moved || !prior.followed || !prior.followed->is_determined) return std::nullopt;
@@ -89,8 +90,7 @@ std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& reg
   prior.tried.push_back(registration.from(followed, FrameRegistration::Gate::narrow, prior.expectation));
   TrackingResult best;
   for (TrackingResult place : prior.tried) {
-    const double distance = view_distance(followed, place.alignment.target_from_source, prior.depth);
-    if (distance > prior.followed->uncertainty + tracking_limits::least_new_view) continue;
+    if (!odometry.allows(place.alignment.target_from_source, tracking_limits::least_new_view)) continue;
     place.expectation = Expectation::confirmed;
     place.test(options, usual_contradiction);
     if (place.decision == Decision::accepted) keep_better(place, best);
@@ -166,7 +166,8 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   }
   if (!best.is_lost()) return best;
   follow();
-  if (const auto confirmed = confirmed_by_odometry(registration, prior, options, target.usual_contradiction)) {
+  if (const auto confirmed =
+          confirmed_by_odometry(registration, odometry, prior, options, target.usual_contradiction)) {
     return *confirmed;
   }
 

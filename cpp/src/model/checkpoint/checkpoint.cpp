@@ -284,7 +284,8 @@ bool PrivateState::is_sound(const FrameOdometry& odometry) {
   const auto& before = odometry.before_;
   const bool has_normals = !before || before->normals.rows() == 0 || before->normals.rows() == before->points.rows();
   return has_normals && odometry.largest_step_ >= 0.0 && std::isfinite(odometry.largest_step_) &&
-         (!odometry.path_ || odometry.path_->uncertainty >= 0.0);
+         (!odometry.path_ ||
+          (odometry.path_->uncertainty.shift >= 0.0 && odometry.path_->uncertainty.turn.allFinite()));
 }
 
 bool PrivateState::is_sound(const NoiseCalibration& calibration) {

@@ -146,7 +146,7 @@ struct PrivateState {
   }
   template <class Archive>
   static void exchange(Archive& archive, FrameOdometry::Path& path) {
-    archive(path.world_from_camera, path.uncertainty);
+    archive(path.world_from_camera, path.uncertainty.shift, path.uncertainty.turn);
   }
   template <class Archive>
   static void exchange(Archive& archive, FrameOdometry& odometry) {
