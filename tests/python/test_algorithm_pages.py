@@ -67,6 +67,7 @@ CONSTANTS = [
         "registration/acceptance.cpp",
         "std::pow(consistency, demands.consistency_power)",
     ),
+    ("tracking", "errs by a quarter of itself", "tracking/limits.hpp", "odometry_error = 0.25"),
     ("noise", r"1.376\, \overline m", "tracking/limits.hpp", "noise_per_residual = 1.376"),
     ("noise", "Until five frames", "tracking/limits.hpp", "enough_frames = 5.0"),
     ("noise", "4, 8 and 16 times", "tracking/limits.hpp", "largest_noise_factor = 16.0"),

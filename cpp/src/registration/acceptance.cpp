@@ -28,8 +28,9 @@ Demands demands_on(Expectation expectation) {
     case Expectation::beside:
       return {doubtful_score, consistency_power, far_misfit, false};
     case Expectation::only_near:
-    case Expectation::confirmed:
       return {only_near_score, consistency_power, far_misfit, false};
+    case Expectation::confirmed:
+      return {only_near_score, consistency_power, far_misfit, true};
     case Expectation::unexpected:
       return {doubtful_score, far_consistency_power, far_misfit, true};
     default:

@@ -30,7 +30,7 @@ void FrameOdometry::follow(const IcpSource& frame, const DepthView& view, const 
   };
   if (is_believed(Expectation::expected)) {
     step_ = Step{moved.target_from_source, moved.weak_directions};
-  } else if (is_believed(Expectation::confirmed)) {  // near there, but no direction is sure
+  } else if (is_believed(Expectation::only_near)) {  // near there, but no direction is sure
     step_ = Step{moved.target_from_source, Matrix6::Identity()};
   }
 }

@@ -65,6 +65,19 @@ TEST_CASE("the more speaks for a place, the less is asked of the frame") {
   CHECK(tested(faint, Expectation::near_lost).decision == Decision::rejected);
 }
 
+TEST_CASE("what the frame before confirms needs less, but not nothing") {
+  const auto faint = [](Registration& result) { result.alignment.overlap = 0.35; };
+  const auto too_faint = [](Registration& result) { result.alignment.overlap = 0.25; };
+  CHECK(tested(faint, Expectation::expected).decision == Decision::rejected);
+  CHECK(tested(faint, Expectation::confirmed).decision == Decision::accepted);
+  CHECK(tested(too_faint, Expectation::confirmed).decision == Decision::rejected);
+  const auto flat = [](Registration& result) {  // two planes slide along each other as they did a frame before
+    result.alignment.overlap = 0.35;
+    result.alignment.off_planes = 0.02;
+  };
+  CHECK(tested(flat, Expectation::confirmed).decision == Decision::rejected);
+}
+
 TEST_CASE("far from all guesses, what matches tell counts as far as they are off three planes") {
   const auto corner = [](Registration& result) { result.alignment.off_planes = 0.04; };
   for (const Expectation near :
