@@ -51,8 +51,7 @@ struct FusionOptions {
   int min_observations = 3;           ///< a point that fewer frames observed is not confirmed
   int max_free_space_violations = 3;  ///< a point that was seen through so often goes; an unconfirmed one also where
                                       ///< cameras looked so often and did not find it
-
-  double reference_sigma = 0.0;  ///< noise of an observation of weight 1 [m]; 0: the frame's median
+  double reference_sigma = 0.0;       ///< noise of an observation of weight 1 [m]; 0: the frame's median
 
   void check() const;  ///< throws std::invalid_argument naming the field, what was expected and the value
 };

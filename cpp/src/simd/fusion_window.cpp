@@ -96,7 +96,7 @@ void observe(const SurfaceImage& image, const WindowQueries& queries, float leas
     const int width = 2 * queries.window[i];
     const int64_t first = queries.first_v[i] * image.stride + queries.first_u[i];
     uint16_t* const rows = asked ? asked->rows + 2 * largest_window * i : nullptr;
-    if (width == 8) {
+    if (width == 2 * paired_window) {
       for (int row = 0; row < width; row += 2) {
         unsigned covered = 0;
         for (int part = 0; part < parts; ++part) {

@@ -9,7 +9,7 @@
 namespace nacre::simd {
 
 constexpr int largest_window = 7;  // pixels on each side of a point: a row is at most 16 lanes
-constexpr int paired_window = 4;   // least, where two rows are 16
+constexpr int paired_window = 4;   // the least, of which two rows are 16 lanes
 
 // Planes of one row stride, from pixel (0, 0) on. Around the image is a border of zeros that windows may reach into:
 // largest_window rows above and below, as many pixels to the left, and 25 to the right.

@@ -1,6 +1,8 @@
 #include "tracking/frame_odometry.hpp"
 
 #include <algorithm>
+#include <cmath>
+#include <utility>
 
 #include "camera/limits.hpp"
 #include "camera/view_distance.hpp"

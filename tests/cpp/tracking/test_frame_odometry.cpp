@@ -17,10 +17,10 @@ double hills(double x, double y) { return 1.0 + 0.06 * std::sin(7.0 * x + 1.0) *
 double wall(double, double) { return 1.0; }
 
 // A camera that goes to the right by some centimetres a step, and turns a little.
-Pose camera_at(int step, double shift = 0.03) {
+Pose camera_at(int step) {
   Pose pose = Pose::Identity();
   pose.linear() = Eigen::AngleAxisd(0.01 * step, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  pose.translation().x() = shift * step;
+  pose.translation().x() = 0.03 * step;
   return pose;
 }
 
