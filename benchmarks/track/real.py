@@ -23,7 +23,9 @@ machine that did other things, too: their order of magnitude counts.
 
 The true poses of the iPhone are its own odometry's, those of the D435 in the hand a tracker's that is fixed
 beside it: good to centimetres over all. The living room is rendered. A flat door leaves three
-directions open: from its depth alone nobody knows them.
+directions open: from its depth alone nobody knows them. Images of tum-fr1-rpy are 20 ms older than their
+poses. By nacre's poses depth images agree better than by the true ones, in wrong frames, too
+([](limits.md#how-true-the-true-poses-are)).
 """
 GROUPS = {
     "Frames right / claimed / far off": ("right", "claimed", "far"),
