@@ -96,6 +96,7 @@ def _whole(low: int, high: int) -> Any:
 # What each parameter may be; a fifth of them is changed in half of the models.
 PARAMETERS: dict[str, Any] = {
     "fusion_method": _one_of("fuse", "wlop", "wlop+"),
+    "binning": _one_of(0, 1, 2, 3, 7),
     "spacing": _one_of(0.0, 1e-30, 1e-6, 1e-4, 0.001, 0.003, 0.01, 0.1, 10.0, 1e6, 1e29),
     "max_points": _one_of(100, 101, 500, 2000, 2**31 - 1),
     "predict_motion": _one_of(True, False),

@@ -99,6 +99,7 @@ void bind_model(py::module_& m) {
       .def_readwrite("fusion_method", &ModelOptions::fusion_method)
       .def_readwrite("fusion", &ModelOptions::fusion)
       .def_readwrite("wlop", &ModelOptions::wlop)
+      .def_readwrite("binning", &ModelOptions::binning)
       .def_readwrite("calibrate_depth", &ModelOptions::calibrate_depth)
       .def_readwrite("spacing", &ModelOptions::spacing)
       .def_readwrite("max_points", &ModelOptions::max_points)
@@ -192,6 +193,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("tilt", [](const Model& model) { return model.options().depth.tilt; })
       .def_property_readonly("noise", &Model::noise)
       .def_property_readonly("depth_unit", &Model::depth_unit)
+      .def_property_readonly("binning", [](const Model& model) { return model.options().binning; })
       .def_property_readonly("noise_factor", &Model::noise_factor)
       .def_property_readonly("num_frames", [](const Model& model) { return model.frames().size(); })
       .def("report", [](const Model& model, std::size_t i) { return model.frames()[i]; })  // i < num_frames

@@ -305,6 +305,12 @@ class Model(ExchangeablePoints, Checkpointed):
             return self._core.spacing
 
     @property
+    def binning(self) -> int:
+        """The side of the blocks of pixels that are averaged: given, or decided by the first frame."""
+        with self._lock:
+            return self._core.binning
+
+    @property
     def depth_calibration(self) -> DepthCalibration | None:
         """
         What views in different directions say of systematic errors of the depth, as it comes.

@@ -183,13 +183,17 @@ class ModelParameters:
     fusion_method : "fuse", "wlop" or "wlop+"
         How a registered frame becomes part of the model: confidence-weighted fusion, the 2010 paper's WLOP of
         model and new points, or WLOP repaired for incremental use.
+    binning : int
+        Of a pinhole camera: each so many by so many pixels are averaged to one before all else. 1: none; 0:
+        as few as leave 100 000 measured pixels of the first image, none where the unit of its depth is
+        coarser than such a pixel, or where a ``region`` is asked for. See :attr:`nacre.Model.binning`.
     calibrate_depth : bool
         Of a pinhole camera that sees one scene (no ``region``), depth along its axis: where views in several
         directions show that its depth is systematically wrong, correct it from then on, and what was there
         (:func:`nacre.calibrate_depth`).
     spacing : float
-        Distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces. New
-        points are also at least a pixel and a half apart in the frame that brings them.
+        Distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces. New points
+        are also at least a pixel and a half apart in the frame that brings them, and an averaged pixel.
     max_points : int
         The model never grows beyond: its spacing is widened instead.
     predict_motion : bool
@@ -217,6 +221,7 @@ class ModelParameters:
     fusion_method: Literal["fuse", "wlop", "wlop+"] = "fuse"
     fusion: FusionParameters = field(default_factory=FusionParameters)
     wlop: WlopParameters = field(default_factory=WlopParameters)
+    binning: int = 0
     calibrate_depth: bool = True
     spacing: float = 0.0
     max_points: int = 500000

@@ -88,7 +88,8 @@ inline ModelOptions model_options(Bytes& bytes) {
     options.wlop = wlop_options(bytes);
   }
   bytes.change_to(options.fusion_method, 3);
-  bytes.change(options.region.object), bytes.change(options.spacing), bytes.change(options.max_points, -1, 400);
+  bytes.change(options.region.object), bytes.change(options.binning, -1, 9), bytes.change(options.spacing),
+      bytes.change(options.max_points, -1, 400);
   bytes.change(options.predict_motion), bytes.change(options.relocalise), bytes.change(options.loop_closure);
   bytes.change(options.denoise_samples), bytes.change(options.verify), bytes.change(options.min_score);
   options.num_threads = bytes.threads();

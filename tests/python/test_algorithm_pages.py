@@ -70,6 +70,7 @@ CONSTANTS = [
     ("tracking", "errs by a quarter of itself", "tracking/limits.hpp", "odometry_error = 0.25"),
     ("noise", r"1.376\, \overline m", "tracking/limits.hpp", "noise_per_residual = 1.376"),
     ("noise", "Until five frames", "tracking/limits.hpp", "enough_frames = 5.0"),
+    ("depth", "100 000 measured", "depth/limits.hpp", "most_worked_on = 100000.0"),
     ("noise", "4, 8 and 16 times", "tracking/limits.hpp", "largest_noise_factor = 16.0"),
     ("simulation", "0.8 + 0.035", "simulation/limits.hpp", "lateral_constant = 0.8"),
     ("simulation", r"\frac{0.0001}{\sqrt z}", "simulation/limits.hpp", "axial_slant = 0.0001"),

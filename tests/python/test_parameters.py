@@ -155,6 +155,7 @@ PAPER: dict[str, Any] = {
     "registration.weak_threshold": 0.0,
     "verify": False,
     "relocalise": False,
+    "binning": 1,
     "calibrate_depth": False,
     "loop_closure": False,
     "denoise_samples": False,

@@ -31,11 +31,15 @@ class Camera {
   /// Brown-Conrady coefficients k1 k2 p1 p2 k3 (OpenCV's order).
   using Distortion = std::array<double, 5>;
 
-  /// x = (u - cx) z / fx. Throws std::invalid_argument naming the argument that is out of range.
+  /// x = (u - cx) z / fx. binning: each pixel is the mean of so many by so many of the sensor's, which tells how far
+  /// apart points are. Throws std::invalid_argument naming the argument that is out of range.
   static Camera pinhole(int width, int height, double fx, double fy, double cx, double cy,
-                        const Distortion& distortion = {}, DepthKind depth_kind = DepthKind::z);
+                        const Distortion& distortion = {}, DepthKind depth_kind = DepthKind::z, int binning = 1);
   /// x = (u - (width - 1) / 2) pixel_size, y likewise [m].
   static Camera orthographic(int width, int height, double pixel_size);
+  /// The pinhole camera whose pixels are the means of blocks of factor x factor of this one's; columns and rows that
+  /// fill no block are left out. 1: this one. Throws std::invalid_argument naming `binning` where there is none.
+  Camera binned(int factor) const;
 
   Model model() const { return model_; }
   int width() const { return width_; }
@@ -46,6 +50,7 @@ class Camera {
   double cy() const { return cy_; }
   const Distortion& distortion() const { return distortion_; }
   DepthKind depth_kind() const { return depth_kind_; }
+  int binning() const { return binning_; }
   double pixel_size() const { return pixel_size_; }  ///< [m]; 0 for a pinhole camera
 
   /// The ray of pixel (u, v); NaN where the distortion model ends before the image does.
@@ -75,6 +80,7 @@ class Camera {
   Distortion distortion_{};
   double max_radius_squared_ = std::numeric_limits<double>::infinity();  // of x^2 + y^2, where the distortion turns
   DepthKind depth_kind_ = DepthKind::z;
+  int binning_ = 1;
   std::shared_ptr<const RayTable> rays_;
 };
 

@@ -1,5 +1,6 @@
 #include "nacre/camera.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "base/check.hpp"
@@ -104,7 +105,8 @@ void differentiate(int height, RayTable& rays) {
 }  // namespace
 
 Camera Camera::pinhole(int width, int height, double fx, double fy, double cx, double cy, const Distortion& distortion,
-                       DepthKind depth_kind) {
+                       DepthKind depth_kind, int binning) {
+  require(binning >= 1, "binning", "at least 1", binning);
   check_size(width, height);
   require(std::isfinite(fx) && fx != 0.0, "fx", "a finite focal length in pixels, not 0", fx);
   require(std::isfinite(fy) && fy != 0.0, "fy", "a finite focal length in pixels, not 0", fy);
@@ -125,6 +127,7 @@ Camera Camera::pinhole(int width, int height, double fx, double fy, double cx, d
   camera.cy_ = cy;
   camera.distortion_ = distortion;
   camera.depth_kind_ = depth_kind;
+  camera.binning_ = binning;
 
   const bool distorted = distortion != Distortion{};
   if (distorted) camera.max_radius_squared_ = turning_point(distortion);
@@ -200,10 +203,19 @@ double Camera::depth_of(const Eigen::Vector3d& point) const {
   return depth_kind_ == DepthKind::radial ? point.norm() : point.z();
 }
 
+Camera Camera::binned(int factor) const {
+  if (factor == 1) return *this;
+  require(model_ == Model::pinhole, "binning", "0 or 1 unless the camera is a pinhole", factor);
+  require(factor >= 1 && factor <= std::min(width_, height_), "binning", "at most the sides of the image", factor);
+  const double shift = 0.5 * (factor - 1);
+  return pinhole(width_ / factor, height_ / factor, fx_ / factor, fy_ / factor, (cx_ - shift) / factor,
+                 (cy_ - shift) / factor, distortion_, depth_kind_, factor * binning_);
+}
+
 bool Camera::operator==(const Camera& other) const {
   return model_ == other.model_ && width_ == other.width_ && height_ == other.height_ && fx_ == other.fx_ &&
          fy_ == other.fy_ && cx_ == other.cx_ && cy_ == other.cy_ && distortion_ == other.distortion_ &&
-         depth_kind_ == other.depth_kind_;
+         depth_kind_ == other.depth_kind_ && binning_ == other.binning_;
 }
 
 }  // namespace nacre

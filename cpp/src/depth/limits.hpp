@@ -34,6 +34,7 @@ constexpr double unit_quantile = 0.1;  // [1] tuned: of the steps between neighb
 constexpr float unit_tolerance = 0.1F;  // [unit] derived: to which steps are multiples of the unit; test_coarse_depth
 constexpr double least_multiples = 0.99;  // [1] tuned: part of the steps that are; test_coarse_depth
 constexpr std::int64_t least_levels = 8;  // [levels] tuned: two walls are no unit; test_coarse_depth
+constexpr double most_worked_on = 100000.0;  // [pixels] budget: measured, of the first image; pixels are averaged where there are more; test_pixel_binning
 constexpr float nearest_median = 0.05F;  // [m] derived: nearer medians: a wrong depth_scale; test_depth
 constexpr float farthest_median = 50.0F;  // [m] derived: farther medians: a wrong depth_scale; test_depth
 constexpr std::int64_t most_probes = 8192;  // [pixels] budget: that tell an image's median depth; test_depth

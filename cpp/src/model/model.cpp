@@ -1,7 +1,9 @@
 #include "nacre/model.hpp"
 
+#include <algorithm>
 #include <utility>
 
+#include "depth/pixel_binning.hpp"
 #include "model/checkpoint/checkpoint.hpp"
 #include "model/new_start.hpp"
 #include "model/pipeline.hpp"
@@ -9,8 +11,17 @@
 
 namespace nacre {
 
+namespace {
+
+// Of a region it is not known yet how little of the image it is.
+bool decides_binning(const Pipeline& model) {
+  return model.given.binning == 0 && model.history.size() == 0 && !model.given.region.is_limited();
+}
+
+}  // namespace
+
 Model::Model(const Camera& camera, const ModelOptions& options)
-    : pipeline_(std::make_unique<Pipeline>(camera, options)) {}
+    : pipeline_(std::make_unique<Pipeline>(camera, options, std::max(1, options.binning))) {}
 Model::~Model() = default;
 Model::Model(std::unique_ptr<Pipeline> pipeline) : pipeline_(std::move(pipeline)) {}
 Model::Model(Model&&) noexcept = default;
@@ -18,6 +29,10 @@ Model& Model::operator=(Model&&) noexcept = default;
 
 FrameReport Model::add_frame(const DepthRef& depth, const FrameExtras& extras) {
   const CancelScope whole(nullptr);  // stopped halfway, the model would be neither the one nor the other
+  if (decides_binning(*pipeline_)) {
+    const int binning = binning_for(depth, extras.mask, pipeline_->given_camera);
+    pipeline_ = std::make_unique<Pipeline>(pipeline_->given_camera, pipeline_->given, binning);
+  }
   FrameReport report = pipeline_->add_frame(depth, extras);
   if (auto begun = begin_anew(*pipeline_, depth, extras)) {
     pipeline_ = std::move(begun);
@@ -26,7 +41,7 @@ FrameReport Model::add_frame(const DepthRef& depth, const FrameExtras& extras) {
   return report;
 }
 
-const Camera& Model::camera() const { return pipeline_->camera; }
+const Camera& Model::camera() const { return pipeline_->given_camera; }
 const ModelOptions& Model::options() const { return pipeline_->options; }
 const ModelOptions& Model::given_options() const { return pipeline_->given; }
 const PointModel& Model::cloud() const { return pipeline_->cloud; }

@@ -24,7 +24,7 @@ FrameReport without_model(FrameReport report) {
 }
 
 std::unique_ptr<Pipeline> begun_with(const std::vector<StartFrame>& frames, const Pipeline& model) {
-  auto begun = std::make_unique<Pipeline>(model.camera, model.given);
+  auto begun = std::make_unique<Pipeline>(model.given_camera, model.given, model.options.binning);
   begun->is_trial = true;
   for (const StartFrame& frame : frames) {
     for (auto i = begun->history.size(); i < static_cast<std::size_t>(frame.index); ++i) {

@@ -40,6 +40,7 @@ ModelOptions ModelOptions::preset(const std::string& name) {
   options.registration.max_points = 0;
   options.registration.max_samples = 0;
   options.registration.weak_threshold = 0.0;
+  options.binning = 1;
   options.relocalise = false;
   options.calibrate_depth = false;
   options.denoise_samples = false;
@@ -65,6 +66,7 @@ void ModelOptions::check() const {
   registration.check();
   fusion.check();
   wlop.check();
+  require(binning >= 0, "binning", "0 (automatic) or more", binning);
   require(spacing >= 0.0 && spacing < farthest_place, "spacing",
           "0 (automatic) or a positive distance in metres below 1e30", spacing);
   require(max_points >= 100, "max_points", "at least 100", max_points);

@@ -14,6 +14,7 @@
 #include "camera/point_spacing.hpp"
 #include "depth/cleaning.hpp"
 #include "depth/inverse_depth_image.hpp"
+#include "depth/pixel_binning.hpp"
 #include "fusion/attribute_fusion.hpp"
 #include "fusion/deformation.hpp"
 #include "fusion/fuse.hpp"
@@ -42,14 +43,14 @@ class Stopwatch {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-// Twice the size of a pixel on the nearer surfaces (the lower quartile of depth).
+// Twice the size of a pixel of the sensor on the nearer surfaces (the lower quartile of depth).
 double spacing_for(const Frame& frame, const Camera& camera) {
   std::vector<float> z;
   z.reserve(frame.valid.size());
   for (const std::int32_t row : frame.valid) z.push_back(frame.points(row, 2));
   const auto quartile = z.begin() + static_cast<std::ptrdiff_t>(z.size() / 4);
   std::nth_element(z.begin(), quartile, z.end());
-  return model_limits::spacing_pixels * camera.footprint(*quartile);
+  return model_limits::spacing_pixels * camera.footprint(*quartile) / camera.binning();
 }
 
 void check_extras(const Camera& camera, const FrameExtras& extras, const PointModel& model) {
@@ -58,16 +59,28 @@ void check_extras(const Camera& camera, const FrameExtras& extras, const PointMo
           extras.colors.rows());
   const MaskImage& confidence = extras.confidence;
   if (confidence.size() > 0) require_camera_size("confidence", confidence.rows(), confidence.cols(), camera);
+  if (extras.mask.size() > 0) require_camera_size("mask", extras.mask.rows(), extras.mask.cols(), camera);
   check_attributes(extras.attributes, camera, model);
   require(!extras.keep_guess || extras.guess.has_value(), "keep_guess", "used with a guess", "no guess");
   if (extras.guess) require_rigid(*extras.guess, "guess");
 }
 
+// What comes with an image, of its averaged pixels.
+FrameExtras averaged(const FrameExtras& extras, const PixelBinning& pixels) {
+  FrameExtras result = extras;
+  if (extras.colors.size() > 0) result.colors = pixels.mean(extras.colors);
+  if (extras.mask.size() > 0) result.mask = pixels.majority(extras.mask);
+  if (extras.confidence.size() > 0) result.confidence = pixels.commonest(extras.confidence);
+  for (FrameAttribute& attribute : result.attributes) attribute.values = pixels.mean(attribute.values);
+  return result;
+}
+
 }  // namespace
 
-Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in)
-    : camera(camera_in), given(options_in), options(options_in) {
+Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in, int binning)
+    : given_camera(camera_in), camera(camera_in.binned(binning)), given(options_in), options(options_in) {
   options.check();
+  options.binning = binning;
   options.registration.num_threads = options.num_threads;
   spacing = options.spacing;
   require(options.depth.tilt == 0.0 || can_calibrate_depth(camera), "depth.tilt",
@@ -76,14 +89,30 @@ Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in)
   if (options.calibrate_depth && sees_one_scene && can_calibrate_depth(camera)) depth_views.emplace(camera);
 }
 
+// Pixels are averaged, and their systematic error is taken away, before all else.
 FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras) {
-  if (options.depth.tilt == 0.0) return add_straight_frame(depth, extras);
-  return add_straight_frame(correct_depth(depth, camera, options.depth.tilt, options.num_threads), extras);
+  require_camera_size("depth", depth.rows(), depth.cols(), given_camera);
+  check_extras(given_camera, extras, cloud);
+  FrameReport report;
+  if (options.binning == 1 && options.depth.tilt == 0.0) return add_worked_on(depth, extras, report);
+  DepthImage image;
+  std::optional<FrameExtras> others;
+  {
+    const Stopwatch total(report.milliseconds.total), watch(report.milliseconds.preprocess);
+    if (options.binning > 1) {
+      const PixelBinning pixels(depth, given_camera, options.binning, options.num_threads);
+      others = averaged(extras, pixels);
+      image = pixels.depth();
+    }
+    if (options.depth.tilt != 0.0) {
+      image =
+          correct_depth(options.binning > 1 ? DepthRef(image) : depth, camera, options.depth.tilt, options.num_threads);
+    }
+  }
+  return add_worked_on(image, others ? *others : extras, report);
 }
 
-FrameReport Pipeline::add_straight_frame(const DepthRef& depth, const FrameExtras& extras) {
-  check_extras(camera, extras, cloud);
-  FrameReport report;
+FrameReport Pipeline::add_worked_on(const DepthRef& depth, const FrameExtras& extras, FrameReport report) {
   report.index = static_cast<std::int64_t>(history.size());
   report.timestamp = extras.timestamp;
   report.corrects_earlier = is_trial && history.num_registered() == 2;  // see begin_anew: it confirms both

@@ -28,7 +28,8 @@ struct StartFrame {
 };
 
 struct Pipeline {
-  Camera camera;
+  Camera given_camera;   // of images as they come
+  Camera camera;         // of images as they are worked on, and all below: see ModelOptions::binning
   ModelOptions given;    // options as given
   ModelOptions options;  // what the first frame decides is filled in
   Frame frame;           // the newest; its memory and the observer's are used again for the next
@@ -58,7 +59,8 @@ struct Pipeline {
   std::vector<StartFrame> start_frames;  // while the model holds one frame: the newest that may begin another
   bool is_trial = false;                 // whether the third frame is to confirm the first two
 
-  Pipeline(const Camera& camera_in, const ModelOptions& options_in);
+  // binning: what the first frame decided, 1 before.
+  Pipeline(const Camera& camera_in, const ModelOptions& options_in, int binning);
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
   std::optional<DepthCalibration> depth_calibration() const;
@@ -66,7 +68,7 @@ struct Pipeline {
   NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
 
  private:
-  FrameReport add_straight_frame(const DepthRef& depth, const FrameExtras& extras);
+  FrameReport add_worked_on(const DepthRef& depth, const FrameExtras& extras, FrameReport report);
   // The steps of the loop, in their order.
   DepthImage preprocess(const DepthRef& depth, const MaskRef& mask, FrameReport& report);
   void organise(const DepthRef& depth, const DepthImage& clean, FrameReport& report);

@@ -84,27 +84,28 @@ struct CameraFields {
   int width = 0, height = 0;
   double fx = 0, fy = 0, cx = 0, cy = 0, pixel_size = 0;
   Camera::Distortion distortion{};
+  int binning = 1;
 
   std::int64_t num_pixels() const { return static_cast<std::int64_t>(width) * height; }
   // Whether its rays take memory for every pixel.
   bool has_table() const { return distortion != Camera::Distortion{} || depth_kind == DepthKind::radial; }
   Camera camera() const {
     if (model == Camera::Model::orthographic) return Camera::orthographic(width, height, pixel_size);
-    return Camera::pinhole(width, height, fx, fy, cx, cy, distortion, depth_kind);
+    return Camera::pinhole(width, height, fx, fy, cx, cy, distortion, depth_kind, binning);
   }
 };
 
 CameraFields fields_of(const Camera& camera) {
-  return {camera.model(), camera.depth_kind(), camera.width(), camera.height(),     camera.fx(),
-          camera.fy(),    camera.cx(),         camera.cy(),    camera.pixel_size(), camera.distortion()};
+  return {camera.model(), camera.depth_kind(), camera.width(),      camera.height(),     camera.fx(),     camera.fy(),
+          camera.cx(),    camera.cy(),         camera.pixel_size(), camera.distortion(), camera.binning()};
 }
 
 template <class Archive>
 void exchange(Archive& archive, CameraFields& fields) {
   archive.choice(fields.model, Camera::Model::orthographic);
   archive.choice(fields.depth_kind, DepthKind::radial);
-  archive(fields.width, fields.height, fields.fx, fields.fy, fields.cx, fields.cy, fields.pixel_size,
-          fields.distortion);
+  archive(fields.width, fields.height, fields.fx, fields.fy, fields.cx, fields.cy, fields.pixel_size, fields.distortion,
+          fields.binning);
 }
 
 // What of a model is neither given nor of the newest frame alone.
@@ -331,10 +332,10 @@ bool PrivateState::is_sound(const UsualContradiction& contradiction) {
 std::string save_checkpoint(Pipeline& pipeline, const std::string& note) {
   std::string bytes(header_size, '\0'), kept = note;
   StateWriter archive(bytes);
-  CameraFields camera = fields_of(pipeline.camera);
+  CameraFields camera = fields_of(pipeline.given_camera);
   exchange(archive, camera);
   std::string filler = filler_of(camera, pipeline);
-  archive(pipeline.given, filler);
+  archive(pipeline.given, pipeline.options.binning, filler);
   exchange_state(archive, pipeline);
   archive(kept);
   return sealed(std::move(bytes));
@@ -345,16 +346,18 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   StateReader archive(bytes, header_size);
   CameraFields camera;
   ModelOptions given;
+  int binning = 1;
   std::string filler, kept;
   exchange(archive, camera);
   // Of a camera whose size is made up, the rays would take more memory than there is.
   archive.require(!camera.has_table() || (camera.width > 0 && camera.height > 0 &&
                                           static_cast<std::size_t>(camera.num_pixels()) <= archive.left() / 8),
                   "the camera is larger than what is left");
-  archive(given, filler);
+  archive(given, binning, filler);
+  archive.require(binning >= 1 && (given.binning == 0 || binning == given.binning), "pixels are averaged otherwise");
   std::unique_ptr<Pipeline> pipeline;
   try {
-    pipeline = std::make_unique<Pipeline>(camera.camera(), given);
+    pipeline = std::make_unique<Pipeline>(camera.camera(), given, binning);
   } catch (const std::invalid_argument& error) {
     archive.fail(error.what());
   }
@@ -366,7 +369,7 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   archive.require(PrivateState::is_sound(state.history, state.camera, given),
                   "the report of a frame contradicts itself, the camera or the options");
   const std::size_t num_frames = state.history.size();
-  const Eigen::Index num_pixels = camera.num_pixels();
+  const Eigen::Index num_pixels = fields_of(state.camera).num_pixels();
   const auto is_pixels = [&](const Values& values) { return values.size() == num_pixels; };
   const DepthView& before = state.before;
   const bool is_first = state.cloud.size() == 0 && before.depth.size() == 0;
@@ -390,7 +393,7 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   archive.require(state.start_frames.size() < model_limits::start_frames, "more frames may begin the model than do");
   std::int64_t last_start = -1;
   for (const StartFrame& frame : state.start_frames) {
-    archive.require(is_sound(frame, state.camera, num_frames) && frame.index > last_start,
+    archive.require(is_sound(frame, state.given_camera, num_frames) && frame.index > last_start,
                     "a frame that may begin the model contradicts the camera");
     last_start = frame.index;
   }

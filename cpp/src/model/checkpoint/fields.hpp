@@ -62,7 +62,7 @@ template <class Archive>
 void exchange(Archive& archive, ModelOptions& options) {
   archive(options.depth, options.region, options.registration);
   archive.choice(options.fusion_method, FusionMethod::wlop_plus);
-  archive(options.fusion, options.wlop, options.calibrate_depth, options.spacing, options.max_points,
+  archive(options.fusion, options.wlop, options.binning, options.calibrate_depth, options.spacing, options.max_points,
           options.predict_motion, options.relocalise, options.loop_closure, options.denoise_samples, options.verify,
           options.min_score, options.num_threads);
 }

@@ -1,0 +1,165 @@
+#include "depth/pixel_binning.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "base/parallel.hpp"
+#include "depth/coarse_depth.hpp"
+#include "depth/inverse_depth_image.hpp"
+#include "depth/limits.hpp"
+
+namespace nacre {
+namespace {
+
+template <class Iterator>
+float harmonic_mean(Iterator first, Iterator last) {
+  float sum = 0.0F;
+  for (Iterator z = first; z != last; ++z) sum += 1.0F / *z;
+  return static_cast<float>(last - first) / sum;
+}
+
+}  // namespace
+
+int binning_for(const DepthRef& depth, const MaskRef& mask, const Camera& camera) {
+  require_camera_size("depth", depth.rows(), depth.cols(), camera);
+  if (mask.size() > 0) require_camera_size("mask", mask.rows(), mask.cols(), camera);
+  if (camera.model() != Camera::Model::pinhole) return 1;
+  std::vector<float> measured;
+  for (Eigen::Index v = 0; v < depth.rows(); ++v) {
+    for (Eigen::Index u = 0; u < depth.cols(); ++u) {
+      const bool is_inside = mask.size() == 0 || mask(v, u) != 0;
+      if (is_inside && is_measurement(depth(v, u))) measured.push_back(depth(v, u));
+    }
+  }
+  const std::size_t count = measured.empty() ? static_cast<std::size_t>(depth.size()) : measured.size();
+  const double wanted = std::ceil(std::sqrt(static_cast<double>(count) / depth_limits::most_worked_on));
+  const int factor = std::min({std::max(1, static_cast<int>(wanted)), camera.width(), camera.height()});
+  if (factor == 1 || measured.empty()) return factor;
+  const auto middle = measured.begin() + static_cast<std::ptrdiff_t>(measured.size() / 2);
+  std::nth_element(measured.begin(), middle, measured.end());
+  return static_cast<double>(coarse_unit(depth)) > factor * camera.footprint(*middle) ? 1 : factor;
+}
+
+PixelBinning::PixelBinning(const DepthRef& depth, const Camera& camera, int factor, int num_threads)
+    : depth_(depth),
+      gate_slope_(depth_limits::gate_slope * static_cast<float>(camera.footprint(1.0) * 0.5 * factor)),
+      factor_(factor),
+      num_threads_(num_threads),
+      binned_(depth.rows() / factor, depth.cols() / factor) {
+  const std::size_t block_size = static_cast<std::size_t>(factor_) * static_cast<std::size_t>(factor_);
+  parallel_blocks(binned_.rows(), rows_per_block(depth_.cols()), num_threads_,
+                  [&](std::int64_t, std::int64_t begin, std::int64_t end) {
+                    std::vector<float> values(block_size), sorted;
+                    for (Eigen::Index row = begin; row < end; ++row) {
+                      for (Eigen::Index col = 0; col < binned_.cols(); ++col) {
+                        std::size_t count = 0;
+                        for (Eigen::Index v = row * factor_; v < (row + 1) * factor_; ++v) {
+                          const float* pixel = depth_.data() + v * depth_.outerStride() + col * factor_;
+                          for (int k = 0; k < factor_; ++k) {
+                            if (is_measurement(pixel[k])) values[count++] = pixel[k];
+                          }
+                        }
+                        float& mean = binned_(row, col);
+                        mean = std::numeric_limits<float>::quiet_NaN();
+                        if (2 * count < block_size) continue;
+                        const auto first = values.begin(), last = first + static_cast<std::ptrdiff_t>(count);
+                        const auto [nearest, farthest] = std::minmax_element(first, last);
+                        if (*farthest - *nearest <= gate_slope_ * *nearest) {
+                          mean = harmonic_mean(first, last);
+                          continue;
+                        }
+                        sorted.assign(first, last);
+                        std::sort(sorted.begin(), sorted.end());
+                        const float median = 0.5F * (sorted[(count - 1) / 2] + sorted[count / 2]);
+                        const auto end_taken = std::remove_if(
+                            first, last, [&](float z) { return std::abs(z - median) > gate_slope_ * median; });
+                        if (2 * (end_taken - first) >= static_cast<std::ptrdiff_t>(block_size))
+                          mean = harmonic_mean(first, end_taken);
+                      }
+                    }
+                  });
+}
+
+template <class Visit>
+void PixelBinning::for_each_taken(Eigen::Index row, Eigen::Index col, Visit&& visit) const {
+  const float mean = binned_(row, col), gate = gate_slope_ * mean;
+  for (Eigen::Index v = row * factor_; v < (row + 1) * factor_; ++v) {
+    for (Eigen::Index u = col * factor_; u < (col + 1) * factor_; ++u) {
+      if (std::abs(depth_(v, u) - mean) <= gate) visit(v, u);
+    }
+  }
+}
+
+Colors PixelBinning::mean(const Colors& colors) const {
+  Colors result = Colors::Zero(binned_.size(), 3);
+  parallel_for(binned_.rows(), rows_per_block(depth_.cols()), num_threads_, [&](Eigen::Index row) {
+    for (Eigen::Index col = 0; col < binned_.cols(); ++col) {
+      std::array<int, 3> sum{};
+      int count = 0;
+      for_each_taken(row, col, [&](Eigen::Index v, Eigen::Index u) {
+        const std::uint8_t* color = colors.data() + 3 * (v * depth_.cols() + u);
+        for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += color[k];
+        ++count;
+      });
+      if (count == 0) continue;
+      for (int k = 0; k < 3; ++k) {
+        result(row * binned_.cols() + col, k) =
+            static_cast<std::uint8_t>((sum[static_cast<std::size_t>(k)] + count / 2) / count);
+      }
+    }
+  });
+  return result;
+}
+
+Attributes PixelBinning::mean(const Attributes& values) const {
+  Attributes result(binned_.size(), values.cols());
+  parallel_for(binned_.rows(), rows_per_block(depth_.cols()), num_threads_, [&](Eigen::Index row) {
+    for (Eigen::Index col = 0; col < binned_.cols(); ++col) {
+      for (Eigen::Index channel = 0; channel < values.cols(); ++channel) {
+        float sum = 0.0F, count = 0.0F;
+        for_each_taken(row, col, [&](Eigen::Index v, Eigen::Index u) {
+          const float value = values(v * depth_.cols() + u, channel);
+          if (!std::isfinite(value)) return;
+          sum += value;
+          count += 1.0F;
+        });
+        result(row * binned_.cols() + col, channel) = sum / count;  // NaN where there is none
+      }
+    }
+  });
+  return result;
+}
+
+MaskImage PixelBinning::commonest(const MaskImage& levels) const {
+  MaskImage result = MaskImage::Zero(binned_.rows(), binned_.cols());
+  parallel_for(binned_.rows(), rows_per_block(depth_.cols()), num_threads_, [&](Eigen::Index row) {
+    for (Eigen::Index col = 0; col < binned_.cols(); ++col) {
+      std::array<int, 256> counts{};
+      int most = 0;
+      for_each_taken(row, col, [&](Eigen::Index v, Eigen::Index u) {
+        const std::uint8_t level = levels(v, u);
+        if (++counts[level] <= most) return;
+        most = counts[level];
+        result(row, col) = level;
+      });
+    }
+  });
+  return result;
+}
+
+MaskImage PixelBinning::majority(const MaskImage& mask) const {
+  MaskImage result(binned_.rows(), binned_.cols());
+  for (Eigen::Index row = 0; row < result.rows(); ++row) {
+    for (Eigen::Index col = 0; col < result.cols(); ++col) {
+      const auto block = mask.block(row * factor_, col * factor_, factor_, factor_);
+      result(row, col) = 2 * (block != 0).count() >= block.size() ? 1 : 0;
+    }
+  }
+  return result;
+}
+
+}  // namespace nacre
