@@ -48,4 +48,6 @@ void bind_mesh(py::module_& m) {
       .def_property_readonly("lower", &MeshTree::lower)
       .def_property_readonly("upper", &MeshTree::upper);
   m.def("built_in_object", &make_built_in_object);
+  m.def("triangulate", &nacre::triangulate, py::arg("points"), py::arg("normals"), py::arg("num_threads"),
+        ReleaseGil());
 }

@@ -1024,5 +1024,10 @@ def simulate_depth(
     world_from_camera: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[4, 4]"],
     options: SimulationOptions,
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"]: ...
+def triangulate(
+    points: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
+    normals: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]"]: ...
 
 __version__: str = "0.1.0"

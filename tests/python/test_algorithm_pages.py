@@ -136,8 +136,9 @@ CONSTANTS = [
     ("objects", "0.75 of those", "tracking/limits.hpp", "least_view_consistency = 0.75"),
     ("objects", "At least 25 pairs", "outlines/limits.hpp", "least_matches = 25"),
     ("objects", "0.6 of both outlines", "outlines/limits.hpp", "least_agreement = 0.6"),
-    ("meshing", "$2.5 s$", "../../python/nacre/meshing.py", "_BAND = 2.5"),
-    ("meshing", "$1.5 s$", "../../python/nacre/meshing.py", "_REACH = 1.5"),
+    ("meshing", "$1.75 s$", "mesh/limits.hpp", "largest_circle = 1.75"),
+    ("meshing", "20 nearest", "mesh/limits.hpp", "most_neighbors = 20"),
+    ("meshing", "up to ten edges", "mesh/limits.hpp", "longest_hole = 10"),
     ("simulation", "over 8 x 8 rays", "simulation/limits.hpp", "rays_per_radius = 4"),
     ("neighbours", "blocks of 16", "simd/tree_layout.hpp", "block_points = 16"),
 ]

@@ -6,6 +6,7 @@ import io
 import math
 import pickle
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -33,6 +34,18 @@ def test_numpy_takes_the_model_for_its_points(model: nacre.Model) -> None:
 def test_its_memory_is_not_shared(model: nacre.Model) -> None:
     with pytest.raises(ValueError, match="copy must be True or None"):
         model.__array__(copy=False)
+
+
+def test_triangles_join_the_points(model: nacre.Model, tmp_path: Path) -> None:
+    mesh = model.to_mesh(num_threads=1)
+    assert 1.5 * len(model) < len(mesh.triangles) < 2 * len(model)
+    assert np.isin(mesh.vertices, model.points).all()
+    nacre.write_mesh(tmp_path / "mesh.ply", mesh)
+    assert np.array_equal(nacre.read_mesh(tmp_path / "mesh.ply").triangles, mesh.triangles)
+    with pytest.raises(ValueError, match="triangles must not be given with a Mesh"):
+        nacre.write_mesh(tmp_path / "mesh.ply", mesh, mesh.triangles)
+    with pytest.raises(TypeError, match="triangles must be an array of indices, got None"):
+        nacre.write_mesh(tmp_path / "mesh.ply", mesh.vertices)
 
 
 def test_open3d_gets_points_normals_and_colours(model: nacre.Model, monkeypatch: pytest.MonkeyPatch) -> None:

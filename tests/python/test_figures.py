@@ -31,7 +31,6 @@ def draw(*arguments: object) -> subprocess.CompletedProcess[str]:
 @pytest.mark.slow
 def test_every_picture_is_drawn(tmp_path: Path) -> None:
     image = pytest.importorskip("PIL.Image")
-    pytest.importorskip("skimage")
     done = draw("--out", tmp_path)
     assert done.returncode == 0, done.stderr
     drawn = {path.name for path in tmp_path.iterdir()}

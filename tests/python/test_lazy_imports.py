@@ -24,7 +24,6 @@ HEAVY = {
     "open3d",
     "rosbags",
     "scipy",
-    "skimage",
     "trimesh",
     "viser",
     "websockets",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +10,7 @@ import pytest
 
 import nacre
 from nacre.cli import main
-
-pytest.importorskip("skimage")
-from nacre.meshing import mesh_points
+from nacre.meshing import mesh_points, triangulate
 
 
 def sphere(n: int, radius: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
@@ -37,86 +34,138 @@ def triangle_normals(mesh: nacre.Mesh) -> np.ndarray:
     return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-30)
 
 
+def is_manifold(triangles: np.ndarray) -> bool:
+    """Whether each edge has at most one triangle on each side."""
+    ends = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
+    return len(np.unique(ends, axis=0)) == len(ends)
+
+
 def test_a_sphere_is_closed_round_and_faces_outwards() -> None:
-    mesh = mesh_points(*sphere(6000))
+    points, normals = sphere(6000)
+    triangles = triangulate(points, normals)
+    mesh = nacre.Mesh(points, triangles)
+    assert is_manifold(triangles)
     assert (edges(mesh) == 2).all()
-    assert len(mesh.vertices) - len(edges(mesh)) + len(mesh.triangles) == 2  # Euler
-    assert np.abs(np.linalg.norm(mesh.vertices, axis=1) - 0.1).max() < 1e-4
-    middles = mesh.vertices[mesh.triangles].mean(axis=1)
-    outwards = np.einsum("ij,ij->i", triangle_normals(mesh), middles)
-    assert (outwards > 0).mean() > 0.999
+    assert len(points) - len(edges(mesh)) + len(triangles) == 2  # Euler: every point is a corner
+    middles = points[triangles].mean(axis=1)
+    assert (np.einsum("ij,ij->i", triangle_normals(mesh), middles) > 0.09).all()
+    assert np.linalg.norm(middles, axis=1).min() > 0.1 - 2e-4
+
+
+def test_they_are_delaunay() -> None:
+    from scipy.spatial import Delaunay
+
+    rng = np.random.default_rng(0)
+    places = np.stack(np.meshgrid(np.arange(30.0), np.arange(30.0)), axis=-1).reshape(-1, 2)
+    places += rng.uniform(-0.3, 0.3, places.shape)
+    points = np.column_stack([places, np.zeros(len(places))])
+    found = {tuple(sorted(t)) for t in triangulate(points, np.tile([0, 0, 1.0], (len(points), 1))).tolist()}
+    inner = ((places > 3) & (places < 26)).all(axis=1)
+    expected = {tuple(sorted(t)) for t in Delaunay(places).simplices.tolist() if inner[t].all()}
+    assert expected <= found
+    assert all(t in expected for t in found if inner[list(t)].all())
 
 
 def test_a_plane_ends_where_its_points_do() -> None:
+    """On a grid four points lie on a circle, and either diagonal is right."""
     x, y = np.meshgrid(np.linspace(0, 0.1, 41), np.linspace(0, 0.05, 21))
     points = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
-    mesh = mesh_points(points, np.tile([0, 0, 1.0], (len(points), 1)))
-    assert np.abs(mesh.vertices[:, 2]).max() < 1e-9
-    low, high = mesh.bounds
-    assert np.allclose(low[:2], [0, 0], atol=0.006)
-    assert np.allclose(high[:2], [0.1, 0.05], atol=0.006)
-    assert (edges(mesh) <= 2).all()
+    mesh = mesh_points(points, np.tile([0, 0, 2.0], (len(points), 1)))
+    assert len(mesh.triangles) == 2 * 40 * 20
+    assert is_manifold(mesh.triangles)
+    assert np.allclose(triangle_normals(mesh), [0, 0, 1])
+    assert np.array_equal(mesh.vertices, points)
+
+
+def test_what_was_not_seen_stays_open_and_small_holes_are_closed() -> None:
+    x, y = np.meshgrid(np.arange(40.0), np.arange(40.0))
+    flat = np.stack([x + 0.5 * (y % 2), 0.866 * y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
+    up = np.tile([0, 0, 1.0], (len(flat), 1))
+    far = np.linalg.norm(flat - (20, 17, 0), axis=1)
+    area = {}
+    for name, kept in {"whole": far > -1, "one missing": far > 0.6, "a hole": far > 6}.items():
+        mesh = mesh_points(flat[kept], up[kept])
+        a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
+        is_inner = np.linalg.norm((a + b + c) / 3 - (20, 17, 0), axis=1) < 12
+        area[name] = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)[is_inner].sum()
+    assert area["one missing"] == pytest.approx(area["whole"], rel=0.005)
+    assert area["a hole"] == pytest.approx(area["whole"] - math.pi * 6**2, rel=0.1)
 
 
 def test_two_sides_of_a_thin_sheet_stay_two() -> None:
     x, y = np.meshgrid(np.linspace(0, 0.1, 41), np.linspace(0, 0.1, 41))
     flat = np.stack([x, y, np.zeros_like(x)], axis=-1).reshape(-1, 3)
     up = np.tile([0, 0, 1.0], (len(flat), 1))
-    mesh = mesh_points(np.concatenate([flat, flat - [0, 0, 0.0035]]), np.concatenate([up, -up]), cell=0.001)
-    heights = mesh.vertices[:, 2]
-    inside = (np.abs(mesh.vertices[:, :2] - 0.05) < 0.04).all(axis=1)
-    assert np.minimum(np.abs(heights), np.abs(heights + 0.0035))[inside].max() < 2e-4
+    triangles = triangulate(np.concatenate([flat, flat - [0, 0, 0.001]]), np.concatenate([up, -up]))
+    assert ((triangles < len(flat)).sum(axis=1) % 3 == 0).all()
+    assert len(triangles) == 2 * 2 * 40 * 40
 
 
-def test_smaller_cells_give_more_triangles_of_the_same_surface() -> None:
-    points, normals = sphere(3000)
-    coarse, fine = (mesh_points(points, normals, cell=cell) for cell in (0.006, 0.003))
-    assert 3 * len(coarse.triangles) < len(fine.triangles)
-    assert np.abs(np.linalg.norm(fine.vertices, axis=1) - 0.1).max() < 2e-4
+def test_far_from_the_origin_it_is_the_same() -> None:
+    points, normals = sphere(2000)
+    far = np.array([4e6, 5e6, 100.0])
+    there = points + far
+    assert np.array_equal(triangulate(there, normals), triangulate(there - far, normals))
+    assert mesh_points(there, normals).vertices.dtype == np.float64
 
 
 def test_points_that_are_not_finite_do_not_count() -> None:
     points, normals = sphere(3000)
     points[::100] = np.nan
-    assert len(mesh_points(points, normals).triangles) > 1000
+    normals[1::100] = 0
+    triangles = triangulate(points, normals)
+    assert not np.isin(triangles, np.concatenate([np.arange(0, 3000, 100), np.arange(1, 3000, 100)])).any()
+    mesh = mesh_points(points, normals)
+    assert len(mesh.vertices) == 2940
+    assert np.array_equal(mesh.vertices[0], points[2])
 
 
-def test_any_number_of_threads_gives_the_same_mesh() -> None:
-    one, two = (mesh_points(*sphere(2000), num_threads=n) for n in (1, 2))
-    assert np.array_equal(one.vertices, two.vertices)
-    assert np.array_equal(one.triangles, two.triangles)
+def test_points_in_one_place_make_no_triangle_without_an_area() -> None:
+    points, normals = sphere(2000)
+    mesh = mesh_points(np.repeat(points, 2, axis=0), np.repeat(normals, 2, axis=0))
+    assert is_manifold(mesh.triangles)
+    assert np.linalg.norm(triangle_normals(mesh), axis=1).min() > 0.5
+    assert len(mesh.triangles) > 3000
+
+
+def test_any_number_of_threads_gives_the_same_triangles() -> None:
+    points, normals = sphere(5000)
+    points += np.random.default_rng(0).normal(0, 0.0005, points.shape)
+    one = triangulate(points, normals, num_threads=1)
+    assert is_manifold(one)
+    for n in (2, 5):
+        assert np.array_equal(one, triangulate(points, normals, num_threads=n))
 
 
 @pytest.mark.parametrize(
-    ("points", "normals", "more", "message"),
+    ("points", "normals", "message"),
     [
-        (sphere(5)[0], sphere(5)[1], {}, "points must be at least 12 finite ones, got 5"),
-        (sphere(50)[0], sphere(40)[1], {}, r"normals must have one row per point \(50\), got 40"),
-        (*sphere(50), {"cell": -1.0}, r"cell must be positive \[m\], got -1.0"),
-        (*sphere(50), {"cell": math.nan}, r"cell must be positive"),
-        (*sphere(50), {"cell": 5.0}, "points are too sparse for cells of 5 m"),
+        (sphere(5)[0], sphere(5)[1], "points are too few for a surface"),
+        (*np.zeros((2, 0, 3)), "points are too few for a surface"),
+        (*np.zeros((2, 50, 3)), "points are too few for a surface"),
+        (sphere(50)[0], sphere(40)[1], r"normals must have one row per point of points \(50\), got 40"),
+        (np.zeros((3, 2)), np.zeros((3, 2)), "points must have shape"),
     ],
 )
-def test_misuse(points: np.ndarray, normals: np.ndarray, more: dict[str, float], message: str) -> None:
+def test_misuse(points: np.ndarray, normals: np.ndarray, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        mesh_points(points, normals, **more)
-
-
-def test_without_scikit_image_one_line_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "skimage.measure", None)
-    with pytest.raises(ImportError, match=r'pip install "nacre\[mesh\]"'):
-        mesh_points(*sphere(100))
+        mesh_points(points, normals)
 
 
 class TestCommand:
     def test_it_writes_the_mesh(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         points, normals = sphere(2000)
-        nacre.write_points(tmp_path / "model.ply", points, normals=normals)
+        colors = np.arange(6000).reshape(-1, 3) % 256
+        nacre.write_points(tmp_path / "model.ply", points, normals=normals, colors=colors)
         with pytest.raises(SystemExit) as end:
             main(["mesh", str(tmp_path)])
         assert not end.value.code
         mesh = nacre.read_mesh(tmp_path / "mesh.ply")
         assert f"triangles  {len(mesh.triangles)}" in capsys.readouterr().out
+        assert len(mesh.triangles) == 3996
+        corners = nacre.read_points(tmp_path / "mesh.ply")
+        assert np.array_equal(corners.colors, colors)
+        assert np.allclose(corners.normals, normals)
 
     def test_points_without_normals_are_refused(
         self, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -215,7 +215,6 @@ LAZY = {
     "jinja2": ("nacre.report.render_page(nacre.report.ReportData('empty'))", 'pip install "nacre[report]"'),
     "OpenEXR": ("nacre.io.images.read_depth('a.exr')", 'pip install "nacre[exr]"'),
     "rosbags": ("nacre.open_sequence('a.bag')", 'pip install "nacre[ros]"'),
-    "skimage": ("mesh_points(np.eye(3), np.eye(3))", 'pip install "nacre[mesh]"'),
     "viser": ("nacre.viewer.Viewer(None)", 'pip install "nacre[view]"'),
     "open3d": ("model.to_open3d()", "pip install open3d"),
     "trimesh": ("model.to_trimesh()", "pip install trimesh"),
@@ -231,7 +230,6 @@ def test_a_missing_package_comes_with_the_command_that_brings_it(package: str, t
     program = f"""
 import os, sys; sys.modules[{package!r}] = None
 import numpy as np, nacre, nacre.io.images, nacre.report, nacre.viewer
-from nacre.meshing import mesh_points
 os.chdir({str(tmp_path)!r})
 model = nacre.Model(nacre.Camera(8, 8, 8, 8, 4, 4))
 {call}

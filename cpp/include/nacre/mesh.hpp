@@ -26,6 +26,12 @@ struct Mesh {
 /// symmetry.
 Mesh built_in_object();
 
+/// Triangles that join points with normals, counter-clockwise seen from where the normals point; indices of the points,
+/// which are its corners as they are. Where points are farther apart than their neighbours are, as where nothing was
+/// seen, it is open. Each edge has one triangle on each side at most. Points that are not finite have none. Normals
+/// need not be of unit length. Gopi, Krishnan and Silva 2000. num_threads = 0 uses all; no result depends on it.
+Triangles triangulate(const PointsRef& points, const PointsRef& normals, int num_threads = 0);
+
 /// A bounding volume hierarchy over a mesh; immutable, so any number of threads may ask it. Distances and intersections
 /// are computed in double precision from the float vertices.
 class MeshTree {

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from nacre.mesh import Mesh
 
 
 class ExchangeablePoints(ABC):
@@ -26,6 +29,24 @@ class ExchangeablePoints(ABC):
     @abstractmethod
     def colors(self) -> npt.NDArray[np.uint8] | None:
         """(N, 3), or None."""
+
+    def to_mesh(self, *, num_threads: int = 0) -> Mesh:
+        """
+        Return triangles that join the points; see :func:`nacre.meshing.triangulate`.
+
+        Parameters
+        ----------
+        num_threads : int
+            0 uses all.
+
+        Raises
+        ------
+        ValueError
+            When there are too few points for a surface.
+        """
+        from nacre.meshing import mesh_points
+
+        return mesh_points(self.points, self.normals, num_threads=num_threads)
 
     def to_open3d(self) -> Any:
         """

@@ -23,10 +23,6 @@ def mesh(
         Path | None,
         typer.Option("--out", "-o", metavar="MESH", help="The file to write.", show_default="OUT/mesh.ply"),
     ] = None,
-    cell: Annotated[
-        float | None,
-        typer.Option(help="Edge of the grid's cells (metres).", show_default="the points' distance"),
-    ] = None,
     json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
@@ -34,11 +30,11 @@ def mesh(
     """
     Lay triangles over a model, for programs that need them.
 
-    The mesh is open where the model has no points. It needs the extra "mesh".
+    Their corners are its points, with normals and colours. The mesh is open where the model has no points.
     """
     terminal = Terminal(json, quiet, verbose)
     from nacre import read_points, write_mesh
-    from nacre.meshing import mesh_points
+    from nacre.meshing import triangulate, used_rows
 
     path = written_file(source, "model.ply") if source.is_dir() else source
     target = writable_file(out or path.with_name("mesh.ply"))
@@ -47,8 +43,12 @@ def mesh(
     cloud = read_points(path)
     if cloud.normals is None:
         raise CommandError(f"{path} has no normals: give a model of nacre reconstruct")
-    made = mesh_points(cloud.points, cloud.normals, cell=cell)
-    write_mesh(target, made.vertices, made.triangles)
-    figures = {"mesh": str(target), "vertices": len(made.vertices), "triangles": len(made.triangles)}
+    triangles = triangulate(cloud.points, cloud.normals)
+    if not len(triangles):
+        raise CommandError(f"{path} has too few points for a surface, or normals that contradict it")
+    rows, corners = used_rows(triangles)
+    colors = None if cloud.colors is None else cloud.colors[rows]
+    write_mesh(target, cloud.points[rows], corners, normals=cloud.normals[rows], colors=colors)
+    figures = {"mesh": str(target), "vertices": len(rows), "triangles": len(corners)}
     if not quiet:
         terminal.answer(figures, [(name, str(value)) for name, value in figures.items()])

@@ -14,8 +14,8 @@ import numpy.typing as npt
 
 from nacre._internal import arrays
 from nacre.errors import FileFormatError
-from nacre.io.cloud import Columns
-from nacre.io.ply import read_ply, write_ply
+from nacre.io.cloud import Columns, check_cloud
+from nacre.io.ply import read_ply, vertex_columns, write_ply
 from nacre.io.ply_tables import Ragged
 from nacre.io.raw import excerpt, read_file
 
@@ -81,9 +81,11 @@ def read_mesh_arrays(path: str | os.PathLike[str]) -> MeshArrays:
 
 def write_mesh(
     path: str | os.PathLike[str],
-    vertices: npt.ArrayLike,
-    triangles: npt.ArrayLike,
+    vertices: npt.ArrayLike | Mesh,
+    triangles: npt.ArrayLike | None = None,
     *,
+    normals: npt.ArrayLike | None = None,
+    colors: npt.ArrayLike | None = None,
     comments: Sequence[str] = (),
     binary: bool = True,
 ) -> None:
@@ -94,10 +96,14 @@ def write_mesh(
     ----------
     path : path-like
         A ``.ply`` file.
-    vertices : (N, 3) array
+    vertices : Mesh, or (N, 3) array
         float32 is stored as float, everything else as double.
     triangles : (M, 3) array of integers
-        Indices of the corners, counted from 0.
+        Indices of the corners, counted from 0; not with a Mesh, which has its own.
+    normals : (N, 3) array, optional
+        Of the vertices; stored by the same rule.
+    colors : (N, 3) array of integers from 0 to 255, optional
+        Red, green, blue of the vertices.
     comments : sequence of str
         Lines for the header.
     binary : bool
@@ -112,12 +118,18 @@ def write_mesh(
     """
     if Path(path).suffix.lower() != ".ply":
         raise ValueError(f"meshes are written to .ply files, got {os.fspath(path)!r}")
+    from nacre.mesh import Mesh
+
+    if isinstance(vertices, Mesh):
+        if triangles is not None:
+            raise ValueError("triangles must not be given with a Mesh, which has its own")
+        triangles, vertices = vertices.triangles, vertices.vertices
+    if triangles is None:
+        raise TypeError("triangles must be an array of indices, got None")
     points = arrays.as_points("vertices", vertices)
     corners = arrays.as_triangles("triangles", triangles, len(points))
-    tables: dict[str, Columns] = {
-        "vertex": {name: points[:, i] for i, name in enumerate(("x", "y", "z"))},
-        "face": {"vertex_indices": corners},
-    }
+    columns = vertex_columns(check_cloud(points, normals, colors, None))
+    tables: dict[str, Columns] = {"vertex": columns, "face": {"vertex_indices": corners}}
     write_ply(path, tables, comments=comments, binary=binary)
 
 

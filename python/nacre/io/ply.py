@@ -175,14 +175,19 @@ def write_cloud(
     binary: bool = True,
 ) -> None:
     """Write points as a PLY file; :func:`nacre.write_points` has the parameters."""
-    cloud = check_cloud(points, normals, colors, attributes)
+    columns = vertex_columns(check_cloud(points, normals, colors, attributes))
+    write_ply(path, {"vertex": columns}, comments=comments, binary=binary)
+
+
+def vertex_columns(cloud: Cloud) -> Columns:
+    """Return what is written of each point."""
     columns: Columns = {name: cloud.points[:, i] for i, name in enumerate(("x", "y", "z"))}
     if cloud.normals is not None:
         columns.update({name: cloud.normals[:, i] for i, name in enumerate(("nx", "ny", "nz"))})
     if cloud.colors is not None:
         columns.update({name: cloud.colors[:, i] for i, name in enumerate(("red", "green", "blue"))})
     storable = {name: _storable(name, array) for name, array in cloud.attributes.items()}
-    write_ply(path, {"vertex": with_attributes(columns, storable)}, comments=comments, binary=binary)
+    return with_attributes(columns, storable)
 
 
 def _storable(name: str, array: npt.NDArray[Any]) -> npt.NDArray[Any]:
