@@ -367,7 +367,10 @@ def run_model(seed: int, trial: int, largest: int, most_frames: int, told: colle
     rng = np.random.default_rng([seed, trial])
     camera = random_camera(rng, *random_size(rng, largest))
     scale = float(rng.choice([1.0, 1.0, 1.0, 1000.0, 5000.0]))
-    model = nacre.Model(camera, depth_scale=scale, **random_changes(rng))
+    changes = random_changes(rng)
+    if camera.model == "orthographic":
+        changes.pop("binning", None)
+    model = nacre.Model(camera, depth_scale=scale, **changes)
     scene = Scene(rng, camera)
     slowest = 0.0
     for _ in range(int(rng.integers(1, most_frames + 1))):

@@ -51,7 +51,8 @@ struct FrameReport : TrackingReport {
   StepTimes milliseconds;
 };
 
-/// The reports of a model's frames, oldest first; each is made when it is asked for. Valid as long as the model.
+/// The reports of a model's frames, oldest first; each is made when it is asked for. Valid until the next frame is
+/// added.
 class FrameReports {
  public:
   std::size_t size() const { return size_; }

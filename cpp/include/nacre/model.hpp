@@ -31,7 +31,8 @@ class Model {
   /// not fit or the depth scale cannot be right, before anything is changed.
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras = {});
 
-  const Camera& camera() const;
+  Camera camera() const;  ///< as given
+  // References are valid until the next frame is added.
   const ModelOptions& options() const;        ///< with what the first frame decided
   const ModelOptions& given_options() const;  ///< as given
   const PointModel& cloud() const;            ///< in the world frame

@@ -41,7 +41,7 @@ FrameReport Model::add_frame(const DepthRef& depth, const FrameExtras& extras) {
   return report;
 }
 
-const Camera& Model::camera() const { return pipeline_->given_camera; }
+Camera Model::camera() const { return pipeline_->given_camera; }
 const ModelOptions& Model::options() const { return pipeline_->options; }
 const ModelOptions& Model::given_options() const { return pipeline_->given; }
 const PointModel& Model::cloud() const { return pipeline_->cloud; }
