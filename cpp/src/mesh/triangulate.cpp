@@ -143,10 +143,10 @@ class Triangulation {
     }
     for (const Corners& corners : doubtful) add(corners, edges);
     for (const Corners& corners : lone) {
-      int num_shared = 0;
-      for (std::size_t k = 0; k < 3; ++k) num_shared += edges.has(corners[(k + 1) % 3], corners[k]) ? 1 : 0;
-      if (num_shared >= 2) add(corners, edges);
+      if (num_shared(corners, edges) >= 2) add(corners, edges);
     }
+    const auto is_flake = [&](const Corners& corners) { return num_shared(corners, edges) == 0; };
+    triangles_.erase(std::remove_if(triangles_.begin(), triangles_.end(), is_flake), triangles_.end());
     close_holes(edges);
     return std::move(triangles_);
   }
@@ -208,6 +208,13 @@ class Triangulation {
         lone.push_back({i, a, b});
       }
     }
+  }
+
+  // Edges that have a triangle on their other side.
+  static int num_shared(const Corners& corners, const EdgeSet& edges) {
+    int count = 0;
+    for (std::size_t k = 0; k < 3; ++k) count += edges.has(corners[(k + 1) % 3], corners[k]) ? 1 : 0;
+    return count;
   }
 
   // Where none of its edges is another's.
