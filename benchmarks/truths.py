@@ -39,6 +39,7 @@ RADIUS = 0.04
 class Placed:
     """Points of the claimed frames in the cameras' frames, and both poses of each."""
 
+    indices: Array  # of the frames
     points: list[Array]
     ours: Array
     truths: Array
@@ -67,17 +68,17 @@ def placed(case: cases.Case) -> Placed:
         seen = seen[np.isfinite(seen).all(axis=-1) & (seen[:, 2] < 2.5 * depth)]
         points.append(rng.permutation(seen)[:POINTS_OF_FRAME])
     right = (shifts < largest) & (turns < cases.RIGHT_TURN)
-    return Placed(points, ours, truths, right, len(case.depths) // 5, depth)
+    return Placed(np.array(claimed), points, ours, truths, right, len(case.depths) // 5, depth)
 
 
-def thickness(found: Placed, poses: Array, queries: Array, frames: Array) -> Array:
+def thickness(found: Placed, poses: Array, queries: Array, owners: Array) -> Array:
     """Return the thickness of the surface around some points [m]; NaN where no visits meet."""
     world = np.concatenate(
         [p @ pose[:3, :3].T + pose[:3, 3] for p, pose in zip(found.points, poses, strict=True)]
     )
     distances, indices = nacre.KdTree(world).query(world[queries], k=64)
     near = distances < RADIUS * found.depth
-    seen = frames[indices]
+    seen = found.indices[owners[indices]]
     visits = np.where(near, seen, -1).max(1) - np.where(near, seen, 10**9).min(1)
     result = np.full(len(queries), np.nan)
     for i in np.flatnonzero((near.sum(1) >= 12) & (visits >= found.apart)):
@@ -122,12 +123,12 @@ def rows(names: list[str]) -> Iterator[list[str]]:
     """Return a row of the table for each recording."""
     for name in names:
         found = placed(cases.make(name))
-        frames = np.repeat(np.arange(len(found.points)), [len(p) for p in found.points])
-        queries = np.random.default_rng(1).permutation(len(frames))[:QUERIES]
-        ours, theirs = (thickness(found, poses, queries, frames) for poses in (found.ours, found.truths))
+        owners = np.repeat(np.arange(len(found.points)), [len(p) for p in found.points])
+        queries = np.random.default_rng(1).permutation(len(owners))[:QUERIES]
+        ours, theirs = (thickness(found, poses, queries, owners) for poses in (found.ours, found.truths))
         both = np.isfinite(ours) & np.isfinite(theirs)
         cells = [name, f"{found.right.sum()} / {len(found.right)}"]
-        for some in (both, both & ~found.right[frames[queries]]):
+        for some in (both, both & ~found.right[owners[queries]]):
             pair = (
                 [1e3 * np.sqrt(np.mean(values[some] ** 2)) for values in (ours, theirs)] if some.any() else []
             )

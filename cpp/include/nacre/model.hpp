@@ -19,7 +19,7 @@ struct Pipeline;
 
 /// A 3D model that grows with every depth frame. The world is the first camera's frame unless the first frame comes
 /// with a guess. Frames that cannot be registered change nothing; where the first explains no other, three frames in a
-/// row that explain each other begin the model anew.
+/// row that explain each other begin the model anew. References to what it has are valid until the next frame is added.
 class Model {
  public:
   explicit Model(const Camera& camera, const ModelOptions& options = {});
@@ -31,8 +31,7 @@ class Model {
   /// not fit or the depth scale cannot be right, before anything is changed.
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras = {});
 
-  Camera camera() const;  ///< as given
-  // References are valid until the next frame is added.
+  Camera camera() const;                      ///< as given
   const ModelOptions& options() const;        ///< with what the first frame decided
   const ModelOptions& given_options() const;  ///< as given
   const PointModel& cloud() const;            ///< in the world frame

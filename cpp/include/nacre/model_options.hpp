@@ -43,14 +43,15 @@ struct ModelOptions : TrackingOptions {
   FusionMethod fusion_method = FusionMethod::fuse;
   FusionOptions fusion;
   WlopOptions wlop;
-  int binning =
-      0;  ///< of a pinhole camera, each so many by so many pixels are averaged to one before all else; 1: none;
-          ///< 0: as few as leave 100 000 measured pixels of the first image; 1 where the unit of depth is coarser
+  /// Of a pinhole camera, each so many by so many pixels are averaged to one before all else. 1: none; 0: as few as
+  /// leave 100 000 measured pixels of the first image, none where its unit of depth is coarser or a region is asked
+  /// for.
+  int binning = 0;
   bool calibrate_depth = true;  ///< of a pinhole camera that looks at one scene, depth along its axis: find and correct
                                 ///< its systematic error (depth_calibration.hpp)
-  double spacing =
-      0.0;  ///< distance between model points [m]; 0: twice the camera's pixel on the first frame's nearer
-            ///< surfaces; new points are also at least 1.5 pixels apart in their frame, and an averaged one
+  /// Distance between model points [m]. 0: twice the camera's pixel on the first frame's nearer surfaces; new points
+  /// are also at least 1.5 pixels apart in their frame, and an averaged one.
+  double spacing = 0.0;
   int max_points = 500000;  ///< the model never grows beyond: its spacing is widened instead
 
   /// "default" (what measures best) or "paper" (the 2010 paper's algorithm and numbers, alone);

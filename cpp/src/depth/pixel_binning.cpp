@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
 #include <limits>
 #include <vector>
 
@@ -13,16 +14,6 @@
 #include "depth/limits.hpp"
 
 namespace nacre {
-namespace {
-
-template <class Iterator>
-float harmonic_mean(Iterator first, Iterator last) {
-  float sum = 0.0F;
-  for (Iterator z = first; z != last; ++z) sum += 1.0F / *z;
-  return static_cast<float>(last - first) / sum;
-}
-
-}  // namespace
 
 int binning_for(const DepthRef& depth, const MaskRef& mask, const Camera& camera) {
   require_camera_size("depth", depth.rows(), depth.cols(), camera);
@@ -50,38 +41,38 @@ PixelBinning::PixelBinning(const DepthRef& depth, const Camera& camera, int fact
       factor_(factor),
       num_threads_(num_threads),
       binned_(depth.rows() / factor, depth.cols() / factor) {
-  const std::size_t block_size = static_cast<std::size_t>(factor_) * static_cast<std::size_t>(factor_);
   parallel_blocks(binned_.rows(), rows_per_block(depth_.cols()), num_threads_,
                   [&](std::int64_t, std::int64_t begin, std::int64_t end) {
-                    std::vector<float> values(block_size), sorted;
+                    std::vector<float> values, sorted;
                     for (Eigen::Index row = begin; row < end; ++row) {
                       for (Eigen::Index col = 0; col < binned_.cols(); ++col) {
-                        std::size_t count = 0;
-                        for (Eigen::Index v = row * factor_; v < (row + 1) * factor_; ++v) {
-                          const float* pixel = depth_.data() + v * depth_.outerStride() + col * factor_;
-                          for (int k = 0; k < factor_; ++k) {
-                            if (is_measurement(pixel[k])) values[count++] = pixel[k];
-                          }
-                        }
-                        float& mean = binned_(row, col);
-                        mean = std::numeric_limits<float>::quiet_NaN();
-                        if (2 * count < block_size) continue;
-                        const auto first = values.begin(), last = first + static_cast<std::ptrdiff_t>(count);
-                        const auto [nearest, farthest] = std::minmax_element(first, last);
-                        if (*farthest - *nearest <= gate_slope_ * *nearest) {
-                          mean = harmonic_mean(first, last);
-                          continue;
-                        }
-                        sorted.assign(first, last);
-                        std::sort(sorted.begin(), sorted.end());
-                        const float median = 0.5F * (sorted[(count - 1) / 2] + sorted[count / 2]);
-                        const auto end_taken = std::remove_if(
-                            first, last, [&](float z) { return std::abs(z - median) > gate_slope_ * median; });
-                        if (2 * (end_taken - first) >= static_cast<std::ptrdiff_t>(block_size))
-                          mean = harmonic_mean(first, end_taken);
+                        binned_(row, col) = mean_depth(row, col, values, sorted);
                       }
                     }
                   });
+}
+
+float PixelBinning::mean_depth(Eigen::Index row, Eigen::Index col, std::vector<float>& values,
+                               std::vector<float>& sorted) const {
+  values.clear();
+  for (Eigen::Index v = row * factor_; v < (row + 1) * factor_; ++v) {
+    const float* pixel = depth_.data() + v * depth_.outerStride() + col * factor_;
+    std::copy_if(pixel, pixel + factor_, std::back_inserter(values), is_measurement);
+  }
+  const std::size_t size = static_cast<std::size_t>(factor_) * static_cast<std::size_t>(factor_);
+  if (2 * values.size() < size) return std::numeric_limits<float>::quiet_NaN();
+  const auto [nearest, farthest] = std::minmax_element(values.begin(), values.end());
+  if (*farthest - *nearest > gate_slope_ * *nearest) {
+    sorted = values;
+    std::sort(sorted.begin(), sorted.end());
+    const float median = 0.5F * (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]);
+    const auto is_other = [&](float z) { return std::abs(z - median) > gate_slope_ * median; };
+    values.erase(std::remove_if(values.begin(), values.end(), is_other), values.end());
+    if (2 * values.size() < size) return std::numeric_limits<float>::quiet_NaN();
+  }
+  float sum = 0.0F;
+  for (const float z : values) sum += 1.0F / z;
+  return static_cast<float>(values.size()) / sum;
 }
 
 template <class Visit>

@@ -1,6 +1,8 @@
 // Images of fewer, larger pixels: each the mean of a block of the camera's.
 #pragma once
 
+#include <vector>
+
 #include "nacre/camera.hpp"
 #include "nacre/depth.hpp"
 
@@ -26,6 +28,7 @@ class PixelBinning {
   MaskImage majority(const MaskImage& mask) const;
 
  private:
+  float mean_depth(Eigen::Index row, Eigen::Index col, std::vector<float>& values, std::vector<float>& sorted) const;
   // visit(v, u) for each pixel of a block whose depth was taken.
   template <class Visit>
   void for_each_taken(Eigen::Index row, Eigen::Index col, Visit&& visit) const;
