@@ -48,6 +48,20 @@ def test_triangles_join_the_points(model: nacre.Model, tmp_path: Path) -> None:
         nacre.write_mesh(tmp_path / "mesh.ply", mesh.vertices)
 
 
+def test_a_cloud_has_what_a_surface_has(model: nacre.Model) -> None:
+    rows = nacre.meshing.on_surface(model.points, model.normals, model.confidence)
+    cloud, everything = model.cloud(), model.cloud(all_points=True)
+    assert 0.9 < rows.mean() < 1
+    assert np.array_equal(everything.points, model.points)
+    assert np.array_equal(cloud.points, model.points[rows])
+    assert cloud.normals is not None
+    assert cloud.colors is not None
+    assert np.array_equal(cloud.normals, model.normals[rows])
+    assert np.array_equal(cloud.colors, model.colors[rows])
+    assert np.array_equal(cloud.attributes["confidence"], model.confidence[rows])
+    assert np.array_equal(cloud.attributes["last_seen"], model.last_seen[rows])
+
+
 def test_open3d_gets_points_normals_and_colours(model: nacre.Model, monkeypatch: pytest.MonkeyPatch) -> None:
     open3d = pytest.importorskip("open3d")
     cloud = model.to_open3d()

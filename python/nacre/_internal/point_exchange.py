@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 if TYPE_CHECKING:
+    from nacre.io.cloud import Cloud
     from nacre.mesh import Mesh
 
 
@@ -30,9 +31,13 @@ class ExchangeablePoints(ABC):
     def colors(self) -> npt.NDArray[np.uint8] | None:
         """(N, 3), or None."""
 
+    @abstractmethod
+    def cloud(self, *, all_points: bool = False) -> Cloud:
+        """Return the points that are a surface."""
+
     def to_mesh(self, *, num_threads: int = 0) -> Mesh:
         """
-        Return triangles that join the points; see :func:`nacre.meshing.triangulate`.
+        Return triangles that join the points of :meth:`cloud`; see :func:`nacre.meshing.triangulate`.
 
         Parameters
         ----------
@@ -46,7 +51,9 @@ class ExchangeablePoints(ABC):
         """
         from nacre.meshing import mesh_points
 
-        return mesh_points(self.points, self.normals, num_threads=num_threads)
+        cloud = self.cloud()
+        assert cloud.normals is not None
+        return mesh_points(cloud.points, cloud.normals, num_threads=num_threads)
 
     def to_open3d(self) -> Any:
         """
