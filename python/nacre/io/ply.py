@@ -23,6 +23,7 @@ from nacre.io.cloud import (
     native,
     with_attributes,
 )
+from nacre.io.mesh_arrays import MeshArrays, fan
 from nacre.io.ply_header import BYTE_ORDERS, TYPES, Header, read_header
 from nacre.io.ply_tables import Ragged, Table, read_binary_table, read_text_table
 from nacre.io.raw import TextTable, check_padding, file_writer, read_file
@@ -88,7 +89,22 @@ def _check_vertices(path: str | os.PathLike[str], header: Header) -> None:
 
 def read_cloud(path: str | os.PathLike[str]) -> Cloud:
     """Read the vertices of a PLY file; :func:`nacre.read_points` says what is returned and raised."""
+    return _vertices(read_ply(path))
+
+
+def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
+    """Read vertices and faces of a PLY file; :func:`nacre.read_mesh` says what is raised."""
     file = read_ply(path)
+    cloud = _vertices(file)
+    table = file.tables.get("face", {})
+    faces = table.get("vertex_indices", table.get("vertex_index"))
+    if not isinstance(faces, Ragged) or faces.values.dtype.kind == "f":
+        raise FileFormatError(path, "not a mesh: there is no element face with lists vertex_indices")
+    triangles = fan(path, faces.values.astype(np.int64), faces.counts.astype(np.int64), len(cloud))
+    return MeshArrays(cloud.points, triangles, cloud.normals, cloud.colors)
+
+
+def _vertices(file: PlyFile) -> Cloud:
     points = file.points()
     table = file.tables["vertex"]
     columns = scalar_columns(table)
@@ -175,11 +191,20 @@ def write_cloud(
     binary: bool = True,
 ) -> None:
     """Write points as a PLY file; :func:`nacre.write_points` has the parameters."""
-    columns = vertex_columns(check_cloud(points, normals, colors, attributes))
+    columns = _vertex_columns(check_cloud(points, normals, colors, attributes))
     write_ply(path, {"vertex": columns}, comments=comments, binary=binary)
 
 
-def vertex_columns(cloud: Cloud) -> Columns:
+def write_mesh(
+    path: str | os.PathLike[str], mesh: MeshArrays, *, comments: Sequence[str] = (), binary: bool = True
+) -> None:
+    """Write vertices and faces as a PLY file; :func:`nacre.write_mesh` has the parameters."""
+    columns = _vertex_columns(Cloud(mesh.vertices, mesh.normals, mesh.colors))
+    tables: dict[str, Columns] = {"vertex": columns, "face": {"vertex_indices": mesh.triangles}}
+    write_ply(path, tables, comments=comments, binary=binary)
+
+
+def _vertex_columns(cloud: Cloud) -> Columns:
     """Return what is written of each point."""
     columns: Columns = {name: cloud.points[:, i] for i, name in enumerate(("x", "y", "z"))}
     if cloud.normals is not None:
