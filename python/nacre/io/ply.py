@@ -16,7 +16,6 @@ from nacre.errors import FileFormatError
 from nacre.io.cloud import (
     Cloud,
     Columns,
-    check_cloud,
     check_comments,
     gather_columns,
     gather_floats,
@@ -181,18 +180,10 @@ def _read_info(file: PlyFile, name: str) -> int:
 
 
 def write_cloud(
-    path: str | os.PathLike[str],
-    points: npt.ArrayLike,
-    *,
-    normals: npt.ArrayLike | None = None,
-    colors: npt.ArrayLike | None = None,
-    attributes: Mapping[str, npt.ArrayLike] | None = None,
-    comments: Sequence[str] = (),
-    binary: bool = True,
+    path: str | os.PathLike[str], cloud: Cloud, *, comments: Sequence[str] = (), binary: bool = True
 ) -> None:
     """Write points as a PLY file; :func:`nacre.write_points` has the parameters."""
-    columns = _vertex_columns(check_cloud(points, normals, colors, attributes))
-    write_ply(path, {"vertex": columns}, comments=comments, binary=binary)
+    write_ply(path, {"vertex": _vertex_columns(cloud)}, comments=comments, binary=binary)
 
 
 def write_mesh(

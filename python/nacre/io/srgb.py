@@ -17,4 +17,4 @@ def srgb_from_linear(linear: npt.NDArray[np.floating]) -> npt.NDArray[np.uint8]:
     """Return the nearest colours of 8 bits; what is outside 0 to 1 becomes the nearer end."""
     light = np.clip(linear.astype(np.float64), 0, 1)
     encoded = np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)
-    return np.rint(255 * encoded).astype(np.uint8)
+    return np.asarray(np.rint(255 * encoded), np.uint8)
