@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -28,6 +29,8 @@ from nacre.io.ply_tables import Ragged, Table, read_binary_table, read_text_tabl
 from nacre.io.raw import TextTable, check_padding, file_writer, read_file
 from nacre.io.rows import encode_rows
 
+_log = logging.getLogger(__name__)
+
 
 @dataclass(frozen=True)
 class PlyFile:
@@ -51,6 +54,8 @@ def read_ply(path: str | os.PathLike[str]) -> PlyFile:
     """
     Read every element of a PLY file that has vertices.
 
+    Lines of the header that are none of the format's are passed over, with a warning in the log.
+
     Raises
     ------
     FileFormatError
@@ -73,6 +78,9 @@ def read_ply(path: str | os.PathLike[str]) -> PlyFile:
             order = BYTE_ORDERS[header.format]
             tables[element.name], position = read_binary_table(path, data, position, element, order)
     check_padding(path, data, position)
+    if header.stray_lines:
+        where = ", ".join(map(str, header.stray_lines[:5])) + ", ..." * (len(header.stray_lines) > 5)
+        _log.warning("%s: passed over lines of the header that are none of PLY's: %s", path, where)
     return PlyFile(Path(path), header, tables)
 
 

@@ -25,7 +25,7 @@ def read_points(path: str | os.PathLike[str]) -> Cloud:
     ----------
     path : path-like
         - ``.ply``: ascii, binary little or big endian; elements other than ``vertex`` are checked and left
-          out.
+          out. Lines of the header that are none of PLY's become comments, with a warning in the log.
         - ``.pcd``: ascii, binary, binary_compressed.
         - ``.las``, ``.laz`` (extra ``las``): any version; colours as 8 bits, all else as attributes.
         - ``.e57`` (extra ``e57``): all scans, each in its place; colours and ``intensity``.
