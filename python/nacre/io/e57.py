@@ -20,9 +20,10 @@ from nacre.io.raw import require_regular
 _log = logging.getLogger(__name__)
 
 _MISSING = 'E57 files need pye57: pip install "nacre[e57]"'
+FIELDS = ("colors", "intensity")
+"""What there is a place for beside coordinates."""
 _AXES = ("cartesianX", "cartesianY", "cartesianZ")
 _COLORS = ("colorRed", "colorGreen", "colorBlue")
-_FEWEST_BYTES = 1024  # a page of the file, of which it has one at least
 
 
 def read_cloud(path: str | os.PathLike[str]) -> Cloud:

@@ -15,6 +15,8 @@ from nacre.io.cloud import Cloud, check_cloud
 _FORMATS = {".ply": ply, ".pcd": pcd, ".las": las, ".laz": las, ".e57": e57, ".xyz": xyz, ".npz": npz}
 
 SUFFIXES = tuple(_FORMATS)
+FINITE_SUFFIXES = (".las", ".laz", ".e57")
+"""Of formats that have no points that are not finite."""
 
 
 def read_points(path: str | os.PathLike[str]) -> Cloud:
@@ -115,6 +117,11 @@ def write_points(
     require_point_suffix(path)
     cloud = check_cloud(points, normals, colors, attributes)
     _FORMATS[Path(path).suffix.lower()].write_cloud(path, cloud, comments=comments, binary=binary)
+
+
+def holds(path: str | os.PathLike[str], field: str) -> bool:
+    """Say whether the format of a file has a place for a field: normals, colors, or an attribute."""
+    return field in getattr(_FORMATS[Path(path).suffix.lower()], "FIELDS", (field,))
 
 
 def require_point_suffix(path: str | os.PathLike[str]) -> None:
