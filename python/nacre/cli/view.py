@@ -18,6 +18,12 @@ def view(
     folder: Annotated[
         Path, typer.Argument(metavar="OUT", help="What nacre reconstruct wrote.", show_default=False)
     ],
+    compare: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="OTHER", help="Another run of the same scene, to compare with.", show_default=False
+        ),
+    ] = None,
     html: Annotated[
         Path | None,
         typer.Option(
@@ -35,24 +41,28 @@ def view(
     """
     Look at a reconstruction in the browser.
 
-    The page shows the model, coloured by shading, normal, confidence or age, the camera's path, and for
-    each frame its depth image with removed pixels marked, and its figures. It needs the extra "view",
-    and --rrd the extra "rerun".
+    The page shows the model as points or as a mesh, coloured as seen or by shading, normal, confidence or
+    age, measures distances, crops and saves points, hides those of low confidence, and plays how the model
+    grew; with --compare also how far two runs are apart. --rrd needs the extra "rerun".
     """
     terminal = Terminal(False, quiet, verbose)
     from nacre.viewer import Viewer, export_html, export_rrd, read_timeline
 
     written_file(folder, "report.json")
     timeline = read_timeline(folder)
+    other = None
+    if compare is not None:
+        written_file(compare, "report.json")
+        other = read_timeline(compare)
     if html is not None:
-        export_html(timeline, html)
+        export_html(timeline, html, other=other)
         terminal.say(table([("page", str(html))]))
     if rrd is not None:
         export_rrd(timeline, rrd)
         terminal.say(table([("Rerun", str(rrd))]))
     if html is not None or rrd is not None:
         return
-    viewer = Viewer(timeline, port=port)
+    viewer = Viewer(timeline, other=other, port=port)
     terminal.say(f"the model is at {viewer.url}; Ctrl-C ends it")
     viewer.wait()
     viewer.close()

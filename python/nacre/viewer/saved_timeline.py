@@ -53,7 +53,8 @@ def read_timeline(folder: str | os.PathLike[str]) -> Timeline:
         attributes.get("confidence"),
         attributes.get("last_seen"),
     )
-    timeline.set_snapshot(cloud)
+    is_finite = np.isfinite(cloud.points).all(axis=1) & np.isfinite(cloud.normals).all(axis=1)
+    timeline.set_snapshot(cloud if is_finite.all() else cloud.rows(np.flatnonzero(is_finite), cloud.spacing))
     return timeline
 
 

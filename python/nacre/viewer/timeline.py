@@ -50,17 +50,18 @@ class Snapshot:
             model.points, model.normals, model.spacing, model.colors, model.confidence, model.last_seen
         )
 
+    def rows(self, chosen: slice | npt.NDArray[np.int64], spacing: float) -> Snapshot:
+        """Return some of the points, which are so far apart."""
+        rest = (
+            None if column is None else column[chosen].copy()
+            for column in (self.colors, self.confidence, self.last_seen)
+        )
+        return Snapshot(self.points[chosen].copy(), self.normals[chosen].copy(), spacing, *rest)
+
     def thinned(self, max_points: int) -> Snapshot:
         """Return the same with every second, third, ... point, ``max_points`` at most."""
         step = max(-(-len(self.points) // max_points), 1)
-        if step == 1:
-            return self
-        rest = (
-            None if rows is None else rows[::step].copy()
-            for rows in (self.colors, self.confidence, self.last_seen)
-        )
-        points, normals = self.points[::step].copy(), self.normals[::step].copy()
-        return Snapshot(points, normals, self.spacing * step**0.5, *rest)
+        return self if step == 1 else self.rows(slice(None, None, step), self.spacing * step**0.5)
 
 
 _FIGURES: dict[str, tuple[str, Callable[[Any], str]]] = {

@@ -1,0 +1,143 @@
+"""Which frames had which points in view, and from where to look at them first."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre import Camera
+from nacre.viewer.timeline import Snapshot, Timeline
+
+Array = npt.NDArray[np.float64]
+
+_MAX_VIEWS = 60
+_MAX_POINTS = 20_000
+
+
+class View(NamedTuple):
+    """
+    From where to look: all in the world frame.
+
+    Attributes
+    ----------
+    target : (3,) array
+        What is in the middle [m].
+    direction, up : (3,) array
+        Unit vectors: from the target to the eye, and upwards.
+    radius : float
+        Of a sphere about the target that should be in the picture [m].
+    """
+
+    target: Array
+    direction: Array
+    up: Array
+    radius: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what JSON can say, to a micrometre."""
+        return {name: np.asarray(value).round(6).tolist() for name, value in self._asdict().items()}
+
+
+def posed_places(timeline: Timeline, place: int) -> list[int]:
+    """Return the places, 60 at most and evenly spread, of frames up to one whose pose is known."""
+    places = [i for i, m in enumerate(timeline.frames[: place + 1]) if m.world_from_camera is not None]
+    chosen = np.linspace(0, len(places) - 1, min(len(places), _MAX_VIEWS)).round().astype(int)
+    return [places[i] for i in chosen]
+
+
+def in_view(cloud: Snapshot, camera: Camera, poses: Array) -> npt.NDArray[np.bool_]:
+    """
+    Return which points are in the image of which camera, and face it; what hides them does not count.
+
+    Parameters
+    ----------
+    cloud : Snapshot
+        N points.
+    camera : Camera
+        Of every view.
+    poses : (F, 4, 4) array
+        ``world_from_camera``.
+
+    Returns
+    -------
+    (F, N) bool
+    """
+    seen = np.zeros((len(poses), len(cloud.points)), dtype=bool)
+    middle = 0.5 * np.array([camera.width - 1, camera.height - 1])
+    half = 0.5 * np.array([camera.width, camera.height])
+    for row, pose in zip(seen, poses, strict=True):
+        local = (cloud.points - pose[:3, 3]) @ pose[:3, :3]
+        rays = local if camera.model == "pinhole" else np.array([0.0, 0, 1])
+        facing = np.einsum("ij,ij->i", cloud.normals @ pose[:3, :3], np.broadcast_to(rays, local.shape)) < 0
+        with np.errstate(invalid="ignore"):
+            inside = (np.abs(camera.project(local) - middle) <= half).all(axis=1)
+        row[:] = facing & inside & (local[:, 2] > 0)
+    return seen
+
+
+def first_seen(cloud: Snapshot, timeline: Timeline, place: int) -> npt.NDArray[np.uint32] | None:
+    """
+    Return the place of the first frame that had each point in view; None where cameras are not known.
+
+    It is worked out from 60 frames at most, and points that none of them faced come with the last one.
+    """
+    places = posed_places(timeline, place)
+    if timeline.camera is None or len(places) < 2:
+        return None
+    seen = in_view(cloud, timeline.camera, _poses(timeline, places))
+    first = np.where(seen.any(axis=0), seen.argmax(axis=0), len(places) - 1)
+    return np.asarray(np.array(places)[first], np.uint32)
+
+
+def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
+    """
+    Return a view of the main thing: from where most frames saw it, upright as the cameras were.
+
+    Main is what most frames saw and many observations confirm; specks and far walls have no say.
+    """
+    few = cloud.thinned(_MAX_POINTS)
+    places = posed_places(timeline, place)
+    if timeline.camera is None or not places:
+        return _view(few.points, _core(few, np.ones(len(few.points))), -_FORWARD, -_DOWN)
+    poses = _poses(timeline, places)
+    seen = in_view(few, timeline.camera, poses)
+    core = _core(few, seen.sum(axis=0))
+    best = poses[np.argmax(seen[:, core].sum(axis=1))]
+    target = np.median(few.points[core], axis=0)
+    toward = best[:3, 3] - target if timeline.camera.model == "pinhole" else -best[:3, 2]
+    return _view(few.points, core, toward, -poses[:, :3, 1].mean(axis=0))
+
+
+_DOWN, _FORWARD = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])
+
+
+def _core(cloud: Snapshot, num_views: npt.NDArray[np.integer] | Array) -> npt.NDArray[np.bool_]:
+    """Return which points belong to the main thing."""
+    often = num_views >= np.quantile(num_views, 0.6)
+    if cloud.confidence is None:
+        return often
+    known: npt.NDArray[np.bool_] = cloud.confidence >= np.quantile(cloud.confidence[often], 0.4)
+    return often & known
+
+
+def _view(points: npt.NDArray[np.float32], core: npt.NDArray[np.bool_], toward: Array, up: Array) -> View:
+    """Return a view of the core, with some of what is around it."""
+    target = np.median(points[core], axis=0).astype(np.float64)
+    distances = np.linalg.norm(points - target, axis=1)
+    radius = min(np.quantile(distances, 0.99), 1.3 * np.quantile(distances[core], 0.9))
+    direction = _unit(toward, -_FORWARD)
+    upward = _unit(up, -_DOWN)
+    if abs(upward @ direction) > 0.98:
+        upward = _unit(np.cross(direction, (1.0, 0, 0)), -_DOWN)
+    return View(target, direction, upward, max(float(radius), 1e-6))
+
+
+def _unit(vector: Array, otherwise: Array) -> Array:
+    length = float(np.linalg.norm(vector))
+    return vector / length if length > 1e-9 else otherwise
+
+
+def _poses(timeline: Timeline, places: list[int]) -> Array:
+    return np.array([timeline.frames[i].world_from_camera for i in places], np.float64)

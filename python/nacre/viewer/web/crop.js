@@ -1,0 +1,113 @@
+// A box that leaves out what is not in it, and what is shown as a PLY file.
+
+const SIDES = [["left", "right"], ["bottom", "top"], ["back", "front"]];
+
+/** A box along the axes of the first view: right, up, and towards the eye. */
+class Box {
+  constructor(axes, cloud) {
+    this.axes = axes;
+    // A few far points would leave the sliders coarse; at their ends they leave nothing out.
+    this.reach = axes.map((axis) => {
+      const along = Float64Array.from({ length: cloud.size }, (_, i) => dot(axis, cloud.position(i)));
+      const [low, high] = [quantile(along, 0.01), quantile(along, 0.99)];
+      const margin = 0.05 * (high - low) + cloud.spacing;
+      return [low - margin, high + margin];
+    });
+    this.limits = this.reach.map((range) => [...range]);
+  }
+
+  contains(point) {
+    return this.axes.every((axis, k) => {
+      const at = dot(axis, point), [low, high] = this.limits[k], [least, most] = this.reach[k];
+      return (at >= low || low <= least) && (at <= high || high >= most);
+    });
+  }
+
+  /** The twelve edges, two corners each. */
+  get edges() {
+    const corner = (bits) =>
+      this.axes.reduce((sum, axis, k) => add(sum, scaled(axis, this.limits[k][(bits >> k) & 1])), [0, 0, 0]);
+    const edges = [];
+    for (let bits = 0; bits < 8; bits++) {
+      for (let k = 0; k < 3; k++) if (!((bits >> k) & 1)) edges.push([corner(bits), corner(bits | (1 << k))]);
+    }
+    return edges;
+  }
+}
+
+class Crop {
+  constructor(app) {
+    this.app = app;
+    this.box = null;
+    this.toggle = document.getElementById("crop");
+    this.panel = document.getElementById("box");
+    this.toggle.addEventListener("change", () => this.#switch());
+    document.getElementById("save").addEventListener("click", () => this.save());
+  }
+
+  /** The box, where it is on. */
+  get active() {
+    return this.toggle.checked ? this.box : null;
+  }
+
+  #switch() {
+    if (!this.box && this.app.clouds[0]) {
+      const { direction, up } = this.app.document.view;
+      this.box = new Box(axesOf(direction, up), this.app.clouds[0]);
+      this.panel.replaceChildren(...SIDES.flatMap((names, k) => this.#row(names, k)));
+    }
+    this.panel.hidden = !this.toggle.checked;
+    this.app.select();
+  }
+
+  #row(names, k) {
+    const [min, max] = this.box.reach[k];
+    const inputs = names.map((name, end) => {
+      const value = [min, max][end];
+      const input = element("input", { type: "range", min, max, step: (max - min) / 500, "aria-label": name });
+      input.id = `box-${name}`;
+      input.value = value;
+      input.addEventListener("input", () => {
+        const limits = this.box.limits[k];
+        limits[end] = end ? Math.max(+input.value, limits[0]) : Math.min(+input.value, limits[1]);
+        this.app.select();
+      });
+      return input;
+    });
+    return [element("span", {}, names.join(", ").replace(", ", "/")), ...inputs];
+  }
+
+  save() {
+    const cloud = this.app.clouds[this.app.activeRun];
+    if (!cloud) return;
+    const link = element("a", { download: `${this.app.document.title.replace(/[^\w-]+/g, "-")}.ply` });
+    link.href = URL.createObjectURL(new Blob([plyBytes(cloud)]));
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  }
+}
+
+/** The shown points of a cloud as a binary PLY file. */
+function plyBytes(cloud) {
+  const floats = ["x", "y", "z", "nx", "ny", "nz"], colors = cloud.colors ? ["red", "green", "blue"] : [];
+  const header = [
+    "ply", "format binary_little_endian 1.0", "comment metres", `element vertex ${cloud.numShown}`,
+    ...floats.map((name) => `property float ${name}`), ...colors.map((name) => `property uchar ${name}`),
+    ...(cloud.confidence ? ["property float confidence"] : []), "end_header\n",
+  ].join("\n");
+  const rowSize = 24 + colors.length + (cloud.confidence ? 4 : 0);
+  const start = new TextEncoder().encode(header);
+  const bytes = new Uint8Array(start.length + rowSize * cloud.numShown);
+  bytes.set(start);
+  const view = new DataView(bytes.buffer);
+  let at = start.length;
+  for (let i = 0; i < cloud.size; i++) {
+    if (!cloud.isShown(i)) continue;
+    const normal = unit([0, 1, 2].map((k) => cloud.normals[4 * i + k]));
+    [...cloud.position(i), ...normal].forEach((value, k) => view.setFloat32(at + 4 * k, value, true));
+    colors.forEach((_, k) => view.setUint8(at + 24 + k, cloud.colors[3 * i + k]));
+    if (cloud.confidence) view.setFloat32(at + rowSize - 4, cloud.confidence[i], true);
+    at += rowSize;
+  }
+  return bytes;
+}
