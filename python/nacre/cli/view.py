@@ -54,6 +54,7 @@ def view(
     if compare is not None:
         written_file(compare, "report.json")
         other = read_timeline(compare)
+        timeline.title, other.title = folder.name, compare.name
     if html is not None:
         export_html(timeline, html, other=other)
         terminal.say(table([("page", str(html))]))

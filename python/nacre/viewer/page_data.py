@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -10,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera, KdTree
+from nacre import Camera
 from nacre.errors import FileFormatError
 from nacre.meshing import triangulate
 from nacre.parameters import DepthParameters
@@ -18,6 +17,7 @@ from nacre.report.colormap import viridis
 from nacre.report.image_files import encode_png
 from nacre.viewer.colors import STATUS_COLORS
 from nacre.viewer.depth_picture import depth_legend, depth_picture
+from nacre.viewer.disks import deviation, disk_radii
 from nacre.viewer.packing import morton_order, octahedral, pack, quantized, rounded
 from nacre.viewer.timeline import Snapshot, Timeline, words
 from nacre.viewer.views import first_seen, first_view
@@ -59,7 +59,7 @@ class PageData:
             for place, cloud in timeline.snapshots
         ]
         self.document = json.dumps(self._described(), allow_nan=False).encode()
-        self._prepared = functools.lru_cache(maxsize=2)(self._prepare)
+        self._last: tuple[State, Snapshot] | None = None
 
     @property
     def names(self) -> list[str]:
@@ -86,13 +86,13 @@ class PageData:
         kind, _, rest = name.partition("/")
         if kind == "depth":
             return self._depth(rest)
+        if kind not in ("points", "triangles"):
+            raise KeyError(name)
         state = {state.name: state for state in self._states}[rest]
         if kind == "triangles":
             cloud = self._prepared(state)
             corners = triangulate(cloud.points, cloud.normals)
             return pack({}, {"triangles": _sorted_triangles(corners)})
-        if kind != "points":
-            raise KeyError(name)
         return self._points(state)
 
     def _described(self) -> dict[str, Any]:
@@ -131,11 +131,16 @@ class PageData:
             "states": states,
         }
 
-    def _prepare(self, state: State) -> Snapshot:
+    def _prepared(self, state: State) -> Snapshot:
         """Return the points as the page gets them: not too many, neighbors in space near in order."""
+        last = self._last
+        if last is not None and last[0] is state:
+            return last[1]
         cloud = state.cloud.thinned(MAX_POINTS)
         rows, _, _ = quantized(cloud.points)
-        return cloud.rows(morton_order(rows), cloud.spacing)
+        ordered = cloud.rows(morton_order(rows), cloud.spacing)
+        self._last = state, ordered
+        return ordered
 
     def _points(self, state: State) -> bytes:
         cloud, timeline = self._prepared(state), self._timelines[state.run]
@@ -143,7 +148,7 @@ class PageData:
         columns: dict[str, npt.NDArray[Any]] = {
             "points": rows,
             "normals": octahedral(cloud.normals),
-            "sizes": _sizes(cloud),
+            "sizes": np.rint(16 * disk_radii(cloud) / cloud.spacing).astype(np.uint8),
         }
         if cloud.colors is not None:
             columns["colors"] = cloud.colors
@@ -155,12 +160,9 @@ class PageData:
             first = first_seen(cloud, timeline, state.place)
             columns |= {} if first is None else {"firstSeen": first}
         if len(self._timelines) == 2:
-            columns["deviation"] = rounded(self._deviation(cloud, self._timelines[1 - state.run]))
+            other = self._timelines[1 - state.run].snapshots[-1][1]
+            columns["deviation"] = rounded(deviation(cloud, other))
         return pack({"spacing": cloud.spacing, "origin": origin, "step": step}, columns)
-
-    def _deviation(self, cloud: Snapshot, other: Timeline) -> npt.NDArray[np.float32]:
-        distances, _ = KdTree(other.snapshots[-1][1].points).query(cloud.points)
-        return np.asarray(distances, np.float32)
 
     def _depth(self, place: str) -> bytes:
         """Return the depth image, with what was removed, of the first run's frame at a place."""
@@ -181,17 +183,6 @@ def frustum_corners(camera: Camera | None) -> npt.NDArray[np.float64]:
         focal = (camera.fx, camera.fy) if camera.model == "pinhole" else (camera.width, camera.width)
         x, y = camera.width / (2 * focal[0]), camera.height / (2 * focal[1])
     return np.array([(-x, -y, 1), (x, -y, 1), (x, y, 1), (-x, y, 1)], dtype=np.float64)
-
-
-def _sizes(cloud: Snapshot) -> npt.NDArray[np.uint8]:
-    """
-    Return how large each point is drawn, in sixteenths of the spacing, so that far, sparser surfaces close.
-
-    It is the distance to the fourth neighbor; points farther than 15 spacings from it are specks, and small.
-    """
-    distances, _ = KdTree(cloud.points).query(cloud.points, k=min(5, max(len(cloud.points), 1)))
-    relative = distances[:, -1] / cloud.spacing
-    return np.asarray(np.rint(16 * np.where(relative > 15, 1, np.maximum(relative, 0.5))), np.uint8)
 
 
 def _rounded_pose(pose: npt.NDArray[np.float64] | None) -> list[list[float]] | None:

@@ -102,9 +102,7 @@ class _Handler(BaseHTTPRequestHandler):
         data, known = viewer.data, parse_qs(url.query).get("known")
         if url.path == "/":
             self._answer("text/html; charset=utf-8", page_html(viewer.timeline.title).encode())
-        elif url.path == "/data/document" and parse_qs(url.query).get("known") == [
-            str(self.server.viewer.revision)
-        ]:
+        elif url.path == "/data/document" and known == [str(viewer.revision)]:
             self.send_response(HTTPStatus.NO_CONTENT)
             self.end_headers()
         elif url.path.startswith("/data/"):

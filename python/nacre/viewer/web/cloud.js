@@ -17,6 +17,12 @@ class Cloud {
     return [0, 1, 2].map((axis) => this.origin[axis] + this.step * this.points[3 * i + axis]);
   }
 
+  /** A function of a row: the coordinate of the point along an axis, plus a constant. Positions make garbage. */
+  along(axis, constant = 0) {
+    const points = this.points, [a, b, c] = scaled(axis, this.step), d = dot(axis, this.origin) + constant;
+    return (i) => a * points[3 * i] + b * points[3 * i + 1] + c * points[3 * i + 2] + d;
+  }
+
   isShown(i) {
     return this.paint[4 * i + 3] > 0;
   }
@@ -30,12 +36,13 @@ class Cloud {
 
   /** Show what is confident enough, in the box, and seen by a frame up to a place. */
   select(minConfidence, box, place) {
+    const isInside = box ? box.test(this) : () => true;
     this.numShown = 0;
     for (let i = 0; i < this.size; i++) {
       const shown =
         !(this.confidence && this.confidence[i] < minConfidence) &&
         !(this.firstSeen && this.firstSeen[i] > place) &&
-        (!box || box.contains(this.position(i)));
+        isInside(i);
       this.paint[4 * i + 3] = shown ? 255 : 0;
       this.numShown += shown;
     }

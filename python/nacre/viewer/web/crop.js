@@ -4,23 +4,24 @@ const SIDES = [["left", "right"], ["bottom", "top"], ["back", "front"]];
 
 /** A box along the axes of the first view: right, up, and towards the eye. */
 class Box {
-  constructor(axes, cloud) {
-    this.axes = axes;
-    // A few far points would leave the sliders coarse; at their ends they leave nothing out.
-    this.reach = axes.map((axis) => {
-      const along = Float64Array.from({ length: cloud.size }, (_, i) => dot(axis, cloud.position(i)));
-      const [low, high] = [quantile(along, 0.01), quantile(along, 0.99)];
-      const margin = 0.05 * (high - low) + cloud.spacing;
-      return [low - margin, high + margin];
-    });
+  constructor({ target, direction, up, radius }) {
+    this.axes = axesOf(direction, up);
+    // About the main thing, so that the sliders are fine there; at their ends they leave nothing out.
+    this.reach = this.axes.map((axis) => [dot(axis, target) - 2 * radius, dot(axis, target) + 2 * radius]);
     this.limits = this.reach.map((range) => [...range]);
   }
 
-  contains(point) {
-    return this.axes.every((axis, k) => {
-      const at = dot(axis, point), [low, high] = this.limits[k], [least, most] = this.reach[k];
-      return (at >= low || low <= least) && (at <= high || high >= most);
+  /** A function of a row of a cloud: whether the point is inside. */
+  test(cloud) {
+    const [x, y, z] = this.axes.map((axis) => cloud.along(axis));
+    const [[left, right], [bottom, top], [back, front]] = this.limits.map(([low, high], k) => {
+      const [least, most] = this.reach[k];
+      return [low <= least ? -Infinity : low, high >= most ? Infinity : high];
     });
+    return (i) => {
+      const [a, b, c] = [x(i), y(i), z(i)];
+      return a >= left && a <= right && b >= bottom && b <= top && c >= back && c <= front;
+    };
   }
 
   /** The twelve edges, two corners each. */
@@ -51,9 +52,8 @@ class Crop {
   }
 
   #switch() {
-    if (!this.box && this.app.clouds[0]) {
-      const { direction, up } = this.app.document.view;
-      this.box = new Box(axesOf(direction, up), this.app.clouds[0]);
+    if (!this.box && this.app.document.view) {
+      this.box = new Box(this.app.document.view);
       this.panel.replaceChildren(...SIDES.flatMap((names, k) => this.#row(names, k)));
     }
     this.panel.hidden = !this.toggle.checked;
@@ -64,7 +64,7 @@ class Crop {
     const [min, max] = this.box.reach[k];
     const inputs = names.map((name, end) => {
       const value = [min, max][end];
-      const input = element("input", { type: "range", min, max, step: (max - min) / 500, "aria-label": name });
+      const input = element("input", { type: "range", min, max, step: (max - min) / 1000, "aria-label": name });
       input.id = `box-${name}`;
       input.value = value;
       input.addEventListener("input", () => {
@@ -74,7 +74,7 @@ class Crop {
       });
       return input;
     });
-    return [element("span", {}, names.join(", ").replace(", ", "/")), ...inputs];
+    return [element("span", {}, names.join(", ")), ...inputs];
   }
 
   save() {

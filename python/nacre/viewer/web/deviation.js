@@ -1,4 +1,4 @@
-// How far the points of each run are from the nearest of the other: figures, and a histogram in their colors.
+// How far the points of each run are from the surface of the other: figures, and a histogram in their colors.
 
 const BINS = 40;
 
@@ -11,9 +11,10 @@ class Deviation {
 
   /** The length at which the color scale ends [m]: from 0.1 to 10 of its usual one, by the slider. */
   get end() {
-    const all = this.app.clouds.map((cloud) => quantile(cloud.deviation, 0.95));
-    const usual = Math.max(...all, 1e-6);
-    return usual * 100 ** (this.input.value / 100 - 0.5);
+    const usual = this.app.clouds.map(({ deviation }) => {
+      return Math.min(1.25 * quantile(deviation, 0.95), 5 * quantile(deviation, 0.5)); // parts that one lacks are far
+    });
+    return Math.max(...usual, 1e-6) * 100 ** (this.input.value / 100 - 0.5);
   }
 
   /** Of the points of a run that are shown: the median, what 95 % are below, and how many are in each bin. */

@@ -11,6 +11,7 @@ class App {
     );
     this.clouds = []; // what is drawn of each run
     this.cache = new Map(); // clouds that were read, by name
+    this.framesAtReset = 0; // a model that grows is looked at anew each time its frames have doubled
     this.measure = new Measure(this);
     this.crop = new Crop(this);
     this.deviation = new Deviation(this);
@@ -43,8 +44,16 @@ class App {
     this.document = JSON.parse(new TextDecoder().decode(bytes));
     showDocument(this.document);
     this.player.update();
-    if (this.document.view && !this.orbit.touched) this.reset();
+    this.#forget();
+    const { view, runs } = this.document;
+    if (view && !this.orbit.touched && runs[0].frames.length >= 2 * this.framesAtReset) this.reset();
     await this.load();
+  }
+
+  /** Give back states that the document has no more. */
+  #forget() {
+    const named = new Set(this.document.runs.flatMap((run) => run.states.map((state) => state.name)));
+    for (const name of this.cache.keys()) if (!named.has(name)) this.cache.delete(name);
   }
 
   /** Read the states of the models that belong to the chosen frame, and draw them. */
@@ -113,6 +122,7 @@ class App {
 
   /** Go to the first view. */
   reset() {
+    this.framesAtReset = this.document.runs[0].frames.length;
     this.orbit.look(this.document.view, this.#aspect(this.parts[0]));
   }
 

@@ -38,7 +38,7 @@ function showLegend({ kind, clouds, document: { colormap } }) {
     const bar = element("div", { class: "bar" });
     bar.append(element("span", {}, before + low), element("i", {}), element("span", {}, high + after));
     legend.replaceChildren(bar);
-  } else legend.textContent = LEGENDS[kind] ?? "distance to the nearest point of the other run";
+  } else legend.textContent = LEGENDS[kind] ?? "distance to the surface of the other run";
   document.querySelectorAll(".bar i").forEach((bar) => (bar.style.background = gradient));
 }
 
