@@ -31,19 +31,22 @@ def pack(header: Mapping[str, Any], columns: Mapping[str, Column]) -> bytes:
     Each column is stored as differences between rows, most significant bytes apart from least significant
     ones, as HDF5's shuffle filter does: neighbors that resemble each other become runs of equal bytes.
     """
+    tables = {
+        name: column.reshape(len(column), *column.shape[1:] or (1,)) for name, column in columns.items()
+    }
     described = [
-        {"name": name, "type": column.dtype.name, "rows": len(column), "width": column[:1].size}
-        for name, column in columns.items()
+        {"name": name, "type": table.dtype.name, "rows": table.shape[0], "width": table.shape[1]}
+        for name, table in tables.items()
     ]
     text = json.dumps({**header, "columns": described}, allow_nan=False).encode()
-    return b"".join([struct.pack("<I", len(text)), text, *map(_shuffled, columns.values())])
+    return b"".join([struct.pack("<I", len(text)), text, *map(_shuffled, tables.values())])
 
 
-def _shuffled(column: Column) -> bytes:
-    bits = column.reshape(len(column), -1).view(_UNSIGNED[column.itemsize])
-    differences = np.diff(bits, axis=0, prepend=np.zeros_like(bits[:1]))
-    stored = np.ascontiguousarray(differences.T).astype(f"<u{column.itemsize}")
-    return stored.view(np.uint8).reshape(*stored.shape, -1).transpose(0, 2, 1).tobytes()
+def _shuffled(table: Column) -> bytes:
+    bits = np.ascontiguousarray(table).view(_UNSIGNED[table.itemsize])
+    differences = np.diff(bits, axis=0, prepend=np.zeros((1, bits.shape[1]), bits.dtype))
+    stored = np.ascontiguousarray(differences.T).astype(f"<u{table.itemsize}")
+    return stored[..., None].view(np.uint8).transpose(0, 2, 1).tobytes()
 
 
 def quantized(points: npt.NDArray[np.floating[Any]]) -> tuple[npt.NDArray[np.uint16], list[float], float]:
