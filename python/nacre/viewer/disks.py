@@ -9,21 +9,24 @@ from nacre import KdTree
 from nacre.viewer.timeline import Snapshot
 
 _NEIGHBORS = 4  # of a point of a square grid
-_LONELIEST = 15.0  # spacings: what is farther from its neighbors is a speck
+_FLATTEST = 0.35  # height of the neighbors over the tangent plane, by their distance
 
 
 def disk_radii(cloud: Snapshot) -> npt.NDArray[np.float32]:
     """
     Return the radius of each point's disk [m]: the distance to its fourth neighbor.
 
-    So the sparse surface of what is far closes as the dense one of what is near does. Disks of specks, which
-    have no neighbors within 15 spacings, are one spacing wide.
+    So the sparse surface of what is far closes as the dense one of what is near does. Where the neighbors are
+    not in the point's tangent plane it is a speck, and its disk one spacing wide.
     """
-    if not len(cloud.points):
-        return np.zeros(0, np.float32)
-    distances, _ = KdTree(cloud.points).query(cloud.points, k=_NEIGHBORS + 1)
-    radii = np.maximum(distances[:, -1], 0.5 * cloud.spacing)
-    return np.asarray(np.where(radii > _LONELIEST * cloud.spacing, cloud.spacing, radii), np.float32)
+    if len(cloud.points) < 2:
+        return np.full(len(cloud.points), cloud.spacing, np.float32)
+    distances, rows = KdTree(cloud.points).query(cloud.points, k=min(_NEIGHBORS + 1, len(cloud.points)))
+    offsets = cloud.points[rows] - cloud.points[:, None]
+    heights = np.abs(np.einsum("ijk,ik->ij", offsets, cloud.normals))
+    is_surface = heights.sum(axis=1) < _FLATTEST * distances.sum(axis=1)
+    radii = np.where(is_surface, distances[:, -1], cloud.spacing)
+    return np.asarray(np.maximum(radii, 0.5 * cloud.spacing), np.float32)
 
 
 def deviation(cloud: Snapshot, other: Snapshot) -> npt.NDArray[np.float32]:

@@ -48,7 +48,7 @@ def read_timeline(folder: str | os.PathLike[str]) -> Timeline:
     cloud = Snapshot(
         np.asarray(model.points, np.float32),
         np.asarray(normals, np.float32),
-        float(out.report.get("spacing") or 0.0) or 0.001,
+        max(float(out.report.get("spacing") or 0.001), 1e-6),
         model.colors,
         attributes.get("confidence"),
         attributes.get("last_seen"),

@@ -100,10 +100,10 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
     few = cloud.thinned(_MAX_POINTS)
     places = posed_places(timeline, place)
     if timeline.camera is None or not places:
-        return _view(few.points, _core(few, np.ones(len(few.points))), -_FORWARD, -_DOWN)
+        return _view(few.points, _main_part(few, np.ones(len(few.points))), -_FORWARD, -_DOWN)
     poses = _poses(timeline, places)
     seen = in_view(few, timeline.camera, poses)
-    core = _core(few, seen.sum(axis=0))
+    core = _main_part(few, seen.sum(axis=0))
     best = poses[np.argmax(seen[:, core].sum(axis=1))]
     target = np.median(few.points[core], axis=0)
     toward = best[:3, 3] - target if timeline.camera.model == "pinhole" else -best[:3, 2]
@@ -113,7 +113,7 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
 _DOWN, _FORWARD = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])
 
 
-def _core(cloud: Snapshot, num_views: npt.NDArray[np.integer] | Array) -> npt.NDArray[np.bool_]:
+def _main_part(cloud: Snapshot, num_views: npt.NDArray[np.integer] | Array) -> npt.NDArray[np.bool_]:
     """Return which points belong to the main thing."""
     often = num_views >= np.quantile(num_views, 0.6)
     if cloud.confidence is None:
@@ -126,7 +126,7 @@ def _view(points: npt.NDArray[np.float32], core: npt.NDArray[np.bool_], toward: 
     """Return a view of the core, with some of what is around it."""
     target = np.median(points[core], axis=0).astype(np.float64)
     distances = np.linalg.norm(points - target, axis=1)
-    radius = min(np.quantile(distances, 0.99), 1.3 * np.quantile(distances[core], 0.9))
+    radius = min(np.quantile(distances, 0.99), 2.1 * np.median(distances[core]))
     direction = _unit(toward, -_FORWARD)
     upward = _unit(up, -_DOWN)
     if abs(upward @ direction) > 0.98:

@@ -24,15 +24,19 @@ def test_disks_reach_the_neighbors() -> None:
     assert (radii >= 0.9999 * SPACING).all()
 
 
-def test_specks_stay_small() -> None:
+def test_sparse_surfaces_close_and_specks_stay_small() -> None:
+    near, far = plane(), plane()
+    points = np.concatenate([near.points, 30 * far.points, [[0, 0, 15]]]).astype(np.float32)
+    normals = np.concatenate([near.normals, far.normals, [[0, 0, -1]]]).astype(np.float32)
+    radii = disk_radii(Snapshot(points, normals, SPACING))
+    np.testing.assert_allclose(radii[441:-1].reshape(21, 21)[1:-1, 1:-1], 30 * SPACING, rtol=1e-4)
+    assert radii[-1] == np.float32(SPACING)
+
+
+def test_few_points_have_disks_too() -> None:
     cloud = plane()
-    far = Snapshot(
-        np.concatenate([cloud.points, [[5, 5, 5]]]).astype(np.float32),
-        np.concatenate([cloud.normals, [[0, 0, -1]]]).astype(np.float32),
-        SPACING,
-    )
-    assert disk_radii(far)[-1] == np.float32(SPACING)
-    assert len(disk_radii(far.rows(slice(0, 0), SPACING))) == 0
+    for count in range(3):
+        assert len(disk_radii(cloud.rows(slice(0, count), SPACING))) == count
 
 
 def test_a_model_that_moved_by_2_mm_deviates_by_2_mm() -> None:

@@ -91,9 +91,10 @@ def test_the_distance_between_two_points_that_were_picked(exported: Browser) -> 
         exported.click(*on_plane(exported, x + 0.002, 0.002))  # a little beside the point
     assert exported.evaluate("page.measure.distances.length") == 1
     assert exported.evaluate("page.measure.distances[0]") == pytest.approx(0.08, abs=1e-5)
-    assert "80.0 mm" in exported.text()
+    exported.wait_for("document.getElementById('overlay').textContent === '80.0 mm'")
+    assert exported.evaluate("document.getElementById('distances').textContent") == "80.0 mm"
     exported.press_button("clear")
-    assert "80.0 mm" not in exported.text()
+    exported.wait_for("!document.body.innerText.includes('80.0 mm')")
 
 
 def test_a_click_beside_the_model_picks_nothing(exported: Browser) -> None:

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 import math
+import re
+import shutil
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +19,9 @@ from nacre.cli import main
 from nacre.reconstruction import Reconstruction
 from nacre.report import ReportedFrame
 from nacre.viewer.timeline import words
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from viewer_scenes import plane, two_looks
 
 viewer = pytest.importorskip("nacre.viewer")
 FRAMES = 6
@@ -122,9 +130,54 @@ def test_a_run_is_shown_while_it_grows(out: Path) -> None:
 
 
 def test_nothing_to_export_is_an_error(tmp_path: Path) -> None:
+    empty, known = viewer.Timeline("x", None), two_looks(plane())
     with pytest.raises(ValueError, match="timeline must hold a state of the model"):
-        viewer.export_html(viewer.Timeline("x", None), tmp_path / "x.html")
+        viewer.export_html(empty, tmp_path / "x.html")
+    with pytest.raises(ValueError, match="other must hold a state of the model"):
+        viewer.export_html(known, tmp_path / "x.html", other=empty)
     assert not list(tmp_path.iterdir())
+
+
+def run(*words: str | Path) -> int:
+    with pytest.raises(SystemExit) as end:
+        main([str(word) for word in words])
+    return int(end.value.code or 0)
+
+
+def embedded(page: Path) -> bytes:
+    """Return the data in an exported page."""
+    (found,) = re.findall(r'<script id="data" type="text/plain">(.+?)</script>', page.read_text())
+    return gzip.decompress(base64.b64decode(found))
+
+
+def test_the_command_line_writes_pages(out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "view.html"
+    assert run("view", out, "--html", page) == 0
+    assert str(page) in capsys.readouterr().out
+    assert b'"deviation"' not in embedded(page)
+    assert run("view", out, "--compare", out, "--html", page) == 0
+    assert b'"deviation"' in embedded(page)
+    addresses = set(re.findall(r"https?://[^\"]+", page.read_text()))
+    assert all(address.startswith("http://www.w3.org/") for address in addresses)  # names, never fetched
+
+
+def test_a_run_to_compare_with_that_is_missing(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("view", out, "--compare", tmp_path, "--html", tmp_path / "view.html") != 0
+    assert "report.json" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_points_that_are_not_finite_are_left_out(out: Path, tmp_path: Path) -> None:
+    shutil.copytree(out, tmp_path / "out")
+    model = nacre.read_points(out / "model.ply")
+    points = model.points.copy()
+    points[:7] = np.nan
+    nacre.write_points(tmp_path / "out" / "model.ply", points, normals=model.normals)
+    (cloud,) = (cloud for _, cloud in viewer.read_timeline(tmp_path / "out").snapshots)
+    assert len(cloud.points) == len(points) - 7
+    viewer.export_html(viewer.read_timeline(tmp_path / "out"), tmp_path / "view.html")
 
 
 def test_the_report_tells_the_viewer_what_it_needs(out: Path) -> None:
