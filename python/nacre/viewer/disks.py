@@ -17,7 +17,8 @@ def disk_radii(cloud: Snapshot) -> npt.NDArray[np.float32]:
     Return the radius of each point's disk [m]: the distance to its fourth neighbor.
 
     So the sparse surface of what is far closes as the dense one of what is near does. Where the neighbors are
-    not in the point's tangent plane it is a speck, and its disk one spacing wide.
+    not in the point's tangent plane it is a speck, and its disk one spacing wide; beside neighbors that are
+    denser a disk is twice as large as theirs at most.
     """
     if len(cloud.points) < 2:
         return np.full(len(cloud.points), cloud.spacing, np.float32)
@@ -25,7 +26,8 @@ def disk_radii(cloud: Snapshot) -> npt.NDArray[np.float32]:
     offsets = cloud.points[rows] - cloud.points[:, None]
     heights = np.abs(np.einsum("ijk,ik->ij", offsets, cloud.normals))
     is_surface = heights.sum(axis=1) < _FLATTEST * distances.sum(axis=1)
-    radii = np.where(is_surface, distances[:, -1], cloud.spacing)
+    reach = distances[:, -1]
+    radii = np.where(is_surface, np.minimum(reach, 2 * np.median(reach[rows[:, 1:]], axis=1)), cloud.spacing)
     return np.asarray(np.maximum(radii, 0.5 * cloud.spacing), np.float32)
 
 

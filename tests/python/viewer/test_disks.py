@@ -33,6 +33,13 @@ def test_sparse_surfaces_close_and_specks_stay_small() -> None:
     assert radii[-1] == np.float32(SPACING)
 
 
+def test_a_flake_beside_a_dense_surface_is_small() -> None:
+    cloud = plane()
+    points = np.concatenate([cloud.points, [[0.4, 0, 1]]]).astype(np.float32)
+    normals = np.concatenate([cloud.normals, [[0, 0, -1]]]).astype(np.float32)
+    assert disk_radii(Snapshot(points, normals, SPACING))[-1] < 5 * SPACING
+
+
 def test_few_points_have_disks_too() -> None:
     cloud = plane()
     for count in range(3):

@@ -12,7 +12,7 @@ class Deviation {
   /** The length at which the color scale ends [m]: from 0.1 to 10 of its usual one, by the slider. */
   get end() {
     const usual = this.app.clouds.map(({ deviation }) => {
-      return Math.min(1.25 * quantile(deviation, 0.95), 5 * quantile(deviation, 0.5)); // parts that one lacks are far
+      return Math.min(1.25 * quantile(deviation, 0.95), 10 * quantile(deviation, 0.5)); // parts that one lacks are far
     });
     return Math.max(...usual, 1e-6) * 100 ** (this.input.value / 100 - 0.5);
   }
