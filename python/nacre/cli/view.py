@@ -16,13 +16,12 @@ PortOption = Annotated[
 
 def view(
     folder: Annotated[
-        Path, typer.Argument(metavar="OUT", help="What nacre reconstruct wrote.", show_default=False)
+        Path,
+        typer.Argument(metavar="OUT", help="What nacre reconstruct wrote, or points.", show_default=False),
     ],
     compare: Annotated[
         Path | None,
-        typer.Option(
-            metavar="OTHER", help="Another run of the same scene, to compare with.", show_default=False
-        ),
+        typer.Option(metavar="OTHER", help="Another run of the same scene, or points.", show_default=False),
     ] = None,
     html: Annotated[
         Path | None,
@@ -48,13 +47,14 @@ def view(
     terminal = Terminal(False, quiet, verbose)
     from nacre.viewer import Viewer, export_html, export_rrd, read_timeline
 
-    written_file(folder, "report.json")
-    timeline = read_timeline(folder)
-    other = None
-    if compare is not None:
-        written_file(compare, "report.json")
-        other = read_timeline(compare)
-        timeline.title, other.title = folder.name, compare.name
+    sources = [folder] if compare is None else [folder, compare]
+    for source in sources:
+        if not source.is_file():
+            written_file(source, "report.json")
+    timeline, *others = map(read_timeline, sources)
+    other = others[0] if others else None
+    if other is not None:
+        timeline.title, other.title = (source.name for source in sources)
     if html is not None:
         export_html(timeline, html, other=other)
         terminal.say(table([("page", str(html))]))

@@ -19,7 +19,7 @@ from nacre.viewer.colors import STATUS_COLORS
 from nacre.viewer.depth_picture import depth_legend, depth_picture
 from nacre.viewer.disks import deviation, disk_radii
 from nacre.viewer.packing import morton_order, octahedral, pack, quantized, rounded
-from nacre.viewer.timeline import Snapshot, Timeline, words
+from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline, words
 from nacre.viewer.views import first_seen, first_view
 
 MAX_POINTS = 1_000_000
@@ -103,6 +103,7 @@ class PageData:
         return {
             "title": " and ".join(timeline.title for timeline in self._timelines),
             "view": view,
+            "comment": "metres" if self._timelines[0].is_upright else f"metres; {CAMERA_FRAME}",
             "statusColors": STATUS_COLORS,
             "colormap": viridis(np.linspace(0, 1, 9)).tolist(),
             "depthLegend": depth_legend(),

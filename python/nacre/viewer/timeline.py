@@ -16,6 +16,9 @@ from nacre.model import Model
 from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import count, quantity
 
+CAMERA_FRAME = "the world is the first camera's frame"
+"""A comment of point files: x right, y down, z forward."""
+
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
@@ -97,6 +100,8 @@ class Timeline:
         ``depth_of(index)`` reads the depth image of a frame again: (H, W) float32 [m].
     max_snapshots : int
         So many states of the model are kept, evenly spread over the frames.
+    is_upright : bool
+        Whether y points up and z to who looks, as in files of other programs, and not as in a camera's frame.
     max_points : int
         States but the newest keep so many points at most, so that a long run stays within memory.
 
@@ -112,6 +117,7 @@ class Timeline:
         camera: Camera | None,
         *,
         depth_of: Callable[[int], npt.NDArray[np.float32]] | None = None,
+        is_upright: bool = False,
         max_snapshots: int = 40,
         max_points: int = 100_000,
     ) -> None:
@@ -120,6 +126,7 @@ class Timeline:
         self.title = printable(title)
         self.camera = camera
         self.depth_of = depth_of
+        self.is_upright = is_upright
         self.frames: list[ReportedFrame] = []
         self._snapshots: list[tuple[int, Snapshot]] = []
         self._max_snapshots = max_snapshots

@@ -100,7 +100,8 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
     few = cloud.thinned(_MAX_POINTS)
     places = posed_places(timeline, place)
     if timeline.camera is None or not places:
-        return _view(few.points, _main_part(few, np.ones(len(few.points))), -_FORWARD, -_DOWN)
+        sign = 1 if timeline.is_upright else -1
+        return _view(few.points, _main_part(few, np.ones(len(few.points))), sign * _FORWARD, sign * _DOWN)
     poses = _poses(timeline, places)
     seen = in_view(few, timeline.camera, poses)
     core = _main_part(few, seen.sum(axis=0))

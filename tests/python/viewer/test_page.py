@@ -132,6 +132,7 @@ def test_a_box_keeps_what_is_in_it_and_saves_it(exported: Browser, tmp_path: Pat
     assert len(saved.points) == expected
     assert np.min(saved.points @ axis) >= limit - 1e-5
     np.testing.assert_allclose(saved.normals, plane().normals[:expected], atol=0.01)
+    assert saved.comments == ("metres; the world is the first camera's frame",)
     assert saved.colors is not None
     assert saved.colors.tolist() == [[200, 40, 40]] * expected
     rows = np.rint((saved.points[:, :2] / SPACING) + 10).astype(int)
@@ -173,8 +174,11 @@ def test_the_model_grows_frame_by_frame(exported: Browser) -> None:
     exported.wait_for("page.player.place === 1 && page.clouds[0].numShown === 441", 12)
 
 
-def test_two_runs_2_mm_apart(browser: Browser, tmp_path: Path) -> None:
+@pytest.mark.parametrize("has_frames", [True, False])
+def test_two_runs_2_mm_apart(browser: Browser, tmp_path: Path, has_frames: bool) -> None:
     first, second = two_looks(plane(), "first"), two_looks(plane(1.002), "second")
+    if not has_frames:  # a file of points
+        second.frames.clear()
     export_html(first, tmp_path / "view.html", other=second)
     browser.open((tmp_path / "view.html").as_uri())
     browser.wait_for(LOADED)

@@ -88,6 +88,7 @@ class TestTimeline:
 
     def test_what_was_written_is_told(self, out: Path) -> None:
         timeline = viewer.read_timeline(out)
+        assert not viewer.read_timeline(out / "model.ply").is_upright
         assert [frame.status for frame in timeline.frames].count("LOST") == 1
         assert timeline.frames[3].reason
         assert words(timeline.frames[0])["overlap"] == "100 %"
@@ -178,6 +179,29 @@ def test_points_that_are_not_finite_are_left_out(out: Path, tmp_path: Path) -> N
     (cloud,) = (cloud for _, cloud in viewer.read_timeline(tmp_path / "out").snapshots)
     assert len(cloud.points) == len(points) - 7
     viewer.export_html(viewer.read_timeline(tmp_path / "out"), tmp_path / "view.html")
+
+
+def test_a_point_file_is_shown_too(tmp_path: Path) -> None:
+    cloud = plane()
+    nacre.write_points(tmp_path / "scan.ply", cloud.points)
+    timeline = viewer.read_timeline(tmp_path / "scan.ply")
+    (read,) = (cloud for _, cloud in timeline.snapshots)
+    assert timeline.title == "scan.ply"
+    assert read.spacing == pytest.approx(cloud.spacing, rel=1e-4)
+    np.testing.assert_allclose(read.normals, -cloud.normals, atol=1e-4)  # towards who looks, along -z
+    assert timeline.is_upright
+    assert run("view", tmp_path / "scan.ply", "--html", tmp_path / "view.html", "--quiet") == 0
+    assert b'"frames": []' in embedded(tmp_path / "view.html")
+
+
+def test_a_file_of_no_points_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "scan.ply").write_bytes(b"solid")
+    assert run("view", tmp_path / "scan.ply", "--html", tmp_path / "view.html") != 0
+    assert "scan.ply" in capsys.readouterr().err
+    nacre.write_points(tmp_path / "none.ply", np.zeros((0, 3)))
+    assert run("view", tmp_path / "none.ply", "--html", tmp_path / "view.html") != 0
+    assert "timeline must hold a state of the model to export" in capsys.readouterr().err
+    assert not (tmp_path / "view.html").exists()
 
 
 def test_the_report_tells_the_viewer_what_it_needs(out: Path) -> None:

@@ -73,6 +73,8 @@ def test_a_model_without_frames_is_seen_from_the_world_s_camera() -> None:
     np.testing.assert_allclose(view.direction, (0, 0, -1), atol=1e-6)
     np.testing.assert_allclose(view.up, (0, -1, 0), atol=1e-6)
     assert np.linalg.norm(view.target - (0, 0, 1)) < 0.05
+    upright = first_view(plane(), Timeline("plane", None, is_upright=True), -1)
+    np.testing.assert_allclose([upright.direction, upright.up], -np.array([view.direction, view.up]))
 
 
 def test_a_camera_that_looks_along_up_still_has_an_up() -> None:

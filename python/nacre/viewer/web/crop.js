@@ -81,17 +81,17 @@ class Crop {
     const cloud = this.app.clouds[this.app.activeRun];
     if (!cloud) return;
     const link = element("a", { download: `${this.app.document.title.replace(/[^\w-]+/g, "-")}.ply` });
-    link.href = URL.createObjectURL(new Blob([plyBytes(cloud)]));
+    link.href = URL.createObjectURL(new Blob([plyBytes(cloud, this.app.document.comment)]));
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);
   }
 }
 
 /** The shown points of a cloud as a binary PLY file. */
-function plyBytes(cloud) {
+function plyBytes(cloud, comment) {
   const floats = ["x", "y", "z", "nx", "ny", "nz"], colors = cloud.colors ? ["red", "green", "blue"] : [];
   const header = [
-    "ply", "format binary_little_endian 1.0", "comment metres", `element vertex ${cloud.numShown}`,
+    "ply", "format binary_little_endian 1.0", `comment ${comment}`, `element vertex ${cloud.numShown}`,
     ...floats.map((name) => `property float ${name}`), ...colors.map((name) => `property uchar ${name}`),
     ...(cloud.confidence ? ["property float confidence"] : []), "end_header\n",
   ].join("\n");

@@ -13,10 +13,11 @@ function showDocument({ title, runs, depthLegend }) {
   document.getElementById("title").textContent = title;
   document.getElementById("compare").hidden = runs.length < 2;
   document.getElementById("depth-legend").innerHTML = depthLegend;
-  const counts = new Map();
-  runs[0].frames.forEach(({ status }) => counts.set(status, (counts.get(status) ?? 0) + 1));
+  const { frames } = runs[0], counts = new Map();
+  frames.forEach(({ status }) => counts.set(status, (counts.get(status) ?? 0) + 1));
   const parts = [...counts].map(([status, count]) => `${count} ${status.toLowerCase()}`);
-  document.getElementById("summary").textContent = `${runs[0].frames.length} frames: ${parts.join(", ")}`;
+  document.getElementById("summary").textContent = frames.length ? `${frames.length} frames: ${parts.join(", ")}` : "";
+  document.querySelectorAll(".of-frames").forEach((part) => (part.hidden = !frames.length));
 }
 
 /** Offer what the points can be colored by; at first the differences of two runs, or colors where they have any. */
