@@ -47,34 +47,27 @@ def posed_places(timeline: Timeline, place: int) -> list[int]:
     return [places[i] for i in chosen]
 
 
-def in_view(cloud: Snapshot, camera: Camera, poses: Array) -> npt.NDArray[np.bool_]:
+def sees(
+    camera: Camera, pose: Array, points: npt.NDArray[np.float32], normals: npt.NDArray[np.float32]
+) -> npt.NDArray[np.bool_]:
     """
-    Return which points are in the image of which camera, and face it; what hides them does not count.
+    Return which points (N, 3) are in a camera's image and face it; what hides them does not count.
 
     Parameters
     ----------
-    cloud : Snapshot
-        N points.
-    camera : Camera
-        Of every view.
-    poses : (F, 4, 4) array
-        ``world_from_camera``.
-
-    Returns
-    -------
-    (F, N) bool
+    camera, pose : Camera, (4, 4) array
+        The pose is ``world_from_camera``.
+    points, normals : (N, 3) float32
+        In the world frame [m]; unit vectors.
     """
-    seen = np.zeros((len(poses), len(cloud.points)), dtype=bool)
+    local = (points - pose[:3, 3]) @ pose[:3, :3]
+    rays = local if camera.model == "pinhole" else np.array([[0.0, 0, 1]])
+    facing = (normals @ pose[:3, :3] * rays).sum(axis=1) < 0
     middle = 0.5 * np.array([camera.width - 1, camera.height - 1])
     half = 0.5 * np.array([camera.width, camera.height])
-    for row, pose in zip(seen, poses, strict=True):
-        local = (cloud.points - pose[:3, 3]) @ pose[:3, :3]
-        rays = local if camera.model == "pinhole" else np.array([0.0, 0, 1])
-        facing = np.einsum("ij,ij->i", cloud.normals @ pose[:3, :3], np.broadcast_to(rays, local.shape)) < 0
-        with np.errstate(invalid="ignore"):
-            inside = (np.abs(camera.project(local) - middle) <= half).all(axis=1)
-        row[:] = facing & inside & (local[:, 2] > 0)
-    return seen
+    with np.errstate(invalid="ignore"):
+        inside = (np.abs(camera.project(local) - middle) <= half).all(axis=1)
+    return np.asarray(facing & inside & (local[:, 2] > 0))
 
 
 def first_seen(cloud: Snapshot, timeline: Timeline, place: int) -> npt.NDArray[np.uint32] | None:
@@ -86,9 +79,13 @@ def first_seen(cloud: Snapshot, timeline: Timeline, place: int) -> npt.NDArray[n
     places = posed_places(timeline, place)
     if timeline.camera is None or len(places) < 2:
         return None
-    seen = in_view(cloud, timeline.camera, _poses(timeline, places))
-    first = np.where(seen.any(axis=0), seen.argmax(axis=0), len(places) - 1)
-    return np.asarray(np.array(places)[first], np.uint32)
+    first = np.full(len(cloud.points), places[-1], np.uint32)
+    unseen = np.arange(len(cloud.points))
+    for i, pose in zip(places, _poses(timeline, places), strict=True):
+        seen = sees(timeline.camera, pose, cloud.points[unseen], cloud.normals[unseen])
+        first[unseen[seen]] = i
+        unseen = unseen[~seen]
+    return first
 
 
 def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
@@ -103,7 +100,7 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
         sign = 1 if timeline.is_upright else -1
         return _view(few.points, _main_part(few, np.ones(len(few.points))), sign * _FORWARD, sign * _DOWN)
     poses = _poses(timeline, places)
-    seen = in_view(few, timeline.camera, poses)
+    seen = np.array([sees(timeline.camera, pose, few.points, few.normals) for pose in poses])
     core = _main_part(few, seen.sum(axis=0))
     best = poses[np.argmax(seen[:, core].sum(axis=1))]
     target = np.median(few.points[core], axis=0)

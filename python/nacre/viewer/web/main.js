@@ -63,6 +63,7 @@ class App {
       return (run.states.findLast((state) => state.place <= place) ?? run.states[0])?.name;
     });
     if (names.some((name) => !name)) return this.#say("There is no model yet");
+    const request = (this.request = (this.request ?? 0) + 1);
     let clouds;
     try {
       clouds = await Promise.all(names.map((name) => this.#cloud(name)));
@@ -70,6 +71,7 @@ class App {
       if (!this.clouds.length) this.#say(String(error));
       return; // a state that is gone meanwhile: the next document has another one
     }
+    if (request !== this.request) return; // another frame was chosen meanwhile
     const isOther = clouds.some((cloud, i) => cloud !== this.clouds[i]);
     this.clouds = clouds;
     this.#say("");
