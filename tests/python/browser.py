@@ -98,9 +98,13 @@ class Browser:
         for kind in ("mousePressed", "mouseReleased"):
             self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
-    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
-        """Move with the left button held."""
-        for kind, (x, y) in (("mousePressed", start), ("mouseMoved", end), ("mouseReleased", end)):
+    def drag(self, *places: tuple[float, float]) -> None:
+        """Move from place to place with the left button held."""
+        events = [
+            ("mousePressed", places[0]), *(("mouseMoved", place) for place in places[1:]),
+            ("mouseReleased", places[-1]),
+        ]  # fmt: skip
+        for kind, (x, y) in events:
             self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def choose(self, control: str, value: object) -> None:
