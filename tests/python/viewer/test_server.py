@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import sys
 import urllib.error
 import urllib.request
@@ -91,3 +92,13 @@ def test_a_damaged_depth_image_is_not_there(viewer: Viewer) -> None:
 
     viewer.timeline.depth_of = broken
     assert refused(viewer, "/data/depth/0") == 404
+
+
+def test_a_browser_that_goes_away_is_no_trouble(viewer: Viewer, capfd: pytest.CaptureFixture[str]) -> None:
+    viewer.data.document = b" " * 50_000_000  # more than the system takes without being read
+    port = int(viewer.url.rpartition(":")[2])
+    with socket.create_connection(("127.0.0.1", port)) as connection:
+        connection.sendall(f"GET /data/document HTTP/1.1\r\nHost: localhost:{port}\r\n\r\n".encode())
+        assert connection.recv(100).startswith(b"HTTP/1.1 200")
+    assert ask(viewer, "/").status == 200
+    assert capfd.readouterr().err == ""

@@ -25,19 +25,20 @@ class App {
     this.#poll();
   }
 
-  /** Ask again and again whether there is more. */
-  #poll() {
+  /** Ask again and again whether there is more; seldom where that takes long. */
+  #poll(delay = POLL) {
     if (this.source instanceof EmbeddedSource) return;
     setTimeout(async () => {
+      const start = performance.now();
       try {
         const bytes = await this.source.changed();
         if (bytes) await this.#take(bytes);
-        this.#poll();
+        this.#poll(Math.max(POLL, 5 * (performance.now() - start)));
       } catch {
         this.#say("");
         document.getElementById("summary").textContent += "; no more is coming";
       }
-    }, POLL);
+    }, delay);
   }
 
   async #take(bytes) {
