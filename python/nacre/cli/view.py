@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from nacre.cli.terminal import Quiet, Terminal, Verbose, table, written_file
+from nacre.cli.terminal import CommandError, Quiet, Terminal, Verbose, table, written_file
 
 PortOption = Annotated[
     int, typer.Option(min=0, max=65535, metavar="PORT", help="Where the viewer listens; the next free one.")
@@ -47,6 +47,8 @@ def view(
     terminal = Terminal(False, quiet, verbose)
     from nacre.viewer import Viewer, export_html, export_rrd, read_timeline
 
+    if rrd is not None and compare is not None:
+        raise CommandError("--rrd writes one run: leave out --compare", 2)
     sources = [folder] if compare is None else [folder, compare]
     for source in sources:
         if not source.is_file():

@@ -77,11 +77,9 @@ def export_html(
     Positions are rounded to 1 / 65535 of the model's longest side, confidence to 0.02 %, and of more than a
     million points every second, third, ... is kept.
     """
-    timelines = [timeline] if other is None else [timeline, other]
-    for name, each in zip(("timeline", "other"), timelines, strict=False):
-        if not any(len(cloud.points) for _, cloud in each.snapshots):
-            raise ValueError(f"{name} must hold a state of the model to export, got none")
-    data = PageData(timelines)
+    if not timeline.has_points:
+        raise ValueError("timeline must hold a state of the model to export, got none")
+    data = PageData([timeline] if other is None else [timeline, other])
     names = data.names + (data.triangle_names if triangles else [])
     page = page_html(timeline.title, pack_files((name, data.read(name)) for name in _by_state(names)))
     with atomic_writer(path) as stream:

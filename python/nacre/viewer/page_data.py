@@ -48,9 +48,16 @@ class PageData:
         One or two.
     parameters : DepthParameters, optional
         What is marked as removed in depth images.
+
+    Raises
+    ------
+    ValueError
+        When there is nothing to compare with.
     """
 
     def __init__(self, timelines: Sequence[Timeline], parameters: DepthParameters | None = None) -> None:
+        if not all(other.has_points for other in timelines[1:]):
+            raise ValueError("other must hold a state of the model to compare with, got none")
         self._timelines = timelines
         self._parameters = parameters
         self._states = [

@@ -37,6 +37,8 @@ class Viewer:
     ------
     OSError
         When no port is free.
+    ValueError
+        When the other run has no model.
     """
 
     def __init__(

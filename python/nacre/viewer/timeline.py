@@ -153,6 +153,11 @@ class Timeline:
         """States of the model, each with the place of the newest frame in it."""
         return list(self._snapshots)
 
+    @property
+    def has_points(self) -> bool:
+        """Whether some state of the model has a point."""
+        return any(len(cloud.points) > 0 for _, cloud in self._snapshots)
+
     def snapshot_at(self, place: int) -> Snapshot | None:
         """Return the model as it was after a frame, or the last state known before; the first one else."""
         if not self._snapshots:

@@ -136,6 +136,8 @@ def test_nothing_to_export_is_an_error(tmp_path: Path) -> None:
         viewer.export_html(empty, tmp_path / "x.html")
     with pytest.raises(ValueError, match="other must hold a state of the model"):
         viewer.export_html(known, tmp_path / "x.html", other=empty)
+    with pytest.raises(ValueError, match="other must hold a state of the model"):
+        viewer.Viewer(known, other=empty, port=0)
     assert not list(tmp_path.iterdir())
 
 
@@ -167,6 +169,14 @@ def test_a_run_to_compare_with_that_is_missing(
 ) -> None:
     assert run("view", out, "--compare", tmp_path, "--html", tmp_path / "view.html") != 0
     assert "report.json" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_for_rerun_is_of_one_run(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("view", out, "--compare", out, "--rrd", tmp_path / "view.rrd") != 0
+    assert "--rrd writes one run: leave out --compare" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

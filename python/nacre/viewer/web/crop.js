@@ -80,7 +80,8 @@ class Crop {
   save() {
     const cloud = this.app.clouds[this.app.activeRun];
     if (!cloud) return;
-    const link = element("a", { download: `${this.app.document.title.replace(/[^\w-]+/g, "-")}.ply` });
+    const { title } = this.app.document.runs[this.app.activeRun];
+    const link = element("a", { download: `${title.replace(/(\.\w+)?$/, "").replace(/[^\w-]+/g, "-")}.ply` });
     link.href = URL.createObjectURL(new Blob([plyBytes(cloud, this.app.document.comment)]));
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);

@@ -19,7 +19,7 @@ void main() {
   shade = color;
   diskRadius = radius * exp2(size / 18.0 - 2.0);
   pixels = 2.0 * diskRadius * pixelsPerUnit / max(-position.z, 1e-9);
-  gl_PointSize = clamp(pixels, 1.6, 100.0);
+  gl_PointSize = clamp(pixels, 1.6, 400.0);
   gl_Position = !isMesh && color.a < 0.5 ? vec4(2.0, 2.0, 2.0, 1.0) : clip * position;
 }`;
 
