@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import bisect
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -157,18 +156,3 @@ class Timeline:
     def has_points(self) -> bool:
         """Whether some state of the model has a point."""
         return any(len(cloud.points) > 0 for _, cloud in self._snapshots)
-
-    def snapshot_at(self, place: int) -> Snapshot | None:
-        """Return the model as it was after a frame, or the last state known before; the first one else."""
-        if not self._snapshots:
-            return None
-        found = bisect.bisect_right(self._snapshots, place, key=lambda state: state[0])
-        return self._snapshots[max(found - 1, 0)][1]
-
-    def pose_at(self, place: int) -> npt.NDArray[np.float64] | None:
-        """Return the pose of a frame; for a lost one the last one known before."""
-        for frame in reversed(self.frames[: place + 1]):
-            if frame.world_from_camera is not None:
-                pose: npt.NDArray[np.float64] = frame.world_from_camera
-                return pose
-        return None
