@@ -116,6 +116,17 @@ def test_a_drag_turns_the_model_and_is_no_click(exported: Browser) -> None:
     assert exported.evaluate("page.orbit.touched") is False
 
 
+def test_surfaces_are_seen_from_behind_on_demand(exported: Browser) -> None:
+    exported.evaluate("page.orbit.backward = [0, 0, 1]; page.orbit.up = [0, -1, 0]; page.draw()")
+    middle = [exported.evaluate(f"page.canvas.client{side} / 2") for side in ("Width", "Height")]
+    assert np.ptp(color_at(exported, *middle)) < 60
+    assert exported.evaluate(f"page.pointAt({middle[0]}, {middle[1]})") is None
+    exported.press_button("reverse")
+    red, green, _ = color_at(exported, *middle)
+    assert red > 2 * green
+    assert exported.evaluate(f"page.pointAt({middle[0]}, {middle[1]})") is not None
+
+
 def test_a_box_keeps_what_is_in_it_and_saves_it(exported: Browser, tmp_path: Path) -> None:
     exported.press_button("crop")
     assert num_shown(exported) == 441

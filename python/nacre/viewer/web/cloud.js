@@ -27,6 +27,12 @@ class Cloud {
     return this.paint[4 * i + 3] > 0;
   }
 
+  /** Whether the surface at a point faces an eye. */
+  faces(i, eye) {
+    const offset = subtract(eye, this.position(i));
+    return offset.reduce((sum, value, k) => sum + value * this.normals[4 * i + k], 0) > 0;
+  }
+
   /** What the points can be colored by. */
   get kinds() {
     const known = { colour: this.colors, shading: true, normal: true, confidence: this.confidence };

@@ -30,8 +30,8 @@ class Deviation {
     document.getElementById("scale-value").textContent = lengthText(end);
     const parts = this.app.clouds.flatMap((cloud, run) => {
       const { median, most, counts } = this.figures(cloud);
-      const words = `${this.app.document.runs[run].title}: median ${lengthText(median)}, 95 % below ${lengthText(most)}`;
-      return [element("div", {}, words), this.#histogram(counts)];
+      const words = `median ${lengthText(median)}, 95 % below ${lengthText(most)}`;
+      return [element("div", {}, `${this.app.document.runs[run].title}: ${words}`), this.#histogram(counts)];
     });
     const ends = element("div", { class: "bar" });
     ends.append(element("span", {}, "0"), element("i", {}), element("span", {}, `${lengthText(end)} and more`));

@@ -42,8 +42,10 @@ class App {
   }
 
   async #take(bytes) {
+    const isFirst = !this.document;
     this.document = JSON.parse(new TextDecoder().decode(bytes));
     showDocument(this.document);
+    if (isFirst && !this.document.runs[0].frames.length) document.getElementById("reverse").checked = true;
     this.player.update();
     this.#forget();
     const { view, runs } = this.document;
@@ -168,7 +170,8 @@ class App {
     const asMesh = this.showsMesh && Boolean(cloud.triangles);
     const pointSize = +document.getElementById("size").value;
     const ambient = { shading: 0.25, colour: 0.5 }[this.kind] ?? 0.6;
-    this.renderer.drawCloud(cloud, matrices, part, { asMesh, pointSize, ambient });
+    const showReverse = isChecked("reverse");
+    this.renderer.drawCloud(cloud, matrices, part, { asMesh, showReverse, pointSize, ambient });
     const chosen = { path: isChecked("path"), cameras: isChecked("cameras") };
     const place = part.run === 0 ? this.player.place : run.frames.length;
     const size = 0.06 * (this.document.view?.radius ?? 1);
@@ -201,7 +204,8 @@ class App {
     const part = this.parts.find(({ left, width }) => across >= left && across <= left + width);
     const cloud = part && this.clouds[part.run];
     if (!cloud) return null;
-    const i = pick(cloud, this.matrices(part), part, this.canvas, x, y);
+    const eye = isChecked("reverse") ? null : this.orbit.eye;
+    const i = pick(cloud, this.matrices(part), part, this.canvas, x, y, eye);
     return i < 0 ? null : cloud.position(i);
   }
 
@@ -222,7 +226,7 @@ class App {
     on("surface", "change", () => this.#loadTriangles().then(() => this.redraw()));
     on("size", "input", () => this.redraw());
     on("confidence", "input", () => this.select());
-    for (const id of ["path", "cameras"]) on(id, "change", () => this.redraw());
+    for (const id of ["reverse", "path", "cameras"]) on(id, "change", () => this.redraw());
     on("reset", "click", () => this.reset());
     on("layout", "change", () => this.select());
     new ResizeObserver(() => this.redraw()).observe(this.canvas);

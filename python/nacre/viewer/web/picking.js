@@ -10,8 +10,11 @@ function project(point, { view, clip }, part, canvas) {
   return [middle[0] - (perUnit * x) / z, middle[1] + (perUnit * y) / z];
 }
 
-/** The shown point under a pixel: of those near it in the front surface the nearest; -1 where there is none. */
-function pick(cloud, { view, clip }, part, canvas, x, y) {
+/**
+ * The shown point under a pixel, of those near it in the front surface the nearest; -1 where there is none.
+ * With an eye, of those that face it.
+ */
+function pick(cloud, { view, clip }, part, canvas, x, y, eye) {
   const [right, up, back] = [0, 1, 2].map((row) => cloud.along(viewRow(view, row), view[12 + row]));
   const { middle, perUnit } = screen(clip, part, canvas);
   const found = [];
@@ -21,7 +24,7 @@ function pick(cloud, { view, clip }, part, canvas, x, y) {
     const dx = middle[0] + (perUnit * right(i)) / depth - x;
     const dy = middle[1] - (perUnit * up(i)) / depth - y;
     const distance = Math.hypot(dx, dy);
-    if (distance <= PICK_RADIUS) found.push({ i, distance, depth });
+    if (distance <= PICK_RADIUS && (!eye || cloud.faces(i, eye))) found.push({ i, distance, depth });
   }
   const front = found.reduce((least, point) => Math.min(least, point.depth), Infinity) + 3 * cloud.spacing;
   const surface = found.filter((point) => point.depth <= front);

@@ -26,7 +26,7 @@ void main() {
 const CLOUD_FRAGMENT = `#version 300 es
 precision highp float;
 uniform mat4 clip;
-uniform bool isMesh;
+uniform bool isMesh, showReverse;
 uniform float ambient;
 in vec3 viewNormal, viewPoint;
 in vec4 shade;
@@ -37,6 +37,7 @@ void main() {
   if (shade.a < 0.999) discard;
   vec3 n = normalize(viewNormal);
   bool isReverse = dot(n, viewPoint) > 0.0;
+  if (isReverse && !showReverse) discard;
   if (isReverse) n = -n;
   float z = viewPoint.z;
   if (!isMesh && pixels > 3.0) {
@@ -107,7 +108,7 @@ class Renderer {
   }
 
   /** Draw a cloud into a part of the canvas: from left to left + width, parts of 1. */
-  drawCloud(cloud, { view, clip }, part, { asMesh, pointSize, ambient }) {
+  drawCloud(cloud, { view, clip }, part, { asMesh, showReverse, pointSize, ambient }) {
     const gl = this.gl, program = this.cloudProgram, buffers = this.#buffers(cloud);
     const height = this.#viewport(part);
     gl.useProgram(program.id);
@@ -119,6 +120,7 @@ class Renderer {
     gl.uniform1f(program.at("pixelsPerUnit"), 0.5 * height * clip[5]);
     gl.uniform1f(program.at("ambient"), ambient);
     gl.uniform1i(program.at("isMesh"), asMesh ? 1 : 0);
+    gl.uniform1i(program.at("showReverse"), showReverse ? 1 : 0);
     this.#attribute(0, buffers.points, 3, gl.UNSIGNED_SHORT, false);
     this.#attribute(1, buffers.normals, 4, gl.BYTE, true);
     this.#attribute(2, buffers.paint, 4, gl.UNSIGNED_BYTE, true);
