@@ -13,7 +13,6 @@ from nacre.viewer.timeline import Snapshot, Timeline
 
 __all__ = [
     "LiveView",
-    "ReportedFrame",
     "Snapshot",
     "Timeline",
     "Viewer",
