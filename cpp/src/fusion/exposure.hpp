@@ -10,4 +10,8 @@ namespace nacre {
 // both show, as exposure and white balance change the whole image alike. 1 where too few are known.
 Eigen::Vector3f color_gain(const PointModel& model, const RegisteredFrame& now, double spacing);
 
+// Brings a frame and the model to one exposure, the mean of all frames': returns what the frame's colours are to be
+// multiplied by, and multiplies the model's.
+Eigen::Vector3f share_exposure(PointModel& model, const RegisteredFrame& now, double spacing);
+
 }  // namespace nacre

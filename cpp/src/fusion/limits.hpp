@@ -19,6 +19,10 @@ constexpr int squares_across = 8;  // [1] budget: of the index of pixels, in a r
 constexpr std::size_t sigma_probes = 5000;  // [pixels] budget: that tell a frame's median noise; test_fusion
 constexpr int layer_levels = 4;  // [1] budget: of spacing, each twice the one before; test_deformation
 constexpr float cover_sigmas = 3.0F;  // [sigma] tuned: a pixel nearer to a point's plane is its surface; test_fusion
+constexpr std::size_t exposure_blocks = 8;  // [blocks] budget: of points, one of which tells how bright a frame is; test_exposure
+constexpr std::size_t least_exposure_points = 100;  // [points] derived: whose median ratio is sure to a tenth of their scatter; test_exposure
+constexpr float darkest_color = 16.0F;  // [grey levels] derived: below it rounding is more than 3 %; test_exposure
+constexpr float brightest_color = 239.0F;  // [grey levels] derived: as far from the other end, where sensors saturate; test_exposure
 
 }  // namespace nacre::fusion_limits
 // clang-format on

@@ -14,7 +14,8 @@ struct RegisteredFrame {
   const Camera& camera;
   const SurfaceObserver& observer;  // of the frame and its colours
   const Pose& world_from_camera;
-  std::int32_t index;  // in the recording
+  std::int32_t index;                                    // in the recording
+  Eigen::Vector3f color_gain = Eigen::Vector3f::Ones();  // of its exposure
 };
 
 }  // namespace nacre
