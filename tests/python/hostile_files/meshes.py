@@ -132,7 +132,8 @@ _GLB = {
     "glb accessor huge": (
         glb(
             '{"scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}], "buffers": [{}], '
-            '"bufferViews": [{"buffer": 0, "byteLength": 99}], "meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "accessors": '
+            '"bufferViews": [{"buffer": 0, "byteLength": 99}], '
+            '"meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "accessors": '
             '[{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 1000000000000}]}'
         ),
         "accessor 0 does not end within the data",
