@@ -289,8 +289,9 @@ RECIPES: dict[str, Recipe] = {
         "depth_scale": 1000.0}
     ),
     "nacre.io.meshes.write_mesh": Recipe(
-        functools.partial(nacre.write_mesh, FOLDER / "mesh.ply"), {"vertices": VERTICES,
-        "triangles": TRIANGLES}
+        functools.partial(nacre.write_mesh, FOLDER / "mesh.glb"),
+        {"vertices": VERTICES, "triangles": TRIANGLES, "normals": unit(4),
+         "colors": np.full((4, 3), 7, np.uint8), "binary": True},
     ),
     "nacre.io.points.write_points": Recipe(
         functools.partial(nacre.write_points, FOLDER / "points.ply"),
@@ -298,7 +299,7 @@ RECIPES: dict[str, Recipe] = {
     ),
     "nacre.io.trajectories.write_trajectory": Recipe(
         functools.partial(nacre.write_trajectory, FOLDER / "poses.txt"), {"timestamps": np.arange(3.0),
-        "poses": POSES}
+        "poses": POSES, "format": "kitti"}
     ),
     "nacre.datasets.plain.write_recording": Recipe(
         lambda depth_images, colors, poses, timestamps, **more: nacre.write_recording(

@@ -44,6 +44,11 @@ def write_color(path: Path) -> None:
     write_color_jpeg(path, np.zeros((20, 24, 3), np.uint8))
 
 
+def write_laz(path: Path) -> None:
+    pytest.importorskip("laspy")
+    nacre.write_points(path, POINTS)
+
+
 def timeline() -> Any:
     from nacre.viewer.timeline import Timeline
 
@@ -71,7 +76,13 @@ WRITERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "PLY": ("a.ply", lambda path: nacre.write_points(path, POINTS)),
     "ASCII PLY": ("a.ply", lambda path: nacre.write_points(path, POINTS, binary=False)),
     "PCD": ("a.pcd", lambda path: nacre.write_points(path, POINTS)),
+    "XYZ": ("a.xyz", lambda path: nacre.write_points(path, POINTS)),
+    "NPZ": ("a.npz", lambda path: nacre.write_points(path, POINTS)),
+    "LAZ": ("a.laz", write_laz),
     "mesh": ("m.ply", lambda path: nacre.write_mesh(path, POINTS, TRIANGLES)),
+    "GLB": ("m.glb", lambda path: nacre.write_mesh(path, POINTS, TRIANGLES)),
+    "OBJ": ("m.obj", lambda path: nacre.write_mesh(path, POINTS, TRIANGLES)),
+    "STL": ("m.stl", lambda path: nacre.write_mesh(path, POINTS, TRIANGLES)),
     "trajectory": ("t.txt", lambda path: nacre.write_trajectory(path, [0.0, 1.0], np.stack([np.eye(4)] * 2))),
     "camera": ("camera.json", lambda path: nacre.write_camera(path, CAMERA, 1000)),
     "depth image": ("d.png", write_image),

@@ -28,14 +28,24 @@ COMMANDS = {
         "consolidate {bad} {out}.ply",
         "align {bad} {good}/points.ply",
         "mesh {bad} -o {out}.ply",
+        "convert {bad} {out}.pcd",
     ),
     "range grid": ("reconstruct {bad} -o {out}",),
-    "mesh": ("info {bad}", "simulate {bad} -o {out}", "evaluate {good}/points.ply {bad}"),
+    "mesh": (
+        "info {bad}",
+        "simulate {bad} -o {out}",
+        "evaluate {good}/points.ply {bad}",
+        "convert {bad} {out}.stl",
+    ),
     "camera": (
         "info {good}/recording --camera {bad}",
         "reconstruct {good}/recording --camera {bad} -o {out}",
     ),
-    "trajectory": ("evaluate {bad} {good}/truth.txt", "evaluate {good}/truth.txt {bad}"),
+    "trajectory": (
+        "evaluate {bad} {good}/truth.txt",
+        "evaluate {good}/truth.txt {bad}",
+        "convert {bad} {out}.log",
+    ),
     "matrix": ("evaluate {good}/points.ply {good}/mesh.obj --world-from-model {bad}",),
     "config": ("reconstruct {good}/recording --config {bad} -o {out}",),
     "recording": ("reconstruct {bad} -o {out}",),
@@ -77,7 +87,7 @@ def test_bad_file_ends_a_command(good, tmp_path, kind):
         bad = write(case, tmp_path)
         # What is said of a journal, is said only where the recording of its run is there.
         several = "/run_" in name if kind == "run" else num % 10 == 0
-        for command in COMMANDS[kind][: 4 if several else 1]:
+        for command in COMMANDS[kind][: 5 if several else 1]:
             words = command.format(bad=bad, good=good, out=tmp_path / "out").split()
             code, err = said(*words)
             lines = [line for line in err.splitlines() if not line.startswith("warning: ")]

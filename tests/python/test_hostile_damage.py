@@ -108,9 +108,9 @@ def check_mesh(mesh):
 
 
 SOUND = {
-    "points": (nacre.read_points, check_cloud, (".ply", ".pcd")),
+    "points": (nacre.read_points, check_cloud, (".ply", ".pcd", ".xyz", ".npz")),
     "range grid": (read_range_grid, check_grid, (".ply",)),
-    "mesh": (read_mesh_arrays, check_mesh, (".ply", ".obj", ".off", ".stl")),
+    "mesh": (read_mesh_arrays, check_mesh, (".ply", ".obj", ".off", ".stl", ".glb")),
 }
 
 

@@ -26,14 +26,17 @@ class Method(str, Enum):
 
 def align(
     source: Annotated[
-        Path, typer.Argument(metavar="SOURCE", help="The points that move (PLY, PCD).", show_default=False)
+        Path,
+        typer.Argument(
+            metavar="SOURCE", help="The points that move (PLY, PCD, LAS, ...).", show_default=False
+        ),
     ],
     target: Annotated[
-        Path, typer.Argument(metavar="TARGET", help="The points that stay (PLY, PCD).", show_default=False)
+        Path, typer.Argument(metavar="TARGET", help="The points that stay.", show_default=False)
     ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="OUT.ply", help="Write the moved source.", show_default=False),
+        typer.Option("--out", "-o", metavar="OUT", help="Write the moved source.", show_default=False),
     ] = None,
     initial: Annotated[
         Path | None,

@@ -96,10 +96,15 @@ def _write_points(out: Path, cloud: Cloud) -> Figures:
 
 
 def _mesh(job: Job) -> Figures:
+    import numpy as np
+
     import nacre
     from nacre.io.meshes import read_mesh_arrays
 
     mesh = read_mesh_arrays(job.source)
+    if not len(mesh.triangles) or not np.isfinite(mesh.vertices).all():
+        what = "vertices that are not finite" if len(mesh.triangles) else "no triangle"
+        raise CommandError(f"{job.source} has {what}")
     nacre.write_mesh(job.out, mesh.vertices, mesh.triangles, normals=mesh.normals, colors=mesh.colors)
     return {"num_vertices": len(mesh.vertices), "num_triangles": len(mesh.triangles)}
 

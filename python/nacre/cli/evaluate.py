@@ -32,7 +32,7 @@ def evaluate(
         Path,
         typer.Argument(
             metavar="ESTIMATE",
-            help="A model (PLY, PCD), a trajectory (TUM, Redwood .log), or a reconstruction's OUT folder.",
+            help="A model (PLY, PCD, ...), a trajectory (TUM, Redwood, ...), or the OUT folder of a run.",
             show_default=False,
         ),
     ],

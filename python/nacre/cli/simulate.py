@@ -30,7 +30,7 @@ def simulate(
         str,
         typer.Argument(
             metavar="MESH",
-            help='A mesh in metres (PLY, OBJ, OFF, STL), or the word "built-in".',
+            help='A mesh in metres (PLY, GLB, OBJ, OFF, STL), or the word "built-in".',
             show_default=False,
         ),
     ],

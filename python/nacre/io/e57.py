@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 from collections.abc import Sequence
@@ -47,8 +48,7 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
     except (MemoryError, FileFormatError):
         raise
     except Exception as error:  # of several kinds, the library's own among them
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise FileFormatError(path, f"not a readable E57 file: {reason}", offset=0) from error
+        raise FileFormatError(path, f"not a readable E57 file: {_reason(error)}", offset=0) from error
     points = _joined(scans, _AXES)
     colors, intensity = _joined(scans, _COLORS), _joined(scans, ("intensity",))
     return Cloud(
@@ -95,8 +95,17 @@ def write_cloud(
             left_out.append(name)
     if left_out:
         _log.warning("%s: an E57 file has no place for %s", path, ", ".join(left_out))
-    with atomic_path(path) as temporary, pye57.E57(os.fspath(temporary), mode="w") as file:
-        file.write_scan_raw(data, name=Path(path).stem, translation=origin)
+    with atomic_path(path) as temporary:
+        try:
+            with pye57.E57(os.fspath(temporary), mode="w") as file:
+                file.write_scan_raw(data, name=Path(path).stem, translation=origin)
+        except pye57.libe57.E57Exception as error:
+            raise OSError(errno.EIO, _reason(error), os.fspath(path)) from error
+
+
+def _reason(error: Exception) -> str:
+    """Return the first line of an error, which the library follows by places in its own source."""
+    return str(error).partition("\n")[0] or type(error).__name__
 
 
 def _import_pye57() -> Any:

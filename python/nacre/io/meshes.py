@@ -12,14 +12,14 @@ import numpy.typing as npt
 from nacre._internal import arrays
 from nacre._internal.arrays import as_flag
 from nacre.errors import FileFormatError
-from nacre.io import glb, obj, off, ply, stl
+from nacre.io import glb, glb_reader, obj, off, ply, stl
 from nacre.io.cloud import check_cloud
 from nacre.io.mesh_arrays import MeshArrays
 
 if TYPE_CHECKING:
     from nacre.mesh import Mesh
 
-_READERS = {".ply": ply, ".obj": obj, ".off": off, ".stl": stl}
+_READERS = {".ply": ply, ".glb": glb_reader, ".obj": obj, ".off": off, ".stl": stl}
 _WRITERS = {".ply": ply, ".glb": glb, ".obj": obj, ".stl": stl}
 
 READ_SUFFIXES = tuple(_READERS)
@@ -33,8 +33,9 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     Parameters
     ----------
     path : path-like
-        An ``.obj``, ``.off``, ``.stl`` or ``.ply`` file. Polygons become fans of triangles; the equal corners
-        of an STL file become one vertex. Colours, normals and texture coordinates are left out.
+        A ``.ply``, ``.glb``, ``.obj``, ``.off`` or ``.stl`` file. Polygons become fans of triangles, the
+        equal corners of an STL file one vertex, the meshes of a GLB file's scene one mesh. Colours, normals
+        and texture coordinates are left out.
 
     Returns
     -------

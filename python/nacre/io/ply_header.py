@@ -32,6 +32,7 @@ _FORMATS = ("ascii", *BYTE_ORDERS)
 _KEYWORDS = ("format", "element", "property", "end_header")
 _MAX_ELEMENTS = 1_000
 _MAX_ENTRIES = 5_000
+_LONGEST_NOTE = 1_000
 
 
 @dataclass(frozen=True)
@@ -158,8 +159,9 @@ class _Parser:
 
     def _pass_over(self, line: bytes, keyword: str, number: int) -> None:
         """Keep a line that is none of the format's as a comment, but not one that is almost of the format."""
-        near = meant(keyword, _KEYWORDS)
-        if near or not decode(line).isprintable():
+        is_note = len(line) <= _LONGEST_NOTE and decode(line).isprintable()
+        near = meant(keyword, _KEYWORDS) if is_note else ""
+        if near or not is_note:
             raise ValueError(f"unknown keyword in the header: {excerpt(line)}{near}")
         self._count_note()
         self._stray_lines.append(number)

@@ -30,6 +30,7 @@ def read_points(path: str | os.PathLike[str]) -> Cloud:
           out. Lines of the header that are none of PLY's become comments, with a warning in the log.
         - ``.pcd``: ascii, binary, binary_compressed.
         - ``.las``, ``.laz`` (extra ``las``): any version; colours as 8 bits, all else as attributes.
+          What the header says of the coordinate system is left out.
         - ``.e57`` (extra ``e57``): all scans, each in its place; colours and ``intensity``.
         - ``.xyz``: text, a point a line, values between blanks, commas or semicolons: x y z, then r g b from
           0 to 255, then nx ny nz; or as a first line of names says.

@@ -111,7 +111,8 @@ def write_trajectory(
 
         None takes Redwood for files that end in ``.log``, else TUM.
     """
-    name = format or ("redwood" if Path(path).suffix.lower() == ".log" else "tum")
+    ending = "redwood" if Path(path).suffix.lower() == ".log" else "tum"
+    name = ending if format is None else format
     if name not in _WRITERS:
         raise ValueError(f"format must be one of {', '.join(_WRITERS)}, got {format!r}")
     trajectory = Trajectory(timestamps, poses)  # type: ignore[arg-type]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ _LAYOUTS: dict[int, list[tuple[str, ...]]] = {
     7: [(*_AXES, "intensity", *_COLORS), (*_AXES, *_COLORS, "intensity")],
     9: [(*_AXES, *_COLORS, *_NORMALS), (*_AXES, *_NORMALS, *_COLORS)],
 }
+_LONGEST_NAMES = 4096
 _SEPARATORS = bytes.maketrans(b",;", b"  ")
 
 
@@ -62,8 +64,8 @@ def _read_header(path: str | os.PathLike[str], data: bytes) -> tuple[list[str], 
         end = len(data) if end < 0 else end + 1
         line = data[position:end].strip()
         is_comment = line.startswith((b"#", b"//"))
-        text = decode(line.lstrip(b"#/") if is_comment else line).strip()
-        told = _names_in(text)
+        text = decode(line.lstrip(b"#/") if is_comment else line[:_LONGEST_NAMES]).strip()
+        told = _names_in(text) if len(line) <= _LONGEST_NAMES else None
         if line and not is_comment and (names is not None or told is None):
             break
         position = end
@@ -87,16 +89,19 @@ def _read_table(
     path: str | os.PathLike[str], data: bytes, start: int, names: tuple[str, ...] | None
 ) -> npt.NDArray[np.float64]:
     """Return the numbers, a row for each line; all lines have as many."""
-    num_points = sum(1 for line in data[start:].split(b"\n") if line.strip())
-    width = None if names is None else len(names)
-    rows = []
+    num_points = sum(1 for line in BytesIO(data[start:]) if line.strip())
+    if not num_points and names is None:
+        raise FileFormatError(path, "there is no point, nor a line of names", line=1)
+    width = len(names or _AXES)
+    rows = [np.zeros((0, width))]
     for block in TextTable(path, data, start).blocks(num_points, "points"):
-        width = int(block.widths[0]) if width is None else width
+        if names is None and len(rows) == 1:
+            width = int(block.widths[0])
+            if width not in _LAYOUTS:
+                raise _unknown(path, data, start)
         block.require_width(width)
         rows.append(block.values.reshape(-1, width))
-    if width is None:
-        raise FileFormatError(path, "there is no point, nor a line of names", line=1)
-    return np.concatenate(rows) if rows else np.zeros((0, width))
+    return np.concatenate(rows[1:] or rows)
 
 
 def _named(
@@ -107,14 +112,18 @@ def _named(
     names: tuple[str, ...] | None,
 ) -> Columns:
     """Return the columns by their names."""
-    for layout in _LAYOUTS.get(table.shape[1], []) if names is None else [names]:
+    for layout in _LAYOUTS[table.shape[1]] if names is None else [names]:
         columns: Columns = dict(zip(layout, table.T, strict=True))
         if names is not None or _fits(columns):
             return columns
-    first = data[start:].split(b"\n", 1)[0].strip()
-    line = 1 + data.count(b"\n", 0, start)
+    raise _unknown(path, data, start)
+
+
+def _unknown(path: str | os.PathLike[str], data: bytes, start: int) -> FileFormatError:
+    first = data[start : start + _LONGEST_NAMES].split(b"\n", 1)[0].strip()
     expected = "x y z, then r g b from 0 to 255, then nx ny nz of unit length, or a first line of names"
-    raise FileFormatError(path, f"expected {expected}; got {excerpt(first)}", line=line)
+    line = 1 + data.count(b"\n", 0, start)
+    return FileFormatError(path, f"expected {expected}; got {excerpt(first)}", line=line)
 
 
 def _fits(columns: Columns) -> bool:

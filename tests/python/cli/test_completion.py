@@ -18,6 +18,7 @@ TYPED = {
     "nacre reconstruct --pre": {"--preset"},
     "nacre reconstruct x --preset ": {"default", "paper"},
     "nacre reconstruct x --format ic": {"icl-nuim"},
+    "nacre convert x y --to n": {"nerfstudio"},
     "nacre reconstruct x --set fusion.max": {"fusion.max_confidence=", "fusion.max_free_space_violations="},
 }  # fmt: skip
 

@@ -17,6 +17,7 @@ from hostile_files.outputs import OUTPUTS
 from hostile_files.pcd import PCD
 from hostile_files.phones import PHONES
 from hostile_files.ply import PLY
+from hostile_files.point_texts import POINT_TEXTS
 from hostile_files.recordings import RECORDINGS
 from hostile_files.ros import ROS
 from hostile_files.saved_runs import SAVED_RUNS
@@ -27,6 +28,7 @@ CASES = {
     for cases in (
         PLY,
         PCD,
+        POINT_TEXTS,
         MESHES,
         DEPTH_IMAGES,
         TRAJECTORIES,

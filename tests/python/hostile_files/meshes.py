@@ -18,6 +18,12 @@ def stl(num_facets: int, body: bytes = bytes(50)) -> bytes:
     return bytes(80) + struct.pack("<I", num_facets) + body
 
 
+def glb(text: str) -> bytes:
+    """Return a GLB file of a document alone."""
+    data = text.encode() + b" " * (-len(text) % 4)
+    return b"glTF" + struct.pack("<III", 2, 20 + len(data), len(data)) + b"JSON" + data
+
+
 _OBJ = {
     "obj empty": ("", "no face"),
     "obj nul bytes": ("\0" * 100, "line 1: cannot read"),
@@ -109,9 +115,34 @@ _PLY = {
         "no element face with",
     ),
 }
+_GLB = {
+    "glb empty": (b"", "byte 0: a GLB file begins"),
+    "glb of another program": (b"\x7fELF" + bytes(100), "byte 0: a GLB file begins"),
+    "glb of version 1": (b"glTF" + struct.pack("<III", 1, 20, 0) + b"JSON", "byte 4: glTF of version 1"),
+    "glb length huge": (glb("{}").replace(b"\x18\0\0\0", b"\xff" * 4, 1), "byte 8: the header promises"),
+    "glb json huge": (b"glTF" + struct.pack("<III", 2, 20, 2**32 - 1) + b"JSON", "byte 12: the JSON chunk"),
+    "glb json garbage": (glb("{oops}"), "not a JSON file"),
+    "glb json nested": (glb("[" * 100_000), "not a JSON file"),
+    "glb json a list": (glb("[]"), "expected a JSON object"),
+    "glb without a scene": (glb("{}"), "an index of scenes must be"),
+    "glb nodes in a circle": (
+        glb('{"scenes": [{"nodes": [0]}], "nodes": [{"children": [1]}, {"children": [0]}]}'),
+        "node 0 is there twice",
+    ),
+    "glb accessor huge": (
+        glb(
+            '{"scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}], "buffers": [{}], '
+            '"bufferViews": [{"buffer": 0, "byteLength": 99}], '
+            '"meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "accessors": '
+            '[{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 1000000000000}]}'
+        ),
+        "accessor 0 does not end within the data",
+    ),
+}
 MESHES = (
     single("mesh", "mesh", ".obj", _OBJ)
     + single("mesh", "mesh", ".off", _OFF)
     + single("mesh", "mesh", ".stl", _STL)
     + single("mesh", "mesh", ".ply", _PLY)
+    + single("mesh", "mesh", ".glb", _GLB)
 )

@@ -71,7 +71,7 @@ POINTS = {
         "at least 36 bytes",
     ),
     "header with a line that is no text": (ply(TWO, f"by \1\n{vertices(2)}"), "line 3: unknown keyword"),
-    "header of one endless line": (b"ply\n" + b"x" * 200_000, "line 3: .*before end_header"),
+    "header of one endless line": (b"ply\n" + b"x" * 200_000, "line 2: unknown keyword"),
     "header of blank lines": (b"ply\n" + b"\n" * 100_000, "line 10002: more than 10000 comments"),
     "header of comments": (b"ply\n" + b"comment\n" * 60_000, "line 10002: more than 10000 comments"),
     "header of many elements": (

@@ -1,5 +1,6 @@
 """Small files that are as they should be, and what is in them: the seeds of damage."""
 
+import io
 import json
 import struct
 import zlib
@@ -29,6 +30,38 @@ _many = np.random.default_rng(6).normal(size=(40, 6)).astype("<f4")
 _wide = b"".join(
     row.tobytes() + bytes((i, 2 * i, 3 * i)) + struct.pack("<d", i / 7) for i, row in enumerate(_many)
 )
+
+
+def npz(**arrays: np.ndarray) -> bytes:
+    """Return an archive of arrays."""
+    stream = io.BytesIO()
+    np.savez_compressed(stream, **arrays)
+    return stream.getvalue()
+
+
+def glb() -> bytes:
+    """Return a GLB file of a triangle with normals and colours."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], "<f4")
+    binary = corners.tobytes() * 2 + np.arange(3, dtype="<u4").tobytes() + bytes(range(12))
+    views = [(0, 36), (36, 36), (72, 12), (84, 12)]
+    kinds = [(5126, "VEC3"), (5126, "VEC3"), (5125, "SCALAR"), (5121, "VEC4")]
+    fields = {"POSITION": 0, "NORMAL": 1, "COLOR_0": 3}
+    document = {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0, "translation": [1, 2, 3]}], "buffers": [{"byteLength": 96}],
+        "meshes": [{"primitives": [{"attributes": fields, "indices": 2}]}],
+        "bufferViews": [{"buffer": 0, "byteOffset": start, "byteLength": size} for start, size in views],
+        "accessors": [
+            {"bufferView": i, "componentType": code, "type": kind, "count": 3, "normalized": code == 5121}
+            for i, (code, kind) in enumerate(kinds)
+        ],
+    }  # fmt: skip
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    parts = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", 96, b"BIN\0") + binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(parts)) + parts
+
+
 FILES = {
     "points": {
         "binary.ply": ply(TWO),
@@ -41,6 +74,9 @@ FILES = {
         "mixed_text.ply": text(mixed_text(), MIXED),
         "binary.pcd": pcd(PCD_TWO),
         "text.pcd": pcd(b"0 1 2\n3 4 5\n", "ascii"),
+        "text.xyz": b"# x y z red green blue nx ny nz q\n0 1 2 255 0 7 0 0 1 0.5\n3 4 5 1 2 3 0 1 0 0.25\n",
+        "bare.xyz": b"0,1,2,9\n3,4,5,8\n",
+        "arrays.npz": npz(points=_many[:, :3], normals=_many[:, 3:], labels=np.arange(40)),
         "image.pcd": pcd(PCD_TWO * 2, WIDTH=2, HEIGHT=2, POINTS=4),
         "packed.pcd": packed(23, *PCD_TWO),
         "compressed.pcd": other_pcd(compressed(COLUMNS), "binary_compressed"),
@@ -61,6 +97,7 @@ FILES = {
         "a.off": (OFF + "3 0 1 2\n").encode(),
         "corners.obj": (TRIANGLE + "v 1 1 0\nf 1/2 2//3 3/4/5 -1\n# end\n").encode(),
         "colors.off": b"COFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255 0 0\n3 0 2 1\n",
+        "a.glb": glb(),
         "a.stl": stl(1, struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)),
         "text.stl": b"solid\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
         b"endloop\nendfacet\nendsolid\n",

@@ -188,11 +188,11 @@ def test_illegal_arguments(tmp_path, name, vertices, triangles, error, message):
 
 
 def test_unknown_suffix(tmp_path):
-    with pytest.raises(ValueError, match=r"\.ply, \.obj, \.off, \.stl, got .*a\.3ds"):
+    with pytest.raises(ValueError, match=r"\.ply, \.glb, \.obj, \.off, \.stl, got .*a\.3ds"):
         read_mesh_arrays(tmp_path / "a.3ds")
 
 
-@pytest.mark.parametrize("suffix", [".obj", ".off", ".stl", ".ply"])
+@pytest.mark.parametrize("suffix", [".obj", ".off", ".stl", ".ply", ".glb"])
 def test_missing_files_and_directories(tmp_path, suffix):
     with pytest.raises(FileNotFoundError):
         read_mesh_arrays(tmp_path / f"a{suffix}")

@@ -280,3 +280,18 @@ def test_what_is_missing_is_said(tmp_path, monkeypatch, ending, write):
         nacre.write_points(tmp_path / f"a{ending}", POINTS) if write else nacre.read_points(
             tmp_path / f"a{ending}"
         )
+
+
+def test_an_e57_file_that_cannot_be_written_is_named(tmp_path, monkeypatch):
+    """The library's own error says nothing of it, and leaves what was written so far."""
+    pye57 = pytest.importorskip("pye57")
+
+    def fail(*_, **__):
+        raise pye57.libe57.E57Exception("write() failed\nin a source file")
+
+    monkeypatch.setattr(pye57.E57, "write_scan_raw", fail)
+    (tmp_path / "a.e57").write_bytes(b"before")
+    with pytest.raises(OSError, match=r"write\(\) failed: '.*a\.e57'") as caught:
+        nacre.write_points(tmp_path / "a.e57", POINTS)
+    assert caught.value.filename == str(tmp_path / "a.e57")
+    assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"before"]

@@ -1,0 +1,34 @@
+"""``nacre mesh``: the ending of the file chooses the format."""
+
+import numpy as np
+import pytest
+from command_line import fails, run
+
+import nacre
+from nacre.io.meshes import WRITE_SUFFIXES, read_mesh_arrays
+
+
+@pytest.fixture(scope="module")
+def sheet(tmp_path_factory):
+    """Return a point file of a bent sheet, with normals and colours."""
+    x, y = np.meshgrid(np.linspace(0, 1, 12), np.linspace(0, 1, 12))
+    points = np.column_stack([x.ravel(), y.ravel(), 0.1 * np.sin(3 * x).ravel()])
+    normals = np.tile([0.0, 0.0, 1.0], (144, 1))
+    colors = np.random.default_rng(1).integers(0, 256, (144, 3)).astype(np.uint8)
+    path = tmp_path_factory.mktemp("mesh") / "sheet.ply"
+    nacre.write_points(path, points, normals=normals, colors=colors)
+    return path
+
+
+@pytest.mark.parametrize("suffix", WRITE_SUFFIXES)
+def test_the_ending_chooses_the_format(sheet, tmp_path, suffix):
+    told = run("mesh", sheet, "-o", tmp_path / f"a{suffix}", "--json").json
+    found = read_mesh_arrays(tmp_path / f"a{suffix}")
+    assert (len(found.vertices), len(found.triangles)) == (told["vertices"], told["triangles"]) == (144, 242)
+    assert (found.colors is None) == (found.normals is None) == (suffix == ".stl")
+
+
+def test_an_ending_that_no_mesh_has(sheet, tmp_path):
+    message = fails(2, "mesh", sheet, "-o", tmp_path / "a.usd")
+    assert "meshes are written to .ply, .glb, .obj, .stl, got" in message
+    assert not list(tmp_path.iterdir())
