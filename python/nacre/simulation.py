@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from nacre._core import Camera
 from nacre._internal import arrays
+from nacre.camera import Camera
 from nacre.mesh import Mesh, SensorName
 from nacre.noise import NoiseModel, NoiseName
 

@@ -168,11 +168,12 @@ def test_moves_with_the_points(seed, method):
     rotation, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     shift = rng.uniform(-1, 1, 3)
     order = rng.permutation(len(points))
-    moved = nacre.project_samples(points[:50], points, iterations=2, method=method)
+    options = {"radius": 0.02, "iterations": 2, "method": method}
+    moved = nacre.project_samples(points[:50], points, **options)
     turned = nacre.project_samples(
-        points[:50] @ rotation.T + shift, points[order] @ rotation.T + shift, iterations=2, method=method
+        points[:50] @ rotation.T + shift, points[order] @ rotation.T + shift, **options
     )
-    np.testing.assert_allclose(turned, moved @ rotation.T + shift, atol=5e-5 * 0.008)
+    np.testing.assert_allclose(turned, moved @ rotation.T + shift, atol=5e-5 * 0.02)
 
 
 @settings(max_examples=50, deadline=None)
@@ -298,7 +299,7 @@ def test_attributes_are_means_with_the_weights_of_the_positions():
 def test_attributes_leave_out_what_is_not_finite():
     points = np.array([[0.0, 0, 0], [0.001, 0, 0], [0, 0.001, 0], [1, 1, 1]])
     values = np.array([np.nan, 4.0, np.inf, np.nan])
-    thin = nacre.consolidate(points, attributes={"a": values})
+    thin = nacre.consolidate(points, radius=0.008, attributes={"a": values})
     np.testing.assert_array_equal(thin.attributes["a"], [4, 4, 4, np.nan])
 
 
@@ -361,7 +362,7 @@ def test_defaults_equal_the_cores():
     core = _core.ConsolidateOptions()
     for function in (nacre.consolidate, nacre.project_samples):
         for name, parameter in inspect.signature(function).parameters.items():
-            if hasattr(core, name):
+            if hasattr(core, name) and name != "radius":  # by default from the points
                 default = getattr(core, name)
                 assert parameter.default == getattr(default, "name", default), name
     named = set(inspect.signature(nacre.consolidate).parameters) - {"points", "attributes", "progress"}
@@ -399,7 +400,7 @@ def test_defaults_equal_the_cores():
     ],
 )
 def test_misuse_of_consolidate(change, error, message):
-    arguments = {"points": np.zeros((4, 3))} | change
+    arguments = {"points": np.zeros((4, 3)), "radius": 0.008} | change
     with pytest.raises(error, match=message):
         nacre.consolidate(arguments.pop("points"), **arguments)
 
@@ -421,7 +422,8 @@ def test_misuse_of_consolidate(change, error, message):
     ],
 )
 def test_misuse_of_project_samples(change, error, message):
-    arguments = {"samples": np.zeros((2, 3)), "points": np.zeros((4, 3)), "method": "wlop+"} | change
+    arguments = {"samples": np.zeros((2, 3)), "points": np.zeros((4, 3)), "radius": 1.0, "method": "wlop+"}
+    arguments |= change
     with pytest.raises(error, match=message):
         nacre.project_samples(arguments.pop("samples"), arguments.pop("points"), **arguments)
 

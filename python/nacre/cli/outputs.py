@@ -39,14 +39,10 @@ def write_results(
     model = done.model
     nacre.write_points(
         folder / "model.ply",
-        model.points,
-        normals=model.normals,
-        colors=model.colors,
-        attributes={"confidence": model.confidence, "last_seen": model.last_seen, **model.attributes},
+        model,
         comments=[f"nacre {nacre.__version__}", "metres; the world is the first camera's frame"],
     )
-    trajectory = done.trajectory
-    nacre.write_trajectory(folder / "trajectory.txt", trajectory.timestamps, trajectory.poses)
+    nacre.write_trajectory(folder / "trajectory.txt", done.trajectory)
     if page:
         from nacre.report import render_page
 

@@ -349,7 +349,7 @@ class _FrameIterator(Iterator[SequenceFrame]):
 def load_depth_metres(path: Path, depth_scale: float) -> npt.NDArray[np.float32]:
     """Read a depth image as float32 metres; 0, 65535, negative and not finite values become NaN."""
     stored = read_depth(path)
-    metres = arrays.as_depth("depth", stored, depth_scale)
+    metres = arrays.in_metres(stored, depth_scale)
     invalid = ~(metres > 0) | ~np.isfinite(metres) | (stored == 65535)
     return np.where(invalid, np.float32(np.nan), metres)
 

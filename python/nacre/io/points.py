@@ -10,8 +10,9 @@ from types import ModuleType
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_flag
+from nacre._internal.point_exchange import ArrayOfPoints
 from nacre.io import pcd, ply
-from nacre.io.cloud import Cloud
+from nacre.io.cloud import Cloud, cloud_of
 
 _FORMATS = {".ply": ply, ".pcd": pcd}
 
@@ -51,7 +52,7 @@ def read_points(path: str | os.PathLike[str]) -> Cloud:
 
 def write_points(
     path: str | os.PathLike[str],
-    points: npt.ArrayLike,
+    points: npt.ArrayLike | ArrayOfPoints,
     *,
     normals: npt.ArrayLike | None = None,
     colors: npt.ArrayLike | None = None,
@@ -69,11 +70,12 @@ def write_points(
     path : path-like
         A ``.ply`` file (``x y z nx ny nz red green blue``, then the attributes) or a ``.pcd`` file,
         version 0.7 (``x y z normal_x normal_y normal_z rgb``, then the attributes).
-    points : (N, 3) array
-        Coordinates. float32 is stored as float, everything else as double, so that no digit is lost.
+    points : (N, 3) array, or Cloud, Model or Consolidated
+        Coordinates. What has normals, colours and attributes of its own is written with them, where no others
+        are given. float32 is stored as float, everything else as double, so that no digit is lost.
     normals : (N, 3) array, optional
         Stored by the same rule.
-    colors : (N, 3) array of integers from 0 to 255, optional
+    colors : (N, 3) array of integers from 0 to 255, or of floats from 0 to 1, optional
         Red, green, blue.
     attributes : mapping of str to (N,) or (N, K) array, optional
         Further fields, stored in their own type (bool as uint8, float16 as float). As PLY has no 64-bit
@@ -91,12 +93,23 @@ def write_points(
         When the file cannot be written (no such folder, no permission, a full disk); it has the path.
     """
     binary = as_flag("binary", binary)
+    if isinstance(points, ArrayOfPoints):
+        own = cloud_of(points)
+        points = own.points
+        normals = own.normals if normals is None else normals
+        colors = own.colors if colors is None else colors
+        attributes = own.attributes if attributes is None else attributes
     _format_of(path).write_cloud(
         path, points, normals=normals, colors=colors, attributes=attributes, comments=comments, binary=binary
     )
 
 
 def _format_of(path: str | os.PathLike[str]) -> ModuleType:
+    if not isinstance(path, str | os.PathLike):
+        raise TypeError(
+            "path must be a path, as in write_points(path, points) and read_points(path), "
+            f"got {type(path).__name__}"
+        )
     suffix = Path(path).suffix.lower()
     if suffix not in _FORMATS:
         raise ValueError(f"point files end in {' or '.join(_FORMATS)}, got {os.fspath(path)!r}")

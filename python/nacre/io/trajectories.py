@@ -80,7 +80,9 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     return Trajectory(timestamps, poses)
 
 
-def write_trajectory(path: str | os.PathLike[str], timestamps: npt.ArrayLike, poses: npt.ArrayLike) -> None:
+def write_trajectory(
+    path: str | os.PathLike[str], timestamps: npt.ArrayLike | Trajectory, poses: npt.ArrayLike | None = None
+) -> None:
     """
     Write a trajectory in TUM format (``t tx ty tz qx qy qz qw``), atomically and with all digits.
 
@@ -88,12 +90,23 @@ def write_trajectory(path: str | os.PathLike[str], timestamps: npt.ArrayLike, po
     ----------
     path : path-like
         The file to write.
-    timestamps : (N,) array
+    timestamps : (N,) array, or Trajectory
         Seconds, or the frames' indices.
     poses : (N, 4, 4) array
-        ``world_from_camera``.
+        ``world_from_camera``; not with a Trajectory, which has its own.
+
+    Raises
+    ------
+    TypeError, ValueError
+        When an argument does not fit; the message names it.
+    OSError
+        When the file cannot be written.
     """
-    trajectory = Trajectory(timestamps, poses)  # type: ignore[arg-type]
+    if not isinstance(timestamps, Trajectory):
+        timestamps = Trajectory(timestamps, poses)  # type: ignore[arg-type]
+    elif poses is not None:
+        raise ValueError("poses must not be given with a Trajectory, which has its own; got both")
+    trajectory = timestamps
     if not np.isfinite(trajectory.poses).all():
         raise ValueError("poses must be finite, got NaN or infinity")
     farthest = np.abs(trajectory.poses[:, :3, 3]).max(initial=0.0)

@@ -82,7 +82,7 @@ def test_an_exception_of_the_callback_comes_out_and_what_is_done_is_kept(
     [
         ([], {}, "source must have at least one frame"),
         (3, {}, "source must be a path or a sequence of frames, got int"),
-        ("frames", {"depth_scale": 5}, "depth_scale is for a source that is a path"),
+        ("frames", {"depth_scale": 5}, "depth_scale is not for this source, its frames have their own"),
         ("frames", {"progress": 5}, "progress must be a function or None, got 5"),
     ],
 )
