@@ -258,7 +258,7 @@ class KdTree(GuidedNames):
             radii = np.broadcast_to(radii, shape).reshape(-1)
         except ValueError:
             raise ValueError(
-                f"r must be a number or one for each query, {shape}, got {radii.shape}"
+                f"r must be one number, or as many as queries {shape}, got {radii.shape}"
             ) from None
         if not (radii >= 0).all():
             raise ValueError(f"r must be at least 0, got {radii[~(radii >= 0)][0]}")

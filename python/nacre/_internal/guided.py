@@ -58,7 +58,9 @@ def _how_to_call(
 ) -> str:
     name = function.__qualname__.removesuffix(".__init__").rpartition(".")[2]
     parameters = [p for p in signature.parameters.values() if p.name not in ("self", "cls")]
-    own = {p.name for p in parameters if p.kind is not p.VAR_KEYWORD}
+    own_object = len(signature.parameters) - len(parameters)
+    parameters = [p for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
+    own = {p.name for p in parameters}
     unknown = [word for word in named if word not in own]
     if unknown:
         word = unknown[0]
@@ -67,11 +69,10 @@ def _how_to_call(
             return f"{name} has no argument {word!r}{meant(word, own)}; it has {', '.join(sorted(own))}"
         return f"{name} has no argument {word!r}: {f'it is {advice}' if advice in own else advice}"
     by_place = [p.name for p in parameters if p.kind is p.POSITIONAL_OR_KEYWORD]
-    if len(given) - (len(signature.parameters) - len(parameters)) > len(by_place):
+    if len(given) - own_object > len(by_place):
         others = ", ".join(p.name for p in parameters if p.kind is p.KEYWORD_ONLY)
         return f"{name} takes {listing(by_place)} by place and the rest by name: {others}"
-    first = given[len(signature.parameters) - len(parameters) :]
-    taken = set(by_place[: len(first)])
+    taken = set(by_place[: len(given) - own_object])
     missing = [p.name for p in parameters if p.default is p.empty and p.name not in taken | set(named)]
     if missing:
         return f"{name} needs {listing(missing)}{' too' * bool(taken or named)}{': ' * bool(hint)}{hint}"
