@@ -99,6 +99,14 @@ def through_a_file(model: nacre.Model, folder: Path) -> nacre.Model:
     return nacre.Model.load(folder / "model.ckpt")
 
 
+@pytest.mark.parametrize("name", ["model.ply", "MODEL.PCD", "model.obj", "model.glb"])
+def test_a_model_is_not_saved_under_the_name_of_points_or_a_mesh(name: str, tmp_path: Path) -> None:
+    model = nacre.Model(nacre.Camera(8, 6, 8, 8, 3.5, 2.5))
+    with pytest.raises(ValueError, match=r"path must not end in \.\w+, got .*nacre\.write_points\(path,"):
+        model.save(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_a_model_that_is_saved_and_loaded_after_every_frame_is_the_same(name: str, tmp_path: Path) -> None:
     camera, frames, options = SCENES[name]()

@@ -96,10 +96,11 @@ def consolidate(
     origin = "from the density of the points" if radius is None else "given"
     terminal.say(f"radius {result.radius:.4g} ({origin})")
     terminal.say(f"{count(len(cloud))} points to {count(len(result))} in {out}")
-    terminal.say(
-        f"uniformity {before.coefficient_of_variation:.3f} to {after.coefficient_of_variation:.3f} "
-        "(variation of spacing; random points: 0.52)"
-    )
+    if len(result) > 1:
+        terminal.say(
+            f"uniformity {before.coefficient_of_variation:.3f} to {after.coefficient_of_variation:.3f} "
+            "(variation of spacing; random points: 0.52)"
+        )
     terminal.say(f"carried along: {', '.join(carried) or 'nothing else was there'}")
     if left_out:
         terminal.say(f"left out (not numbers): {', '.join(left_out)}")
