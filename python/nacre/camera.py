@@ -61,9 +61,11 @@ class Camera(GuidedNames, _core.Camera):
         cx: float,
         cy: float,
         *,
-        distortion: Sequence[float] = _NO_DISTORTION,
+        distortion: Sequence[float] | npt.NDArray[np.float64] = _NO_DISTORTION,
         depth: str = "z",
     ) -> None:
+        if isinstance(distortion, np.ndarray):  # OpenCV's are (1, 5) or (5, 1)
+            distortion = distortion.ravel().tolist()
         super().__init__(width, height, fx, fy, cx, cy, distortion=distortion, depth=depth)
 
     @classmethod
@@ -112,7 +114,7 @@ class Camera(GuidedNames, _core.Camera):
         height: int,
         matrix: npt.ArrayLike,
         *,
-        distortion: Sequence[float] = _NO_DISTORTION,
+        distortion: Sequence[float] | npt.NDArray[np.float64] = _NO_DISTORTION,
         depth: str = "z",
     ) -> Camera:
         """

@@ -28,6 +28,7 @@ from nacre._internal.arrays import (
 )
 from nacre._internal.checkpoint import Checkpointed, checkpoint_of, read_checkpoint
 from nacre._internal.core_options import from_core, mirrored, to_core, updated
+from nacre._internal.guided import guided
 from nacre._internal.point_exchange import ExchangeablePoints
 from nacre.camera import Camera, camera_of
 from nacre.depth_calibration import DepthCalibration
@@ -73,6 +74,7 @@ class Model(ExchangeablePoints, Checkpointed):
     After Blackburn, Kubacki and Stratton 2010, incremental 3D model generation with depth cameras.
     """
 
+    @guided("nacre.Camera(width, height, fx, fy, cx, cy), or nacre.read_camera(path).camera")
     def __init__(
         self,
         camera: Camera,
@@ -95,6 +97,16 @@ class Model(ExchangeablePoints, Checkpointed):
         self._calibration: tuple[int, DepthCalibration | None] | None = None  # by so many frames
         self._lock = threading.RLock()  # the handler of a signal may come into a call
 
+    @guided(
+        rgb="color",
+        image="color",
+        time="timestamp",
+        pose="guess",
+        world_from_camera="guess",
+        extrinsic="guess takes its inverse, world_from_camera",
+        depth_scale="it belongs to the model: nacre.Model(camera, depth_scale=...)",
+        intrinsic="the model has its camera: nacre.Model(camera)",
+    )
     def add_frame(
         self,
         depth: npt.ArrayLike,

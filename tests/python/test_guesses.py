@@ -79,6 +79,7 @@ WORKS = {
     # Cameras.
     "nacre.Camera.from_fov(640, 480, 90)": "np.isclose(it.fx, 320) and (it.cx, it.cy) == (319.5, 239.5)",
     "nacre.Camera.from_matrix(80, 60, K)": "it == camera",
+    "nacre.Camera.from_matrix(80, 60, K, distortion=np.zeros((1, 5)))": "it == camera",
     "camera.matrix": "np.array_equal(it, K)",
     "nacre.Model(camera).camera.matrix": "np.array_equal(it, K)",
     "nacre.back_project(Image.fromarray(millimetres[0]), camera, depth_scale=1000)": "it.shape[1] == 3",
@@ -119,6 +120,7 @@ TOLD = {
     "nacre.Camera(640, 480, K)": ["fy, cx and cy", "from_matrix"],
     "nacre.Camera(640, 480, fov=60)": ["fov", "from_fov"],
     "nacre.Camera.from_fov(640, 480, 1.2, 190)": ["vertical_degrees", "190"],
+    "nacre.Model()": ["camera", "nacre.Camera(width, height,"],
     "nacre.Model(K)": ["camera must be a nacre.Camera", "Camera.from_matrix(width, height, K)"],
     "nacre.Model(nacre.read_camera(folder / 'camera.json'))": ["give its .camera"],
     "nacre.Model('camera.json')": ["read_camera"],
@@ -154,6 +156,11 @@ TOLD = {
     "np.asarray(mesh)": ["vertices", "triangles"],
     "done.points": ["model.points"],
     # Arguments of other libraries.
+    "model.add_frame(depths[0], pose=np.eye(4))": ["it is guess"],
+    "model.add_frame(depths[0], extrinsic=np.eye(4))": ["guess takes its inverse"],
+    "nacre.back_project(depths[0], camera, 1000)": ["by name", "depth_scale"],
+    "nacre.reconstruct(depths, camera)": ["by name", "camera"],
+    "nacre.write_points(out, points, color=rgb)": ["did you mean 'colors'?"],
     "nacre.align(points, points, 0.02)": ["by name", "max_distance"],
     "nacre.align(points, points, max_correspondence_distance=0.02)": ["max_distance"],
     "nacre.align(points, points, init=np.eye(4))": ["initial"],

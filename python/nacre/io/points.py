@@ -10,6 +10,7 @@ from types import ModuleType
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_flag
+from nacre._internal.guided import guided
 from nacre._internal.point_exchange import ArrayOfPoints
 from nacre.io import pcd, ply
 from nacre.io.cloud import Cloud, cloud_of
@@ -50,6 +51,7 @@ def read_points(path: str | os.PathLike[str]) -> Cloud:
     return cloud
 
 
+@guided(write_ascii="it is binary=False", pointcloud="points", filename="path")
 def write_points(
     path: str | os.PathLike[str],
     points: npt.ArrayLike | ArrayOfPoints,

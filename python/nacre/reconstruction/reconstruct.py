@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from nacre import Camera
+from nacre._internal.guided import guided
 from nacre.datasets import Sequence as Recording
 from nacre.datasets import SequenceFrame, open_sequence
 from nacre.datasets.held_frames import HeldFrames, first_of
@@ -20,6 +21,7 @@ from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.runner import Run
 
 
+@guided("a recording, or a list of depth images with camera=")
 def reconstruct(
     source: str | os.PathLike[str] | Iterable[Any],
     *,
