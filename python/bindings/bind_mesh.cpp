@@ -48,6 +48,9 @@ void bind_mesh(py::module_& m) {
       .def_property_readonly("lower", &MeshTree::lower)
       .def_property_readonly("upper", &MeshTree::upper);
   m.def("built_in_object", &make_built_in_object);
+  m.def("connected_parts", &nacre::connected_parts, py::arg("triangles"), py::arg("num_points"), ReleaseGil());
+  m.def("on_surface", &nacre::on_surface, py::arg("points"), py::arg("normals"), py::arg("confidence"),
+        py::arg("num_threads"), ReleaseGil());
   m.def("triangulate", &nacre::triangulate, py::arg("points"), py::arg("normals"), py::arg("num_threads"),
         ReleaseGil());
 }

@@ -903,6 +903,10 @@ def back_project(
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]"]: ...
 def built_in_object() -> tuple[typing.Any, ...]: ...
 def can_calibrate_depth(camera: Camera) -> bool: ...
+def connected_parts(
+    triangles: typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 3]", "flags.c_contiguous"],
+    num_points: typing.SupportsInt | typing.SupportsIndex,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.int32], "[m, 1]"]: ...
 @typing.overload
 def consolidate(
     points: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
@@ -973,6 +977,12 @@ def make_frame(
     noise: NoiseModel | None,
     num_threads: typing.SupportsInt | typing.SupportsIndex,
 ) -> Frame: ...
+def on_surface(
+    points: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
+    normals: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
+    confidence: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
+) -> typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 1]"]: ...
 def parallel_backend() -> str: ...
 def preprocess_depth(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],

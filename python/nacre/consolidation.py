@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,9 @@ from nacre._internal.point_exchange import ArrayOfPoints
 from nacre._internal.value_equality import Value
 from nacre.kdtree import KdTree
 from nacre.progress import as_progress
+
+if TYPE_CHECKING:
+    from nacre.io.cloud import Cloud
 
 _DENSITY_NEIGHBORS = 17  # itself included
 _DENSITY_PROBES = 5000
@@ -69,14 +72,18 @@ class Consolidated(ArrayOfPoints, Value):
     iterations: int
     cancelled: bool
 
-    def _columns(self) -> dict[str, Any]:
+    def cloud(self) -> Cloud:
+        """
+        Return the points with their normals, colours and other attributes where a file has them.
+
+        Returns
+        -------
+        Cloud
+        """
+        from nacre.io.cloud import Cloud
+
         more = dict(self.attributes)
-        return {
-            "points": self.points,
-            "normals": more.pop("normals", None),
-            "colors": more.pop("colors", None),
-            "attributes": more,
-        }
+        return Cloud(self.points, more.pop("normals", None), more.pop("colors", None), more)
 
     def __len__(self) -> int:
         return len(self.points)

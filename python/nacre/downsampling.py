@@ -12,7 +12,6 @@ from nacre._internal.arrays import as_colors, as_dtype, as_length, as_real, as_u
 from nacre._internal.guided import guided
 
 if TYPE_CHECKING:
-    from nacre._internal.point_exchange import ArrayOfPoints
     from nacre.io.cloud import Cloud
 
 
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
     leaf_size="voxel_size", resolution="voxel_size", downsampling_resolution="voxel_size", size="voxel_size"
 )
 def voxel_downsample(
-    points: npt.ArrayLike | ArrayOfPoints,
+    points: Any,
     voxel_size: float,
     *,
     normals: npt.ArrayLike | None = None,
@@ -35,9 +34,9 @@ def voxel_downsample(
 
     Parameters
     ----------
-    points : (N, 3) array_like, or Cloud, Model or Consolidated
-        Rows that are not finite are left out. What has normals, colours and attributes of its own brings
-        them along, where no others are given.
+    points : (N, 3) array_like, or Cloud, Model, Reconstruction or Consolidated
+        Rows that are not finite are left out. What has normals, colours and attributes of its own (a model
+        its :meth:`~nacre.Model.cloud`) brings them along, where no others are given.
     voxel_size : float
         Edge of a cube, in the unit of the points.
     normals : (N, 3) array, optional

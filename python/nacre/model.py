@@ -8,7 +8,7 @@ import os
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -33,11 +33,15 @@ from nacre._internal.point_exchange import ExchangeablePoints
 from nacre.camera import Camera, camera_of
 from nacre.depth_calibration import DepthCalibration
 from nacre.frame_report import FrameReport, FrameReports, report_from
+from nacre.meshing import on_surface
 from nacre.noise import NoiseModel
 from nacre.parameters import (
     ModelParameters,
     Preset,
 )
+
+if TYPE_CHECKING:
+    from nacre.io.cloud import Cloud
 
 _log = logging.getLogger("nacre.model")
 
@@ -181,11 +185,6 @@ class Model(ExchangeablePoints, Checkpointed):
                     "frame %d: depth is tilted by %.4f / m, and is corrected", report.index, self._core.tilt
                 )
             return report
-
-    def _columns(self) -> dict[str, Any]:
-        with self._lock:
-            more = {"confidence": self.confidence, "last_seen": self.last_seen, **self.attributes}
-            return {"points": self.points, "normals": self.normals, "colors": self.colors, "attributes": more}
 
     def _checkpoint(self, **more: Any) -> bytes:
         with self._lock:
@@ -376,6 +375,35 @@ class Model(ExchangeablePoints, Checkpointed):
         """
         with self._lock:
             return self._core.noise_factor
+
+    def cloud(self, *, all_points: bool = False) -> Cloud:
+        """
+        Return the points that are a surface, with all that is known of each.
+
+        Parameters
+        ----------
+        all_points : bool
+            Those, too, that :func:`nacre.meshing.on_surface` tells from it: litter, doubled layers, and
+            normals that contradict. The model keeps them, since a later frame may confirm them.
+
+        Returns
+        -------
+        Cloud
+            Points [m], normals, colours where there are any; as attributes ``confidence``, ``last_seen``, and
+            the model's own.
+        """
+        from nacre.io.cloud import Cloud
+
+        with self._lock:
+            points, normals, colors = self.points, self.normals, self.colors
+            more = {"confidence": self.confidence, "last_seen": self.last_seen, **self.attributes}
+        rows = slice(None) if all_points else on_surface(points, normals, more["confidence"])
+        return Cloud(
+            points[rows],
+            normals[rows],
+            None if colors is None else colors[rows],
+            {name: values[rows] for name, values in more.items()},
+        )
 
     def in_camera(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
         """Return points and normals in the newest registered camera's frame, as the paper keeps its model."""

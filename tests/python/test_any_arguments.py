@@ -143,7 +143,9 @@ FILES = {
     "nacre.io.points.read_points", "nacre.io.trajectories.read_trajectory",
     "nacre.reconstruction.reconstruct.reconstruct",
 }  # fmt: skip
-NOT_OF_ARRAYS = re.compile(r"\.(Sequence|Reconstruction)\.\w+$|\.NoiseModel\.to_core$|\.as_dict$")
+NOT_OF_ARRAYS = re.compile(
+    r"\.(Sequence|Reconstruction)\.\w+$|\.(Model|Consolidated)\.cloud$|\.NoiseModel\.to_core$|\.as_dict$"
+)
 
 
 def test_the_table_is_complete() -> None:

@@ -48,6 +48,20 @@ def test_triangles_join_the_points(model: nacre.Model, tmp_path: Path) -> None:
         nacre.write_mesh(tmp_path / "mesh.ply", mesh.vertices)
 
 
+def test_a_cloud_has_what_a_surface_has(model: nacre.Model) -> None:
+    rows = nacre.meshing.on_surface(model.points, model.normals, model.confidence)
+    cloud, everything = model.cloud(), model.cloud(all_points=True)
+    assert 0.9 < rows.mean() < 1
+    assert np.array_equal(everything.points, model.points)
+    assert np.array_equal(cloud.points, model.points[rows])
+    assert cloud.normals is not None
+    assert cloud.colors is not None
+    assert np.array_equal(cloud.normals, model.normals[rows])
+    assert np.array_equal(cloud.colors, model.colors[rows])
+    assert np.array_equal(cloud.attributes["confidence"], model.confidence[rows])
+    assert np.array_equal(cloud.attributes["last_seen"], model.last_seen[rows])
+
+
 def test_open3d_gets_points_normals_and_colours(model: nacre.Model, monkeypatch: pytest.MonkeyPatch) -> None:
     open3d = pytest.importorskip("open3d")
     cloud = model.to_open3d()
@@ -120,11 +134,11 @@ def test_a_cloud_a_model_and_a_result_are_written_with_all_they_have(
 ) -> None:
     path = tmp_path / "a.ply"
     nacre.write_points(path, model)
-    cloud = nacre.read_points(path)
-    assert np.array_equal(cloud.points, model.points)
-    assert np.array_equal(cloud.normals, model.normals)
-    assert np.array_equal(cloud.colors, model.colors)
-    assert np.array_equal(cloud.attributes["confidence"], model.confidence)
+    cloud, expected = nacre.read_points(path), model.cloud()
+    assert np.array_equal(cloud.points, expected.points)
+    assert np.array_equal(cloud.normals, expected.normals)
+    assert np.array_equal(cloud.colors, expected.colors)
+    assert np.array_equal(cloud.attributes["confidence"], expected.attributes["confidence"])
     nacre.write_points(path, cloud, normals=-cloud.normals, attributes={})
     again = nacre.read_points(path)
     assert np.array_equal(again.normals, -cloud.normals)

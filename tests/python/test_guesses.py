@@ -63,9 +63,10 @@ WORKS = {
     "nacre.evaluation.surface_accuracy(cloud, mesh)": "it",
     "nacre.write_points(out, cloud)": "nacre.read_points(out) == nacre.read_points(out) "
     "and np.array_equal(nacre.read_points(out).colors, rgb) and nacre.read_points(out).normals is not None",
-    "nacre.write_points(out, model)": "np.array_equal(nacre.read_points(out).colors, model.colors)",
+    "nacre.write_points(out, model)": "nacre.read_points(out).colors.shape == model.cloud().points.shape",
     "nacre.write_points(out, nacre.consolidate(points, attributes={'normals': points}))": "nacre.read_points"
     "(out).normals is not None",
+    "nacre.write_points(out, done)": "len(nacre.read_points(out)) == len(done.cloud)",
     "nacre.write_mesh(out, mesh)": "len(nacre.read_mesh(out).triangles) == len(mesh.triangles)",
     "nacre.write_trajectory(out, done.trajectory)": "len(nacre.read_trajectory(out)) == 3",
     "model.to_mesh()": "len(it.triangles) > 100",
@@ -154,7 +155,7 @@ TOLD = {
     "model.mesh": ["to_mesh"],
     "mesh.faces": ["triangles"],
     "np.asarray(mesh)": ["vertices", "triangles"],
-    "done.points": ["model.points"],
+    "done.points": ["cloud.points"],
     # Arguments of other libraries.
     "model.add_frame(depths[0], pose=np.eye(4))": ["it is guess"],
     "model.add_frame(depths[0], extrinsic=np.eye(4))": ["guess takes its inverse"],

@@ -103,8 +103,8 @@ def check_grid(grid):
 
 
 def check_mesh(mesh):
-    vertices, triangles = mesh
-    assert triangles.size == 0 or (triangles.min() >= 0 and triangles.max() < len(vertices))
+    triangles = mesh.triangles
+    assert triangles.size == 0 or (triangles.min() >= 0 and triangles.max() < len(mesh.vertices))
 
 
 SOUND = {

@@ -10,7 +10,7 @@ import pytest
 
 import nacre
 from nacre.cli import main
-from nacre.meshing import mesh_points, triangulate
+from nacre.meshing import mesh_points, on_surface, triangulate
 
 
 def sphere(n: int, radius: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
@@ -150,6 +150,41 @@ def test_any_number_of_threads_gives_the_same_triangles() -> None:
 def test_misuse(points: np.ndarray, normals: np.ndarray, message: str) -> None:
     with pytest.raises(ValueError, match=message):
         mesh_points(points, normals)
+
+
+class TestOnSurface:
+    def test_a_layer_beneath_litter_and_contrary_normals_are_no_surface(self) -> None:
+        points, normals = sphere(6000)
+        below, outward = 0.96 * points[:600], normals[:600]  # a cap, 4 mm beneath; points are 4.6 mm apart
+        contrary = normals.copy()
+        contrary[3000] = -normals[3000]
+        litter = np.random.default_rng(0).uniform(0.2, 0.3, (20, 3))
+        is_surface = on_surface(
+            np.concatenate([points, below, litter]),
+            np.concatenate([contrary, outward, np.tile([0, 0, 1.0], (20, 1))]),
+            np.concatenate([np.full(6000, 9), np.full(600, 2), np.full(20, 50)]),
+        )
+        assert np.array_equal(np.flatnonzero(~is_surface[:6000]), [3000])
+        assert not is_surface[6000:].any()
+
+    def test_noise_is_a_surface(self) -> None:
+        points, normals = sphere(6000)
+        rng = np.random.default_rng(1)
+        rough = points + rng.normal(0, 0.0005, (6000, 1)) * normals  # a ninth of the distance between points
+        assert on_surface(rough, normals, rng.uniform(1, 100, 6000)).all()
+
+    def test_the_same_on_any_number_of_threads(self) -> None:
+        rng = np.random.default_rng(2)
+        points = rng.uniform(0, 0.1, (4000, 3)) * [1, 1, 0.05]
+        up, sure = np.tile([0, 0, 1.0], (4000, 1)), rng.uniform(1, 9, 4000)
+        one = on_surface(points, up, sure, num_threads=1)
+        assert 0.1 < one.mean() < 0.9
+        assert np.array_equal(one, on_surface(points, up, sure, num_threads=3))
+
+    def test_misuse(self) -> None:
+        points, normals = sphere(50)
+        with pytest.raises(ValueError, match=r"confidence must have one entry per point \(50\)"):
+            on_surface(points, normals, np.ones(49))
 
 
 class TestCommand:

@@ -12,6 +12,11 @@ namespace nacre {
 using Triangles = Eigen::Matrix<std::int32_t, Eigen::Dynamic, 3, Eigen::RowMajor>;
 using TrianglesRef = Eigen::Ref<const Triangles>;
 
+/// A number for each point.
+using PointNumbers = Eigen::Matrix<std::int32_t, Eigen::Dynamic, 1>;
+/// 1 or 0 for each point.
+using PointFlags = Eigen::Matrix<std::uint8_t, Eigen::Dynamic, 1>;
+
 using PointsDouble = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 using PointsDoubleRef = Eigen::Ref<const PointsDouble>;
 
@@ -31,6 +36,16 @@ Mesh built_in_object();
 /// seen, it is open. Each edge has one triangle on each side at most. Points that are not finite have none. Normals
 /// need not be of unit length. Gopi, Krishnan and Silva 2000. num_threads = 0 uses all; no result depends on it.
 Triangles triangulate(const PointsRef& points, const PointsRef& normals, int num_threads = 0);
+
+/// The number of the part that each point is in, from 0 in the order of their first points: points that triangles join
+/// are in one part, a point of no triangle is one by itself. Throws std::invalid_argument for indices out of range.
+PointNumbers connected_parts(const TrianglesRef& triangles, std::int64_t num_points);
+
+/// Which points of a model are a surface, 1 for each that is, else 0: points that surer ones cover are not (those that
+/// have points of higher confidence, on the same side of the surface, on all sides above or below them), nor are those
+/// that `triangulate` joins to none of the others or to few. num_threads = 0 uses all; no result depends on it.
+PointFlags on_surface(const PointsRef& points, const PointsRef& normals, const ValuesRef& confidence,
+                      int num_threads = 0);
 
 /// A bounding volume hierarchy over a mesh; immutable, so any number of threads may ask it. Distances and intersections
 /// are computed in double precision from the float vertices.

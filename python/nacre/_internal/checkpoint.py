@@ -14,8 +14,6 @@ from nacre._internal.arrays import as_scale
 from nacre._internal.guided import GuidedNames
 from nacre.errors import FileFormatError
 
-_OTHERS = {".ply", ".pcd", ".obj", ".off", ".stl", ".glb", ".gltf", ".las", ".laz", ".e57", ".xyz", ".npz"}
-
 
 class Checkpointed(GuidedNames, ABC):
     """What can be written to a file between any two frames, and goes on from there to the same bits."""
@@ -41,8 +39,11 @@ class Checkpointed(GuidedNames, ABC):
         OSError
             The file cannot be written; what was there before is left as it was.
         """
+        from nacre.io.meshes import WRITE_SUFFIXES
+        from nacre.io.points import SUFFIXES
+
         ending = Path(path).suffix.lower()
-        if ending in _OTHERS:
+        if ending in {*SUFFIXES, *WRITE_SUFFIXES}:
             raise ValueError(
                 f"path must not end in {ending}, got {os.fspath(path)!r}: what is saved is to go on from; "
                 "nacre.write_points(path, model) and nacre.write_mesh(path, model.to_mesh()) write the model"

@@ -139,7 +139,7 @@ OF_CLASS = {
     "Model": {
         "integrate": "it is add_frame(depth, color), which finds the pose, or takes guess=world_from_camera",
         "update": "it is add_frame(depth, color)",
-        "extract_point_cloud": "model.points, model.normals and model.colors are arrays",
+        "extract_point_cloud": "it is cloud()",
         "extract_triangle_mesh": "it is to_mesh()",
         "mesh": "it is to_mesh()",
         "pose": "it is poses[-1]",
@@ -147,10 +147,9 @@ OF_CLASS = {
         "write": "it is nacre.write_points(path, model)",
     },
     "Reconstruction": {
-        "points": "it is model.points",
-        "normals": "it is model.normals",
-        "colors": "it is model.colors",
-        "cloud": "it is model",
+        "points": "it is cloud.points, or model.points with those that are not confirmed",
+        "normals": "it is cloud.normals",
+        "colors": "it is cloud.colors",
         "mesh": "it is model.to_mesh()",
         "to_mesh": "it is model.to_mesh()",
     },

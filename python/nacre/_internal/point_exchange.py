@@ -11,6 +11,7 @@ import numpy.typing as npt
 from nacre._internal.guided import GuidedNames
 
 if TYPE_CHECKING:
+    from nacre.io.cloud import Cloud
     from nacre.mesh import Mesh
 
 
@@ -26,10 +27,6 @@ class ArrayOfPoints(GuidedNames):
         if copy is False and array is not points:
             raise ValueError(f"copy must be True or None for points as {array.dtype}, got False")
         return array
-
-    def _columns(self) -> dict[str, Any]:
-        """Return all that there is of each point, as a file has it: the arguments of a Cloud."""
-        return {"points": self.points}  # type: ignore[attr-defined]
 
 
 class ExchangeablePoints(ArrayOfPoints, ABC):
@@ -50,9 +47,13 @@ class ExchangeablePoints(ArrayOfPoints, ABC):
     def colors(self) -> npt.NDArray[np.uint8] | None:
         """(N, 3), or None."""
 
+    @abstractmethod
+    def cloud(self, *, all_points: bool = False) -> Cloud:
+        """Return the points that are a surface."""
+
     def to_mesh(self, *, num_threads: int = 0) -> Mesh:
         """
-        Return triangles that join the points; see :func:`nacre.meshing.triangulate`.
+        Return triangles that join the points of :meth:`cloud`; see :func:`nacre.meshing.triangulate`.
 
         Parameters
         ----------
@@ -66,7 +67,9 @@ class ExchangeablePoints(ArrayOfPoints, ABC):
         """
         from nacre.meshing import mesh_points
 
-        return mesh_points(self.points, self.normals, num_threads=num_threads)
+        cloud = self.cloud()
+        assert cloud.normals is not None
+        return mesh_points(cloud.points, cloud.normals, num_threads=num_threads)
 
     def to_open3d(self) -> Any:
         """

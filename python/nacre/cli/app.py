@@ -14,6 +14,7 @@ import typer
 
 from nacre.cli.align import align
 from nacre.cli.consolidate import consolidate
+from nacre.cli.convert import convert
 from nacre.cli.demo import demo
 from nacre.cli.doctor import doctor
 from nacre.cli.evaluate import evaluate
@@ -47,7 +48,8 @@ EXAMPLES: dict[Callable[..., None], str] = {
     demo: "nacre demo -o nacre-demo",
     reconstruct: "nacre reconstruct rgbd_dataset_freiburg3_teddy -o teddy",
     view: "nacre view teddy",
-    mesh: "nacre mesh teddy -o teddy-mesh.ply",
+    mesh: "nacre mesh teddy -o teddy.glb",
+    convert: "nacre convert teddy/model.ply teddy.las",
     simulate: (
         "nacre simulate bunny.ply -o bunny-recording --views 12 --step 30 --noise 0.0005 --orthographic"
     ),

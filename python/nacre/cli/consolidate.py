@@ -21,10 +21,11 @@ class Method(str, Enum):
 
 def consolidate(
     source: Annotated[
-        Path, typer.Argument(metavar="IN", help="A point file (PLY, PCD).", show_default=False)
+        Path,
+        typer.Argument(metavar="IN", help="A point file (PLY, PCD, LAS, E57, XYZ, ...).", show_default=False),
     ],
     out: Annotated[
-        Path, typer.Argument(metavar="OUT", help="The file to write (PLY, PCD).", show_default=False)
+        Path, typer.Argument(metavar="OUT", help="The file to write, in one of these.", show_default=False)
     ],
     radius: Annotated[
         float | None,
@@ -53,11 +54,11 @@ def consolidate(
 
     import nacre
     from nacre.evaluation import uniformity
+    from nacre.io.points import require_point_suffix
     from nacre.report.text import count
 
     writable_file(out)
-    if out.suffix.lower() not in (".ply", ".pcd"):
-        raise CommandError(f"point files end in .ply or .pcd, got {out}", 2)
+    require_point_suffix(out)
     cloud = nacre.read_points(source)
     finite = int(np.isfinite(cloud.points).all(axis=1).sum())
     if finite == 0:

@@ -71,9 +71,10 @@ def demo(
         follow(terminal, Run(done, range(views), retry=False), stop)
     done.evaluate_trajectory()
     figures: dict[str, Any] = {}
-    if len(done.model):
+    cloud = done.cloud
+    if len(cloud):
         samples = evaluation.sample_surface(mesh.vertices, mesh.triangles, 20_000)
-        points, normals = transformed(poses[0], done.model.points, done.model.normals)
+        points, normals = transformed(poses[0], cloud.points, cloud.normals)
         seen = evaluation.seen_samples(mesh, samples, camera, poses)
         done.evaluation |= evaluate_surface(
             points, normals, mesh, samples=samples, seen=seen, tau=(0.002, 0.003, 0.005)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nacre.cli.align import format_matrix, read_matrix
-from nacre.cli.surfaces import MESH_SUFFIXES, POINT_SUFFIXES, evaluate_surface, read_surface, transformed
+from nacre.cli.surfaces import evaluate_surface, mesh_suffixes, point_suffixes, read_surface, transformed
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 
 if TYPE_CHECKING:
@@ -88,7 +88,7 @@ def evaluate(
         raise CommandError(f"no such file or folder: {estimate}", 2)
     if truth is not None and not truth.exists():
         raise CommandError(f"no such file or folder: {truth}", 2)
-    is_surface = truth is not None and truth.suffix.lower() in MESH_SUFFIXES + POINT_SUFFIXES
+    is_surface = truth is not None and truth.suffix.lower() in mesh_suffixes() + point_suffixes()
     saved = None
     if estimate.is_dir():
         from nacre.report.saved_run import SavedRun
@@ -98,7 +98,7 @@ def evaluate(
                 f"{estimate}: no report.json; give the OUT folder of a reconstruction, or a file", 2
             )
         saved = SavedRun(estimate)
-    if is_surface or (estimate.suffix.lower() in POINT_SUFFIXES and saved is None):
+    if is_surface or (estimate.suffix.lower() in point_suffixes() and saved is None):
         if truth is None or not is_surface:
             raise CommandError(f"{estimate} is a model: a mesh or a point file must follow it", 2)
         figures, rows = _surface(estimate, saved, truth, tau, world_from_model, align, scale)

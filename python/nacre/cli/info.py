@@ -11,7 +11,7 @@ import typer
 from nacre.cli.live_feed import is_camera, open_camera
 from nacre.cli.run_options import describe_unfinished
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
-from nacre.cli.surfaces import MESH_SUFFIXES, POINT_SUFFIXES, has_faces
+from nacre.cli.surfaces import has_faces, mesh_suffixes, point_suffixes
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 
 Rows = list[tuple[str, str]]
@@ -45,7 +45,7 @@ def info(
 
     if source.is_dir() or source.suffix.lower() in FILE_SUFFIXES or format is not None:
         figures, rows = _recording(open_source(source, format, camera, depth_scale))
-    elif source.suffix.lower() in POINT_SUFFIXES and not (
+    elif source.suffix.lower() in point_suffixes() and not (
         source.suffix.lower() == ".ply" and has_faces(source)
     ):
         from nacre.datasets.stanford import recognise
@@ -54,10 +54,10 @@ def info(
         if recognise(source):
             rows.append(("range scan", "yes: nacre reconstruct takes it, and folders of such scans"))
             figures["range_scan"] = True
-    elif source.suffix.lower() in MESH_SUFFIXES:
+    elif source.suffix.lower() in mesh_suffixes():
         figures, rows = _mesh(source)
     else:
-        known = ", ".join(dict.fromkeys(POINT_SUFFIXES + MESH_SUFFIXES))
+        known = ", ".join(dict.fromkeys(point_suffixes() + mesh_suffixes()))
         recordings = ", ".join(FILE_SUFFIXES)
         raise CommandError(
             f"{source}: neither a recording (a folder, {recordings}) nor points or triangles ({known})", 2

@@ -21,7 +21,13 @@ def mesh(
     ],
     out: Annotated[
         Path | None,
-        typer.Option("--out", "-o", metavar="MESH", help="The file to write.", show_default="OUT/mesh.ply"),
+        typer.Option(
+            "--out",
+            "-o",
+            metavar="MESH",
+            help="The file to write: .ply, .glb, .obj or .stl.",
+            show_default="OUT/mesh.ply",
+        ),
     ] = None,
     json: Json = False,
     quiet: Quiet = False,
@@ -34,12 +40,12 @@ def mesh(
     """
     terminal = Terminal(json, quiet, verbose)
     from nacre import read_points, write_mesh
+    from nacre.io.meshes import require_mesh_suffix
     from nacre.meshing import triangulate, used_rows
 
     path = written_file(source, "model.ply") if source.is_dir() else source
     target = writable_file(out or path.with_name("mesh.ply"))
-    if target.suffix.lower() != ".ply":
-        raise CommandError(f"meshes are written to .ply files, got {target}", 2)
+    require_mesh_suffix(target)
     cloud = read_points(path)
     if cloud.normals is None:
         raise CommandError(f"{path} has no normals: give a model of nacre reconstruct")

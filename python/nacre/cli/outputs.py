@@ -36,10 +36,9 @@ def write_results(
     """Write the files of a run, the page if wanted, and return what report.json, the last one, holds."""
     import nacre
 
-    model = done.model
     nacre.write_points(
         folder / "model.ply",
-        model,
+        done.cloud,
         comments=[f"nacre {nacre.__version__}", "metres; the world is the first camera's frame"],
     )
     nacre.write_trajectory(folder / "trajectory.txt", done.trajectory)
@@ -93,7 +92,7 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
     extra = f" ({', '.join(f'{number} {name}' for name, number in counts.items())})" if counts else ""
     rows = [
         ("frames tracked", f"{done.num_tracked} of {len(done.frames)}{extra}"),
-        ("model", f"{count(len(done.model))} points, {quantity(done.model.spacing, 'm')} apart"),
+        ("model", f"{count(len(done.cloud))} points, {quantity(done.model.spacing, 'm')} apart"),
     ]
     if done.loops:
         last = done.loops[-1]

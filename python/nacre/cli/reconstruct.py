@@ -127,6 +127,13 @@ def reconstruct(
             help="Images of anything else, named as the depth images; fused along. May be repeated.",
         ),
     ] = None,
+    all_points: Annotated[
+        bool,
+        typer.Option(
+            "--all-points",
+            help="Write the points, too, that are no surface: litter, and layers that surer ones cover.",
+        ),
+    ] = False,
     view: Annotated[
         bool, typer.Option("--view", help="Show the model in the browser while it grows.")
     ] = False,
@@ -193,6 +200,7 @@ def reconstruct(
                 retry=retry,
                 preset=preset_name,
                 is_camera=is_camera(source),
+                all_points=all_points,
             )
             job = _begun(terminal, options, unfinished, parameters)
         carry_out(terminal, job, stop, port if view else None)

@@ -117,6 +117,7 @@ def _run(terminal: Terminal, job: Job, stop: Interruption, live: LiveView | None
 def _write(job: Job, stop: Interruption) -> dict[str, Any]:
     """Write the results; of a run that is stopped without the page, whose pictures take long."""
     done = job.run.done
+    done.all_points = job.options.all_points
     done.evaluate_trajectory()
     feed, calibration = job.feed, done.depth_calibration
     advice = done.advice

@@ -39,6 +39,7 @@ class RunOptions:
     retry: bool = True
     preset: str = "default"
     is_camera: bool = False
+    all_points: bool = False
 
     @property
     def pick(self) -> tuple[int, int | None, int]:
@@ -147,7 +148,7 @@ def _checked(options: RunOptions) -> RunOptions:
         may_be_none = name not in ("source", "preset")
         if not (isinstance(value, str) and "\0" not in value) and not (value is None and may_be_none):
             raise TypeError(f"{name} must be a text, got {shown(value)}")
-    for name in ("color", "realtime", "retry", "is_camera"):
+    for name in ("color", "realtime", "retry", "is_camera", "all_points"):
         as_flag(name, getattr(options, name))
     for name, minimum in (("first", 0), ("last", 0), ("every", 1)):
         if getattr(options, name) is not None or name != "last":

@@ -50,7 +50,10 @@ DepthScaleOption = Annotated[
 
 
 def open_source(
-    source: Path, format: str | None = None, camera: Path | None = None, depth_scale: float | None = None
+    source: Path,
+    format: str | None = None,
+    camera: Camera | Path | None = None,
+    depth_scale: float | None = None,
 ) -> Sequence:
     """Open a recording, or say which option is missing."""
     import nacre

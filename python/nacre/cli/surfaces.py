@@ -18,8 +18,19 @@ if TYPE_CHECKING:
 
     Array = npt.NDArray[Any]
 
-MESH_SUFFIXES = (".ply", ".obj", ".off", ".stl")
-POINT_SUFFIXES = (".ply", ".pcd")
+
+def mesh_suffixes() -> tuple[str, ...]:
+    """Return the endings of files that may hold a mesh."""
+    from nacre.io.meshes import READ_SUFFIXES
+
+    return READ_SUFFIXES
+
+
+def point_suffixes() -> tuple[str, ...]:
+    """Return the endings of point files."""
+    from nacre.io.points import SUFFIXES
+
+    return SUFFIXES
 
 
 def transformed(pose: Array, points: Array, normals: Array | None) -> tuple[Array, Array | None]:
@@ -71,10 +82,10 @@ def read_surface(path: Path, scale: float = 1.0) -> tuple[Mesh | Array, Array | 
     import nacre
 
     suffix = path.suffix.lower()
-    if suffix not in MESH_SUFFIXES + POINT_SUFFIXES:
-        known = ", ".join(dict.fromkeys(MESH_SUFFIXES + POINT_SUFFIXES))
+    if suffix not in mesh_suffixes() + point_suffixes():
+        known = ", ".join(dict.fromkeys(mesh_suffixes() + point_suffixes()))
         raise CommandError(f"{path}: a surface is a mesh or a point file ({known})", 2)
-    if suffix in MESH_SUFFIXES and has_faces(path):
+    if suffix in mesh_suffixes() and has_faces(path):
         mesh = nacre.read_mesh(path)
         return (mesh if scale == 1 else nacre.Mesh(scale * mesh.vertices, mesh.triangles)), None
     cloud = nacre.read_points(path)

@@ -3,7 +3,9 @@
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from nacre.datasets.colmap import write_colmap
 from nacre.datasets.detect import open_sequence
+from nacre.datasets.nerfstudio import write_nerfstudio
 from nacre.datasets.plain import write_recording
 from nacre.datasets.sequence import Sequence, SequenceFrame
 
@@ -21,6 +23,8 @@ __all__ = [
     "SequenceFrame",
     "in_real_time",
     "open_sequence",
+    "write_colmap",
+    "write_nerfstudio",
     "write_recording",
 ]
 

@@ -203,9 +203,20 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         """Return the depth file of a view."""
         return self._sources[index].depth
 
+    def color_file(self, index: int) -> Path | None:
+        """Return the colour image of a view where that is a PNG or JPEG file, used as it is; else None."""
+        path = self._sources[index].color
+        if path is None or self._load_color is not read_color:
+            return None
+        return path if path.suffix.lower() in (".png", ".jpg", ".jpeg") else None
+
     def timestamp(self, index: int) -> float | None:
         """Return when a view was taken [s]; None where that is not known."""
         return self._sources[index].timestamp
+
+    def true_pose(self, index: int) -> npt.NDArray[np.float64] | None:
+        """Return ``world_from_camera`` of a view as the recording has it; None where it is not known."""
+        return self._sources[index].truth
 
     def digests(self) -> dict[str, str]:
         """

@@ -88,13 +88,12 @@ class Cloud(ArrayOfPoints, Value):
         return picture_of_points(self.points, self.normals, self.colors)
 
 
-def cloud_of(points: npt.ArrayLike | ArrayOfPoints) -> Cloud:
-    """Return points with the normals, colours and attributes that a cloud or a model has of them."""
-    if isinstance(points, Cloud):
-        return points
-    if not isinstance(points, ArrayOfPoints):
-        return Cloud(arrays.as_points("points", points))
-    return Cloud(**points._columns())
+def cloud_of(points: Any) -> Cloud:
+    """Return points as a cloud: themselves, that of what has one, or an array without more."""
+    own = points if isinstance(points, Cloud) else getattr(points, "cloud", None)
+    if callable(own):
+        own = own()
+    return own if isinstance(own, Cloud) else Cloud(arrays.as_points("points", points))
 
 
 def gather_columns(columns: Columns, names: tuple[str, ...]) -> npt.NDArray[Any]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Iterator, Sequence
@@ -17,6 +16,7 @@ import numpy.typing as npt
 from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
 from nacre.io.image_limits import check_exr, check_pixels, checked_png
+from nacre.io.npy import read_npy_array, read_npy_header
 from nacre.io.raw import check_padding, read_file
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ COLOR_SUFFIXES = (".png", ".jpg", ".jpeg", ".ppm", ".bmp", ".webp")
 _COLOR_FORMATS = ("PNG", "JPEG", "PPM", "BMP", "WEBP")
 _ATTRIBUTE_FORMATS = ("PNG", "TIFF", "JPEG")
 _EXR_DEPTH_CHANNELS = ("Z", "depth", "Depth", "Y", "R")
-_MOST_NPY_HEADER = 1000
 _PGM_GAP = rb"(?:\s|#[^\n]*\n){1,1000}"
 _PGM_HEADER = re.compile(_PGM_GAP.join((rb"P5", *3 * (rb"(\d{1,20})",))) + rb"\s")
 
@@ -225,31 +224,12 @@ def _read_pgm(path: Path) -> npt.NDArray[Any]:
 
 def _read_npy(path: Path) -> npt.NDArray[Any]:
     data = read_file(path)
-    stream = BytesIO(data)
-    try:
-        version = np.lib.format.read_magic(stream)
-        read_header = {
-            (1, 0): np.lib.format.read_array_header_1_0,
-            (2, 0): np.lib.format.read_array_header_2_0,
-        }[version]
-        shape, by_columns, dtype = read_header(stream, _MOST_NPY_HEADER)
-    except Exception as error:  # of numpy's own, and of Python's, with which it reads the header
-        reason = str(error).partition(": <")[0]
-        raise FileFormatError(path, f"not a readable .npy array: {reason}", offset=0) from error
-    start = stream.tell()
-    if dtype.kind not in "buif" or len(shape) not in (2, 3) or min(shape) < 1:
+    header = read_npy_header(path, data)
+    if header.dtype.kind not in "buif" or len(header.shape) not in (2, 3) or min(header.shape) < 1:
         raise FileFormatError(
-            path, f"an image must be (H, W) numbers, this is {shown(shape)} of {shown(dtype)}"
+            path, f"an image must be (H, W) numbers, this is {shown(header.shape)} of {shown(header.dtype)}"
         )
-    num_bytes = math.prod(shape) * dtype.itemsize
-    if num_bytes > len(data) - start:
-        reason = (
-            f"not a readable .npy array: its shape promises {num_bytes} bytes, {len(data) - start} are there"
-        )
-        raise FileFormatError(path, reason, offset=start)
-    check_padding(path, data, start + num_bytes)
-    array = np.frombuffer(data, dtype, math.prod(shape), start)
-    return array.reshape(shape, order="F" if by_columns else "C").copy()
+    return read_npy_array(path, data, header)
 
 
 def _read_exr(path: Path) -> npt.NDArray[Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from nacre.errors import FileFormatError
 from nacre.io import lzf
-from nacre.io.cloud import Cloud, Columns, check_cloud, check_comments, gather_floats, native, with_attributes
+from nacre.io.cloud import Cloud, Columns, check_comments, gather_floats, native, with_attributes
 from nacre.io.raw import MAX_COMMENTS, TextTable, check_padding, decode, excerpt, file_writer, read_file
 from nacre.io.rows import encode_rows
 
@@ -276,17 +276,9 @@ def _read_compressed(path: str | os.PathLike[str], data: bytes, header: _Header)
 
 
 def write_cloud(
-    path: str | os.PathLike[str],
-    points: npt.ArrayLike,
-    *,
-    normals: npt.ArrayLike | None = None,
-    colors: npt.ArrayLike | None = None,
-    attributes: Mapping[str, npt.ArrayLike] | None = None,
-    comments: Sequence[str] = (),
-    binary: bool = True,
+    path: str | os.PathLike[str], cloud: Cloud, *, comments: Sequence[str] = (), binary: bool = True
 ) -> None:
     """Write points as a PCD file, version 0.7; :func:`nacre.write_points` has the parameters."""
-    cloud = check_cloud(points, normals, colors, attributes)
     columns: Columns = {name: cloud.points[:, i] for i, name in enumerate(("x", "y", "z"))}
     if cloud.normals is not None:
         columns.update({name: cloud.normals[:, i] for i, name in enumerate(_NORMALS)})

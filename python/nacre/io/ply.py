@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -16,17 +17,19 @@ from nacre.errors import FileFormatError
 from nacre.io.cloud import (
     Cloud,
     Columns,
-    check_cloud,
     check_comments,
     gather_columns,
     gather_floats,
     native,
     with_attributes,
 )
+from nacre.io.mesh_arrays import MeshArrays, fan
 from nacre.io.ply_header import BYTE_ORDERS, TYPES, Header, read_header
 from nacre.io.ply_tables import Ragged, Table, read_binary_table, read_text_table
 from nacre.io.raw import TextTable, check_padding, file_writer, read_file
 from nacre.io.rows import encode_rows
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,8 @@ def read_ply(path: str | os.PathLike[str]) -> PlyFile:
     """
     Read every element of a PLY file that has vertices.
 
+    Lines of the header that are none of the format's are passed over, with a warning in the log.
+
     Raises
     ------
     FileFormatError
@@ -73,6 +78,9 @@ def read_ply(path: str | os.PathLike[str]) -> PlyFile:
             order = BYTE_ORDERS[header.format]
             tables[element.name], position = read_binary_table(path, data, position, element, order)
     check_padding(path, data, position)
+    if header.stray_lines:
+        where = ", ".join(map(str, header.stray_lines[:5])) + ", ..." * (len(header.stray_lines) > 5)
+        _log.warning("%s: passed over lines of the header that are none of PLY's: %s", path, where)
     return PlyFile(Path(path), header, tables)
 
 
@@ -88,7 +96,22 @@ def _check_vertices(path: str | os.PathLike[str], header: Header) -> None:
 
 def read_cloud(path: str | os.PathLike[str]) -> Cloud:
     """Read the vertices of a PLY file; :func:`nacre.read_points` says what is returned and raised."""
+    return _vertices(read_ply(path))
+
+
+def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
+    """Read vertices and faces of a PLY file; :func:`nacre.read_mesh` says what is raised."""
     file = read_ply(path)
+    cloud = _vertices(file)
+    table = file.tables.get("face", {})
+    faces = table.get("vertex_indices", table.get("vertex_index"))
+    if not isinstance(faces, Ragged) or faces.values.dtype.kind == "f":
+        raise FileFormatError(path, "not a mesh: there is no element face with lists vertex_indices")
+    triangles = fan(path, faces.values.astype(np.int64), faces.counts.astype(np.int64), len(cloud))
+    return MeshArrays(cloud.points, triangles, cloud.normals, cloud.colors)
+
+
+def _vertices(file: PlyFile) -> Cloud:
     points = file.points()
     table = file.tables["vertex"]
     columns = scalar_columns(table)
@@ -165,21 +188,22 @@ def _read_info(file: PlyFile, name: str) -> int:
 
 
 def write_cloud(
-    path: str | os.PathLike[str],
-    points: npt.ArrayLike,
-    *,
-    normals: npt.ArrayLike | None = None,
-    colors: npt.ArrayLike | None = None,
-    attributes: Mapping[str, npt.ArrayLike] | None = None,
-    comments: Sequence[str] = (),
-    binary: bool = True,
+    path: str | os.PathLike[str], cloud: Cloud, *, comments: Sequence[str] = (), binary: bool = True
 ) -> None:
     """Write points as a PLY file; :func:`nacre.write_points` has the parameters."""
-    columns = vertex_columns(check_cloud(points, normals, colors, attributes))
-    write_ply(path, {"vertex": columns}, comments=comments, binary=binary)
+    write_ply(path, {"vertex": _vertex_columns(cloud)}, comments=comments, binary=binary)
 
 
-def vertex_columns(cloud: Cloud) -> Columns:
+def write_mesh(
+    path: str | os.PathLike[str], mesh: MeshArrays, *, comments: Sequence[str] = (), binary: bool = True
+) -> None:
+    """Write vertices and faces as a PLY file; :func:`nacre.write_mesh` has the parameters."""
+    columns = _vertex_columns(Cloud(mesh.vertices, mesh.normals, mesh.colors))
+    tables: dict[str, Columns] = {"vertex": columns, "face": {"vertex_indices": mesh.triangles}}
+    write_ply(path, tables, comments=comments, binary=binary)
+
+
+def _vertex_columns(cloud: Cloud) -> Columns:
     """Return what is written of each point."""
     columns: Columns = {name: cloud.points[:, i] for i, name in enumerate(("x", "y", "z"))}
     if cloud.normals is not None:

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from nacre.errors import FileFormatError
+from nacre.errors import FileFormatError, meant
 from nacre.io.raw import MAX_COMMENTS, decode, excerpt
 
 TYPES = {
@@ -29,6 +29,7 @@ TYPES = {
 }
 BYTE_ORDERS: dict[str, Literal["<", ">"]] = {"binary_little_endian": "<", "binary_big_endian": ">"}
 _FORMATS = ("ascii", *BYTE_ORDERS)
+_KEYWORDS = ("format", "element", "property", "end_header")
 _MAX_ELEMENTS = 1_000
 _MAX_ENTRIES = 5_000
 
@@ -65,7 +66,9 @@ class Header:
         ``ascii``, ``binary_little_endian`` or ``binary_big_endian``.
     elements : tuple of Element
     comments, obj_info : tuple of str
-        The text of these lines.
+        The text of these lines; among the comments, what stray lines say.
+    stray_lines : tuple of int
+        The lines, counted from 1, that are none of the format's: some programs leave out ``comment``.
     newline : bytes
         What ends a line.
     size : int
@@ -76,6 +79,7 @@ class Header:
     elements: tuple[Element, ...]
     comments: tuple[str, ...]
     obj_info: tuple[str, ...]
+    stray_lines: tuple[int, ...]
     newline: bytes
     size: int
 
@@ -115,16 +119,18 @@ class _Parser:
         self._properties: dict[str, Property] | None = None
         self._num_entries = self._num_notes = 0
         self._notes: dict[str, list[str]] = {"comment": [], "obj_info": []}
+        self._stray_lines: list[int] = []
 
     def take(self, line: bytes, number: int) -> None:
         """Take in the line of this number, or raise a ValueError that says what is wrong with it."""
         first, *rest = line.split(maxsplit=1) or [b""]
         keyword = decode(first)
         if keyword in self._notes:
-            self._num_notes += 1
-            if self._num_notes > MAX_COMMENTS:
-                raise ValueError(f"more than {MAX_COMMENTS} comments")
+            self._count_note()
             self._notes[keyword].append(decode(rest[0]).strip() if rest else "")
+            return
+        if keyword not in _KEYWORDS[:-1]:
+            self._pass_over(line, keyword, number)
             return
         words = [decode(word) for word in rest[0].split()] if rest else []
         self._num_entries += 1
@@ -147,10 +153,23 @@ class _Parser:
                 raise ValueError(f"a second element {excerpt(words[0].encode())}")
             self._properties = {}
             self._elements[words[0]] = number, int(words[1]), self._properties
-        elif keyword == "property":
-            self._take_property(words, line)
         else:
-            raise ValueError(f"unknown keyword in the header: {excerpt(line)}")
+            self._take_property(words, line)
+
+    def _pass_over(self, line: bytes, keyword: str, number: int) -> None:
+        """Keep a line that is none of the format's as a comment, but not one that is almost of the format."""
+        near = meant(keyword, _KEYWORDS)
+        if near or not decode(line).isprintable():
+            raise ValueError(f"unknown keyword in the header: {excerpt(line)}{near}")
+        self._count_note()
+        self._stray_lines.append(number)
+        if line:
+            self._notes["comment"].append(decode(line))
+
+    def _count_note(self) -> None:
+        self._num_notes += 1
+        if self._num_notes > MAX_COMMENTS:
+            raise ValueError(f"more than {MAX_COMMENTS} comments")
 
     def _take_property(self, words: list[str], line: bytes) -> None:
         if self._properties is None:
@@ -183,4 +202,12 @@ class _Parser:
             if element.num_rows and not element.properties:
                 raise ValueError(f"element {element.name} has rows but no properties")
         notes = {keyword: tuple(lines) for keyword, lines in self._notes.items()}
-        return Header(self._format, elements, notes["comment"], notes["obj_info"], newline, size)
+        return Header(
+            self._format,
+            elements,
+            notes["comment"],
+            notes["obj_info"],
+            tuple(self._stray_lines),
+            newline,
+            size,
+        )

@@ -5,17 +5,20 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import ModuleType
+from typing import Any
 
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_flag
 from nacre._internal.guided import guided
-from nacre._internal.point_exchange import ArrayOfPoints
-from nacre.io import pcd, ply
-from nacre.io.cloud import Cloud, cloud_of
+from nacre.io import e57, las, npz, pcd, ply, xyz
+from nacre.io.cloud import Cloud, check_cloud, cloud_of
 
-_FORMATS = {".ply": ply, ".pcd": pcd}
+_FORMATS = {".ply": ply, ".pcd": pcd, ".las": las, ".laz": las, ".e57": e57, ".xyz": xyz, ".npz": npz}
+
+SUFFIXES = tuple(_FORMATS)
+FINITE_SUFFIXES = (".las", ".laz", ".e57")
+"""Of formats that have no points that are not finite."""
 
 
 def read_points(path: str | os.PathLike[str]) -> Cloud:
@@ -25,8 +28,14 @@ def read_points(path: str | os.PathLike[str]) -> Cloud:
     Parameters
     ----------
     path : path-like
-        A ``.ply`` file (ascii, binary little or big endian; elements other than ``vertex`` are checked and
-        left out) or a ``.pcd`` file (ascii, binary, binary_compressed).
+        - ``.ply``: ascii, binary little or big endian; elements other than ``vertex`` are checked and left
+          out. Lines of the header that are none of PLY's become comments, with a warning in the log.
+        - ``.pcd``: ascii, binary, binary_compressed.
+        - ``.las``, ``.laz`` (extra ``las``): any version; colours as 8 bits, all else as attributes.
+        - ``.e57`` (extra ``e57``): all scans, each in its place; colours and ``intensity``.
+        - ``.xyz``: text, a point a line, values between blanks, commas or semicolons: x y z, then r g b from
+          0 to 255, then nx ny nz; or as a first line of names says.
+        - ``.npz``: arrays ``points``, and ``normals``, ``colors`` and others if there are any.
 
     Returns
     -------
@@ -40,21 +49,25 @@ def read_points(path: str | os.PathLike[str]) -> Cloud:
         When the file is broken: nothing is ever read in part. The error names path, place and reason.
     OSError
         When the file cannot be read (FileNotFoundError, IsADirectoryError, ...).
+    ImportError
+        When the format needs a package that is not installed; the message says how to install it.
     ValueError
         When the suffix is none of the above.
 
     Notes
     -----
-    Formats: G. Turk, "The PLY Polygon File Format", 1994; "The PCD file format", Point Cloud Library.
+    Formats: G. Turk, "The PLY Polygon File Format", 1994; "The PCD file format", Point Cloud Library; "LAS
+    specification 1.4", ASPRS, 2019; ASTM E2807, "3D imaging data exchange".
     """
-    cloud: Cloud = _format_of(path).read_cloud(path)
+    require_point_suffix(path)
+    cloud: Cloud = _FORMATS[Path(path).suffix.lower()].read_cloud(path)
     return cloud
 
 
 @guided(write_ascii="it is binary=False", pointcloud="points", filename="path")
 def write_points(
     path: str | os.PathLike[str],
-    points: npt.ArrayLike | ArrayOfPoints,
+    points: Any,
     *,
     normals: npt.ArrayLike | None = None,
     colors: npt.ArrayLike | None = None,
@@ -70,11 +83,19 @@ def write_points(
     Parameters
     ----------
     path : path-like
-        A ``.ply`` file (``x y z nx ny nz red green blue``, then the attributes) or a ``.pcd`` file,
-        version 0.7 (``x y z normal_x normal_y normal_z rgb``, then the attributes).
-    points : (N, 3) array, or Cloud, Model or Consolidated
-        Coordinates. What has normals, colours and attributes of its own is written with them, where no others
-        are given. float32 is stored as float, everything else as double, so that no digit is lost.
+        - ``.ply``: ``x y z nx ny nz red green blue``, then the attributes.
+        - ``.pcd``, version 0.7: ``x y z normal_x normal_y normal_z rgb``, then the attributes.
+        - ``.las``, ``.laz``, version 1.4 (extra ``las``): coordinates in steps of a micrometre, coarser where
+          points lie more than 4 km apart; colours, attributes that LAS knows (``intensity``,
+          ``classification``, ``gps_time``, ...), and all else, the normals too, as extra bytes.
+        - ``.e57`` (extra ``e57``): one scan, coordinates in float32 about an origin in float64; colours and
+          ``intensity``. What else there is has no place, which a warning in the log tells.
+        - ``.xyz``: text with a first line of names.
+        - ``.npz``: each field an array, exactly.
+    points : (N, 3) array, or Cloud, Model, Reconstruction or Consolidated
+        Coordinates. What has normals, colours and attributes of its own (a model its
+        :meth:`~nacre.Model.cloud`) is written with them, where no others are given. float32 is stored as
+        float, everything else as double, so that no digit is lost.
     normals : (N, 3) array, optional
         Stored by the same rule.
     colors : (N, 3) array of integers from 0 to 255, or of floats from 0 to 1, optional
@@ -83,36 +104,43 @@ def write_points(
         Further fields, stored in their own type (bool as uint8, float16 as float). As PLY has no 64-bit
         integers, they become 32-bit ones there if all values fit.
     comments : sequence of str
-        Lines for the header.
+        Lines for the header; LAS and E57 have none.
     binary : bool
-        Binary little-endian; else text, from which every number is read back exactly.
+        Binary little-endian; else text, from which every number is read back exactly. Of PLY and PCD: XYZ is
+        always text, the others never.
 
     Raises
     ------
     TypeError, ValueError
         When an argument does not fit; the message names it.
+    ImportError
+        When the format needs a package that is not installed; the message says how to install it.
     OSError
         When the file cannot be written (no such folder, no permission, a full disk); it has the path.
     """
     binary = as_flag("binary", binary)
-    if isinstance(points, ArrayOfPoints):
-        own = cloud_of(points)
-        points = own.points
-        normals = own.normals if normals is None else normals
-        colors = own.colors if colors is None else colors
-        attributes = own.attributes if attributes is None else attributes
-    _format_of(path).write_cloud(
-        path, points, normals=normals, colors=colors, attributes=attributes, comments=comments, binary=binary
+    require_point_suffix(path)
+    own = cloud_of(points)
+    cloud = check_cloud(
+        own.points,
+        own.normals if normals is None else normals,
+        own.colors if colors is None else colors,
+        own.attributes if attributes is None else attributes,
     )
+    _FORMATS[Path(path).suffix.lower()].write_cloud(path, cloud, comments=comments, binary=binary)
 
 
-def _format_of(path: str | os.PathLike[str]) -> ModuleType:
+def holds(path: str | os.PathLike[str], field: str) -> bool:
+    """Say whether the format of a file has a place for a field: normals, colors, or an attribute."""
+    return field in getattr(_FORMATS[Path(path).suffix.lower()], "FIELDS", (field,))
+
+
+def require_point_suffix(path: str | os.PathLike[str]) -> None:
+    """Raise where point files do not end so."""
     if not isinstance(path, str | os.PathLike):
         raise TypeError(
             "path must be a path, as in write_points(path, points) and read_points(path), "
             f"got {type(path).__name__}"
         )
-    suffix = Path(path).suffix.lower()
-    if suffix not in _FORMATS:
-        raise ValueError(f"point files end in {' or '.join(_FORMATS)}, got {os.fspath(path)!r}")
-    return _FORMATS[suffix]
+    if Path(path).suffix.lower() not in _FORMATS:
+        raise ValueError(f"point files end in {', '.join(_FORMATS)}, got {os.fspath(path)!r}")

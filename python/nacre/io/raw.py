@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
+from io import BytesIO
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -155,6 +156,19 @@ class TextBlock:
             return np.array([int(self.tokens[token]) for token in tokens], dtype=dtype)
         except (ValueError, OverflowError):
             raise self.error(int(tokens[0]), f"{name} holds a value that does not fit {dtype.name}") from None
+
+
+def code_lines(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield numbered lines without comments; a backslash at its end joins a line with the next."""
+    parts: list[bytes] = []
+    number = 0
+    for number, raw in enumerate(BytesIO(data.removeprefix(b"\xef\xbb\xbf")), 1):
+        line = raw.partition(b"#")[0].rstrip()
+        parts.append(line.removesuffix(b"\\"))
+        if not line.endswith(b"\\"):
+            yield number, b" ".join(parts)
+            parts.clear()
+    yield number, b" ".join(parts)
 
 
 def number_of(text: str) -> float:

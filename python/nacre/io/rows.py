@@ -20,10 +20,20 @@ def encode_rows(columns: Iterable[npt.NDArray[Any]], *, binary: bool) -> Iterato
 
     ``columns`` are (N,) or (N, K) arrays. From the text every value is read back bit for bit.
     """
+    for rows in _blocks(columns):
+        yield _binary(rows) if binary else _text(rows)
+
+
+def encode_lines(line: str, columns: Iterable[npt.NDArray[Any]]) -> Iterator[bytes]:
+    """Yield text in pieces: for each row its numbers in the places ``{}`` of ``line``, exact as they are."""
+    for rows in _blocks(columns):
+        yield _filled(line, rows)
+
+
+def _blocks(columns: Iterable[npt.NDArray[Any]]) -> Iterator[Arrays]:
     columns = list(columns)
     for start in range(0, len(columns[0]), _ROWS_PER_BLOCK):
-        rows = [column[start : start + _ROWS_PER_BLOCK] for column in columns]
-        yield _binary(rows) if binary else _text(rows)
+        yield [column[start : start + _ROWS_PER_BLOCK] for column in columns]
 
 
 def _binary(columns: Arrays) -> memoryview:
@@ -36,6 +46,11 @@ def _binary(columns: Arrays) -> memoryview:
 
 
 def _text(columns: Arrays) -> bytes:
+    width = sum(column[0].size for column in columns)
+    return _filled(" ".join(width * ["{}"]) + "\n", columns)
+
+
+def _filled(line: str, columns: Arrays) -> bytes:
     codes: list[str] = []
     values: list[list[Any]] = []
     for column in columns:
@@ -43,5 +58,5 @@ def _text(columns: Arrays) -> bytes:
             # Nine digits tell all float32 apart; repr gives the fewest that tell all float64 apart.
             codes.append("%d" if part.dtype.kind in "iu" else "%.9g" if part.dtype.itemsize == 4 else "%r")
             values.append(part.tolist())
-    line = " ".join(codes) + "\n"
-    return (line * len(columns[0]) % tuple(chain.from_iterable(zip(*values, strict=True)))).encode()
+    template = line.format(*codes) * len(columns[0])
+    return (template % tuple(chain.from_iterable(zip(*values, strict=True)))).encode()

@@ -1,4 +1,4 @@
-"""Trajectories as files: TUM, Redwood and 7-Scenes."""
+"""Trajectories as files: TUM, Redwood, KITTI and 7-Scenes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from array import array
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from io import BytesIO
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +22,7 @@ from nacre.io.raw import excerpt, number_of, read_file, text_of
 from nacre.trajectory import Trajectory
 
 Float64 = npt.NDArray[np.float64]
+TrajectoryFormat = Literal["tum", "redwood", "kitti"]
 
 _LONGEST_LINE = 4096
 _POSES_PER_BLOCK = 1024  # for the sake of memory
@@ -34,6 +37,8 @@ class _Block:
     """(N, K): all numbers of each pose."""
     lines: npt.NDArray[np.int64]
     """(N, L): where they stand."""
+    first: int
+    """How many poses come before."""
 
     def error(self, pose: int, reason: str, line: int = 0) -> FileFormatError:
         """Return the error for a line of a pose."""
@@ -54,6 +59,7 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
 
     - TUM: lines of ``t tx ty tz qx qy qz qw``;
     - Redwood ``.log``: blocks of three whole numbers, the first one the frame's index, and a 4x4 matrix;
+    - KITTI: lines of 12 numbers, the first three rows of the matrix; the times are 0, 1, 2, ...;
     - 7-Scenes ``.pose.txt``: one 4x4 matrix, its time is 0.
 
     Lines that start with ``#`` are comments. Matrices are camera to world; their rotations are made exact.
@@ -81,10 +87,14 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
 
 
 def write_trajectory(
-    path: str | os.PathLike[str], timestamps: npt.ArrayLike | Trajectory, poses: npt.ArrayLike | None = None
+    path: str | os.PathLike[str],
+    timestamps: npt.ArrayLike | Trajectory,
+    poses: npt.ArrayLike | None = None,
+    *,
+    format: TrajectoryFormat | None = None,
 ) -> None:
     """
-    Write a trajectory in TUM format (``t tx ty tz qx qy qz qw``), atomically and with all digits.
+    Write a trajectory, atomically and with all digits.
 
     Parameters
     ----------
@@ -94,6 +104,12 @@ def write_trajectory(
         Seconds, or the frames' indices.
     poses : (N, 4, 4) array
         ``world_from_camera``; not with a Trajectory, which has its own.
+    format : {"tum", "redwood", "kitti"}, optional
+        - ``"tum"``: ``t tx ty tz qx qy qz qw``;
+        - ``"redwood"``: three whole numbers and a 4x4 matrix; times that are fractions become 0, 1, 2, ...;
+        - ``"kitti"``: the first three rows of the matrix; without times.
+
+        None takes Redwood for files that end in ``.log``, else TUM.
 
     Raises
     ------
@@ -102,6 +118,9 @@ def write_trajectory(
     OSError
         When the file cannot be written.
     """
+    name = format or ("redwood" if Path(path).suffix.lower() == ".log" else "tum")
+    if name not in _WRITERS:
+        raise ValueError(f"format must be one of {', '.join(_WRITERS)}, got {format!r}")
     if not isinstance(timestamps, Trajectory):
         timestamps = Trajectory(timestamps, poses)  # type: ignore[arg-type]
     elif poses is not None:
@@ -115,17 +134,33 @@ def write_trajectory(
     largest = np.abs(trajectory.poses[:, :3, :3]).max(initial=0.0)
     if largest > 2:
         raise ValueError(f"poses must be rigid, got a rotation matrix with an entry of {largest:g}")
-    rows = np.column_stack(
-        [
-            trajectory.timestamps,
-            trajectory.poses[:, :3, 3],
-            quaternion_from_matrix(trajectory.poses[:, :3, :3]),
-        ]
-    )
     with atomic_writer(path) as stream:
-        stream.write(b"# timestamp tx ty tz qx qy qz qw\n")
-        for row in rows:
-            stream.write((" ".join(_shortest(value) for value in row) + "\n").encode())
+        stream.writelines(line.encode() for line in _WRITERS[name](trajectory))
+
+
+def _tum_lines(trajectory: Trajectory) -> Iterator[str]:
+    yield "# timestamp tx ty tz qx qy qz qw\n"
+    quaternions = quaternion_from_matrix(trajectory.poses[:, :3, :3])
+    for row in np.column_stack([trajectory.timestamps, trajectory.poses[:, :3, 3], quaternions]):
+        yield _line(row)
+
+
+def _redwood_lines(trajectory: Trajectory) -> Iterator[str]:
+    times = trajectory.timestamps
+    has_indices = (times == np.floor(times)).all()
+    for i, pose in enumerate(trajectory.poses):
+        index = int(times[i]) if has_indices else i
+        yield f"{index} {index} {index + 1}\n"
+        yield from map(_line, pose)
+
+
+def _kitti_lines(trajectory: Trajectory) -> Iterator[str]:
+    yield from map(_line, trajectory.poses[:, :3].reshape(-1, 12))
+
+
+_WRITERS = {"tum": _tum_lines, "redwood": _redwood_lines, "kitti": _kitti_lines}
+
+WRITE_FORMATS = tuple(_WRITERS)
 
 
 def _rows(path: str | os.PathLike[str], data: bytes) -> Iterator[tuple[int, list[float]]]:
@@ -151,12 +186,14 @@ def _blocks(path: str | os.PathLike[str], data: bytes) -> Iterator[tuple[_Format
     """Yield a file's poses, and the format that its first line is of."""
     numbers, lines = array("d"), array("q")
     format_ = None
+    first = 0
 
     def block(format_: _Format) -> _Block:
         return _Block(
             path,
             np.array(numbers).reshape(-1, sum(format_.widths)),
             np.array(lines).reshape(-1, len(format_.widths)),
+            first,
         )
 
     for line, values in _rows(path, data):
@@ -171,6 +208,7 @@ def _blocks(path: str | os.PathLike[str], data: bytes) -> Iterator[tuple[_Format
         lines.append(line)
         if len(lines) == _POSES_PER_BLOCK * len(format_.widths):
             yield format_, block(format_)
+            first += _POSES_PER_BLOCK
             del numbers[:], lines[:]
     if format_ is None or not lines:
         return
@@ -200,6 +238,12 @@ def _parse_redwood(block: _Block) -> tuple[Float64, Float64]:
     return block.numbers[:, 0].copy(), _exact(block, block.numbers[:, 3:].reshape(-1, 4, 4), 1)
 
 
+def _parse_kitti(block: _Block) -> tuple[Float64, Float64]:
+    poses = np.tile(np.eye(4), (len(block.numbers), 1, 1))
+    poses[:, :3] = block.numbers.reshape(-1, 3, 4)
+    return block.first + np.arange(len(poses), dtype=np.float64), _exact(block, poses, 0)
+
+
 def _parse_seven_scenes(block: _Block) -> tuple[Float64, Float64]:
     if len(block.numbers) != 1:
         raise _unknown(block.path, int(block.lines[0, 0]), 4)
@@ -210,9 +254,11 @@ _EXPECTED = {
     8: "8 numbers (t tx ty tz qx qy qz qw)",
     4: "4 numbers of a 4x4 matrix",
     3: "3 numbers before a matrix",
+    12: "12 numbers of a 3x4 matrix",
 }
 _FORMATS = {
     8: _Format((8,), _parse_tum),
+    12: _Format((12,), _parse_kitti),
     4: _Format((4, 4, 4, 4), _parse_seven_scenes),
     3: _Format((3, 4, 4, 4, 4), _parse_redwood),
 }
@@ -220,8 +266,8 @@ _FORMATS = {
 
 def _unknown(path: str | os.PathLike[str], line: int, width: int) -> FileFormatError:
     reason = (
-        "expected lines of 8 numbers (TUM), blocks of 3 numbers and a 4x4 matrix (Redwood), or a 4x4 matrix "
-        f"(7-Scenes), got {width} numbers"
+        "expected lines of 8 numbers (TUM) or 12 (KITTI), blocks of 3 numbers and a 4x4 matrix (Redwood), or "
+        f"a 4x4 matrix (7-Scenes), got {width} numbers"
     )
     return FileFormatError(path, reason, line=line)
 
@@ -242,12 +288,12 @@ def _exact(block: _Block, poses: Float64, line: int) -> Float64:
     wrong |= ~np.isclose(poses[:, 3], (0, 0, 0, 1)).all(axis=1)
     if wrong.any():
         raise block.error(
-            int(np.flatnonzero(wrong)[0]), "the 4x4 matrix is not a rotation and a translation", line
+            int(np.flatnonzero(wrong)[0]), "the matrix is not a rotation and a translation", line
         )
     exact = poses.copy()
     exact[:, :3, :3] = u @ vt
     return exact
 
 
-def _shortest(value: float) -> str:
-    return repr(float(value)).removesuffix(".0")
+def _line(values: Float64) -> str:
+    return " ".join(repr(value).removesuffix(".0") for value in values.tolist()) + "\n"

@@ -25,6 +25,7 @@ from nacre.errors import FileFormatError
 from nacre.evaluation import absolute_trajectory_error, relative_pose_error
 from nacre.evaluation.result import Result
 from nacre.frame_report import FrameReport, count_statuses
+from nacre.io.cloud import Cloud
 from nacre.model import Model
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.saved_state import record_from, record_state
@@ -86,6 +87,8 @@ class Reconstruction(Checkpointed):
         What is known beyond the trajectory's errors, by name; may be added to.
     cancelled : bool
         Whether a progress callback ended :meth:`complete` before its last frame.
+    all_points : bool
+        Whether :attr:`cloud` has those, too, that are no surface.
     """
 
     def __init__(self, sequence: collections.abc.Sequence[SequenceFrame], model: Model) -> None:
@@ -94,7 +97,9 @@ class Reconstruction(Checkpointed):
         self.frames: list[FrameRecord] = []
         self.evaluation: dict[str, Result] = {}
         self.cancelled = False
+        self.all_points = False
         self._retry: _Retry | None = None
+        self._cloud: tuple[tuple[int, bool], Cloud] | None = None  # of so many frames
 
     def __repr__(self) -> str:
         ended = ", cancelled" * self.cancelled
@@ -385,6 +390,14 @@ class Reconstruction(Checkpointed):
     def parameters(self) -> dict[str, Any]:
         """The model's parameters as nested mappings."""
         return dataclasses.asdict(self.model.parameters)
+
+    @property
+    def cloud(self) -> Cloud:
+        """The points that reports and files show: :meth:`nacre.Model.cloud`."""
+        state = (len(self.model.frames), self.all_points)
+        if self._cloud is None or self._cloud[0] != state:
+            self._cloud = state, self.model.cloud(all_points=self.all_points)
+        return self._cloud[1]
 
     def as_dict(self, **more: Any) -> dict[str, Any]:
         """Return every figure as plain values that JSON can hold (NaN and inf become None)."""

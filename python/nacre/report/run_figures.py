@@ -39,7 +39,7 @@ def run_dict(run: Reconstruction, **more: Any) -> dict[str, Any]:
             **{f"num_{name.lower()}": counts[name] for name in STATUSES[1:]},
             "num_loops": len(run.loops),
             "coverage": run.num_tracked / len(run.frames) if run.frames else None,
-            "num_points": len(run.model),
+            "num_points": len(run.cloud),
             "spacing": run.model.spacing,
             "noise": dataclasses.asdict(run.model.noise),
             "milliseconds": {
@@ -67,9 +67,10 @@ def run_report(
     from nacre.report import ModelCloud, ReportData
     from nacre.report.text import label
 
-    model = None
-    if len(run.model):
-        model = ModelCloud(run.model.points, run.model.normals, run.model.colors, run.model.confidence)
+    model, cloud = None, run.cloud
+    if len(cloud):
+        assert cloud.normals is not None
+        model = ModelCloud(cloud.points, cloud.normals, cloud.colors, cloud.attributes["confidence"])
     return ReportData(
         title=title,
         source=source,

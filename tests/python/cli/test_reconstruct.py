@@ -29,6 +29,18 @@ def test_writes_every_file(reconstructed):
     assert "<html" in (out / "report.html").read_text()
 
 
+def test_all_points_may_be_written(recording, tmp_path, monkeypatch):
+    monkeypatch.setattr("nacre.model.on_surface", lambda points, *_: points[:, 0] > points[:, 0].mean())
+    run("reconstruct", recording, "-o", tmp_path / "surface", "--last", "1")
+    run("reconstruct", recording, "-o", tmp_path / "all", "--last", "1", "--all-points")
+    surface, everything = (nacre.read_points(tmp_path / name / "model.ply") for name in ("surface", "all"))
+    kept = everything.points[:, 0] > everything.points[:, 0].mean()
+    assert np.array_equal(surface.points, everything.points[kept])
+    assert np.array_equal(surface.attributes["confidence"], everything.attributes["confidence"][kept])
+    assert strict_json(tmp_path / "all" / "report.json")["num_points"] == len(everything)
+    assert strict_json(tmp_path / "surface" / "report.json")["num_points"] == len(surface)
+
+
 def test_json_is_the_report_and_nothing_else(reconstructed):
     out, result = reconstructed
     assert result.json == strict_json(out / "report.json")

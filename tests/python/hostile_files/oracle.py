@@ -36,7 +36,7 @@ def ply(data: bytes) -> dict[str, list]:
     end = re.search(rb"\n[ \t\v\f]*end_header[ \t\v\f\r]*\n", data)
     lines = data[: end.start()].decode("latin-1").split("\n")[1:]
     body, form, elements = data[end.end() :], None, []
-    for words in (line.split() for line in lines):
+    for words in (line.split() for line in lines if line.split()):
         if words[0] == "format":
             form = words[1]
         elif words[0] == "element":

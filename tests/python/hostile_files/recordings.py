@@ -198,7 +198,7 @@ OTHER = {
     ),
     "stanford header without end": (
         {"a.ply": b"ply\nelement range_grid 2\n" + b"x" * 9000},
-        r"a\.ply, line 3: unknown keyword",
+        r"a\.ply, line 4: the file ends before end_header",
     ),
     "azure calibration damaged": (
         {"calibration.json": b"{", "depth/1.pgm": pgm()},

@@ -168,11 +168,11 @@ def test_suffix_in_capitals(tmp_path, name):
     assert len(nacre.read_points(str(tmp_path / name))) == 1
 
 
-@pytest.mark.parametrize("name", ["cloud.xyz", "cloud", "ply"])
+@pytest.mark.parametrize("name", ["cloud.pts", "cloud", "ply"])
 def test_unknown_suffix(tmp_path, name):
-    with pytest.raises(ValueError, match=r"\.ply or \.pcd.*" + name):
+    with pytest.raises(ValueError, match=r"\.ply, \.pcd, .*\.npz, got .*" + name):
         nacre.read_points(tmp_path / name)
-    with pytest.raises(ValueError, match=r"\.ply or \.pcd.*" + name):
+    with pytest.raises(ValueError, match=r"\.ply, \.pcd, .*\.npz, got .*" + name):
         nacre.write_points(tmp_path / name, np.zeros((1, 3)))
 
 

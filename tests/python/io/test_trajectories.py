@@ -259,3 +259,49 @@ def test_a_file_of_many_poses_is_read_whole_and_errors_name_their_line(tmp_path)
     path.write_text("0 0 0 0 0 0 0 1\n" * 2000 + "0 0 0 0 0 0 0 0\n")
     with pytest.raises(FileFormatError, match="line 2001: the quaternion is 0"):
         read_trajectory(path)
+
+
+@pytest.mark.parametrize("format", ["tum", "redwood", "kitti"])
+def test_every_format_is_read_again(tmp_path, format):
+    poses = random_poses(1500, seed=8)
+    write_trajectory(tmp_path / "t.txt", np.arange(1500) + 3, poses, format=format)
+    found = read_trajectory(tmp_path / "t.txt")
+    np.testing.assert_allclose(found.poses, poses, atol=1e-12)
+    np.testing.assert_array_equal(found.timestamps, np.arange(1500) + (0 if format == "kitti" else 3))
+
+
+def test_the_ending_log_means_redwood(tmp_path):
+    write_trajectory(tmp_path / "t.log", [0.5, 1.5], np.tile(np.eye(4), (2, 1, 1)))
+    assert (tmp_path / "t.log").read_text() == "".join(
+        f"{i} {i} {i + 1}\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n" for i in range(2)
+    )
+
+
+def test_lines_of_kitti(tmp_path):
+    """As its development kit has them: the rows of a 3x4 matrix, one after the other."""
+    pose = np.eye(4)
+    pose[:3] = [[0, -1, 0, 1.5], [1, 0, 0, 2], [0, 0, 1, 3]]
+    write_trajectory(tmp_path / "t.txt", [7], [pose], format="kitti")
+    assert (tmp_path / "t.txt").read_text() == "0 -1 0 1.5 1 0 0 2 0 0 1 3\n"
+    (tmp_path / "t.txt").write_text("1.000000e+00 9e-12 0 0 -9e-12 1 0 0 0 0 1 -2e-1\n")  # as the benchmark's
+    assert read_trajectory(tmp_path / "t.txt").poses[0, 2, 3] == -0.2
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1\n", "line 2: expected 12 numbers .*, got 11"),
+        ("1 0 0 0 0 1 0 0 0 0 2 0\n", "line 1: the matrix is not a rotation"),
+        ("1 0 0 0 0 1 0 0 0 0 1 nan\n", "line 1: expected finite numbers"),
+    ],
+)  # fmt: skip
+def test_lines_that_are_not_of_kitti(tmp_path, text, message):
+    (tmp_path / "t.txt").write_text(text)
+    with pytest.raises(FileFormatError, match=message):
+        read_trajectory(tmp_path / "t.txt")
+
+
+def test_an_unknown_format(tmp_path):
+    with pytest.raises(ValueError, match="format must be one of tum, redwood, kitti, got 'euroc'"):
+        write_trajectory(tmp_path / "t.txt", [0], [np.eye(4)], format="euroc")
+    assert not list(tmp_path.iterdir())

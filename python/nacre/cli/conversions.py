@@ -1,0 +1,185 @@
+"""What ``nacre convert`` makes of what."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nacre.cli.source import open_source
+from nacre.cli.terminal import CommandError, written_file
+
+if TYPE_CHECKING:
+    from nacre import Camera, Cloud, Trajectory
+    from nacre.datasets import Sequence
+
+Figures = dict[str, int | list[str]]
+
+
+class Target(str, Enum):
+    """The formats that no ending tells."""
+
+    colmap = "colmap"
+    nerfstudio = "nerfstudio"
+    tum = "tum"
+    kitti = "kitti"
+    redwood = "redwood"
+
+
+@dataclass(frozen=True)
+class Job:
+    """What is to be converted, and how a recording is to be opened."""
+
+    source: Path
+    out: Path
+    to: Target | None
+    format: str | None
+    camera: Camera | Path | None
+    depth_scale: float | None
+
+    def recording(
+        self,
+        path: Path,
+        format: str | None = None,
+        camera: Camera | None = None,
+        depth_scale: float | None = None,
+    ) -> Sequence:
+        """Open a recording; the command's options go before what is known of it."""
+        return open_source(
+            path, self.format or format, self.camera or camera, self.depth_scale or depth_scale
+        )
+
+
+def _points(job: Job) -> Figures:
+    import nacre
+
+    return _write_points(job.out, nacre.read_points(job.source))
+
+
+def _vertices(job: Job) -> Figures:
+    import nacre
+    from nacre.io.meshes import read_mesh_arrays
+
+    mesh = read_mesh_arrays(job.source)
+    return _write_points(job.out, nacre.Cloud(mesh.vertices, mesh.normals, mesh.colors))
+
+
+def _model(job: Job) -> Figures:
+    import nacre
+
+    return _write_points(job.out, nacre.read_points(written_file(job.source, "model.ply")))
+
+
+def _write_points(out: Path, cloud: Cloud) -> Figures:
+    """Write a cloud as far as the format can hold it, and say what it cannot."""
+    import numpy as np
+
+    import nacre
+    from nacre.io.points import FINITE_SUFFIXES, holds
+
+    kept = np.isfinite(cloud.points).all(axis=1) | (out.suffix.lower() not in FINITE_SUFFIXES)
+    fields = {"normals": cloud.normals, "colors": cloud.colors}
+    own: dict[str, Any] = {name: array[kept] for name, array in fields.items() if array is not None}
+    attributes = {name: a[kept] for name, a in cloud.attributes.items() if a.dtype.kind in "buif"}
+    nacre.write_points(out, cloud.points[kept], attributes=attributes, comments=cloud.comments, **own)
+    figures: Figures = {
+        "num_points": int(kept.sum()),
+        "fields": [name for name in (*own, *attributes) if holds(out, name)],
+    }
+    if not kept.all():
+        figures["not_finite_left_out"] = int((~kept).sum())
+    if len(attributes) < len(cloud.attributes):
+        figures["not_numbers_left_out"] = sorted(set(cloud.attributes) - set(attributes))
+    return figures
+
+
+def _mesh(job: Job) -> Figures:
+    import nacre
+    from nacre.io.meshes import read_mesh_arrays
+
+    mesh = read_mesh_arrays(job.source)
+    nacre.write_mesh(job.out, mesh.vertices, mesh.triangles, normals=mesh.normals, colors=mesh.colors)
+    return {"num_vertices": len(mesh.vertices), "num_triangles": len(mesh.triangles)}
+
+
+def _trajectory(job: Job) -> Figures:
+    import nacre
+
+    return _write_trajectory(job, nacre.read_trajectory(job.source))
+
+
+def _camera_path(job: Job) -> Figures:
+    import nacre
+
+    return _write_trajectory(job, nacre.read_trajectory(written_file(job.source, "trajectory.txt")))
+
+
+def _truth(job: Job) -> Figures:
+    truth = job.recording(job.source).truth
+    if truth is None:
+        raise CommandError(f"{job.source} has no true poses: nacre reconstruct finds some")
+    return _write_trajectory(job, truth)
+
+
+def _write_trajectory(job: Job, trajectory: Trajectory) -> Figures:
+    import nacre
+
+    format: Any = None if job.to is None else job.to.value
+    nacre.write_trajectory(job.out, trajectory.timestamps, trajectory.poses, format=format)
+    return {"num_poses": len(trajectory)}
+
+
+def _images_of_run(job: Job) -> Figures:
+    import numpy as np
+
+    import nacre
+    from nacre.report.saved_run import SavedRun
+
+    run = SavedRun(job.source)
+    recording = run.report.get("recording") or {}
+    path = Path(recording.get("path") or "")
+    if not recording.get("path") or not path.exists():
+        raise CommandError(f"{job.source}: its recording, which has the images, is no longer at {path}")
+    sequence = job.recording(path, recording.get("format"), run.camera, recording.get("depth_scale"))
+    poses = np.full((len(sequence), 4, 4), np.nan)
+    for frame, pose in zip(run.frames, run.poses, strict=True):
+        if frame.index >= len(sequence):
+            raise CommandError(f"{job.source}: its recording {path} has only {len(sequence)} views by now")
+        poses[frame.index] = pose
+    return _write_images(job, sequence, poses, nacre.read_points(written_file(job.source, "model.ply")))
+
+
+def _images_of_recording(job: Job) -> Figures:
+    from nacre._internal.arrays import stacked_poses
+
+    sequence = job.recording(job.source)
+    if sequence.truth is None:
+        commands = f"nacre reconstruct {job.source} -o RUN, then nacre convert RUN {job.out}"
+        raise CommandError(f"{job.source} has no true poses: {commands}")
+    poses = stacked_poses(sequence.true_pose(i) for i in range(len(sequence)))
+    return _write_images(job, sequence, poses, None)
+
+
+def _write_images(job: Job, sequence: Sequence, poses: Any, cloud: Cloud | None) -> Figures:
+    from nacre.datasets import write_colmap, write_nerfstudio
+
+    if not sequence.has_color:
+        raise CommandError(f"{sequence.path} has no colour images, which COLMAP and nerfstudio need")
+    write = write_colmap if job.to is Target.colmap else write_nerfstudio
+    num_images = write(job.out, sequence, poses, cloud=cloud)
+    return {"num_images": num_images, "num_points": 0 if cloud is None else len(cloud)}
+
+
+CONVERSIONS: dict[tuple[str, str], Callable[[Job], Figures]] = {
+    ("points", "points"): _points,
+    ("mesh", "points"): _vertices,
+    ("mesh", "mesh"): _mesh,
+    ("trajectory", "trajectory"): _trajectory,
+    ("run", "points"): _model,
+    ("run", "trajectory"): _camera_path,
+    ("run", "images"): _images_of_run,
+    ("recording", "trajectory"): _truth,
+    ("recording", "images"): _images_of_recording,
+}

@@ -1,0 +1,107 @@
+"""E57 files (ASTM E2807): points of laser scanners, by pye57."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre._internal.arrays import localize
+from nacre.errors import FileFormatError
+from nacre.io.atomic import atomic_path
+from nacre.io.cloud import Cloud
+from nacre.io.raw import require_regular
+
+_log = logging.getLogger(__name__)
+
+_MISSING = 'E57 files need pye57: pip install "nacre[e57]"'
+FIELDS = ("colors", "intensity")
+"""What there is a place for beside coordinates."""
+_AXES = ("cartesianX", "cartesianY", "cartesianZ")
+_COLORS = ("colorRed", "colorGreen", "colorBlue")
+
+
+def read_cloud(path: str | os.PathLike[str]) -> Cloud:
+    """
+    Read an E57 file; :func:`nacre.read_points` says what is returned and raised.
+
+    All scans come together, each in its place; points that are marked as invalid are left out.
+    """
+    pye57 = _import_pye57()
+    size = require_regular(path).stat().st_size
+    with Path(path).open("rb"):  # else the library says nothing of a folder, or of a file without permission
+        pass
+    try:
+        with pye57.E57(os.fspath(path)) as file:
+            for i in range(file.scan_count):
+                _check_count(path, file.get_header(i).point_count, size)
+            scans = [
+                file.read_scan(i, intensity=True, colors=True, ignore_missing_fields=True)
+                for i in range(file.scan_count)
+            ]
+    except (MemoryError, FileFormatError):
+        raise
+    except Exception as error:  # of several kinds, the library's own among them
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise FileFormatError(path, f"not a readable E57 file: {reason}", offset=0) from error
+    points = _joined(scans, _AXES)
+    colors, intensity = _joined(scans, _COLORS), _joined(scans, ("intensity",))
+    return Cloud(
+        np.zeros((0, 3)) if points is None else points,
+        colors=None if colors is None else colors.astype(np.uint8),
+        attributes={} if intensity is None else {"intensity": intensity[:, 0]},
+        path=Path(path),
+    )
+
+
+def _check_count(path: str | os.PathLike[str], count: int, size: int) -> None:
+    """Refuse a number of points that cannot be in the file, before memory is set aside for it."""
+    if count > 8 * size:  # less than a bit of a point
+        raise FileFormatError(path, f"{count} points are promised in {size} bytes", offset=0)
+
+
+def _joined(scans: list[Any], names: tuple[str, ...]) -> npt.NDArray[Any] | None:
+    """Return fields side by side, of all scans one after the other; None where a scan has them not."""
+    if not scans or not all(name in scan for scan in scans for name in names):
+        return None
+    return np.concatenate([np.column_stack([scan[name] for name in names]) for scan in scans])
+
+
+def write_cloud(
+    path: str | os.PathLike[str], cloud: Cloud, *, comments: Sequence[str] = (), binary: bool = True
+) -> None:
+    """
+    Write points as one scan of an E57 file; :func:`nacre.write_points` has the parameters.
+
+    Coordinates are float32 about a place that the scan's pose gives in float64.
+    """
+    pye57 = _import_pye57()
+    if not len(cloud) or not np.isfinite(cloud.points).all():
+        raise ValueError("points must be finite, and at least one, in an E57 file, got others")
+    local, origin = localize(cloud.points)
+    data = dict(zip(_AXES, local.T.astype(np.float64), strict=True))
+    if cloud.colors is not None:
+        data.update(zip(_COLORS, cloud.colors.T, strict=True))
+    left_out = ["normals"] * (cloud.normals is not None)
+    for name, values in cloud.attributes.items():
+        if name == "intensity" and values.ndim == 1 and np.isfinite(values).all():
+            data[name] = values.astype(np.float32)
+        else:
+            left_out.append(name)
+    if left_out:
+        _log.warning("%s: an E57 file has no place for %s", path, ", ".join(left_out))
+    with atomic_path(path) as temporary, pye57.E57(os.fspath(temporary), mode="w") as file:
+        file.write_scan_raw(data, name=Path(path).stem, translation=origin)
+
+
+def _import_pye57() -> Any:
+    try:
+        import pye57
+    except ImportError as error:
+        raise ImportError(_MISSING, name="pye57") from error
+    return pye57

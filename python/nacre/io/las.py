@@ -1,0 +1,207 @@
+"""LAS 1.4 and LAZ files: points of surveys, by laspy."""
+
+from __future__ import annotations
+
+import math
+import os
+import struct
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre._internal import arrays
+from nacre.errors import FileFormatError
+from nacre.io.atomic import atomic_path
+from nacre.io.cloud import Cloud, Columns, native
+from nacre.io.raw import require_regular
+
+_MISSING = 'LAS and LAZ files need laspy and lazrs: pip install "nacre[las]"'
+_NORMALS = ("NormalX", "NormalY", "NormalZ")  # as the Point Data Abstraction Library names them
+_COLORS = ("red", "green", "blue")
+_POINTS_PER_CHUNK = 1_000_000
+_HEADER = struct.Struct("<96xIIBHI116x")  # data offset, number of records, point format, bytes and number
+_RECORD_BYTES = 54  # of a variable length record, at least
+_COMPRESSED = 0x80
+_FINEST_SCALE = 1e-6  # [m]
+_DEFAULTS = {"return_number": 1, "number_of_returns": 1}
+_PLAIN, _COLORED = 6, 7  # the point formats of LAS 1.4
+
+
+def read_cloud(path: str | os.PathLike[str]) -> Cloud:
+    """
+    Read a LAS or LAZ file; :func:`nacre.read_points` says what is returned and raised.
+
+    Coordinates are scaled and shifted as the header says. Dimensions that every file has are left out where
+    they are the same as in a file that says nothing: 0, and the first of one return.
+    """
+    laspy = _import_laspy()
+    size = require_regular(path).stat().st_size
+    with Path(path).open("rb") as stream:
+        _check_header(path, stream, size)
+        stream.seek(0)
+        try:
+            with laspy.open(stream, closefd=False, read_evlrs=False) as reader:
+                expected = reader.header.point_count
+                chunks = list(reader.chunk_iterator(_POINTS_PER_CHUNK))
+                cloud = _cloud_of(Path(path), chunks, list(reader.header.point_format.dimension_names))
+        except (MemoryError, OSError):
+            raise
+        except BaseException as error:  # of laspy, and of lazrs, which panics
+            if isinstance(error, KeyboardInterrupt | SystemExit):
+                raise
+            raise FileFormatError(path, f"not a readable LAS file: {error}", offset=0) from error
+    if len(cloud) != expected:
+        reason = f"the header promises {expected} points, {len(cloud)} are in the file"
+        raise FileFormatError(path, reason, offset=size)
+    return cloud
+
+
+def _check_header(path: str | os.PathLike[str], stream: BinaryIO, size: int) -> None:
+    """Refuse a header whose tables cannot be in the file, before memory and time are spent on them."""
+    header = stream.read(_HEADER.size)
+    if not header.startswith(b"LASF") or len(header) < _HEADER.size:
+        raise FileFormatError(path, "a LAS file begins with 'LASF' and a header of 227 bytes", offset=0)
+    start, num_records, point_format, point_bytes, num_points = _HEADER.unpack(header)
+    if not _HEADER.size <= start <= size:
+        reason = f"the header promises points from byte {start} on, the file has {size} bytes"
+        raise FileFormatError(path, reason, offset=96)
+    if num_records * _RECORD_BYTES > start:
+        reason = f"{num_records} records are promised in {start} bytes"
+        raise FileFormatError(path, reason, offset=100)
+    if point_format & _COMPRESSED:
+        _check_chunk_table(path, stream, start, size)
+    elif num_points * point_bytes > size - start:
+        reason = f"the header promises {num_points} points of {point_bytes} bytes, {size - start} are left"
+        raise FileFormatError(path, reason, offset=107)
+
+
+def _check_chunk_table(path: str | os.PathLike[str], stream: BinaryIO, start: int, size: int) -> None:
+    """Refuse more chunks of compressed points than the file can hold: lazrs would end the process."""
+    place = start
+    for at in (start, size - 8):  # where the table is; -1: that is told at the end, as from a stream
+        stream.seek(max(at, 0))
+        (place,) = struct.unpack("<q", stream.read(8).ljust(8, b"\xff"))
+        if place != -1:
+            break
+    stream.seek(min(max(place, 0), size))
+    _, num_chunks = struct.unpack("<II", stream.read(8).ljust(8, b"\xff"))
+    if num_chunks > size:
+        raise FileFormatError(path, f"{num_chunks} chunks are promised in {size} bytes", offset=max(place, 0))
+
+
+def _cloud_of(path: Path, chunks: list[Any], names: list[str]) -> Cloud:
+    def column(name: str) -> npt.NDArray[Any]:
+        parts = [np.asarray(chunk[name]) for chunk in chunks]
+        return native(np.concatenate(parts)) if parts else np.zeros(0)
+
+    points = np.column_stack([column(axis) for axis in "xyz"]).astype(np.float64).reshape(-1, 3)
+    normals, colors = None, None
+    used = {"X", "Y", "Z"}
+    if set(_NORMALS) <= set(names):
+        normals = np.column_stack([column(name) for name in _NORMALS])
+        used.update(_NORMALS)
+    if set(_COLORS) <= set(names):
+        colors = _eight_bits(np.column_stack([column(name) for name in _COLORS]))
+        used.update(_COLORS)
+    attributes: Columns = {}
+    for name in (name for name in names if name not in used):
+        values = column(name)
+        if not (values == _DEFAULTS.get(name, 0)).all():
+            attributes[name] = values
+    return Cloud(points, normals, colors, attributes, path=path)
+
+
+def _eight_bits(colors: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
+    """Return colours from 16 bits, or from 8 where a program has stored them so."""
+    wide = colors.astype(np.uint16)
+    return (wide >> 8 if wide.max(initial=0) > 255 else wide).astype(np.uint8)
+
+
+def write_cloud(
+    path: str | os.PathLike[str], cloud: Cloud, *, comments: Sequence[str] = (), binary: bool = True
+) -> None:
+    """
+    Write points as a LAS 1.4 file, compressed where it ends in ``.laz``.
+
+    :func:`nacre.write_points` has the parameters.
+
+    Coordinates are whole steps of a micrometre, or coarser where the points lie more than 4 km apart.
+    """
+    laspy = _import_laspy()
+    if not np.isfinite(cloud.points).all():
+        raise ValueError("points must be finite in a LAS file, got some that are not")
+    header = laspy.LasHeader(version="1.4", point_format=_PLAIN if cloud.colors is None else _COLORED)
+    header.offsets, header.scales = _quantization(cloud.points)
+    header.generating_software = "nacre"
+    standard = set(header.point_format.dimension_names) - {"X", "Y", "Z", *_COLORS}
+    columns = _extra_columns(cloud)
+    for name, values in columns.items():
+        if name not in standard:
+            dtype = values.dtype.str[1:] if values.ndim == 1 else f"{values.shape[1]}{values.dtype.str[1:]}"
+            header.add_extra_dim(laspy.ExtraBytesParams(name=name, type=dtype))
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = cloud.points.astype(np.float64).T
+    if cloud.colors is not None:
+        las.red, las.green, las.blue = cloud.colors.T.astype(np.uint16) * 257
+    for name, value in _DEFAULTS.items():
+        las[name] = np.full(len(cloud), value)
+    for name, values in columns.items():
+        las[name] = _fitted(name, values, header.point_format) if name in standard else values
+    with atomic_path(path) as temporary, temporary.open("r+b") as stream:
+        las.write(stream, do_compress=Path(path).suffix.lower() == ".laz")
+
+
+def _quantization(points: arrays.FloatArray) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    """Return the offset and the step of each axis: a power of ten with which all points fit 32 bits."""
+    if not len(points):
+        return np.zeros(3), np.full(3, _FINEST_SCALE)
+    low, high = points.min(axis=0).astype(np.float64), points.max(axis=0).astype(np.float64)
+    offsets = np.round(low / 2 + high / 2)
+    half = float(np.maximum(high - offsets, offsets - low).max())
+    exponent = math.ceil(math.log10(half / (2**31 - 2))) if half > 0 else -math.inf
+    return offsets, np.full(3, max(10.0**exponent, _FINEST_SCALE))
+
+
+def _extra_columns(cloud: Cloud) -> Columns:
+    """Return what is written beside coordinates and colours, by its name in the file."""
+    columns: Columns = {}
+    if cloud.normals is not None:
+        columns.update(zip(_NORMALS, cloud.normals.T, strict=True))
+    for name, values in cloud.attributes.items():
+        if name in columns or name in {"X", "Y", "Z", "x", "y", "z", *_COLORS}:
+            raise ValueError(f"attributes must not be called {name!r}: the file has that name already")
+        if (values.ndim == 2 and not 1 <= values.shape[1] <= 3) or len(name) > 32:
+            raise ValueError(
+                f"attributes[{name!r}] must have 1 to 3 values per point and a name of at most 32 letters in "
+                f"a LAS file, got shape {values.shape}"
+            )
+        columns[name] = values if values.ndim == 1 or values.shape[1] > 1 else values[:, 0]
+    return columns
+
+
+def _fitted(name: str, values: npt.NDArray[Any], point_format: Any) -> npt.NDArray[Any]:
+    """Return values for a dimension that LAS has; intensities from 0 to 1 are spread over its 16 bits."""
+    dimension = point_format.dimension_by_name(name)
+    if dimension.dtype is not None and dimension.dtype.kind == "f":
+        return np.asarray(values, dimension.dtype)
+    if name == "intensity" and values.dtype.kind == "f" and ((values >= 0) & (values <= 1)).all():
+        return np.asarray(np.rint(dimension.max * values), np.uint16)
+    fits = (values >= dimension.min) & (values <= dimension.max) & (values == np.floor(values))
+    if values.ndim != 1 or not fits.all():
+        expected = f"whole numbers from {dimension.min} to {dimension.max}"
+        expected += " or real ones from 0 to 1" * (name == "intensity")
+        wrong = values[~fits][0] if values.ndim == 1 else f"shape {values.shape}"
+        raise ValueError(f"attributes[{name!r}] must be {expected} in a LAS file, got {wrong}")
+    return values.astype(np.int64)
+
+
+def _import_laspy() -> Any:
+    try:
+        import laspy
+        import lazrs  # noqa: F401
+    except ImportError as error:
+        raise ImportError(_MISSING, name=error.name) from error
+    return laspy

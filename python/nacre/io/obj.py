@@ -1,0 +1,120 @@
+"""OBJ files: triangle meshes in and out."""
+
+from __future__ import annotations
+
+import os
+from array import array
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre.errors import FileFormatError
+from nacre.io.cloud import check_comments
+from nacre.io.mesh_arrays import MeshArrays, Polygons, float_of
+from nacre.io.raw import code_lines, excerpt, file_writer, read_file
+from nacre.io.rows import encode_lines
+
+Float64 = npt.NDArray[np.float64]
+
+_NO_NORMAL = -1
+
+
+def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
+    """
+    Read an OBJ file.
+
+    Colours are the three numbers from 0 to 1 that may follow the coordinates. Normals are taken where each
+    vertex has the same one in all its faces; texture coordinates and materials are left out.
+    """
+    mesh = _Attributed()
+    for line_number, line in code_lines(read_file(path)):
+        keyword, *words = line.split() or [b""]
+        try:
+            if keyword == b"v":
+                mesh.add_vertex(words)
+            elif keyword == b"vn":
+                mesh.normals.extend(map(float_of, words[:3]))
+            elif keyword == b"f":
+                mesh.add_corners(words)
+            elif not keyword.isascii() or (keyword and not keyword[:1].isalpha()):
+                raise ValueError
+        except (ValueError, OverflowError):
+            raise FileFormatError(path, f"cannot read {excerpt(line.strip())}", line=line_number) from None
+    if not mesh.counts:
+        raise FileFormatError(path, "not a mesh: there is no face")
+    return mesh.finish(path)
+
+
+class _Attributed(Polygons):
+    """A mesh with normals and colours as it grows line by line."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.colors = array("d")
+        self.normals = array("d")
+        self.normal_of_corner = array("q")
+
+    def add_vertex(self, words: Sequence[bytes]) -> None:
+        super().add_vertex(words)
+        if len(words) == 6:
+            self.colors.extend(map(float_of, words[3:]))
+
+    def add_corners(self, words: Sequence[bytes]) -> None:
+        """Take in a polygon, given as words ``v``, ``v/vt``, ``v//vn`` or ``v/vt/vn``."""
+        self.add_face([_index(word.partition(b"/")[0], self.num_vertices) for word in words])
+        num_normals = len(self.normals) // 3
+        for word in words:
+            normal = b"".join(word.split(b"/")[2:3])
+            self.normal_of_corner.append(_index(normal, num_normals) if normal else _NO_NORMAL)
+
+    def finish(self, path: str | os.PathLike[str]) -> MeshArrays:
+        bare = super().finish(path)
+        colors = np.frombuffer(self.colors, np.float64).reshape(-1, 3)
+        has_colors = len(colors) == len(bare.vertices) and colors.min() >= 0 and colors.max() <= 1
+        return MeshArrays(
+            bare.vertices,
+            bare.triangles,
+            self._vertex_normals(),
+            np.rint(255 * colors).astype(np.uint8) if has_colors else None,
+        )
+
+    def _vertex_normals(self) -> Float64 | None:
+        """Return the normals of the vertices, or None where one has several, or none."""
+        corners, chosen = (np.frombuffer(a, np.int64) for a in (self.corners, self.normal_of_corner))
+        given = np.frombuffer(self.normals, np.float64)
+        if len(given) % 3 or not len(given) or chosen.min() < 0 or chosen.max() >= len(given) // 3:
+            return None
+        given = given.reshape(-1, 3)
+        normals = np.full((self.num_vertices, 3), np.nan)
+        normals[corners] = given[chosen]
+        is_same = (normals[corners] == given[chosen]).all()
+        return normals if is_same and np.isfinite(normals).all() else None
+
+
+def _index(text: bytes, count: int) -> int:
+    """Return the place, from 0, of an index that counts from 1 or, of the ``count`` so far, back from -1."""
+    index = int(text)
+    if b"_" in text or index == 0 or -index > count:
+        raise ValueError
+    return index - 1 if index > 0 else count + index
+
+
+def write_mesh(
+    path: str | os.PathLike[str], mesh: MeshArrays, *, comments: Sequence[str] = (), binary: bool = True
+) -> None:
+    """Write an OBJ file, which is text; :func:`nacre.write_mesh` has the parameters."""
+    corners = mesh.triangles + np.int64(1)
+    vertex_line, vertex_columns = "v {} {} {}\n", [mesh.vertices]
+    if mesh.colors is not None:
+        vertex_line = "v {} {} {} {} {} {}\n"
+        vertex_columns.append(np.round(mesh.colors / 255.0, 6))
+    face_line, face_columns = "f {} {} {}\n", [corners]
+    if mesh.normals is not None:
+        face_line, face_columns = "f {}//{} {}//{} {}//{}\n", [np.repeat(corners, 2, axis=1)]
+    with file_writer(path) as stream:
+        stream.write("".join(f"# {line}".rstrip() + "\n" for line in check_comments(comments)).encode())
+        stream.writelines(encode_lines(vertex_line, vertex_columns))
+        if mesh.normals is not None:
+            stream.writelines(encode_lines("vn {} {} {}\n", [mesh.normals]))
+        stream.writelines(encode_lines(face_line, face_columns))

@@ -1,0 +1,151 @@
+"""Meshes that nacre writes, as they are read again and as another program (trimesh) sees them."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+
+import nacre
+from nacre.io.meshes import READ_SUFFIXES, WRITE_SUFFIXES, read_mesh_arrays
+
+TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0.7]])
+TRIANGLES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+NORMALS = np.array([[0, 0, 1], [1, 0, 0], [0, 0.6, 0.8], [0, 0, -1]])
+COLORS = np.array([[255, 0, 0], [1, 2, 3], [0, 128, 127], [250, 251, 252]], np.uint8)
+COLORED = [".glb", ".obj", ".ply"]
+
+
+def write(path, vertices=TETRAHEDRON, **options):
+    nacre.write_mesh(path, vertices, TRIANGLES, **options)
+    return path
+
+
+def seen_by_trimesh(path):
+    trimesh = pytest.importorskip("trimesh")
+    loaded = trimesh.load(path, process=False)
+    if not isinstance(loaded, trimesh.Scene):
+        return loaded
+    (node,) = loaded.graph.nodes_geometry
+    place, name = loaded.graph[node]
+    return loaded.geometry[name].apply_transform(place)
+
+
+@pytest.mark.parametrize("suffix", WRITE_SUFFIXES)
+def test_another_program_sees_the_same_surface(tmp_path, suffix):
+    path = write(tmp_path / f"a{suffix}", normals=NORMALS, colors=COLORS)
+    seen = seen_by_trimesh(path)
+    assert seen.area == pytest.approx(np.linalg.norm(_doubled_normals(), axis=1).sum() / 2)
+    np.testing.assert_allclose(seen.triangles, TETRAHEDRON[TRIANGLES], rtol=1e-6)
+
+
+@pytest.mark.parametrize("suffix", [".obj", ".ply"])
+def test_another_program_sees_normals_and_colours(tmp_path, suffix):
+    seen = seen_by_trimesh(write(tmp_path / f"a{suffix}", normals=NORMALS, colors=COLORS))
+    np.testing.assert_allclose(seen.vertex_normals, NORMALS, atol=1e-6)
+    np.testing.assert_array_equal(seen.visual.vertex_colors[:, :3], COLORS)
+
+
+def test_colours_of_glb_are_linear_light(tmp_path):
+    """The format has it so: what is half as bright in linear light is 188 of 255 on a screen."""
+    path = write(tmp_path / "a.glb", colors=np.full((4, 3), 188, np.uint8), normals=NORMALS)
+    seen = seen_by_trimesh(path)
+    np.testing.assert_allclose(seen.visual.vertex_attributes["color"], 0.5, atol=0.003)
+    np.testing.assert_allclose(seen.vertex_normals, NORMALS, atol=1e-6)
+    assert seen.visual.material.doubleSided
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("suffix", sorted(set(COLORED) & set(READ_SUFFIXES)))
+def test_what_is_written_is_read_again(tmp_path, suffix, dtype):
+    vertices = TETRAHEDRON.astype(dtype) / 3
+    found = read_mesh_arrays(write(tmp_path / f"a{suffix}", vertices, normals=NORMALS, colors=COLORS))
+    np.testing.assert_array_equal(found.vertices.astype(dtype), vertices)
+    np.testing.assert_array_equal(found.triangles, TRIANGLES)
+    np.testing.assert_array_equal(found.normals, NORMALS)
+    np.testing.assert_array_equal(found.colors, COLORS)
+    bare = read_mesh_arrays(write(tmp_path / f"b{suffix}", vertices))
+    assert (bare.normals, bare.colors) == (None, None)
+
+
+@pytest.mark.parametrize("binary", [True, False])
+def test_facets_of_stl_have_the_normals_of_their_corners(tmp_path, binary):
+    path = write(tmp_path / "a.stl", normals=NORMALS, binary=binary)
+    expected = _doubled_normals() / np.linalg.norm(_doubled_normals(), axis=1, keepdims=True)
+    np.testing.assert_allclose(seen_by_trimesh(path).face_normals, expected, atol=1e-6)
+    again = read_mesh_arrays(path)
+    np.testing.assert_array_equal(again.vertices[again.triangles], TETRAHEDRON[TRIANGLES].astype(np.float32))
+    assert (b"facet normal" in path.read_bytes()) != binary
+
+
+def test_a_facet_without_area_has_no_normal(tmp_path):
+    nacre.write_mesh(tmp_path / "a.stl", TETRAHEDRON, [[0, 1, 1]])
+    assert np.frombuffer((tmp_path / "a.stl").read_bytes(), "<f4", 3, 84).tolist() == [0, 0, 0]
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".obj", ".ply"])
+def test_georeferenced_vertices_keep_a_tenth_of_a_millimetre(tmp_path, suffix):
+    vertices = TETRAHEDRON / 3 + (4_500_000.1234, 5_300_000.9876, 321.4321)
+    seen = seen_by_trimesh(write(tmp_path / f"a{suffix}", vertices))
+    np.testing.assert_allclose(seen.vertices, vertices, rtol=0, atol=1e-4 if suffix != ".ply" else 0)
+
+
+def test_normals_of_glb_are_unit_vectors(tmp_path):
+    path = write(tmp_path / "a.glb", normals=[[0, 0, 9], [0, 0, 0], [np.nan, 0, 0], [0.1, 0, 0]])
+    document, binary = _chunks(path)
+    (accessor,) = (document["accessors"][p["attributes"]["NORMAL"]] for p in _primitives(document))
+    view = document["bufferViews"][accessor["bufferView"]]
+    normals = np.frombuffer(binary, "<f4", 12, view["byteOffset"]).reshape(4, 3)
+    assert normals.tolist() == [[0, 0, 1], [0, 0, 1], [0, 0, 1], [1, 0, 0]]
+
+
+def test_comments(tmp_path):
+    comments = ["made by hand", "café"]
+    assert "# made by hand\n# café\nv 0" in write(tmp_path / "a.obj", comments=comments).read_text("utf-8")
+    assert _chunks(write(tmp_path / "a.glb", comments=comments))[0]["asset"]["extras"]["comments"] == comments
+
+
+@pytest.mark.parametrize("suffix", WRITE_SUFFIXES)
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"normals": NORMALS[:2]}, r"normals must have one row per point of points \(4\), got 2"),
+        ({"colors": COLORS[:, :2]}, r"colors must have shape \(4, 3\)"),
+        ({"colors": COLORS + 0.5}, "colors must be integers from 0 to 255"),
+        ({"binary": 1}, "binary must be True or False, got 1"),
+        ({"comments": "one"}, "comments must be a sequence of strings"),
+    ],
+)
+def test_illegal_arguments_write_nothing(tmp_path, suffix, arguments, message):
+    if suffix == ".stl" and "comments" in arguments:
+        pytest.skip("STL files have no comments")
+    with pytest.raises((ValueError, TypeError), match=message):
+        write(tmp_path / f"a{suffix}", **arguments)
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".stl"])
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
+def test_vertices_that_do_not_fit(tmp_path, suffix, value):
+    vertices = TETRAHEDRON.copy()
+    vertices[2, 1] = value
+    with pytest.raises(ValueError, match="vertices must be finite, and fit float32"):
+        write(tmp_path / f"a{suffix}", vertices)
+    assert not list(tmp_path.iterdir())
+
+
+def _doubled_normals():
+    a, b, c = (TETRAHEDRON[TRIANGLES[:, i]] for i in range(3))
+    return np.cross(b - a, c - a)
+
+
+def _chunks(path):
+    """Return the JSON document and the binary chunk of a GLB file."""
+    data = path.read_bytes()
+    assert struct.unpack_from("<4sII", data) == (b"glTF", 2, len(data))
+    (size,) = struct.unpack_from("<I", data, 12)
+    return json.loads(data[20 : 20 + size]), data[28 + size :]
+
+
+def _primitives(document):
+    return [primitive for mesh in document["meshes"] for primitive in mesh["primitives"]]
