@@ -33,7 +33,7 @@ from nacre._internal.point_exchange import ExchangeablePoints
 from nacre.camera import Camera, camera_of
 from nacre.depth_calibration import DepthCalibration
 from nacre.frame_report import FrameReport, FrameReports, report_from
-from nacre.meshing import on_surface
+from nacre.meshing.surface_points import on_surface
 from nacre.noise import NoiseModel
 from nacre.parameters import (
     ModelParameters,

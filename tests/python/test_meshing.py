@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 import nacre
 from nacre.cli import main
-from nacre.meshing import mesh_points, on_surface, triangulate
+from nacre.meshing import close_surface, largest_part, mesh_points, on_surface, simplify, triangulate
 
 
 def sphere(n: int, radius: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
@@ -187,7 +188,110 @@ class TestOnSurface:
             on_surface(points, normals, np.ones(49))
 
 
+class TestCloseSurface:
+    def test_a_sphere_without_its_cap_is_closed_and_the_cap_is_a_guess(self) -> None:
+        points, normals = sphere(4000)
+        low = points[:, 2] < 0.08
+        surface = close_surface(points[low] + [100, 0, 0], normals[low])
+        mesh = nacre.Mesh(surface.vertices, surface.triangles)
+        assert (edges(mesh) == 2).all()
+        away = surface.vertices - [100, 0, 0]
+        radius = np.linalg.norm(away, axis=1)
+        lower = away[:, 2] < 0.07
+        assert np.abs(radius[lower] - 0.1).max() < 0.001  # a quarter of the distance between points
+        assert surface.is_seen[lower].all()
+        assert not surface.is_seen[np.hypot(away[:, 0], away[:, 1]) + (away[:, 2] < 0) < 0.03].any()
+        outward = np.einsum("ij,ij->i", surface.normals, away / radius[:, None])
+        assert outward[lower].min() > 0.95
+
+    def test_misuse(self) -> None:
+        points, normals = sphere(50)
+        with pytest.raises(ValueError, match="points must be 10 or more for a surface, got 9"):
+            close_surface(points[:9], normals[:9])
+        with pytest.raises(ValueError, match="most of them are in one place"):
+            close_surface(np.zeros((50, 3)), normals)
+
+    def test_without_the_library(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "gpytoolbox", None)
+        with pytest.raises(ImportError, match=r'pip install "nacre\[closed\]"'):
+            close_surface(*sphere(50))
+
+
+class TestSimplify:
+    def test_a_round_thing_stays_round(self) -> None:
+        points, normals = sphere(6000)
+        far = points.astype(np.float64) + np.array([1e6, 0, 0])
+        vertices, triangles = simplify(far, triangulate(points, normals), 1000)
+        assert len(triangles) == 1000
+        assert vertices.dtype == np.float64
+        assert (edges(nacre.Mesh(vertices, triangles)) == 2).all()
+        radius = np.linalg.norm(vertices - [1e6, 0, 0], axis=1)
+        assert np.abs(radius - 0.1).max() < 0.0005  # of edges of 16 mm, whose middle is 0.3 mm deep
+
+    def test_few_triangles_stay_as_they_are(self) -> None:
+        points, normals = sphere(100)
+        triangles = triangulate(points, normals)
+        vertices, left = simplify(points, triangles, 1000)
+        assert np.array_equal(left, triangles)
+        assert np.array_equal(vertices, points)
+
+    def test_misuse(self) -> None:
+        with pytest.raises(ValueError, match="num_triangles must be an integer of at least 1, got 0"):
+            simplify(np.eye(3), [[0, 1, 2]], 0)
+
+    def test_without_the_library(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setitem(sys.modules, "fast_simplification", None)
+        with pytest.raises(ImportError, match=r'pip install "nacre\[simplify\]"'):
+            simplify(np.eye(3), [[0, 1, 2], [2, 1, 0]], 1)
+
+
+class TestLargestPart:
+    def test_it_has_the_most_triangles(self) -> None:
+        triangles = [[0, 1, 2], [3, 4, 5], [5, 6, 7], [8, 9, 0]]
+        assert largest_part(triangles).tolist() == [[0, 1, 2], [8, 9, 0]]
+        assert largest_part([*triangles, [7, 10, 11]]).tolist() == [[3, 4, 5], [5, 6, 7], [7, 10, 11]]
+        assert len(largest_part(np.zeros((0, 3), int))) == 0
+
+    def test_misuse(self) -> None:
+        with pytest.raises(ValueError, match="triangles must"):
+            largest_part([[0, 1, -1]])
+
+
 class TestCommand:
+    def test_parts_fewer_triangles_and_closed(
+        self, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        points, normals = sphere(2000)
+        low = points[:, 2] < 0.06
+        both = np.concatenate([points[low], 0.2 * points[:200] + [0.5, 0, 0]])
+        colors = np.tile(np.array([200, 10, 10], np.uint8), (len(both), 1))
+        facing = np.concatenate([normals[low], normals[:200]])
+        nacre.write_points(tmp_path / "model.ply", both, normals=facing, colors=colors)
+
+        def made(*options: str) -> tuple[nacre.Mesh, nacre.io.cloud.Cloud]:
+            with pytest.raises(SystemExit) as end:
+                main(["mesh", str(tmp_path), *options])
+            assert not end.value.code
+            return nacre.read_mesh(tmp_path / "mesh.ply"), nacre.read_points(tmp_path / "mesh.ply")
+
+        whole, _ = made()
+        largest, corners = made("--keep", "largest")
+        assert np.array_equal(corners.points, points[low])
+        assert 350 < len(whole.triangles) - len(largest.triangles) < 400
+        few, corners = made("--keep", "largest", "--simplify", "500")
+        assert 490 < len(few.triangles) <= 500
+        assert np.array_equal(corners.colors, colors[: len(corners)])
+        capsys.readouterr()
+        closed, corners = made("--keep", "largest", "--closed")
+        assert (edges(closed) == 2).all()
+        seen = corners.attributes["seen"] == 1
+        assert 0.9 < seen.mean() < 0.99  # its triangles are larger where there are no points
+        assert (
+            f"seen       {seen.mean():.1%} of the corners; the others are a guess" in capsys.readouterr().out
+        )
+        assert (corners.colors[seen] == [200, 10, 10]).all()
+        assert (corners.colors[~seen] == 128).all()
+
     def test_it_writes_the_mesh(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
         points, normals = sphere(2000)
         colors = np.arange(6000).reshape(-1, 3) % 256

@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+import dataclasses
+import enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_file, written_file
+
+if TYPE_CHECKING:
+    from nacre.io.cloud import Cloud
+    from nacre.io.mesh_arrays import MeshArrays
+
+_UNSEEN = 128  # grey
+
+
+class Keep(str, enum.Enum):
+    """Which parts of a mesh."""
+
+    all = "all"
+    largest = "largest"
 
 
 def mesh(
@@ -29,6 +44,20 @@ def mesh(
             show_default="OUT/mesh.ply",
         ),
     ] = None,
+    closed: Annotated[
+        bool,
+        typer.Option(
+            "--closed",
+            help="Close the surface (screened Poisson); what was never seen is grey, and a guess.",
+        ),
+    ] = False,
+    keep: Annotated[Keep, typer.Option(help="Which of the parts that nothing joins.")] = Keep.all,
+    num_triangles: Annotated[
+        int | None,
+        typer.Option(
+            "--simplify", min=1, metavar="N", help="Leave N triangles, where they matter.", show_default=False
+        ),
+    ] = None,
     json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
@@ -41,7 +70,7 @@ def mesh(
     terminal = Terminal(json, quiet, verbose)
     from nacre import read_points, write_mesh
     from nacre.io.meshes import require_mesh_suffix
-    from nacre.meshing import triangulate, used_rows
+    from nacre.meshing import largest_part
 
     path = written_file(source, "model.ply") if source.is_dir() else source
     target = writable_file(out or path.with_name("mesh.ply"))
@@ -49,12 +78,85 @@ def mesh(
     cloud = read_points(path)
     if cloud.normals is None:
         raise CommandError(f"{path} has no normals: give a model of nacre reconstruct")
-    triangles = triangulate(cloud.points, cloud.normals)
-    if not len(triangles):
+    mesh = _closed(cloud) if closed else _open(cloud)
+    if not len(mesh.triangles):
         raise CommandError(f"{path} has too few points for a surface, or normals that contradict it")
-    rows, corners = used_rows(triangles)
-    colors = None if cloud.colors is None else cloud.colors[rows]
-    write_mesh(target, cloud.points[rows], corners, normals=cloud.normals[rows], colors=colors)
-    figures = {"mesh": str(target), "vertices": len(rows), "triangles": len(corners)}
+    if keep is Keep.largest:
+        mesh = _used(dataclasses.replace(mesh, triangles=largest_part(mesh.triangles)))
+    if num_triangles is not None:
+        mesh = _simplified(mesh, num_triangles)
+    write_mesh(
+        target,
+        mesh.vertices,
+        mesh.triangles,
+        normals=mesh.normals,
+        colors=mesh.colors,
+        attributes=mesh.attributes,
+    )
+    figures = {"mesh": str(target), "vertices": len(mesh.vertices), "triangles": len(mesh.triangles)}
+    if "seen" in mesh.attributes:
+        figures["seen"] = float(mesh.attributes["seen"].mean())
     if not quiet:
-        terminal.answer(figures, [(name, str(value)) for name, value in figures.items()])
+        terminal.answer(figures, [(name, _words(name, value)) for name, value in figures.items()])
+
+
+def _words(name: str, value: Any) -> str:
+    return f"{value:.1%} of the corners; the others are a guess" if name == "seen" else str(value)
+
+
+def _open(cloud: Cloud) -> MeshArrays:
+    """Join the points."""
+    from nacre.io.mesh_arrays import MeshArrays
+    from nacre.meshing import triangulate
+
+    assert cloud.normals is not None
+    return _used(
+        MeshArrays(cloud.points, triangulate(cloud.points, cloud.normals), cloud.normals, cloud.colors)
+    )
+
+
+def _closed(cloud: Cloud) -> MeshArrays:
+    """Lay a closed surface through the points; what was never seen is grey."""
+    import numpy as np
+
+    from nacre import KdTree
+    from nacre.io.mesh_arrays import MeshArrays
+    from nacre.meshing import close_surface
+
+    assert cloud.normals is not None
+    found = close_surface(cloud.points, cloud.normals)
+    colors = None
+    if cloud.colors is not None:
+        nearest = KdTree(cloud.points).query(found.vertices, 1)[1]
+        colors = np.where(found.is_seen[:, None], cloud.colors[nearest], np.uint8(_UNSEEN))
+    seen = {"seen": found.is_seen.astype(np.uint8)}
+    return MeshArrays(found.vertices, found.triangles, found.normals, colors, seen)
+
+
+def _used(mesh: MeshArrays) -> MeshArrays:
+    """Leave out the vertices of no triangle."""
+    from nacre.meshing import used_rows
+
+    rows, triangles = used_rows(mesh.triangles)
+    return _rows_of(mesh, rows, mesh.vertices[rows], triangles)
+
+
+def _simplified(mesh: MeshArrays, num_triangles: int) -> MeshArrays:
+    """Leave so many triangles; a corner has what its nearest one had."""
+    from nacre import KdTree
+    from nacre.meshing import simplify
+
+    vertices, triangles = simplify(mesh.vertices, mesh.triangles, num_triangles)
+    return _rows_of(mesh, KdTree(mesh.vertices).query(vertices, 1)[1], vertices, triangles)
+
+
+def _rows_of(mesh: MeshArrays, rows: Any, vertices: Any, triangles: Any) -> MeshArrays:
+    """Return a mesh whose vertices have what some of another's have."""
+    return dataclasses.replace(
+        mesh,
+        vertices=vertices,
+        triangles=triangles,
+        normals=None if mesh.normals is None else mesh.normals[rows],
+        colors=None if mesh.colors is None else mesh.colors[rows],
+        attributes={name: values[rows] for name, values in mesh.attributes.items()},
+    )

@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 from array import array
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre._internal import arrays
 from nacre.errors import FileFormatError
+from nacre.io.cloud import Columns
 
 
 @dataclass(frozen=True)
@@ -29,12 +30,15 @@ class MeshArrays:
         Of the vertices.
     colors : (N, 3) uint8, or None
         Red, green, blue of the vertices.
+    attributes : dict of str to (N,) or (N, K) array
+        More of the vertices; not read.
     """
 
     vertices: arrays.FloatArray
     triangles: npt.NDArray[np.int32]
     normals: arrays.FloatArray | None = None
     colors: npt.NDArray[np.uint8] | None = None
+    attributes: Columns = field(default_factory=dict)
 
 
 def fan(

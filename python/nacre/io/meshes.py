@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -75,6 +75,7 @@ def write_mesh(
     *,
     normals: npt.ArrayLike | None = None,
     colors: npt.ArrayLike | None = None,
+    attributes: Mapping[str, npt.ArrayLike] | None = None,
     comments: Sequence[str] = (),
     binary: bool = True,
 ) -> None:
@@ -97,6 +98,8 @@ def write_mesh(
         Of the vertices; stored by the same rule. Of any length, but in GLB files of unit length.
     colors : (N, 3) array of integers from 0 to 255, or of floats from 0 to 1, optional
         Red, green, blue of the vertices.
+    attributes : mapping of str to (N,) or (N, K) array, optional
+        More of the vertices; PLY alone has a place for them.
     comments : sequence of str
         Lines for the header; STL has none.
     binary : bool
@@ -121,8 +124,8 @@ def write_mesh(
         raise TypeError("triangles must be an array of indices, got None")
     points = arrays.as_points("vertices", vertices)
     corners = arrays.as_triangles("triangles", triangles, len(points))
-    checked = check_cloud(points, normals, colors, None)
-    mesh = MeshArrays(checked.points, corners, checked.normals, checked.colors)
+    checked = check_cloud(points, normals, colors, attributes)
+    mesh = MeshArrays(checked.points, corners, checked.normals, checked.colors, checked.attributes)
     _WRITERS[Path(path).suffix.lower()].write_mesh(path, mesh, comments=comments, binary=binary)
 
 

@@ -198,7 +198,7 @@ def write_mesh(
     path: str | os.PathLike[str], mesh: MeshArrays, *, comments: Sequence[str] = (), binary: bool = True
 ) -> None:
     """Write vertices and faces as a PLY file; :func:`nacre.write_mesh` has the parameters."""
-    columns = _vertex_columns(Cloud(mesh.vertices, mesh.normals, mesh.colors))
+    columns = _vertex_columns(Cloud(mesh.vertices, mesh.normals, mesh.colors, mesh.attributes))
     tables: dict[str, Columns] = {"vertex": columns, "face": {"vertex_indices": mesh.triangles}}
     write_ply(path, tables, comments=comments, binary=binary)
 

@@ -70,7 +70,7 @@ def test_default_radius_follows_the_spacing(cloud, tmp_path):
 
 
 def test_wrong_usage(cloud, tmp_path):
-    fails(2, "consolidate", cloud, tmp_path / "o.txt")
+    fails(2, "consolidate", cloud, tmp_path / "o.obj")
     fails(2, "consolidate", cloud, tmp_path / "no" / "o.ply")
     fails(2, "consolidate", tmp_path / "no.ply", tmp_path / "o.ply")
     fails(2, "consolidate", cloud, tmp_path / "o.ply", "--radius", "-1")
