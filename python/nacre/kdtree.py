@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -179,10 +180,12 @@ class KdTree(GuidedNames):
         if distance_upper_bound is not None:
             bound = as_length("distance_upper_bound", distance_upper_bound)
         threads = _threads(num_threads, workers)
-        distances, indices = self._core.query(array.reshape(-1, 3), k, min(gate, bound), threads)
+        exact = array if bound == math.inf else array.astype(np.float64)
+        distances, indices = self._core.query(exact.reshape(-1, 3), k, min(gate, bound), threads)
         if bound < math.inf:
             is_beyond = distances >= bound
             distances[is_beyond], indices[is_beyond] = math.inf, len(self)
+            distances = distances.astype(array.dtype, copy=False)
         shape = array.shape[:-1] if k == 1 else (*array.shape[:-1], k)
         return distances.reshape(shape)[()], indices.reshape(shape)[()]
 
@@ -264,15 +267,19 @@ class KdTree(GuidedNames):
             raise ValueError(f"r must be at least 0, got {radii[~(radii >= 0)][0]}")
         is_sorted = return_sorted is None or as_flag("return_sorted", return_sorted)
         wants_length = as_flag("return_length", return_length)
-        found = self.query_radius(
-            array.reshape(-1, 3), radii.max(initial=0.0), num_threads=_threads(0, workers)
-        )
-        rows = np.empty(len(radii), object)
-        for query, (radius, (distances, indices)) in enumerate(zip(radii, found, strict=True)):
-            near = indices[distances <= radius]
-            rows[query] = (np.sort(near) if is_sorted else near).tolist()
+        queries = array.reshape(-1, 3).astype(np.float64)
+        found = self.query_radius(queries, radii.max(initial=0.0), num_threads=_threads(0, workers))
+        is_near = found.distances <= np.repeat(radii, found.counts)
+        owners = np.repeat(np.arange(len(radii)), found.counts)[is_near]
+        counts = np.bincount(owners, minlength=len(radii))
         if wants_length:
-            return np.array([len(row) for row in rows], np.int64).reshape(shape)[()]
+            return counts.reshape(shape)[()]
+        indices = found.indices[is_near]
+        near = (indices[np.lexsort((indices, owners))] if is_sorted else indices).tolist()
+        ends = np.cumsum(counts).tolist()
+        rows = np.empty(len(radii), object)
+        for query, (begin, end) in enumerate(itertools.pairwise([0, *ends])):
+            rows[query] = near[begin:end]
         return rows.reshape(shape)[()]
 
 

@@ -285,3 +285,12 @@ def test_a_ball_has_the_nearest_first_where_it_is_not_sorted():
     tree = nacre.KdTree([[3.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [np.nan, 0, 0]])
     assert tree.query_ball_point([0, 0, 0], 9, return_sorted=False) == [1, 2, 0]
     assert tree.query_ball_point([np.nan, 0, 0], 9) == []
+
+
+def test_bounds_are_compared_in_double_precision():
+    tree, query = nacre.KdTree([[0.1, 0.0, 0.0]]), np.zeros(3, np.float32)
+    assert tree.query(query, distance_upper_bound=0.1)[1] == 1
+    distance, index = tree.query(query, distance_upper_bound=np.nextafter(0.1, 1.0))
+    assert (distance.dtype, index) == (np.float32, 0)
+    assert tree.query_ball_point(query, 0.1) == [0]
+    assert tree.query_ball_point(query, np.nextafter(0.1, 0.0)) == []

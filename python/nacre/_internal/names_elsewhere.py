@@ -11,6 +11,7 @@ _VOXELS = "it is nacre.voxel_downsample(points, voxel_size)"
 _MODULES = "functions on points and images are in nacre itself: nacre.align, nacre.KdTree, nacre.read_points"
 _BACK_PROJECT = "it is nacre.back_project(depth, camera, depth_scale=...)"
 _MOVE = "it is an array of rows: points @ pose[:3, :3].T + pose[:3, 3]"
+_VIEW = "nacre reconstruct --view and nacre view show runs in the browser; notebooks show models and clouds"
 _POSE = "it is target_from_source"
 
 OF_PACKAGE = {
@@ -22,8 +23,10 @@ OF_PACKAGE = {
     "pipelines": _ALIGN,
     "t": _MODULES,
     "ml": _MODULES,
-    "visualization": "it is nacre.viewer, or nacre view on the command line",
-    "draw_geometries": "it is nacre.viewer.Viewer, or nacre view on the command line",
+    "visualization": _VIEW,
+    "draw_geometries": _VIEW,
+    "show": _VIEW,
+    "view": _VIEW,
     "icp": _ALIGN,
     "ICP": _ALIGN,
     "gicp": _ALIGN,
@@ -113,6 +116,9 @@ OF_CLASS = {
         "crop": "it is cloud[mask], with a mask of its points",
         "select_by_index": "it is cloud[indices]",
         "save": "it is nacre.write_points(path, cloud)",
+        "show": _VIEW,
+        "to_open3d": "open3d.geometry.PointCloud(open3d.utility.Vector3dVector(cloud.points)) makes one",
+        "to_trimesh": "trimesh.PointCloud(cloud.points, colors=cloud.colors) makes one",
     },
     "KdTree": {
         "data": "it is points",
@@ -135,6 +141,8 @@ OF_CLASS = {
         "sample_points_uniformly": "it is nacre.evaluation.sample_surface(mesh.vertices, mesh.triangles, n)",
         "save": "it is nacre.write_mesh(path, mesh)",
         "export": "it is nacre.write_mesh(path, mesh)",
+        "show": _VIEW,
+        "to_trimesh": "trimesh.Trimesh(mesh.vertices, mesh.triangles) makes one",
     },
     "Model": {
         "integrate": "it is add_frame(depth, color), which finds the pose, or takes guess=world_from_camera",
@@ -145,6 +153,7 @@ OF_CLASS = {
         "pose": "it is poses[-1]",
         "trajectory": "it is poses",
         "write": "it is nacre.write_points(path, model)",
+        "show": _VIEW,
     },
     "Reconstruction": {
         "points": "it is cloud.points, or model.points with those that are not confirmed",
@@ -160,6 +169,7 @@ OF_CLASS = {
     "Trajectory": {
         "positions": "it is poses[:, :3, 3]",
         "times": "it is timestamps",
+        "save": "it is nacre.write_trajectory(path, trajectory)",
     },
 }
 
