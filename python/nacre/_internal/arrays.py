@@ -58,6 +58,10 @@ def as_points(name: str, value: npt.ArrayLike) -> FloatArray:
     float32 and float64 arrays that are already C-contiguous are returned as they are; other real dtypes
     become float64.
     """
+    if isinstance(value, str | os.PathLike):
+        raise TypeError(
+            f"{name} must be an array of real numbers, got {value!r}; nacre.read_points(path) reads a file"
+        )
     array = as_real(name, value)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} must have shape (N, 3), got {array.shape}")

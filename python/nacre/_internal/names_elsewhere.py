@@ -11,6 +11,7 @@ _VOXELS = "it is nacre.voxel_downsample(points, voxel_size)"
 _MODULES = "functions on points and images are in nacre itself: nacre.align, nacre.KdTree, nacre.read_points"
 _BACK_PROJECT = "it is nacre.back_project(depth, camera, depth_scale=...)"
 _MOVE = "it is an array of rows: points @ pose[:3, :3].T + pose[:3, 3]"
+_MESH_NORMALS = "mesh.closest(points).normals has those of its triangles"
 _VIEW = "nacre reconstruct --view and nacre view show runs in the browser; notebooks show models and clouds"
 _POSE = "it is target_from_source"
 
@@ -65,7 +66,7 @@ OF_PACKAGE = {
     "create_from_depth_image": _BACK_PROJECT,
     "create_from_rgbd_image": _BACK_PROJECT,
     "depthTo3d": _BACK_PROJECT,
-    "poisson": "it is nacre.meshing.mesh_points(points, normals)",
+    "poisson": "it is nacre.meshing.close_surface(points, normals)",
     "ball_pivoting": "it is nacre.meshing.mesh_points(points, normals)",
     "wlop_simplify_and_regularize_point_set": "it is nacre.consolidate(points, method='cgal')",
 }
@@ -137,7 +138,10 @@ OF_CLASS = {
     "Mesh": {
         "faces": "it is triangles",
         "area": "sum the cross products of its edges: numpy.cross",
-        "compute_vertex_normals": "mesh.closest(points).normals has those of its triangles",
+        "simplify_quadric_decimation": "it is nacre.meshing.simplify",
+        "compute_vertex_normals": _MESH_NORMALS,
+        "normals": _MESH_NORMALS,
+        "vertex_normals": _MESH_NORMALS,
         "sample_points_uniformly": "it is nacre.evaluation.sample_surface(mesh.vertices, mesh.triangles, n)",
         "save": "it is nacre.write_mesh(path, mesh)",
         "export": "it is nacre.write_mesh(path, mesh)",

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from nacre import Camera
 from nacre._internal import arrays
+from nacre._internal.guided import guided
 from nacre._internal.value_equality import Value
 from nacre.datasets.listing import files, pair
 from nacre.datasets.sanity_check import depth_oddity
@@ -135,6 +136,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         A trajectory that came along but is somebody's estimate.
     """
 
+    @guided("nacre.open_sequence(path) opens a recording")
     def __init__(
         self,
         path: Path,

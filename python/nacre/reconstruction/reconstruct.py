@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -98,7 +98,7 @@ def _opened(
     if isinstance(source, str | os.PathLike):
         recording = open_sequence(source, format=format, camera=camera, depth_scale=depth_scale)
         return recording, recording.camera, range(len(recording))
-    if not isinstance(source, Iterable):
+    if not isinstance(source, Iterable) or isinstance(source, Mapping):
         raise TypeError(f"source must be a path or a sequence of frames, got {type(source).__name__}")
     if isinstance(source, Recording):
         _refuse("this one is open", format=format, camera=camera, depth_scale=depth_scale)
