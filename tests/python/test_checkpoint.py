@@ -14,6 +14,8 @@ from hostile_files.seals import sealed_model
 from test_determinism import digest
 
 import nacre
+from nacre._internal.checkpoint import POINTS_AND_MESHES
+from nacre.io import meshes, points
 
 Frames = list[dict[str, Any]]
 MESH = nacre.built_in_object()
@@ -97,6 +99,10 @@ def bits(model: nacre.Model) -> str:
 def through_a_file(model: nacre.Model, folder: Path) -> nacre.Model:
     model.save(folder / "model.ckpt")
     return nacre.Model.load(folder / "model.ckpt")
+
+
+def test_every_format_of_points_and_meshes_is_known_to_checkpoints() -> None:
+    assert {*points.SUFFIXES, *meshes.READ_SUFFIXES, *meshes.WRITE_SUFFIXES} == POINTS_AND_MESHES
 
 
 @pytest.mark.parametrize("name", ["model.ply", "MODEL.PCD", "model.obj", "model.glb"])

@@ -14,6 +14,11 @@ from nacre._internal.arrays import as_scale
 from nacre._internal.guided import GuidedNames
 from nacre.errors import FileFormatError
 
+POINTS_AND_MESHES = frozenset([
+    ".ply", ".pcd", ".las", ".laz", ".e57", ".xyz", ".npz", ".glb", ".obj", ".off", ".stl",
+])  # fmt: skip
+"""What their files end in: not asked of ``nacre.io``, as the handler of a signal may save amid an import."""
+
 
 class Checkpointed(GuidedNames, ABC):
     """What can be written to a file between any two frames, and goes on from there to the same bits."""
@@ -39,11 +44,8 @@ class Checkpointed(GuidedNames, ABC):
         OSError
             The file cannot be written; what was there before is left as it was.
         """
-        from nacre.io.meshes import WRITE_SUFFIXES
-        from nacre.io.points import SUFFIXES
-
         ending = Path(path).suffix.lower()
-        if ending in {*SUFFIXES, *WRITE_SUFFIXES}:
+        if ending in POINTS_AND_MESHES:
             raise ValueError(
                 f"path must not end in {ending}, got {os.fspath(path)!r}: what is saved is to go on from; "
                 "nacre.write_points(path, model) and nacre.write_mesh(path, model.to_mesh()) write the model"
