@@ -81,7 +81,7 @@ class Browser:
             value = self.evaluate(script)
             if value:
                 return value
-            time.sleep(0.2)
+            time.sleep(0.02)
         raise AssertionError(f"never true: {script}; the page says: {self.text()}")
 
     def text(self) -> str:
@@ -92,6 +92,35 @@ class Browser:
         """Press a key on what has the focus."""
         for kind in ("rawKeyDown", "keyUp"):
             self.send("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code)
+
+    def click(self, x: float, y: float) -> None:
+        """Click with the left button at a place of the page."""
+        for kind in ("mousePressed", "mouseReleased"):
+            self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+
+    def drag(self, *places: tuple[float, float]) -> None:
+        """Move from place to place with the left button held."""
+        events = [
+            ("mousePressed", places[0]), *(("mouseMoved", place) for place in places[1:]),
+            ("mouseReleased", places[-1]),
+        ]  # fmt: skip
+        for kind, (x, y) in events:
+            self.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
+
+    def choose(self, control: str, value: object) -> None:
+        """Give the control of an id a value, as a hand does."""
+        self.evaluate(
+            f"{{ const c = document.getElementById({json.dumps(control)}); c.value = {json.dumps(value)};"
+            "c.dispatchEvent(new Event('input')); c.dispatchEvent(new Event('change')); }"
+        )
+
+    def press_button(self, control: str) -> None:
+        """Click on the control of an id."""
+        self.evaluate(f"document.getElementById({json.dumps(control)}).click()")
+
+    def download_to(self, folder: Path) -> None:
+        """Save what the page offers in a folder."""
+        self.send("Page.setDownloadBehavior", behavior="allow", downloadPath=str(folder))
 
     def screenshot(self) -> bytes:
         """Return the page as PNG."""

@@ -57,6 +57,16 @@ def write_rerun(path: Path) -> None:
     export_rrd(timeline(), path)
 
 
+def write_page(path: Path) -> None:
+    from nacre.report import ReportedFrame
+    from nacre.viewer import Snapshot, export_html
+
+    grown = timeline()
+    grown.add(ReportedFrame(0, "TRACKED", world_from_camera=np.eye(4)))
+    grown.set_snapshot(Snapshot(POINTS, np.broadcast_to(np.float32([0, 0, -1]), POINTS.shape), 0.1))
+    export_html(grown, path)
+
+
 WRITERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "PLY": ("a.ply", lambda path: nacre.write_points(path, POINTS)),
     "ASCII PLY": ("a.ply", lambda path: nacre.write_points(path, POINTS, binary=False)),
@@ -70,6 +80,7 @@ WRITERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "run": ("run.ckpt", write_run),
     "report": ("report.html", write_html),
     "rerun": ("view.rrd", write_rerun),
+    "viewer": ("view.html", write_page),
 }
 
 

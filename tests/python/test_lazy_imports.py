@@ -25,7 +25,6 @@ HEAVY = {
     "rosbags",
     "scipy",
     "trimesh",
-    "viser",
     "websockets",
 }
 

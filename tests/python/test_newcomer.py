@@ -215,7 +215,6 @@ LAZY = {
     "jinja2": ("nacre.report.render_page(nacre.report.ReportData('empty'))", 'pip install "nacre[report]"'),
     "OpenEXR": ("nacre.io.images.read_depth('a.exr')", 'pip install "nacre[exr]"'),
     "rosbags": ("nacre.open_sequence('a.bag')", 'pip install "nacre[ros]"'),
-    "viser": ("nacre.viewer.Viewer(None)", 'pip install "nacre[view]"'),
     "open3d": ("model.to_open3d()", "pip install open3d"),
     "trimesh": ("model.to_trimesh()", "pip install trimesh"),
 }

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from nacre.cli.terminal import Quiet, Terminal, Verbose, table, written_file
+from nacre.cli.terminal import CommandError, Quiet, Terminal, Verbose, table, written_file
 
 PortOption = Annotated[
     int, typer.Option(min=0, max=65535, metavar="PORT", help="Where the viewer listens; the next free one.")
@@ -16,8 +16,13 @@ PortOption = Annotated[
 
 def view(
     folder: Annotated[
-        Path, typer.Argument(metavar="OUT", help="What nacre reconstruct wrote.", show_default=False)
+        Path,
+        typer.Argument(metavar="OUT", help="What nacre reconstruct wrote, or points.", show_default=False),
     ],
+    compare: Annotated[
+        Path | None,
+        typer.Option(metavar="OTHER", help="Another run of the same scene, or points.", show_default=False),
+    ] = None,
     html: Annotated[
         Path | None,
         typer.Option(
@@ -35,24 +40,32 @@ def view(
     """
     Look at a reconstruction in the browser.
 
-    The page shows the model, coloured by shading, normal, confidence or age, the camera's path, and for
-    each frame its depth image with removed pixels marked, and its figures. It needs the extra "view",
-    and --rrd the extra "rerun".
+    The page shows the model as points or as a mesh, coloured as seen or by shading, normal, confidence or
+    age, measures distances, crops and saves points, hides those of low confidence, and plays how the model
+    grew; with --compare also how far two runs are apart. --rrd needs the extra "rerun".
     """
     terminal = Terminal(False, quiet, verbose)
     from nacre.viewer import Viewer, export_html, export_rrd, read_timeline
 
-    written_file(folder, "report.json")
-    timeline = read_timeline(folder)
+    if rrd is not None and compare is not None:
+        raise CommandError("--rrd writes one run: leave out --compare", 2)
+    sources = [folder] if compare is None else [folder, compare]
+    for source in sources:
+        if not source.is_file():
+            written_file(source, "report.json")
+    timeline, *others = map(read_timeline, sources)
+    other = others[0] if others else None
+    if other is not None:
+        timeline.title, other.title = (source.name for source in sources)
     if html is not None:
-        export_html(timeline, html)
+        export_html(timeline, html, other=other)
         terminal.say(table([("page", str(html))]))
     if rrd is not None:
         export_rrd(timeline, rrd)
         terminal.say(table([("Rerun", str(rrd))]))
     if html is not None or rrd is not None:
         return
-    viewer = Viewer(timeline, port=port)
+    viewer = Viewer(timeline, other=other, port=port)
     terminal.say(f"the model is at {viewer.url}; Ctrl-C ends it")
     viewer.wait()
     viewer.close()

@@ -1,18 +1,18 @@
 """
-The model in the browser while it grows, and afterwards; needs ``pip install "nacre[view]"`` (viser).
+The model in the browser while it grows, and afterwards; in a page of its own or from a server.
 
 :class:`Viewer` is the page; :class:`Timeline` what it shows: the frames, and the model after some of them.
 """
 
 from nacre.viewer.live import LiveView
-from nacre.viewer.page import Viewer, export_html
+from nacre.viewer.page import export_html
 from nacre.viewer.rerun_file import export_rrd
 from nacre.viewer.saved_timeline import read_timeline
+from nacre.viewer.server import Viewer
 from nacre.viewer.timeline import Snapshot, Timeline
 
 __all__ = [
     "LiveView",
-    "ReportedFrame",
     "Snapshot",
     "Timeline",
     "Viewer",

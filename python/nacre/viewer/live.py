@@ -7,7 +7,7 @@ import time
 from nacre.reconstruction import Reconstruction
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.report.reported_frame import ReportedFrame
-from nacre.viewer.page import Viewer
+from nacre.viewer.server import Viewer
 from nacre.viewer.timeline import Snapshot, Timeline
 
 _SHARE = 5.0

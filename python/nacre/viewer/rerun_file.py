@@ -11,7 +11,7 @@ import numpy as np
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_path
 from nacre.report.reported_frame import ReportedFrame
-from nacre.viewer.colors import STATUS_COLORS, color_kinds, point_colors
+from nacre.viewer.colors import STATUS_COLORS, point_colors
 from nacre.viewer.timeline import Timeline, words
 
 _MISSING = 'files for Rerun need rerun-sdk: pip install "nacre[rerun]"'
@@ -56,8 +56,7 @@ def _write(rr: Any, path: Path, timeline: Timeline) -> None:
     for place, cloud in timeline.snapshots:
         if len(timeline.snapshots) > 1:
             recording.set_time("frame", sequence=timeline.frames[place].index)
-        colors = point_colors(cloud, color_kinds(cloud)[0])
-        points = rr.Points3D(cloud.points, colors=colors, radii=0.6 * cloud.spacing)
+        points = rr.Points3D(cloud.points, colors=point_colors(cloud), radii=0.6 * cloud.spacing)
         recording.log("world/model", points, static=len(timeline.snapshots) == 1)
     step = -(-len(timeline.frames) // _MOST_DEPTH_IMAGES)
     for place, frame in enumerate(timeline.frames):

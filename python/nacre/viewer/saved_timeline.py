@@ -1,4 +1,4 @@
-"""The timeline of what ``nacre reconstruct`` wrote."""
+"""The timeline of what ``nacre reconstruct`` wrote, or of the points of a file."""
 
 from __future__ import annotations
 
@@ -7,54 +7,82 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
+from nacre import KdTree, estimate_normals
 from nacre.errors import FileFormatError
+from nacre.io.cloud import Cloud
 from nacre.io.points import read_points
 from nacre.report.saved_run import SavedRun
-from nacre.viewer.timeline import Snapshot, Timeline
+from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline
 
 
-def read_timeline(folder: str | os.PathLike[str]) -> Timeline:
+def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     """
-    Read what a reconstruction wrote.
+    Read what a reconstruction wrote, or the points of a file.
 
     Depth images are shown where the recording is still in its place.
 
     Parameters
     ----------
-    folder : path-like
-        ``OUT``; it holds ``model.ply`` and ``report.json``.
+    path : path-like
+        ``OUT``, which holds ``model.ply`` and ``report.json``; or a point file. Where it has no normals, they
+        are estimated; y is up unless a comment says that it is nacre's.
 
     Raises
     ------
     FileFormatError, OSError
         When a file is damaged or missing.
     """
-    out = SavedRun(Path(folder))
-    timeline = Timeline(
-        out.report.get("title") or Path(folder).name, out.camera, depth_of=_recorded_depth(out)
-    )
+    path = Path(path)
+    if path.is_file():
+        file = read_points(path)
+        is_upright = not any(CAMERA_FRAME in comment for comment in file.comments)
+        timeline = Timeline(path.name, None, is_upright=is_upright)
+        timeline.set_snapshot(_cloud(file, None))
+        return timeline
+    out = SavedRun(path)
+    timeline = Timeline(out.report.get("title") or path.name, out.camera, depth_of=_recorded_depth(out))
     placed = out.truth_from_world
     world_from_truth = None if placed is None else np.asarray(np.linalg.inv(placed), np.float64)
     for frame in out.frames:
         if frame.truth is not None:
             frame.figures["truth"] = None if world_from_truth is None else world_from_truth @ frame.truth
         timeline.add(frame)
-    model = read_points(Path(folder) / "model.ply")
-    normals = model.normals
-    if normals is None:
-        raise FileFormatError(Path(folder) / "model.ply", "a model of nacre reconstruct has normals")
-    attributes = model.attributes
-    cloud = Snapshot(
-        np.asarray(model.points, np.float32),
-        np.asarray(normals, np.float32),
-        float(out.report.get("spacing") or 0.0) or 0.001,
-        model.colors,
-        attributes.get("confidence"),
-        attributes.get("last_seen"),
-    )
-    timeline.set_snapshot(cloud)
+    timeline.set_snapshot(_cloud(read_points(path / "model.ply"), out.report.get("spacing")))
     return timeline
+
+
+def _cloud(file: Cloud, spacing: float | None) -> Snapshot:
+    """Return the points of a file that are finite."""
+    kept = np.flatnonzero(np.isfinite(file.points).all(axis=1))
+    points = np.asarray(file.points[kept], np.float32)
+    normals = _estimated_normals(points) if file.normals is None else file.normals[kept]
+    known = np.isfinite(normals).all(axis=1, keepdims=True)
+    columns = (file.colors, file.attributes.get("confidence"), file.attributes.get("last_seen"))
+    return Snapshot(
+        points,
+        np.where(known, normals, (0, 0, -1)).astype(np.float32),
+        max(float(spacing or _usual_spacing(points)), 1e-6),
+        *(None if column is None else column[kept] for column in columns),
+    )
+
+
+def _estimated_normals(points: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Return normals that point to who looks along -z from afar, as at files of other programs."""
+    if not len(points):
+        return np.zeros((0, 3), np.float32)
+    afar = np.array([0, 0, 1000 * np.abs(points).max()])
+    return np.asarray(estimate_normals(points, viewpoint=afar), np.float32)
+
+
+def _usual_spacing(points: npt.NDArray[np.float32]) -> float:
+    """Return the median distance of a point to its nearest neighbor, of a sample of them."""
+    sample = points[:: max(len(points) // 10_000, 1)]
+    if len(points) < 2:
+        return 0.001
+    distances, _ = KdTree(points).query(sample, k=2)
+    return float(np.median(distances[:, 1]))
 
 
 def _recorded_depth(out: SavedRun) -> Any:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import bisect
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +14,9 @@ from nacre.errors import printable
 from nacre.model import Model
 from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import count, quantity
+
+CAMERA_FRAME = "the world is the first camera's frame"
+"""A comment of point files: x right, y down, z forward."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,17 +52,18 @@ class Snapshot:
             model.points, model.normals, model.spacing, model.colors, model.confidence, model.last_seen
         )
 
+    def rows(self, chosen: slice | npt.NDArray[np.int64], spacing: float) -> Snapshot:
+        """Return some of the points, which are so far apart."""
+        rest = (
+            None if column is None else column[chosen].copy()
+            for column in (self.colors, self.confidence, self.last_seen)
+        )
+        return Snapshot(self.points[chosen].copy(), self.normals[chosen].copy(), spacing, *rest)
+
     def thinned(self, max_points: int) -> Snapshot:
         """Return the same with every second, third, ... point, ``max_points`` at most."""
         step = max(-(-len(self.points) // max_points), 1)
-        if step == 1:
-            return self
-        rest = (
-            None if rows is None else rows[::step].copy()
-            for rows in (self.colors, self.confidence, self.last_seen)
-        )
-        points, normals = self.points[::step].copy(), self.normals[::step].copy()
-        return Snapshot(points, normals, self.spacing * step**0.5, *rest)
+        return self if step == 1 else self.rows(slice(None, None, step), self.spacing * step**0.5)
 
 
 _FIGURES: dict[str, tuple[str, Callable[[Any], str]]] = {
@@ -96,6 +99,8 @@ class Timeline:
         ``depth_of(index)`` reads the depth image of a frame again: (H, W) float32 [m].
     max_snapshots : int
         So many states of the model are kept, evenly spread over the frames.
+    is_upright : bool
+        Whether y points up and z to who looks, as in files of other programs, and not as in a camera's frame.
     max_points : int
         States but the newest keep so many points at most, so that a long run stays within memory.
 
@@ -111,6 +116,7 @@ class Timeline:
         camera: Camera | None,
         *,
         depth_of: Callable[[int], npt.NDArray[np.float32]] | None = None,
+        is_upright: bool = False,
         max_snapshots: int = 40,
         max_points: int = 100_000,
     ) -> None:
@@ -119,6 +125,7 @@ class Timeline:
         self.title = printable(title)
         self.camera = camera
         self.depth_of = depth_of
+        self.is_upright = is_upright
         self.frames: list[ReportedFrame] = []
         self._snapshots: list[tuple[int, Snapshot]] = []
         self._max_snapshots = max_snapshots
@@ -145,17 +152,7 @@ class Timeline:
         """States of the model, each with the place of the newest frame in it."""
         return list(self._snapshots)
 
-    def snapshot_at(self, place: int) -> Snapshot | None:
-        """Return the model as it was after a frame, or the last state known before; the first one else."""
-        if not self._snapshots:
-            return None
-        found = bisect.bisect_right(self._snapshots, place, key=lambda state: state[0])
-        return self._snapshots[max(found - 1, 0)][1]
-
-    def pose_at(self, place: int) -> npt.NDArray[np.float64] | None:
-        """Return the pose of a frame; for a lost one the last one known before."""
-        for frame in reversed(self.frames[: place + 1]):
-            if frame.world_from_camera is not None:
-                pose: npt.NDArray[np.float64] = frame.world_from_camera
-                return pose
-        return None
+    @property
+    def has_points(self) -> bool:
+        """Whether some state of the model has a point."""
+        return any(len(cloud.points) > 0 for _, cloud in self._snapshots)

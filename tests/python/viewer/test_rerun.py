@@ -49,6 +49,7 @@ def test_rerun_reads_what_was_written(
 ) -> None:
     pytest.importorskip("rerun")
     monkeypatch.setattr(nacre.viewer, "read_timeline", lambda folder: timeline())
+    (tmp_path / "report.json").touch()
     file = tmp_path / "view.rrd"
     assert run(["view", str(tmp_path), "--rrd", str(file)]) == 0
     assert str(file) in capsys.readouterr().out

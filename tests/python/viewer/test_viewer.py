@@ -1,10 +1,13 @@
-"""The viewer: what it tells, and that a real browser draws it and obeys its controls."""
+"""What the viewer tells of a run, while it grows and afterwards."""
 
 from __future__ import annotations
 
-import io
+import base64
+import gzip
 import json
 import math
+import re
+import shutil
 import sys
 from pathlib import Path
 
@@ -18,12 +21,9 @@ from nacre.report import ReportedFrame
 from nacre.viewer.timeline import words
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from browser import CHROMIUM, Browser
+from viewer_scenes import plane, two_looks
 
 viewer = pytest.importorskip("nacre.viewer")
-pytest.importorskip("viser")
-
-needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
 FRAMES = 6
 
 
@@ -50,7 +50,7 @@ def snapshot(n: int = 50) -> viewer.Snapshot:
     return viewer.Snapshot(points, normals, 0.1, confidence=np.arange(1.0, n + 1))
 
 
-class TestStory:
+class TestTimeline:
     def test_snapshots_stay_few_and_evenly_spread(self) -> None:
         timeline = viewer.Timeline("x", None, max_snapshots=8)
         for i in range(100):
@@ -60,8 +60,6 @@ class TestStory:
         assert len(places) <= 8
         assert places[-1] == 99
         assert places[0] == 0
-        assert timeline.snapshot_at(0) is timeline.snapshots[0][1]
-        assert timeline.snapshot_at(99) is timeline.snapshots[-1][1]
 
     def test_older_states_keep_fewer_points(self) -> None:
         timeline = viewer.Timeline("x", None, max_points=20)
@@ -74,20 +72,13 @@ class TestStory:
         assert len(thin.normals) == len(thin.confidence) == 17
         assert thin.spacing == pytest.approx(0.1 * 3**0.5)
 
-    def test_a_lost_frame_is_drawn_where_the_camera_was_last_known(self) -> None:
-        timeline = viewer.Timeline("x", None)
-        pose = np.eye(4)
-        pose[0, 3] = 2
-        timeline.add(ReportedFrame(0, "TRACKED", world_from_camera=pose))
-        timeline.add(ReportedFrame(1, "LOST"))
-        assert timeline.pose_at(1) is pose
-
     def test_too_few_snapshots_are_refused(self) -> None:
         with pytest.raises(ValueError, match="max_snapshots must be at least 2, got 1"):
             viewer.Timeline("x", None, max_snapshots=1)
 
     def test_what_was_written_is_told(self, out: Path) -> None:
         timeline = viewer.read_timeline(out)
+        assert not viewer.read_timeline(out / "model.ply").is_upright
         assert [frame.status for frame in timeline.frames].count("LOST") == 1
         assert timeline.frames[3].reason
         assert words(timeline.frames[0])["overlap"] == "100 %"
@@ -100,51 +91,15 @@ class TestStory:
         assert timeline.depth_of(2).shape == (120, 160)
 
 
-class TestColors:
-    @pytest.mark.parametrize("kind", ["colour", "shading", "normal", "confidence", "age"])
-    def test_every_point_has_one(self, kind: str) -> None:
-        from nacre.viewer.colors import point_colors
+def test_removed_pixels_are_marked() -> None:
+    from nacre.viewer.depth_picture import depth_picture
 
-        colors = point_colors(snapshot(), kind)
-        assert colors.shape == (50, 3)
-        assert colors.dtype == np.uint8
-
-    def test_confident_points_are_lighter(self) -> None:
-        from nacre.viewer.colors import point_colors
-
-        colors = point_colors(snapshot(), "confidence").astype(int).sum(axis=1)
-        assert colors[-1] > colors[0]
-
-    def test_the_ends_of_the_colours_are_told(self) -> None:
-        from nacre.viewer.page import color_bar
-
-        assert "2.0" in color_bar(snapshot(), "confidence")
-        assert "49 observations" in color_bar(snapshot(), "confidence")
-        assert "green: up" in color_bar(snapshot(), "normal")
-
-    def test_the_view_begins_at_what_is_best_known(self) -> None:
-        from nacre.viewer.scene import core, extent
-
-        far = snapshot(400)
-        near = 0.1 * far.points[:100]
-        cloud = viewer.Snapshot(
-            np.concatenate([near, far.points[100:]]),
-            far.normals,
-            0.1,
-            confidence=np.r_[np.full(100, 9.0), np.ones(300)],
-        )
-        np.testing.assert_array_equal(core(cloud), near)
-        assert extent(cloud) < 0.2 * extent(far)
-
-    def test_removed_pixels_are_marked(self) -> None:
-        from nacre.viewer.depth_picture import depth_picture
-
-        depth = np.full((60, 80), 0.5, np.float32)
-        depth[20:40, 30:50] = 0.3
-        picture = depth_picture(depth, nacre.Camera(80, 60, 70, 70, 39.5, 29.5))
-        colors = {tuple(color) for color in picture.reshape(-1, 3).tolist()}
-        assert picture.shape == (60, 80, 3)
-        assert len(colors) >= 3
+    depth = np.full((60, 80), 0.5, np.float32)
+    depth[20:40, 30:50] = 0.3
+    picture = depth_picture(depth, nacre.Camera(80, 60, 70, 70, 39.5, 29.5))
+    colors = {tuple(color) for color in picture.reshape(-1, 3).tolist()}
+    assert picture.shape == (60, 80, 3)
+    assert len(colors) >= 3
 
 
 def test_a_run_is_shown_while_it_grows(out: Path) -> None:
@@ -158,75 +113,95 @@ def test_a_run_is_shown_while_it_grows(out: Path) -> None:
         first, last = (live.timeline.snapshots[i][1] for i in (0, -1))
         assert len(first.points) < len(last.points)
         live.finish()
-        assert live.viewer.place == FRAMES - 1
+        frames = json.loads(live.viewer.data.document)["runs"][0]["frames"]
+        assert len(frames) == FRAMES
         assert len(live.timeline.snapshots) == FRAMES
     finally:
         live.viewer.close()
 
 
-def test_what_a_frame_does_not_have_is_not_left_from_another(out: Path) -> None:
-    page = viewer.Viewer(viewer.read_timeline(out), port=0)
-    try:
-        assert "/path" in page._scene._drawn
-        page._scene.show_cameras(page.timeline, 0, 0.02)  # one camera makes no path
-        assert "/path" not in page._scene._drawn
-        assert "/camera" in page._scene._drawn
-    finally:
-        page.close()
-
-
 def test_nothing_to_export_is_an_error(tmp_path: Path) -> None:
+    empty, known = viewer.Timeline("x", None), two_looks(plane())
     with pytest.raises(ValueError, match="timeline must hold a state of the model"):
-        viewer.export_html(viewer.Timeline("x", None), tmp_path / "x.html")
+        viewer.export_html(empty, tmp_path / "x.html")
+    with pytest.raises(ValueError, match="other must hold a state of the model"):
+        viewer.export_html(known, tmp_path / "x.html", other=empty)
+    with pytest.raises(ValueError, match="other must hold a state of the model"):
+        viewer.Viewer(known, other=empty, port=0)
     assert not list(tmp_path.iterdir())
 
 
-def bright_part(png: bytes) -> float:
-    """Return which part of the page's left, where the scene is, is lighter than its background."""
-    from PIL import Image
-
-    pixels = np.asarray(Image.open(io.BytesIO(png)).convert("L"), dtype=float)
-    scene = pixels[150:, : int(0.7 * pixels.shape[1])]
-    return float((scene > 80).mean())
+def run(*words: str | Path) -> int:
+    with pytest.raises(SystemExit) as end:
+        main([str(word) for word in words])
+    return int(end.value.code or 0)
 
 
-@needs_browser
-@pytest.mark.slow
-def test_a_browser_draws_the_model_and_a_control_is_obeyed(out: Path, tmp_path: Path) -> None:
-    page = viewer.Viewer(viewer.read_timeline(out), port=0)
-    try:
-        with Browser(tmp_path / "profile") as browser:
-            browser.open(page.url)
-            browser.wait_for("document.body.innerText.includes('frame 5, TRACKED')")
-            for _ in range(40):
-                picture = browser.screenshot()
-                if bright_part(picture) > 0.02:
-                    break
-            (out.parent / "viewer.png").write_bytes(picture)
-            assert bright_part(picture) > 0.02
-            browser.evaluate("document.querySelector('[role=slider]').focus()")
-            browser.press("ArrowLeft", 37)
-            browser.wait_for("document.body.innerText.includes('frame 4, RELOCALISED')")
-            browser.press("ArrowLeft", 37)
-            browser.wait_for("document.body.innerText.includes('frame 3, LOST')")
-            assert page.place == 3
-    finally:
-        page.close()
+def embedded(page: Path) -> bytes:
+    """Return the data in an exported page."""
+    (found,) = re.findall(r'<script id="data" type="text/plain">(.+?)</script>', page.read_text())
+    return gzip.decompress(base64.b64decode(found))
 
 
-@needs_browser
-@pytest.mark.slow
-def test_the_exported_page_opens_from_disk(out: Path, tmp_path: Path) -> None:
-    viewer.export_html(viewer.read_timeline(out), tmp_path / "view.html")
-    text = (tmp_path / "view.html").read_text()
-    assert "__VISER_EMBED_DATA__" in text
-    with Browser(tmp_path / "profile") as browser:
-        browser.open((tmp_path / "view.html").as_uri())
-        for _ in range(60):
-            picture = browser.screenshot()
-            if bright_part(picture) > 0.02:
-                return
-    raise AssertionError("nothing was drawn")
+def test_the_command_line_writes_pages(out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    page = tmp_path / "view.html"
+    assert run("view", out, "--html", page) == 0
+    assert str(page) in capsys.readouterr().out
+    assert b'"deviation"' not in embedded(page)
+    assert run("view", out, "--compare", out, "--html", page) == 0
+    assert b'"deviation"' in embedded(page)
+    addresses = set(re.findall(r"https?://[^\"]+", page.read_text()))
+    assert all(address.startswith("http://www.w3.org/") for address in addresses)  # names, never fetched
+
+
+def test_a_run_to_compare_with_that_is_missing(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("view", out, "--compare", tmp_path, "--html", tmp_path / "view.html") != 0
+    assert "report.json" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_file_for_rerun_is_of_one_run(
+    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run("view", out, "--compare", out, "--rrd", tmp_path / "view.rrd") != 0
+    assert "--rrd writes one run: leave out --compare" in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_points_that_are_not_finite_are_left_out(out: Path, tmp_path: Path) -> None:
+    shutil.copytree(out, tmp_path / "out")
+    model = nacre.read_points(out / "model.ply")
+    points = model.points.copy()
+    points[:7] = np.nan
+    nacre.write_points(tmp_path / "out" / "model.ply", points, normals=model.normals)
+    (cloud,) = (cloud for _, cloud in viewer.read_timeline(tmp_path / "out").snapshots)
+    assert len(cloud.points) == len(points) - 7
+    viewer.export_html(viewer.read_timeline(tmp_path / "out"), tmp_path / "view.html")
+
+
+def test_a_point_file_is_shown_too(tmp_path: Path) -> None:
+    cloud = plane()
+    nacre.write_points(tmp_path / "scan.ply", cloud.points)
+    timeline = viewer.read_timeline(tmp_path / "scan.ply")
+    (read,) = (cloud for _, cloud in timeline.snapshots)
+    assert timeline.title == "scan.ply"
+    assert read.spacing == pytest.approx(cloud.spacing, rel=1e-4)
+    np.testing.assert_allclose(read.normals, -cloud.normals, atol=1e-4)  # towards who looks, along -z
+    assert timeline.is_upright
+    assert run("view", tmp_path / "scan.ply", "--html", tmp_path / "view.html", "--quiet") == 0
+    assert b'"frames": []' in embedded(tmp_path / "view.html")
+
+
+def test_a_file_of_no_points_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "scan.ply").write_bytes(b"solid")
+    assert run("view", tmp_path / "scan.ply", "--html", tmp_path / "view.html") != 0
+    assert "scan.ply" in capsys.readouterr().err
+    nacre.write_points(tmp_path / "none.ply", np.zeros((0, 3)))
+    assert run("view", tmp_path / "none.ply", "--html", tmp_path / "view.html") != 0
+    assert "timeline must hold a state of the model to export" in capsys.readouterr().err
+    assert not (tmp_path / "view.html").exists()
 
 
 def test_the_report_tells_the_viewer_what_it_needs(out: Path) -> None:

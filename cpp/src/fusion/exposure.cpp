@@ -1,0 +1,58 @@
+#include "fusion/exposure.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "base/limits.hpp"
+#include "camera/limits.hpp"
+#include "camera/point_projection.hpp"
+#include "depth/depth_view.hpp"
+#include "fusion/limits.hpp"
+#include "fusion/observable.hpp"
+
+namespace nacre {
+namespace {
+
+bool is_well_exposed(const Eigen::Vector3f& color) {
+  return color.minCoeff() >= fusion_limits::darkest_color && color.maxCoeff() <= fusion_limits::brightest_color;
+}
+
+}  // namespace
+
+Eigen::Vector3f color_gain(const PointModel& model, const RegisteredFrame& now, double spacing) {
+  if (!now.observer.has_colors() || model.colors.empty()) return Eigen::Vector3f::Ones();
+  const PointProjection view(now.camera, now.world_from_camera);
+  std::array<std::vector<float>, 3> ratios;
+  constexpr std::size_t block_size = PointProjection::capacity;
+  PointProjection::Block points;
+  for (std::size_t first = 0; first < model.points.size(); first += fusion_limits::exposure_blocks * block_size) {
+    const std::size_t count = std::min(block_size, model.points.size() - first);
+    view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(count), points);
+    for (int j = 0; j < static_cast<int>(count); ++j) {
+      if (!points.inside[j] || !(points.facing[j] > fusion_limits::least_facing)) continue;
+      const std::int32_t pixel = points.pixel[j];
+      const float margin = std::max(static_cast<float>(camera_limits::surface_spacings * spacing),
+                                    base_limits::noise_sigmas * sigma_at(now.frame, pixel));
+      if (visibility(now.frame.points(pixel, 2) - points.z[j], margin) != Visibility::agrees) continue;
+      const Eigen::Vector3f known = model.colors[first + static_cast<std::size_t>(j)];
+      const Eigen::Vector3f seen = now.observer.color(pixel % now.frame.width, pixel / now.frame.width);
+      if (!known.allFinite() || !is_well_exposed(known) || !is_well_exposed(seen)) continue;
+      for (int c = 0; c < 3; ++c) ratios[static_cast<std::size_t>(c)].push_back(known[c] / seen[c]);
+    }
+  }
+  Eigen::Vector3f gain = Eigen::Vector3f::Ones();
+  if (ratios[0].size() < fusion_limits::least_exposure_points) return gain;
+  for (int c = 0; c < 3; ++c) {
+    std::vector<float>& values = ratios[static_cast<std::size_t>(c)];
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    gain[c] = *middle;
+  }
+  return gain;
+}
+
+}  // namespace nacre

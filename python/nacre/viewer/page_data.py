@@ -1,0 +1,209 @@
+"""What the page reads, by name: a document, and for each state of a model its points and triangles."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre import Camera
+from nacre.errors import FileFormatError
+from nacre.meshing import triangulate
+from nacre.parameters import DepthParameters
+from nacre.report.colormap import viridis
+from nacre.report.image_files import encode_png
+from nacre.viewer.colors import STATUS_COLORS
+from nacre.viewer.depth_picture import depth_legend, depth_picture
+from nacre.viewer.disks import deviation, disk_radii
+from nacre.viewer.packing import morton_order, octahedral, pack, quantized, rounded
+from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline, words
+from nacre.viewer.views import first_seen, first_view
+
+MAX_POINTS = 1_000_000
+
+
+class State(NamedTuple):
+    """A state of a run's model: of the run ``run``, after the frame at ``place``."""
+
+    run: int
+    place: int
+    cloud: Snapshot
+
+    @property
+    def name(self) -> str:
+        """Of the state; another one has another name."""
+        return f"{self.run}/{self.place}/{len(self.cloud.points)}"
+
+
+class PageData:
+    """
+    What the page shows of one run, or of two that are compared, as they are now.
+
+    Parameters
+    ----------
+    timelines : sequence of Timeline
+        One or two.
+    parameters : DepthParameters, optional
+        What is marked as removed in depth images.
+
+    Raises
+    ------
+    ValueError
+        When there is nothing to compare with.
+    """
+
+    def __init__(self, timelines: Sequence[Timeline], parameters: DepthParameters | None = None) -> None:
+        if not all(other.has_points for other in timelines[1:]):
+            raise ValueError("other must hold a state of the model to compare with, got none")
+        self._timelines = timelines
+        self._parameters = parameters
+        self._states = [
+            State(run, place, cloud)
+            for run, timeline in enumerate(timelines)
+            for place, cloud in timeline.snapshots
+        ]
+        self.document = json.dumps(self._described(), allow_nan=False).encode()
+        self._last: tuple[State, Snapshot] | None = None
+
+    @property
+    def names(self) -> list[str]:
+        """Of all that a page without a server needs, but triangles."""
+        return ["document", *(f"points/{state.name}" for state in self._states)]
+
+    @property
+    def triangle_names(self) -> list[str]:
+        """Of the triangles of the newest state of each run."""
+        newest = {state.run: f"triangles/{state.name}" for state in self._states}
+        return list(newest.values())
+
+    def read(self, name: str) -> bytes:
+        """
+        Return the bytes that a name stands for.
+
+        Raises
+        ------
+        KeyError
+            When there are none.
+        """
+        if name == "document":
+            return self.document
+        kind, _, rest = name.partition("/")
+        if kind == "depth":
+            return self._depth(rest)
+        if kind not in ("points", "triangles"):
+            raise KeyError(name)
+        state = {state.name: state for state in self._states}[rest]
+        if kind == "triangles":
+            cloud = self._prepared(state)
+            corners = triangulate(cloud.points, cloud.normals)
+            return pack({}, {"triangles": _sorted_triangles(corners)})
+        return self._points(state)
+
+    def _described(self) -> dict[str, Any]:
+        newest = {state.run: state for state in self._states}
+        view = None
+        if 0 in newest and len(newest[0].cloud.points):
+            view = first_view(newest[0].cloud, self._timelines[0], newest[0].place).as_dict()
+        return {
+            "title": " and ".join(timeline.title for timeline in self._timelines),
+            "view": view,
+            "comment": "metres" if self._timelines[0].is_upright else f"metres; {CAMERA_FRAME}",
+            "statusColors": STATUS_COLORS,
+            "colormap": viridis(np.linspace(0, 1, 9)).tolist(),
+            "depthLegend": depth_legend(),
+            "runs": [self._described_run(run) for run in range(len(self._timelines))],
+        }
+
+    def _described_run(self, run: int) -> dict[str, Any]:
+        timeline = self._timelines[run]
+        frames = [
+            {
+                "index": frame.index,
+                "status": frame.status,
+                "reason": frame.reason,
+                "figures": words(frame),
+                "pose": _rounded_pose(frame.world_from_camera),
+                "truth": _rounded_pose(frame.truth),
+            }
+            for frame in timeline.frames
+        ]
+        states = [{"name": s.name, "place": s.place} for s in self._states if s.run == run]
+        return {
+            "title": timeline.title,
+            "hasDepth": timeline.depth_of is not None and timeline.camera is not None,
+            "frustum": frustum_corners(timeline.camera).tolist(),
+            "frames": frames,
+            "states": states,
+        }
+
+    def _prepared(self, state: State) -> Snapshot:
+        """Return the points as the page gets them: not too many, neighbors in space near in order."""
+        last = self._last
+        if last is not None and last[0] is state:
+            return last[1]
+        cloud = state.cloud.thinned(MAX_POINTS)
+        rows, _, _ = quantized(cloud.points)
+        ordered = cloud.rows(morton_order(rows), cloud.spacing)
+        self._last = state, ordered
+        return ordered
+
+    def _points(self, state: State) -> bytes:
+        cloud, timeline = self._prepared(state), self._timelines[state.run]
+        rows, origin, step = quantized(cloud.points)
+        columns: dict[str, npt.NDArray[Any]] = {
+            "points": rows,
+            "normals": octahedral(cloud.normals),
+            "sizes": _logarithms(disk_radii(cloud) / cloud.spacing),
+        }
+        if cloud.colors is not None:
+            columns["colors"] = cloud.colors
+        if cloud.confidence is not None:
+            columns["confidence"] = rounded(np.maximum(np.nan_to_num(cloud.confidence), 0))
+        if cloud.last_seen is not None:
+            columns["lastSeen"] = np.maximum(cloud.last_seen, 0).astype(np.uint32)
+        if len(timeline.snapshots) == 1:
+            first = first_seen(cloud, timeline, state.place)
+            columns |= {} if first is None else {"firstSeen": first}
+        if len(self._timelines) == 2:
+            other = self._timelines[1 - state.run].snapshots[-1][1]
+            columns["deviation"] = rounded(deviation(cloud, other))
+        return pack({"spacing": cloud.spacing, "origin": origin, "step": step}, columns)
+
+    def _depth(self, place: str) -> bytes:
+        """Return the depth image, with what was removed, of the first run's frame at a place."""
+        timeline = self._timelines[0]
+        if timeline.depth_of is None or timeline.camera is None or not place.isdecimal():
+            raise KeyError(place)
+        try:
+            depth = timeline.depth_of(timeline.frames[int(place)].index)
+        except (IndexError, FileFormatError, OSError) as error:
+            raise KeyError(place) from error
+        return encode_png(depth_picture(depth, timeline.camera, self._parameters))
+
+
+def frustum_corners(camera: Camera | None) -> npt.NDArray[np.float64]:
+    """Return the corners of the image, seen from the camera, on a plane at distance 1; (4, 3)."""
+    x, y = 0.5, 0.375
+    if camera is not None:
+        focal = (camera.fx, camera.fy) if camera.model == "pinhole" else (camera.width, camera.width)
+        x, y = camera.width / (2 * focal[0]), camera.height / (2 * focal[1])
+    return np.array([(-x, -y, 1), (x, -y, 1), (x, y, 1), (-x, y, 1)], dtype=np.float64)
+
+
+def _logarithms(factors: npt.NDArray[np.float32]) -> npt.NDArray[np.uint8]:
+    """Return factors from 1/4 to 4000, true to 2 %, as 18 times their binary logarithms above that of 1/4."""
+    return np.asarray(np.rint(np.clip(18 * (np.log2(factors) + 2), 0, 255)), np.uint8)
+
+
+def _rounded_pose(pose: npt.NDArray[np.float64] | None) -> list[list[float]] | None:
+    return None if pose is None else np.asarray(pose)[:3].round(6).tolist()
+
+
+def _sorted_triangles(triangles: npt.NDArray[np.int32]) -> npt.NDArray[np.uint32]:
+    """Return the same triangles, each from its first row on, in the order of these rows."""
+    start = triangles.argmin(axis=1)[:, None] if len(triangles) else np.zeros((0, 1), np.int64)
+    turned = np.take_along_axis(triangles, (start + np.arange(3)) % 3, axis=1)
+    return np.asarray(turned[np.argsort(turned[:, 0], kind="stable")], np.uint32)

@@ -1,0 +1,141 @@
+"""Which frames had which points in view, and from where to look at them first."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre import Camera
+from nacre.viewer.timeline import Snapshot, Timeline
+
+Array = npt.NDArray[np.float64]
+
+_MAX_VIEWS = 60
+_MAX_POINTS = 20_000
+
+
+class View(NamedTuple):
+    """
+    From where to look: all in the world frame.
+
+    Attributes
+    ----------
+    target : (3,) array
+        What is in the middle [m].
+    direction, up : (3,) array
+        Unit vectors: from the target to the eye, and upwards.
+    radius : float
+        Of a sphere about the target that should be in the picture [m].
+    """
+
+    target: Array
+    direction: Array
+    up: Array
+    radius: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what JSON can say, to a micrometre."""
+        return {name: np.asarray(value).round(6).tolist() for name, value in self._asdict().items()}
+
+
+def posed_places(timeline: Timeline, place: int) -> list[int]:
+    """Return the places, 60 at most and evenly spread, of frames up to one whose pose is known."""
+    places = [i for i, m in enumerate(timeline.frames[: place + 1]) if m.world_from_camera is not None]
+    chosen = np.linspace(0, len(places) - 1, min(len(places), _MAX_VIEWS)).round().astype(int)
+    return [places[i] for i in chosen]
+
+
+def sees(
+    camera: Camera, pose: Array, points: npt.NDArray[np.float32], normals: npt.NDArray[np.float32]
+) -> npt.NDArray[np.bool_]:
+    """
+    Return which points (N, 3) are in a camera's image and face it; what hides them does not count.
+
+    Parameters
+    ----------
+    camera, pose : Camera, (4, 4) array
+        The pose is ``world_from_camera``.
+    points, normals : (N, 3) float32
+        In the world frame [m]; unit vectors.
+    """
+    local = (points - pose[:3, 3]) @ pose[:3, :3]
+    rays = local if camera.model == "pinhole" else np.array([[0.0, 0, 1]])
+    facing = (normals @ pose[:3, :3] * rays).sum(axis=1) < 0
+    middle = 0.5 * np.array([camera.width - 1, camera.height - 1])
+    half = 0.5 * np.array([camera.width, camera.height])
+    with np.errstate(invalid="ignore"):
+        inside = (np.abs(camera.project(local) - middle) <= half).all(axis=1)
+    return np.asarray(facing & inside & (local[:, 2] > 0))
+
+
+def first_seen(cloud: Snapshot, timeline: Timeline, place: int) -> npt.NDArray[np.uint32] | None:
+    """
+    Return the place of the first frame that had each point in view; None where cameras are not known.
+
+    It is worked out from 60 frames at most, and points that none of them faced come with the last one.
+    """
+    places = posed_places(timeline, place)
+    if timeline.camera is None or len(places) < 2:
+        return None
+    first = np.full(len(cloud.points), places[-1], np.uint32)
+    unseen = np.arange(len(cloud.points))
+    for i, pose in zip(places, _poses(timeline, places), strict=True):
+        seen = sees(timeline.camera, pose, cloud.points[unseen], cloud.normals[unseen])
+        first[unseen[seen]] = i
+        unseen = unseen[~seen]
+    return first
+
+
+def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
+    """
+    Return a view of the main thing: from where most frames saw it, upright as the cameras were.
+
+    Main is what most frames saw and many observations confirm; specks and far walls have no say.
+    """
+    few = cloud.thinned(_MAX_POINTS)
+    places = posed_places(timeline, place)
+    if timeline.camera is None or not places:
+        sign = 1 if timeline.is_upright else -1
+        return _view(few.points, _main_part(few, np.ones(len(few.points))), sign * _FORWARD, sign * _DOWN)
+    poses = _poses(timeline, places)
+    seen = np.array([sees(timeline.camera, pose, few.points, few.normals) for pose in poses])
+    core = _main_part(few, seen.sum(axis=0))
+    best = poses[np.argmax(seen[:, core].sum(axis=1))]
+    target = np.median(few.points[core], axis=0)
+    toward = best[:3, 3] - target if timeline.camera.model == "pinhole" else -best[:3, 2]
+    return _view(few.points, core, toward, -poses[:, :3, 1].mean(axis=0))
+
+
+_DOWN, _FORWARD = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])
+
+
+def _main_part(cloud: Snapshot, num_views: npt.NDArray[np.integer] | Array) -> npt.NDArray[np.bool_]:
+    """Return which points belong to the main thing."""
+    often = num_views >= np.quantile(num_views, 0.6)
+    if cloud.confidence is None:
+        return often
+    known: npt.NDArray[np.bool_] = cloud.confidence >= np.quantile(cloud.confidence[often], 0.4)
+    return often & known
+
+
+def _view(points: npt.NDArray[np.float32], core: npt.NDArray[np.bool_], toward: Array, up: Array) -> View:
+    """Return a view of the core, with some of what is around it."""
+    target = np.median(points[core], axis=0).astype(np.float64)
+    distances = np.linalg.norm(points - target, axis=1)
+    radius = min(np.quantile(distances, 0.99), 2.1 * np.median(distances[core]))
+    direction = _unit(toward, -_FORWARD)
+    upward = _unit(up, -_DOWN)
+    if abs(upward @ direction) > 0.98:
+        upward = _unit(np.cross(direction, (1.0, 0, 0)), -_DOWN)
+    return View(target, direction, upward, max(float(radius), 1e-6))
+
+
+def _unit(vector: Array, otherwise: Array) -> Array:
+    length = float(np.linalg.norm(vector))
+    return vector / length if length > 1e-9 else otherwise
+
+
+def _poses(timeline: Timeline, places: list[int]) -> Array:
+    return np.array([timeline.frames[i].world_from_camera for i in places], np.float64)

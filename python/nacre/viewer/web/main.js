@@ -1,0 +1,251 @@
+// The page: what is chosen, what is loaded for it, and the picture of it.
+
+const POLL = 1000; // [ms]
+
+class App {
+  constructor() {
+    this.canvas = document.getElementById("scene");
+    this.renderer = new Renderer(this.canvas);
+    this.orbit = new Orbit(
+      this.canvas, () => this.redraw(), (x, y) => this.#click(x, y), (x, y) => this.#turnAbout(x, y),
+    );
+    this.clouds = []; // what is drawn of each run
+    this.cache = new Map(); // clouds that were read, by name
+    this.framesAtReset = 0; // a model that grows is looked at anew each time its frames have doubled
+    this.measure = new Measure(this);
+    this.crop = new Crop(this);
+    this.deviation = new Deviation(this);
+    this.player = new Player(this);
+    this.#listen();
+  }
+
+  async start() {
+    this.source = await openSource();
+    await this.#take(await this.source.read("document"));
+    this.#poll();
+  }
+
+  /** Ask again and again whether there is more; seldom where that takes long. */
+  #poll(delay = POLL) {
+    if (this.source instanceof EmbeddedSource) return;
+    setTimeout(async () => {
+      const start = performance.now();
+      try {
+        const bytes = await this.source.changed();
+        if (bytes) await this.#take(bytes);
+        this.#poll(Math.max(POLL, 5 * (performance.now() - start)));
+      } catch {
+        this.#say("");
+        document.getElementById("summary").textContent += "; no more is coming";
+      }
+    }, delay);
+  }
+
+  async #take(bytes) {
+    const isFirst = !this.document;
+    this.document = JSON.parse(new TextDecoder().decode(bytes));
+    showDocument(this.document);
+    if (isFirst && !this.document.runs[0].frames.length) document.getElementById("reverse").checked = true;
+    this.player.update();
+    this.#forget();
+    const { view, runs } = this.document;
+    if (view && !this.orbit.touched && runs[0].frames.length >= 2 * this.framesAtReset) this.reset();
+    await this.load();
+  }
+
+  /** Give back states that the document has no more. */
+  #forget() {
+    const named = new Set(this.document.runs.flatMap((run) => run.states.map((state) => state.name)));
+    for (const name of this.cache.keys()) if (!named.has(name)) this.cache.delete(name);
+  }
+
+  /** Read the states of the models that belong to the chosen frame, and draw them. */
+  async load() {
+    const names = this.document.runs.map((run, i) => {
+      const place = i === 0 ? this.player.place : Infinity;
+      return (run.states.findLast((state) => state.place <= place) ?? run.states[0])?.name;
+    });
+    if (names.some((name) => !name)) return this.#say("There is no model yet");
+    const request = (this.request = (this.request ?? 0) + 1);
+    let clouds;
+    try {
+      clouds = await Promise.all(names.map((name) => this.#cloud(name)));
+    } catch (error) {
+      if (!this.clouds.length) this.#say(String(error));
+      return; // a state that is gone meanwhile: the next document has another one
+    }
+    if (request !== this.request) return; // another frame was chosen meanwhile
+    const isOther = clouds.some((cloud, i) => cloud !== this.clouds[i]);
+    this.clouds = clouds;
+    this.#say("");
+    if (isOther) {
+      this.renderer.keepOnly(clouds);
+      showKinds(this);
+      await this.#loadTriangles();
+      this.color();
+    }
+    this.select();
+  }
+
+  async #cloud(name) {
+    if (!this.cache.has(name)) this.cache.set(name, new Cloud(await this.source.read(`points/${name}`)));
+    const cloud = this.cache.get(name);
+    cloud.name = name;
+    return cloud;
+  }
+
+  async #loadTriangles() {
+    if (!this.showsMesh) return;
+    for (const cloud of this.clouds) {
+      if (cloud.triangles || !this.source.has(`triangles/${cloud.name}`)) continue;
+      this.#say("Joining the points");
+      cloud.triangles = unpack(await this.source.read(`triangles/${cloud.name}`)).columns.triangles;
+    }
+    this.#say("");
+  }
+
+  get showsMesh() {
+    return document.getElementById("surface").value === "mesh";
+  }
+
+  get kind() {
+    return document.getElementById("kind").value;
+  }
+
+  /** Which run is drawn; of two the first. */
+  get activeRun() {
+    const layout = document.getElementById("layout").value;
+    return this.clouds.length > 1 && layout !== "both" ? +layout : 0;
+  }
+
+  /** Which run is drawn where, as parts of the canvas. */
+  get parts() {
+    const layout = document.getElementById("layout").value;
+    if (this.clouds.length < 2 || layout !== "both") return [{ run: this.activeRun, left: 0, width: 1 }];
+    return [{ run: 0, left: 0, width: 0.5 }, { run: 1, left: 0.5, width: 0.5 }];
+  }
+
+  /** Go to the first view. */
+  reset() {
+    this.framesAtReset = this.document.runs[0].frames.length;
+    this.orbit.look(this.document.view, this.#aspect(this.parts[0]));
+  }
+
+  /** Show the points that the tools leave. */
+  select() {
+    const least = showConfidence(this);
+    this.clouds.forEach((cloud, run) => {
+      cloud.select(least, this.crop.active, run === 0 ? this.player.place : Infinity);
+    });
+    showCount(this);
+    if (this.clouds.length === 2) this.deviation.show();
+    this.redraw();
+  }
+
+  /** Give the points their colors. */
+  color() {
+    const end = this.clouds.length === 2 ? this.deviation.end : 0;
+    this.clouds.forEach((cloud) => cloud.color(this.kind, this.document.colormap, end));
+    if (this.clouds.length === 2) this.deviation.show();
+    showLegend(this);
+    this.redraw();
+  }
+
+  redraw() {
+    this.pending ??= requestAnimationFrame(() => {
+      this.pending = null;
+      this.draw();
+    });
+  }
+
+  draw() {
+    this.renderer.resize();
+    this.renderer.clear();
+    const overlay = this.clouds.length ? this.parts.flatMap((part) => this.#drawPart(part)) : [];
+    document.getElementById("overlay").replaceChildren(...overlay);
+  }
+
+  #drawPart(part) {
+    const cloud = this.clouds[part.run], run = this.document.runs[part.run], matrices = this.matrices(part);
+    const asMesh = this.showsMesh && Boolean(cloud.triangles);
+    const pointSize = +document.getElementById("size").value;
+    const ambient = { shading: 0.25, colour: 0.5 }[this.kind] ?? 0.6;
+    const showReverse = isChecked("reverse");
+    this.renderer.drawCloud(cloud, matrices, part, { asMesh, showReverse, pointSize, ambient });
+    const chosen = { path: isChecked("path"), cameras: isChecked("cameras") };
+    const place = part.run === 0 ? this.player.place : run.frames.length;
+    const size = 0.06 * (this.document.view?.radius ?? 1);
+    const lines = cameraLines(run, place, this.document.statusColors, size, chosen);
+    this.crop.active?.edges.forEach(([a, b]) => lines.add(a, b, [255, 255, 255], 150));
+    this.renderer.drawLines(lines.positions, lines.colors, matrices, part);
+    return this.#overlay(part, matrices);
+  }
+
+  #overlay(part, matrices) {
+    const drawn = this.measure.overlay((point) => project(point, matrices, part, this.canvas));
+    if (this.parts.length < 2) return drawn;
+    const width = this.canvas.clientWidth, x = part.left * width;
+    drawn.push(element("text", { class: "run", x: x + 0.25 * width, y: 20 }, this.document.runs[part.run].title, SVG));
+    if (x) drawn.push(element("line", { class: "divider", x1: x, y1: 0, x2: x, y2: 10000 }, "", SVG));
+    return drawn;
+  }
+
+  matrices(part) {
+    return this.orbit.matrices(this.#aspect(part));
+  }
+
+  #aspect(part) {
+    return (part.width * this.canvas.clientWidth) / Math.max(this.canvas.clientHeight, 1);
+  }
+
+  /** The position of the point under a pixel; null where there is none. */
+  pointAt(x, y) {
+    const across = x / this.canvas.clientWidth;
+    const part = this.parts.find(({ left, width }) => across >= left && across <= left + width);
+    const cloud = part && this.clouds[part.run];
+    if (!cloud) return null;
+    const eye = isChecked("reverse") ? null : this.orbit.eye;
+    const i = pick(cloud, this.matrices(part), part, this.canvas, x, y, eye);
+    return i < 0 ? null : cloud.position(i);
+  }
+
+  #click(x, y) {
+    if (!this.measure.isActive) return;
+    const point = this.pointAt(x, y);
+    if (point) this.measure.add(point);
+  }
+
+  #turnAbout(x, y) {
+    const point = this.measure.isActive ? null : this.pointAt(x, y);
+    if (point) this.orbit.turnAbout(point);
+  }
+
+  #listen() {
+    const on = (id, event, action) => document.getElementById(id).addEventListener(event, action);
+    on("kind", "change", () => this.color());
+    on("surface", "change", () => this.#loadTriangles().then(() => this.redraw()));
+    on("size", "input", () => this.redraw());
+    on("confidence", "input", () => this.select());
+    for (const id of ["reverse", "path", "cameras"]) on(id, "change", () => this.redraw());
+    on("reset", "click", () => this.reset());
+    on("layout", "change", () => this.select());
+    new ResizeObserver(() => this.redraw()).observe(this.canvas);
+  }
+
+  #say(words) {
+    document.getElementById("message").textContent = words;
+  }
+}
+
+const isChecked = (id) => document.getElementById(id).checked;
+
+try {
+  window.page = new App();
+  window.page.start().catch(fail);
+} catch (error) {
+  fail(error);
+}
+
+function fail(error) {
+  document.getElementById("message").textContent = String(error);
+}

@@ -1,0 +1,78 @@
+"""What the page reads: bytes that say what went in, and are few."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import struct
+from typing import Any
+
+import numpy as np
+import pytest
+
+from nacre.viewer.packing import morton_order, octahedral, pack, quantized, rounded
+
+
+def unpacked(block: bytes) -> dict[str, np.ndarray[Any, Any]]:
+    """Undo pack, as data.js does."""
+    (size,) = struct.unpack_from("<I", block)
+    at, columns = 4 + size, {}
+    for column in json.loads(block[4:at])["columns"]:
+        rows, width = column["rows"], column["width"]
+        dtype = np.dtype(column["type"])
+        planes = np.frombuffer(block, np.uint8, rows * width * dtype.itemsize, at)
+        bits = planes.reshape(width, dtype.itemsize, rows).transpose(0, 2, 1).copy()
+        differences = bits.view(f"<u{dtype.itemsize}").reshape(width, rows)
+        values = np.cumsum(differences, axis=1, dtype=f"u{dtype.itemsize}").T.copy()
+        columns[column["name"]] = values.view(dtype)
+        at += rows * width * dtype.itemsize
+    assert at == len(block)
+    return columns
+
+
+@pytest.mark.parametrize("rows", [0, 1, 500])
+@pytest.mark.parametrize("dtype", ["uint8", "uint16", "uint32"])
+def test_integers_come_back(dtype: str, rows: int) -> None:
+    values = np.random.default_rng(0).integers(0, np.iinfo(dtype).max, (rows, 3), dtype, endpoint=True)
+    np.testing.assert_array_equal(unpacked(pack({}, {"values": values}))["values"].reshape(rows, 3), values)
+
+
+def test_floats_come_back() -> None:
+    values = np.random.default_rng(1).exponential(size=200).astype(np.float32)
+    np.testing.assert_array_equal(unpacked(pack({}, {"values": values}))["values"][:, 0], values)
+    assert np.abs(rounded(values) / values - 1).max() <= 2**-12
+
+
+def test_positions_are_true_to_half_a_step() -> None:
+    points = np.random.default_rng(2).uniform(-3, 5, (1000, 3)).astype(np.float32)
+    rows, origin, step = quantized(points)
+    assert step == pytest.approx(np.ptp(points, axis=0).max() / 65535)
+    assert np.abs(origin + step * rows - points).max() <= 0.51 * step
+
+
+@pytest.mark.parametrize("points", [np.zeros((0, 3)), np.ones((1, 3)), np.full((4, 3), 7.0)])
+def test_positions_without_extent(points: np.ndarray[Any, Any]) -> None:
+    rows, origin, step = quantized(points)
+    np.testing.assert_allclose(np.asarray(origin) + step * rows, points)
+
+
+def test_normals_are_true_to_a_degree() -> None:
+    normals = np.random.default_rng(3).normal(size=(2000, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    x, y = (octahedral(normals) / 127.5 - 1).T
+    z = 1 - np.abs(x) - np.abs(y)
+    below = z < 0
+    x, y = (
+        np.where(below, np.copysign(1 - np.abs(y), x), x),
+        np.where(below, np.copysign(1 - np.abs(x), y), y),
+    )
+    back = np.column_stack([x, y, z]) / np.linalg.norm(np.column_stack([x, y, z]), axis=1, keepdims=True)
+    assert np.degrees(np.arccos(np.clip((back * normals).sum(axis=1), -1, 1))).max() < 1
+
+
+def test_neighbors_in_space_are_near_in_order_and_compress_well() -> None:
+    rng = np.random.default_rng(4)
+    rows = np.column_stack([rng.integers(0, 65536, (20_000, 2)), np.full(20_000, 500)]).astype(np.uint16)
+    sizes = [len(gzip.compress(pack({}, {"points": p}), 6)) for p in (rows, rows[morton_order(rows)])]
+    assert sizes[1] < 0.85 * sizes[0]
+    assert sorted(morton_order(rows)) == list(range(len(rows)))

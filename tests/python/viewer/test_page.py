@@ -1,0 +1,258 @@
+"""The page in a real browser: its tools find what is known of the scene, with a server and without."""
+
+from __future__ import annotations
+
+import io
+import json
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import nacre
+from nacre.report import ReportedFrame
+from nacre.viewer import Timeline, Viewer, export_html
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from browser import CHROMIUM, Browser
+from viewer_scenes import SPACING, plane, two_looks
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium"),
+]
+LOADED = "page.clouds.length > 0 && page.clouds[0].version > 1"
+# Pixels per metre at the target: half the height by the tangent of half the field of view, 0.7 rad.
+PIXEL = "(page.canvas.clientHeight / 2) / Math.tan(0.35) / page.orbit.distance"
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    pytest.importorskip("websockets")
+    with Browser(tmp_path_factory.mktemp("profile")) as browser:
+        yield browser
+
+
+@pytest.fixture
+def exported(browser: Browser, tmp_path: Path) -> Browser:
+    """Return the browser with the page of the plane, opened from disk."""
+    export_html(two_looks(plane()), tmp_path / "view.html")
+    browser.open((tmp_path / "view.html").as_uri())
+    browser.wait_for(LOADED)
+    browser.download_to(tmp_path)
+    return browser
+
+
+def on_plane(browser: Browser, x: float, y: float) -> tuple[float, float]:
+    """Return the pixel of a point of the plane, which the first view looks at along its normal."""
+    target, width, height, pixels = json.loads(
+        browser.evaluate(
+            f"JSON.stringify([page.orbit.target, page.canvas.clientWidth, page.canvas.clientHeight, {PIXEL}])"
+        )
+    )
+    return width / 2 + pixels * (x - target[0]), height / 2 + pixels * (y - target[1])
+
+
+def look_along_the_normal(browser: Browser) -> None:
+    browser.evaluate("page.orbit.backward = [0, 0, -1]; page.orbit.up = [0, -1, 0]; page.draw()")
+
+
+def color_at(browser: Browser, x: float, y: float) -> np.ndarray:
+    image = pytest.importorskip("PIL.Image")
+    browser.evaluate("page.draw()")
+    pixels = np.asarray(image.open(io.BytesIO(browser.screenshot())).convert("RGB"), dtype=int)
+    return pixels[round(y), round(x)]
+
+
+def num_shown(browser: Browser) -> int:
+    return int(browser.evaluate("page.clouds[0].numShown"))
+
+
+def test_it_begins_with_the_colored_model_in_the_middle(exported: Browser) -> None:
+    assert exported.evaluate("page.kind") == "colour"
+    assert "2 frames: 2 tracked" in exported.text()
+    width, height = (
+        exported.evaluate("page.canvas.clientWidth"),
+        exported.evaluate("page.canvas.clientHeight"),
+    )
+    red, green, blue = color_at(exported, width / 2, height / 2)
+    assert red > 2 * max(green, blue)
+    assert max(np.ptp(color_at(exported, 20, 20)), 0) < 60  # the background is grey
+    assert exported.evaluate("performance.getEntriesByType('resource').length") == 0  # no network
+
+
+def test_the_distance_between_two_points_that_were_picked(exported: Browser) -> None:
+    look_along_the_normal(exported)
+    exported.press_button("measure")
+    for x in (-0.03, 0.05):
+        exported.click(*on_plane(exported, x + 0.002, 0.002))  # a little beside the point
+    assert exported.evaluate("page.measure.distances.length") == 1
+    assert exported.evaluate("page.measure.distances[0]") == pytest.approx(0.08, abs=1e-5)
+    exported.wait_for("document.getElementById('overlay').textContent === '80.0 mm'")
+    assert exported.evaluate("document.getElementById('distances').textContent") == "80.0 mm"
+    exported.press_button("clear")
+    exported.wait_for("!document.body.innerText.includes('80.0 mm')")
+
+
+def test_a_click_beside_the_model_picks_nothing(exported: Browser) -> None:
+    look_along_the_normal(exported)
+    exported.press_button("measure")
+    exported.click(*on_plane(exported, 0.15, 0))
+    assert exported.evaluate("page.measure.pairs.length") == 0
+
+
+def test_a_drag_turns_the_model_and_is_no_click(exported: Browser) -> None:
+    look_along_the_normal(exported)
+    exported.press_button("measure")
+    point = on_plane(exported, 0.02, 0.03)
+    exported.drag(point, (point[0] + 100, point[1]), point)  # and back, to where a click would pick
+    assert exported.evaluate("page.measure.pairs.length") == 0
+    exported.drag((300, 300), (400, 320))
+    assert abs(exported.evaluate("page.orbit.backward[0]")) > 0.1
+    exported.press_button("reset")
+    assert exported.evaluate("page.orbit.touched") is False
+
+
+def test_surfaces_are_seen_from_behind_on_demand(exported: Browser) -> None:
+    exported.evaluate("page.orbit.backward = [0, 0, 1]; page.orbit.up = [0, -1, 0]; page.draw()")
+    middle = [exported.evaluate(f"page.canvas.client{side} / 2") for side in ("Width", "Height")]
+    assert np.ptp(color_at(exported, *middle)) < 60
+    assert exported.evaluate(f"page.pointAt({middle[0]}, {middle[1]})") is None
+    exported.press_button("reverse")
+    red, green, _ = color_at(exported, *middle)
+    assert red > 2 * green
+    assert exported.evaluate(f"page.pointAt({middle[0]}, {middle[1]})") is not None
+
+
+def test_a_box_keeps_what_is_in_it_and_saves_it(exported: Browser, tmp_path: Path) -> None:
+    exported.press_button("crop")
+    assert num_shown(exported) == 441
+    axis = np.array(exported.evaluate("page.crop.box.axes[0]"))
+    exported.choose("box-left", 0.0)
+    limit = exported.evaluate("page.crop.box.limits[0][0]")
+    expected = int((plane().points @ axis >= limit).sum())
+    assert 0 < expected < 441
+    assert num_shown(exported) == expected
+    assert f"{expected} of 441 points" in exported.text()
+    exported.press_button("save")
+    end = time.monotonic() + 10
+    while not (tmp_path / "plane.ply").exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    saved = nacre.read_points(tmp_path / "plane.ply")
+    assert len(saved.points) == expected
+    assert np.min(saved.points @ axis) >= limit - 1e-5
+    np.testing.assert_allclose(saved.normals, plane().normals[:expected], atol=0.01)
+    assert saved.comments == ("metres; the world is the first camera's frame",)
+    assert saved.colors is not None
+    assert saved.colors.tolist() == [[200, 40, 40]] * expected
+    rows = np.rint((saved.points[:, :2] / SPACING) + 10).astype(int)
+    np.testing.assert_allclose(saved.attributes["confidence"], 1 + rows[:, 0] + 21 * rows[:, 1])
+
+
+def test_points_of_low_confidence_are_hidden(exported: Browser) -> None:
+    confidence = plane().confidence
+    assert confidence is not None
+    for level in (30, 60, 90):
+        exported.choose("confidence", level)
+        told = exported.evaluate("document.getElementById('confidence-value').textContent")
+        assert 0 < num_shown(exported) == int((confidence >= float(told)).sum()) < 441
+    exported.choose("confidence", 0)
+    assert num_shown(exported) == 441
+
+
+def test_the_mesh_closes_the_gaps_between_points(exported: Browser) -> None:
+    look_along_the_normal(exported)
+    exported.choose("size", 0.3)
+    exported.evaluate("document.getElementById('path').click()")
+    gap = on_plane(exported, 0.045, 0.045)
+    assert np.ptp(color_at(exported, *gap)) < 60
+    exported.choose("surface", "mesh")
+    exported.wait_for("page.clouds[0].triangles")
+    cloud = plane()
+    assert exported.evaluate("page.clouds[0].triangles.length") == 3 * len(
+        nacre.meshing.triangulate(cloud.points, cloud.normals)
+    )
+    red, green, _ = color_at(exported, *gap)
+    assert red > 2 * green
+
+
+def test_the_model_grows_frame_by_frame(exported: Browser) -> None:
+    exported.choose("frame", 0)
+    exported.wait_for("page.clouds[0].numShown === 126")
+    assert "frame 0, TRACKED" in exported.text()
+    exported.press_button("play")
+    exported.wait_for("page.player.place === 1 && page.clouds[0].numShown === 441", 12)
+
+
+@pytest.mark.parametrize("has_frames", [True, False])
+def test_two_runs_2_mm_apart(browser: Browser, tmp_path: Path, has_frames: bool) -> None:
+    first, second = two_looks(plane(), "first"), two_looks(plane(1.002), "second")
+    if not has_frames:  # a file of points
+        second.frames.clear()
+    export_html(first, tmp_path / "view.html", other=second)
+    browser.open((tmp_path / "view.html").as_uri())
+    browser.wait_for(LOADED)
+    assert browser.evaluate("page.kind") == "deviation"
+    assert browser.evaluate("page.parts.length") == 2
+    text = browser.text()
+    for run in ("first", "second"):
+        assert f"{run}: median 2.00 mm, 95 % below 2.00 mm" in text
+    counts = browser.evaluate("page.deviation.figures(page.clouds[0]).counts")
+    assert sum(counts) == max(counts) == 441
+    browser.choose("layout", "1")
+    assert browser.evaluate("page.parts.length") == 1
+    assert browser.evaluate("page.activeRun") == 1
+
+
+def test_points_are_where_they_were_to_half_a_step(exported: Browser) -> None:
+    found = np.array(exported.evaluate("Array.from({length: 441}, (_, i) => page.clouds[0].position(i))"))
+    expected = plane().points
+    order = np.lexsort(np.round(found, 4).T)
+    np.testing.assert_allclose(found[order], expected[np.lexsort(np.round(expected, 4).T)], atol=2e-6)
+    normals = np.array(exported.evaluate("Array.from(page.clouds[0].normals)")).reshape(-1, 4)
+    np.testing.assert_array_equal(normals[:, :3], np.broadcast_to((0, 0, -127), (441, 3)))
+
+
+def test_a_served_page_follows_the_run(browser: Browser) -> None:
+    timeline = two_looks(plane())
+    timeline.depth_of = lambda index: np.full((100, 100), 1.0, np.float32)
+    viewer = Viewer(timeline, port=0)
+    try:
+        browser.open(viewer.url)
+        browser.wait_for(LOADED)
+        assert "frame 1, TRACKED" in browser.text()
+        browser.wait_for("document.getElementById('depth').naturalWidth > 50")
+        timeline.add(ReportedFrame(2, "LOST", reason="no overlap"))
+        grown = plane()
+        timeline.set_snapshot(grown.rows(slice(0, 400), SPACING))
+        viewer.refresh()
+        browser.wait_for("document.body.innerText.includes('frame 2, LOST: no overlap')")
+        browser.wait_for("page.clouds[0].size === 400")
+        browser.choose("frame", 1)
+        browser.wait_for("page.clouds[0].size === 441")
+        viewer.refresh()
+        time.sleep(1.2)
+        assert browser.evaluate("page.player.place") == 1  # where a hand has put it
+    finally:
+        viewer.close()
+
+
+def test_a_title_is_no_markup(browser: Browser, tmp_path: Path) -> None:
+    title = "</script><b id='injected'>x</b> <!-- data -->"
+    export_html(two_looks(plane(), title), tmp_path / "view.html", triangles=False)
+    browser.open((tmp_path / "view.html").as_uri())
+    browser.wait_for(LOADED)
+    assert browser.evaluate("document.getElementById('injected')") is None
+    assert browser.evaluate("document.title") == title
+
+
+def test_an_empty_run_says_so(browser: Browser) -> None:
+    viewer = Viewer(Timeline("nothing", None), port=0)
+    try:
+        browser.open(viewer.url)
+        browser.wait_for("document.body.innerText.includes('There is no model yet')")
+    finally:
+        viewer.close()
