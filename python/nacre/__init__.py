@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from nacre import evaluation
-    from nacre._core import Camera, __version__
+    from nacre._core import __version__
+    from nacre.camera import Camera
     from nacre.consolidation import Consolidated, consolidate, project_samples
     from nacre.datasets import Sequence, SequenceFrame, open_sequence, write_recording
     from nacre.depth import (
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
         preprocess_depth,
     )
     from nacre.depth_calibration import DepthCalibration, calibrate_depth
+    from nacre.downsampling import voxel_downsample
     from nacre.errors import CameraError, FileFormatError
     from nacre.frame_report import FrameReport
     from nacre.global_registration import GlobalAlignResult, align_global
@@ -106,6 +108,7 @@ __all__ = [
     "select_region",
     "simulate_depth",
     "turntable_poses",
+    "voxel_downsample",
     "write_camera",
     "write_mesh",
     "write_points",
@@ -118,11 +121,13 @@ _PACKAGES = ("datasets", "io", "meshing", "reconstruction", "report", "viewer")
 
 # Where each name is, so that it is imported when it is first asked for: most programs need few of them.
 _NAMES = {
-    "_core": "Camera __version__",
+    "_core": "__version__",
+    "camera": "Camera",
     "consolidation": "Consolidated consolidate project_samples",
     "datasets": "Sequence SequenceFrame open_sequence write_recording",
     "depth": "PIXEL_LABELS DepthReport back_project depth_normals label_pixels preprocess_depth",
     "depth_calibration": "DepthCalibration calibrate_depth",
+    "downsampling": "voxel_downsample",
     "errors": "CameraError FileFormatError",
     "frame_report": "FrameReport",
     "global_registration": "GlobalAlignResult align_global",
@@ -160,7 +165,12 @@ def __getattr__(name: str) -> Any:
         return value
     if not name.startswith("__") and importlib.util.find_spec(f"nacre.{name}") is not None:
         return importlib.import_module(f"nacre.{name}")
-    raise AttributeError(f"module 'nacre' has no attribute {name!r}")
+    if name.startswith("_"):
+        raise AttributeError(f"module 'nacre' has no attribute {name!r}")
+    from nacre._internal.guided import no_such_name
+    from nacre._internal.names_elsewhere import OF_PACKAGE
+
+    raise no_such_name("nacre", name, __all__, OF_PACKAGE)
 
 
 def __dir__() -> list[str]:

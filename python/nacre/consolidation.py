@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,7 @@ from nacre import _core
 from nacre._internal.arrays import (
     FloatArray,
     as_count,
+    as_dtype,
     as_length,
     as_matching_points,
     as_points,
@@ -21,8 +22,18 @@ from nacre._internal.arrays import (
     as_rows,
 )
 from nacre._internal.core_options import as_choice
+from nacre._internal.guided import guided
+from nacre._internal.point_exchange import ArrayOfPoints
 from nacre._internal.value_equality import Value
+from nacre.kdtree import KdTree
 from nacre.progress import as_progress
+
+if TYPE_CHECKING:
+    from nacre.io.cloud import Cloud
+
+_DENSITY_NEIGHBORS = 17  # itself included
+_DENSITY_PROBES = 5000
+_SPACINGS_PER_RADIUS = 2.5
 
 _METHODS = {
     "wlop": _core.ConsolidationMethod.wlop,
@@ -33,7 +44,7 @@ _THETAS = {"huang": _core.Theta.huang, "printed": _core.Theta.printed}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Consolidated(Value):
+class Consolidated(ArrayOfPoints, Value):
     """
     A consolidated point set.
 
@@ -45,6 +56,8 @@ class Consolidated(Value):
         What was carried along, in the input's dtypes.
     sources : (K,) int64 array, ascending
         The row of the input that each point started from.
+    radius : float
+        The support radius: as given, or from the density of the points.
     iterations : int
         That were done.
     cancelled : bool
@@ -55,8 +68,22 @@ class Consolidated(Value):
     points: FloatArray
     attributes: dict[str, npt.NDArray[Any]]
     sources: npt.NDArray[np.int64]
+    radius: float
     iterations: int
     cancelled: bool
+
+    def cloud(self) -> Cloud:
+        """
+        Return the points with their normals, colours and other attributes where a file has them.
+
+        Returns
+        -------
+        Cloud
+        """
+        from nacre.io.cloud import Cloud
+
+        more = dict(self.attributes)
+        return Cloud(self.points, more.pop("normals", None), more.pop("colors", None), more)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -73,10 +100,16 @@ class Consolidated(Value):
         return picture_of_points(self.points, normals, colors)
 
 
+@guided(
+    neighbor_radius="radius",
+    iter_number="iterations",
+    select_percentage="give num_points",
+    h="radius",
+)
 def consolidate(
     points: npt.ArrayLike,
     *,
-    radius: float = 0.008,
+    radius: float | None = None,
     num_points: int | None = 2000,
     iterations: int = 10,
     mu: float = 0.4,
@@ -98,9 +131,11 @@ def consolidate(
     ----------
     points : (N, 3) array of any real dtype
         Not changed. Rows that are not finite are ignored.
-    radius : float
+    radius : float, optional
         Support radius h, in the unit of the points. The spacing of the result should be at most about h / 2:
-        points without neighbours within h cannot spread evenly.
+        points without neighbours within h cannot spread evenly. By default 2.5 times that spacing, from the
+        density of the points: h = 2.5 r sqrt(pi N / (k K)) for K of N points on a surface, where r is the
+        median distance to the k-th nearest point (k = 17, itself included).
     num_points : int or None
         Size of the result, at most the number of finite rows. None takes them all: points move, none is lost.
         For one seed, the points chosen for a smaller result are among those chosen for a larger one.
@@ -154,21 +189,23 @@ def consolidate(
     >>> thin.points, thin.attributes["normals"]
     """
     array = as_points("points", points)
-    options = _options(radius, iterations, mu, method, theta, num_threads)
+    options = _options(iterations, mu, method, theta, num_threads)
     wanted = len(array) if num_points is None else as_count("num_points", num_points, minimum=1)
     options.num_points = max(1, min(wanted, len(array)))
     options.seed = as_count("seed", seed)
     cargo = _Cargo(attributes, len(array))
+    options.radius = _radius(radius, array, options.num_points)
     told = None if progress is None else as_progress("progress", progress)
     moved, carried, sources, done = _core.consolidate(array, options, cargo.columns, told)
-    return Consolidated(moved, cargo.unpack(carried, sources), sources, done, done < options.iterations)
+    attributes = cargo.unpack(carried, sources)
+    return Consolidated(moved, attributes, sources, options.radius, done, done < options.iterations)
 
 
 def project_samples(
     samples: npt.ArrayLike,
     points: npt.ArrayLike,
     *,
-    radius: float = 0.008,
+    radius: float | None = None,
     iterations: int = 10,
     mu: float = 0.4,
     method: str = "wlop",
@@ -188,7 +225,7 @@ def project_samples(
     points : (N, 3) array of any real dtype
         What the samples are drawn to. Rows that are not finite are ignored.
     radius, iterations, mu, method, theta, num_threads
-        As in :func:`consolidate`.
+        As in :func:`consolidate`; the default radius is that of as many of its points as there are samples.
     point_weights : (N,) array, optional, method "wlop+" only
         How many observations each point stands for: a point of weight 2 counts as two points at its place.
     sample_normals : (K, 3) array, optional, method "wlop+" only
@@ -209,7 +246,7 @@ def project_samples(
     """
     sample_array = as_points("samples", samples)
     point_array = as_points("points", points)
-    options = _options(radius, iterations, mu, method, theta, num_threads)
+    options = _options(iterations, mu, method, theta, num_threads)
     hints = _core.ProjectionHints()
     if point_weights is not None:
         hints.point_weights = as_rows(
@@ -220,6 +257,7 @@ def project_samples(
         hints.sample_normals = as_rows(normals, np.float32)
     if frozen is not None:
         hints.frozen = (_as_column("frozen", frozen, len(sample_array)) != 0).astype(np.uint8)
+    options.radius = _radius(radius, point_array, max(len(sample_array), 1))
     common = np.promote_types(sample_array.dtype, point_array.dtype)
     moved = _core.project_samples(
         sample_array.astype(common, copy=False), point_array.astype(common, copy=False), options, hints
@@ -228,16 +266,32 @@ def project_samples(
 
 
 def _options(
-    radius: float, iterations: int, mu: float, method: str, theta: str, num_threads: int
+    iterations: int, mu: float, method: str, theta: str, num_threads: int
 ) -> _core.ConsolidateOptions:
     options = _core.ConsolidateOptions()
-    options.radius = as_length("radius", radius)
     options.iterations = as_count("iterations", iterations)
     options.mu = as_length("mu", mu)
     options.method = as_choice("method", method, _METHODS)
     options.theta = as_choice("theta", theta, _THETAS)
     options.num_threads = as_count("num_threads", num_threads)
     return options
+
+
+def _radius(given: float | None, points: FloatArray, num_samples: int) -> float:
+    """Return a support radius: the given one, or from how far apart so many of the points would be."""
+    if given is not None:
+        return as_length("radius", given)
+    cloud = points[np.isfinite(points).all(axis=1)]
+    if len(cloud) < 2:
+        return 1.0  # nothing moves
+    k = min(_DENSITY_NEIGHBORS, len(cloud))
+    probes = cloud[:: max(len(cloud) // _DENSITY_PROBES, 1)]
+    reach = float(np.median(KdTree(cloud).query(probes, k)[0][:, -1]))
+    if not 0 < reach < math.inf:
+        where = "on top of each other" if reach == 0 else "too far from each other"
+        raise ValueError(f"radius must be given, got None: the points lie {where}")
+    per_area = k * min(num_samples / len(cloud), 1.0) / math.pi  # [1 / reach^2]
+    return _SPACINGS_PER_RADIUS * reach / math.sqrt(per_area)
 
 
 def _as_column(name: str, value: npt.ArrayLike, size: int) -> npt.NDArray[Any]:
@@ -290,16 +344,5 @@ class _Cargo:
             if name == "normals":
                 lengths = np.linalg.norm(values, axis=1, keepdims=True)
                 values = np.divide(values, lengths, out=array[sources].astype(np.float64), where=lengths > 0)
-            result[name] = _as_dtype(values, array.dtype)
+            result[name] = as_dtype(values, array.dtype)
         return result
-
-
-def _as_dtype(values: npt.NDArray[np.float64], dtype: np.dtype[Any]) -> npt.NDArray[Any]:
-    if dtype.kind == "f":
-        return values.astype(dtype)
-    if dtype.kind == "b":
-        return values >= 0.5
-    info = np.iinfo(dtype)
-    # The largest float64 that the type can hold: its own maximum may round up and out of range.
-    largest = float(info.max) if int(float(info.max)) <= info.max else np.nextafter(float(info.max), 0.0)
-    return np.clip(np.rint(values), float(info.min), largest).astype(dtype)

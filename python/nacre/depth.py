@@ -12,6 +12,7 @@ import numpy.typing as npt
 from nacre import _core
 from nacre._internal.arrays import as_camera, as_count, as_depth, as_flag, as_mask
 from nacre._internal.core_options import mirrored, to_core
+from nacre._internal.guided import guided
 from nacre.noise import Noise, NoiseModel, as_noise, estimate_noise
 from nacre.parameters import DepthParameters, EdgeTest
 
@@ -259,6 +260,12 @@ def label_pixels(
     return labels
 
 
+@guided(
+    intrinsic="camera",
+    intrinsics="camera",
+    scale="depth_scale",
+    depth_trunc="nacre.preprocess_depth(depth, camera, max_depth=...) cuts off",
+)
 def back_project(
     depth: npt.ArrayLike, camera: _core.Camera, *, depth_scale: float = 1.0, num_threads: int = 0
 ) -> npt.NDArray[np.float32]:

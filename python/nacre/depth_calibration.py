@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre._core import Camera
 from nacre._internal.arrays import as_camera, as_depth, as_pose
 from nacre._internal.core_options import mirrored
+from nacre.camera import Camera
 from nacre.depth import preprocess_depth
 
 

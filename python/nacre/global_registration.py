@@ -11,6 +11,7 @@ import numpy.typing as npt
 from nacre import _core
 from nacre._internal.arrays import FloatArray, as_points, as_unit_rows, as_vector, localize
 from nacre._internal.core_options import mirrored, to_core
+from nacre._internal.guided import guided
 from nacre._internal.value_equality import Value
 from nacre.parameters import GlobalRegistrationParameters
 
@@ -81,6 +82,12 @@ def _cloud(
     return points, rows, place
 
 
+@guided(
+    max_correspondence_distance="tolerance",
+    distance_threshold="tolerance",
+    source_feature="it needs no features: leave them out",
+    target_feature="it needs no features: leave them out",
+)
 def align_global(
     source: npt.ArrayLike,
     target: npt.ArrayLike,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import Literal
+from typing import Literal, NoReturn
 
 import numpy as np
 import numpy.typing as npt
@@ -12,6 +12,7 @@ import numpy.typing as npt
 from nacre import _core
 from nacre._internal import arrays
 from nacre._internal.core_options import to_core
+from nacre._internal.guided import GuidedNames
 from nacre._internal.value_equality import Value
 from nacre.noise import NoiseModel, NoiseName, as_noise
 
@@ -62,7 +63,7 @@ class ClosestPoints(Value):
     triangles: npt.NDArray[np.int32]
 
 
-class Mesh:
+class Mesh(GuidedNames):
     """
     A triangle mesh with a search tree, built once, for rays and nearest points. Immutable.
 
@@ -93,6 +94,9 @@ class Mesh:
 
     def __reduce__(self) -> tuple[type[Mesh], tuple[arrays.FloatArray, npt.NDArray[np.int32]]]:
         return Mesh, (self.vertices, self.triangles)
+
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> NoReturn:
+        raise TypeError("a Mesh is two arrays: give its vertices or its triangles")
 
     @property
     def vertices(self) -> arrays.FloatArray:

@@ -14,23 +14,23 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre._core import Camera
 from nacre._internal.arrays import (
-    as_array,
     as_attributes,
     as_camera,
+    as_colors,
     as_depth,
     as_flag,
     as_levels,
     as_mask,
     as_number,
     as_pose,
-    as_rows,
     as_scale,
 )
 from nacre._internal.checkpoint import Checkpointed, checkpoint_of, read_checkpoint
 from nacre._internal.core_options import from_core, mirrored, to_core, updated
+from nacre._internal.guided import guided
 from nacre._internal.point_exchange import ExchangeablePoints
+from nacre.camera import Camera, camera_of
 from nacre.depth_calibration import DepthCalibration
 from nacre.frame_report import FrameReport, FrameReports, report_from
 from nacre.meshing.surface_points import on_surface
@@ -78,6 +78,7 @@ class Model(ExchangeablePoints, Checkpointed):
     After Blackburn, Kubacki and Stratton 2010, incremental 3D model generation with depth cameras.
     """
 
+    @guided("nacre.Camera(width, height, fx, fy, cx, cy), or nacre.read_camera(path).camera")
     def __init__(
         self,
         camera: Camera,
@@ -87,18 +88,29 @@ class Model(ExchangeablePoints, Checkpointed):
         depth_scale: float = 1.0,
         **changes: Any,
     ) -> None:
-        camera = as_camera("camera", camera)
+        given = as_camera("camera", camera)
         if parameters is None:
             parameters = ModelParameters.preset(preset)
         elif not isinstance(parameters, ModelParameters):
             raise TypeError(f"parameters must be nacre.ModelParameters, got {type(parameters).__name__}")
         parameters = updated(parameters, changes)
         self.parameters = replace(parameters, depth=parameters.depth.for_camera(camera))
+        self._camera = given if isinstance(given, Camera) else camera_of(given)
         self._depth_scale = as_scale("depth_scale", depth_scale)
         self._core = _core.Model(camera, to_core(self.parameters, _core.ModelOptions()))
         self._calibration: tuple[int, DepthCalibration | None] | None = None  # by so many frames
         self._lock = threading.RLock()  # the handler of a signal may come into a call
 
+    @guided(
+        rgb="color",
+        image="color",
+        time="timestamp",
+        pose="guess",
+        world_from_camera="guess",
+        extrinsic="guess takes its inverse, world_from_camera",
+        depth_scale="it belongs to the model: nacre.Model(camera, depth_scale=...)",
+        intrinsic="the model has its camera: nacre.Model(camera)",
+    )
     def add_frame(
         self,
         depth: npt.ArrayLike,
@@ -121,7 +133,7 @@ class Model(ExchangeablePoints, Checkpointed):
             Depth in the camera's kind, in units of 1 / ``depth_scale`` metres; 0, NaN, inf, negative values
             and 65535 of integer images are no measurement. Not copied if it is C-contiguous float32 in
             metres.
-        color : (H, W, 3) uint8, optional
+        color : (H, W, 3) integers from 0 to 255, or floats from 0 to 1, optional
             Red, green, blue of each pixel; fused along with the points.
         mask : (H, W), optional
             Pixels where it is 0 are not used.
@@ -158,12 +170,7 @@ class Model(ExchangeablePoints, Checkpointed):
         sure = as_levels("confidence", confidence, image.shape)
         colors = np.zeros((0, 3), np.uint8)
         if color is not None:
-            array = as_array("color", color)
-            if array.shape != (*image.shape, 3) or array.dtype != np.uint8:
-                raise ValueError(
-                    f"color must be uint8 of shape {(*image.shape, 3)}, got {array.dtype} {array.shape}"
-                )
-            colors = as_rows(array.reshape(-1, 3), np.uint8)
+            colors = as_colors("color", color, (*image.shape, 3)).reshape(-1, 3)
         more = as_attributes("attributes", attributes, (image.shape[0], image.shape[1]))
         pose = None if guess is None else as_pose("guess", guess)
         if timestamp is not None and not isinstance(timestamp, numbers.Real):
@@ -210,7 +217,11 @@ class Model(ExchangeablePoints, Checkpointed):
     @classmethod
     def _loaded(cls, path: str | os.PathLike[str]) -> tuple[Model, dict[str, Any]]:
         core, scale, more = read_checkpoint(path)
-        model = cls(core.camera, parameters=from_core(ModelParameters, core.given_options), depth_scale=scale)
+        model = cls(
+            camera_of(core.camera),
+            parameters=from_core(ModelParameters, core.given_options),
+            depth_scale=scale,
+        )
         model._core = core
         return model, more
 
@@ -235,7 +246,7 @@ class Model(ExchangeablePoints, Checkpointed):
     @property
     def camera(self) -> Camera:
         """The camera of all frames."""
-        return self._core.camera
+        return self._camera
 
     @property
     def points(self) -> npt.NDArray[np.float32]:

@@ -8,8 +8,18 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal.arrays import FloatArray, as_count, as_length, as_points, as_vector
+from nacre._internal.guided import guided
 
 
+@guided(
+    radius="max_radius",
+    max_nn="k",
+    knn="k",
+    k_neighbors="k",
+    num_neighbors="k",
+    search_param="give k, and max_radius",
+    camera_location="viewpoint",
+)
 def estimate_normals(
     points: npt.ArrayLike,
     *,

@@ -20,6 +20,7 @@ from nacre._internal.arrays import (
     localize,
 )
 from nacre._internal.core_options import mirrored, to_core
+from nacre._internal.guided import guided
 from nacre._internal.value_equality import Value
 from nacre.parameters import Method, RegistrationParameters
 
@@ -102,6 +103,8 @@ def _brightness(name: str, colors: npt.ArrayLike | None, num_points: int) -> npt
     if colors is None:
         return np.zeros(0, np.float32)
     given = as_real(name, colors)
+    if given.dtype.kind == "f" and given.size and np.nanmax(given, initial=0.0) <= 1:
+        given = given * 255
     if given.shape not in ((num_points,), (num_points, 3)):
         raise ValueError(f"{name} must have shape ({num_points},) or ({num_points}, 3), got {given.shape}")
     luma = given @ np.array([0.299, 0.587, 0.114]) if given.ndim == 2 else given
@@ -117,6 +120,15 @@ def _shifted(
     return moved
 
 
+@guided(
+    max_correspondence_distance="max_distance",
+    threshold="max_distance",
+    init="initial",
+    init_T_target_source="initial",
+    registration_type="method",
+    estimation_method="method",
+    max_iteration="max_iterations",
+)
 def align(
     source: npt.ArrayLike,
     target: npt.ArrayLike,
@@ -162,9 +174,10 @@ def align(
     source_sigma, target_sigma : (N,), (M,) real, optional
         Standard deviation of each point along its normal [m]; pairs count by 1 / (sum of squares).
     source_colors, target_colors : (N,) or (N, 3), (M,) or (M, 3) real, optional
-        Brightness, or red, green and blue, on a scale to 255; NaN where unknown. Where both clouds have them,
-        they decide the directions of the pose that the shapes leave open (a textured plane, a labelled
-        bottle) and nothing else; gain and offset between the two clouds are found along the way.
+        Brightness, or red, green and blue, on a scale to 255, or floats from 0 to 1; NaN where unknown. Where
+        both clouds have them, they decide the directions of the pose that the shapes leave open (a textured
+        plane, a labelled bottle) and nothing else; gain and offset between the two clouds are found along the
+        way.
     initial : (4, 4), optional
         First guess of ``target_from_source``; the identity by default.
     method : "symmetric", "point_to_plane", "point_to_point" or "paper"

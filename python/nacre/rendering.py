@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
-from nacre._internal.arrays import as_matching_points, as_points, as_pose
+from nacre._internal.arrays import as_colors, as_matching_points, as_points, as_pose
 from nacre.kdtree import KdTree
 from nacre.normals import estimate_normals
 
@@ -144,7 +144,7 @@ def render_points(
     normals : array_like, shape (N, 3), optional
         Outward normals. Sides turned away from the viewer are drawn in brown. Without normals (or where they
         are not finite) the disks face the viewer.
-    colors : array_like of uint8, shape (N, 3), optional
+    colors : array_like of integers from 0 to 255 or floats from 0 to 1, shape (N, 3), optional
         Colours of the points; they are shaded gently. Default: light grey.
     view_from : str or three numbers, optional
         "front" (what the first camera saw), "right", "back", "left", "top", "bottom", or the direction from
@@ -175,11 +175,7 @@ def render_points(
     cloud = as_points("points", points)
     finite = np.isfinite(cloud).all(axis=1)
     if colors is not None:
-        colors = np.asarray(colors)
-        if colors.shape != cloud.shape or colors.dtype != np.uint8:
-            raise ValueError(
-                f"colors must be uint8 of shape {cloud.shape}, got {colors.dtype} {colors.shape}"
-            )
+        colors = as_colors("colors", colors, cloud.shape)
     if view is None:
         view = View.fit(cloud, view_from, size=size)
     if normals is None:
@@ -197,7 +193,7 @@ def render_points(
     picture = _core.render_points(
         np.asarray(cloud, dtype=np.float64),
         normals,
-        np.zeros((0, 3), np.uint8) if colors is None else np.ascontiguousarray(colors),
+        np.zeros((0, 3), np.uint8) if colors is None else colors,
         radius.astype(np.float32),
         view_from_model=view.view_from_model,
         center=view.center,

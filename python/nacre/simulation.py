@@ -8,12 +8,14 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from nacre._core import Camera
 from nacre._internal import arrays
+from nacre._internal.guided import guided
+from nacre.camera import Camera
 from nacre.mesh import Mesh, SensorName
 from nacre.noise import NoiseModel, NoiseName
 
 
+@guided("of a Mesh it is mesh.simulate_depth(camera, world_from_camera)")
 def simulate_depth(
     vertices: npt.ArrayLike,
     triangles: npt.ArrayLike,

@@ -128,6 +128,12 @@ def _neighbors_within(result: nacre.RadiusNeighbors, **arguments: Any) -> None:
     assert ((result.indices >= 0) & (result.indices < 60)).all()
 
 
+def _balls(result: Any, **arguments: Any) -> None:
+    lengths = arguments["return_length"]
+    counts = np.ravel(result if lengths else [len(row) for row in np.ravel(result)])
+    assert ((counts >= 0) & (counts <= 60)).all()
+
+
 def _report(report: nacre.FrameReport, **arguments: Any) -> None:
     assert report.status in {"TRACKED", "WEAK", "LOST", "RELOCALISED"}
     assert np.isfinite(report.world_from_camera).all()
@@ -183,16 +189,27 @@ _CONSOLIDATION = {
 }
 
 RECIPES: dict[str, Recipe] = {
-    "nacre._core.Camera": Recipe(
+    "nacre.camera.Camera": Recipe(
         nacre.Camera,
         {"width": 24, "height": 18, "fx": 20.0, "fy": 20.0, "cx": 11.5, "cy": 8.5,
          "distortion": (0.1, 0.0, 0.0, 0.0, 0.0), "depth": "z"},
         grows=("width", "height"),
     ),
-    "nacre._core.Camera.orthographic": Recipe(
+    "nacre.camera.Camera.orthographic": Recipe(
         nacre.Camera.orthographic, {"width": 24, "height": 18, "pixel_size": 0.001}, grows=("width", "height")
     ),
-    "nacre._core.Camera.project": Recipe(CAMERA.project, {"points": bumpy()}),
+    "nacre.camera.Camera.from_fov": Recipe(
+        nacre.Camera.from_fov,
+        {"width": 24, "height": 18, "horizontal_degrees": 60.0, "vertical_degrees": 45.0, "depth": "z"},
+        grows=("width", "height"),
+    ),
+    "nacre.camera.Camera.from_matrix": Recipe(
+        nacre.Camera.from_matrix,
+        {"width": 24, "height": 18, "matrix": CAMERA.matrix, "distortion": (0.1, 0.0, 0.0, 0.0, 0.0),
+         "depth": "z"},
+        grows=("width", "height"),
+    ),
+    "nacre.camera.Camera.project": Recipe(CAMERA.project, {"points": bumpy()}),
     "nacre.consolidation.consolidate": Recipe(
         nacre.consolidate,
         {"points": bumpy(), "num_points": 20, "attributes": unit(), "seed": 3, **_CONSOLIDATION},
@@ -208,6 +225,11 @@ RECIPES: dict[str, Recipe] = {
     ),
     "nacre.parameters.DepthParameters.for_camera": Recipe(
         nacre.DepthParameters().for_camera, {"camera": CAMERA}
+    ),
+    "nacre.downsampling.voxel_downsample": Recipe(
+        nacre.voxel_downsample,
+        {"points": bumpy(), "voxel_size": 0.05, "normals": unit(), "colors": np.full((60, 3), 7, np.uint8)},
+        lambda result, **_: is_finite(result.points),
     ),
     "nacre.depth.back_project": Recipe(nacre.back_project, _DEPTH, is_finite),
     "nacre.depth.depth_normals": Recipe(
@@ -339,7 +361,14 @@ RECIPES: dict[str, Recipe] = {
     ),
     "nacre.kdtree.KdTree": Recipe(nacre.KdTree, {"points": bumpy(), "num_threads": 1}),
     "nacre.kdtree.KdTree.query": Recipe(
-        tree().query, {"queries": bumpy(10), "k": 3, "max_distance": 0.1, "num_threads": 1}, _neighbors
+        tree().query,
+        {"queries": bumpy(10), "k": 3, "max_distance": 0.1, "distance_upper_bound": 0.1, "workers": 1},
+        _neighbors,
+    ),
+    "nacre.kdtree.KdTree.query_ball_point": Recipe(
+        tree().query_ball_point,
+        {"x": bumpy(10), "r": np.full(10, 0.1), "workers": 1, "return_sorted": True, "return_length": False},
+        _balls,
     ),
     "nacre.kdtree.KdTree.query_radius": Recipe(
         tree().query_radius, {"queries": bumpy(10), "radius": 0.1, "num_threads": 1}, _neighbors_within

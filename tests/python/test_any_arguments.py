@@ -144,7 +144,7 @@ FILES = {
     "nacre.reconstruction.reconstruct.reconstruct",
 }  # fmt: skip
 NOT_OF_ARRAYS = re.compile(
-    r"\.(Sequence|Reconstruction)\.\w+$|\.Model\.cloud$|\.NoiseModel\.to_core$|\.as_dict$"
+    r"\.(Sequence|Reconstruction)\.\w+$|\.(Model|Consolidated)\.cloud$|\.NoiseModel\.to_core$|\.as_dict$"
 )
 
 

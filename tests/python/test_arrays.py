@@ -162,6 +162,48 @@ def test_depth_scale_out_of_range(scale: float) -> None:
         arrays.as_depth("depth", np.zeros((2, 2)), scale)
 
 
+def test_whole_numbers_are_not_taken_for_metres() -> None:
+    millimetres = np.full((3, 4), 600, np.uint16)
+    with pytest.raises(ValueError, match=r"depth_scale must be .*of depth \(1000 for mill.*got 1, .* 600 m"):
+        arrays.as_depth("depth", millimetres)
+    assert arrays.as_depth("depth", np.full((3, 4), 2, np.uint8))[0, 0] == 2.0
+    assert np.isnan(arrays.as_depth("depth", np.array([[0, 65535]], np.uint16))).all()
+
+
+@pytest.mark.parametrize(
+    "colors",
+    [
+        np.array([[0, 128, 255]], np.uint8),
+        np.array([[0, 128, 255]], np.int64),
+        np.array([[0, 128 / 255, 1]]),
+        np.array([[0, 128 / 255, 1]], np.float32),
+        [[0, 128, 255]],
+    ],
+)
+def test_colours_are_whole_or_parts_of_one(colors: Any) -> None:
+    found = arrays.as_colors("colors", colors, (1, 3))
+    assert found.dtype == np.uint8
+    assert found.tolist() == [[0, 128, 255]]
+
+
+@pytest.mark.parametrize(
+    ("colors", "error", "words"),
+    [
+        (np.full((1, 3), 1.5), ValueError, r"got float64 from 1.5 to 1.5; give colors\.astype\(np\.uint8\)"),
+        (np.full((1, 3), -0.5), ValueError, "got float64 from -0.5 to -0.5$"),
+        (np.full((1, 3), np.nan), ValueError, "floats from 0 to 1, got float64 from nan to nan"),
+        (np.full((1, 3), 256), ValueError, "integers from 0 to 255 .*got int64 from 256 to 256$"),
+        (np.ones((1, 3), bool), TypeError, "integers from 0 to 255 or floats from 0 to 1, got bool"),
+        (np.zeros((1, 4)), ValueError, r"shape \(1, 3\), got \(1, 4\): leave alpha out with colors"),
+        (np.zeros((2, 3)), ValueError, r"colors must have shape \(1, 3\), got \(2, 3\)$"),
+        (np.full((1, 3), "red"), TypeError, "colors must be an array of real numbers"),
+    ],
+)
+def test_colours_that_are_none(colors: Any, error: type[Exception], words: str) -> None:
+    with pytest.raises(error, match=words):
+        arrays.as_colors("colors", colors, (1, 3))
+
+
 def test_mask() -> None:
     assert arrays.as_mask("mask", None, (2, 3)).shape == (0, 0)
     values = np.array([[0, 1, 2], [0.5, -1, 0]])

@@ -131,3 +131,46 @@ def test_wrong_types():
         Camera(**{**PINHOLE, "fx": "wide"})
     with pytest.raises(TypeError):
         Camera(64, 48)
+
+
+def test_a_field_of_view_reaches_to_the_edges_of_the_outer_pixels():
+    camera = Camera.from_fov(64, 48, 60.0)
+    edge = np.tan(np.radians(30.0))
+    np.testing.assert_allclose(camera.project([[-edge, 0.0, 1.0], [edge, 0.0, 1.0]])[:, 0], [-0.5, 63.5])
+    assert camera.fx == camera.fy
+    wide = Camera.from_fov(64, 48, 60.0, 60.0, depth="radial")
+    assert wide.fy == pytest.approx(camera.fx * 48 / 64)
+    assert wide.depth == "radial"
+
+
+def test_a_matrix_goes_in_and_out():
+    camera = Camera(**PINHOLE, distortion=BARREL)
+    matrix = [[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]]
+    np.testing.assert_array_equal(camera.matrix, matrix)
+    assert Camera.from_matrix(camera.width, camera.height, matrix, distortion=BARREL) == camera
+
+
+def test_a_camera_of_the_model_is_the_one_given():
+    camera = Camera(**PINHOLE)
+    assert nacre.Model(camera).camera is camera
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "message"),
+    [
+        (lambda: Camera.from_fov(64, 48, 0), ValueError, "horizontal_degrees must be more than 0 .* got 0"),
+        (lambda: Camera.from_fov(64, 48, 60, 180), ValueError, "vertical_degrees must be .* got 180"),
+        (lambda: Camera.from_fov(64, 48, np.nan), ValueError, "horizontal_degrees must be .* got nan"),
+        (lambda: Camera.from_fov(64, 48, "60"), TypeError, "horizontal_degrees must be a number, got '60'"),
+        (lambda: Camera.from_fov(64.5, 48, 60), TypeError, "width must be an integer, got 64.5"),
+        (lambda: Camera.from_fov(64, 0, 60), ValueError, "height must be 1 to 65536 pixels, got 0"),
+        (lambda: Camera.from_matrix(64, 48, np.eye(4)), ValueError, r"matrix must have shape \(3, 3\), got"),
+        (lambda: Camera.from_matrix(64, 48, np.ones((3, 3))), ValueError, r"matrix must be \[\[fx, 0, cx\]"),
+        (lambda: Camera.from_matrix(64, 48, np.full((3, 3), np.nan)), ValueError, "matrix must be finite"),
+        (lambda: Camera.from_matrix(64, 48, np.diag([0, 5, 1])), ValueError, "fx must be"),
+        (lambda: Camera.from_matrix(64, 48, [["a"] * 3] * 3), TypeError, "matrix must be an array of real"),
+    ],
+)
+def test_wrong_fields_of_view_and_matrices(call, error, message):
+    with pytest.raises(error, match=message):
+        call()

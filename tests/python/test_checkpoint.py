@@ -14,6 +14,8 @@ from hostile_files.seals import sealed_model
 from test_determinism import digest
 
 import nacre
+from nacre._internal.checkpoint import POINTS_AND_MESHES
+from nacre.io import meshes, points
 
 Frames = list[dict[str, Any]]
 MESH = nacre.built_in_object()
@@ -97,6 +99,18 @@ def bits(model: nacre.Model) -> str:
 def through_a_file(model: nacre.Model, folder: Path) -> nacre.Model:
     model.save(folder / "model.ckpt")
     return nacre.Model.load(folder / "model.ckpt")
+
+
+def test_every_format_of_points_and_meshes_is_known_to_checkpoints() -> None:
+    assert {*points.SUFFIXES, *meshes.READ_SUFFIXES, *meshes.WRITE_SUFFIXES} == POINTS_AND_MESHES
+
+
+@pytest.mark.parametrize("name", ["model.ply", "MODEL.PCD", "model.obj", "model.glb"])
+def test_a_model_is_not_saved_under_the_name_of_points_or_a_mesh(name: str, tmp_path: Path) -> None:
+    model = nacre.Model(nacre.Camera(8, 6, 8, 8, 3.5, 2.5))
+    with pytest.raises(ValueError, match=r"path must not end in \.\w+, got .*nacre\.write_points\(path,"):
+        model.save(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", SCENES)

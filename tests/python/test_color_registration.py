@@ -101,6 +101,12 @@ def test_other_light_does_not_matter(change: Callable[[Array], Array]) -> None:
     assert off_by(result.target_from_source, PAIR, (0, 0, 0))[0] < 0.0005
 
 
+def test_floats_from_0_to_1_are_the_same_colours() -> None:
+    scaled = align_planes(lambda colors: colors / 255)
+    assert np.allclose(scaled.target_from_source, align_planes().target_from_source, atol=1e-6)
+    assert len(scaled.weak_directions) == 0
+
+
 def test_red_green_and_blue_are_one_brightness() -> None:
     source, gray = plane(np.linalg.inv(PAIR), 1)
     target, target_gray = plane(np.eye(4), 2)

@@ -168,11 +168,12 @@ def test_moves_with_the_points(seed, method):
     rotation, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     shift = rng.uniform(-1, 1, 3)
     order = rng.permutation(len(points))
-    moved = nacre.project_samples(points[:50], points, iterations=2, method=method)
+    options = {"radius": 0.02, "iterations": 2, "method": method}
+    moved = nacre.project_samples(points[:50], points, **options)
     turned = nacre.project_samples(
-        points[:50] @ rotation.T + shift, points[order] @ rotation.T + shift, iterations=2, method=method
+        points[:50] @ rotation.T + shift, points[order] @ rotation.T + shift, **options
     )
-    np.testing.assert_allclose(turned, moved @ rotation.T + shift, atol=5e-5 * 0.008)
+    np.testing.assert_allclose(turned, moved @ rotation.T + shift, atol=5e-5 * 0.02)
 
 
 @settings(max_examples=50, deadline=None)
@@ -298,7 +299,7 @@ def test_attributes_are_means_with_the_weights_of_the_positions():
 def test_attributes_leave_out_what_is_not_finite():
     points = np.array([[0.0, 0, 0], [0.001, 0, 0], [0, 0.001, 0], [1, 1, 1]])
     values = np.array([np.nan, 4.0, np.inf, np.nan])
-    thin = nacre.consolidate(points, attributes={"a": values})
+    thin = nacre.consolidate(points, radius=0.008, attributes={"a": values})
     np.testing.assert_array_equal(thin.attributes["a"], [4, 4, 4, np.nan])
 
 
@@ -361,7 +362,7 @@ def test_defaults_equal_the_cores():
     core = _core.ConsolidateOptions()
     for function in (nacre.consolidate, nacre.project_samples):
         for name, parameter in inspect.signature(function).parameters.items():
-            if hasattr(core, name):
+            if hasattr(core, name) and name != "radius":  # by default from the points
                 default = getattr(core, name)
                 assert parameter.default == getattr(default, "name", default), name
     named = set(inspect.signature(nacre.consolidate).parameters) - {"points", "attributes", "progress"}
@@ -399,7 +400,7 @@ def test_defaults_equal_the_cores():
     ],
 )
 def test_misuse_of_consolidate(change, error, message):
-    arguments = {"points": np.zeros((4, 3))} | change
+    arguments = {"points": np.zeros((4, 3)), "radius": 0.008} | change
     with pytest.raises(error, match=message):
         nacre.consolidate(arguments.pop("points"), **arguments)
 
@@ -421,9 +422,66 @@ def test_misuse_of_consolidate(change, error, message):
     ],
 )
 def test_misuse_of_project_samples(change, error, message):
-    arguments = {"samples": np.zeros((2, 3)), "points": np.zeros((4, 3)), "method": "wlop+"} | change
+    arguments = {"samples": np.zeros((2, 3)), "points": np.zeros((4, 3)), "radius": 1.0, "method": "wlop+"}
+    arguments |= change
     with pytest.raises(error, match=message):
         nacre.project_samples(arguments.pop("samples"), arguments.pop("points"), **arguments)
+
+
+def test_the_default_radius_is_that_of_the_documented_equation():
+    points, _ = sphere(3000)
+    r = np.median(nacre.KdTree(points).query(points, 17)[0][:, -1])
+    expected = 2.5 * r * np.sqrt(np.pi * 3000 / (17 * 500))
+    thin = nacre.consolidate(points, num_points=500)
+    assert thin.radius == pytest.approx(expected, rel=1e-12)
+    given = nacre.consolidate(points, num_points=500, radius=thin.radius)
+    np.testing.assert_array_equal(thin.points, given.points)
+    assert thin == given
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1.0, 1e3])
+def test_the_default_radius_follows_the_unit(unit):
+    points, _ = sphere(2000)
+    radius = nacre.consolidate(points, num_points=300, iterations=0).radius
+    assert nacre.consolidate(unit * points, num_points=300, iterations=0).radius == pytest.approx(
+        unit * radius
+    )
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_the_default_spreads_and_denoises_a_box_of_any_size(method):
+    rng = np.random.default_rng(0)
+    box = np.column_stack([rng.uniform(size=(6000, 2)), 0.01 * rng.normal(size=6000)])  # a noisy side
+    thin = nacre.consolidate(box, num_points=400, method=method)
+    left = np.abs(thin.points[:, 2]).mean() / np.abs(box[:, 2]).mean()
+    assert left < (0.9 if method == "wlop" else 0.5)  # which draws a sample to the point that it starts on
+    assert unevenness(thin.points) < 0.6 * unevenness(box[thin.sources])
+    moved = nacre.project_samples(box[thin.sources], box, method=method)
+    np.testing.assert_allclose(moved, thin.points, atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("points", "where"), [(np.ones((50, 3)), "on top of each other"), (1e300 * np.eye(3), "too far from")]
+)
+def test_where_no_radius_can_be_told_it_must_be_given(points, where):
+    with pytest.raises(ValueError, match=f"radius must be given, got None: the points lie {where}"):
+        nacre.consolidate(points)
+    with pytest.raises(ValueError, match=f"radius must be given, got None: the points lie {where}"):
+        nacre.project_samples(points, points)
+
+
+def test_a_single_point_stays_without_a_radius():
+    np.testing.assert_array_equal(nacre.consolidate([[1.0, 2, 3]]).points, [[1, 2, 3]])
+
+
+def test_the_result_is_taken_for_its_points(tmp_path):
+    points, normals = sphere(500)
+    thin = nacre.consolidate(points, num_points=50, attributes={"normals": normals, "height": points[:, 2]})
+    np.testing.assert_array_equal(np.asarray(thin), thin.points)
+    nacre.write_points(tmp_path / "thin.ply", thin)
+    written = nacre.read_points(tmp_path / "thin.ply")
+    np.testing.assert_array_equal(written.normals, thin.attributes["normals"])
+    np.testing.assert_array_equal(written.attributes["height"], thin.attributes["height"])
 
 
 @pytest.mark.data

@@ -36,6 +36,25 @@ def test_the_python_of_a_page_runs(page: Path, tmp_path: Path, monkeypatch: pyte
         exec(compile(block, page.name, "exec"), names)
 
 
+def calls_of_tables(page: Path) -> list[str]:
+    """Return the code of the second column of a page's tables."""
+    rows = re.findall(r"^\|[^|]*\|([^|]*)\|", page.read_text(encoding="utf-8"), re.MULTILINE)
+    return [code for cell in rows for code in re.findall(r"`([^`]+)`", cell)]
+
+
+def test_the_calls_beside_those_of_other_libraries_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    page = DOCS / "coming-from.md"
+    names: dict[str, object] = {}
+    exec(compile(blocks(page, "python")[0], page.name, "exec"), names)
+    calls = calls_of_tables(page)
+    assert len(calls) > 50
+    for call in calls:
+        eval(compile(call, page.name, "eval"), names)
+
+
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_commands_of_a_page_exist(page: Path) -> None:
     from nacre.cli.app import app

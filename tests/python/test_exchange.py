@@ -96,6 +96,64 @@ def test_notebooks_get_a_picture(model: nacre.Model) -> None:
     assert nacre.Model(model.camera)._repr_png_() is None
 
 
+def test_numpy_takes_a_cloud_for_its_points() -> None:
+    cloud = nacre.Cloud(np.arange(12.0).reshape(4, 3))
+    assert np.shares_memory(np.asarray(cloud), cloud.points)
+    assert not np.shares_memory(np.array(cloud), cloud.points)
+    assert np.asarray(cloud, np.float32).dtype == np.float32
+    with pytest.raises(ValueError, match="copy must be True or None for points as float32, got False"):
+        cloud.__array__(np.float32, copy=False)
+
+
+def test_some_rows_of_a_cloud_keep_what_belongs_to_them() -> None:
+    points = np.arange(12.0).reshape(4, 3)
+    cloud = nacre.Cloud(points, points, np.eye(4, 3, dtype=np.uint8), {"i": np.arange(4)}, ("hello",))
+    mask = np.array([False, True, False, True])
+    for some in (cloud[mask], cloud[[1, 3]], cloud[1::2], cloud[mask.tolist()]):
+        assert some.points.tolist() == some.normals.tolist() == points[[1, 3]].tolist()
+        assert some.colors.tolist() == [[0, 1, 0], [0, 0, 0]]
+        assert some.attributes["i"].tolist() == [1, 3]
+        assert some.comments == ("hello",)
+    assert len(cloud[[]]) == len(nacre.Cloud(points)[:0]) == 0
+
+
+@pytest.mark.parametrize("rows", [0, 1.0, "points", [0.5], [[0, 1]], None])
+def test_rows_are_a_slice_a_mask_or_indices(rows: object) -> None:
+    with pytest.raises(TypeError, match=r"rows must be a slice, a mask or indices, got .*cloud\.points\[0\]"):
+        nacre.Cloud(np.zeros((4, 3)))[rows]  # type: ignore[index]
+
+
+@pytest.mark.parametrize("rows", [[4], [True, False]])
+def test_rows_that_are_not_there(rows: list[int]) -> None:
+    with pytest.raises(IndexError):
+        nacre.Cloud(np.zeros((4, 3)))[rows]
+
+
+def test_a_cloud_a_model_and_a_result_are_written_with_all_they_have(
+    model: nacre.Model, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.ply"
+    nacre.write_points(path, model)
+    cloud, expected = nacre.read_points(path), model.cloud()
+    assert np.array_equal(cloud.points, expected.points)
+    assert np.array_equal(cloud.normals, expected.normals)
+    assert np.array_equal(cloud.colors, expected.colors)
+    assert np.array_equal(cloud.attributes["confidence"], expected.attributes["confidence"])
+    nacre.write_points(path, cloud, normals=-cloud.normals, attributes={})
+    again = nacre.read_points(path)
+    assert np.array_equal(again.normals, -cloud.normals)
+    assert np.array_equal(again.colors, cloud.colors)
+    assert again.attributes == {}
+
+
+def test_a_mesh_is_not_an_array() -> None:
+    mesh = nacre.Mesh(np.eye(3), [[0, 1, 2]])
+    with pytest.raises(TypeError, match="a Mesh is two arrays: give its vertices or its triangles"):
+        np.asarray(mesh)
+    with pytest.raises(ValueError, match=r"points must be an array, got Mesh: a Mesh is two arrays"):
+        nacre.KdTree(mesh)
+
+
 def test_notebooks_get_pictures_of_clouds_and_frames(model: nacre.Model) -> None:
     opened = pytest.importorskip("PIL.Image").open
     thin = nacre.consolidate(model.points, num_points=200, attributes={"normals": model.normals})

@@ -1,4 +1,5 @@
 import copy
+import math
 import pickle
 
 import numpy as np
@@ -199,6 +200,37 @@ def test_the_tree_keeps_its_own_points():
         ),
         (lambda tree: tree.query([0, 0, 0], max_distance="far"), TypeError, "max_distance must be a number"),
         (lambda tree: tree.query([0, 0, 0], num_threads=1.0), TypeError, "num_threads must be an integer"),
+        (
+            lambda tree: tree.query([0, 0, 0], distance_upper_bound=-1),
+            ValueError,
+            "distance_upper_bound must be at least 0, got -1",
+        ),
+        (
+            lambda tree: tree.query([0, 0, 0], workers=0),
+            ValueError,
+            r"workers must be -1 \(all\) or at least 1",
+        ),
+        (lambda tree: tree.query([0, 0, 0], workers=-2), ValueError, "workers must be .*at least -1, got -2"),
+        (lambda tree: tree.query([0, 0, 0], workers=1.0), TypeError, "workers must be an integer, got 1.0"),
+        (lambda tree: tree.query_ball_point([0, 0], 1), ValueError, r"x must have shape \(\.\.\., 3\)"),
+        (lambda tree: tree.query_ball_point([0, 0, 0], -1), ValueError, "r must be at least 0, got -1"),
+        (lambda tree: tree.query_ball_point([0, 0, 0], np.nan), ValueError, "r must be at least 0, got nan"),
+        (lambda tree: tree.query_ball_point([0, 0, 0], "1"), TypeError, "r must be an array of real numbers"),
+        (
+            lambda tree: tree.query_ball_point(np.zeros((2, 3)), [1, 2, 3]),
+            ValueError,
+            r"r must be one number, or as many as queries \(2,\), got \(3,\)",
+        ),
+        (
+            lambda tree: tree.query_ball_point([0, 0, 0], 1, return_length=1),
+            TypeError,
+            "return_length must be True or False, got 1",
+        ),
+        (
+            lambda tree: tree.query_ball_point([0, 0, 0], 1, return_sorted="no"),
+            TypeError,
+            "return_sorted must be True or False",
+        ),
         (lambda tree: tree.query_radius([0, 0, 0], -0.1), ValueError, "radius must be at least 0"),
         (
             lambda tree: tree.query_radius(np.zeros((2, 2, 3)), 1),
@@ -210,3 +242,55 @@ def test_the_tree_keeps_its_own_points():
 def test_illegal_arguments(call, error, message):
     with pytest.raises(error, match=message):
         call(nacre.KdTree([[0.0, 0.0, 0.0]]))
+
+
+def lattice(count, seed):
+    """Points with whole coordinates, so that many distances are equal to a bound."""
+    return np.random.default_rng(seed).integers(0, 5, (count, 3)).astype(np.float64)
+
+
+@pytest.mark.parametrize("bound", [0.0, 1.0, 2.0, np.inf])
+def test_an_upper_bound_is_that_of_scipy(bound):
+    spatial = pytest.importorskip("scipy.spatial")
+    points, queries = np.unique(lattice(60, 1), axis=0), lattice(20, 2) + np.array([0.25, 0.0, 0.0])
+    expected = spatial.cKDTree(points).query(queries, 9, distance_upper_bound=bound)
+    found = nacre.KdTree(points).query(queries, 9, distance_upper_bound=bound, workers=-1)
+    np.testing.assert_allclose(found[0], expected[0], rtol=1e-15)
+    np.testing.assert_array_equal(np.isinf(found[0]), found[1] == len(points))
+    assert nacre.KdTree(points).query(points[0], distance_upper_bound=bound, max_distance=5.0)[1] == (
+        0 if bound > 0 else len(points)
+    )
+
+
+@pytest.mark.parametrize("radius", [0.0, 1.0, "one for each"])
+@pytest.mark.parametrize("shape", [(), (7,), (2, 3), (0,)])
+def test_balls_are_those_of_scipy(radius, shape):
+    spatial = pytest.importorskip("scipy.spatial")
+    points, queries = lattice(80, 3), np.resize(lattice(9, 4), (*shape, 3))
+    r = np.linspace(0, 3, math.prod(shape)).reshape(shape) if radius == "one for each" else radius
+    theirs, ours = spatial.cKDTree(points), nacre.KdTree(points)
+    for options in ({}, {"return_sorted": True}, {"return_length": True}):
+        expected = theirs.query_ball_point(queries, r, **options)
+        found = ours.query_ball_point(queries, r, **options)
+        assert np.shape(found) == np.shape(expected) if shape else type(found) is not np.ndarray
+        if options.get("return_length"):
+            np.testing.assert_array_equal(found, expected)
+        elif shape:
+            assert [sorted(row) for row in np.ravel(expected)] == list(np.ravel(found))
+        else:
+            assert sorted(expected) == found
+
+
+def test_a_ball_has_the_nearest_first_where_it_is_not_sorted():
+    tree = nacre.KdTree([[3.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [np.nan, 0, 0]])
+    assert tree.query_ball_point([0, 0, 0], 9, return_sorted=False) == [1, 2, 0]
+    assert tree.query_ball_point([np.nan, 0, 0], 9) == []
+
+
+def test_bounds_are_compared_in_double_precision():
+    tree, query = nacre.KdTree([[0.1, 0.0, 0.0]]), np.zeros(3, np.float32)
+    assert tree.query(query, distance_upper_bound=0.1)[1] == 1
+    distance, index = tree.query(query, distance_upper_bound=np.nextafter(0.1, 1.0))
+    assert (distance.dtype, index) == (np.float32, 0)
+    assert tree.query_ball_point(query, 0.1) == [0]
+    assert tree.query_ball_point(query, np.nextafter(0.1, 0.0)) == []

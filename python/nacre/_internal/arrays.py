@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import operator
+import os
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -15,6 +16,9 @@ FloatArray = npt.NDArray[np.float32] | npt.NDArray[np.float64]
 
 FARTHEST = 1e30
 """Positions that are farther away [m] are none: their squares are to be computed with."""
+
+MOST_METRES = 50.0
+"""The median depth [m] of an image whose unit can be right, as of the model."""
 
 
 def as_array(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
@@ -54,6 +58,10 @@ def as_points(name: str, value: npt.ArrayLike) -> FloatArray:
     float32 and float64 arrays that are already C-contiguous are returned as they are; other real dtypes
     become float64.
     """
+    if isinstance(value, str | os.PathLike):
+        raise TypeError(
+            f"{name} must be an array of real numbers, got {value!r}; nacre.read_points(path) reads a file"
+        )
     array = as_real(name, value)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} must have shape (N, 3), got {array.shape}")
@@ -175,15 +183,52 @@ def as_depth(name: str, value: npt.ArrayLike, depth_scale: float = 1.0) -> npt.N
     if array.ndim != 2:
         raise ValueError(f"{name} must have shape (H, W), got {array.shape}")
     scale = as_scale("depth_scale", depth_scale)
-    if array.dtype == np.uint16:
-        return _core.depth_from_raw(as_rows(array, np.uint16), scale)
-    metres = as_rows(array, np.float32)
-    if array.dtype.kind in "bui":
-        metres = np.where((array == 0) | (array == 65535), np.float32(np.nan), metres)
+    if scale == 1.0 and array.dtype.kind in "ui":
+        _check_whole_metres(name, array)
+    return in_metres(array, scale)
+
+
+def in_metres(stored: npt.NDArray[Any], scale: float) -> npt.NDArray[np.float32]:
+    """Return a stored depth image in float32 metres."""
+    if stored.dtype == np.uint16:
+        return _core.depth_from_raw(as_rows(stored, np.uint16), scale)
+    metres = as_rows(stored, np.float32)
+    if stored.dtype.kind in "bui":
+        metres = np.where((stored == 0) | (stored == 65535), np.float32(np.nan), metres)
     if scale != 1.0:
         with np.errstate(over="ignore"):
             metres = metres / np.float32(scale)
     return metres
+
+
+def _check_whole_metres(name: str, stored: npt.NDArray[Any]) -> None:
+    """Raise where integers cannot be metres: those of most cameras are millimetres."""
+    measured = stored[(stored > 0) & (stored != 65535)]
+    if measured.size and np.median(measured) > MOST_METRES:
+        raise ValueError(
+            f"depth_scale must be the stored units per metre of {name} (1000 for millimetres, 5000 for TUM), "
+            f"got 1, with which its median depth is {np.median(measured):g} m"
+        )
+
+
+def as_colors(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> npt.NDArray[np.uint8]:
+    """Return colours as uint8 of a shape: integers from 0 to 255 as they are, floats from 0 to 1 scaled."""
+    array = as_real(name, value)
+    if array.shape != shape:
+        alpha = f": leave alpha out with {name}[..., :3]" * (array.shape == (*shape[:-1], 4))
+        raise ValueError(f"{name} must have shape {shape}, got {array.shape}{alpha}")
+    if array.dtype == np.uint8:
+        return as_rows(array, np.uint8)
+    if array.dtype.kind == "b":
+        raise TypeError(f"{name} must be integers from 0 to 255 or floats from 0 to 1, got bool")
+    largest = 1 if array.dtype.kind == "f" else 255
+    if array.size and not (array.min() >= 0 and array.max() <= largest):
+        of_bytes = f"; give {name}.astype(np.uint8)" * bool(array.min() >= 0 and array.max() <= 255)
+        raise ValueError(
+            f"{name} must be integers from 0 to 255 or floats from 0 to 1, got {array.dtype} from "
+            f"{array.min():g} to {array.max():g}{of_bytes}"
+        )
+    return np.rint(array * (255 / largest)).astype(np.uint8) if largest == 1 else as_rows(array, np.uint8)
 
 
 def as_mask(name: str, value: npt.ArrayLike | None, shape: tuple[int, int]) -> npt.NDArray[np.uint8]:
@@ -227,6 +272,18 @@ def as_attributes(
         rows = array.reshape(shape[0] * shape[1], -1)
         images.append((key, as_rows(rows, np.float32)))
     return images
+
+
+def as_dtype(values: npt.NDArray[np.float64], dtype: np.dtype[Any]) -> npt.NDArray[Any]:
+    """Return means in the type of what they are of: rounded and in range for integers."""
+    if dtype.kind == "f":
+        return values.astype(dtype)
+    if dtype.kind == "b":
+        return values >= 0.5
+    info = np.iinfo(dtype)
+    # The largest float64 that the type can hold: its own maximum may round up and out of range.
+    largest = float(info.max) if int(float(info.max)) <= info.max else np.nextafter(float(info.max), 0.0)
+    return np.clip(np.rint(values), float(info.min), largest).astype(dtype)
 
 
 def localize(points: FloatArray) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float64]]:
@@ -326,5 +383,15 @@ def as_flag(name: str, value: Any) -> bool:
 def as_camera(name: str, value: Any) -> _core.Camera:
     """Return ``value``, which must be a camera."""
     if not isinstance(value, _core.Camera):
-        raise TypeError(f"{name} must be a nacre.Camera, got {type(value).__name__}")
+        raise TypeError(f"{name} must be a nacre.Camera, got {type(value).__name__}{_way_to_a_camera(value)}")
     return value
+
+
+def _way_to_a_camera(value: Any) -> str:
+    """Say how to make a camera of what was given in place of one."""
+    if hasattr(value, "camera"):
+        return "; give its .camera"
+    if isinstance(value, str | os.PathLike):
+        return "; give nacre.read_camera(path).camera"
+    is_matrix = isinstance(value, np.ndarray) and value.shape == (3, 3)
+    return "; nacre.Camera.from_matrix(width, height, K) makes one" * is_matrix

@@ -6,14 +6,21 @@ import json
 import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from nacre import _core
 from nacre._internal.arrays import as_scale
+from nacre._internal.guided import GuidedNames
 from nacre.errors import FileFormatError
 
+POINTS_AND_MESHES = frozenset([
+    ".ply", ".pcd", ".las", ".laz", ".e57", ".xyz", ".npz", ".glb", ".obj", ".off", ".stl",
+])  # fmt: skip
+"""What their files end in: not asked of ``nacre.io``, as the handler of a signal may save amid an import."""
 
-class Checkpointed(ABC):
+
+class Checkpointed(GuidedNames, ABC):
     """What can be written to a file between any two frames, and goes on from there to the same bits."""
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -32,9 +39,17 @@ class Checkpointed(ABC):
 
         Raises
         ------
+        ValueError
+            The file is named like one of points or a mesh, which it would not be.
         OSError
             The file cannot be written; what was there before is left as it was.
         """
+        ending = Path(path).suffix.lower()
+        if ending in POINTS_AND_MESHES:
+            raise ValueError(
+                f"path must not end in {ending}, got {os.fspath(path)!r}: what is saved is to go on from; "
+                "nacre.write_points(path, model) and nacre.write_mesh(path, model.to_mesh()) write the model"
+            )
         self._save(path)
 
     def _save(self, path: str | os.PathLike[str], **more: Any) -> None:

@@ -9,6 +9,7 @@ from typing import Any, TypeVar, get_args, get_type_hints
 import numpy as np
 
 from nacre._internal.arrays import as_number
+from nacre._internal.names_elsewhere import PARAMETERS
 from nacre.errors import meant
 
 Core = TypeVar("Core")
@@ -86,7 +87,7 @@ def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
         names = [field.name for field in dataclasses.fields(parameters)]  # type: ignore[arg-type]
         if head not in names or (dot and not rest):
             raise ValueError(
-                f"there is no parameter {name!r} in {type(parameters).__name__}{meant(head, names)}; "
+                f"there is no parameter {name!r} in {type(parameters).__name__}{_meant(head, parameters)}; "
                 f"it has {', '.join(names)}"
             )
         current = getattr(parameters, head)
@@ -98,6 +99,21 @@ def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
             value = as_number(name, value)
         parameters = dataclasses.replace(parameters, **{head: value})  # type: ignore[type-var]
     return parameters
+
+
+def _meant(word: str, parameters: Any) -> str:
+    """Return a hint: the parameter that a library calls so, the one of a group, or the nearest name."""
+    names = [field.name for field in dataclasses.fields(parameters)]
+    found = PARAMETERS.get(word, word)
+    group, _, last = found.rpartition(".")
+    groups = [
+        name for name in names if word in getattr(getattr(parameters, name), "__dataclass_fields__", ())
+    ]
+    if not group and found not in names and groups:
+        group, last = groups[0], word
+    if group in names:
+        return f" (it is {group}.{last}: {group}={{{last!r}: ...}})"
+    return f" (it is {found})" if found in names else meant(word, names)
 
 
 def as_choice(name: str, value: Any, choices: Mapping[str, Core]) -> Core:

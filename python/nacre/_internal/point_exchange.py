@@ -8,12 +8,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre._internal.guided import GuidedNames
+
 if TYPE_CHECKING:
     from nacre.io.cloud import Cloud
     from nacre.mesh import Mesh
 
 
-class ExchangeablePoints(ABC):
+class ArrayOfPoints(GuidedNames):
+    """What has points is taken for them by NumPy's functions, and so by nacre's."""
+
+    __slots__ = ()
+
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        """Return the points (N, 3)."""
+        points: npt.NDArray[Any] = self.points  # type: ignore[attr-defined]
+        array = points.astype(points.dtype if dtype is None else dtype, copy=bool(copy))
+        if copy is False and array is not points:
+            raise ValueError(f"copy must be True or None for points as {array.dtype}, got False")
+        return array
+
+
+class ExchangeablePoints(ArrayOfPoints, ABC):
     """Gives points to other libraries, which are imported when they are asked for."""
 
     @property
@@ -92,11 +108,10 @@ class ExchangeablePoints(ABC):
         return trimesh.PointCloud(self.points, colors=self.colors, metadata={"normals": self.normals})
 
     def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]:
-        """Return the points (N, 3), so that NumPy's functions take the model itself."""
+        """Return a copy of the points (N, 3)."""
         if copy is False:
             raise ValueError("copy must be True or None: the points of a model are always copied, got False")
-        points = self.points
-        return points if dtype is None else points.astype(dtype, copy=False)
+        return super().__array__(dtype)
 
     def _repr_png_(self) -> bytes | None:
         """Return a picture of the points, which notebooks show in place of the words of ``repr``."""

@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from nacre._internal.guided import GuidedNames
 
-class Value:
+
+class Value(GuidedNames):
     """
     Base of frozen dataclasses that hold arrays; they need ``eq=False``.
 

@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, to_json, writable_file
-
-if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
 
 
 class Method(str, Enum):
@@ -68,9 +63,6 @@ def consolidate(
     finite = int(np.isfinite(cloud.points).all(axis=1).sum())
     if finite == 0:
         raise CommandError(f"{source}: no point of {len(cloud)} is finite")
-    given = radius is not None
-    if radius is None:
-        radius = default_radius(cloud.points, num_points)
     attributes = dict(cloud.attributes)
     left_out = [name for name, array in attributes.items() if array.dtype.kind not in "buif"]
     for name in left_out:
@@ -78,16 +70,21 @@ def consolidate(
     cargo = dict(attributes)
     own = {"normals": cloud.normals, "colors": cloud.colors}
     cargo |= {name: array for name, array in own.items() if array is not None}
-    result = nacre.consolidate(
-        cloud.points,
-        radius=radius,
-        num_points=num_points,
-        iterations=iterations,
-        mu=mu,
-        method=method.value,
-        attributes=cargo,
-        seed=seed,
-    )
+    try:
+        result = nacre.consolidate(
+            cloud.points,
+            radius=radius,
+            num_points=num_points,
+            iterations=iterations,
+            mu=mu,
+            method=method.value,
+            attributes=cargo,
+            seed=seed,
+        )
+    except ValueError as error:
+        if radius is not None:
+            raise
+        raise CommandError(f"{error}; give --radius", 2) from None
     nacre.write_points(
         out,
         result.points,
@@ -97,38 +94,22 @@ def consolidate(
     )
     before, after = uniformity(cloud.points), uniformity(result.points)
     carried = [*(name for name, array in own.items() if array is not None), *attributes]
-    terminal.say(f"radius {radius:.4g} ({'given' if given else 'from the density of the points'})")
+    origin = "from the density of the points" if radius is None else "given"
+    terminal.say(f"radius {result.radius:.4g} ({origin})")
     terminal.say(f"{count(len(cloud))} points to {count(len(result))} in {out}")
-    terminal.say(
-        f"uniformity {before.coefficient_of_variation:.3f} to {after.coefficient_of_variation:.3f} "
-        "(variation of spacing; random points: 0.52)"
-    )
+    if len(result) > 1:
+        terminal.say(
+            f"uniformity {before.coefficient_of_variation:.3f} to {after.coefficient_of_variation:.3f} "
+            "(variation of spacing; random points: 0.52)"
+        )
     terminal.say(f"carried along: {', '.join(carried) or 'nothing else was there'}")
     if left_out:
         terminal.say(f"left out (not numbers): {', '.join(left_out)}")
     if json:
         figures: dict[str, Any] = {
-            "out": out, "radius": radius, "radius_given": given,
+            "out": out, "radius": result.radius, "radius_given": radius is not None,
             "num_input": len(cloud), "num_points": len(result),
             "uniformity": after.as_dict(), "uniformity_before": before.as_dict(), "carried": carried,
             "left_out": left_out,
         }  # fmt: skip
         print(to_json(figures))
-
-
-def default_radius(points: npt.NDArray[np.floating[Any]], num_points: int) -> float:
-    """Return 2.5 times the distance that so many points will have, which the neighbours' density tells."""
-    import numpy as np
-
-    import nacre
-
-    cloud = points[np.isfinite(points).all(axis=1)]
-    k = min(17, len(cloud))
-    probes = cloud[:: max(len(cloud) // 5000, 1)]
-    reach = float(np.median(nacre.KdTree(cloud).query(probes, k=k)[0].reshape(len(probes), -1)[:, -1]))
-    if not 0 < reach < math.inf:
-        where = "on top of each other" if reach == 0 else "too far from each other"
-        raise CommandError(f"the points lie {where}; give --radius", 2)
-    kept = min(num_points / len(cloud), 1.0)
-    per_area = k * kept / math.pi  # [1 / reach^2]
-    return float(f"{2.5 * reach / math.sqrt(per_area):.3g}")

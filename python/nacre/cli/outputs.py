@@ -36,17 +36,12 @@ def write_results(
     """Write the files of a run, the page if wanted, and return what report.json, the last one, holds."""
     import nacre
 
-    cloud = done.cloud
     nacre.write_points(
         folder / "model.ply",
-        cloud.points,
-        normals=cloud.normals,
-        colors=cloud.colors,
-        attributes=cloud.attributes,
+        done.cloud,
         comments=[f"nacre {nacre.__version__}", "metres; the world is the first camera's frame"],
     )
-    trajectory = done.trajectory
-    nacre.write_trajectory(folder / "trajectory.txt", trajectory.timestamps, trajectory.poses)
+    nacre.write_trajectory(folder / "trajectory.txt", done.trajectory)
     if page:
         from nacre.report import render_page
 

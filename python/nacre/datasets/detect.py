@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from nacre import Camera
 from nacre.datasets import (
@@ -51,7 +51,7 @@ FILE_SUFFIXES = (*rosbag.SUFFIXES, *record3d.SUFFIXES, *azure_kinect.SUFFIXES)
 
 
 def open_sequence(
-    path: str | os.PathLike[str],
+    path: str | os.PathLike[str] | Iterable[Any],
     *,
     format: str | None = None,
     camera: Camera | str | os.PathLike[str] | None = None,
@@ -63,8 +63,10 @@ def open_sequence(
 
     Parameters
     ----------
-    path : path-like
+    path : path-like, or iterable of path-like
         The folder of the recording, a file (``.bag``, ``.mcap``, ``.db3``, ``.r3d``), or a single range scan.
+        Or depth images in their order, an iterable of paths, or of pairs of a depth and a colour image; then
+        ``camera`` and ``depth_scale`` are needed.
     format : str, optional
         ``"tum"``, ``"redwood"`` (also Open3D), ``"7-scenes"``, ``"icl-nuim"``, ``"stray-scanner"``,
         ``"rosbag"`` (ROS 1 and 2, MCAP, RealSense), ``"record3d"``, ``"azure-kinect"`` (images of an
@@ -98,10 +100,6 @@ def open_sequence(
     >>> for frame in sequence:  # doctest: +SKIP
     ...     model.add_frame(frame.depth, color=frame.color, timestamp=frame.timestamp)
     """
-    folder = Path(path)
-    if not folder.exists():
-        beside = [p.name for p in folder.parent.iterdir()] if folder.parent.is_dir() else []
-        raise FileNotFoundError(f"no such recording: {folder}{meant(folder.name, beside)}")
     if depth_scale is not None and not (math.isfinite(depth_scale) and depth_scale > 0):
         raise ValueError(
             f"depth_scale must be a positive number of stored units per metre, got {depth_scale!r}"
@@ -112,6 +110,16 @@ def open_sequence(
         found = read_camera(camera)
         camera, depth_scale = found.camera, depth_scale if depth_scale is not None else found.depth_scale
     given = Overrides(camera, depth_scale, max_difference)
+    if not isinstance(path, str | os.PathLike):
+        if not isinstance(path, Iterable):
+            raise TypeError(f"path must be a path, or paths of depth images, got {type(path).__name__}")
+        if format not in (None, images.FORMAT):
+            raise ValueError(f"format must be None or {images.FORMAT!r} for a list of images, got {format!r}")
+        return check_first_view(images.read_listed(path, given))
+    folder = Path(path)
+    if not folder.exists():
+        beside = [p.name for p in folder.parent.iterdir()] if folder.parent.is_dir() else []
+        raise FileNotFoundError(f"no such recording: {folder}{meant(folder.name, beside)}")
     reader = _named(format) if format is not None else _recognised(folder, given)
     return check_first_view(reader.read(folder, given))
 

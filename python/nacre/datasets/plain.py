@@ -115,8 +115,8 @@ def write_recording(
         Metres; 0, negative and not finite values mean no measurement.
     depth_scale : float
         Stored units per metre. The depth is rounded to the nearest unit.
-    colors : iterable of (H, W, 3) uint8 arrays, optional
-        RGB, one for each depth image.
+    colors : iterable of (H, W, 3) arrays, optional
+        RGB, integers from 0 to 255 or floats from 0 to 1, one for each depth image.
     poses : iterable of (4, 4) arrays, optional
         True ``world_from_camera``, one for each depth image.
     timestamps : iterable of float, optional
@@ -153,12 +153,7 @@ def write_recording(
             folder / "depth" / f"{index:06d}.png", _stored(view["depth_images"], camera, depth_scale, index)
         )
         if "colors" in view:
-            color = arrays.as_real(f"colors[{index}]", view["colors"])
-            if color.shape != (camera.height, camera.width, 3) or color.dtype != np.uint8:
-                raise ValueError(
-                    f"colors[{index}] must have shape ({camera.height}, {camera.width}, 3) and dtype uint8, "
-                    f"got {color.shape} and {color.dtype}"
-                )
+            color = arrays.as_colors(f"colors[{index}]", view["colors"], (camera.height, camera.width, 3))
             write_color_png(folder / "color" / f"{index:06d}.png", color)
         times.append(arrays.as_number(f"timestamps[{index}]", view.get("timestamps", index)))
         if "poses" in view:

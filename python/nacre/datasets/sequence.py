@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from nacre import Camera
 from nacre._internal import arrays
+from nacre._internal.guided import guided
 from nacre._internal.value_equality import Value
 from nacre.datasets.listing import files, pair
 from nacre.datasets.sanity_check import depth_oddity
@@ -135,6 +136,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         A trajectory that came along but is somebody's estimate.
     """
 
+    @guided("nacre.open_sequence(path) opens a recording")
     def __init__(
         self,
         path: Path,
@@ -360,7 +362,7 @@ class _FrameIterator(Iterator[SequenceFrame]):
 def load_depth_metres(path: Path, depth_scale: float) -> npt.NDArray[np.float32]:
     """Read a depth image as float32 metres; 0, 65535, negative and not finite values become NaN."""
     stored = read_depth(path)
-    metres = arrays.as_depth("depth", stored, depth_scale)
+    metres = arrays.in_metres(stored, depth_scale)
     invalid = ~(metres > 0) | ~np.isfinite(metres) | (stored == 65535)
     return np.where(invalid, np.float32(np.nan), metres)
 

@@ -12,6 +12,7 @@ from typing import Any
 
 from nacre import Camera
 from nacre._internal.arrays import as_camera, as_scale
+from nacre._internal.guided import GuidedNames
 from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
 from nacre.io.image_limits import MAX_PIXELS
@@ -30,7 +31,7 @@ _KEYS = {
 
 
 @dataclass(frozen=True)
-class CameraFile:
+class CameraFile(GuidedNames):
     """
     What a camera file says.
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal import arrays
+from nacre._internal.point_exchange import ArrayOfPoints
 from nacre._internal.value_equality import Value
 from nacre.io.raw import MAX_COMMENTS
 
@@ -18,7 +19,7 @@ Columns = dict[str, npt.NDArray[Any]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cloud(Value):
+class Cloud(ArrayOfPoints, Value):
     """
     The points of a file with everything that the file holds for each of them.
 
@@ -51,6 +52,26 @@ class Cloud(Value):
     def __len__(self) -> int:
         return len(self.points)
 
+    def __getitem__(self, rows: slice | npt.ArrayLike) -> Cloud:
+        """Return some of the points with all that belongs to them: a slice, a mask or indices."""
+        if not isinstance(rows, slice):
+            picked = arrays.as_array("rows", rows)
+            if picked.ndim != 1 or (picked.size and picked.dtype.kind not in "bui"):
+                raise TypeError(
+                    f"rows must be a slice, a mask or indices, got {rows!r}; one is cloud.points[0]"
+                )
+            rows = picked if picked.size else np.zeros(0, np.int64)
+        return Cloud(
+            self.points[rows],
+            None if self.normals is None else self.normals[rows],
+            None if self.colors is None else self.colors[rows],
+            {name: values[rows] for name, values in self.attributes.items()},
+            self.comments,
+            path=self.path,
+        )
+
+    __iter__ = None  # rows are iterated over as arrays: cloud.points
+
     def __repr__(self) -> str:
         parts = [f"{len(self)} points", self.points.dtype.name]
         if self.shape is not None:
@@ -65,6 +86,14 @@ class Cloud(Value):
         from nacre.report.notebook_pictures import picture_of_points
 
         return picture_of_points(self.points, self.normals, self.colors)
+
+
+def cloud_of(points: Any) -> Cloud:
+    """Return points as a cloud: themselves, that of what has one, or an array without more."""
+    own = points if isinstance(points, Cloud) else getattr(points, "cloud", None)
+    if callable(own):
+        own = own()
+    return own if isinstance(own, Cloud) else Cloud(arrays.as_points("points", points))
 
 
 def gather_columns(columns: Columns, names: tuple[str, ...]) -> npt.NDArray[Any]:
@@ -98,7 +127,7 @@ def check_cloud(
     if normals is not None:
         normals = arrays.as_matching_points("normals", normals, "points", len(points))
     if colors is not None:
-        colors = _as_colors(colors, len(points))
+        colors = arrays.as_colors("colors", colors, (len(points), 3))
     checked = {name: _as_attribute(name, value, len(points)) for name, value in (attributes or {}).items()}
     return Cloud(points, normals, colors, checked)
 
@@ -119,17 +148,6 @@ def check_comments(comments: Sequence[str]) -> list[str]:
     if len(lines) > MAX_COMMENTS:
         raise ValueError(f"comments must be at most {MAX_COMMENTS} lines, got {len(lines)}")
     return lines
-
-
-def _as_colors(value: npt.ArrayLike, num_points: int) -> npt.NDArray[np.uint8]:
-    array = arrays.as_array("colors", value)
-    if array.shape != (num_points, 3):
-        raise ValueError(f"colors must have shape ({num_points}, 3), one row per point, got {array.shape}")
-    if array.dtype.kind not in "ui":
-        raise TypeError(f"colors must be integers from 0 to 255, got dtype {array.dtype}")
-    if array.size and (array.min() < 0 or array.max() > 255):
-        raise ValueError(f"colors must be integers from 0 to 255, got {array.min()} to {array.max()}")
-    return array.astype(np.uint8, copy=False)
 
 
 def _as_attribute(name: str, value: npt.ArrayLike, num_points: int) -> npt.NDArray[Any]:

@@ -97,7 +97,7 @@ def write_mesh(
         Indices of the corners, counted from 0; not with a Mesh, which has its own.
     normals : (N, 3) array, optional
         Of the vertices; stored by the same rule. Of any length, but in GLB files of unit length.
-    colors : (N, 3) array of integers from 0 to 255, optional
+    colors : (N, 3) array of integers from 0 to 255, or of floats from 0 to 1, optional
         Red, green, blue of the vertices.
     attributes : mapping of str to (N,) or (N, K) array, optional
         More of the vertices; PLY alone has a place for them.

@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_flag
+from nacre._internal.guided import guided
 from nacre.io import e57, las, npz, pcd, ply, xyz
-from nacre.io.cloud import Cloud, check_cloud
+from nacre.io.cloud import Cloud, check_cloud, cloud_of
 
 _FORMATS = {".ply": ply, ".pcd": pcd, ".las": las, ".laz": las, ".e57": e57, ".xyz": xyz, ".npz": npz}
 
@@ -63,9 +65,10 @@ def read_points(path: str | os.PathLike[str]) -> Cloud:
     return cloud
 
 
+@guided(write_ascii="it is binary=False", pointcloud="points", filename="path")
 def write_points(
     path: str | os.PathLike[str],
-    points: npt.ArrayLike,
+    points: Any,
     *,
     normals: npt.ArrayLike | None = None,
     colors: npt.ArrayLike | None = None,
@@ -90,11 +93,13 @@ def write_points(
           ``intensity``. What else there is has no place, which a warning in the log tells.
         - ``.xyz``: text with a first line of names.
         - ``.npz``: each field an array, exactly.
-    points : (N, 3) array
-        Coordinates. float32 is stored as float, everything else as double, so that no digit is lost.
+    points : (N, 3) array, or Cloud, Model, Reconstruction or Consolidated
+        Coordinates. What has normals, colours and attributes of its own (a model its
+        :meth:`~nacre.Model.cloud`) is written with them, where no others are given. float32 is stored as
+        float, everything else as double, so that no digit is lost.
     normals : (N, 3) array, optional
         Stored by the same rule.
-    colors : (N, 3) array of integers from 0 to 255, optional
+    colors : (N, 3) array of integers from 0 to 255, or of floats from 0 to 1, optional
         Red, green, blue.
     attributes : mapping of str to (N,) or (N, K) array, optional
         Further fields, stored in their own type (bool as uint8, float16 as float). As PLY has no 64-bit
@@ -116,7 +121,13 @@ def write_points(
     """
     binary = as_flag("binary", binary)
     require_point_suffix(path)
-    cloud = check_cloud(points, normals, colors, attributes)
+    own = cloud_of(points)
+    cloud = check_cloud(
+        own.points,
+        own.normals if normals is None else normals,
+        own.colors if colors is None else colors,
+        own.attributes if attributes is None else attributes,
+    )
     _FORMATS[Path(path).suffix.lower()].write_cloud(path, cloud, comments=comments, binary=binary)
 
 
@@ -127,5 +138,10 @@ def holds(path: str | os.PathLike[str], field: str) -> bool:
 
 def require_point_suffix(path: str | os.PathLike[str]) -> None:
     """Raise where point files do not end so."""
+    if not isinstance(path, str | os.PathLike):
+        raise TypeError(
+            "path must be a path, as in write_points(path, points) and read_points(path), "
+            f"got {type(path).__name__}"
+        )
     if Path(path).suffix.lower() not in _FORMATS:
         raise ValueError(f"point files end in {', '.join(_FORMATS)}, got {os.fspath(path)!r}")

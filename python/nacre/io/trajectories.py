@@ -88,8 +88,8 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
 
 def write_trajectory(
     path: str | os.PathLike[str],
-    timestamps: npt.ArrayLike,
-    poses: npt.ArrayLike,
+    timestamps: npt.ArrayLike | Trajectory,
+    poses: npt.ArrayLike | None = None,
     *,
     format: TrajectoryFormat | None = None,
 ) -> None:
@@ -100,22 +100,33 @@ def write_trajectory(
     ----------
     path : path-like
         The file to write.
-    timestamps : (N,) array
+    timestamps : (N,) array, or Trajectory
         Seconds, or the frames' indices.
     poses : (N, 4, 4) array
-        ``world_from_camera``.
+        ``world_from_camera``; not with a Trajectory, which has its own.
     format : {"tum", "redwood", "kitti"}, optional
         - ``"tum"``: ``t tx ty tz qx qy qz qw``;
         - ``"redwood"``: three whole numbers and a 4x4 matrix; times that are fractions become 0, 1, 2, ...;
         - ``"kitti"``: the first three rows of the matrix; without times.
 
         None takes Redwood for files that end in ``.log``, else TUM.
+
+    Raises
+    ------
+    TypeError, ValueError
+        When an argument does not fit; the message names it.
+    OSError
+        When the file cannot be written.
     """
     ending = "redwood" if Path(path).suffix.lower() == ".log" else "tum"
     name = ending if format is None else format
     if name not in _WRITERS:
         raise ValueError(f"format must be one of {', '.join(_WRITERS)}, got {format!r}")
-    trajectory = Trajectory(timestamps, poses)  # type: ignore[arg-type]
+    if not isinstance(timestamps, Trajectory):
+        timestamps = Trajectory(timestamps, poses)  # type: ignore[arg-type]
+    elif poses is not None:
+        raise ValueError("poses must not be given with a Trajectory, which has its own; got both")
+    trajectory = timestamps
     if not np.isfinite(trajectory.poses).all():
         raise ValueError("poses must be finite, got NaN or infinity")
     farthest = np.abs(trajectory.poses[:, :3, 3]).max(initial=0.0)

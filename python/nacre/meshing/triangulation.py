@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal import arrays
+from nacre._internal.guided import guided
 from nacre.mesh import Mesh
 
 
@@ -49,6 +50,7 @@ def triangulate(
     return triangles
 
 
+@guided("a Cloud has cloud.normals, and nacre.estimate_normals(points) finds them")
 def mesh_points(points: npt.ArrayLike, normals: npt.ArrayLike, *, num_threads: int = 0) -> Mesh:
     """
     Lay triangles over points with normals: those of :func:`triangulate`, with the points that they use.

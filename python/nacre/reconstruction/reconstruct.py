@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
-from typing import Any, cast
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
 
 from nacre import Camera
+from nacre._internal.guided import guided
 from nacre.datasets import Sequence as Recording
 from nacre.datasets import SequenceFrame, open_sequence
+from nacre.datasets.held_frames import HeldFrames, first_of
+from nacre.io.cameras import read_camera
 from nacre.model import Model
 from nacre.parameters import ModelParameters, Preset
 from nacre.reconstruction.frame_record import FrameRecord
@@ -16,8 +21,9 @@ from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.runner import Run
 
 
+@guided("a recording, or a list of depth images with camera=")
 def reconstruct(
-    source: str | os.PathLike[str] | Sequence[SequenceFrame],
+    source: str | os.PathLike[str] | Iterable[Any],
     *,
     format: str | None = None,
     camera: Camera | str | os.PathLike[str] | None = None,
@@ -33,11 +39,18 @@ def reconstruct(
 
     Parameters
     ----------
-    source : path-like or sequence of SequenceFrame
-        A recording of any format that :func:`nacre.open_sequence` knows, or one that is open, or a list of
-        frames.
-    format, camera, depth_scale
+    source : path-like, or iterable
+        A recording of any format that :func:`nacre.open_sequence` knows, or one that is open. Or views in
+        their order, a list, an array or a generator: depth images, (H, W) arrays or paths; pairs of a depth
+        and a colour image; or frames (:class:`nacre.SequenceFrame`). What a generator gives is kept, for the
+        lost frames are gone over again.
+    format
         As in :func:`nacre.open_sequence`; for a path only.
+    camera : Camera or path-like, optional
+        The depth camera, or a camera file; needed for depth images, and in place of what a recording says.
+    depth_scale : float, optional
+        Stored units per metre, in place of what a recording or the camera file says. Arrays of floats are
+        metres without it; integers need it.
     preset, parameters, **changes
         As in :class:`nacre.Model`.
     progress : callable, optional
@@ -57,25 +70,77 @@ def reconstruct(
     FileNotFoundError, FileFormatError
         There is no recording, or not one that can be read; the message says what to do.
     TypeError, ValueError
-        Naming the argument, what was expected and what came.
+        Naming the argument, what was expected and what came. Where the model refuses every frame, what it
+        says of the first.
 
     Examples
     --------
     >>> done = nacre.reconstruct("my-recording", progress=print)  # doctest: +SKIP
-    >>> nacre.write_points("model.ply", done.model.points, normals=done.model.normals)  # doctest: +SKIP
+    >>> nacre.write_points("model.ply", done.model)  # doctest: +SKIP
+    >>> done = nacre.reconstruct(depth_images, camera=camera, depth_scale=1000)  # doctest: +SKIP
     """
-    frames: Sequence[SequenceFrame]
-    if isinstance(source, (str, os.PathLike)):
-        frames = open_sequence(source, format=format, camera=camera, depth_scale=depth_scale)
-    elif not isinstance(source, Sequence):
-        raise TypeError(f"source must be a path or a sequence of frames, got {type(source).__name__}")
-    else:
-        for name, value in (("format", format), ("camera", camera), ("depth_scale", depth_scale)):
-            if value is not None:
-                raise ValueError(f"{name} is for a source that is a path: this one is open, got {value!r}")
-        frames = cast(Sequence[SequenceFrame], source)
-    if not len(frames):
-        raise ValueError("source must have at least one frame, got none")
-    of_all = frames.camera if isinstance(frames, Recording) else frames[0].camera
+    frames, of_all, indices = _opened(source, format, camera, depth_scale)
     model = Model(of_all, preset, parameters=parameters, **changes)
-    return Run(Reconstruction(frames, model), range(len(frames)), retry=retry).to_end(progress)
+    done = Run(Reconstruction(frames, model), indices, retry=retry).to_end(progress)
+    errors = [frame.error for frame in done.frames]
+    if errors and errors[0] is not None and None not in errors:
+        raise errors[0]
+    return done
+
+
+def _opened(
+    source: str | os.PathLike[str] | Iterable[Any],
+    format: str | None,
+    camera: Camera | str | os.PathLike[str] | None,
+    depth_scale: float | None,
+) -> tuple[Sequence[SequenceFrame], Camera, Iterable[int]]:
+    """Return the frames of a source, their camera, and the indices of all, which may come one by one."""
+    if isinstance(source, str | os.PathLike):
+        recording = open_sequence(source, format=format, camera=camera, depth_scale=depth_scale)
+        return recording, recording.camera, range(len(recording))
+    if not isinstance(source, Iterable) or isinstance(source, Mapping):
+        raise TypeError(f"source must be a path or a sequence of frames, got {type(source).__name__}")
+    if isinstance(source, Recording):
+        _refuse("this one is open", format=format, camera=camera, depth_scale=depth_scale)
+        if not len(source):
+            raise ValueError("source must have at least one frame, got none")
+        return source, source.camera, range(len(source))
+    first, items = first_of(source)
+    depth = first[0] if isinstance(first, tuple) and first else first
+    if isinstance(depth, str | os.PathLike):
+        recording = open_sequence(items, format=format, camera=camera, depth_scale=depth_scale)
+        return recording, recording.camera, range(len(recording))
+    if not isinstance(first, SequenceFrame):
+        _refuse("these are arrays", format=format)
+        return _held(first, items, camera, depth_scale)
+    _refuse("its frames have their own", format=format, camera=camera, depth_scale=depth_scale)
+    if isinstance(items, Sequence):
+        return items, first.camera, range(len(items))
+    held = HeldFrames(None)
+    return held, first.camera, held.receive(items)
+
+
+def _refuse(why: str, **given: Any) -> None:
+    for name, value in given.items():
+        if value is not None:
+            raise ValueError(f"{name} is not for this source, {why}; got {value!r}")
+
+
+def _held(
+    first: Any,
+    items: Iterable[Any],
+    camera: Camera | str | os.PathLike[str] | None,
+    depth_scale: float | None,
+) -> tuple[HeldFrames, Camera, Iterable[int]]:
+    """Return frames of depth images in memory; the first is made at once, so that its errors come first."""
+    of_integers = None
+    if isinstance(camera, str | os.PathLike):
+        found = read_camera(camera)
+        camera, of_integers = found.camera, found.depth_scale
+    held = HeldFrames(camera, depth_scale, of_integers, [first])
+    of_all = held[0].camera
+    if isinstance(items, Sequence | np.ndarray):
+        held = HeldFrames(camera, depth_scale, of_integers, items)
+        return held, of_all, range(len(held))
+    held = HeldFrames(camera, depth_scale, of_integers)
+    return held, of_all, held.receive(items)

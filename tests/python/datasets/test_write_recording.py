@@ -101,7 +101,7 @@ def test_written_scale_must_be_positive(tmp_path, scale):
         ({"poses": [np.eye(4)] * 3}, "depth_images must have one item for each view, but it ends after 2"),
         ({"timestamps": []}, "timestamps must have one item"),
         ({"colors": [np.zeros((8, 6, 3), np.uint8)] * 2}, r"colors\[0\] must have shape \(6, 8, 3\)"),
-        ({"colors": [np.zeros((6, 8, 3))] * 2}, "uint8"),
+        ({"colors": [np.full((6, 8, 3), 2.0)] * 2}, r"colors\[0\] must be .*floats from 0 to 1"),
         ({"poses": [np.diag([2.0, 2, 2, 1])] * 2}, r"poses\[0\] must be a rigid transform"),
     ],
 )

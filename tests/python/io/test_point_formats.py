@@ -213,7 +213,7 @@ def test_texts_that_are_none(tmp_path, text, message):
         ({"vertices": POINTS}, "no array points in it, but vertices"),
         ({"points": POINTS[:, :2]}, r"points must have shape \(N, 3\), got \(50, 2\)"),
         ({"points": POINTS, "normals": NORMALS[:5]}, "normals must have one row per point"),
-        ({"points": POINTS, "colors": COLORS / 255}, "colors must be integers"),
+        ({"points": POINTS, "colors": COLORS + 0.5}, "colors must be integers"),
         ({"points": POINTS, "times": np.arange(4)}, "times"),
         ({"points": POINTS, "comments": np.arange(4)}, "comments must be a list of texts"),
         ({"points": POINTS.astype(object)}, "points must be an array of numbers"),

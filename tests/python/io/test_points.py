@@ -213,9 +213,9 @@ ONE = np.zeros((1, 3))
         ({"points": ONE, "normals": np.zeros((1, 2))}, ValueError, r"normals must have shape \(N, 3\)"),
         ({"points": ONE, "colors": np.zeros((1, 4), int)}, ValueError, r"colors must have shape \(1, 3\)"),
         (
-            {"points": ONE, "colors": ONE},
-            TypeError,
-            "colors must be integers from 0 to 255, got dtype float64",
+            {"points": ONE, "colors": 2 * ONE + 2},
+            ValueError,
+            "colors must be integers from 0 to 255 or floats from 0 to 1, got float64",
         ),
         ({"points": ONE, "colors": [[0, 0, 256]]}, ValueError, "colors must be integers from 0 to 255"),
         ({"points": ONE, "colors": [[0, 0, -1]]}, ValueError, "colors must be integers from 0 to 255"),

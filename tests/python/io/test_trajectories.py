@@ -134,6 +134,17 @@ def test_trajectory_shapes_are_checked(tmp_path, times, poses):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_trajectory_is_written_as_it_is(tmp_path):
+    trajectory = Trajectory([0.0, 2.5], np.stack([np.eye(4)] * 2))
+    write_trajectory(tmp_path / "t.txt", trajectory)
+    assert read_trajectory(tmp_path / "t.txt") == trajectory
+    with pytest.raises(ValueError, match="poses must not be given with a Trajectory"):
+        write_trajectory(tmp_path / "t.txt", trajectory, trajectory.poses)
+    with pytest.raises(TypeError, match="poses must be"):
+        write_trajectory(tmp_path / "t.txt", [0.0, 2.5])
+    assert read_trajectory(tmp_path / "t.txt") == trajectory
+
+
 def test_poses_that_are_not_finite_are_not_written(tmp_path):
     with pytest.raises(ValueError, match="finite"):
         write_trajectory(tmp_path / "t.txt", [0], np.full((1, 4, 4), np.nan))

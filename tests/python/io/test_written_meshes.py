@@ -111,7 +111,7 @@ def test_comments(tmp_path):
     [
         ({"normals": NORMALS[:2]}, r"normals must have one row per point of points \(4\), got 2"),
         ({"colors": COLORS[:, :2]}, r"colors must have shape \(4, 3\)"),
-        ({"colors": COLORS / 255}, "colors must be integers from 0 to 255"),
+        ({"colors": COLORS + 0.5}, "colors must be integers from 0 to 255"),
         ({"binary": 1}, "binary must be True or False, got 1"),
         ({"comments": "one"}, "comments must be a sequence of strings"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import subprocess
 import sys
@@ -49,6 +50,50 @@ def test_progress_gets_each_frame_when_it_is_done(frames: list[nacre.SequenceFra
     assert told[-1].report is done.frames[-1].report
 
 
+def test_whatever_holds_the_images_the_run_is_the_same(
+    frames: list[nacre.SequenceFrame], tmp_path: Path
+) -> None:
+    camera = frames[0].camera
+    nacre.write_recording(tmp_path, camera, (f.depth for f in frames), depth_scale=10000)
+    recording = nacre.open_sequence(tmp_path)
+    expected = nacre.reconstruct(recording).model.points
+    depths = [frame.depth for frame in recording]
+    files = sorted((tmp_path / "depth").glob("*.png"))
+    for source, options in (
+        (depths, {"camera": camera}),
+        (np.stack(depths), {"camera": camera}),
+        (iter(depths), {"camera": camera}),
+        (iter(recording), {}),
+        (files, {"camera": camera, "depth_scale": 10000}),
+        (map(str, files), {"camera": tmp_path / "camera.json"}),
+    ):
+        assert np.array_equal(nacre.reconstruct(source, **options).model.points, expected)
+
+
+def test_an_endless_source_ends_when_the_callback_says_so(frames: list[nacre.SequenceFrame]) -> None:
+    endless = itertools.cycle(frame.depth for frame in frames)
+    done = nacre.reconstruct(endless, camera=frames[0].camera, progress=lambda frame: frame.index < 3)
+    assert done.cancelled
+    assert len(done.frames) == len(done.sequence) == 4
+
+
+def test_a_lost_frame_of_a_generator_is_gone_over_again(frames: list[nacre.SequenceFrame]) -> None:
+    depths = [frames[i].depth for i in (0, 4, 1, 2, 3)]
+    listed = nacre.reconstruct(depths, camera=frames[0].camera, relocalise=False)
+    streamed = nacre.reconstruct(iter(depths), camera=frames[0].camera, relocalise=False)
+    assert [frame.status for frame in streamed.frames] == [frame.status for frame in listed.frames]
+    assert streamed.report_data("title", "memory").title == "title"
+
+
+def test_where_every_frame_is_refused_the_reason_comes_out(frames: list[nacre.SequenceFrame]) -> None:
+    millimetres = [1000 * frame.depth for frame in frames]
+    with pytest.raises(ValueError, match=r"depth must be in metres .* check depth_scale"):
+        nacre.reconstruct(millimetres, camera=frames[0].camera)
+    done = nacre.reconstruct([millimetres[0], *(f.depth for f in frames)], camera=frames[0].camera)
+    assert done.frames[0].status == "LOST"
+    assert done.num_tracked == 5
+
+
 @pytest.mark.parametrize("way", ["return False", "raise Cancelled"])
 def test_a_cancelled_run_keeps_what_is_done(frames: list[nacre.SequenceFrame], way: str) -> None:
     def progress(record: FrameRecord) -> bool:
@@ -82,7 +127,11 @@ def test_an_exception_of_the_callback_comes_out_and_what_is_done_is_kept(
     [
         ([], {}, "source must have at least one frame"),
         (3, {}, "source must be a path or a sequence of frames, got int"),
-        ("frames", {"depth_scale": 5}, "depth_scale is for a source that is a path"),
+        ("frames", {"depth_scale": 5}, "depth_scale is not for this source, its frames have their own"),
+        ("frames", {"format": "tum"}, "format is not for this source, its frames have their own; got 'tum'"),
+        ([np.ones((4, 4))], {"format": "tum"}, "format is not for this source, these are arrays"),
+        ([np.ones((4, 4))], {"camera": 3}, "camera must be a nacre.Camera, got int"),
+        (iter(()), {}, "source must have at least one frame, got none"),
         ("frames", {"progress": 5}, "progress must be a function or None, got 5"),
     ],
 )

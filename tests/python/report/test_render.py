@@ -220,7 +220,7 @@ class TestRenderPoints:
             ({"view_from": (0, 0, 0)}, "view_from must be a side"),
             ({"size": (0, 10)}, "size must be"),
             ({"normals": np.zeros((2, 3))}, "normals must have one row"),
-            ({"colors": np.zeros((6000, 3))}, "colors must be uint8"),
+            ({"colors": np.full((6000, 3), 2.0)}, "colors must be integers from 0 to 255 or floats"),
             ({"spacing": 0.0}, "spacing must be positive"),
         ],
     )

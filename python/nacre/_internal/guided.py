@@ -1,0 +1,111 @@
+"""Calls and names that do not fit are answered by what does."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Iterable, Mapping
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+
+from nacre.errors import meant
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+
+def guided(
+    hint: str = "", **elsewhere: str
+) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
+    """
+    Decorate a function so that a call with missing, unknown or too many arguments says how to call it.
+
+    Parameters
+    ----------
+    hint : str
+        What to do where arguments are missing.
+    **elsewhere
+        Arguments that functions of other libraries have: which one it is here, or a sentence on what to do.
+    """
+
+    def decorate(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+        signature = inspect.signature(function)
+
+        @functools.wraps(function)
+        def call(*given: Arguments.args, **named: Arguments.kwargs) -> Result:
+            try:
+                return function(*given, **named)
+            except TypeError:
+                try:
+                    signature.bind(*given, **named)
+                except TypeError:
+                    message = _how_to_call(function, signature, given, named, hint, elsewhere)
+                else:
+                    raise
+            raise TypeError(message)
+
+        return call
+
+    return decorate
+
+
+def _how_to_call(
+    function: Callable[..., Any],
+    signature: inspect.Signature,
+    given: tuple[Any, ...],
+    named: Mapping[str, Any],
+    hint: str,
+    elsewhere: Mapping[str, str],
+) -> str:
+    name = function.__qualname__.removesuffix(".__init__").rpartition(".")[2]
+    parameters = [p for p in signature.parameters.values() if p.name not in ("self", "cls")]
+    own_object = len(signature.parameters) - len(parameters)
+    parameters = [p for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
+    own = {p.name for p in parameters}
+    unknown = [word for word in named if word not in own]
+    if unknown:
+        word = unknown[0]
+        advice = elsewhere.get(word)
+        if advice is None:
+            return f"{name} has no argument {word!r}{meant(word, own)}; it has {', '.join(sorted(own))}"
+        return f"{name} has no argument {word!r}: {f'it is {advice}' if advice in own else advice}"
+    by_place = [p.name for p in parameters if p.kind is p.POSITIONAL_OR_KEYWORD]
+    if len(given) - own_object > len(by_place):
+        others = ", ".join(p.name for p in parameters if p.kind is p.KEYWORD_ONLY)
+        return f"{name} takes {listing(by_place)} by place and the rest by name: {others}"
+    taken = set(by_place[: len(given) - own_object])
+    missing = [p.name for p in parameters if p.default is p.empty and p.name not in taken | set(named)]
+    if missing:
+        return f"{name} needs {listing(missing)}{' too' * bool(taken or named)}{': ' * bool(hint)}{hint}"
+    return f"{name} got {listing(sorted(taken & set(named)))} twice, by place and by name"
+
+
+def listing(words: Iterable[str]) -> str:
+    """Return words as a sentence lists them: a, b and c."""
+    *most, last = words
+    return f"{', '.join(most)} and {last}" if most else last
+
+
+def no_such_name(owner: str, name: str, known: Iterable[str], elsewhere: Mapping[str, str]) -> AttributeError:
+    """Return the error for a name that is not there: what to use in its place, or the nearest one."""
+    if name in elsewhere:
+        return AttributeError(f"{owner} has no attribute {name!r}: {elsewhere[name]}")
+    return AttributeError(f"{owner} has no attribute {name!r}{meant(name, known)}")
+
+
+class GuidedNames:
+    """Base of classes whose missing attributes are answered by what takes their place."""
+
+    __slots__ = ()
+
+    if not TYPE_CHECKING:  # a type checker would take every name for one that is there
+
+        def __getattr__(self, name: str) -> Any:
+            kind = type(self)
+            if name in dir(kind):  # a property that raised
+                return object.__getattribute__(self, name)
+            if name.startswith("_"):
+                raise AttributeError(f"{kind.__name__!r} object has no attribute {name!r}")
+            from nacre._internal.names_elsewhere import OF_CLASS
+
+            known = (word for word in dir(self) if not word.startswith("_"))
+            raise no_such_name(f"a {kind.__name__}", name, known, OF_CLASS.get(kind.__name__, {}))

@@ -1,0 +1,188 @@
+"""What Open3D, SciPy, PCL, small_gicp, OpenCV and trimesh call what nacre has: the advice for each name."""
+
+from __future__ import annotations
+
+_CLOUD = "points are an (N, 3) array; nacre.Cloud holds those of a file with normals and colours"
+_ALIGN = "it is nacre.align(source, target, method=...)"
+_GLOBAL = "it is nacre.align_global(source, target), which needs no features"
+_FUSION = "nacre.Model(camera).add_frame(depth, color) fuses images, and finds their poses"
+_TREE = "it is nacre.KdTree(points)"
+_VOXELS = "it is nacre.voxel_downsample(points, voxel_size)"
+_MODULES = "functions on points and images are in nacre itself: nacre.align, nacre.KdTree, nacre.read_points"
+_BACK_PROJECT = "it is nacre.back_project(depth, camera, depth_scale=...)"
+_MOVE = "it is an array of rows: points @ pose[:3, :3].T + pose[:3, 3]"
+_MESH_NORMALS = "mesh.closest(points).normals has those of its triangles"
+_VIEW = "nacre reconstruct --view and nacre view show runs in the browser; notebooks show models and clouds"
+_POSE = "it is target_from_source"
+
+OF_PACKAGE = {
+    "PointCloud": _CLOUD,
+    "geometry": _CLOUD,
+    "Vector3dVector": _CLOUD,
+    "utility": _CLOUD,
+    "TriangleMesh": "it is nacre.Mesh(vertices, triangles)",
+    "pipelines": _ALIGN,
+    "t": _MODULES,
+    "ml": _MODULES,
+    "visualization": _VIEW,
+    "draw_geometries": _VIEW,
+    "show": _VIEW,
+    "view": _VIEW,
+    "icp": _ALIGN,
+    "ICP": _ALIGN,
+    "gicp": _ALIGN,
+    "registration_icp": _ALIGN,
+    "registration_colored_icp": "it is nacre.align(..., source_colors=..., target_colors=...)",
+    "registration_generalized_icp": _ALIGN,
+    "registration_ransac_based_on_feature_matching": _GLOBAL,
+    "compute_fpfh_feature": _GLOBAL,
+    "read_point_cloud": "it is nacre.read_points(path)",
+    "write_point_cloud": "it is nacre.write_points(path, points)",
+    "load_points": "it is nacre.read_points(path)",
+    "loadPCDFile": "it is nacre.read_points(path)",
+    "savePCDFile": "it is nacre.write_points(path, points)",
+    "read_triangle_mesh": "it is nacre.read_mesh(path)",
+    "write_triangle_mesh": "it is nacre.write_mesh(path, mesh)",
+    "load_mesh": "it is nacre.read_mesh(path)",
+    "load": "it is nacre.read_mesh(path), nacre.read_points(path) or nacre.Model.load(path)",
+    "read_image": "nacre.open_sequence(folder) reads recordings; single images are arrays of any library",
+    "KDTree": _TREE,
+    "cKDTree": _TREE,
+    "KDTreeFlann": _TREE,
+    "voxel_down_sample": _VOXELS,
+    "voxelgrid_sampling": _VOXELS,
+    "VoxelGrid": _VOXELS,
+    "downsample": _VOXELS,
+    "NormalEstimation": "it is nacre.estimate_normals(points, k=...)",
+    "estimate_covariances": "it is nacre.estimate_normals(points, k=...)",
+    "remove_statistical_outlier": "nacre.KdTree(points).query(points, k) has the distances to threshold; "
+    "nacre.consolidate(points) denoises",
+    "PinholeCameraIntrinsic": "it is nacre.Camera(width, height, fx, fy, cx, cy)",
+    "RGBDImage": "depth and colour are arrays: nacre.Model(camera).add_frame(depth, color)",
+    "ScalableTSDFVolume": _FUSION,
+    "UniformTSDFVolume": _FUSION,
+    "VoxelBlockGrid": _FUSION,
+    "KinFu": _FUSION,
+    "create_from_depth_image": _BACK_PROJECT,
+    "create_from_rgbd_image": _BACK_PROJECT,
+    "depthTo3d": _BACK_PROJECT,
+    "poisson": "it is nacre.meshing.close_surface(points, normals)",
+    "ball_pivoting": "it is nacre.meshing.mesh_points(points, normals)",
+    "wlop_simplify_and_regularize_point_set": "it is nacre.consolidate(points, method='cgal')",
+}
+
+OF_CLASS = {
+    "AlignResult": {
+        "transformation": _POSE,
+        "T_target_source": _POSE,
+        "pose": _POSE,
+        "fitness": "it is overlap",
+        "inlier_rmse": "it is rmse",
+        "error": "it is rmse",
+        "correspondence_set": "nacre.KdTree(target).query(moved_source) pairs the points",
+        "H": "it is information",
+    },
+    "GlobalAlignResult": {
+        "transformation": _POSE,
+        "T_target_source": _POSE,
+        "fitness": "it is overlap",
+        "inlier_rmse": "it is rmse",
+        "converged": "it is found",
+    },
+    "Camera": {
+        "K": "it is matrix",
+        "intrinsic_matrix": "it is matrix",
+        "intrinsics": "it is matrix",
+        "ppx": "it is cx",
+        "ppy": "it is cy",
+        "coeffs": "it is distortion",
+        "fov": "it is 2 * numpy.arctan(width / (2 * fx)) in radians",
+    },
+    "CameraFile": {
+        "width": "it is in .camera",
+        "fx": "it is in .camera",
+        "matrix": "it is in .camera",
+    },
+    "Cloud": {
+        "xyz": "it is points",
+        "vertices": "it is points",
+        "estimate_normals": "it is nacre.estimate_normals(cloud), which returns them",
+        "has_normals": "ask cloud.normals is not None",
+        "has_colors": "ask cloud.colors is not None",
+        "voxel_down_sample": "it is nacre.voxel_downsample(cloud, voxel_size)",
+        "remove_statistical_outlier": OF_PACKAGE["remove_statistical_outlier"],
+        "transform": _MOVE,
+        "rotate": _MOVE,
+        "translate": _MOVE,
+        "crop": "it is cloud[mask], with a mask of its points",
+        "select_by_index": "it is cloud[indices]",
+        "save": "it is nacre.write_points(path, cloud)",
+        "show": _VIEW,
+        "to_open3d": "open3d.geometry.PointCloud(open3d.utility.Vector3dVector(cloud.points)) makes one",
+        "to_trimesh": "trimesh.PointCloud(cloud.points, colors=cloud.colors) makes one",
+    },
+    "KdTree": {
+        "data": "it is points",
+        "n": "it is len(tree)",
+        "m": "points have three coordinates",
+        "query_pairs": "tree.query_radius(tree.points, r) has the neighbours of each",
+        "query_ball_tree": "it is tree.query_ball_point(other.points, r)",
+        "count_neighbors": "it is tree.query_radius(other.points, r).counts.sum()",
+        "search_knn_vector_3d": "it is query(points, k), for many at once",
+        "search_radius_vector_3d": "it is query_radius(points, radius), for many at once",
+        "nearestKSearch": "it is query(points, k), for many at once",
+        "radiusSearch": "it is query_radius(points, radius), for many at once",
+        "batch_nearest_neighbor_search": "it is query(points)",
+        "batch_knn_search": "it is query(points, k)",
+    },
+    "Mesh": {
+        "faces": "it is triangles",
+        "area": "sum the cross products of its edges: numpy.cross",
+        "simplify_quadric_decimation": "it is nacre.meshing.simplify",
+        "compute_vertex_normals": _MESH_NORMALS,
+        "normals": _MESH_NORMALS,
+        "vertex_normals": _MESH_NORMALS,
+        "sample_points_uniformly": "it is nacre.evaluation.sample_surface(mesh.vertices, mesh.triangles, n)",
+        "save": "it is nacre.write_mesh(path, mesh)",
+        "export": "it is nacre.write_mesh(path, mesh)",
+        "show": _VIEW,
+        "to_trimesh": "trimesh.Trimesh(mesh.vertices, mesh.triangles) makes one",
+    },
+    "Model": {
+        "integrate": "it is add_frame(depth, color), which finds the pose, or takes guess=world_from_camera",
+        "update": "it is add_frame(depth, color)",
+        "extract_point_cloud": "it is cloud()",
+        "extract_triangle_mesh": "it is to_mesh()",
+        "mesh": "it is to_mesh()",
+        "pose": "it is poses[-1]",
+        "trajectory": "it is poses",
+        "write": "it is nacre.write_points(path, model)",
+        "show": _VIEW,
+    },
+    "Reconstruction": {
+        "points": "it is cloud.points, or model.points with those that are not confirmed",
+        "normals": "it is cloud.normals",
+        "colors": "it is cloud.colors",
+        "mesh": "it is model.to_mesh()",
+        "to_mesh": "it is model.to_mesh()",
+    },
+    "FrameReport": {
+        "pose": "it is world_from_camera",
+        "fitness": "it is overlap",
+    },
+    "Trajectory": {
+        "positions": "it is poses[:, :3, 3]",
+        "times": "it is timestamps",
+        "save": "it is nacre.write_trajectory(path, trajectory)",
+    },
+}
+
+PARAMETERS = {
+    "voxel_size": "spacing",
+    "voxel_length": "spacing",
+    "depth_trunc": "depth.max_depth",
+    "depth_max": "depth.max_depth",
+    "depth_min": "depth.min_depth",
+    "max_correspondence_distance": "registration.max_distance",
+}
+"""Parameters of a model, by what they are called elsewhere."""
