@@ -38,6 +38,7 @@ from nacre.parameters import (
     ModelParameters,
     Preset,
 )
+from nacre.point_sigma import point_sigma
 
 _log = logging.getLogger("nacre.model")
 
@@ -266,6 +267,19 @@ class Model(ExchangeablePoints, Checkpointed):
         """(N,) frontal observations that each point stands for; a copy."""
         with self._lock:
             return self._core.cloud.confidence
+
+    @property
+    def point_sigma(self) -> npt.NDArray[np.float64]:
+        """
+        (N,) the expected standard deviation of each point across the surface [m].
+
+        From the measured noise: what a point's observations average away of it (``confidence``), and what
+        registered frames showed beyond it (``noise_factor``), which is taken for the same in all of them.
+        Errors of the poses, and shape that is finer than the pixels, come on top. NaN where
+        ``fusion_method`` is not "fuse".
+        """
+        with self._lock:
+            return point_sigma(self)
 
     @property
     def last_seen(self) -> npt.NDArray[np.int32]:

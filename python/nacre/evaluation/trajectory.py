@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_count, as_length, as_number, as_poses, as_times, as_values
+from nacre._internal.rotations import rotation_angles
 from nacre.evaluation.result import Array, Count, Fraction, Metres, Radians, Result
 from nacre.trajectory import associate
 
@@ -136,7 +137,7 @@ def absolute_trajectory_error(
     errors = np.full(len(poses), np.nan)
     rotation_errors = np.full(len(poses), np.nan)
     errors[rows] = np.linalg.norm(moved[:, :3, 3] - target[:, :3, 3], axis=1)
-    rotation_errors[rows] = _rotation_angles(turned.transpose(0, 2, 1) @ target[:, :3, :3])
+    rotation_errors[rows] = rotation_angles(turned.transpose(0, 2, 1) @ target[:, :3, :3])
     return AbsoluteTrajectoryError(
         **_statistics("", errors[rows], ("rmse", "mean", "median", "max")),
         **_statistics("rotation_", rotation_errors[rows], ("rmse", "mean", "median", "max")),
@@ -218,7 +219,7 @@ def relative_pose_error(
     names = ("rmse", "mean", "max")
     return RelativePoseError(
         **_statistics("translation_", np.linalg.norm(error[:, :3, 3], axis=1), names),
-        **_statistics("rotation_", _rotation_angles(error[:, :3, :3]), names),
+        **_statistics("rotation_", rotation_angles(error[:, :3, :3]), names),
         delta=step,
         unit=unit,
         num_pairs=len(first),
@@ -285,7 +286,7 @@ def _likeliest_rotation(source: Array, target: Array) -> Array:
     left = centered @ _umeyama(source, target)[:3, :3].T - target_centered
     orientations = _orientations(source, target)
     turned = _closest_rotation(orientations) @ source[:, :3, :3]
-    angles = _rotation_angles(turned.transpose(0, 2, 1) @ target[:, :3, :3])
+    angles = rotation_angles(turned.transpose(0, 2, 1) @ target[:, :3, :3])
     exact = 1e-18  # [rad^2]: a variance that is not 0
     size = (centered**2).sum() / len(source) or 1.0
     of_positions = (left**2).sum() / len(source) / size + exact
@@ -312,20 +313,6 @@ def _inverse(poses: Array) -> Array:
     inverse[:, :3, 3] = -(inverse[:, :3, :3] @ poses[:, :3, 3, None])[:, :, 0]
     inverse[:, 3, 3] = 1
     return inverse
-
-
-def _rotation_angles(rotation: Array) -> Array:
-    """Return the angle of each rotation; exact for small angles too, unlike the arc cosine."""
-    axis = np.stack(
-        [
-            rotation[:, 2, 1] - rotation[:, 1, 2],
-            rotation[:, 0, 2] - rotation[:, 2, 0],
-            rotation[:, 1, 0] - rotation[:, 0, 1],
-        ],
-        axis=1,
-    )
-    trace = np.trace(rotation, axis1=1, axis2=2)
-    return np.asarray(np.arctan2(np.linalg.norm(axis, axis=1), trace - 1))
 
 
 def _statistics(prefix: str, errors: Array, names: tuple[str, ...]) -> dict[str, Any]:
