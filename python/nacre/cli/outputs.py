@@ -58,6 +58,8 @@ def write_results(
         _write(folder / "report.html", text.encode())
         if pictures:
             _write_pictures(folder / "pictures", text)
+    else:
+        (folder / "report.html").unlink(missing_ok=True)  # of an earlier model
     report = done.as_dict(title=title, source=source, min_tracked=min_tracked, **document)
     _write(folder / "report.json", (to_json(report) + "\n").encode())
     return report

@@ -75,8 +75,9 @@ def find_doubled_surfaces(
     rows = np.arange(len(known))
     if len(rows) > _MAX_SAMPLES:
         rows = np.sort(np.random.default_rng(0).choice(rows, _MAX_SAMPLES, replace=False))
-    least = np.maximum(2 * np.maximum(spacing, surface.reach(rows)), 4 * noise[known][rows])
-    heights = _heights_of_cover(surface, rows, least, math.tan(min(max_slant, _STEEPEST)))
+    reach = surface.reach(rows)
+    least = np.maximum(np.maximum(2 * spacing, 1.5 * reach), 4 * noise[known][rows])
+    heights = _heights_of_cover(surface, rows, reach, least, math.tan(min(max_slant, _STEEPEST)))
     found = ~np.isnan(heights)
     if not found.any():
         return DoubledSurfaces(0.0, math.nan, (math.nan, math.nan, math.nan))
@@ -108,9 +109,10 @@ class _Surface:
         return np.where(agrees & (beside < 1.5 * reach), height, np.nan)
 
 
-def _heights_of_cover(surface: _Surface, rows: npt.NDArray[np.intp], least: Array, slope: float) -> Array:
+def _heights_of_cover(
+    surface: _Surface, rows: npt.NDArray[np.intp], reach: Array, least: Array, slope: float
+) -> Array:
     """Return how far before points the surface is that hides them [m]; NaN where there is none."""
-    reach = surface.reach(rows)
     heights = np.full(len(rows), np.nan)
     for step in range(1, _FARTHEST + 1):
         rest = np.flatnonzero(np.isnan(heights))
