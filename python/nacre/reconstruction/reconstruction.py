@@ -333,7 +333,7 @@ class Reconstruction(Checkpointed):
 
     @property
     def doubled_surfaces(self) -> DoubledSurfaces | None:
-        """How much of the model is there twice, as wrong poses leave it; None where there are no points."""
+        """How much of the model is there twice, as frames that disagree leave it; None without points."""
         model = self.model
         if not len(model):
             return None
@@ -343,7 +343,6 @@ class Reconstruction(Checkpointed):
                 model.points,
                 model.normals,
                 spacing=model.spacing,
-                sigma=model.point_sigma,
                 max_slant=model.parameters.depth.max_slant,
             )
             self._doubled = num_frames, found

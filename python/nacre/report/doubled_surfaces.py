@@ -1,4 +1,4 @@
-"""Surfaces that a model has twice, one a little before the other, as wrong poses leave them."""
+"""Surfaces that a model has twice, one a little before the other, as frames that disagree leave them."""
 
 from __future__ import annotations
 
@@ -36,7 +36,6 @@ def find_doubled_surfaces(
     normals: npt.ArrayLike,
     *,
     spacing: float = 0.0,
-    sigma: Array | float = 0.0,
     max_slant: float = 1.3962634,
 ) -> DoubledSurfaces:
     """
@@ -51,8 +50,6 @@ def find_doubled_surfaces(
         Of the model [m]; rows that are not finite are left out.
     spacing : float
         Between points [m]: sheets within two of it are one.
-    sigma : float or (N,)
-        Standard deviation of the points [m]: so are sheets within four of it; NaN: not known.
     max_slant : float
         Greatest angle between the normal and the ray of a measurement that is used [rad].
 
@@ -68,7 +65,6 @@ def find_doubled_surfaces(
     cloud = as_points("points", points)
     facing = as_matching_points("normals", normals, "points", len(cloud)).astype(np.float64)
     known = np.flatnonzero(np.isfinite(cloud).all(axis=1) & np.isfinite(facing).all(axis=1))
-    noise = np.nan_to_num(np.broadcast_to(sigma, len(cloud)))
     if len(known) <= _NEIGHBORS:
         return DoubledSurfaces(0.0, math.nan, (math.nan, math.nan, math.nan))
     surface = _Surface(cloud[known], facing[known])
@@ -76,7 +72,7 @@ def find_doubled_surfaces(
     if len(rows) > _MAX_SAMPLES:
         rows = np.sort(np.random.default_rng(0).choice(rows, _MAX_SAMPLES, replace=False))
     reach = surface.reach(rows)
-    least = np.maximum(np.maximum(2 * spacing, 1.5 * reach), 4 * noise[known][rows])
+    least = np.maximum(2 * spacing, 1.5 * reach)
     heights = _heights_of_cover(surface, rows, reach, least, math.tan(min(max_slant, _STEEPEST)))
     found = ~np.isnan(heights)
     if not found.any():

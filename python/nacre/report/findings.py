@@ -25,8 +25,8 @@ _ADVICE = {
     "before a plain wall something with shape must be in view.",
     "trajectory": "Look where the errors begin to grow (Trajectory), and whether true poses and images fit "
     "together in time. More overlap, and coming back to the start, keep drift small.",
-    "doubled": "Some frames were fused at wrong poses: look at this place in the viewer and record it again, "
-    "more slowly, or come back to it so that a loop closes. nacre info shows whether the camera is right.",
+    "doubled": "Frames disagree there, by their poses or by systematic errors of their depth: look at it in "
+    "the viewer; record it more slowly, come back to it so that a loop closes, or calibrate the camera.",
     "doubtful": "Look at these frames in the viewer: does what they see lie on the model?",
     "interrupted": "nacre reconstruct --resume goes on with it.",
     "single": "Points are confirmed where three frames saw them: record more views.",

@@ -19,8 +19,8 @@ _NEXT_STEPS = {
     "what was seen before? Does an object turn before a background that stands still (--object)?",
     "region": "Nothing was found to model: does a thing stand on a plane (--object), is one in the box?",
     "unreadable": "These images could not be used: are the files whole, and is it the right camera?",
-    "weak": "What these frames see, a wall or a smooth cylinder, does not tell where the camera is. Move so "
-    "that corners or texture come into view.",
+    "weak": "What these frames see, a wall or a smooth cylinder, does not tell where the camera is, and poses "
+    "after them may be off. Move so that corners or texture come into view.",
 }
 
 

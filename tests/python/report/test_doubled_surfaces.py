@@ -57,14 +57,6 @@ def test_surfaces_that_turn_their_backs_to_each_other_are_not() -> None:
     assert find_doubled_surfaces(np.concatenate([front, back]), normals, spacing=SPACING).fraction == 0
 
 
-def test_what_noise_explains_is_not() -> None:
-    points = np.concatenate([sheet(0.5), sheet(0.2, 0.015)])
-    normals = np.tile([0.0, 0, -1], (len(points), 1))
-    assert find_doubled_surfaces(points, normals, spacing=SPACING, sigma=0.004).fraction == 0
-    unknown = np.full(len(points), np.nan)
-    assert find_doubled_surfaces(points, normals, spacing=SPACING, sigma=unknown).fraction > 0.01
-
-
 def test_a_frame_that_is_fused_at_a_wrong_pose_shows() -> None:
     camera = nacre.Camera(160, 120, 131, 131, 79.5, 59.5)
     wall = np.random.default_rng(0).normal(0.6, 0.0005, (120, 160)).astype(np.float32)
@@ -75,9 +67,7 @@ def test_a_frame_that_is_fused_at_a_wrong_pose_shows() -> None:
     for pose in (np.eye(4), wrong):
         for _ in range(3):
             model.add_frame(wall, guess=pose, keep_guess=True)
-        found = find_doubled_surfaces(
-            model.points, model.normals, spacing=model.spacing, sigma=model.point_sigma
-        )
+        found = find_doubled_surfaces(model.points, model.normals, spacing=model.spacing)
         fractions.append(found.fraction)
     assert fractions[0] == 0
     assert fractions[1] > 0.05
