@@ -52,8 +52,9 @@ def find_problems(data: ReportData, trajectory: AbsoluteTrajectoryError | None) 
     is_failed = _is_failed(data, len(data.frames) - len(lost))
     if is_failed:
         yield _failure(lost, len(data.frames))
-    yield from _jumps(data.frames)
-    yield from _pose_errors(data, trajectory)
+    distance = _distance_seen(data)
+    yield from _jumps(data.frames, distance)
+    yield from _pose_errors(data.frames, trajectory, distance)
     yield from _doubled(data)
     yield from _doubtful(data.frames)
     if lost and not is_failed:
@@ -91,8 +92,8 @@ def _failure(lost: Sequence[ReportedFrame], total: int) -> Finding:
     return Finding("untracked", "lost", "Failed", statement, advice_on(lost), _indices(lost))
 
 
-def _jumps(frames: Sequence[ReportedFrame]) -> Iterator[Finding]:
-    jumps = find_jumps(frames)
+def _jumps(frames: Sequence[ReportedFrame], distance_seen: float) -> Iterator[Finding]:
+    jumps = find_jumps(frames, distance_seen)
     for kind, found in (
         ("flip", [j for j in jumps if j.is_flip]),
         ("jump", [j for j in jumps if not j.is_flip]),
@@ -110,37 +111,41 @@ def _told(jump: Jump) -> str:
     if not jump.is_flip:
         verb, moved = "jumps", f"{quantity(jump.distance, 'm')} and {moved}"
     times = (
-        f"{jump.ratio:.0f} times as far as around it" if np.isfinite(jump.ratio) else "and stood still before"
+        f"{jump.ratio:.0f} times as far as around it"
+        if np.isfinite(jump.ratio)
+        else "which stands still around it"
     )
     return f"the camera {verb} by {moved} from frame {jump.first} to {jump.last}, {times}"
 
 
-def _pose_errors(data: ReportData, error: AbsoluteTrajectoryError | None) -> Iterator[Finding]:
+def _pose_errors(
+    frames: Sequence[ReportedFrame], error: AbsoluteTrajectoryError | None, distance_seen: float
+) -> Iterator[Finding]:
     """Hold the trajectory against the truth, as far as it is known."""
-    if error is None or error.num_compared < MIN_COMPARED or len(error.errors) != len(data.frames):
+    if error is None or error.num_compared < MIN_COMPARED or len(error.errors) != len(frames):
         return
-    most = MAX_POSE_ERROR * _scale(data)
+    places = np.array([frame.truth[:3, 3] for frame in frames if frame.truth is not None]).reshape(-1, 3)
+    extent = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
+    most = MAX_POSE_ERROR * max(extent, distance_seen)
     is_off = (error.errors > most) | (error.rotation_errors > MAX_POSE_ERROR)  # False for NaN
-    frames = [frame for frame, off in zip(data.frames, is_off, strict=True) if off]
-    if not frames:
+    off = [frame for frame, wrong in zip(frames, is_off, strict=True) if wrong]
+    if not off:
         return
     is_wrong = error.rmse > most or error.rotation_rmse > MAX_POSE_ERROR
     worst = f"{quantity(error.max, 'm')} and {quantity(error.rotation_max, 'rad')}"
     statement = (
-        f"{count(len(frames))} of {count(error.num_compared)} poses depart from the truth, by up to {worst}"
+        f"{count(len(off))} of {count(error.num_compared)} poses depart from the truth, by up to {worst}"
     )
     level: Level = "lost" if is_wrong else "weak"
     word = "Wrong" if is_wrong else "Wrong in part"
-    yield _of_frames("trajectory", level, word, statement, frames, _ADVICE["trajectory"])
+    yield _of_frames("trajectory", level, word, statement, off, _ADVICE["trajectory"])
 
 
-def _scale(data: ReportData) -> float:
-    """Return the larger of the true path's extent and the distance of the model from its first camera [m]."""
-    places = [np.asarray(frame.truth, np.float64)[:3, 3] for frame in data.frames if frame.truth is not None]
-    extent = float(np.linalg.norm(np.ptp(np.array(places), axis=0))) if places else 0.0
+def _distance_seen(data: ReportData) -> float:
+    """Return the median distance of the model from its first camera [m]; 0 without points."""
     points = np.zeros((0, 3)) if data.model is None else np.asarray(data.model.points, np.float64)
     distances = np.linalg.norm(points[np.isfinite(points).all(axis=1)], axis=1)
-    return max(extent, float(np.median(distances))) if len(distances) else extent
+    return float(np.median(distances)) if len(distances) else 0.0
 
 
 def _doubled(data: ReportData) -> Iterator[Finding]:

@@ -19,7 +19,7 @@ _NEXT_STEPS = {
     "what was seen before? Does an object turn before a background that stands still (--object)?",
     "region": "Nothing was found to model: does a thing stand on a plane (--object), is one in the box?",
     "unreadable": "These images could not be used: are the files whole, and is it the right camera?",
-    "weak": "What these frames see, a wall or a smooth cylinder, does not tell where the camera is, and poses "
+    "weak": "What these frames see, a wall or a smooth cylinder, does not tell where the camera is: poses "
     "after them may be off. Move so that corners or texture come into view.",
 }
 
@@ -83,4 +83,4 @@ def _cause(frame: ReportedFrame) -> str:
         return "empty"
     if "pixels of the frame" in frame.reason:
         return "unusable"
-    return "region" if "plane" in frame.reason or "box" in frame.reason else "registration"
+    return "region" if frame.reason.startswith(("there is no plane", "nothing ")) else "registration"

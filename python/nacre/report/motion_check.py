@@ -33,13 +33,25 @@ class Jump:
         return self.angle > _REVERSAL
 
 
-def find_jumps(frames: Sequence[ReportedFrame]) -> list[Jump]:
+def find_jumps(frames: Sequence[ReportedFrame], distance_seen: float = 0.0) -> list[Jump]:
     """
     Return the steps that are much larger than the recording's own motion, in the order of the frames.
 
     A step counts per time, or per frame where the recording has no time stamps, and is held against the
     median of the steps around it, and against the upper quartile of all: a camera may begin to move, and
-    views in any order are all far apart. Steps within the model's spacing double nothing and do not count.
+    views in any order are all far apart. Only steps count that move what is seen by a notable part of its
+    distance.
+
+    Parameters
+    ----------
+    frames : sequence of ReportedFrame
+        In the order in which they came.
+    distance_seen : float
+        Of the surfaces from the cameras [m].
+
+    Returns
+    -------
+    list of Jump
     """
     tracked = [frame for frame in frames if frame.is_tracked and frame.world_from_camera is not None]
     if len(tracked) <= MIN_STEPS:
@@ -48,9 +60,8 @@ def find_jumps(frames: Sequence[ReportedFrame]) -> list[Jump]:
     motion = np.linalg.inv(poses[:-1]) @ poses[1:]
     angles, distances = rotation_angles(motion[:, :3, :3]), np.linalg.norm(motion[:, :3, 3], axis=1)
     durations = _durations(tracked)
-    spacing = max((frame.spacing or 0.0 for frame in tracked), default=0.0)
     by_angle = np.where(angles > MAX_POSE_ERROR, _ratios(angles / durations), 0)
-    by_distance = np.where(distances > 2 * spacing, _ratios(distances / durations), 0)
+    by_distance = np.where(distances > MAX_POSE_ERROR * distance_seen, _ratios(distances / durations), 0)
     ratios = np.maximum(by_angle, by_distance)
     return [
         Jump(tracked[i].index, tracked[i + 1].index, float(angles[i]), float(distances[i]), float(ratios[i]))
@@ -59,12 +70,16 @@ def find_jumps(frames: Sequence[ReportedFrame]) -> list[Jump]:
 
 
 def _durations(frames: Sequence[ReportedFrame]) -> Array:
-    """Return how long each step took: in seconds where all frames are timed in order, or in frames."""
+    """
+    Return how long each step took: in seconds where all frames are timed in order, or in frames.
+
+    Those that seem shorter than usual are as long as usual: clocks jitter.
+    """
     times = np.array([np.nan if f.timestamp is None else f.timestamp for f in frames], np.float64)
     steps = np.diff(times)
     if not (steps > 0).all():
         steps = np.maximum(np.abs(np.diff([float(frame.index) for frame in frames])), 1)
-    return np.asarray(steps)
+    return np.maximum(steps, np.median(steps))
 
 
 def _ratios(speeds: Array) -> Array:

@@ -80,10 +80,16 @@ class TestMotion:
         assert "the camera jumps by 531 mm and 1.89" in verdict.sentence
         assert verdict.findings[0].frames == (10,)
 
-    def test_a_step_within_the_spacing_of_the_model_is_none(self) -> None:
-        still = [ReportedFrame(i, "TRACKED", world_from_camera=turned(0), spacing=0.01) for i in range(12)]
-        assert not find_jumps(moved(still, range(6, 12), turned(0, x=0.015)))
-        assert find_jumps(moved(still, range(6, 12), turned(0, x=0.03)))[0].ratio == math.inf
+    def test_a_step_that_hardly_moves_what_is_seen_is_none(self) -> None:
+        still = [ReportedFrame(i, "TRACKED", world_from_camera=turned(0)) for i in range(12)]
+        frames = moved(still, range(6, 12), turned(0, x=0.04))
+        assert not find_jumps(frames, distance_seen=1.0)
+        assert find_jumps(frames, distance_seen=0.5)[0].ratio == math.inf
+        sentence = verdict_on(frames, model=ModelCloud(np.array([[0, 0, 0.5]]))).sentence
+        assert (
+            "the camera jumps by 40.0 mm and 0\N{DEGREE SIGN} from frame 5 to 6, which stands still"
+            in sentence
+        )
 
     def test_a_camera_that_begins_to_move_does_not_jump(self) -> None:
         frames = [
@@ -103,6 +109,12 @@ class TestMotion:
         frames = frames[:12] + frames[20:]  # what lies between was not read
         if not timed:
             frames = [with_figures(frame, timestamp=None) for frame in frames]
+        assert not find_jumps(frames)
+
+    def test_a_clock_that_jitters_makes_no_jump(self) -> None:
+        times = 0.1 * np.arange(20)
+        times[12] = times[11] + 0.002
+        frames = [with_figures(frame, timestamp=float(times[frame.index])) for frame in walk()]
         assert not find_jumps(frames)
 
 
