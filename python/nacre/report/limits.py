@@ -5,8 +5,8 @@ MAX_STEP_RATIO = 3.0  # [1] of a step to the recording's motion around it
 STEPS_AROUND = 3  # [steps] to each side, so that frames which flip there and back are the fewer
 MIN_STEPS = 5  # [steps] with fewer, nobody knows the recording's motion
 
-# Five parts in a hundred of what is measured: of the distance of what is seen, or of the path's extent where it is
-# larger; and the rotation that moves what is seen by as much.
+# Five parts in a hundred of what is measured: of the distance of what is seen, or of the path's extent where
+# that is larger; and the rotation that moves what is seen by as much.
 MAX_POSE_ERROR = 0.05  # [1] and [rad]
 MIN_COMPARED = 3  # [poses] two positions are aligned with any two others of their distance
 
