@@ -9,8 +9,9 @@ from typing import Literal
 import numpy as np
 
 from nacre.evaluation import AbsoluteTrajectoryError
+from nacre.evaluation.trajectory import MIN_ALIGNED
 from nacre.report.data import ReportData
-from nacre.report.limits import MAX_DOUBLED, MAX_POSE_ERROR, MIN_COMPARED, MIN_PROBABILITY
+from nacre.report.limits import MAX_DOUBLED, MAX_POSE_ERROR, MIN_PROBABILITY
 from nacre.report.lost_frames import advice_on, most_common_reason
 from nacre.report.motion_check import Jump, find_jumps
 from nacre.report.reported_frame import ReportedFrame
@@ -122,7 +123,7 @@ def _pose_errors(
     frames: Sequence[ReportedFrame], error: AbsoluteTrajectoryError | None, distance_seen: float
 ) -> Iterator[Finding]:
     """Hold the trajectory against the truth, as far as it is known."""
-    if error is None or error.num_compared < MIN_COMPARED or len(error.errors) != len(frames):
+    if error is None or error.num_compared < MIN_ALIGNED or len(error.errors) != len(frames):
         return
     places = np.array([frame.truth[:3, 3] for frame in frames if frame.truth is not None]).reshape(-1, 3)
     extent = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0

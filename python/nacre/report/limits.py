@@ -8,7 +8,6 @@ MIN_STEPS = 5  # [steps] with fewer, nobody knows the recording's motion
 # Five parts in a hundred of what is measured: of the distance of what is seen, or of the path's extent where
 # that is larger; and the rotation that moves what is seen by as much.
 MAX_POSE_ERROR = 0.05  # [1] and [rad]
-MIN_COMPARED = 3  # [poses] two positions are aligned with any two others of their distance
 
 # The usual level of significance.
 MIN_PROBABILITY = 0.95  # [1] that a registration is right

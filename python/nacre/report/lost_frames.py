@@ -13,7 +13,7 @@ from nacre.report.reported_frame import ReportedFrame
 _NEXT_STEPS = {
     "empty": "The depth images hold no measurement: is it the right folder or topic, and the right "
     "depth scale? nacre info shows what is in the recording.",
-    "unusable": "Hardly a pixel was left after filtering: is the depth scale right, and do --min-depth, "
+    "unusable": "Hardly a pixel was left after cleaning: is the depth scale right, and do --min-depth, "
     "--max-depth, --box and masks leave what is of interest?",
     "registration": "Is the depth scale right (nacre info shows the median depth)? Does each frame overlap "
     "what was seen before? Does an object turn before a background that stands still (--object)?",

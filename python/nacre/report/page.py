@@ -84,7 +84,7 @@ def render_page(data: ReportData) -> str:
             "of each frame: inliers, score, residual",
             registration_charts(data.frames, data.parameters),
         ),
-        Section("depth", "Depth filtering", "images before and after", depth if data.depth else None),
+        Section("depth", "Depth cleaning", "images before and after", depth if data.depth else None),
         Section("funnel", "Pixels", "how many were measured, kept and fused", pixel_counts(data.frames)),
         Section("time", "Time", "of each step in each frame", time_chart(data.frames)),
         Section("figures", "Evaluation", "all figures", result_tables(data, trajectory)),

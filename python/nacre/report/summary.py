@@ -16,8 +16,8 @@ from nacre.evaluation import (
     SurfaceAccuracy,
     absolute_trajectory_error,
 )
+from nacre.evaluation.trajectory import MIN_ALIGNED
 from nacre.report.data import ReportData
-from nacre.report.limits import MIN_COMPARED
 from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import count, length_unit, quantity
 from nacre.report.verdict import Verdict, judge
@@ -86,7 +86,7 @@ def _model_tiles(data: ReportData) -> Iterator[Tile]:
     spread = None if data.model.sigma is None else sigma_statistics(data.model.sigma)
     if spread is not None:
         note = f"median, expected from noise alone; 95 % within {quantity(spread['p95'], 'm')}"
-        yield Tile("Standard deviation of points", quantity(spread["median"], "m"), note)
+        yield Tile("Point standard deviation", quantity(spread["median"], "m"), note)
 
 
 def _evaluation_tiles(data: ReportData) -> Iterator[Tile]:
@@ -102,15 +102,15 @@ def _evaluation_tiles(data: ReportData) -> Iterator[Tile]:
 
 def _trajectory_tile(error: AbsoluteTrajectoryError) -> Tile:
     rmse, of = told_trajectory_error(error)
-    more = f"; {quantity(error.rotation_rmse, 'rad')} in rotation" * (error.num_compared >= MIN_COMPARED)
+    more = f"; {quantity(error.rotation_rmse, 'rad')} in rotation" * (error.num_compared >= MIN_ALIGNED)
     return Tile("Trajectory error (ATE)", rmse, of + more)
 
 
 def told_trajectory_error(error: AbsoluteTrajectoryError) -> tuple[str, str]:
     """Return the RMSE in words, and of how many frames it is: of fewer than three it says nothing."""
-    if error.num_compared < MIN_COMPARED:
+    if error.num_compared < MIN_ALIGNED:
         compared = f"{count(error.num_compared)} of {count(error.num_frames)} frames"
-        return "not known", f"{compared} have a pose and a true one, at least {MIN_COMPARED} must"
+        return "not known", f"{compared} have a pose and a true one, at least {MIN_ALIGNED} must"
     rmse = quantity(error.rmse, "m")
     return rmse, f"RMSE over {count(error.num_compared)} of {count(error.num_frames)} frames"
 

@@ -116,7 +116,7 @@ def test_a_good_run_is_called_good(runs: dict[str, Run]) -> None:
     assert run.tile(r"Trajectory error \(ATE\)") == quantity(error, "m")
     assert "RMSE over 6 of 6 frames" in run.text
     spread = run.figures["point_sigma"]
-    assert run.tile("Standard deviation of points") == quantity(spread["median"], "m")
+    assert run.tile("Point standard deviation") == quantity(spread["median"], "m")
     assert f"95 % within {quantity(spread['p95'], 'm')}" in run.text
     for section in ("model", "depth", "funnel", "trajectory", "frames", "time", "figures"):
         assert f'<div id="{section}"' in run.page
