@@ -20,11 +20,12 @@ _CELLS = 40  # across an image, to find what its pixels see
 def point_sigma(model: Model) -> Array:
     """Return the standard deviation of each point across the surface (N,) [m]; see `Model.point_sigma`."""
     confidence = model.confidence.astype(np.float64)
-    fused = [frame.world_from_camera for frame in model.frames if frame.status in ("TRACKED", "RELOCALISED")]
-    if model.parameters.fusion_method != "fuse" or not len(confidence) or not fused:
+    fused = (frame.world_from_camera for frame in model.frames if frame.status in ("TRACKED", "RELOCALISED"))
+    first = next(fused, None)
+    if model.parameters.fusion_method != "fuse" or not len(confidence) or first is None:
         return np.full(len(confidence), np.nan)
     noise, factor = model.noise, model.noise_factor
-    reference = model.parameters.fusion.reference_sigma or _median_sigma(model, fused[0])
+    reference = model.parameters.fusion.reference_sigma or _median_sigma(model, first)
     independent, shared = _variance_of_window()
     averaged = (1 - noise.shared) * independent + noise.shared * shared
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -155,7 +155,10 @@ def verdict_rows(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     if spread is not None:
         median, p95 = (quantity(spread[name], "m") for name in ("median", "p95"))
         rows.append(
-            ("points known to", f"{median} (expected standard deviation from noise alone; 95 % within {p95})")
+            (
+                "points known to",
+                f"{median} (standard deviation expected from noise alone: median; for 95 % at most {p95})",
+            )
         )
     return rows
 

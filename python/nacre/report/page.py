@@ -9,13 +9,14 @@ from typing import Any, NamedTuple
 
 from nacre import __version__
 from nacre.errors import printable
+from nacre.evaluation import AbsoluteTrajectoryError
 from nacre.io.atomic import atomic_writer
 from nacre.report.charts import status_strip
 from nacre.report.data import ReportData
 from nacre.report.depth_pictures import draw_depth
 from nacre.report.frame_charts import registration_charts, time_chart, trajectory_charts
 from nacre.report.lost_frames import stretches
-from nacre.report.pictures import draw_model
+from nacre.report.pictures import ModelPictures, draw_model
 from nacre.report.pixel_counts import pixel_counts, removed_chart
 from nacre.report.reported_frame import ReportedFrame
 from nacre.report.summary import summarize
@@ -64,43 +65,43 @@ def render_page(data: ReportData) -> str:
     """Return the report as HTML text."""
     summary = summarize(data)
     model = None if data.model is None else draw_model(data.model, data.frames)
-    depth = {
-        "examples": [(example, draw_depth(example)) for example in data.depth],
-        "removed": removed_chart(data.frames),
-    }
-    trajectory = summary.trajectory
-    sections = [
-        Section("look", "Frames not fused", "where, and why", stretches(data.frames)),
-        Section("model", "Model", "six sides, point spacing, confidence, colours", model),
-        Section(
-            "trajectory",
-            "Trajectory",
-            "path of the camera, errors",
-            trajectory_charts(data.frames, trajectory),
-        ),
-        Section(
-            "frames",
-            "Registration",
-            "of each frame: inliers, score, residual",
-            registration_charts(data.frames, data.parameters),
-        ),
-        Section("depth", "Depth cleaning", "images before and after", depth if data.depth else None),
-        Section("funnel", "Pixels", "how many were measured, kept and fused", pixel_counts(data.frames)),
-        Section("time", "Time", "of each step in each frame", time_chart(data.frames)),
-        Section("figures", "Evaluation", "all figures", result_tables(data, trajectory)),
-        Section("table", "Frames", "a row for each", frame_table(data.frames)),
-        Section("parameters", "Parameters", "all of them", flatten(data.parameters)),
-    ]
     page = render(
         "page.html",
         data=data,
         summary=summary,
         model=model,
         states=_states(data.frames),
-        sections=[section for section in sections if section.content],
+        sections=_sections(data, summary.trajectory, model),
         version=__version__,
     )
     return printable(page)
+
+
+def _sections(
+    data: ReportData, trajectory: AbsoluteTrajectoryError | None, model: ModelPictures | None
+) -> list[Section]:
+    """Return the folded parts that have something to show."""
+    frames = data.frames
+    views = "six sides, point spacing, confidence" + ", colours" * bool(model and model.colors)
+    path = trajectory_charts(frames, trajectory)
+    registration = registration_charts(frames, data.parameters)
+    depth = {
+        "examples": [(example, draw_depth(example)) for example in data.depth],
+        "removed": removed_chart(frames),
+    }
+    sections = [
+        Section("look", "Frames not fused", "where, and why", stretches(frames)),
+        Section("model", "Model", views, model),
+        Section("trajectory", "Trajectory", "path of the camera, errors", path),
+        Section("frames", "Registration", "of each frame: inliers, score, residual", registration),
+        Section("depth", "Depth cleaning", "images before and after", depth if data.depth else None),
+        Section("funnel", "Pixels", "how many were measured, kept and fused", pixel_counts(frames)),
+        Section("time", "Time", "of each step in each frame", time_chart(frames)),
+        Section("figures", "Evaluation", "all figures", result_tables(data, trajectory)),
+        Section("table", "Frames", "a row for each", frame_table(frames)),
+        Section("parameters", "Parameters", "all of them", flatten(data.parameters)),
+    ]
+    return [section for section in sections if section.content]
 
 
 def _states(frames: Sequence[ReportedFrame]) -> dict[str, Any] | None:

@@ -85,7 +85,7 @@ def _model_tiles(data: ReportData) -> Iterator[Tile]:
     yield Tile("Model points", count(num_points), _extent(data))
     spread = None if data.model.sigma is None else sigma_statistics(data.model.sigma)
     if spread is not None:
-        note = f"median, expected from noise alone; 95 % within {quantity(spread['p95'], 'm')}"
+        note = f"median, expected from noise alone; for 95 % at most {quantity(spread['p95'], 'm')}"
         yield Tile("Point standard deviation", quantity(spread["median"], "m"), note)
 
 

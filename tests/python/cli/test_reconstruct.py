@@ -255,6 +255,6 @@ def test_the_terminal_tells_the_verdict_and_the_accuracy(reconstructed, recordin
     report = strict_json(reconstructed[0] / "report.json")
     result = run("reconstruct", recording, "-o", tmp_path / "o", "--no-report")
     assert report["verdict"]["sentence"] in result.out
-    assert "expected standard deviation" in result.out
+    assert "standard deviation expected from noise alone" in result.out
     assert report["doubled_surfaces"]["fraction"] == 0
     assert 0 < report["point_sigma"]["median"] <= report["point_sigma"]["p95"] < 0.001

@@ -117,7 +117,7 @@ def test_a_good_run_is_called_good(runs: dict[str, Run]) -> None:
     assert "RMSE over 6 of 6 frames" in run.text
     spread = run.figures["point_sigma"]
     assert run.tile("Point standard deviation") == quantity(spread["median"], "m")
-    assert f"95 % within {quantity(spread['p95'], 'm')}" in run.text
+    assert f"for 95 % at most {quantity(spread['p95'], 'm')}" in run.text
     for section in ("model", "depth", "funnel", "trajectory", "frames", "time", "figures"):
         assert f'<div id="{section}"' in run.page
     assert '<div id="look"' not in run.page
