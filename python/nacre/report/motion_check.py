@@ -57,8 +57,9 @@ def find_jumps(frames: Sequence[ReportedFrame], distance_seen: float = 0.0) -> l
     if len(tracked) <= MIN_STEPS:
         return []
     poses = np.array([frame.world_from_camera for frame in tracked], np.float64)
-    motion = np.linalg.inv(poses[:-1]) @ poses[1:]
-    angles, distances = rotation_angles(motion[:, :3, :3]), np.linalg.norm(motion[:, :3, 3], axis=1)
+    rotations = poses[:, :3, :3]
+    angles = rotation_angles(rotations[:-1].transpose(0, 2, 1) @ rotations[1:])
+    distances = np.linalg.norm(np.diff(poses[:, :3, 3], axis=0), axis=1)
     durations = _durations(tracked)
     by_angle = np.where(angles > MAX_POSE_ERROR, _ratios(angles / durations), 0)
     by_distance = np.where(distances > MAX_POSE_ERROR * distance_seen, _ratios(distances / durations), 0)

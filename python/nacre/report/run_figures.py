@@ -39,9 +39,7 @@ def run_dict(run: Reconstruction, *, min_tracked: float = MIN_TRACKED, **more: A
                 "numpy": np.__version__,
             },
             **more,
-            "verdict": None
-            if verdict is None
-            else {**dataclasses.asdict(verdict), "next_step": verdict.next_step},
+            "verdict": None if verdict is None else dataclasses.asdict(verdict),
             "num_frames": len(run.frames),
             "num_tracked": run.num_tracked,
             **{f"num_{name.lower()}": counts[name] for name in STATUSES[1:]},
@@ -93,7 +91,7 @@ def run_report(
         figures=figures or {},
         parameters=run.parameters,
         interrupted=interrupted,
-        doubled=run.doubled_surfaces,
+        doubled=None if interrupted else run.doubled_surfaces,  # who stops a run waits for it
         min_tracked=min_tracked,
     )
 
