@@ -61,7 +61,8 @@ def find_problems(data: ReportData, trajectory: AbsoluteTrajectoryError | None) 
     if lost and not is_failed:
         reason = most_common_reason(frame.reason for frame in lost)
         statement = f"{count(len(lost))} of {_were(len(data.frames))} lost" + f": {reason}" * bool(reason)
-        yield _of_frames("lost", "weak", "Incomplete", statement, lost, advice_on(lost))
+        advice = advice_on(lost, some_are_tracked=True)
+        yield _of_frames("lost", "weak", "Incomplete", statement, lost, advice)
     if weak:
         statement = f"{_were(len(weak))} not fused, as the shape in view leaves directions of the pose open"
         yield _of_frames("weak", "weak", "Incomplete", statement, weak, advice_on(weak))

@@ -17,6 +17,8 @@ _NEXT_STEPS = {
     "--max-depth, --box and masks leave what is of interest?",
     "registration": "Is the depth scale right (nacre info shows the median depth)? Does each frame overlap "
     "what was seen before? Does an object turn before a background that stands still (--object)?",
+    "overlap": "What a frame sees must overlap what was seen before: look at these frames in the viewer; "
+    "move more slowly there, or go back to where the camera was tracked and record on from there.",
     "region": "Nothing was found to model: does a thing stand on a plane (--object), is one in the box?",
     "unreadable": "These images could not be used: are the files whole, and is it the right camera?",
     "weak": "What these frames see, a wall or a smooth cylinder, does not tell where the camera is: poses "
@@ -59,7 +61,7 @@ def most_common_reason(reasons: Iterable[str]) -> str:
 def plain_reason(reason: str) -> str:
     """Return a frame's reason without the figures that differ from frame to frame."""
     if reason.startswith("registration score "):
-        return "too little agrees with the model"
+        return "the registration score is too low"
     if re.match(r"only 0 pixels", reason):
         return "no usable pixel"
     if re.match(r"only \d+ pixels", reason):
@@ -69,9 +71,10 @@ def plain_reason(reason: str) -> str:
     return reason
 
 
-def advice_on(frames: Sequence[ReportedFrame]) -> str:
+def advice_on(frames: Sequence[ReportedFrame], *, some_are_tracked: bool = False) -> str:
     """Return what to do about what most of some lost or weak frames suffer from."""
-    return _NEXT_STEPS[Counter(map(_cause, frames)).most_common(1)[0][0]]
+    cause = Counter(map(_cause, frames)).most_common(1)[0][0]
+    return _NEXT_STEPS["overlap" if cause == "registration" and some_are_tracked else cause]
 
 
 def _cause(frame: ReportedFrame) -> str:

@@ -164,6 +164,23 @@ class TestFrames:
         assert (failed.level, failed.findings[0].kind) == ("lost", "untracked")
         assert "only 10 of 20 frames (50.0 %) were tracked" in failed.sentence
 
+    @pytest.mark.parametrize(
+        ("reason", "advice"),
+        [
+            (
+                "registration score 0.1 is below 0.3, all but 0.1 on three planes",
+                "overlap what was seen",
+            ),
+            ("there is no plane on which anything stands", "does a thing stand on a plane"),
+            ("only 3 pixels of the frame", "Hardly a pixel was left after cleaning"),
+        ],
+    )
+    def test_each_cause_has_its_advice(self, reason: str, advice: str) -> None:
+        depth = {"num_pixels": 100, "num_invalid": 10}
+        frames = walk(depth=depth)
+        frames[3] = with_figures(frames[3], status="LOST", reason=reason)
+        assert advice in verdict_on(frames).next_step
+
     def test_open_directions_are_told_with_what_helps(self) -> None:
         frames = walk()
         frames[5] = with_figures(frames[5], status="WEAK")
