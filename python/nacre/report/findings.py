@@ -11,7 +11,7 @@ import numpy as np
 from nacre.evaluation import AbsoluteTrajectoryError
 from nacre.evaluation.trajectory import MIN_ALIGNED
 from nacre.report.data import ReportData
-from nacre.report.limits import MAX_DOUBLED, MAX_POSE_ERROR, MIN_PROBABILITY
+from nacre.report.limits import FLIP_ANGLE, MAX_DOUBLED, MAX_POSE_ERROR, MIN_PROBABILITY
 from nacre.report.lost_frames import advice_on, most_common_reason
 from nacre.report.motion_check import Jump, find_jumps
 from nacre.report.reported_frame import ReportedFrame
@@ -140,7 +140,8 @@ def _pose_errors(
     )
     level: Level = "lost" if is_wrong else "weak"
     word = "Wrong" if is_wrong else "Wrong in part"
-    yield _of_frames("trajectory", level, word, statement, off, _ADVICE["trajectory"])
+    advice = _ADVICE["flip" if error.rotation_max > FLIP_ANGLE else "trajectory"]
+    yield _of_frames("trajectory", level, word, statement, off, advice)
 
 
 def _distance_seen(data: ReportData) -> float:

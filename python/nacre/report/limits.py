@@ -3,6 +3,7 @@
 # A camera has inertia: from rest, a constant acceleration makes the second step three times the first.
 MAX_STEP_RATIO = 3.0  # [1] of a step to the recording's motion around it
 STEPS_AROUND = 3  # [steps] to each side, so that frames which flip there and back are the fewer
+FLIP_ANGLE = 1.5707963  # [rad] a right angle: a camera that turned farther sees another side
 MIN_STEPS = 5  # [steps] with fewer, nobody knows the recording's motion
 
 # Five parts in a hundred of what is measured: of the distance of what is seen, or of the path's extent where

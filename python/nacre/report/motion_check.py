@@ -9,12 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.rotations import rotation_angles
-from nacre.report.limits import MAX_POSE_ERROR, MAX_STEP_RATIO, MIN_STEPS, STEPS_AROUND
+from nacre.report.limits import FLIP_ANGLE, MAX_POSE_ERROR, MAX_STEP_RATIO, MIN_STEPS, STEPS_AROUND
 from nacre.report.reported_frame import ReportedFrame
 
 Array = npt.NDArray[np.float64]
-
-_REVERSAL = np.pi / 2  # [rad] a turn beyond: the camera sees another side
 
 
 @dataclass(frozen=True)
@@ -30,7 +28,7 @@ class Jump:
     @property
     def is_flip(self) -> bool:
         """Whether the camera turned to another side."""
-        return self.angle > _REVERSAL
+        return self.angle > FLIP_ANGLE
 
 
 def find_jumps(frames: Sequence[ReportedFrame], distance_seen: float = 0.0) -> list[Jump]:

@@ -130,6 +130,15 @@ class TestTruth:
         assert verdict.findings[0].kind == "trajectory"
         assert "of 20 poses depart from the truth, by up to" in verdict.sentence
 
+    def test_what_looks_the_same_from_two_sides_is_said_to(self) -> None:
+        bent = [
+            with_figures(f, world_from_camera=turned(9 * f.index) @ f.world_from_camera)
+            for f in walk(truth=True)
+        ]
+        verdict = verdict_on(bent)
+        assert verdict.findings[0].kind == "trajectory"
+        assert "does the scene look the same from there?" in verdict.next_step
+
     def test_a_few_wrong_poses_are_named(self) -> None:
         frames = walk(40, truth=True)
         verdict = verdict_on(moved(frames, range(20, 22), turned(0, y=0.07)))
