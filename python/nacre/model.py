@@ -39,6 +39,7 @@ from nacre.parameters import (
     ModelParameters,
     Preset,
 )
+from nacre.point_sigma import point_sigma
 
 if TYPE_CHECKING:
     from nacre.io.cloud import Cloud
@@ -283,6 +284,19 @@ class Model(ExchangeablePoints, Checkpointed):
             return self._core.cloud.confidence
 
     @property
+    def point_sigma(self) -> npt.NDArray[np.float64]:
+        """
+        (N,) the expected standard deviation of each point across the surface [m].
+
+        From the measured noise: what a point's observations average away of it (``confidence``), and what
+        registered frames showed beyond it (``noise_factor``), which is taken for the same in all of them.
+        Errors of the poses, and shape that is finer than the pixels, come on top. NaN where
+        ``fusion_method`` is not "fuse".
+        """
+        with self._lock:
+            return point_sigma(self)
+
+    @property
     def last_seen(self) -> npt.NDArray[np.int32]:
         """(N,) the index of the last frame that observed each point; a copy."""
         with self._lock:
@@ -389,14 +403,19 @@ class Model(ExchangeablePoints, Checkpointed):
         Returns
         -------
         Cloud
-            Points [m], normals, colours where there are any; as attributes ``confidence``, ``last_seen``, and
-            the model's own.
+            Points [m], normals, colours where there are any; as attributes ``confidence``, ``last_seen``,
+            ``sigma`` (:attr:`point_sigma`, [m]) and the model's own.
         """
         from nacre.io.cloud import Cloud
 
         with self._lock:
             points, normals, colors = self.points, self.normals, self.colors
-            more = {"confidence": self.confidence, "last_seen": self.last_seen, **self.attributes}
+            more = {
+                "confidence": self.confidence,
+                "last_seen": self.last_seen,
+                "sigma": self.point_sigma.astype(np.float32),
+                **self.attributes,
+            }
         rows = slice(None) if all_points else on_surface(points, normals, more["confidence"])
         return Cloud(
             points[rows],

@@ -11,9 +11,9 @@ import typer
 
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
 from nacre.cli.follow import follow
-from nacre.cli.outputs import file_rows, trajectory_rows, write_results
+from nacre.cli.outputs import file_rows, require_tracked, trajectory_rows, verdict_rows, write_results
 from nacre.cli.signals import interruptible
-from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
+from nacre.cli.terminal import Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
 
 
 def demo(
@@ -103,13 +103,12 @@ def demo(
     if json:
         print(to_json(report))
     terminal.say()
-    terminal.say(table(_rows(done, pose_error)))
+    terminal.say(table([*verdict_rows(report), *_rows(done, pose_error)]))
     terminal.say()
     terminal.say(table([*file_rows(out), ("pictures", str(out / "pictures"))]))
     if stop.wanted:
         raise typer.Exit(stop.exit_code)
-    if done.num_tracked == 0:
-        raise CommandError(f"every frame was lost: {done.frames[0].reason}")
+    require_tracked(done, 0.5)
 
 
 def _pose_error(done: Any, center: Any) -> dict[str, Any] | None:

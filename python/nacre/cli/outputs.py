@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nacre.cli.terminal import to_json
+from nacre.cli.terminal import CommandError, to_json
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
@@ -32,6 +32,7 @@ def write_results(
     figures: Mapping[str, Any] | None = None,
     pictures: bool = False,
     page: bool = True,
+    min_tracked: float = 0.5,
 ) -> dict[str, Any]:
     """Write the files of a run, the page if wanted, and return what report.json, the last one, holds."""
     import nacre
@@ -45,13 +46,16 @@ def write_results(
     if page:
         from nacre.report import render_page
 
+        interrupted = bool(document.get("interrupted"))
         text = render_page(
-            done.report_data(title, source, figures, interrupted=bool(document.get("interrupted")))
+            done.report_data(title, source, figures, interrupted=interrupted, min_tracked=min_tracked)
         )
         _write(folder / "report.html", text.encode())
         if pictures:
             _write_pictures(folder / "pictures", text)
-    report = done.as_dict(title=title, source=source, **document)
+    else:
+        (folder / "report.html").unlink(missing_ok=True)  # of an earlier model
+    report = done.as_dict(title=title, source=source, min_tracked=min_tracked, **document)
     _write(folder / "report.json", (to_json(report) + "\n").encode())
     return report
 
@@ -86,6 +90,7 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
     """Return what a person wants to know of a run, in words."""
     import numpy as np
 
+    from nacre.report.summary import told_trajectory_error
     from nacre.report.text import count, quantity
 
     counts = {name.lower(): number for name, number in done.counts.items() if number and name != "TRACKED"}
@@ -98,14 +103,12 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
         last = done.loops[-1]
         rows.append(("loops closed", f"{len(done.loops)}, the last at frame {last.index}"))
     ate: Any = done.evaluation.get("absolute_trajectory_error")
-    if ate is not None and ate.num_compared:
-        rows.append(
-            ("trajectory error", f"{quantity(ate.rmse, 'm')} RMS, {quantity(ate.max, 'm')} at most (ATE)")
-        )
+    if ate is not None:
+        rows.append(("trajectory error", " ".join(told_trajectory_error(ate)) + " (ATE)"))
     rpe: Any = done.evaluation.get("relative_pose_error")
     if rpe is not None and rpe.num_pairs:
         text = f"{quantity(rpe.translation_rmse, 'm')}, {quantity(rpe.rotation_rmse, 'rad')}"
-        rows.append(("drift per frame", f"{text} RMS (RPE)"))
+        rows.append(("drift per frame", f"{text} RMSE over {count(rpe.num_pairs)} pairs (RPE)"))
     times = done.milliseconds
     if len(times):
         slow = quantity(float(np.percentile(times, 99)), "ms")
@@ -133,11 +136,47 @@ def describe_recording(sequence: Sequence) -> dict[str, Any]:
     }
 
 
-def file_rows(folder: Path) -> list[tuple[str, str]]:
+def verdict_rows(report: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return the verdict that report.json holds, what else was found, and how well the points are known."""
+    from nacre.report.text import quantity
+
+    rows = []
+    verdict, spread = report["verdict"], report["point_sigma"]
+    if verdict is not None:
+        rows.append(("verdict", verdict["sentence"]))
+        rows += [("", f"{found['word']}: {found['statement']}.") for found in verdict["findings"][1:]]
+        if verdict["next_step"]:
+            rows.append(("next", verdict["next_step"]))
+    if spread is not None:
+        median, p95 = (quantity(spread[name], "m") for name in ("median", "p95"))
+        rows.append(
+            (
+                "points known to",
+                f"{median} (standard deviation expected from noise alone: median; for 95 % at most {p95})",
+            )
+        )
+    return rows
+
+
+def require_tracked(done: Reconstruction, min_tracked: float, advice: str = "") -> None:
+    """Raise where too few frames were tracked of a run whose results are written all the same."""
+    num_tracked, total = done.num_tracked, len(done.frames)
+    if num_tracked >= min_tracked * total:
+        return
+    from nacre.report.lost_frames import most_common_reason
+
+    reason = most_common_reason(frame.reason for frame in done.frames if frame.status == "LOST")
+    told = "every frame was lost"
+    if num_tracked:
+        told = f"only {num_tracked} of {total} frames were tracked, less than {min_tracked:g} of them"
+    raise CommandError(f"{told}: {reason}{advice}", 3)
+
+
+def file_rows(folder: Path, *, page: bool = True) -> list[tuple[str, str]]:
     """Return where the files are."""
     return [
         ("model", str(folder / "model.ply")),
         ("trajectory", str(folder / "trajectory.txt")),
         ("figures", str(folder / "report.json")),
-        ("report", str(folder / "report.html")),
+        *([("report", str(folder / "report.html"))] if page else []),
     ]

@@ -134,6 +134,13 @@ def reconstruct(
             help="Write the points, too, that are no surface: litter, and layers that surer ones cover.",
         ),
     ] = False,
+    report: Annotated[bool, typer.Option("--report/--no-report", help="Write report.html.")] = True,
+    min_tracked: Annotated[
+        float,
+        typer.Option(
+            min=0, max=1, metavar="PART", help="Exit with 3 where a smaller part of the frames is tracked."
+        ),
+    ] = 0.5,
     view: Annotated[
         bool, typer.Option("--view", help="Show the model in the browser while it grows.")
     ] = False,
@@ -156,7 +163,8 @@ def reconstruct(
     Where frames come faster than they can be registered, the oldest are dropped and counted.
 
     OUT gets model.ply (points with normals, in the first camera's frame), trajectory.txt, report.json and
-    report.html. A frame that cannot be read or registered is LOST and changes nothing.
+    report.html. A frame that cannot be read or registered is LOST and changes nothing. Where fewer than
+    --min-tracked of the frames are tracked, all is written, and the exit code is 3.
     The frames may be far apart and in any order: a lost camera is searched for everywhere.
 
     Ctrl-C (and SIGTERM) saves the run and writes what there is; --resume OUT goes on with it, and with one
@@ -201,9 +209,17 @@ def reconstruct(
                 preset=preset_name,
                 is_camera=is_camera(source),
                 all_points=all_points,
+                report=report,
+                min_tracked=_part("--min-tracked", min_tracked),
             )
             job = _begun(terminal, options, unfinished, parameters)
         carry_out(terminal, job, stop, port if view else None)
+
+
+def _part(option: str, value: float) -> float:
+    if not 0 <= value <= 1:  # NaN, which the parser lets through
+        raise CommandError(f"{option} must be 0 to 1, got {value}", 2)
+    return value
 
 
 def _text(path: Path | None) -> str | None:

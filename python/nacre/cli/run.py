@@ -11,7 +11,15 @@ import typer
 
 from nacre.cli.follow import follow
 from nacre.cli.live_feed import LiveFeed
-from nacre.cli.outputs import depth_rows, describe_recording, file_rows, trajectory_rows, write_results
+from nacre.cli.outputs import (
+    depth_rows,
+    describe_recording,
+    file_rows,
+    require_tracked,
+    trajectory_rows,
+    verdict_rows,
+    write_results,
+)
 from nacre.cli.run_options import RunOptions
 from nacre.cli.signals import Interruption, Stopped
 from nacre.cli.terminal import CommandError, Terminal, table, to_json
@@ -68,7 +76,8 @@ def carry_out(terminal: Terminal, job: Job, stop: Interruption, port: int | None
     if terminal.json:
         print(to_json(report))
     rows = depth_rows(job.run.done) + ([] if job.feed is None else job.feed.rows)
-    terminal.say(table([*trajectory_rows(job.run.done), *rows, *file_rows(job.unfinished.out)]))
+    files = file_rows(job.unfinished.out, page=job.options.report)
+    terminal.say(table([*verdict_rows(report), *trajectory_rows(job.run.done), *rows, *files]))
     if live is not None:
         live.finish()
         terminal.say(f"the model stays at {live.viewer.url}; Ctrl-C ends it")
@@ -139,7 +148,8 @@ def _write(job: Job, stop: Interruption) -> dict[str, Any]:
             "live": job.unfinished.live,
         },
         figures=figures if feed is None else {**figures, **dict(feed.rows)},
-        page=not stop.wanted,
+        page=job.options.report and not stop.wanted,
+        min_tracked=job.options.min_tracked,
     )
 
 
@@ -161,9 +171,5 @@ def _complain(job: Job) -> None:
     done: Reconstruction = job.run.done
     if job.feed is not None and job.feed.error is not None:
         raise CommandError(f"{job.feed.error}; what there is was written")
-    if done.num_tracked == 0:
-        reasons = list(dict.fromkeys(frame.reason for frame in done.frames))
-        others = " (and other reasons)" * (len(reasons) > 1)
-        raise CommandError(
-            f"every frame was lost: {reasons[0]}{others}; nacre info {job.options.source} looks at its depth"
-        )
+    advice = f"; nacre info {job.options.source} looks at its depth"
+    require_tracked(done, job.options.min_tracked, advice)

@@ -40,6 +40,8 @@ class RunOptions:
     preset: str = "default"
     is_camera: bool = False
     all_points: bool = False
+    report: bool = True
+    min_tracked: float = 0.5
 
     @property
     def pick(self) -> tuple[int, int | None, int]:
@@ -141,18 +143,20 @@ def describe_unfinished(out: Path) -> tuple[dict[str, Any], list[tuple[str, str]
 
 def _checked(options: RunOptions) -> RunOptions:
     """Return options that a file tells; a TypeError or a ValueError says what nobody can have options for."""
-    from nacre._internal.arrays import as_count, as_flag, as_scale
+    from nacre._internal.arrays import as_count, as_flag, as_number, as_scale
 
     for name in ("source", "preset", "format", "camera", "masks"):
         value = getattr(options, name)
         may_be_none = name not in ("source", "preset")
         if not (isinstance(value, str) and "\0" not in value) and not (value is None and may_be_none):
             raise TypeError(f"{name} must be a text, got {shown(value)}")
-    for name in ("color", "realtime", "retry", "is_camera", "all_points"):
+    for name in ("color", "realtime", "retry", "is_camera", "all_points", "report"):
         as_flag(name, getattr(options, name))
     for name, minimum in (("first", 0), ("last", 0), ("every", 1)):
         if getattr(options, name) is not None or name != "last":
             as_count(name, getattr(options, name), minimum=minimum)
+    if not 0 <= as_number("min_tracked", options.min_tracked) <= 1:
+        raise ValueError(f"min_tracked must be 0 to 1, got {options.min_tracked}")
     if options.depth_scale is not None:
         as_scale("depth_scale", options.depth_scale)
     if not (isinstance(options.attribute, list) and all(isinstance(text, str) for text in options.attribute)):

@@ -21,7 +21,7 @@ Verbose = Annotated[
 
 
 class CommandError(Exception):
-    """An error that is told in one line. Code 1: the data does not allow it; 2: wrong usage."""
+    """An error that is told in one line, with the exit code; docs/conventions.md says what each means."""
 
     def __init__(self, message: str, code: int = 1) -> None:
         super().__init__(message)

@@ -9,8 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_count, as_length, as_number, as_poses, as_times, as_values
+from nacre._internal.rotations import rotation_angles
 from nacre.evaluation.result import Array, Count, Fraction, Metres, Radians, Result
 from nacre.trajectory import associate
+
+#: Poses; fewer are aligned with any others.
+MIN_ALIGNED = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -18,7 +22,8 @@ class AbsoluteTrajectoryError(Result):
     """
     How far each estimated pose is from its true pose; made by :func:`absolute_trajectory_error`.
 
-    The statistics are NaN where no frame has both an estimate and a truth.
+    The statistics and errors are NaN where no frame has both an estimate and a truth, and where fewer than
+    three are aligned: any two positions fit any others of their distance, which says nothing.
     """
 
     rmse: Metres
@@ -102,13 +107,13 @@ def absolute_trajectory_error(
     Examples
     --------
     >>> import numpy as np
-    >>> truth = np.tile(np.eye(4), (3, 1, 1))
-    >>> truth[:, 0, 3] = [0.0, 0.1, 0.2]
+    >>> truth = np.tile(np.eye(4), (4, 1, 1))
+    >>> truth[:, 0, 3] = [0.0, 0.1, 0.2, 0.3]
     >>> estimated = truth.copy()
-    >>> estimated[2] = np.nan
+    >>> estimated[3] = np.nan
     >>> error = absolute_trajectory_error(estimated, truth)
     >>> round(error.rmse, 6), round(error.coverage, 3)
-    (0.0, 0.667)
+    (0.0, 0.75)
     """
     if not (isinstance(align, bool) or align == "first"):
         raise ValueError(f'align must be True, False or "first", got {align!r}')
@@ -135,11 +140,12 @@ def absolute_trajectory_error(
 
     errors = np.full(len(poses), np.nan)
     rotation_errors = np.full(len(poses), np.nan)
-    errors[rows] = np.linalg.norm(moved[:, :3, 3] - target[:, :3, 3], axis=1)
-    rotation_errors[rows] = _rotation_angles(turned.transpose(0, 2, 1) @ target[:, :3, :3])
+    if align is not True or len(rows) >= MIN_ALIGNED:
+        errors[rows] = np.linalg.norm(moved[:, :3, 3] - target[:, :3, 3], axis=1)
+        rotation_errors[rows] = rotation_angles(turned.transpose(0, 2, 1) @ target[:, :3, :3])
     return AbsoluteTrajectoryError(
-        **_statistics("", errors[rows], ("rmse", "mean", "median", "max")),
-        **_statistics("rotation_", rotation_errors[rows], ("rmse", "mean", "median", "max")),
+        **_statistics("", errors, ("rmse", "mean", "median", "max")),
+        **_statistics("rotation_", rotation_errors, ("rmse", "mean", "median", "max")),
         num_frames=total,
         num_tracked=num_tracked,
         num_compared=len(rows),
@@ -218,7 +224,7 @@ def relative_pose_error(
     names = ("rmse", "mean", "max")
     return RelativePoseError(
         **_statistics("translation_", np.linalg.norm(error[:, :3, 3], axis=1), names),
-        **_statistics("rotation_", _rotation_angles(error[:, :3, :3]), names),
+        **_statistics("rotation_", rotation_angles(error[:, :3, :3]), names),
         delta=step,
         unit=unit,
         num_pairs=len(first),
@@ -285,7 +291,7 @@ def _likeliest_rotation(source: Array, target: Array) -> Array:
     left = centered @ _umeyama(source, target)[:3, :3].T - target_centered
     orientations = _orientations(source, target)
     turned = _closest_rotation(orientations) @ source[:, :3, :3]
-    angles = _rotation_angles(turned.transpose(0, 2, 1) @ target[:, :3, :3])
+    angles = rotation_angles(turned.transpose(0, 2, 1) @ target[:, :3, :3])
     exact = 1e-18  # [rad^2]: a variance that is not 0
     size = (centered**2).sum() / len(source) or 1.0
     of_positions = (left**2).sum() / len(source) / size + exact
@@ -314,21 +320,9 @@ def _inverse(poses: Array) -> Array:
     return inverse
 
 
-def _rotation_angles(rotation: Array) -> Array:
-    """Return the angle of each rotation; exact for small angles too, unlike the arc cosine."""
-    axis = np.stack(
-        [
-            rotation[:, 2, 1] - rotation[:, 1, 2],
-            rotation[:, 0, 2] - rotation[:, 2, 0],
-            rotation[:, 1, 0] - rotation[:, 0, 1],
-        ],
-        axis=1,
-    )
-    trace = np.trace(rotation, axis1=1, axis2=2)
-    return np.asarray(np.arctan2(np.linalg.norm(axis, axis=1), trace - 1))
-
-
 def _statistics(prefix: str, errors: Array, names: tuple[str, ...]) -> dict[str, Any]:
+    """Return statistics of the errors that are known; NaN where none is."""
+    errors = errors[np.isfinite(errors)]
     if not len(errors):
         return dict.fromkeys((prefix + name for name in names), np.nan)
     values = {

@@ -29,6 +29,8 @@ from nacre.io.cloud import Cloud
 from nacre.model import Model
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.saved_state import record_from, record_state
+from nacre.report.doubled_surfaces import DoubledSurfaces, find_doubled_surfaces
+from nacre.report.limits import MIN_TRACKED
 from nacre.report.run_figures import run_dict, run_report
 from nacre.trajectory import Trajectory
 
@@ -100,6 +102,7 @@ class Reconstruction(Checkpointed):
         self.all_points = False
         self._retry: _Retry | None = None
         self._cloud: tuple[tuple[int, bool], Cloud] | None = None  # of so many frames
+        self._doubled: tuple[int, DoubledSurfaces] | None = None  # after so many of the model's frames
 
     def __repr__(self) -> str:
         ended = ", cancelled" * self.cancelled
@@ -334,6 +337,23 @@ class Reconstruction(Checkpointed):
         return [sentence for sentence in told if sentence]
 
     @property
+    def doubled_surfaces(self) -> DoubledSurfaces | None:
+        """How much of the model is there twice, as frames that disagree leave it; None without points."""
+        model = self.model
+        if not len(model):
+            return None
+        num_frames = len(model.frames)
+        if self._doubled is None or self._doubled[0] != num_frames:
+            found = find_doubled_surfaces(
+                model.points,
+                model.normals,
+                spacing=model.spacing,
+                max_slant=model.parameters.depth.max_slant,
+            )
+            self._doubled = num_frames, found
+        return self._doubled[1]
+
+    @property
     def counts(self) -> dict[str, int]:
         """How many frames have each status."""
         return count_statuses(self.frames)
@@ -399,9 +419,22 @@ class Reconstruction(Checkpointed):
             self._cloud = state, self.model.cloud(all_points=self.all_points)
         return self._cloud[1]
 
-    def as_dict(self, **more: Any) -> dict[str, Any]:
-        """Return every figure as plain values that JSON can hold (NaN and inf become None)."""
-        return run_dict(self, **more)
+    def as_dict(self, *, min_tracked: float = MIN_TRACKED, **more: Any) -> dict[str, Any]:
+        """
+        Return every figure as plain values that JSON can hold (NaN and inf become None).
+
+        Parameters
+        ----------
+        min_tracked : float
+            Part of the frames; with less the verdict is that the run failed.
+        **more
+            Further entries.
+
+        Returns
+        -------
+        dict
+        """
+        return run_dict(self, min_tracked=min_tracked, **more)
 
     def report_data(
         self,
@@ -410,6 +443,7 @@ class Reconstruction(Checkpointed):
         figures: Mapping[str, Any] | None = None,
         *,
         interrupted: bool = False,
+        min_tracked: float = MIN_TRACKED,
     ) -> ReportData:
         """
         Return what :func:`nacre.report.write_report` shows; it reads some frames again.
@@ -422,9 +456,19 @@ class Reconstruction(Checkpointed):
             More numbers for the page, by name.
         interrupted : bool
             Whether the run ended before the recording did.
+        min_tracked : float
+            Part of the frames; with less the verdict is that the run failed.
 
         Returns
         -------
         ReportData
         """
-        return run_report(self, title, source, figures, interrupted=interrupted)
+        return run_report(
+            self,
+            title,
+            source,
+            figures,
+            interrupted=interrupted,
+            min_tracked=min_tracked,
+            with_depth=True,
+        )

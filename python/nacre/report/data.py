@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre.report.doubled_surfaces import DoubledSurfaces
+from nacre.report.limits import MIN_TRACKED
 from nacre.report.reported_frame import ReportedFrame
 
 
@@ -20,6 +22,7 @@ class ModelCloud:
     normals: npt.NDArray[np.floating[Any]] | None = None
     colors: npt.NDArray[np.uint8] | None = None
     confidence: npt.NDArray[Any] | None = None  #: (N,), in frontal observations
+    sigma: npt.NDArray[np.floating[Any]] | None = None  #: (N,) expected standard deviation [m]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,3 +52,5 @@ class ReportData:
     figures: Mapping[str, Any] = field(default_factory=dict)  #: further figures, name -> number or text
     parameters: Mapping[str, Any] = field(default_factory=dict)  #: name -> value, or a group of them
     interrupted: bool = False  #: whether it was stopped before the last frame
+    doubled: DoubledSurfaces | None = None  #: of the model; None where nobody looked
+    min_tracked: float = MIN_TRACKED  #: part of the frames; with less the run has failed

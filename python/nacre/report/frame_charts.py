@@ -87,7 +87,7 @@ def trajectory_charts(
     ):
         seen = [(name, track[:, axes], color) for name, track, color in tracks]
         svg = map_chart(seen, x_label=names[0], y_label=names[1], y_up=axes[1] == 2, unit=unit, factor=factor)
-        maps.append(ChartFigure(f"Path of the camera, {caption}", svg, keys))
+        maps.append(ChartFigure(f"Camera trajectory, {caption}", svg, keys))
     return {"maps": maps, "errors": _error_charts(frames, error), "marked": _marked(frames)}
 
 
@@ -99,7 +99,7 @@ def _error_charts(
         translation, rotation = error.errors, error.rotation_errors
     charts = []
     if np.isfinite(translation).any():
-        charts.append(_length_figure(frames, "Position error", translation, "position"))
+        charts.append(_length_figure(frames, "Position error (ATE)", translation, "position"))
     if np.isfinite(rotation).any():
         one = Series("", np.degrees(rotation))
         charts.append(_line_figure(frames, "Rotation error", [one], "rotation [\N{DEGREE SIGN}]"))
@@ -121,19 +121,19 @@ def registration_charts(
     overlap, consistency, score, rmse = map(known, ("overlap", "consistency", "score", "rmse"))
     if np.isfinite(overlap).any():
         both = [
-            Series("matches the model", 100 * overlap, 0),
-            Series("not seen through", 100 * consistency, 2),
+            Series("inlier ratio", 100 * overlap, 0),
+            Series("free-space violations", 100 * (1 - consistency), 5),
         ]
         both = [one for one in both if np.isfinite(one.values).any()]
-        title = "Overlap and consistency"
-        charts.append(_line_figure(frames, title, both, "part of the frame [%]", y_max=100))
+        title = "Inlier ratio and free-space violations"
+        charts.append(_line_figure(frames, title, both, "part [%]", y_max=100))
     if np.isfinite(score).any():
         least = parameters.get("min_score")
         note = f"a frame below {least:g} is lost" if isinstance(least, float) else ""
         title, one = "Registration score", Series("", score)
         charts.append(_line_figure(frames, title, [one], title.lower(), note=note, level=least))
     if np.isfinite(rmse).any():
-        charts.append(_length_figure(frames, "Residual of the registration (RMS)", rmse, "residual"))
+        charts.append(_length_figure(frames, "Inlier RMSE", rmse, "RMSE"))
     num_points = values(frames, "num_points")
     if np.nanmax(num_points, initial=0) > 0:
         one = Series("", num_points / 1000)

@@ -9,26 +9,28 @@ from typing import Any, NamedTuple
 
 from nacre import __version__
 from nacre.errors import printable
+from nacre.evaluation import AbsoluteTrajectoryError
 from nacre.io.atomic import atomic_writer
 from nacre.report.charts import status_strip
 from nacre.report.data import ReportData
 from nacre.report.depth_pictures import draw_depth
 from nacre.report.frame_charts import registration_charts, time_chart, trajectory_charts
-from nacre.report.pictures import draw_model
+from nacre.report.lost_frames import stretches
+from nacre.report.pictures import ModelPictures, draw_model
 from nacre.report.pixel_counts import pixel_counts, removed_chart
 from nacre.report.reported_frame import ReportedFrame
 from nacre.report.summary import summarize
 from nacre.report.tables import frame_table, result_tables
 from nacre.report.templating import render
 from nacre.report.text import flatten, ranges
-from nacre.report.verdict import stretches
 
 
 class Section(NamedTuple):
-    """A part of the page; ``templates/NAME.html`` shows its content."""
+    """A folded part of the page; ``templates/NAME.html`` shows its content."""
 
     name: str
     title: str
+    lead: str  #: what it holds
     content: Any
 
 
@@ -63,36 +65,47 @@ def render_page(data: ReportData) -> str:
     """Return the report as HTML text."""
     summary = summarize(data)
     model = None if data.model is None else draw_model(data.model, data.frames)
-    depth = {
-        "examples": [(example, draw_depth(example)) for example in data.depth],
-        "removed": removed_chart(data.frames),
-    }
-    sections = [
-        Section("look", "Frames to look at", stretches(data.frames)),
-        Section("model", "Model", model),
-        Section("depth", "Depth before and after cleaning", depth if data.depth else None),
-        Section("funnel", "Where the points were lost", pixel_counts(data.frames)),
-        Section("trajectory", "Trajectory", trajectory_charts(data.frames, summary.trajectory)),
-        Section("frames", "Frames", registration_charts(data.frames, data.parameters)),
-        Section("time", "Time", time_chart(data.frames)),
-        Section("figures", "Figures", result_tables(data, summary.trajectory)),
-        Section("table", "Table of frames", frame_table(data.frames)),
-        Section("parameters", "Parameters", flatten(data.parameters)),
-    ]
     page = render(
         "page.html",
         data=data,
         summary=summary,
         model=model,
         states=_states(data.frames),
-        sections=[section for section in sections if section.content],
+        sections=_sections(data, summary.trajectory, model),
         version=__version__,
     )
     return printable(page)
 
 
+def _sections(
+    data: ReportData, trajectory: AbsoluteTrajectoryError | None, model: ModelPictures | None
+) -> list[Section]:
+    """Return the folded parts that have something to show."""
+    frames = data.frames
+    views = "six sides, point spacing, confidence" + ", colours" * bool(model and model.colors)
+    path = trajectory_charts(frames, trajectory)
+    registration = registration_charts(frames, data.parameters)
+    depth = {
+        "examples": [(example, draw_depth(example)) for example in data.depth],
+        "removed": removed_chart(frames),
+    }
+    sections = [
+        Section("look", "Frames not fused", "where, and why", stretches(frames)),
+        Section("model", "Model", views, model),
+        Section("trajectory", "Trajectory", "path of the camera, errors", path),
+        Section("frames", "Registration", "of each frame: inliers, score, residual", registration),
+        Section("depth", "Depth cleaning", "images before and after", depth if data.depth else None),
+        Section("funnel", "Pixels", "how many were measured, kept and fused", pixel_counts(frames)),
+        Section("time", "Time", "of each step in each frame", time_chart(frames)),
+        Section("figures", "Evaluation", "all figures", result_tables(data, trajectory)),
+        Section("table", "Frames", "a row for each", frame_table(frames)),
+        Section("parameters", "Parameters", "all of them", flatten(data.parameters)),
+    ]
+    return [section for section in sections if section.content]
+
+
 def _states(frames: Sequence[ReportedFrame]) -> dict[str, Any] | None:
-    """Return the states of all frames, in the order in which they came."""
+    """Return the statuses of all frames, in the order in which they came."""
     if len(frames) < 2:
         return None
     states = [frame.status for frame in frames]

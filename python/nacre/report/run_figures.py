@@ -14,6 +14,7 @@ from nacre.depth import PIXEL_LABELS, label_pixels
 from nacre.errors import FileFormatError
 from nacre.evaluation.result import plain, result_dict
 from nacre.frame_report import STATUSES
+from nacre.report.limits import MIN_TRACKED
 from nacre.report.reported_frame import ReportedFrame
 
 if TYPE_CHECKING:
@@ -21,10 +22,14 @@ if TYPE_CHECKING:
     from nacre.report import DepthExample, ReportData
 
 
-def run_dict(run: Reconstruction, **more: Any) -> dict[str, Any]:
+def run_dict(run: Reconstruction, *, min_tracked: float = MIN_TRACKED, **more: Any) -> dict[str, Any]:
     """Return what ``report.json`` says of a run."""
+    from nacre.report.summary import sigma_statistics, summarize
+
     counts = run.counts
     times = run.milliseconds
+    told = run_report(run, "", "", interrupted=bool(more.get("interrupted")), min_tracked=min_tracked)
+    verdict, sigma = summarize(told).verdict, None if told.model is None else told.model.sigma
     figures: dict[str, Any] = plain(
         {
             "nacre": __version__,
@@ -34,6 +39,7 @@ def run_dict(run: Reconstruction, **more: Any) -> dict[str, Any]:
                 "numpy": np.__version__,
             },
             **more,
+            "verdict": None if verdict is None else dataclasses.asdict(verdict),
             "num_frames": len(run.frames),
             "num_tracked": run.num_tracked,
             **{f"num_{name.lower()}": counts[name] for name in STATUSES[1:]},
@@ -41,6 +47,8 @@ def run_dict(run: Reconstruction, **more: Any) -> dict[str, Any]:
             "coverage": run.num_tracked / len(run.frames) if run.frames else None,
             "num_points": len(run.cloud),
             "spacing": run.model.spacing,
+            "point_sigma": None if sigma is None else sigma_statistics(sigma),
+            "doubled_surfaces": None if told.doubled is None else dataclasses.asdict(told.doubled),
             "noise": dataclasses.asdict(run.model.noise),
             "milliseconds": {
                 "mean": times.mean() if len(times) else None,
@@ -49,7 +57,7 @@ def run_dict(run: Reconstruction, **more: Any) -> dict[str, Any]:
             },
             **{name: result_dict(result) for name, result in run.evaluation.items()},
             "parameters": run.parameters,
-            "frames": [frame.figures for frame in _reported_frames(run)],
+            "frames": [frame.figures for frame in told.frames],
         }
     )
     return figures
@@ -59,28 +67,33 @@ def run_report(
     run: Reconstruction,
     title: str,
     source: str,
-    figures: Mapping[str, Any] | None,
+    figures: Mapping[str, Any] | None = None,
     *,
     interrupted: bool,
+    min_tracked: float = MIN_TRACKED,
+    with_depth: bool = False,
 ) -> ReportData:
-    """Return what ``report.html`` says of a run; it reads some frames again."""
+    """Return what ``report.html`` says of a run; ``with_depth`` reads some frames again."""
     from nacre.report import ModelCloud, ReportData
     from nacre.report.text import label
 
     model, cloud = None, run.cloud
     if len(cloud):
         assert cloud.normals is not None
-        model = ModelCloud(cloud.points, cloud.normals, cloud.colors, cloud.attributes["confidence"])
+        more = cloud.attributes
+        model = ModelCloud(cloud.points, cloud.normals, cloud.colors, more["confidence"], more["sigma"])
     return ReportData(
         title=title,
         source=source,
         frames=_reported_frames(run),
         model=model,
-        depth=_depth_examples(run),
+        depth=_depth_examples(run) if with_depth else (),
         evaluation={label(name): result for name, result in run.evaluation.items()},
         figures=figures or {},
         parameters=run.parameters,
         interrupted=interrupted,
+        doubled=None if interrupted else run.doubled_surfaces,  # who stops a run waits for it
+        min_tracked=min_tracked,
     )
 
 

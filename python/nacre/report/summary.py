@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from nacre._internal.arrays import stacked_poses
 from nacre.evaluation import (
@@ -15,9 +16,10 @@ from nacre.evaluation import (
     SurfaceAccuracy,
     absolute_trajectory_error,
 )
+from nacre.evaluation.trajectory import MIN_ALIGNED
 from nacre.report.data import ReportData
 from nacre.report.reported_frame import ReportedFrame
-from nacre.report.text import count, quantity
+from nacre.report.text import count, length_unit, quantity
 from nacre.report.verdict import Verdict, judge
 
 ResultType = TypeVar("ResultType")
@@ -37,7 +39,6 @@ class Summary:
     """The main figures of a reconstruction."""
 
     verdict: Verdict | None
-    sentence: str
     tiles: tuple[Tile, ...]
     trajectory: AbsoluteTrajectoryError | None  #: given, or worked out from the poses
 
@@ -50,58 +51,78 @@ def find(data: ReportData, kind: type[ResultType]) -> ResultType | None:
 def summarize(data: ReportData) -> Summary:
     """Work out what to say first."""
     trajectory = find(data, AbsoluteTrajectoryError) or _trajectory_error(data.frames)
-    verdict = judge(data, trajectory)
-    sentences, tiles = [], []
-    if verdict is not None:
-        sentences.append(verdict.why)
-        num_frames, num_tracked = len(data.frames), sum(frame.is_tracked for frame in data.frames)
-        part = quantity(num_tracked / num_frames, "fraction")
-        tiles.append(Tile("Frames tracked", f"{count(num_tracked)} / {count(num_frames)}", part))
-    matching = [f.overlap for f in data.frames if f.is_tracked and f.num_inliers and f.overlap is not None]
-    if matching:
-        typical = 100 * float(np.median(matching))
-        sentences.append(f"Typically {typical:.0f} % of a frame matches the model")
-    if data.model is not None:
-        num_points = int(np.isfinite(np.asarray(data.model.points)).all(axis=1).sum())
-        sentences.append(f"The model has {count(num_points)} points")
-        tiles.append(Tile("Model points", count(num_points), _extent(data)))
+    tiles = [*_frame_tiles(data.frames), *_model_tiles(data), *_evaluation_tiles(data)]
+    if trajectory is not None:
+        tiles.append(_trajectory_tile(trajectory))
+    times = [time for frame in data.frames if (time := frame.total_milliseconds) is not None]
+    if times:
+        slow = quantity(float(np.percentile(times, 99)), "ms")
+        tiles.append(
+            Tile("Time per frame", quantity(float(np.median(times)), "ms"), f"median; 99 % within {slow}")
+        )
+    return Summary(judge(data, trajectory), tuple(tiles), trajectory)
 
+
+def _frame_tiles(frames: Sequence[ReportedFrame]) -> Iterator[Tile]:
+    if not frames:
+        return
+    num_tracked = sum(frame.is_tracked for frame in frames)
+    found = sum(frame.status == "RELOCALISED" for frame in frames)
+    more = f"; {count(found)} relocalised after a loss" * bool(found)
+    part = quantity(num_tracked / len(frames), "fraction")
+    yield Tile("Frames tracked", f"{count(num_tracked)} / {count(len(frames))}", part + more)
+    matching = [f.overlap for f in frames if f.is_tracked and f.num_inliers and f.overlap is not None]
+    if matching:
+        yield Tile(
+            "Inlier ratio", quantity(float(np.median(matching)), "fraction"), "median of tracked frames"
+        )
+
+
+def _model_tiles(data: ReportData) -> Iterator[Tile]:
+    if data.model is None:
+        return
+    num_points = int(np.isfinite(np.asarray(data.model.points)).all(axis=1).sum())
+    yield Tile("Model points", count(num_points), _extent(data))
+    spread = None if data.model.sigma is None else sigma_statistics(data.model.sigma)
+    if spread is not None:
+        note = f"median, expected from noise alone; for 95 % at most {quantity(spread['p95'], 'm')}"
+        yield Tile("Point standard deviation", quantity(spread["median"], "m"), note)
+
+
+def _evaluation_tiles(data: ReportData) -> Iterator[Tile]:
     accuracy, covered = find(data, SurfaceAccuracy), find(data, Completeness)
     if accuracy is not None:
-        rms = quantity(accuracy.rms, "m")
-        sentences.append(f"It lies {rms} (RMS) from the reference surface")
-        tiles.append(Tile("Distance to reference", rms, f"RMS; bias {quantity(accuracy.bias, 'm')}"))
+        note = f"RMS distance to the reference; bias {quantity(accuracy.bias, 'm')}"
+        yield Tile("Accuracy", quantity(accuracy.rms, "m"), note)
     if covered is not None:
         middle = len(covered.tau) // 2
         part = quantity(covered.fraction[middle], "fraction")
-        tiles.append(Tile("Surface covered", part, f"within {quantity(covered.tau[middle], 'm')}"))
-
-    if trajectory is not None and trajectory.num_compared:
-        rmse = quantity(trajectory.rmse, "m")
-        sentences.append(f"The camera positions are off by {rmse} (RMS){_path_length(data.frames)}")
-        tiles.append(
-            Tile(
-                "Trajectory error", rmse, f"ATE RMSE; {quantity(trajectory.rotation_rmse, 'rad')} in rotation"
-            )
-        )
-
-    times = [time for frame in data.frames if (time := frame.total_milliseconds) is not None]
-    if times:
-        median = quantity(float(np.median(times)), "ms")
-        tiles.append(
-            Tile(
-                "Time per frame",
-                median,
-                f"median; 99 % within {quantity(float(np.percentile(times, 99)), 'ms')}",
-            )
-        )
-    return Summary(verdict, ". ".join(sentences) + "." * bool(sentences), tuple(tiles), trajectory)
+        yield Tile("Completeness", part, f"within {quantity(covered.tau[middle], 'm')}")
 
 
-def _path_length(frames: Sequence[ReportedFrame]) -> str:
-    places = [np.asarray(frame.truth, dtype=np.float64)[:3, 3] for frame in frames if frame.truth is not None]
-    length = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum()) if len(places) > 1 else 0.0
-    return f" on a path of {quantity(length, 'm')}" if length > 0 else ""
+def _trajectory_tile(error: AbsoluteTrajectoryError) -> Tile:
+    rmse, of = told_trajectory_error(error)
+    more = f"; {quantity(error.rotation_rmse, 'rad')} in rotation" * (error.num_compared >= MIN_ALIGNED)
+    return Tile("Trajectory error (ATE)", rmse, of + more)
+
+
+def told_trajectory_error(error: AbsoluteTrajectoryError) -> tuple[str, str]:
+    """Return the RMSE in words, and of how many frames it is: of fewer than three it says nothing."""
+    if error.num_compared < MIN_ALIGNED:
+        compared = f"{count(error.num_compared)} of {count(error.num_frames)} frames"
+        return "not known", f"{compared} have a pose and a true one, at least {MIN_ALIGNED} must"
+    rmse = quantity(error.rmse, "m")
+    return rmse, f"RMSE over {count(error.num_compared)} of {count(error.num_frames)} frames"
+
+
+def sigma_statistics(sigma: npt.ArrayLike) -> dict[str, float] | None:
+    """Return median, 95th percentile and root mean square of standard deviations; None: none is known."""
+    known = np.asarray(sigma, dtype=np.float64)
+    known = known[np.isfinite(known)]
+    if not len(known):
+        return None
+    median, p95 = np.percentile(known, (50, 95))
+    return {"median": float(median), "p95": float(p95), "rms": float(np.sqrt(np.mean(known**2)))}
 
 
 def _trajectory_error(frames: Sequence[ReportedFrame]) -> AbsoluteTrajectoryError | None:
@@ -120,8 +141,6 @@ def _extent(data: ReportData) -> str:
     if not len(points):
         return ""
     low, high = np.percentile(points, (0.1, 99.9), axis=0)
-    sides = [quantity(float(side), "m") for side in high - low]
-    units = {side.split(" ")[1] for side in sides}
-    if len(units) == 1:
-        return " \N{MULTIPLICATION SIGN} ".join(side.split(" ")[0] for side in sides) + f" {units.pop()}"
-    return " \N{MULTIPLICATION SIGN} ".join(sides)
+    unit, factor = length_unit(float(max(high - low)))
+    sides = " \N{MULTIPLICATION SIGN} ".join(quantity(float(factor * side), "number") for side in high - low)
+    return f"{sides} {unit}"

@@ -16,10 +16,10 @@ from nacre.report.text import flatten, label, quantity
 _MAX_ROWS = 300
 _COLUMNS = (
     ("Inliers", "num_inliers", "count"),
-    ("Overlap", "overlap", "fraction"),
+    ("Inlier ratio", "overlap", "fraction"),
     ("Registration score", "score", "number"),
     ("Probability", "probability", "fraction"),
-    ("Residual", "rmse", "m"),
+    ("Inlier RMSE", "rmse", "m"),
     ("Position error", "translation_error", "m"),
     ("Rotation error", "rotation_error", "rad"),
     ("Model points", "num_points", "count"),

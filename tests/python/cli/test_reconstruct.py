@@ -103,8 +103,8 @@ def test_every_frame_lost(copied, tmp_path):
     for path in (copied / "depth").iterdir():
         write_depth_png(path, np.zeros((112, 112), np.uint16))
     result = run("reconstruct", copied, "-o", tmp_path / "o")
-    assert result.code == 1
-    assert "every frame was lost" in result.err
+    assert result.code == 3
+    assert "every frame was lost: no usable pixel" in result.err
     assert strict_json(tmp_path / "o" / "report.json")["num_tracked"] == 0
     assert len(nacre.read_points(tmp_path / "o" / "model.ply")) == 0
     assert (tmp_path / "o" / "report.html").exists()
@@ -216,3 +216,57 @@ def test_redwood_with_and_without_colour(recordings, tmp_path):
         assert run("reconstruct", source, "-o", tmp_path / name, "--last", 0, *options).code == 0
         cloud = nacre.read_points(tmp_path / name / "model.ply")
         assert (cloud.colors is not None) == (name == "color")
+
+
+@pytest.fixture(scope="module")
+def mostly_blank(recording, tmp_path_factory):
+    """A recording of which one frame of four holds a measurement."""
+    copy = tmp_path_factory.mktemp("blank") / "recording"
+    shutil.copytree(recording, copy)
+    for index in (1, 2, 3):
+        write_depth_png(copy / "depth" / f"{index:06d}.png", np.zeros((112, 112), np.uint16))
+    return copy
+
+
+@pytest.mark.parametrize(
+    ("least", "code"), [((), 3), (("--min-tracked", 0.25), 0), (("--min-tracked", 0), 0)]
+)
+def test_too_few_tracked_frames_exit_with_3_and_all_is_written(mostly_blank, tmp_path, least, code):
+    result = run("reconstruct", mostly_blank, "-o", tmp_path / "o", *least)
+    assert result.code == code
+    report = strict_json(tmp_path / "o" / "report.json")
+    assert report["num_tracked"] == 1
+    assert (report["verdict"]["level"] == "lost") == (code == 3)
+    assert "not known 1 of 4 frames have a pose and a true one" in result.out
+    assert (tmp_path / "o" / "report.html").exists()
+    assert len(nacre.read_points(tmp_path / "o" / "model.ply")) == report["num_points"] > 0
+    assert (code == 3) == ("only 1 of 4 frames were tracked, less than 0.5 of them" in result.err)
+
+
+@pytest.mark.parametrize("value", ["-0.1", "1.5", "nan", "half"])
+def test_illegal_parts_are_refused_before_the_work(recording, tmp_path, value):
+    assert "--min-tracked" in fails(2, "reconstruct", recording, "-o", tmp_path / "o", "--min-tracked", value)
+    assert not (tmp_path / "o").exists()
+
+
+def test_without_report_no_page_is_written_or_left(recording, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "jinja2", None)  # what only the page needs
+    (tmp_path / "o").mkdir()
+    (tmp_path / "o" / "report.html").write_text("of an earlier model")
+    (tmp_path / "o" / "notes.txt").write_text("mine")
+    result = run("reconstruct", recording, "-o", tmp_path / "o", "--no-report")
+    assert result.code == 0, result.err
+    assert sorted(path.name for path in (tmp_path / "o").iterdir()) == [
+        "model.ply", "notes.txt", "report.json", "trajectory.txt",
+    ]  # fmt: skip
+    assert "report.html" not in result.out
+    assert strict_json(tmp_path / "o" / "report.json")["verdict"]["level"] == "ok"
+
+
+def test_the_terminal_tells_the_verdict_and_the_accuracy(reconstructed, recording, tmp_path):
+    report = strict_json(reconstructed[0] / "report.json")
+    result = run("reconstruct", recording, "-o", tmp_path / "o", "--no-report")
+    assert report["verdict"]["sentence"] in result.out
+    assert "standard deviation expected from noise alone" in result.out
+    assert report["doubled_surfaces"]["fraction"] == 0
+    assert 0 < report["point_sigma"]["median"] <= report["point_sigma"]["p95"] < 0.001

@@ -132,10 +132,20 @@ class TestAbsoluteTrajectoryError:
 
     def test_orientations_decide_what_positions_leave_open(self) -> None:
         line = np.stack([pose((0, 1, 0), 0.1 * i, (i, 0, 0)) for i in range(5)])
-        for truth in (line, line[:1], np.tile(pose((1, 0, 0), 0.3), (3, 1, 1))):
+        for truth in (line, line[:3], np.tile(pose((1, 0, 0), 0.3), (3, 1, 1))):
             error = absolute_trajectory_error(pose((1, 2, 3), 1.2, (4, 5, 6)) @ truth, truth)
             assert error.rmse < 1e-9
             assert error.rotation_max < 1e-6
+
+    @pytest.mark.parametrize("number", [1, 2])
+    def test_fewer_than_three_aligned_poses_say_nothing(self, number: int) -> None:
+        truth = wandering(48)
+        estimated = np.full_like(truth, np.nan)
+        estimated[:number] = truth[20 : 20 + number]
+        error = absolute_trajectory_error(estimated, truth)
+        assert np.isnan([error.rmse, error.max, error.rotation_rmse, *error.errors]).all()
+        assert (error.num_compared, error.num_frames) == (number, 48)
+        assert absolute_trajectory_error(estimated, truth, align=False).rmse > 0
 
     def test_lost_frames_lower_the_coverage_only(self) -> None:
         truth = wandering(10)

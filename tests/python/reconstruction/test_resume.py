@@ -173,6 +173,16 @@ class TestRefused:
         assert "leave out --every" in self.fails(2, "--resume", killed[1], "--every", 2)
         assert "leave out SOURCE" in self.fails(2, killed[0], "--resume", killed[1])
 
+    def test_the_report_that_was_asked_for_is_among_them(self, recording: Path, tmp_path: Path) -> None:
+        out = tmp_path / "o"
+        killed_after(3, "reconstruct", recording, "-o", out, "--no-report", "--min-tracked", 1)
+        assert "leave out --report" in self.fails(2, "--resume", out, "--no-report")
+        assert "leave out --min-tracked" in self.fails(2, "--resume", out, "--min-tracked", 0.1)
+        code, _, _ = command("reconstruct", "--resume", out)
+        report = json.loads((out / "report.json").read_text())
+        assert (code, report["num_tracked"] < report["num_frames"]) == (3, True)
+        assert not (out / "report.html").exists()
+
     def test_another_recording(self, killed: tuple[Path, Path]) -> None:
         (killed[0] / "depth" / "000006.png").unlink()
         assert "not the recording that it was" in self.fails(1, "--resume", killed[1])

@@ -1,0 +1,185 @@
+"""What speaks against a reconstruction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from nacre.evaluation import AbsoluteTrajectoryError
+from nacre.evaluation.trajectory import MIN_ALIGNED
+from nacre.report.data import ReportData
+from nacre.report.limits import FLIP_ANGLE, MAX_DOUBLED, MAX_POSE_ERROR, MIN_PROBABILITY
+from nacre.report.lost_frames import advice_on, most_common_reason
+from nacre.report.motion_check import Jump, find_jumps
+from nacre.report.reported_frame import ReportedFrame
+from nacre.report.text import count, quantity, ranges
+
+Level = Literal["ok", "weak", "lost"]
+
+_ADVICE = {
+    "flip": "Look at the frames on both sides in the viewer: does the scene look the same from there? Record "
+    "it more slowly, with more in view that differs, or leave those frames out (--first, --last).",
+    "jump": "Look at these frames in the viewer. Fast motion needs more frames per second, no --every; "
+    "before a plain wall something with shape must be in view.",
+    "trajectory": "Look where the errors begin to grow (Trajectory), and whether true poses and images fit "
+    "together in time. More overlap, and coming back to the start, keep drift small.",
+    "doubled": "Frames disagree there, by their poses or by systematic errors of their depth: look at it in "
+    "the viewer; record it more slowly, come back to it so that a loop closes, or calibrate the camera.",
+    "doubtful": "Look at these frames in the viewer: does what they see lie on the model?",
+    "interrupted": "nacre reconstruct --resume goes on with it.",
+    "single": "Points are confirmed where three frames saw them: record more views.",
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that speaks against a run."""
+
+    kind: str  #: "untracked", "flip", "jump", "trajectory", "doubled", "doubtful", "lost", "weak", ...
+    level: Level  #: "lost": do not trust it; "weak": look at it
+    word: str  #: the verdict where this is the worst
+    statement: str  #: what was found
+    next_step: str  #: what to do
+    frames: tuple[int, ...] = ()  #: indices of the frames that it is about
+
+
+def find_problems(data: ReportData, trajectory: AbsoluteTrajectoryError | None) -> Iterator[Finding]:
+    """Look for all that can be wrong with a run, the worst first."""
+    lost = [frame for frame in data.frames if not frame.is_tracked]
+    weak = [frame for frame in data.frames if frame.status == "WEAK"]
+    is_failed = _is_failed(data, len(data.frames) - len(lost))
+    if is_failed:
+        yield _failure(lost, len(data.frames))
+    distance = _distance_seen(data)
+    yield from _jumps(data.frames, distance)
+    yield from _pose_errors(data.frames, trajectory, distance)
+    yield from _doubled(data)
+    yield from _doubtful(data.frames)
+    if lost and not is_failed:
+        reason = most_common_reason(frame.reason for frame in lost)
+        statement = f"{count(len(lost))} of {_were(len(data.frames))} lost" + f": {reason}" * bool(reason)
+        advice = advice_on(lost, some_are_tracked=True)
+        yield _of_frames("lost", "weak", "Incomplete", statement, lost, advice)
+    if weak:
+        statement = f"{_were(len(weak))} not fused, as the shape in view leaves directions of the pose open"
+        yield _of_frames("weak", "weak", "Incomplete", statement, weak, advice_on(weak))
+    if data.interrupted:
+        yield Finding(
+            "interrupted",
+            "weak",
+            "Not finished",
+            "the run was stopped before its end",
+            _ADVICE["interrupted"],
+        )
+    if len(data.frames) == 1 and not is_failed:
+        yield Finding("single", "weak", "One view", "there was nothing to register it to", _ADVICE["single"])
+
+
+def _is_failed(data: ReportData, num_tracked: int) -> bool:
+    return not num_tracked or num_tracked < data.min_tracked * len(data.frames)
+
+
+def _failure(lost: Sequence[ReportedFrame], total: int) -> Finding:
+    num_tracked, reason = total - len(lost), most_common_reason(frame.reason for frame in lost)
+    statement = "the only frame could not be used"
+    if num_tracked:
+        part = quantity(num_tracked / total, "fraction")
+        statement = f"only {count(num_tracked)} of {count(total)} frames ({part}) were tracked"
+    elif total > 1:
+        statement = f"none of the {count(total)} frames could be registered"
+    statement += f": {reason}" * bool(reason)
+    return Finding("untracked", "lost", "Failed", statement, advice_on(lost), _indices(lost))
+
+
+def _jumps(frames: Sequence[ReportedFrame], distance_seen: float) -> Iterator[Finding]:
+    jumps = find_jumps(frames, distance_seen)
+    for kind, found in (
+        ("flip", [j for j in jumps if j.is_flip]),
+        ("jump", [j for j in jumps if not j.is_flip]),
+    ):
+        if not found:
+            continue
+        worst = max(found, key=lambda jump: jump.ratio)
+        more = f", and {count(len(found) - 1)} more like it" * (len(found) > 1)
+        indices = tuple(jump.last for jump in found)
+        yield Finding(kind, "lost", "Wrong", _told(worst) + more, _ADVICE[kind], indices)
+
+
+def _told(jump: Jump) -> str:
+    verb, moved = "flips", quantity(jump.angle, "rad")
+    if not jump.is_flip:
+        verb, moved = "jumps", f"{quantity(jump.distance, 'm')} and {moved}"
+    times = (
+        f"{jump.ratio:.0f} times as far as around it"
+        if np.isfinite(jump.ratio)
+        else "which stands still around it"
+    )
+    return f"the camera {verb} by {moved} from frame {jump.first} to {jump.last}, {times}"
+
+
+def _pose_errors(
+    frames: Sequence[ReportedFrame], error: AbsoluteTrajectoryError | None, distance_seen: float
+) -> Iterator[Finding]:
+    """Hold the trajectory against the truth, as far as it is known."""
+    if error is None or error.num_compared < MIN_ALIGNED or len(error.errors) != len(frames):
+        return
+    places = np.array([frame.truth[:3, 3] for frame in frames if frame.truth is not None]).reshape(-1, 3)
+    extent = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
+    most = MAX_POSE_ERROR * max(extent, distance_seen)
+    is_off = (error.errors > most) | (error.rotation_errors > MAX_POSE_ERROR)  # False for NaN
+    off = [frame for frame, wrong in zip(frames, is_off, strict=True) if wrong]
+    if not off:
+        return
+    is_wrong = error.rmse > most or error.rotation_rmse > MAX_POSE_ERROR
+    worst = f"{quantity(error.max, 'm')} and {quantity(error.rotation_max, 'rad')}"
+    statement = (
+        f"{count(len(off))} of {count(error.num_compared)} poses depart from the truth, by up to {worst}"
+    )
+    level: Level = "lost" if is_wrong else "weak"
+    word = "Wrong" if is_wrong else "Wrong in part"
+    advice = _ADVICE["flip" if error.rotation_max > FLIP_ANGLE else "trajectory"]
+    yield _of_frames("trajectory", level, word, statement, off, advice)
+
+
+def _distance_seen(data: ReportData) -> float:
+    """Return the median distance of the model from its first camera [m]; 0 without points."""
+    points = np.zeros((0, 3)) if data.model is None else np.asarray(data.model.points, np.float64)
+    distances = np.linalg.norm(points[np.isfinite(points).all(axis=1)], axis=1)
+    return float(np.median(distances)) if len(distances) else 0.0
+
+
+def _doubled(data: ReportData) -> Iterator[Finding]:
+    found = data.doubled
+    if found is not None and found.fraction > MAX_DOUBLED:
+        part, apart = quantity(found.fraction, "fraction"), quantity(found.distance, "m")
+        place = ", ".join(quantity(value, "m") for value in found.center)
+        statement = f"{part} of the surface is there twice, {apart} apart, around ({place})"
+        yield Finding("doubled", "weak", "Inaccurate", statement, _ADVICE["doubled"])
+
+
+def _doubtful(frames: Sequence[ReportedFrame]) -> Iterator[Finding]:
+    tracked = [frame for frame in frames if frame.is_tracked and frame.probability is not None]
+    found = [frame for frame in tracked if frame.probability < MIN_PROBABILITY]
+    if found:
+        least = quantity(min(frame.probability for frame in found), "fraction")
+        statement = f"{_were(len(found))} accepted with a probability of being right down to {least}"
+        yield _of_frames("doubtful", "weak", "Doubtful", statement, found, _ADVICE["doubtful"])
+
+
+def _of_frames(
+    kind: str, level: Level, word: str, statement: str, frames: Sequence[ReportedFrame], next_step: str
+) -> Finding:
+    """Return a finding that names its frames."""
+    indices = _indices(frames)
+    return Finding(kind, level, word, f"{statement} ({ranges(indices)})", next_step, indices)
+
+
+def _were(number: int) -> str:
+    return f"{count(number)} frames were" if number > 1 else f"{count(number)} frame was"
+
+
+def _indices(frames: Sequence[ReportedFrame]) -> tuple[int, ...]:
+    return tuple(frame.index for frame in frames)
