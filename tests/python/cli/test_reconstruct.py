@@ -201,10 +201,11 @@ def test_missing_extra_names_the_command(recording, tmp_path, monkeypatch):
 
 @pytest.mark.data
 def test_tum(recordings, tmp_path):
-    result = run("reconstruct", recordings / "tum-fr3-teddy", "-o", tmp_path / "o", "--last", 4, "--json")
+    result = run("reconstruct", recordings / "tum-fr3-teddy", "-o", tmp_path / "o", "--last", 11, "--json")
     assert result.code == 0, result.err
     report = result.json
-    assert report["num_tracked"] == 5
+    assert report["num_tracked"] == 12
+    assert report["absolute_trajectory_error"]["num_compared"] >= 3
     assert report["absolute_trajectory_error"]["rmse"] < 0.01
     assert report["frames"][0]["timestamp"] > 1e9
 
