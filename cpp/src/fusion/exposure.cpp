@@ -57,7 +57,7 @@ Eigen::Vector3f color_gain(const PointModel& model, const RegisteredFrame& now, 
 
 Eigen::Vector3f share_exposure(PointModel& model, const RegisteredFrame& now, double spacing) {
   const Eigen::Vector3f gain = color_gain(model, now, spacing);
-  if (gain == Eigen::Vector3f::Ones()) return gain;
+  if (gain == Eigen::Vector3f::Ones()) return Eigen::Vector3f::Ones();
   const float share = -1.0F / std::max(1.0F, static_cast<float>(now.index) + 1.0F);
   const Eigen::Vector3f moved = gain.array().pow(share);
   for (Eigen::Vector3f& color : model.colors) color = color.cwiseProduct(moved);
