@@ -5,9 +5,11 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "base/limits.hpp"
+#include "base/statistics.hpp"
 #include "camera/limits.hpp"
 #include "camera/point_projection.hpp"
 #include "depth/depth_view.hpp"
@@ -19,6 +21,15 @@ namespace {
 
 bool is_well_exposed(const Eigen::Vector3f& color) {
   return color.minCoeff() >= fusion_limits::darkest_color && color.maxCoeff() <= fusion_limits::brightest_color;
+}
+
+// The median of ratios [log]; 1 where chance explains it: its standard error is sqrt(pi / 2n) of theirs.
+float significant_gain(std::vector<float> ratios) {
+  const float middle = median_of(ratios);
+  for (float& ratio : ratios) ratio = std::abs(ratio - middle);
+  const double count = static_cast<double>(ratios.size());
+  const double error = std::sqrt(0.5 * M_PI / count) * mad_to_sigma * static_cast<double>(median_of(std::move(ratios)));
+  return std::abs(static_cast<double>(middle)) > base_limits::noise_sigmas * error ? std::exp(middle) : 1.0F;
 }
 
 }  // namespace
@@ -41,17 +52,12 @@ Eigen::Vector3f color_gain(const PointModel& model, const RegisteredFrame& now, 
       const Eigen::Vector3f known = model.colors[first + static_cast<std::size_t>(j)];
       const Eigen::Vector3f seen = now.observer.color(pixel % now.frame.width, pixel / now.frame.width);
       if (!known.allFinite() || !is_well_exposed(known) || !is_well_exposed(seen)) continue;
-      for (int c = 0; c < 3; ++c) ratios[static_cast<std::size_t>(c)].push_back(known[c] / seen[c]);
+      for (int c = 0; c < 3; ++c) ratios[static_cast<std::size_t>(c)].push_back(std::log(known[c] / seen[c]));
     }
   }
   Eigen::Vector3f gain = Eigen::Vector3f::Ones();
   if (ratios[0].size() < fusion_limits::least_exposure_points) return gain;
-  for (int c = 0; c < 3; ++c) {
-    std::vector<float>& values = ratios[static_cast<std::size_t>(c)];
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    gain[c] = *middle;
-  }
+  for (int c = 0; c < 3; ++c) gain[c] = significant_gain(std::move(ratios[static_cast<std::size_t>(c)]));
   return gain;
 }
 

@@ -7,7 +7,7 @@
 namespace nacre {
 
 // By what a frame's colours are to be multiplied, channel by channel, to be as the model's: the median over points that
-// both show, as exposure and white balance change the whole image alike. 1 where too few are known.
+// both show, as exposure and white balance change the whole image alike. 1 where chance explains it.
 Eigen::Vector3f color_gain(const PointModel& model, const RegisteredFrame& now, double spacing);
 
 // Brings a frame and the model to one exposure, the mean of all frames': returns what the frame's colours are to be
