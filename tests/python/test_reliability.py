@@ -56,7 +56,7 @@ def test_the_determinism_program_tells_a_difference() -> None:
     subprocess.run(command, check=True)
 
 
-@pytest.mark.parametrize("scene", ["static", "turning"])
+@pytest.mark.parametrize("scene", ["static", pytest.param("turning", marks=pytest.mark.weekly)])
 def test_three_hundred_frames(scene: str) -> None:
     """Drift and cap, and memory where no new surface comes into view; frame times are for longer runs."""
     left_out = ["--not", "p99_ratio", *(["--not", "memory_growth"] if scene == "turning" else [])]

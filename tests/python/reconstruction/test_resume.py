@@ -33,7 +33,7 @@ from nacre.reconstruction.journal import _line, read_journal
 
 
 class TestKilled:
-    @pytest.mark.parametrize("every", ["0", "1", "3"])
+    @pytest.mark.parametrize("every", ["0", pytest.param("1", marks=pytest.mark.weekly), "3"])
     def test_after_any_frame_it_goes_on_to_the_same_bytes(
         self, recording: Path, undisturbed: Any, tmp_path: Path, every: str
     ) -> None:
