@@ -70,7 +70,7 @@ def _log_gains(logarithms: Array, usable: Bools) -> Array:
     for _ in range(_REWEIGHTINGS):
         totals = np.maximum(weights.sum(axis=0), 1e-12)
         means = (weights * logarithms).sum(axis=0) / totals
-        matrix = np.diag(weights.sum(axis=1)) - (weights / totals) @ weights.T
+        matrix = np.diag(weights.sum(axis=1)) - np.einsum("kp,lp->kl", weights / totals, weights)
         right = (weights * (means - logarithms)).sum(axis=1)
         # Images that share no place with others, and the mean, are left as they are.
         damping = 1e-6 * max(1.0, float(np.trace(matrix)) / len(matrix))

@@ -51,7 +51,7 @@ def _cover(scores: Scores, areas: npt.NDArray[np.float64]) -> Labels:
     weights = good.astype(np.float32)
     open_areas = np.where(best > 0, areas, 0).astype(np.float32)
     for _ in range(len(scores)):
-        view = int(np.argmax(weights @ open_areas))
+        view = int(np.einsum("kt,t->k", weights, open_areas).argmax())
         taken = good[view] & (labels == NO_VIEW)
         labels[taken] = view
         open_areas[taken] = 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,7 @@ Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 _COARSER = 3  # than the image is the mesh rendered to find what it hides: a budget of time
-_EROSION = 1  # [rendered pixels] of what lies behind: poses, and colours beside depth, err by some pixels
+_EROSION = 1  # [rendered pixels] of what lies behind: poses, and colours beside depth, err by some
 _LEAST_FACING = 0.15  # cosine: more slanted, an image has but streaks
 _MEASURED_TOLERANCE = 0.03  # of the distance: depth cameras err by less
 
@@ -41,7 +42,7 @@ class Projection:
 
 
 def project(mesh: Mesh, view: TextureView, tolerance: Array) -> Projection:
-    """Project a mesh into an image, which shows what is within (V,) tolerances [m] of what the camera sees."""
+    """Project a mesh into an image, which shows what is within (V,) tolerances [m] of what it sees."""
     camera = view.camera
     local = _in_camera(mesh.vertices, view)
     pixels = camera.project(local)
@@ -87,14 +88,15 @@ def _is_shown(mesh: Mesh, view: TextureView, pixels: Array, depths: Array, toler
     rendered = mesh.simulate_depth(camera, view.world_from_camera)
     columns, lines = np.rint((pixels.T + 0.5) / _COARSER - 0.5).astype(np.intp)
     columns, lines = np.clip(columns, 0, camera.width - 1), np.clip(lines, 0, camera.height - 1)
-    nearest = _eroded(np.where(np.isfinite(rendered), rendered, np.inf), _EROSION)
-    footprint = _EROSION * _COARSER * depths / _focal(view.camera) if camera.model == "pinhole" else 0
-    is_shown: Bools = depths <= nearest[lines, columns] + tolerance + footprint
+    nearest = _eroded(rendered, _EROSION)[lines, columns]
+    slope = _EROSION * _COARSER * depths / _focal(view.camera) if camera.model == "pinhole" else 0
+    margin = tolerance + slope
+    is_shown: Bools = ~(depths - nearest > margin)
     if view.depth is not None:
         columns, lines = np.rint(pixels.T).astype(np.intp)
-        measured = view.depth[lines, columns]
-        off = np.abs(measured - depths) > tolerance + footprint + _MEASURED_TOLERANCE * depths
-        is_shown &= ~(np.isfinite(measured) & off)
+        margin = margin + _MEASURED_TOLERANCE * depths
+        nearest = _eroded(view.depth, _EROSION * _COARSER)[lines, columns]
+        is_shown &= ~(depths - nearest > margin) & ~(view.depth[lines, columns] - depths > margin)
     return is_shown
 
 
@@ -122,14 +124,14 @@ def _focal(camera: Camera) -> float:
     return min(abs(camera.fx), abs(camera.fy))
 
 
-def _eroded(image: npt.NDArray[np.float32], radius: int) -> npt.NDArray[np.float32]:
-    """Return the least value around each pixel."""
+def _eroded(depth: npt.NDArray[np.float32], radius: int) -> npt.NDArray[np.float32]:
+    """Return the least depth around each pixel; NaN where there is none."""
     for axis in (0, 1):
-        widths = [(radius, radius) if i == axis else (0, 0) for i in (0, 1)]
-        padded = np.pad(image, widths, mode="edge")
-        windows = np.lib.stride_tricks.sliding_window_view(padded, 2 * radius + 1, axis=axis)
-        image = windows.min(axis=-1)
-    return image
+        padded = np.pad(depth, [(radius, radius) if i == axis else (0, 0) for i in (0, 1)], "edge")
+        size = depth.shape[axis]
+        shifted = (padded.take(range(i, i + size), axis) for i in range(2 * radius + 1))
+        depth = functools.reduce(np.fmin, shifted)
+    return depth
 
 
 def _cross(a: Array, b: Array) -> Array:
