@@ -10,7 +10,7 @@ import numpy.typing as npt
 from nacre._internal import arrays
 from nacre.io.texture import Texture
 from nacre.mesh import Mesh
-from nacre.meshing.texture_exposure import blurred, colors_at, image_gains, seam_corrections
+from nacre.meshing.texture_exposure import blurred, colors_at, detail_at, image_gains, seam_corrections
 from nacre.meshing.texture_labels import NO_VIEW, choose_labels, neighbors_of
 from nacre.meshing.texture_painting import paint
 from nacre.meshing.texture_patches import Patches
@@ -90,9 +90,10 @@ def _choose_views(
     colors = np.empty((len(views), len(places), 3))
     for k, view in enumerate(views):
         projection = project(mesh, view, tolerance)
-        scores[k] = projection.area
+        image = blurred(view.color)
+        scores[k] = projection.area * detail_at(image, projection.pixels)[mesh.triangles[:, 0]]
         is_visible[k] = projection.is_visible[places]
-        colors[k] = colors_at(blurred(view.color), projection.pixels[places])
+        colors[k] = colors_at(image, projection.pixels[places])
     scores[:, is_guess[mesh.triangles].any(axis=1)] = 0
     if not scores.any():
         raise ValueError("views show no triangle of the mesh: check that their poses are of its frame")

@@ -9,6 +9,9 @@ Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 _DARKEST, _BRIGHTEST = 8, 247  # of 255: beyond, a pixel tells little of the exposure
+_BLOCK = 16  # [pixels] over which detail is averaged: patches should be larger
+_LEAST_CONTRAST = 0.02  # a pixel: that of noise
+_CLIPPED = 0.2  # of its contrast: a white pixel has lost its colour
 _REWEIGHTINGS = 6
 _TRUST = 0.1  # of the logarithm: residuals of gloss and of wrong places are larger
 _FADING = 100  # rounds of smoothing: the correction of a seam reaches some ten triangles
@@ -20,6 +23,18 @@ def blurred(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.float32]:
     rows = padded[:-2] + padded[1:-1] + padded[2:]
     means: npt.NDArray[np.float32] = (rows[:, :-2] + rows[:, 1:-1] + rows[:, 2:]) / 9
     return means
+
+
+def detail_at(image: npt.NDArray[np.float32], pixels: Array) -> Array:
+    """Return the detail around (P, 2) places of an image: relative gradients, few where it is white."""
+    light = image.mean(axis=2)
+    slopes = [np.gradient(light, axis=i) if light.shape[i] > 1 else 0 * light for i in (0, 1)]
+    contrast = np.hypot(*slopes) / (light + _DARKEST) + _LEAST_CONTRAST
+    contrast[image.max(axis=2) >= _BRIGHTEST] *= _CLIPPED
+    side = min(_BLOCK, *light.shape)
+    rows, columns = (size // side for size in light.shape)
+    blocks = contrast[: rows * side, : columns * side].reshape(rows, side, columns, side)
+    return colors_at(blocks.mean(axis=(1, 3))[..., None], (pixels + 0.5) / side - 0.5)[:, 0]
 
 
 def colors_at(image: npt.NDArray[np.float32], pixels: Array) -> Array:

@@ -16,7 +16,7 @@ NO_VIEW = -1
 
 _GOOD = 0.5  # of the best score: an image with half the pixels does as well
 _ROUNDS = 8  # of smoothing
-_SMALL = 200.0  # [pixels]: patches below it are not worth their seams
+_SMALL = 50  # triangles: smaller patches are not worth their seams
 
 
 def choose_labels(scores: Scores, areas: npt.NDArray[np.float64], neighbors: Ints) -> Labels:
@@ -26,7 +26,7 @@ def choose_labels(scores: Scores, areas: npt.NDArray[np.float64], neighbors: Int
     Parameters
     ----------
     scores : (K, T) float32
-        How well each image shows each triangle [pixels]; 0 where it does not.
+        How well each image shows each triangle, in any unit; 0 where it does not.
     areas : (T,) float64
         Of the triangles, in any unit.
     neighbors : (T, 3)
@@ -76,12 +76,12 @@ def _absorb_small(labels: Labels, scores: Scores, neighbors: Ints) -> None:
     for _ in range(_ROUNDS):
         patches = patches_of(labels, neighbors)
         seen = np.flatnonzero(labels != NO_VIEW)
-        pixels = np.bincount(patches[seen], scores[labels[seen], seen], patches.max(initial=0) + 1)
-        rows = seen[pixels[patches[seen]] < _SMALL]
+        counts = np.bincount(patches)
+        rows = seen[counts[patches[seen]] < _SMALL]
         around = np.where(neighbors[rows] >= 0, labels[neighbors[rows]], NO_VIEW)
-        sizes = np.where(around != NO_VIEW, pixels[patches[neighbors[rows]]], 0)
+        sizes = np.where(around != NO_VIEW, counts[patches[neighbors[rows]]], 0)
         is_shown = scores[around, rows[:, None]] > 0
-        sizes = np.where(is_shown & (sizes > pixels[patches[rows]][:, None]), sizes, 0)
+        sizes = np.where(is_shown & (sizes > counts[patches[rows]][:, None]), sizes, 0)
         side = sizes.argmax(axis=1)
         each = np.arange(len(rows))
         changes = sizes[each, side] > 0
