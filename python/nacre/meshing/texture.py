@@ -76,6 +76,7 @@ def texture_mesh(
     edges = patches.corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     is_photographed = patches.view_of_node != NO_VIEW
     corrections = seam_corrections(node_colors, patches.vertex_of_node, edges, is_photographed)
+    corrections[is_guess[patches.vertex_of_node]] = 0
     return paint(patches, checked, gains, node_colors, corrections)
 
 
