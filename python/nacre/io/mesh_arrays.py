@@ -13,7 +13,7 @@ import numpy.typing as npt
 from nacre._internal import arrays
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Columns
-from nacre.io.texture import Texture
+from nacre.meshing.texture import Texture
 
 
 @dataclass(frozen=True)

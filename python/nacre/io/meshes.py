@@ -15,7 +15,7 @@ from nacre.errors import FileFormatError
 from nacre.io import glb, obj, off, ply, stl
 from nacre.io.cloud import check_cloud
 from nacre.io.mesh_arrays import MeshArrays
-from nacre.io.texture import Texture, check_texture
+from nacre.meshing.texture import Texture, check_texture
 
 if TYPE_CHECKING:
     from nacre.mesh import Mesh

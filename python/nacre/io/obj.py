@@ -16,7 +16,7 @@ from nacre.io.images import encode_jpeg
 from nacre.io.mesh_arrays import MeshArrays, Polygons, float_of
 from nacre.io.raw import code_lines, excerpt, file_writer, read_file
 from nacre.io.rows import encode_lines
-from nacre.io.texture import Texture
+from nacre.meshing.texture import Texture
 
 Float64 = npt.NDArray[np.float64]
 

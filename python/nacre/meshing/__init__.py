@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from nacre.io.texture import Texture
 from nacre.meshing.closed_surface import ClosedSurface, close_surface
 from nacre.meshing.parts import largest_part
 from nacre.meshing.simplification import simplify
 from nacre.meshing.surface_points import on_surface
-from nacre.meshing.texture import texture_mesh
+from nacre.meshing.texture import Texture
 from nacre.meshing.texture_views import TextureView, texture_views
+from nacre.meshing.texturing import texture_mesh
 from nacre.meshing.triangulation import mesh_points, triangulate, used_rows
 
 __all__ = [

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from nacre.io.images import import_pillow
-from nacre.io.texture import Texture
+from nacre.meshing.texture import Texture
 from nacre.meshing.texture_atlas import CELL, MOST_PIXELS, add_to, cut, pack, paint_cells, rectangles
 from nacre.meshing.texture_labels import NO_VIEW
 from nacre.meshing.texture_patches import Patches
@@ -78,6 +77,8 @@ def paint(
 def _scaled(image: Image, scale: float) -> Image:
     if scale == 1:
         return image
+    from nacre.io.images import import_pillow
+
     pillow = import_pillow()
     size = [max(1, round(scale * side)) for side in image.shape[1::-1]]
     return np.asarray(pillow.fromarray(image).resize(size, pillow.Resampling.BOX))
