@@ -37,7 +37,7 @@ def detail_at(image: npt.NDArray[np.float32], pixels: Array) -> Array:
     return colors_at(blocks.mean(axis=(1, 3))[..., None], (pixels + 0.5) / side - 0.5)[:, 0]
 
 
-def colors_at(image: npt.NDArray[np.float32], pixels: Array) -> Array:
+def colors_at(image: npt.NDArray[np.floating], pixels: Array) -> Array:
     """Return the colours of an image at (P, 2) places between its pixels; beyond its edges, those there."""
     last = np.array(image.shape[1::-1]) - 1
     places = np.clip(np.nan_to_num(pixels), 0, last)

@@ -31,6 +31,8 @@ class Patches:
         To what they belong.
     pixels : (N, 2) float64
         Where the patch's view shows them; 0 without one.
+    seams : (S, 2)
+        The nodes of the edges at which a patch meets another; each has a row for both.
     """
 
     view_of_patch: Labels
@@ -38,11 +40,13 @@ class Patches:
     vertex_of_node: npt.NDArray[np.intp]
     patch_of_node: npt.NDArray[np.intp]
     pixels: npt.NDArray[np.float64]
+    seams: npt.NDArray[np.intp]
 
     @classmethod
     def of(cls, mesh: Mesh, labels: Labels, views: Sequence[TextureView]) -> Patches:
         """Return the patches of a mesh whose triangles have views."""
-        patches = patches_of(labels, neighbors_of(mesh.triangles))
+        neighbors = neighbors_of(mesh.triangles)
+        patches = patches_of(labels, neighbors)
         view_of_patch = np.full(int(patches.max()) + 1, NO_VIEW, np.int32)
         view_of_patch[patches] = labels
         num_vertices = len(mesh.vertices)
@@ -53,7 +57,10 @@ class Patches:
         for k, view in enumerate(views):
             rows = np.flatnonzero(view_of_patch[patch_of_node] == k)
             pixels[rows] = pixels_of(mesh.vertices[vertex_of_node[rows]], view)
-        return cls(view_of_patch, corners.reshape(-1, 3), vertex_of_node, patch_of_node, pixels)
+        corners = corners.reshape(-1, 3)
+        triangle, side = np.nonzero((neighbors >= 0) & (patches[neighbors] != patches[:, None]))
+        seams = np.stack([corners[triangle, side], corners[triangle, (side + 1) % 3]], axis=1)
+        return cls(view_of_patch, corners, vertex_of_node, patch_of_node, pixels, seams)
 
     @property
     def view_of_node(self) -> Labels:

@@ -21,6 +21,7 @@ Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 
 _PLACES = 5_000  # budget: vertices at which the exposures are compared
+_SAMPLES = 5  # of the colours along an edge
 _GRAY = 128.0  # where neither an image nor a colour is known
 
 
@@ -109,12 +110,35 @@ def _node_colors(
     """Return what the images show at the corners of patches, in one exposure; else the fallback."""
     colors = np.full((len(patches.vertex_of_node), 3), _GRAY)
     for k, view in enumerate(views):
+        image = gains[k] * blurred(view.color)
         rows = np.flatnonzero(patches.view_of_node == k)
-        colors[rows] = colors_at(blurred(view.color), patches.pixels[rows]) * gains[k]
+        colors[rows] = colors_at(image, patches.pixels[rows])
+        seams = patches.seams[patches.view_of_node[patches.seams[:, 0]] == k]
+        rows, means = _means_along(image, patches.pixels, seams)
+        colors[rows] = means
     unseen = patches.view_of_node == NO_VIEW
     if fallback is not None:
         colors[unseen] = fallback[patches.vertex_of_node[unseen]]
     return colors
+
+
+def _means_along(
+    image: Array, pixels: Array, edges: npt.NDArray[np.intp]
+) -> tuple[npt.NDArray[np.intp], Array]:
+    """
+    Return the ends of edges, and the mean colours along their edges, weighted by nearness.
+
+    Both sides of a seam have these edges: their means differ by exposure, and less by what lies beside them.
+    """
+    ends, rows = np.unique(edges, return_inverse=True)
+    first, second = rows.reshape(-1, 2).T
+    sums = np.zeros((len(ends), 4))
+    for part in np.linspace(0, 1, _SAMPLES):
+        places = (1 - part) * pixels[edges[:, 0]] + part * pixels[edges[:, 1]]
+        samples = np.pad(colors_at(image, places), ((0, 0), (0, 1)), constant_values=1)
+        np.add.at(sums, first, (1 - part) * samples)
+        np.add.at(sums, second, part * samples)
+    return ends, sums[:, :3] / sums[:, 3:]
 
 
 def _as_colors(name: str, value: npt.ArrayLike, num_vertices: int) -> Array:
