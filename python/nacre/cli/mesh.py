@@ -128,7 +128,7 @@ def _views(source: Path) -> list[TextureView]:
     from nacre.meshing import texture_views
     from nacre.report.saved_run import SavedRun
 
-    if not source.is_dir():
+    if source.is_file():
         raise CommandError(
             f"--texture needs the folder of nacre reconstruct, which knows the images: {source} is a file", 2
         )

@@ -19,7 +19,7 @@ MOST_PIXELS = 8192
 
 CELL = 4  # [pixels] in width and height, for a triangle without an image: three corners and a border
 _BORDER = 2  # [pixels] around a patch: smaller copies of a texture mix neighbors
-_AT_ONCE = 4_000_000  # budget: pixels that are tested together
+_AT_ONCE = 1_000_000  # budget: pixels that are tested together
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
