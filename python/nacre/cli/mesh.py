@@ -43,7 +43,7 @@ def mesh(
             "-o",
             metavar="MESH",
             help="The file to write: .ply, .glb, .obj or .stl.",
-            show_default="OUT/mesh.ply",
+            show_default="OUT/mesh.ply, with --texture OUT/mesh.glb",
         ),
     ] = None,
     closed: Annotated[
@@ -124,7 +124,9 @@ def _words(name: str, value: Any) -> str:
 
 
 def _views(source: Path) -> list[TextureView]:
-    """Choose the images to paint with."""
+    """Choose the images to paint with, of frames whose pose is sure where there are some."""
+    import numpy as np
+
     from nacre.meshing import texture_views
     from nacre.report.saved_run import SavedRun
 
@@ -133,9 +135,13 @@ def _views(source: Path) -> list[TextureView]:
             f"--texture needs the folder of nacre reconstruct, which knows the images: {source} is a file", 2
         )
     written_file(source, "report.json")
-    sequence, poses = reopen(SavedRun(source))
+    run = SavedRun(source)
+    sequence, poses = reopen(run)
     if not sequence.has_color:
         raise CommandError(f"{sequence.path} has no colour images, which --texture paints with")
+    weak = [frame.index for frame in run.frames if frame.status == "WEAK"]
+    if len(weak) < np.isfinite(poses[:, 0, 0]).sum():
+        poses[weak] = np.nan  # they may lie beside their places
     return texture_views(sequence, poses)
 
 

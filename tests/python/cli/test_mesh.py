@@ -80,6 +80,16 @@ def test_what_it_says(painted_run, tmp_path):
     assert f"mesh       {folder / 'mesh.glb'}\n" in out
 
 
+def test_weak_frames_paint_where_there_are_no_others(painted_run, tmp_path):
+    folder = shutil.copytree(painted_run, tmp_path / "out")
+    report = json.loads((folder / "report.json").read_text())
+    for weak, used in (([0], 2), ([0, 1, 2], 3)):
+        for i in weak:
+            report["frames"][i]["status"] = "WEAK"
+        (folder / "report.json").write_text(json.dumps(report))
+        assert run("mesh", folder, "--texture", "--json").json["images"] == used
+
+
 @pytest.mark.parametrize("suffix", [".ply", ".stl"])
 def test_formats_without_textures(painted_run, tmp_path, suffix):
     message = f"textured meshes are written to .glb, .obj, got '{tmp_path / 'a'}{suffix}'"
