@@ -17,6 +17,7 @@ Bools = npt.NDArray[np.bool_]
 
 _COARSER = 3  # than the image is the mesh rendered to find what it hides: a budget of time
 _EROSION = 1  # [rendered pixels] of what lies behind: poses, and colours beside depth, err by some
+_AT_OUTLINE = 0.2  # of a triangle's area: the image may show what lies behind instead
 _LEAST_FACING = 0.15  # cosine: more slanted, an image has but streaks
 _MEASURED_TOLERANCE = 0.03  # of the distance: depth cameras err by less
 
@@ -33,7 +34,7 @@ class Projection:
     is_visible : (V,) bool
         Whether the image shows them.
     area : (T,) float32
-        Of the triangles [pixels]; 0 where the image does not show the whole of it from in front.
+        Of the triangles [pixels], less at silhouettes; 0 where not the whole is shown from in front.
     """
 
     pixels: Array
@@ -50,13 +51,17 @@ def project(mesh: Mesh, view: TextureView, tolerance: Array) -> Projection:
     inside = ((pixels >= 0) & (pixels <= np.array([camera.width, camera.height]) - 1)).all(axis=1)
     is_visible = inside & (depths > 0)
     rows = np.flatnonzero(is_visible)
-    is_visible[rows] = _is_shown(mesh, view, pixels[rows], depths[rows], tolerance[rows])
+    is_shown, is_outline = _shown(mesh, view, pixels[rows], depths[rows], tolerance[rows])
+    is_visible[rows] = is_shown
+    outline = np.zeros(len(pixels), np.bool_)
+    outline[rows] = is_outline
     shown = np.flatnonzero(is_visible[mesh.triangles].all(axis=1))
     area = np.zeros(len(mesh.triangles), np.float32)
     corners = mesh.triangles[shown]
     a, b, c = (pixels[corners[:, i]] for i in range(3))
     facing = _facing(local, corners, camera)
-    area[shown] = np.where(facing >= _LEAST_FACING, np.abs(_cross(b - a, c - a)) / 2, 0)
+    weight = np.where(outline[corners].any(axis=1), _AT_OUTLINE, 1.0) * (facing >= _LEAST_FACING)
+    area[shown] = weight * np.abs(_cross(b - a, c - a)) / 2
     return Projection(pixels, is_visible, area)
 
 
@@ -82,22 +87,33 @@ def _in_camera(points: npt.NDArray[np.floating], view: TextureView) -> Array:
     return local
 
 
-def _is_shown(mesh: Mesh, view: TextureView, pixels: Array, depths: Array, tolerance: Array) -> Bools:
-    """Whether neither the mesh itself, nor what the camera measured, stands before its vertices."""
+def _shown(
+    mesh: Mesh, view: TextureView, pixels: Array, depths: Array, tolerance: Array
+) -> tuple[Bools, Bools]:
+    """
+    Compare vertices with what the camera sees of the mesh, and with what it measured.
+
+    Returns whether neither stands before them, nor anything measured is behind them; and whether something
+    around them in the image is behind them.
+    """
     camera = _coarser(view.camera)
     rendered = mesh.simulate_depth(camera, view.world_from_camera)
-    columns, lines = np.rint((pixels.T + 0.5) / _COARSER - 0.5).astype(np.intp)
-    columns, lines = np.clip(columns, 0, camera.width - 1), np.clip(lines, 0, camera.height - 1)
-    nearest = _eroded(rendered, _EROSION)[lines, columns]
     slope = _EROSION * _COARSER * depths / _focal(view.camera) if camera.model == "pinhole" else 0
     margin = tolerance + slope
+    columns, rows = np.rint((pixels.T + 0.5) / _COARSER - 0.5).astype(np.intp)
+    columns, rows = np.clip(columns, 0, camera.width - 1), np.clip(rows, 0, camera.height - 1)
+    nearest = _eroded(rendered, _EROSION)[rows, columns]
+    farthest = -_eroded(-np.where(np.isfinite(rendered), rendered, np.inf), _EROSION)[rows, columns]
     is_shown: Bools = ~(depths - nearest > margin)
+    is_outline: Bools = farthest - depths > margin
     if view.depth is not None:
-        columns, lines = np.rint(pixels.T).astype(np.intp)
+        columns, rows = np.rint(pixels.T).astype(np.intp)
         margin = margin + _MEASURED_TOLERANCE * depths
-        nearest = _eroded(view.depth, _EROSION * _COARSER)[lines, columns]
-        is_shown &= ~(depths - nearest > margin) & ~(view.depth[lines, columns] - depths > margin)
-    return is_shown
+        nearest = _eroded(view.depth, _EROSION * _COARSER)[rows, columns]
+        farthest = -_eroded(-view.depth, _EROSION * _COARSER)[rows, columns]
+        is_shown &= ~(depths - nearest > margin) & ~(view.depth[rows, columns] - depths > margin)
+        is_outline |= farthest - depths > margin
+    return is_shown, is_outline
 
 
 def _facing(local: Array, corners: npt.NDArray[np.int32], camera: Camera) -> Array:
