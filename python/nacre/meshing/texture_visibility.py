@@ -17,7 +17,7 @@ Bools = npt.NDArray[np.bool_]
 
 _COARSER = 3  # than the image is the mesh rendered to find what it hides: a budget of time
 _EROSION = 1  # [rendered pixels] of what lies behind: poses, and colours beside depth, err by some
-_AT_OUTLINE = 0.2  # of a triangle's area: the image may show what lies behind instead
+_LOST_AT_OUTLINE = 0.4  # of a triangle's area: the image may show what lies behind instead
 _LEAST_FACING = 0.15  # cosine: more slanted, an image has but streaks
 _MEASURED_TOLERANCE = 0.03  # of the distance: depth cameras err by less
 
@@ -60,7 +60,7 @@ def project(mesh: Mesh, view: TextureView, tolerance: Array) -> Projection:
     corners = mesh.triangles[shown]
     a, b, c = (pixels[corners[:, i]] for i in range(3))
     facing = _facing(local, corners, camera)
-    weight = np.where(outline[corners].any(axis=1), _AT_OUTLINE, 1.0) * (facing >= _LEAST_FACING)
+    weight = (facing >= _LEAST_FACING) * (1 - _LOST_AT_OUTLINE * outline[corners].mean(axis=1))
     area[shown] = weight * np.abs(_cross(b - a, c - a)) / 2
     return Projection(pixels, is_visible, area)
 
