@@ -10,6 +10,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = ROOT / "docs" / "algorithms"
 SOURCES = ROOT / "cpp" / "src"
+MESHING = "../../python/nacre/meshing/"
 
 # page, what it says; file, what it says there.
 CONSTANTS = [
@@ -141,6 +142,17 @@ CONSTANTS = [
     ("meshing", "64 nearest", "mesh/limits.hpp", "covering_neighbors = 64"),
     ("meshing", "part of at least 30", "mesh/limits.hpp", "least_part = 30"),
     ("meshing", "up to ten edges", "mesh/limits.hpp", "longest_hole = 10"),
+    ("meshing", "into 40 stretches", MESHING + "texture_views.py", "_MOST_VIEWS = 40"),
+    ("meshing", "four images that are read", MESHING + "texture_views.py", "_READ_OF_EACH_STRETCH = 4"),
+    ("meshing", "three pixels in one", MESHING + "texture_visibility.py", "_COARSER = 3"),
+    ("meshing", "at least 0.15 towards", MESHING + "texture_visibility.py", "_LEAST_FACING = 0.15"),
+    ("meshing", "over 16 by 16 pixels", MESHING + "texture_exposure.py", "_BLOCK = 16"),
+    ("meshing", "least half of the best scores", MESHING + "texture_labels.py", "_GOOD = 0.5"),
+    ("meshing", "fewer than 50 triangles", MESHING + "texture_labels.py", "_SMALL = 50"),
+    ("meshing", "at 5000 vertices", MESHING + "texturing.py", "_PLACES = 5_000"),
+    ("meshing", "100 rounds of averages", MESHING + "texture_exposure.py", "_FADING = 100"),
+    ("meshing", "8192 by 8192", MESHING + "texture_atlas.py", "MOST_PIXELS = 8192"),
+    ("meshing", "cells of 4 by 4", MESHING + "texture_atlas.py", "CELL = 4"),
     ("simulation", "over 8 x 8 rays", "simulation/limits.hpp", "rays_per_radius = 4"),
     ("neighbours", "blocks of 16", "simd/tree_layout.hpp", "block_points = 16"),
 ]

@@ -8,7 +8,7 @@ from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nacre.cli.source import open_source
+from nacre.cli.source import open_source, reopen
 from nacre.cli.terminal import CommandError, written_file
 
 if TYPE_CHECKING:
@@ -137,22 +137,10 @@ def _write_trajectory(job: Job, trajectory: Trajectory) -> Figures:
 
 
 def _images_of_run(job: Job) -> Figures:
-    import numpy as np
-
     import nacre
     from nacre.report.saved_run import SavedRun
 
-    run = SavedRun(job.source)
-    recording = run.report.get("recording") or {}
-    path = Path(recording.get("path") or "")
-    if not recording.get("path") or not path.exists():
-        raise CommandError(f"{job.source}: its recording, which has the images, is no longer at {path}")
-    sequence = job.recording(path, recording.get("format"), run.camera, recording.get("depth_scale"))
-    poses = np.full((len(sequence), 4, 4), np.nan)
-    for frame, pose in zip(run.frames, run.poses, strict=True):
-        if frame.index >= len(sequence):
-            raise CommandError(f"{job.source}: its recording {path} has only {len(sequence)} views by now")
-        poses[frame.index] = pose
+    sequence, poses = reopen(SavedRun(job.source), job.recording)
     return _write_images(job, sequence, poses, nacre.read_points(written_file(job.source, "model.ply")))
 
 

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from nacre.cli.source import reopen
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_file, written_file
 
 if TYPE_CHECKING:
     from nacre.io.cloud import Cloud
     from nacre.io.mesh_arrays import MeshArrays
+    from nacre.meshing import TextureView
 
 _UNSEEN = 128  # grey
 
@@ -41,7 +43,7 @@ def mesh(
             "-o",
             metavar="MESH",
             help="The file to write: .ply, .glb, .obj or .stl.",
-            show_default="OUT/mesh.ply",
+            show_default="OUT/mesh.ply, with --texture OUT/mesh.glb",
         ),
     ] = None,
     closed: Annotated[
@@ -58,6 +60,10 @@ def mesh(
             "--simplify", min=1, metavar="N", help="Leave N triangles, where they matter.", show_default=False
         ),
     ] = None,
+    texture: Annotated[
+        bool,
+        typer.Option("--texture", help="Paint it with the recording's sharpest images; .glb or .obj."),
+    ] = False,
     json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
@@ -73,8 +79,9 @@ def mesh(
     from nacre.meshing import largest_part
 
     path = written_file(source, "model.ply") if source.is_dir() else source
-    target = writable_file(out or path.with_name("mesh.ply"))
-    require_mesh_suffix(target)
+    target = writable_file(out or path.with_name("mesh.glb" if texture else "mesh.ply"))
+    require_mesh_suffix(target, textured=texture)
+    views = _views(source) if texture else []
     cloud = read_points(path)
     if cloud.normals is None:
         raise CommandError(f"{path} has no normals: give a model of nacre reconstruct")
@@ -85,6 +92,8 @@ def mesh(
         mesh = _used(dataclasses.replace(mesh, triangles=largest_part(mesh.triangles)))
     if num_triangles is not None:
         mesh = _simplified(mesh, num_triangles)
+    if texture:
+        mesh = _textured(mesh, views)
     write_mesh(
         target,
         mesh.vertices,
@@ -92,8 +101,16 @@ def mesh(
         normals=mesh.normals,
         colors=mesh.colors,
         attributes=mesh.attributes,
+        texture=mesh.texture,
     )
-    figures = {"mesh": str(target), "vertices": len(mesh.vertices), "triangles": len(mesh.triangles)}
+    figures: dict[str, Any] = {
+        "mesh": str(target),
+        "vertices": len(mesh.vertices),
+        "triangles": len(mesh.triangles),
+    }
+    if mesh.texture is not None:
+        figures["images"] = len(views)
+        figures["texture"] = list(mesh.texture.image.shape[1::-1])
     if "seen" in mesh.attributes:
         figures["seen"] = float(mesh.attributes["seen"].mean())
     if not quiet:
@@ -101,7 +118,41 @@ def mesh(
 
 
 def _words(name: str, value: Any) -> str:
-    return f"{value:.1%} of the corners; the others are a guess" if name == "seen" else str(value)
+    if name == "seen":
+        return f"{value:.1%} of the corners; the others are a guess"
+    return " x ".join(map(str, value)) if name == "texture" else str(value)
+
+
+def _views(source: Path) -> list[TextureView]:
+    """Choose the images to paint with, of frames whose pose is sure where there are some."""
+    import numpy as np
+
+    from nacre.meshing import texture_views
+    from nacre.report.saved_run import SavedRun
+
+    if source.is_file():
+        raise CommandError(
+            f"--texture needs the folder of nacre reconstruct, which knows the images: {source} is a file", 2
+        )
+    written_file(source, "report.json")
+    run = SavedRun(source)
+    sequence, poses = reopen(run)
+    if not sequence.has_color:
+        raise CommandError(f"{sequence.path} has no colour images, which --texture paints with")
+    weak = [frame.index for frame in run.frames if frame.status == "WEAK"]
+    if len(weak) < np.isfinite(poses[:, 0, 0]).sum():
+        poses[weak] = np.nan  # they may lie beside their places
+    return texture_views(sequence, poses)
+
+
+def _textured(mesh: MeshArrays, views: list[TextureView]) -> MeshArrays:
+    """Paint a mesh with images; what is a guess keeps its colour."""
+    from nacre.meshing import texture_mesh
+
+    texture = texture_mesh(
+        mesh.vertices, mesh.triangles, views, colors=mesh.colors, is_seen=mesh.attributes.get("seen")
+    )
+    return dataclasses.replace(mesh, texture=texture)
 
 
 def _open(cloud: Cloud) -> MeshArrays:

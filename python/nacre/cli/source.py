@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,8 +12,12 @@ from nacre.cli.terminal import CommandError
 from nacre.errors import FileFormatError, UnknownRecordingError
 
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
     from nacre import Camera
     from nacre.datasets import Sequence
+    from nacre.report.saved_run import SavedRun
 
 
 def complete_format(incomplete: str) -> list[str]:
@@ -74,6 +79,40 @@ def open_source(
                 f"{name}=", f"--{option} "
             )
         raise CommandError(text, code) from error
+
+
+def reopen(
+    run: SavedRun, open: Callable[..., Sequence] = open_source
+) -> tuple[Sequence, npt.NDArray[np.float64]]:
+    """
+    Open the recording of a run, and return it with the poses that were found.
+
+    Parameters
+    ----------
+    run : SavedRun
+        What nacre reconstruct wrote.
+    open : callable
+        What opens a recording as :func:`open_source` does.
+
+    Returns
+    -------
+    sequence : Sequence
+    poses : (N, 4, 4) float64
+        ``world_from_camera`` of its views; NaN where it is not known.
+    """
+    import numpy as np
+
+    recording = run.report.get("recording") or {}
+    path = Path(recording.get("path") or "")
+    if not recording.get("path") or not path.exists():
+        raise CommandError(f"{run.folder}: its recording, which has the images, is no longer at {path}")
+    sequence = open(path, recording.get("format"), run.camera, recording.get("depth_scale"))
+    poses = np.full((len(sequence), 4, 4), np.nan)
+    for frame, pose in zip(run.frames, run.poses, strict=True):
+        if frame.index >= len(sequence):
+            raise CommandError(f"{run.folder}: its recording {path} has only {len(sequence)} views by now")
+        poses[frame.index] = pose
+    return sequence, poses
 
 
 def describe_camera(camera: Camera) -> str:

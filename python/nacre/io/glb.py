@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import os
 import struct
@@ -13,6 +14,7 @@ import numpy.typing as npt
 
 from nacre._internal.arrays import localize
 from nacre.io.cloud import check_comments
+from nacre.io.images import encode_jpeg
 from nacre.io.mesh_arrays import MeshArrays
 from nacre.io.raw import file_writer
 from nacre.io.srgb import linear_from_srgb
@@ -20,10 +22,14 @@ from nacre.io.srgb import linear_from_srgb
 MAGIC, VERSION = b"glTF", 2
 JSON_CHUNK, BINARY_CHUNK = b"JSON", b"BIN\0"
 FLOAT, UNSIGNED_INT = 5126, 5125
+CLAMP_TO_EDGE = 33071
 TRIANGLES = 4
 _VERTEX_BUFFER, _INDEX_BUFFER = 34962, 34963
 # Both sides are seen, and light is scattered as by paper: a surface that is open, of unknown gloss.
-_MATERIAL = {"doubleSided": True, "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0}}
+_MATERIAL: dict[str, Any] = {
+    "doubleSided": True,
+    "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0},
+}
 
 
 def write_mesh(
@@ -34,6 +40,7 @@ def write_mesh(
 
     Coordinates are float32 about a place that the node's ``translation`` gives in float64.
     """
+    mesh, uv = _split(mesh)
     vertices, origin = localize(mesh.vertices)
     if not np.isfinite(vertices).all():
         raise ValueError("vertices must be finite, and fit float32 in a GLB file, got some that do not")
@@ -42,7 +49,9 @@ def write_mesh(
     attributes = {"POSITION": buffer.add(vertices, "VEC3", _VERTEX_BUFFER, **bounds)}
     if mesh.normals is not None:
         attributes["NORMAL"] = buffer.add(_unit(mesh.normals), "VEC3", _VERTEX_BUFFER)
-    if mesh.colors is not None:
+    if uv is not None:
+        attributes["TEXCOORD_0"] = buffer.add(uv, "VEC2", _VERTEX_BUFFER)
+    elif mesh.colors is not None:
         attributes["COLOR_0"] = buffer.add(linear_from_srgb(mesh.colors), "VEC3", _VERTEX_BUFFER)
     corners = mesh.triangles.reshape(-1).astype(np.uint32)
     indices = buffer.add(corners, "SCALAR", _INDEX_BUFFER)
@@ -50,7 +59,7 @@ def write_mesh(
     asset: dict[str, Any] = {"version": "2.0", "generator": "nacre"}
     if comments:
         asset["extras"] = {"comments": check_comments(comments)}
-    document = {
+    document: dict[str, Any] = {
         "asset": asset,
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -59,8 +68,10 @@ def write_mesh(
         "materials": [_MATERIAL],
         "accessors": buffer.accessors,
         "bufferViews": buffer.views,
-        "buffers": [{"byteLength": buffer.size}],
     }
+    if mesh.texture is not None:
+        _add_image(document, buffer, encode_jpeg(mesh.texture.image))
+    document["buffers"] = [{"byteLength": buffer.size}]
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
     if buffer.size + len(text) > (1 << 32) - 100:
@@ -70,6 +81,33 @@ def write_mesh(
         stream.write(struct.pack("<I", len(text)) + JSON_CHUNK + text)
         stream.write(struct.pack("<I", buffer.size) + BINARY_CHUNK)
         stream.writelines(buffer.parts)
+
+
+def _split(mesh: MeshArrays) -> tuple[MeshArrays, npt.NDArray[np.float32] | None]:
+    """Return a mesh whose vertices have one place on the texture each, and those places."""
+    texture = mesh.texture
+    if texture is None:
+        return mesh, None
+    pairs = mesh.triangles.astype(np.int64) * len(texture.uv) + texture.triangles
+    corners, triangles = np.unique(pairs, return_inverse=True)
+    rows, places = np.divmod(corners, len(texture.uv))
+    split = dataclasses.replace(
+        mesh,
+        vertices=mesh.vertices[rows],
+        triangles=triangles.reshape(-1, 3).astype(np.int32),
+        normals=None if mesh.normals is None else mesh.normals[rows],
+    )
+    return split, texture.uv[places]
+
+
+def _add_image(document: dict[str, Any], buffer: _Buffer, data: bytes) -> None:
+    """Paint the mesh with a JPEG image."""
+    material: dict[str, Any] = document["materials"][0]
+    document["images"] = [{"bufferView": buffer.add_bytes(data), "mimeType": "image/jpeg"}]
+    document["samplers"] = [{"wrapS": CLAMP_TO_EDGE, "wrapT": CLAMP_TO_EDGE}]
+    document["textures"] = [{"source": 0, "sampler": 0}]
+    reflectance = material["pbrMetallicRoughness"] | {"baseColorTexture": {"index": 0}}
+    document["materials"] = [material | {"pbrMetallicRoughness": reflectance}]
 
 
 class _Buffer:
@@ -84,14 +122,25 @@ class _Buffer:
     def add(self, array: npt.NDArray[Any], kind: str, target: int, **bounds: Any) -> int:
         """Take in an array of float32 or uint32, all of 4 bytes, and return its accessor."""
         component = FLOAT if array.dtype.kind == "f" else UNSIGNED_INT
-        view = {"buffer": 0, "byteOffset": self.size, "byteLength": array.nbytes, "target": target}
-        accessor = {"bufferView": len(self.views), "componentType": component, "count": len(array)}
-        self.views.append(view)
-        self.accessors.append({**accessor, "type": kind, **bounds})
         stored = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
-        self.parts.append(stored.reshape(-1).view(np.uint8).data)
-        self.size += array.nbytes
+        view = self._add_view(stored.reshape(-1).view(np.uint8).data, target=target)
+        accessor = {"bufferView": view, "componentType": component, "count": len(array)}
+        self.accessors.append({**accessor, "type": kind, **bounds})
         return len(self.accessors) - 1
+
+    def add_bytes(self, data: bytes) -> int:
+        """Take in a file, filled up to 4 bytes, and return its view."""
+        view = self._add_view(memoryview(data))
+        filling = bytes(-len(data) % 4)
+        self.parts.append(memoryview(filling))
+        self.size += len(filling)
+        return view
+
+    def _add_view(self, part: memoryview, **more: int) -> int:
+        self.views.append({"buffer": 0, "byteOffset": self.size, "byteLength": part.nbytes, **more})
+        self.parts.append(part)
+        self.size += part.nbytes
+        return len(self.views) - 1
 
 
 def _unit(normals: npt.NDArray[Any]) -> npt.NDArray[np.float32]:

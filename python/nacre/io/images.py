@@ -139,6 +139,13 @@ def write_color_jpeg(path: str | os.PathLike[str], color: npt.ArrayLike) -> None
     _write_image(path, _checked_color(color), "JPEG", quality=95)
 
 
+def encode_jpeg(color: npt.ArrayLike) -> bytes:
+    """Return an (H, W, 3) uint8 RGB image as a JPEG whose colours are as fine as its light."""
+    stream = BytesIO()
+    import_pillow().fromarray(_checked_color(color)).save(stream, "JPEG", quality=92, subsampling=0)
+    return stream.getvalue()
+
+
 def _checked_color(color: npt.ArrayLike) -> npt.NDArray[np.uint8]:
     array: npt.NDArray[Any] = np.ascontiguousarray(color)
     if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3:

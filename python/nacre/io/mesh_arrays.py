@@ -13,6 +13,7 @@ import numpy.typing as npt
 from nacre._internal import arrays
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Columns
+from nacre.meshing.texture import Texture
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,8 @@ class MeshArrays:
         Red, green, blue of the vertices.
     attributes : dict of str to (N,) or (N, K) array
         More of the vertices; not read.
+    texture : Texture or None
+        What is painted on the triangles; not read.
     """
 
     vertices: arrays.FloatArray
@@ -39,6 +42,7 @@ class MeshArrays:
     normals: arrays.FloatArray | None = None
     colors: npt.NDArray[np.uint8] | None = None
     attributes: Columns = field(default_factory=dict)
+    texture: Texture | None = None
 
 
 def fan(

@@ -15,6 +15,7 @@ from nacre.errors import FileFormatError
 from nacre.io import glb, glb_reader, obj, off, ply, stl
 from nacre.io.cloud import check_cloud
 from nacre.io.mesh_arrays import MeshArrays
+from nacre.meshing.texture import Texture, check_texture
 
 if TYPE_CHECKING:
     from nacre.mesh import Mesh
@@ -24,6 +25,7 @@ _WRITERS = {".ply": ply, ".glb": glb, ".obj": obj, ".stl": stl}
 
 READ_SUFFIXES = tuple(_READERS)
 WRITE_SUFFIXES = tuple(_WRITERS)
+TEXTURE_SUFFIXES = (".glb", ".obj")
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
@@ -77,6 +79,7 @@ def write_mesh(
     normals: npt.ArrayLike | None = None,
     colors: npt.ArrayLike | None = None,
     attributes: Mapping[str, npt.ArrayLike] | None = None,
+    texture: Texture | None = None,
     comments: Sequence[str] = (),
     binary: bool = True,
 ) -> None:
@@ -101,6 +104,9 @@ def write_mesh(
         Red, green, blue of the vertices.
     attributes : mapping of str to (N,) or (N, K) array, optional
         More of the vertices; PLY alone has a place for them.
+    texture : nacre.meshing.Texture, optional
+        What is painted on the triangles, in place of ``colors``: in a GLB file, or beside an OBJ file as
+        ``NAME.mtl`` and ``NAME_texture.jpg``. As a JPEG image, which needs pillow.
     comments : sequence of str
         Lines for the header; STL has none.
     binary : bool
@@ -110,13 +116,15 @@ def write_mesh(
     ------
     TypeError, ValueError
         When an argument does not fit; the message names it.
+    ImportError
+        When a texture is to be written and pillow is missing.
     OSError
         When the file cannot be written; it has the path.
     """
     from nacre.mesh import Mesh
 
     binary = as_flag("binary", binary)
-    require_mesh_suffix(path)
+    require_mesh_suffix(path, textured=texture is not None)
     if isinstance(vertices, Mesh):
         if triangles is not None:
             raise ValueError("triangles must not be given with a Mesh, which has its own")
@@ -126,11 +134,13 @@ def write_mesh(
     points = arrays.as_points("vertices", vertices)
     corners = arrays.as_triangles("triangles", triangles, len(points))
     checked = check_cloud(points, normals, colors, attributes)
-    mesh = MeshArrays(checked.points, corners, checked.normals, checked.colors, checked.attributes)
+    painted = None if texture is None else check_texture(texture, len(corners))
+    mesh = MeshArrays(checked.points, corners, checked.normals, checked.colors, checked.attributes, painted)
     _WRITERS[Path(path).suffix.lower()].write_mesh(path, mesh, comments=comments, binary=binary)
 
 
-def require_mesh_suffix(path: str | os.PathLike[str]) -> None:
-    """Raise where no mesh is written to files that end so."""
-    if Path(path).suffix.lower() not in _WRITERS:
-        raise ValueError(f"meshes are written to {', '.join(_WRITERS)}, got {os.fspath(path)!r}")
+def require_mesh_suffix(path: str | os.PathLike[str], *, textured: bool = False) -> None:
+    """Raise where no mesh, or none with a texture, is written to files that end so."""
+    suffixes, what = (TEXTURE_SUFFIXES, "textured meshes") if textured else (WRITE_SUFFIXES, "meshes")
+    if Path(path).suffix.lower() not in suffixes:
+        raise ValueError(f"{what} are written to {', '.join(suffixes)}, got {os.fspath(path)!r}")

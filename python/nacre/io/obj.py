@@ -5,19 +5,23 @@ from __future__ import annotations
 import os
 from array import array
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre.errors import FileFormatError
 from nacre.io.cloud import check_comments
+from nacre.io.images import encode_jpeg
 from nacre.io.mesh_arrays import MeshArrays, Polygons, float_of
 from nacre.io.raw import code_lines, excerpt, file_writer, read_file
 from nacre.io.rows import encode_lines
+from nacre.meshing.texture import Texture
 
 Float64 = npt.NDArray[np.float64]
 
 _NO_NORMAL = -1
+_MATERIAL = "texture"
 
 
 def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
@@ -104,17 +108,49 @@ def write_mesh(
     path: str | os.PathLike[str], mesh: MeshArrays, *, comments: Sequence[str] = (), binary: bool = True
 ) -> None:
     """Write an OBJ file, which is text; :func:`nacre.write_mesh` has the parameters."""
-    corners = mesh.triangles + np.int64(1)
+    texture = mesh.texture
     vertex_line, vertex_columns = "v {} {} {}\n", [mesh.vertices]
-    if mesh.colors is not None:
+    if mesh.colors is not None and texture is None:
         vertex_line = "v {} {} {} {} {} {}\n"
         vertex_columns.append(np.round(mesh.colors / 255.0, 6))
-    face_line, face_columns = "f {} {} {}\n", [corners]
-    if mesh.normals is not None:
-        face_line, face_columns = "f {}//{} {}//{} {}//{}\n", [np.repeat(corners, 2, axis=1)]
+    head = "".join(f"# {line}".rstrip() + "\n" for line in check_comments(comments))
+    if texture is not None:
+        head += f"mtllib {_write_material(Path(path), texture)}\nusemtl {_MATERIAL}\n"
+    face_line, face_columns = _faces(mesh)
     with file_writer(path) as stream:
-        stream.write("".join(f"# {line}".rstrip() + "\n" for line in check_comments(comments)).encode())
+        stream.write(head.encode())
         stream.writelines(encode_lines(vertex_line, vertex_columns))
+        if texture is not None:
+            upwards = texture.uv.astype(np.float64) * (1, -1) + (0, 1)
+            stream.writelines(encode_lines("vt {} {}\n", [np.round(upwards, 7)]))
         if mesh.normals is not None:
             stream.writelines(encode_lines("vn {} {} {}\n", [mesh.normals]))
         stream.writelines(encode_lines(face_line, face_columns))
+
+
+def _faces(mesh: MeshArrays) -> tuple[str, list[npt.NDArray[np.int64]]]:
+    """Return a face's line, with corners ``v``, ``v/vt``, ``v//vn`` or ``v/vt/vn``, and its numbers."""
+    vertices = mesh.triangles + np.int64(1)
+    numbers, corner = [vertices], "{}"
+    if mesh.texture is not None:
+        numbers.append(mesh.texture.triangles + np.int64(1))
+        corner += "/{}"
+    if mesh.normals is not None:
+        numbers.append(vertices)
+        corner += "/{}" if mesh.texture is not None else "//{}"
+    return f"f {corner} {corner} {corner}\n", [np.stack(numbers, axis=2).reshape(len(vertices), -1)]
+
+
+def _write_material(path: Path, texture: Texture) -> str:
+    """Write image and material beside an OBJ file, and return the material's file name."""
+    image, material = path.with_name(f"{path.stem}_texture.jpg"), path.with_suffix(".mtl")
+    if not path.name.isprintable():
+        raise ValueError(f"path must be a name that fits a line of an OBJ file, got {path.name!r}")
+    data = encode_jpeg(texture.image)
+    with file_writer(image) as stream:
+        stream.write(data)
+    with file_writer(material) as stream:
+        stream.write(
+            f"newmtl {_MATERIAL}\nKa 1 1 1\nKd 1 1 1\nKs 0 0 0\nillum 1\nmap_Kd {image.name}\n".encode()
+        )
+    return material.name

@@ -6,15 +6,22 @@ from nacre.meshing.closed_surface import ClosedSurface, close_surface
 from nacre.meshing.parts import largest_part
 from nacre.meshing.simplification import simplify
 from nacre.meshing.surface_points import on_surface
+from nacre.meshing.texture import Texture
+from nacre.meshing.texture_views import TextureView, texture_views
+from nacre.meshing.texturing import texture_mesh
 from nacre.meshing.triangulation import mesh_points, triangulate, used_rows
 
 __all__ = [
     "ClosedSurface",
+    "Texture",
+    "TextureView",
     "close_surface",
     "largest_part",
     "mesh_points",
     "on_surface",
     "simplify",
+    "texture_mesh",
+    "texture_views",
     "triangulate",
     "used_rows",
 ]

@@ -1,13 +1,16 @@
 """Meshes that nacre writes, as they are read again and as another program (trimesh) sees them."""
 
+import dataclasses
 import json
 import struct
+import sys
 
 import numpy as np
 import pytest
 
 import nacre
 from nacre.io.meshes import READ_SUFFIXES, WRITE_SUFFIXES, read_mesh_arrays
+from nacre.meshing import Texture
 
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0.75]])
 TRIANGLES = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
@@ -149,3 +152,81 @@ def _chunks(path):
 
 def _primitives(document):
     return [primitive for mesh in document["meshes"] for primitive in mesh["primitives"]]
+
+
+UV = np.array([[0, 0], [1, 0], [0, 1], [0.75, 0.5], [0.25, 0.25]], np.float32)
+CORNERS = np.array([[0, 1, 2], [2, 1, 3], [3, 4, 0], [4, 4, 2]], np.int32)
+RAMP = np.repeat(np.arange(0, 256, 8, dtype=np.uint8), 3).reshape(1, 32, 3).repeat(24, axis=0)
+TEXTURE = Texture(RAMP, UV, CORNERS)
+
+
+class TestTexture:
+    @pytest.mark.parametrize("name", ["a.glb", "my mesh.obj"])
+    def test_another_program_sees_image_and_corners(self, tmp_path, name):
+        path = write(tmp_path / name, normals=NORMALS, colors=COLORS, texture=TEXTURE)
+        seen = seen_by_trimesh(path)
+        np.testing.assert_allclose(seen.triangles, TETRAHEDRON[TRIANGLES], rtol=1e-6)
+        np.testing.assert_allclose(seen.vertex_normals[seen.faces], NORMALS[TRIANGLES], atol=1e-6)
+        np.testing.assert_allclose(seen.visual.uv[seen.faces] * (1, -1) + (0, 1), UV[CORNERS], atol=1e-6)
+        material = seen.visual.material
+        image = material.baseColorTexture if path.suffix == ".glb" else material.image
+        assert np.abs(np.asarray(image.convert("RGB"), int) - RAMP).max() < 6  # JPEG
+        assert len(seen.vertices) <= len(np.unique(np.stack([TRIANGLES, CORNERS]).reshape(2, -1), axis=1).T)
+
+    def test_files_beside_an_obj_file(self, tmp_path):
+        path = write(tmp_path / "a.obj", colors=COLORS, texture=TEXTURE)
+        assert sorted(p.name for p in tmp_path.iterdir()) == ["a.mtl", "a.obj", "a_texture.jpg"]
+        assert "mtllib a.mtl\nusemtl texture\nv 0.0 0.0 0.0\n" in path.read_text()
+        assert "map_Kd a_texture.jpg\n" in (tmp_path / "a.mtl").read_text()
+        assert len(nacre.read_mesh(path).triangles) == 4
+
+    def test_a_glb_file_has_it_in_place_of_colours(self, tmp_path):
+        document, binary = _chunks(write(tmp_path / "a.glb", colors=COLORS, texture=TEXTURE))
+        (primitive,) = _primitives(document)
+        assert set(primitive["attributes"]) == {"POSITION", "TEXCOORD_0"}
+        assert document["buffers"][0]["byteLength"] == len(binary)
+        view = document["bufferViews"][document["images"][0]["bufferView"]]
+        assert binary[view["byteOffset"] :].startswith(b"\xff\xd8\xff")
+
+    @pytest.mark.parametrize("suffix", [".glb", ".obj"])
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            ({"image": RAMP[..., :1]}, r"texture.image must be \(H, W, 3\) uint8, got \(24, 32, 1\)"),
+            ({"image": RAMP / 255}, r"texture.image must be \(H, W, 3\) uint8, got .* of float64"),
+            ({"image": RAMP[:0]}, r"texture.image must be \(H, W, 3\) uint8, got \(0, 32, 3\)"),
+            ({"uv": UV[:, :1]}, r"texture.uv must be \(N, 2\) finite numbers, got shape \(5, 1\)"),
+            ({"uv": np.full_like(UV, np.nan)}, r"texture.uv must be \(N, 2\) finite numbers"),
+            ({"triangles": CORNERS[:2]}, r"texture.triangles must have one row per triangle \(4\), got 2"),
+            ({"triangles": CORNERS + 1}, r"texture.triangles must hold indices of the 5 vertices, got 5"),
+        ],
+    )
+    def test_what_does_not_fit_writes_nothing(self, tmp_path, suffix, change, message):
+        with pytest.raises(ValueError, match=message):
+            write(tmp_path / f"a{suffix}", texture=dataclasses.replace(TEXTURE, **change))
+        assert not list(tmp_path.iterdir())
+
+    def test_other_things_are_no_texture(self, tmp_path):
+        with pytest.raises(TypeError, match=r"texture must be a nacre\.meshing\.Texture, got ndarray"):
+            write(tmp_path / "a.glb", texture=RAMP)
+
+    @pytest.mark.parametrize("suffix", [".ply", ".stl"])
+    def test_formats_without(self, tmp_path, suffix):
+        with pytest.raises(
+            ValueError, match=r"textured meshes are written to .glb, .obj, got .*a\.(ply|stl)"
+        ):
+            write(tmp_path / f"a{suffix}", texture=TEXTURE)
+        assert not list(tmp_path.iterdir())
+
+    def test_a_name_of_two_lines(self, tmp_path):
+        with pytest.raises(ValueError, match="path must be a name that fits a line of an OBJ file"):
+            write(tmp_path / "a\nb.obj", texture=TEXTURE)
+        assert not list(tmp_path.iterdir())
+
+    @pytest.mark.parametrize("suffix", [".glb", ".obj"])
+    def test_without_pillow(self, tmp_path, monkeypatch, suffix):
+        monkeypatch.setitem(sys.modules, "PIL", None)
+        monkeypatch.setitem(sys.modules, "PIL.Image", None)
+        with pytest.raises(ImportError, match=r'pip install "nacre\[images\]"'):
+            write(tmp_path / f"a{suffix}", texture=TEXTURE)
+        assert not list(tmp_path.iterdir())

@@ -1,0 +1,148 @@
+"""A mesh painted with the images of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre._internal import arrays
+from nacre.mesh import Mesh
+from nacre.meshing.texture import Texture
+from nacre.meshing.texture_exposure import blurred, colors_at, detail_at, image_gains, seam_corrections
+from nacre.meshing.texture_labels import NO_VIEW, choose_labels, neighbors_of
+from nacre.meshing.texture_painting import paint
+from nacre.meshing.texture_patches import Patches
+from nacre.meshing.texture_views import TextureView, check_views
+from nacre.meshing.texture_visibility import edge_lengths, project
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+_PLACES = 5_000  # budget: vertices at which the exposures are compared
+_SAMPLES = 5  # of the colours along an edge
+_GRAY = 128.0  # where neither an image nor a colour is known
+
+
+def texture_mesh(
+    vertices: npt.ArrayLike,
+    triangles: npt.ArrayLike,
+    views: Sequence[TextureView],
+    *,
+    colors: npt.ArrayLike | None = None,
+    is_seen: npt.ArrayLike | None = None,
+) -> Texture:
+    """
+    Paint a mesh with images: each triangle with one that shows it well, in one exposure, without seams.
+
+    Parameters
+    ----------
+    vertices : (V, 3) array_like of real numbers
+        [m].
+    triangles : (T, 3) array_like of integers
+        Vertex indices, counter-clockwise seen from outside.
+    views : sequence of TextureView
+        Images, whose places fit the mesh; :func:`texture_views` chooses some of a recording.
+    colors : (V, 3) array_like of uint8, optional
+        Of the vertices, for the triangles that no image shows.
+    is_seen : (V,) array_like of bool, optional
+        False at vertices that are a guess: their triangles have ``colors`` alone.
+
+    Returns
+    -------
+    Texture
+
+    Raises
+    ------
+    TypeError, ValueError
+        Arguments of the wrong type or shape, or too many triangles that no image shows for one atlas.
+    ImportError
+        The images are too large for one atlas, and pillow, which scales them, is missing.
+
+    Notes
+    -----
+    M. Waechter, N. Moehrle and M. Goesele, "Let There Be Color! Large-Scale Texturing of 3D Reconstructions",
+    ECCV 2014, with a cover by few images in place of their Markov random field.
+    """
+    mesh = Mesh(vertices, triangles)
+    checked = check_views("views", views)
+    fallback = None if colors is None else _as_colors("colors", colors, len(mesh.vertices))
+    is_guess = np.zeros(len(mesh.vertices), np.bool_)
+    if is_seen is not None:
+        is_guess = arrays.as_values("is_seen", is_seen, len(mesh.vertices), "vertex") == 0
+    labels, gains = _choose_views(mesh, checked, is_guess)
+    patches = Patches.of(mesh, labels, checked)
+    node_colors = _node_colors(patches, checked, gains, fallback)
+    edges = patches.corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    is_photographed = patches.view_of_node != NO_VIEW
+    corrections = seam_corrections(node_colors, patches.vertex_of_node, edges, is_photographed)
+    corrections[is_guess[patches.vertex_of_node]] = 0
+    return paint(patches, checked, gains, node_colors, corrections)
+
+
+def _choose_views(
+    mesh: Mesh, views: Sequence[TextureView], is_guess: Bools
+) -> tuple[npt.NDArray[np.int32], Array]:
+    """Return the view of each triangle, and the gains of the views' channels."""
+    tolerance = edge_lengths(mesh)
+    places = np.unique(np.linspace(0, len(mesh.vertices) - 1, _PLACES).astype(np.intp))
+    scores = np.empty((len(views), len(mesh.triangles)), np.float32)
+    is_visible = np.empty((len(views), len(places)), np.bool_)
+    colors = np.empty((len(views), len(places), 3))
+    for k, view in enumerate(views):
+        projection = project(mesh, view, tolerance)
+        image = blurred(view.color)
+        scores[k] = projection.area * detail_at(image, projection.pixels)[mesh.triangles[:, 0]]
+        is_visible[k] = projection.is_visible[places]
+        colors[k] = colors_at(image, projection.pixels[places])
+    scores[:, is_guess[mesh.triangles].any(axis=1)] = 0
+    if not scores.any():
+        raise ValueError("views show no triangle of the mesh: check that their poses are of its frame")
+    a, b, c = (mesh.vertices[mesh.triangles[:, i]].astype(np.float64) for i in range(3))
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return choose_labels(scores, areas, neighbors_of(mesh.triangles)), image_gains(colors, is_visible)
+
+
+def _node_colors(
+    patches: Patches, views: Sequence[TextureView], gains: Array, fallback: Array | None
+) -> Array:
+    """Return what the images show at the corners of patches, in one exposure; else the fallback."""
+    colors = np.full((len(patches.vertex_of_node), 3), _GRAY)
+    for k, view in enumerate(views):
+        image = gains[k] * blurred(view.color)
+        rows = np.flatnonzero(patches.view_of_node == k)
+        colors[rows] = colors_at(image, patches.pixels[rows])
+        seams = patches.seams[patches.view_of_node[patches.seams[:, 0]] == k]
+        rows, means = _means_along(image, patches.pixels, seams)
+        colors[rows] = means
+    unseen = patches.view_of_node == NO_VIEW
+    if fallback is not None:
+        colors[unseen] = fallback[patches.vertex_of_node[unseen]]
+    return colors
+
+
+def _means_along(
+    image: Array, pixels: Array, edges: npt.NDArray[np.intp]
+) -> tuple[npt.NDArray[np.intp], Array]:
+    """
+    Return the ends of edges, and the mean colours along their edges, weighted by nearness.
+
+    Both sides of a seam have these edges: their means differ by exposure, and less by what lies beside them.
+    """
+    ends, rows = np.unique(edges, return_inverse=True)
+    first, second = rows.reshape(-1, 2).T
+    sums = np.zeros((len(ends), 4))
+    for part in np.linspace(0, 1, _SAMPLES):
+        places = (1 - part) * pixels[edges[:, 0]] + part * pixels[edges[:, 1]]
+        samples = np.pad(colors_at(image, places), ((0, 0), (0, 1)), constant_values=1)
+        np.add.at(sums, first, (1 - part) * samples)
+        np.add.at(sums, second, part * samples)
+    return ends, sums[:, :3] / sums[:, 3:]
+
+
+def _as_colors(name: str, value: npt.ArrayLike, num_vertices: int) -> Array:
+    array = arrays.as_real(name, value)
+    if array.shape != (num_vertices, 3) or array.dtype != np.uint8:
+        raise ValueError(f"{name} must be ({num_vertices}, 3) uint8, got {array.shape} of {array.dtype}")
+    return array.astype(np.float64)
