@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal import arrays
 from nacre._internal.value_equality import Value
+from nacre.camera import Camera, camera_of
 from nacre.errors import FileFormatError
 
 if TYPE_CHECKING:
@@ -61,7 +61,7 @@ def check_views(name: str, views: Any) -> list[TextureView]:
 def _checked(name: str, view: Any) -> TextureView:
     if not isinstance(view, TextureView):
         raise TypeError(f"{name} must be a TextureView, got {type(view).__name__}")
-    camera = arrays.as_camera(f"{name}.camera", view.camera)
+    camera = camera_of(arrays.as_camera(f"{name}.camera", view.camera))
     pose = arrays.as_pose(f"{name}.world_from_camera", view.world_from_camera)
     color = arrays.as_array(f"{name}.color", view.color)
     shape = (camera.height, camera.width)
