@@ -17,6 +17,18 @@ from typing import Any
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 
+def _page_of(address: str, seconds: float = 20.0) -> str:
+    """Return where the first page listens, once there is one."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        with urllib.request.urlopen(f"http://{address}/json") as answer:
+            pages = [target for target in json.load(answer) if target["type"] == "page"]
+        if pages:
+            return str(pages[0]["webSocketDebuggerUrl"])
+        time.sleep(0.1)
+    raise TimeoutError(f"Chromium opened no page in {seconds} s")
+
+
 class Browser:
     """One page. Use as a context manager."""
 
@@ -31,15 +43,15 @@ class Browser:
             [CHROMIUM, *options], stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
         )
         assert self._process.stderr is not None
+        found = None
         for line in self._process.stderr:
             found = re.search(r"DevTools listening on ws://([^/]+)/", line)
             if found:
                 break
-        with urllib.request.urlopen(f"http://{found[1]}/json") as answer:
-            pages = [target for target in json.load(answer) if target["type"] == "page"]
+        assert found is not None, "Chromium ended before it began"
         from websockets.sync.client import connect
 
-        self._socket = connect(pages[0]["webSocketDebuggerUrl"], max_size=None)
+        self._socket = connect(_page_of(found[1]), max_size=None)
         self._ids = itertools.count(1)
 
     def __enter__(self) -> Browser:

@@ -280,7 +280,8 @@ def test_reconstruct_tells_what_it_corrected(wrong, tmp_path):
     done = nacre.reconstruct(tmp_path / "recording")
     assert report["depth_calibration"] == {**dataclasses.asdict(done.depth_calibration), "used": True}
     assert done.depth_calibration.tilt == pytest.approx(0.01, rel=0.1)
-    np.testing.assert_array_equal(nacre.read_points(tmp_path / "out" / "model.ply").points, done.model.points)
+    written = nacre.read_points(tmp_path / "out" / "model.ply")
+    np.testing.assert_array_equal(written.points, done.cloud.points)
     assert reconstruct(tmp_path / "recording", tmp_path / "o", "--no-calibrate")["depth_calibration"] is None
 
 

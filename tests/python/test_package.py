@@ -27,7 +27,7 @@ def test_numpy_is_the_only_requirement() -> None:
 
 
 # They have no wheel for some machines, or are larger than all the rest.
-NOT_FOR_ALL = {"realsense", "record3d", "rerun", "e57"}
+NOT_FOR_ALL = {"realsense", "record3d", "rerun", "e57", "closed"}
 
 
 def test_all_brings_every_extra_but_the_developers() -> None:

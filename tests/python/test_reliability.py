@@ -30,6 +30,7 @@ def run(program: str, *words: str) -> str:
     return done.stdout
 
 
+@pytest.mark.weekly
 def test_whole_reconstructions_have_the_same_bits() -> None:
     cases = ("--only", "room", "--only", "object", "--frames", "40")
     said = run("determinism.py", "--threads", "1,3", "--repeats", "1", *cases)

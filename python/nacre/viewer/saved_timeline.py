@@ -49,7 +49,10 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
         if frame.truth is not None:
             frame.figures["truth"] = None if world_from_truth is None else world_from_truth @ frame.truth
         timeline.add(frame)
-    timeline.set_snapshot(_cloud(read_points(path / "model.ply"), out.report.get("spacing")))
+    model = read_points(path / "model.ply")
+    if model.normals is None:
+        raise FileFormatError(path / "model.ply", "a model of nacre reconstruct has normals")
+    timeline.set_snapshot(_cloud(model, out.report.get("spacing")))
     return timeline
 
 
