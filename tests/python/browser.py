@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import time
 import urllib.request
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -51,7 +52,8 @@ class Browser:
         assert found is not None, "Chromium ended before it began"
         from websockets.sync.client import connect
 
-        self._socket = connect(_page_of(found[1]), max_size=None)
+        self._ends = ExitStack()
+        self._socket = self._ends.enter_context(connect(_page_of(found[1]), max_size=None))
         self._ids = itertools.count(1)
 
     def __enter__(self) -> Browser:
@@ -60,7 +62,7 @@ class Browser:
     def __exit__(
         self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
     ) -> None:
-        self._socket.close()
+        self._ends.close()
         self._process.terminate()
         self._process.wait(timeout=20)
         assert self._process.stderr is not None
