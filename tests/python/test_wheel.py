@@ -30,7 +30,7 @@ def test_it_holds_the_package_and_nothing_else(files: list[PackagePath]) -> None
     assert {f.name for f in files if f.parts[0] == ".."} <= {"nacre", "nacre.exe"}  # the command
     binaries = (".so", ".pyd", ".dylib", ".dll")
     suffixes = {"." + f.name.rpartition(".")[2] for f in files if f.parts[0] == "nacre"}
-    assert suffixes - {*binaries} == {".py", ".pyi", ".typed", ".css", ".html", ".svg"}
+    assert suffixes - {*binaries} == {".py", ".pyi", ".typed", ".css", ".html", ".js", ".svg"}
     assert (
         len([f for f in files if f.name.endswith(binaries)]) == 1
     )  # no library of threads or of C++ is bundled
