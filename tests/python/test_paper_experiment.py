@@ -109,14 +109,16 @@ def test_default_preset(sigma: float, seed: int, angle: float, shift: float, rms
     assert sigma == 0 or surface_error(model.points) < 0.5 * sigma
 
 
-@pytest.mark.parametrize("sigma", [0.0, 0.0005])
-def test_paper_preset(sigma: float) -> None:
+@pytest.mark.parametrize(
+    ("sigma", "num_runs"), [(0.0, 20), pytest.param(0.0, 60, marks=pytest.mark.weekly), (0.0005, 60)]
+)
+def test_paper_preset(sigma: float, num_runs: int) -> None:
     """
-    The paper's algorithm, alone, completes the turn in at least 57 of 60: 95 %.
+    The paper's algorithm, alone, completes the turn in at least 95 % of the runs.
 
     No pose is more than 5 degrees off, and the model has the object's shape.
     """
-    runs = [experiment("paper", sigma, seed) for seed in range(60)]
+    runs = [experiment("paper", sigma, seed) for seed in range(num_runs)]
     assert all(len(model.frames) == 12 for model in runs)
     assert max(report.num_points for model in runs for report in model.frames) == 2000
     succeed = [
@@ -125,7 +127,7 @@ def test_paper_preset(sigma: float) -> None:
         and completeness(model.points, 0.008) > 0.85
         for model in runs
     ]
-    assert sum(succeed) >= 57
+    assert sum(succeed) >= 0.95 * num_runs
 
 
 def test_paper_preset_needs_what_the_paper_leaves_open() -> None:

@@ -146,7 +146,7 @@ def test_retry_leaves_frames_that_were_refused() -> None:
 
 
 @pytest.mark.data
-@pytest.mark.parametrize("seed", [None, 0, 1])
+@pytest.mark.parametrize("seed", [None, 0, pytest.param(1, marks=pytest.mark.weekly)])
 def test_bunny_scans_in_any_order(recordings: Any, seed: int | None) -> None:
     """Measured: all ten scans in each of several orders, within 0.4 degrees and 0.7 mm of bun.conf."""
     sequence = nacre.open_sequence(recordings / "stanford-bunny" / "data")
