@@ -67,7 +67,8 @@ struct FusionReport {
 /// moving-least-squares residual; surface that the model lacks is inserted at the given spacing, but no denser than a
 /// pixel and a half of the frame; points that the camera sees through, or that were never confirmed, are removed.
 /// colors is empty or has a row per pixel; the frame has the camera's size. Colours and attributes are averaged with
-/// the weights of the points; an attribute keeps its number of channels from frame to frame.
+/// the weights of the points, colours in the mean exposure of the frames 0 to frame_index; an attribute keeps its
+/// number of channels from frame to frame.
 FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, const Pose& world_from_camera,
                   double spacing, std::int32_t frame_index, const FusionOptions& options = {},
                   const ColorsRef& colors = Colors(), int num_threads = 0,

@@ -66,7 +66,9 @@ Eigen::Vector3f share_exposure(PointModel& model, const RegisteredFrame& now, do
   if (gain == Eigen::Vector3f::Ones()) return Eigen::Vector3f::Ones();
   const float share = -1.0F / std::max(1.0F, static_cast<float>(now.index) + 1.0F);
   const Eigen::Vector3f moved = gain.array().pow(share);
-  for (Eigen::Vector3f& color : model.colors) color = color.cwiseProduct(moved);
+  for (Eigen::Vector3f& color : model.colors) {
+    if (color.allFinite()) color = exposed(color, moved);
+  }
   return gain.cwiseProduct(moved);
 }
 

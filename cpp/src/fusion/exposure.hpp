@@ -6,6 +6,11 @@
 
 namespace nacre {
 
+// A colour in another exposure; white stays white.
+inline Eigen::Vector3f exposed(const Eigen::Vector3f& color, const Eigen::Vector3f& gain) {
+  return color.cwiseProduct(gain).cwiseMin(255.0F);
+}
+
 // By what a frame's colours are to be multiplied, channel by channel, to be as the model's: the median over points that
 // both show, as exposure and white balance change the whole image alike. 1 where chance explains it.
 Eigen::Vector3f color_gain(const PointModel& model, const RegisteredFrame& now, double spacing);

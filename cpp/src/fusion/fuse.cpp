@@ -136,7 +136,7 @@ Known update(PointModel& model, const RegisteredFrame& now, double spacing, cons
             model.normals[i] = (model.confidence[i] * model.normals[i] + world_rotation * observed.normal).normalized();
             if (observer.has_colors()) {
               Eigen::Vector3f& color = model.colors[i];
-              const Eigen::Vector3f seen_color = observed.color.cwiseProduct(now.color_gain);
+              const Eigen::Vector3f seen_color = exposed(observed.color, now.color_gain);
               color = color.allFinite() ? Eigen::Vector3f(color + gain * (seen_color - color)) : seen_color;
             }
             model.confidence[i] =
@@ -213,7 +213,7 @@ std::vector<NewPoint> find_new_points(const RegisteredFrame& now, const PixelSet
       if (!(observed.weight * facing > least * observer.frontal_weight(block.sigma(k)))) continue;
       candidate.point += observed.offset * block.ray(k);
       candidate.normal = observed.normal.normalized();
-      if (observer.has_colors()) candidate.color = observed.color.cwiseProduct(now.color_gain);
+      if (observer.has_colors()) candidate.color = exposed(observed.color, now.color_gain);
       candidate.weight = observed.weight;
       candidate.cover = block.cover(k);
       candidate.reach = reach_of(candidate, camera);
@@ -304,12 +304,10 @@ void FusionOptions::check() const {
   require(reference_sigma >= 0.0, "reference_sigma", "0 (automatic) or positive metres", reference_sigma);
 }
 
-FusionReport fuse_observed(PointModel& model, const RegisteredFrame& frame, double spacing,
-                           const FusionOptions& options, int num_threads,
-                           const std::vector<FrameAttribute>& attributes) {
+FusionReport fuse_observed(PointModel& model, RegisteredFrame now, double spacing, const FusionOptions& options,
+                           int num_threads, const std::vector<FrameAttribute>& attributes) {
   FusionReport report;
-  RegisteredFrame now = frame;
-  now.color_gain = share_exposure(model, frame, spacing);
+  now.color_gain = share_exposure(model, now, spacing);
   const bool with_colors = now.observer.has_colors() || !model.colors.empty();
   if (with_colors) {
     model.colors.resize(model.points.size(), Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));

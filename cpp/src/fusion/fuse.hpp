@@ -9,7 +9,7 @@
 namespace nacre {
 
 // fuse() with the observer of the frame. Colours are the observer's.
-FusionReport fuse_observed(PointModel& model, const RegisteredFrame& now, double spacing, const FusionOptions& options,
+FusionReport fuse_observed(PointModel& model, RegisteredFrame now, double spacing, const FusionOptions& options,
                            int num_threads, const std::vector<FrameAttribute>& attributes);
 
 }  // namespace nacre

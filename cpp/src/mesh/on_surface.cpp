@@ -11,6 +11,7 @@
 #include "base/check.hpp"
 #include "base/parallel.hpp"
 #include "mesh/limits.hpp"
+#include "mesh/spacing.hpp"
 #include "nacre/kdtree.hpp"
 #include "nacre/mesh.hpp"
 
@@ -53,9 +54,7 @@ struct Surface {
     constexpr int k = mesh_limits::covering_neighbors + 1;  // and itself
     const int count = tree.nearest(point(i), k, KdTree::infinity, indices, squared);
     if (count <= mesh_limits::spacing_neighbors) return false;
-    double sum = 0.0;
-    for (int n = 1; n <= mesh_limits::spacing_neighbors; ++n) sum += std::sqrt(squared[n]);
-    const double spacing = sum / mesh_limits::spacing_neighbors;
+    const double spacing = spacing_around(squared);
     const Eigen::Vector3d up = normal(i), right = up.unitOrthogonal(), ahead = up.cross(right);
     Layer above, below;
     for (int n = 1; n < count; ++n) {

@@ -12,6 +12,7 @@
 #include "base/check.hpp"
 #include "base/parallel.hpp"
 #include "mesh/limits.hpp"
+#include "mesh/spacing.hpp"
 #include "nacre/kdtree.hpp"
 #include "nacre/mesh.hpp"
 
@@ -170,9 +171,7 @@ class Triangulation {
     const int count =
         normal(i).squaredNorm() > 0.0 ? tree.nearest(point(i), k, KdTree::infinity, indices.data(), squared.data()) : 0;
     if (count <= mesh_limits::spacing_neighbors) return;
-    double sum = 0.0;
-    for (std::size_t n = 1; n <= mesh_limits::spacing_neighbors; ++n) sum += std::sqrt(squared[n]);
-    const double spacing = sum / mesh_limits::spacing_neighbors, largest_circle = mesh_limits::largest_circle * spacing;
+    const double spacing = spacing_around(squared.data()), largest_circle = mesh_limits::largest_circle * spacing;
     spacing_[static_cast<std::size_t>(i)] = static_cast<float>(spacing);
     if (!(spacing > 0.0)) return;
 

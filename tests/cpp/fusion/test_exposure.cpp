@@ -64,6 +64,11 @@ TEST_CASE("what is black, or too bright for the sensor, tells nothing") {
   CHECK(gain_of({9.0F, 9.0F, 9.0F}) == Eigen::Vector3f::Ones());
 }
 
+TEST_CASE("white stays white in a brighter exposure") {
+  const Eigen::Vector3f twice(2.0F, 2.0F, 2.0F);
+  CHECK(exposed({200.0F, 100.0F, 10.0F}, twice) == Eigen::Vector3f(255.0F, 200.0F, 20.0F));
+}
+
 TEST_CASE("the model has the mean exposure of its frames, whichever came first") {
   const Eigen::Vector3f dark(0.8F, 0.8F, 0.8F), bright(1.25F, 1.25F, 1.25F), red(1.2F, 1.0F, 0.9F);
   const PointModel one = fused({dark, bright}), other = fused({bright, dark}),
