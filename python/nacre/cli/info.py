@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from nacre.cli.live_feed import is_camera, open_camera
+from nacre.cli.cameras import is_camera, open_camera
 from nacre.cli.run_options import describe_unfinished
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
 from nacre.cli.surfaces import has_faces, mesh_suffixes, point_suffixes

@@ -17,7 +17,7 @@ from nacre.viewer.timeline import Timeline
 _WEB = Path(__file__).with_name("web")
 _SCRIPTS = (
     "linear.js", "data.js", "cloud.js", "orbit.js", "renderer.js", "cameras.js", "picking.js", "measure.js",
-    "crop.js", "deviation.js", "player.js", "panel.js", "main.js",
+    "crop.js", "deviation.js", "player.js", "live.js", "panel.js", "main.js",
 )  # fmt: skip
 
 

@@ -48,6 +48,8 @@ class PageData:
         One or two.
     parameters : DepthParameters, optional
         What is marked as removed in depth images.
+    is_live : bool
+        Whether a camera runs.
 
     Raises
     ------
@@ -55,11 +57,18 @@ class PageData:
         When there is nothing to compare with.
     """
 
-    def __init__(self, timelines: Sequence[Timeline], parameters: DepthParameters | None = None) -> None:
+    def __init__(
+        self,
+        timelines: Sequence[Timeline],
+        parameters: DepthParameters | None = None,
+        *,
+        is_live: bool = False,
+    ) -> None:
         if not all(other.has_points for other in timelines[1:]):
             raise ValueError("other must hold a state of the model to compare with, got none")
         self._timelines = timelines
         self._parameters = parameters
+        self._is_live = is_live
         self._states = [
             State(run, place, cloud)
             for run, timeline in enumerate(timelines)
@@ -109,6 +118,7 @@ class PageData:
             view = first_view(newest[0].cloud, self._timelines[0], newest[0].place).as_dict()
         return {
             "title": " and ".join(timeline.title for timeline in self._timelines),
+            "isLive": self._is_live,
             "view": view,
             "comment": "metres" if self._timelines[0].is_upright else f"metres; {CAMERA_FRAME}",
             "statusColors": STATUS_COLORS,

@@ -16,12 +16,14 @@ class App {
     this.crop = new Crop(this);
     this.deviation = new Deviation(this);
     this.player = new Player(this);
+    this.live = new Live(this);
     this.#listen();
   }
 
   async start() {
     this.source = await openSource();
     await this.#take(await this.source.read("document"));
+    if (this.document.isLive) this.live.poll();
     this.#poll();
   }
 
@@ -45,7 +47,8 @@ class App {
     const isFirst = !this.document;
     this.document = JSON.parse(new TextDecoder().decode(bytes));
     showDocument(this.document);
-    if (isFirst && !this.document.runs[0].frames.length) document.getElementById("reverse").checked = true;
+    const { isLive } = this.document;
+    if (isFirst && !isLive && !this.document.runs[0].frames.length) document.getElementById("reverse").checked = true;
     this.player.update();
     this.#forget();
     const { view, runs } = this.document;
