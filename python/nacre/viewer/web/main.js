@@ -15,6 +15,7 @@ class App {
     this.measure = new Measure(this);
     this.crop = new Crop(this);
     this.deviation = new Deviation(this);
+    this.holes = new Holes(this);
     this.player = new Player(this);
     this.live = new Live(this);
     this.#listen();
@@ -48,6 +49,7 @@ class App {
     this.document = JSON.parse(new TextDecoder().decode(bytes));
     showDocument(this.document);
     const { isLive } = this.document;
+    if (isFirst && isLive) document.getElementById("holes").checked = true;
     if (isFirst && !isLive && !this.document.runs[0].frames.length) document.getElementById("reverse").checked = true;
     this.player.update();
     this.#forget();
@@ -88,6 +90,7 @@ class App {
       this.color();
     }
     this.select();
+    this.holes.load();
   }
 
   async #cloud(name) {
@@ -181,6 +184,8 @@ class App {
     const lines = cameraLines(run, place, this.document.statusColors, size, chosen);
     this.crop.active?.edges.forEach(([a, b]) => lines.add(a, b, [255, 255, 255], 150));
     this.renderer.drawLines(lines.positions, lines.colors, matrices, part);
+    const holes = this.holes.lines(part.run);
+    if (holes) this.renderer.drawLines(holes.positions, holes.colors, matrices, part, HOLE_WIDTH);
     return this.#overlay(part, matrices);
   }
 
