@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
+from nacre.cli.terminal import CommandError
+
 if TYPE_CHECKING:
     from nacre import Camera
     from nacre.datasets import SequenceFrame
@@ -36,10 +38,20 @@ def _realsense(which: str, color: bool) -> LiveCamera:
     return RealSense(None if is_file else which or None, file=which if is_file else None, color=color)
 
 
+def _ros(which: str, color: bool) -> LiveCamera:
+    from nacre.datasets import RosTopic
+
+    depth, _, colors = which.partition(",")
+    if not depth:
+        raise CommandError("ros2 needs a topic of depth images: ros2:/camera/depth/image_raw", 2)
+    return RosTopic(depth, colors if color and colors else None)
+
+
 _OPENERS: dict[str, Callable[[str, bool], LiveCamera]] = {
     "realsense": _realsense,
+    "ros2": _ros,
 }
-CAMERAS = "realsense, realsense:SERIAL"
+CAMERAS = "realsense, realsense:SERIAL, ros2:/DEPTH/TOPIC, ros2:/DEPTH/TOPIC,/COLOUR/TOPIC"
 
 
 def is_camera(source: Path) -> bool:

@@ -89,8 +89,10 @@ def _show(terminal: Terminal, job: Job, window: Window) -> LiveView:
 def _ending(job: Job) -> str:
     """Say in the window how it ended."""
     error = job.feed and job.feed.error
-    return (f"{error}; what there is was" if error else "Model, report and recording were") + (
-        f" written to {job.unfinished.out}"
+    return (
+        f"{error}; what there is was written to {job.unfinished.out}"
+        if error
+        else (f"The results are in {job.unfinished.out}")
     )
 
 

@@ -14,11 +14,13 @@ if TYPE_CHECKING:
     from nacre.datasets.real_time import in_real_time
     from nacre.datasets.realsense import RealSense
     from nacre.datasets.recorder import GrowingRecording
+    from nacre.datasets.ros_topic import RosTopic
 
 __all__ = [
     "GrowingRecording",
     "LiveQueue",
     "RealSense",
+    "RosTopic",
     "Sequence",
     "SequenceFrame",
     "in_real_time",
@@ -32,6 +34,7 @@ _LIVE = {
     "GrowingRecording": "recorder",
     "LiveQueue": "live_queue",
     "RealSense": "realsense",
+    "RosTopic": "ros_topic",
     "in_real_time": "real_time",
 }
 

@@ -149,7 +149,7 @@ class TestWindow:
 
         browser.press_button("stop")
         self.say(browser, "Finished")
-        assert f"Model, report and recording were written to {out}" in browser.text()
+        assert f"The results are in {out}" in browser.text()
         running.send_signal(signal.SIGINT)
         told, errors = running.communicate(timeout=60)
         assert running.returncode == 0, errors

@@ -1,6 +1,6 @@
 // A camera that runs: what it sees, how its frames are registered, and the buttons.
 
-const LIVE_POLL = 200; // [ms]
+const LIVE_POLL = 250; // [ms]
 const STATES = {
   ready: "Ready", recording: "Recording", paused: "Paused", stopped: "Finishing: lost frames are tried again",
   finished: "Finished",
