@@ -16,9 +16,9 @@ WIDTH, HEIGHT = 96, 72
 
 
 def wave(i: int) -> np.ndarray:
-    """Return the i-th depth image [mm]: a wavy surface that comes nearer by 1 mm a frame."""
+    """Return the i-th depth image [mm]: a wavy surface that comes and goes by 10 mm, 1 mm a frame."""
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
-    depth = (700 - i % 40 + 30 * np.sin(x / 6) * np.cos(y / 7)).astype(np.uint16)
+    depth = (690 + abs(i % 20 - 10) + 30 * np.sin(x / 6) * np.cos(y / 7)).astype(np.uint16)
     depth[0] = 0
     return depth
 

@@ -38,6 +38,17 @@ def _realsense(which: str, color: bool) -> LiveCamera:
     return RealSense(None if is_file else which or None, file=which if is_file else None, color=color)
 
 
+def _opencv(driver: str | None) -> Callable[[str, bool], LiveCamera]:
+    def opener(which: str, color: bool) -> LiveCamera:
+        from nacre.datasets import OpenCVCamera
+
+        if which and not which.isdecimal():
+            raise CommandError(f"{driver or 'opencv'} needs the camera's index, 0 or more, got {which!r}", 2)
+        return OpenCVCamera(int(which or 0), driver=driver, color=color)
+
+    return opener
+
+
 def _ros(which: str, color: bool) -> LiveCamera:
     from nacre.datasets import RosTopic
 
@@ -49,9 +60,15 @@ def _ros(which: str, color: bool) -> LiveCamera:
 
 _OPENERS: dict[str, Callable[[str, bool], LiveCamera]] = {
     "realsense": _realsense,
+    "opencv": _opencv(None),
+    "openni": _opencv("openni"),
+    "orbbec": _opencv("orbbec"),
     "ros2": _ros,
 }
-CAMERAS = "realsense, realsense:SERIAL, ros2:/DEPTH/TOPIC, ros2:/DEPTH/TOPIC,/COLOUR/TOPIC"
+CAMERAS = (
+    "realsense, openni, orbbec or opencv (behind a colon its serial number, or its index), "
+    "ros2:/DEPTH/TOPIC or ros2:/DEPTH/TOPIC,/COLOUR/TOPIC"
+)
 
 
 def is_camera(source: Path) -> bool:

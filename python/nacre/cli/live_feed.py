@@ -64,13 +64,12 @@ class LiveFeed:
     def _wanted(self) -> Iterator[Any]:
         """Yield what comes while it is wanted, until it is enough."""
         for item in self._queue:
-            if self._has_enough():
-                return
-            if self._controls is None or self._controls.is_recording:
+            is_enough = self._has_enough()
+            if not is_enough and (self._controls is None or self._controls.is_recording):
                 yield item
             else:
                 self._num_unwanted += 1
-            if self._has_enough():
+            if is_enough or self._has_enough():
                 return
 
     def tend(self, step: Step) -> None:

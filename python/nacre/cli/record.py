@@ -94,17 +94,15 @@ def record(
         is_camera=is_live,
         report=report,
     )
-    place = _window(terminal, port, waits=is_live) if window else None
+    place = _window(waits=is_live, port=port) if window and has_browser() else None
     with interruptible() as stop, closing(UnfinishedRun(out)) as unfinished:
         job = begun(terminal, options, unfinished, parameters, stop, place.controls if place else None)
+        if window and place is None:
+            terminal.say("no window: there is no browser, or no display; Ctrl-C stops")
         carry_out(terminal, job, stop, place)
 
 
-def _window(terminal: Terminal, port: int, *, waits: bool) -> Window | None:
-    """Return the window, or say that there is no browser for it."""
+def _window(*, waits: bool, port: int) -> Window:
     from nacre.viewer import Controls
 
-    if not has_browser():
-        terminal.say("no window: there is no browser, or no display; recording begins, Ctrl-C ends it")
-        return None
     return Window(port, Controls("ready" if waits else "recording"), opens=True)

@@ -22,12 +22,15 @@ class Window:
 
 
 def has_browser() -> bool:
-    """Say whether there is a browser that opens a window here."""
+    """Say whether there is a browser that opens a window here, and not one of the terminal."""
+    if os.environ.get("BROWSER"):
+        return True
     is_unix = os.name == "posix" and sys.platform != "darwin"
-    if is_unix and not any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")):
+    if is_unix and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         return False
     try:
-        webbrowser.get()
+        browser = webbrowser.get()
     except webbrowser.Error:
         return False
-    return True
+    waits = isinstance(browser, webbrowser.GenericBrowser)
+    return not waits or isinstance(browser, webbrowser.BackgroundBrowser)

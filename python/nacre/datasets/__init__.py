@@ -11,6 +11,7 @@ from nacre.datasets.sequence import Sequence, SequenceFrame
 
 if TYPE_CHECKING:
     from nacre.datasets.live_queue import LiveQueue
+    from nacre.datasets.opencv_camera import OpenCVCamera
     from nacre.datasets.real_time import in_real_time
     from nacre.datasets.realsense import RealSense
     from nacre.datasets.recorder import GrowingRecording
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 __all__ = [
     "GrowingRecording",
     "LiveQueue",
+    "OpenCVCamera",
     "RealSense",
     "RosTopic",
     "Sequence",
@@ -33,6 +35,7 @@ __all__ = [
 _LIVE = {
     "GrowingRecording": "recorder",
     "LiveQueue": "live_queue",
+    "OpenCVCamera": "opencv_camera",
     "RealSense": "realsense",
     "RosTopic": "ros_topic",
     "in_real_time": "real_time",

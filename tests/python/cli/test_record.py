@@ -6,6 +6,7 @@ import json
 import signal
 import sys
 import time
+import webbrowser
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ import fake_realsense as fake
 from browser import CHROMIUM, Browser
 from command_line import run
 
+from nacre.cli.window import has_browser
 from nacre.datasets import realsense
 
 pytest.importorskip("PIL")
@@ -78,6 +80,21 @@ def test_without_a_frame_nothing_is_left(plug: Callable[..., fake.Library], tmp_
     assert not (tmp_path / "out" / "recording").exists()
 
 
+def test_unplugged_before_the_start(
+    plug: Callable[..., fake.Library], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("BROWSER", "firefox")
+    opened: list[str] = []
+    monkeypatch.setattr(webbrowser, "open", opened.append)
+    plug(frames=3, unplugged=True, seconds=0.005)
+    done = run("record", "realsense", "-o", tmp_path / "out", "--port", 0)
+    assert done.code == 1
+    assert done.err == "error: Fake D435 0815 was unplugged: nothing was recorded\n"
+    assert f"the model is at {opened[0]}\n" in done.out
+    assert not (tmp_path / "out" / "recording").exists()
+    assert not (tmp_path / "out" / "unfinished").exists()
+
+
 def test_what_is_no_camera(tmp_path: Path) -> None:
     done = run("record", "realsens", "-o", tmp_path / "out")
     assert done.code == 2
@@ -90,6 +107,33 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     pytest.importorskip("websockets")
     with Browser(tmp_path_factory.mktemp("profile")) as browser:
         yield browser
+
+
+class TestBrowser:
+    @pytest.mark.parametrize(
+        ("found", "opens"),
+        [
+            (webbrowser.BackgroundBrowser("firefox"), True),
+            (webbrowser.Chrome("chromium"), True),
+            (webbrowser.GenericBrowser("lynx"), False),  # it would take the terminal
+            (webbrowser.Error("none"), False),
+        ],
+    )
+    def test_one_that_opens_a_window(
+        self, found: Any, opens: bool, no_browser: None, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        def get() -> Any:
+            if isinstance(found, Exception):
+                raise found
+            return found
+
+        monkeypatch.setattr(webbrowser, "get", get)
+        monkeypatch.setenv("DISPLAY", ":0")
+        assert has_browser() == opens
+
+    def test_the_users_own(self, no_browser: None, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setenv("BROWSER", "firefox")
+        assert has_browser()
 
 
 @pytest.mark.slow
@@ -162,11 +206,3 @@ class TestWindow:
             report["live"]["num_received"] < 1.5 * report["num_frames"] + 30
         )  # not those before and between
         np.testing.assert_array_equal(np.isnan(again[0].depth[25:55, 25:55]), True)
-
-    def test_unplugged_before_the_start(self, browser: Browser, tmp_path: Path) -> None:
-        running = self.opened(browser, "frames=20, unplugged=True", tmp_path / "out")
-        _, errors = running.communicate(timeout=60)
-        assert running.returncode == 1
-        assert errors == "error: Fake D435 0815 was unplugged: nothing was recorded\n"
-        browser.wait_for("document.body.innerText.includes('The run has ended')")
-        assert not (tmp_path / "out" / "recording").exists()

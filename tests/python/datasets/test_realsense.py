@@ -117,6 +117,25 @@ class TestTheLibrarysOwnFiles:
             assert np.isnan(frame.depth[:2]).all()
             np.testing.assert_allclose(frame.depth[2:], 0.6 + 0.001 * i, atol=1e-6)
 
+    def test_what_is_played_is_recorded(self, recorded: Path, tmp_path: Path) -> None:
+        from nacre.cli.app import run
+
+        command = [
+            "record",
+            f"realsense:{recorded}",
+            "-o",
+            str(tmp_path / "out"),
+            "--no-window",
+            "--no-report",
+        ]
+        assert run(command) in (0, 3)  # a plane tells little of where the camera is
+        kept = nacre.open_sequence(tmp_path / "out" / "recording")
+        assert 1 <= len(kept) <= FRAMES
+        assert kept.depth_scale == 2000
+        for frame in kept:
+            i = round((frame.timestamp - 1) / 0.04)
+            np.testing.assert_allclose(frame.depth[2:], 0.6 + 0.001 * i, atol=1e-6)
+
     @pytest.mark.parametrize("content", [b"", b"not a recording" * 100])
     def test_what_is_no_recording(self, content: bytes, tmp_path: Path) -> None:
         pytest.importorskip("pyrealsense2")

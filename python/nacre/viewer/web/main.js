@@ -70,7 +70,7 @@ class App {
       const place = i === 0 ? this.player.place : Infinity;
       return (run.states.findLast((state) => state.place <= place) ?? run.states[0])?.name;
     });
-    if (names.some((name) => !name)) return this.#say("There is no model yet");
+    if (names.some((name) => !name)) return this.#say(this.document.isLive ? "The model appears here" : "There is no model yet");
     const request = (this.request = (this.request ?? 0) + 1);
     let clouds;
     try {
