@@ -18,7 +18,10 @@ from nacre.errors import CameraError
 
 _log = logging.getLogger(__name__)
 
-_MISSING = 'cameras of OpenCV need cv2: pip install "nacre[opencv]"'
+_MISSING = (
+    "cameras of OpenNI and Orbbec need OpenCV's cv2, built with -D WITH_OPENNI2=ON or -D WITH_OBSENSOR=ON; "
+    "that from pip is not, on Linux"
+)
 _VGA = 640  # [pixels], the width that OpenNI's focal length is of
 _REST = 0.005  # s, before asking again a driver that does not wait for frames
 _MAX_DIFFERENCE = 0.05  # s, between a depth image and colours that come apart
@@ -48,7 +51,7 @@ _DRIVERS = {
 
 class OpenCVCamera:
     """
-    A depth camera that OpenCV drives, which must be built with its driver: those from pip are not, on Linux.
+    A depth camera that OpenCV drives, which must be built with its driver: that from pip is not, on Linux.
 
     Iterating it waits for frames; put :class:`nacre.datasets.LiveQueue` around it. Depth is in millimetres,
     laid over the colours where the camera can do that; the time stamps are those of the frames' arrival.

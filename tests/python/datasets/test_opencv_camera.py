@@ -148,7 +148,7 @@ def test_misuse(plug: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(ValueError, match="driver must be 'openni' or 'orbbec', got 'kinect'"):
         OpenCVCamera(driver="kinect")
     monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(ImportError, match=r'pip install "nacre\[opencv\]"'):
+    with pytest.raises(ImportError, match=r"need OpenCV's cv2, built with -D WITH_OPENNI2=ON"):
         OpenCVCamera()
 
 

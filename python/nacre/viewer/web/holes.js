@@ -2,7 +2,7 @@
 
 const HOLE = [255, 70, 200, 255], RIM = [255, 70, 200, 110];
 const HOLE_WIDTH = 3; // [pixels]
-const HOLES_REST = 5; // times what finding them took: until they are looked for again, in a model that grows
+const HOLES_REST = 3; // times what finding them took: until they are looked for again, in a model that grows
 
 class Holes {
   constructor(app) {
