@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from nacre.cli.cameras import is_camera
+from nacre.cli.cameras import CAMERAS, is_camera
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
 from nacre.cli.job import begun, resumed
 from nacre.cli.run import carry_out
@@ -26,7 +26,7 @@ def reconstruct(
         Path | None,
         typer.Argument(
             metavar="SOURCE",
-            help="The recording: a folder or a file; or a camera: realsense, realsense:SERIAL.",
+            help=f"The recording: a folder or a file; or a camera: {CAMERAS}.",
             show_default=False,
         ),
     ] = None,
@@ -154,7 +154,7 @@ def reconstruct(
     Record3D, Stray Scanner, images of an Azure Kinect, Stanford range scans, a plain recording (camera.json
     and depth/), or a folder of depth images with --camera and --depth-scale; its format is recognised.
 
-    SOURCE realsense is a camera: it runs until Ctrl-C or --last, and OUT/recording keeps what was used.
+    A camera runs until Ctrl-C or --last, and OUT/recording keeps what was used; nacre record has a window.
     Where frames come faster than they can be registered, the oldest are dropped and counted.
 
     OUT gets model.ply (points with normals, in the first camera's frame), trajectory.txt, report.json and

@@ -6,6 +6,7 @@ import json
 import signal
 import sys
 import time
+import urllib.request
 import webbrowser
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -23,6 +24,7 @@ from command_line import run
 
 from nacre.cli.window import has_browser
 from nacre.datasets import realsense
+from nacre.viewer import Viewer
 
 pytest.importorskip("PIL")
 
@@ -93,6 +95,34 @@ def test_unplugged_before_the_start(
     assert f"the model is at {opened[0]}\n" in done.out
     assert not (tmp_path / "out" / "recording").exists()
     assert not (tmp_path / "out" / "unfinished").exists()
+
+
+def test_unplugged_in_the_middle(
+    plug: Callable[..., fake.Library], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    shown: list[dict[str, Any]] = []
+
+    def press_start(url: str) -> None:
+        own = urllib.request.Request(f"{url}/press/start", headers={"Origin": url}, method="POST")
+        urllib.request.urlopen(own).close()
+
+    def keep(viewer: Viewer) -> None:
+        shown.append(json.loads(viewer.read("live")[1]))
+
+    monkeypatch.setenv("BROWSER", "firefox")
+    monkeypatch.setattr(webbrowser, "open", press_start)
+    monkeypatch.setattr(Viewer, "wait", keep)
+    plug(frames=9, unplugged=True, seconds=0.02)
+    out = tmp_path / "out"
+    done = run("record", "realsense", "-o", out, "--port", 0, "--no-report")
+    assert done.code == 1
+    assert "error: Fake D435 0815 was unplugged; what there is was written" in done.err
+    (window,) = shown
+    assert window["state"] == "finished"
+    assert window["message"] == f"Fake D435 0815 was unplugged; what there is was written to {out}"
+    kept = nacre.open_sequence(out / "recording")
+    assert 1 <= len(kept) == json.loads((out / "report.json").read_text())["num_frames"] <= 9
+    assert len(nacre.read_points(out / "model.ply")) > 100
 
 
 def test_what_is_no_camera(tmp_path: Path) -> None:
