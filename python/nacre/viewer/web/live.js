@@ -42,6 +42,7 @@ class Live {
   #show({ state, message, rate, numSeen, status, reason }) {
     this.#say(STATES[state] + (state === "ready" || state === "recording" ? this.#rate(rate) : ""));
     document.getElementById("live-message").textContent = message;
+    document.body.classList.toggle("is-ready", state === "ready"); // the picture is large, as there is no model
     const isRunning = state === "recording" || state === "paused";
     this.#enable({ start: state === "ready" || state === "paused", pause: state === "recording",
       stop: isRunning || state === "ready" });
