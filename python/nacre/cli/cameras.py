@@ -66,7 +66,7 @@ _OPENERS: dict[str, Callable[[str, bool], LiveCamera]] = {
     "ros2": _ros,
 }
 CAMERAS = (
-    "realsense, openni, orbbec or opencv (behind a colon its serial number, or its index), "
+    "realsense, openni, orbbec or opencv, where there are several as realsense:SERIAL or openni:INDEX; "
     "ros2:/DEPTH/TOPIC or ros2:/DEPTH/TOPIC,/COLOUR/TOPIC"
 )
 

@@ -59,7 +59,8 @@ class LiveFeed:
         except CameraError as error:
             if not self._queue.num_received:
                 raise
-            self.error = error
+            if not self._has_enough():
+                self.error = error
 
     def _wanted(self) -> Iterator[Any]:
         """Yield what comes while it is wanted, until it is enough."""

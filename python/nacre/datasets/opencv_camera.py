@@ -99,6 +99,7 @@ class OpenCVCamera:
         self._title = f"{self.name} {index}"
         self._wants_color = color
         self._color: tuple[float, npt.NDArray[np.uint8]] | None = None
+        self._grabbed_at = 0.0
         self._turn = threading.Lock()  # of who grabs or closes
         self._closed = False
         try:
@@ -143,15 +144,18 @@ class OpenCVCamera:
     def _next(self) -> npt.NDArray[np.uint16]:
         """Return the next depth image; an empty one when this is closed."""
         end = time.monotonic() + self.timeout
-        while time.monotonic() < end:
+        while True:
             with self._turn:
                 if self._closed:
                     return np.zeros((0, 0), np.uint16)
                 depth = self._grabbed()
             if depth is not None:
                 return depth
+            if time.monotonic() > end:
+                raise CameraError(
+                    f"{self._title} gave no depth image for {self.timeout:g} s: plug it in again"
+                )
             time.sleep(_REST)
-        raise CameraError(f"{self._title} gave no depth image for {self.timeout:g} s: plug it in again")
 
     def _grabbed(self) -> npt.NDArray[np.uint16] | None:
         """Return the depth image that is there now, if one is, and keep the colours."""
@@ -159,11 +163,12 @@ class OpenCVCamera:
         try:
             if not self._capture.grab():
                 return None
+            self._grabbed_at = time.monotonic()
             has_depth, depth = self._capture.retrieve(None, getattr(cv2, self._driver.depth))
             if self._wants_color:
                 has_color, color = self._capture.retrieve(None, getattr(cv2, self._driver.color))
                 if has_color:
-                    self._color = time.monotonic(), np.ascontiguousarray(color[..., ::-1])
+                    self._color = self._grabbed_at, np.ascontiguousarray(color[..., ::-1])
         except cv2.error as error:
             raise CameraError(f"{self._title} stopped: {error}") from error
         if not has_depth:
@@ -188,8 +193,8 @@ class OpenCVCamera:
         return Camera(width, height, *focal, *center)
 
     def _color_now(self) -> npt.NDArray[np.uint8] | None:
-        """Return the newest colours, if they are of the newest depth image."""
-        if self._color is None or time.monotonic() - self._color[0] > _MAX_DIFFERENCE:
+        """Return the newest colours, if they were there with the newest depth image, or just before."""
+        if self._color is None or self._grabbed_at - self._color[0] > _MAX_DIFFERENCE:
             return None
         color = self._color[1]
         if color.shape[:2] == (self.camera.height, self.camera.width):

@@ -171,10 +171,10 @@ class RosTopic:
         """Wait until something is there, or this is closed."""
         end = time.monotonic() + self.timeout
         while not is_there():
-            if time.monotonic() > end:
-                raise CameraError(failure if isinstance(failure, str) else failure())
             if not self._spin():
                 return
+            if time.monotonic() > end and not is_there():
+                raise CameraError(failure if isinstance(failure, str) else failure())
 
     def _spin(self) -> bool:
         """Take messages that arrive; False: this is closed."""

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import nacre
-from nacre.datasets import RosTopic
+from nacre.datasets import RosTopic, ros_topic
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from fake_ros import COMPRESSED, HEIGHT, IMAGE, INFO, WIDTH, Ros, compressed, image, info
@@ -46,6 +46,11 @@ def messages(count: int = 4, encoding: str = "16UC1") -> Iterator[tuple[str, Any
         yield DEPTH, image(7 + i / 10, depth, encoding)
         if i != 1:
             yield COLOR, image(7.005 + i / 10, rgb(i), "rgb8")
+
+
+@pytest.fixture(autouse=True)
+def there_is_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ros_topic, "_WAIT_FOR_COLOR", 60)  # all colours come, or later ones
 
 
 def frames_of(topic: RosTopic, count: int) -> list[nacre.SequenceFrame]:
@@ -157,9 +162,9 @@ def test_colours_of_another_camera_or_size_are_left_out(
         (TOPICS, [], ["/nothing"], "there is no topic /nothing; images are on /camera/color/image_raw, "),
         ({}, [], [DEPTH], f"there is no topic {DEPTH}; there are no topics of images"),
         (TOPICS, [], [DEPTH_INFO], "has no images, but sensor_msgs/msg/CameraInfo; images are on"),
-        (TOPICS, [], [DEPTH], r"no camera_info of /camera/depth/image_raw came for 0\.05 s"),
-        (TOPICS, [(DEPTH_INFO, info())], [DEPTH], r"no image on /camera/depth/image_raw came for 0\.05 s"),
-        (TOPICS, [*messages(1)][:3], [DEPTH, COLOR], r"no image on /camera/color/image_raw came for 0\.05 s"),
+        (TOPICS, [], [DEPTH], r"no camera_info of /camera/depth/image_raw came for 0\.2 s"),
+        (TOPICS, [(DEPTH_INFO, info())], [DEPTH], r"no image on /camera/depth/image_raw came for 0\.2 s"),
+        (TOPICS, [*messages(1)][:3], [DEPTH, COLOR], r"no image on /camera/color/image_raw came for 0\.2 s"),
         (
             TOPICS, [(DEPTH_INFO, info()), (DEPTH, image(1, rgb(0), "rgb8"))], [DEPTH],
             "depth images are 16UC1, mono16, Z16, 32FC1, this one is rgb8",
@@ -179,13 +184,13 @@ def test_what_cannot_be_used(
 ) -> None:
     ros = Ros(topics, sent).install(monkeypatch)
     with pytest.raises(nacre.CameraError, match=message):
-        RosTopic(*arguments, timeout=0.05)
+        RosTopic(*arguments, timeout=0.2)
     assert ros.closed
 
 
 @pytest.mark.parametrize(
     ("broken", "timeout", "message"),
-    [(False, 0.05, r"no image came on .* for 0\.05 s"), (True, 5, "ROS ended while .* was read: context")],
+    [(False, 0.2, r"no image came on .* for 0\.2 s"), (True, 5, "ROS ended while .* was read: context")],
 )
 def test_it_ends_with_an_error_after_what_came(
     broken: bool, timeout: float, message: str, monkeypatch: pytest.MonkeyPatch
