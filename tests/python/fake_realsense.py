@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import itertools
+import subprocess
+import sys
 import time
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,9 +16,9 @@ WIDTH, HEIGHT = 96, 72
 
 
 def wave(i: int) -> np.ndarray:
-    """Return the i-th depth image [mm]: a wavy surface that comes nearer by 1 mm a frame."""
+    """Return the i-th depth image [mm]: a wavy surface that comes and goes by 10 mm, 1 mm a frame."""
     y, x = np.mgrid[0:HEIGHT, 0:WIDTH]
-    depth = (700 - i % 40 + 30 * np.sin(x / 6) * np.cos(y / 7)).astype(np.uint16)
+    depth = (690 + abs(i % 20 - 10) + 30 * np.sin(x / 6) * np.cos(y / 7)).astype(np.uint16)
     depth[0] = 0
     return depth
 
@@ -23,8 +26,8 @@ def wave(i: int) -> np.ndarray:
 class Frames:
     """A frameset, and the depth frame in it."""
 
-    def __init__(self, i: int, confident: bool) -> None:
-        self.i, self.confident = i, confident
+    def __init__(self, i: int, confident: bool, hole: slice) -> None:
+        self.i, self.confident, self.hole = i, confident, hole
 
     def get_depth_frame(self) -> Any:
         return self
@@ -38,7 +41,9 @@ class Frames:
         return SimpleNamespace(get_data=lambda: values) if self.confident else None
 
     def get_data(self) -> np.ndarray:
-        return wave(self.i)
+        depth = wave(self.i)
+        depth[self.hole, self.hole] = 0
+        return depth
 
     def get_frame_number(self) -> int:
         return self.i
@@ -48,7 +53,11 @@ class Frames:
 
 
 class Library:
-    """The module. ``frames`` come, then the camera is silent, or gone where ``unplugged``."""
+    """
+    The module. ``frames`` come, then the camera is silent, or gone where ``unplugged``.
+
+    Nothing is measured in the rows and columns of ``hole``.
+    """
 
     stream = SimpleNamespace(depth="depth", color="color", confidence="confidence")
     format = SimpleNamespace(z16="z16", rgb8="rgb8")
@@ -64,8 +73,10 @@ class Library:
         coefficients: tuple[float, ...] = (0.0,) * 5,
         busy: bool = False,
         seconds: float = 1 / 30,
+        hole: slice = slice(0),
     ) -> None:
         self.serials, self.unplugged, self.confident, self.seconds = serials, unplugged, confident, seconds
+        self.hole = hole
         self.streams, self.coefficients, self.busy = streams, coefficients, busy
         self.numbers = itertools.count() if frames is None else iter(range(frames))
         self.enabled: dict[str, Any] = {}
@@ -123,4 +134,24 @@ class Library:
         if i is None:
             self.serials = () if self.unplugged else self.serials
             return False, None
-        return True, Frames(i, self.confident)
+        return True, Frames(i, self.confident, self.hole)
+
+
+_PROGRAM = """
+import sys
+sys.path.insert(0, {here!r})
+import fake_realsense
+from nacre.cli import main
+from nacre.datasets import realsense
+library = fake_realsense.Library({options})
+realsense._library = lambda: library
+main(sys.argv[1:])
+"""
+
+
+def start(options: str, *arguments: str) -> subprocess.Popen[str]:
+    """Start a command in a process of its own, with a camera of the given options."""
+    code = _PROGRAM.format(here=str(Path(__file__).parent), options=options)
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *arguments], text=True, stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )

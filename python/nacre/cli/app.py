@@ -21,6 +21,7 @@ from nacre.cli.evaluate import evaluate
 from nacre.cli.info import info
 from nacre.cli.mesh import mesh
 from nacre.cli.reconstruct import reconstruct
+from nacre.cli.record import record
 from nacre.cli.signals import Stopped
 from nacre.cli.simulate import simulate
 from nacre.cli.terminal import CommandError, set_verbosity
@@ -47,6 +48,7 @@ def _nacre(
 EXAMPLES: dict[Callable[..., None], str] = {
     demo: "nacre demo -o nacre-demo",
     reconstruct: "nacre reconstruct rgbd_dataset_freiburg3_teddy -o teddy",
+    record: "nacre record realsense -o kitchen",
     view: "nacre view teddy",
     mesh: "nacre mesh teddy -o teddy.glb",
     convert: "nacre convert teddy/model.ply teddy.las",

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from nacre.cli.live_feed import is_camera, open_camera
+from nacre.cli.cameras import is_camera, open_camera
 from nacre.cli.run_options import describe_unfinished
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
 from nacre.cli.surfaces import has_faces, mesh_suffixes, point_suffixes
@@ -31,7 +31,7 @@ def info(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Tell what is in a recording, a point file or a mesh, or what a camera is (realsense)."""
+    """Tell what is in a recording, a point file or a mesh, or what a camera is (realsense and others)."""
     terminal = Terminal(json, quiet, verbose)
     if is_camera(source):
         terminal.answer(*_camera(source))
@@ -76,7 +76,7 @@ def _camera(source: Path) -> tuple[dict[str, Any], Rows]:
         "color": frame.color is not None, "confidence": frame.confidence is not None,
     }  # fmt: skip
     return figures, [
-        ("camera", f"{camera.name}, serial number {camera.serial}"),
+        ("camera", camera.name + f", serial number {camera.serial}" * bool(camera.serial)),
         ("depth", describe_camera(camera.camera)),
         ("depth scale", f"{camera.depth_scale:g} stored units per metre"),
         ("colour", "yes" if frame.color is not None else "no"),

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
+from nacre.cli.cameras import CAMERAS, is_camera
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
-from nacre.cli.live_feed import LiveFeed, camera_feed, is_camera, real_time_feed
-from nacre.cli.run import Job, carry_out
-from nacre.cli.run_options import RunOptions, check_recording, describe, options_before, read_document
+from nacre.cli.job import begun, resumed
+from nacre.cli.run import carry_out
+from nacre.cli.run_options import RunOptions
 from nacre.cli.signals import interruptible
-from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
-from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_folder
+from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 from nacre.cli.view import PortOption
-from nacre.errors import FileFormatError
-
-if TYPE_CHECKING:
-    from nacre import ModelParameters
-    from nacre.datasets import Sequence as Recording
-    from nacre.reconstruction.resume import UnfinishedRun
+from nacre.cli.window import Window
 
 
 def reconstruct(
@@ -31,7 +26,7 @@ def reconstruct(
         Path | None,
         typer.Argument(
             metavar="SOURCE",
-            help="The recording: a folder or a file; or a camera: realsense, realsense:SERIAL.",
+            help=f"The recording: a folder or a file; or a camera: {CAMERAS}.",
             show_default=False,
         ),
     ] = None,
@@ -159,7 +154,7 @@ def reconstruct(
     Record3D, Stray Scanner, images of an Azure Kinect, Stanford range scans, a plain recording (camera.json
     and depth/), or a folder of depth images with --camera and --depth-scale; its format is recognised.
 
-    SOURCE realsense is a camera: it runs until Ctrl-C or --last, and OUT/recording keeps what was used.
+    A camera runs until Ctrl-C or --last, and OUT/recording keeps what was used; nacre record has a window.
     Where frames come faster than they can be registered, the oldest are dropped and counted.
 
     OUT gets model.ply (points with normals, in the first camera's frame), trajectory.txt, report.json and
@@ -173,11 +168,12 @@ def reconstruct(
     terminal = Terminal(json, quiet, verbose)
     from nacre.reconstruction.resume import UnfinishedRun
 
+    window = _window(port) if view else None
     with interruptible() as stop, ExitStack() as ends:
         if resume is not None:
             _refuse_more_options(context, resume)
             unfinished = ends.enter_context(closing(UnfinishedRun(resume, checkpoint_every)))
-            job = _resumed(unfinished)
+            job = resumed(unfinished)
         else:
             if source is None or out is None:
                 missing = "argument 'SOURCE'" if source is None else "option '--out' / '-o'"
@@ -212,8 +208,14 @@ def reconstruct(
                 report=report,
                 min_tracked=_part("--min-tracked", min_tracked),
             )
-            job = _begun(terminal, options, unfinished, parameters)
-        carry_out(terminal, job, stop, port if view else None)
+            job = begun(terminal, options, unfinished, parameters, stop, window.controls if window else None)
+        carry_out(terminal, job, stop, window)
+
+
+def _window(port: int) -> Window:
+    from nacre.viewer import Controls
+
+    return Window(port, Controls("recording"))
 
 
 def _part(option: str, value: float) -> float:
@@ -226,100 +228,9 @@ def _text(path: Path | None) -> str | None:
     return None if path is None else str(path)
 
 
-def _begun(
-    terminal: Terminal, options: RunOptions, unfinished: UnfinishedRun, parameters: ModelParameters
-) -> Job:
-    """Open what is asked for, and note it in ``OUT/unfinished``."""
-    import nacre
-    from nacre.io.atomic import remove_leftovers
-    from nacre.reconstruction import Reconstruction
-    from nacre.reconstruction.runner import Run
-
-    out = unfinished.out
-    feed: LiveFeed | None = None
-    indices: Iterable[int]
-    if options.is_camera:
-        options.require_none_for_a_camera()
-        feed = camera_feed(Path(options.source), writable_folder(out), options.color, options.pick)
-        sequence, num_frames = feed.sequence, None
-        words, indices = f"live, {describe_camera(sequence.camera)}", feed
-    else:
-        sequence = options.open()
-        chosen = options.indices(sequence)
-        words, num_frames, indices = describe(sequence, chosen), len(chosen), chosen
-        if options.realtime:
-            indices = feed = real_time_feed(sequence, chosen)
-    done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
-    writable_folder(out)
-    _hold(unfinished)
-    remove_leftovers(out)
-    if unfinished.checkpoint.exists():
-        terminal.say(
-            f"{out} held an unfinished run, which --resume would have gone on with: it is begun again"
-        )
-    run = Run(done, indices, retry=options.retry)
-    unfinished.live = None if feed is None else feed.figures
-    unfinished.begin(run, options.document(sequence))
-    return Job(options, sequence, words, num_frames, run, unfinished, feed)
-
-
 def _refuse_more_options(context: typer.Context, out: Path) -> None:
     allowed = ("resume", "checkpoint_every", "view", "port", "json", "quiet", "verbose")
     for name in context.params:
         if name not in allowed and str(context.get_parameter_source(name)).endswith("COMMANDLINE"):
             option = "SOURCE" if name == "source" else "--" + name.replace("_", "-")
             raise CommandError(f"--resume takes everything from {out / 'unfinished'}: leave out {option}", 2)
-
-
-def _resumed(unfinished: UnfinishedRun) -> Job:
-    """Open what a run was asked for that was stopped or killed, and load what it had."""
-    from nacre.io.atomic import remove_leftovers
-
-    out = unfinished.out
-    if out.is_dir():
-        _hold(unfinished)
-    document = read_document(unfinished)
-    options, folder = options_before(document, unfinished.document_path)
-    indices: Sequence[int]
-    if options.is_camera:
-        from nacre.datasets.recorder import mend
-
-        mend(out / "recording")
-        sequence = open_source(out / "recording")
-        words, indices = f"live, {describe_camera(sequence.camera)}", range(len(sequence))
-    else:
-        sequence = options.open(folder)
-        check_recording(document, sequence)
-        chosen = options.indices(sequence)
-        words = describe(sequence, chosen)
-        # Of a recording in real time what it had seen; which frames come, is the clock's doing.
-        indices = _journaled_indices(unfinished, sequence) if options.realtime else chosen
-    for place in (out, unfinished.folder):
-        remove_leftovers(place)
-    compare = not options.is_camera  # its colours were kept as JPEG
-    run = unfinished.resume(sequence, indices, compare=compare, retry=options.retry)
-    live = unfinished.live
-    if live is not None and len(run.done.frames) < len(
-        unfinished.journaled_indices()
-    ):  # nobody counted since
-        unfinished.live = {**live, "num_received": None, "num_dropped": None}
-    return Job(options, sequence, words, len(indices), run, unfinished)
-
-
-def _journaled_indices(unfinished: UnfinishedRun, sequence: Recording) -> list[int]:
-    indices = unfinished.journaled_indices()
-    if max(indices, default=0) >= len(sequence):
-        reason = f"frame {max(indices)} is none of the recording's {len(sequence)}"
-        raise FileFormatError(unfinished.journal_path, reason)
-    return indices
-
-
-def _hold(unfinished: UnfinishedRun) -> None:
-    try:
-        unfinished.hold()
-    except BlockingIOError:
-        raise CommandError(
-            f"another nacre reconstruct is writing to {unfinished.out}: wait until it has ended; "
-            "a new run can go to another folder (-o)",
-            2,
-        ) from None

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+import webbrowser
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from nacre.cli.follow import follow
-from nacre.cli.live_feed import LiveFeed
+from nacre.cli.job import Job
 from nacre.cli.outputs import (
     depth_rows,
     describe_recording,
@@ -20,44 +20,31 @@ from nacre.cli.outputs import (
     verdict_rows,
     write_results,
 )
-from nacre.cli.run_options import RunOptions
 from nacre.cli.signals import Interruption, Stopped
 from nacre.cli.terminal import CommandError, Terminal, table, to_json
+from nacre.cli.window import Window
 
 if TYPE_CHECKING:
-    from nacre.datasets import Sequence
     from nacre.reconstruction.reconstruction import Reconstruction
-    from nacre.reconstruction.resume import UnfinishedRun
-    from nacre.reconstruction.runner import Run, Step
+    from nacre.reconstruction.runner import Step
     from nacre.viewer import LiveView
 
 
-@dataclass
-class Job:
-    """A run that may have been begun before; where frames come by themselves there is a feed."""
-
-    options: RunOptions
-    sequence: Sequence
-    words: str
-    num_frames: int | None
-    run: Run
-    unfinished: UnfinishedRun
-    feed: LiveFeed | None = None
-
-
-def carry_out(terminal: Terminal, job: Job, stop: Interruption, port: int | None) -> None:
-    """Bring a run to its end, or to where it is stopped; ``port``: show it there."""
+def carry_out(terminal: Terminal, job: Job, stop: Interruption, window: Window | None) -> None:
+    """Bring a run to its end, or to where it is stopped; in a window, if there is one."""
     from nacre.reconstruction.journal import ChangedRunError
 
     terminal.say(f"{job.sequence.name}: {job.words}")
     if job.run.done.frames:
         terminal.say(f"going on after {len(job.run.done.frames)} frames")
-    live = None if port is None else _show(terminal, job, port)
+    live = None if window is None else _show(terminal, job, window)
     try:
         try:
             _run(terminal, job, stop, live)
         except ChangedRunError as error:
             raise CommandError(f"{error}; run it again without --resume") from error
+        if job.feed is not None and not (job.run.done.frames or stop.wanted):
+            raise CommandError(f"{job.feed.error or 'stopped before the first frame'}: nothing was recorded")
         if not stop.wanted:
             with suppress(Stopped), stop.at_once():
                 report = _write(job, stop)
@@ -79,7 +66,7 @@ def carry_out(terminal: Terminal, job: Job, stop: Interruption, port: int | None
     files = file_rows(job.unfinished.out, page=job.options.report)
     terminal.say(table([*verdict_rows(report), *trajectory_rows(job.run.done), *rows, *files]))
     if live is not None:
-        live.finish()
+        live.finish(_ending(job))
         terminal.say(f"the model stays at {live.viewer.url}; Ctrl-C ends it")
         with suppress(Stopped), stop.at_once():
             live.viewer.wait()
@@ -87,14 +74,26 @@ def carry_out(terminal: Terminal, job: Job, stop: Interruption, port: int | None
     _complain(job)
 
 
-def _show(terminal: Terminal, job: Job, port: int) -> LiveView:
+def _show(terminal: Terminal, job: Job, window: Window) -> LiveView:
     from nacre.viewer import LiveView
 
-    live = LiveView(job.run.done, job.sequence.name, port=port)
+    live = LiveView(job.run.done, job.sequence.name, port=window.port, controls=job.controls)
     for frame in job.run.done.frames:
         live.add(frame)
     terminal.say(f"the model is at {live.viewer.url}")
+    if window.opens:
+        webbrowser.open(live.viewer.url)
     return live
+
+
+def _ending(job: Job) -> str:
+    """Say in the window how it ended."""
+    error = job.feed and job.feed.error
+    return (
+        f"{error}; what there is was written to {job.unfinished.out}"
+        if error
+        else (f"The results are in {job.unfinished.out}")
+    )
 
 
 def _run(terminal: Terminal, job: Job, stop: Interruption, live: LiveView | None) -> None:
@@ -113,13 +112,13 @@ def _run(terminal: Terminal, job: Job, stop: Interruption, live: LiveView | None
         return
 
     def tend(step: Step) -> None:
-        feed.tend(step, stop)
+        feed.tend(step)
         job.unfinished.live = feed.figures
 
     try:
         follow(terminal, job.run, stop, [tend, note])
     finally:
-        feed.close(stop)
+        feed.close()
     job.unfinished.live = feed.figures
 
 

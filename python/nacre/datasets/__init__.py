@@ -11,14 +11,18 @@ from nacre.datasets.sequence import Sequence, SequenceFrame
 
 if TYPE_CHECKING:
     from nacre.datasets.live_queue import LiveQueue
+    from nacre.datasets.opencv_camera import OpenCVCamera
     from nacre.datasets.real_time import in_real_time
     from nacre.datasets.realsense import RealSense
     from nacre.datasets.recorder import GrowingRecording
+    from nacre.datasets.ros_topic import RosTopic
 
 __all__ = [
     "GrowingRecording",
     "LiveQueue",
+    "OpenCVCamera",
     "RealSense",
+    "RosTopic",
     "Sequence",
     "SequenceFrame",
     "in_real_time",
@@ -31,7 +35,9 @@ __all__ = [
 _LIVE = {
     "GrowingRecording": "recorder",
     "LiveQueue": "live_queue",
+    "OpenCVCamera": "opencv_camera",
     "RealSense": "realsense",
+    "RosTopic": "ros_topic",
     "in_real_time": "real_time",
 }
 

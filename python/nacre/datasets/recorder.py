@@ -7,6 +7,7 @@ import os
 import threading
 from collections import deque
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -82,7 +83,7 @@ class GrowingRecording(Sequence):
         return index
 
     def close(self) -> None:
-        """Wait until everything is written, with the time stamps; leave no empty folders."""
+        """Wait until everything is written, with the time stamps; leave nothing where no view was added."""
         try:
             self._settle(0)
         finally:
@@ -90,10 +91,14 @@ class GrowingRecording(Sequence):
         if self._grown and self.has_timestamps:
             with atomic_writer(self.path / "timestamps.txt") as stream:
                 stream.write("".join(f"{source.timestamp!r}\n" for source in self._grown).encode())
-        for inside in _OPTIONAL:
+        for inside in ("depth", *_OPTIONAL):
             folder = self.path / inside
             if folder.is_dir() and not any(folder.iterdir()):
                 folder.rmdir()
+        if not self._grown:
+            (self.path / "camera.json").unlink(missing_ok=True)
+            with suppress(OSError):  # there is something else in it
+                self.path.rmdir()
 
     def _settle(self, most: int) -> None:
         """Wait until at most so many views are not yet written."""

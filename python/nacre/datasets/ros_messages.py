@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre import Camera
 from nacre.errors import FileFormatError
-from nacre.io.images import decoded
+from nacre.io.cameras import check_lens
+from nacre.io.images import decode_color, decoded
 
 IMAGE, COMPRESSED_IMAGE = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
@@ -82,4 +84,45 @@ def without_tail(data: bytes) -> bytes:
 
 def intrinsics(info: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Return the matrix and the distortion of a camera_info."""
-    return _field(info, "k").reshape(3, 3), _field(info, "d")
+    return np.asarray(_field(info, "k")).reshape(3, 3), np.asarray(_field(info, "d"))
+
+
+def have_one_lens(info: Any, other: Any) -> bool:
+    """Say whether two camera_info have the same matrix, to a hundredth of the focal length."""
+    matrix = intrinsics(info)[0]
+    return np.allclose(intrinsics(other)[0], matrix, rtol=0.01, atol=0.01 * matrix[0, 0])
+
+
+def camera_of(info: Any, place: Path) -> Camera:
+    """Return the camera of a camera_info; a ValueError says what is wrong with it."""
+    matrix, coefficients = intrinsics(info)
+    distortion = coefficients if len(coefficients) in (4, 5) else np.zeros(5)
+    camera = Camera(
+        info.width, info.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2],
+        distortion=list(distortion),
+    )  # fmt: skip
+    return check_lens(place, camera)
+
+
+def depth_of(message: Any, depth_scale: float, place: Path) -> npt.NDArray[np.float32]:
+    """Return a depth image [m] of a message, raw or compressed; integers are divided by the scale."""
+    is_raw = hasattr(message, "encoding")
+    encoding = message.encoding if is_raw else message.format.split(";")[0].strip()
+    if encoding not in MILLIMETRES + METRES:
+        known = ", ".join(MILLIMETRES + METRES)
+        raise FileFormatError(place, f"depth images are {known}, this one is {encoding}")
+    image = pixels(message, place) if is_raw else compressed_depth(message, place)
+    metres = np.array(image if encoding in METRES else image / depth_scale, np.float32)
+    metres[~(metres > 0) | ~np.isfinite(metres) | (image == 65535)] = np.nan
+    return metres
+
+
+def color_of(message: Any, place: Path) -> npt.NDArray[np.uint8]:
+    """Return a colour image of a message, raw or compressed."""
+    if not hasattr(message, "encoding"):
+        return decode_color(bytes(message.data), place)
+    if message.encoding not in CHANNELS:
+        raise FileFormatError(place, f"colour images are {', '.join(CHANNELS)}, this is {message.encoding}")
+    image = pixels(message, place)
+    image = image if image.ndim == 3 else image[..., None]
+    return np.ascontiguousarray(image[..., CHANNELS[message.encoding]])

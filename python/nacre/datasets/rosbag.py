@@ -20,20 +20,18 @@ from nacre.datasets.open_file import OpenFile
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.ros_messages import (
     CAMERA_INFO,
-    CHANNELS,
     COMPRESSED_IMAGE,
     IMAGE,
-    METRES,
-    MILLIMETRES,
+    camera_of,
     check_fields,
-    compressed_depth,
-    intrinsics,
+    color_of,
+    depth_of,
+    have_one_lens,
     pixels,
     without_tail,
 )
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
-from nacre.io.cameras import check_lens
 from nacre.io.images import decode_color
 from nacre.io.raw import read_file, require_regular
 
@@ -148,21 +146,15 @@ class _Bag(OpenFile):
         info = self._first(chosen)
         if info is None:
             raise FileFormatError(self.path, f"{chosen.topic} is empty; give the camera")
-        matrix, coefficients = intrinsics(info)
-        distortion = coefficients if len(coefficients) in (4, 5) else np.zeros(5)
         try:
-            camera = Camera(
-                info.width, info.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2],
-                distortion=list(distortion),
-            )  # fmt: skip
-            return check_lens(self.path, camera)
+            return camera_of(info, self.path)
         except ValueError as error:
             raise FileFormatError(self.path, f"{chosen.topic}: {error}") from error
 
     def _has_camera_of_depth(self, topic: str) -> bool:
         """Say whether an image's own camera is the depth images', as far as they tell their cameras."""
-        matrices = []
-        for image in (topic, self.depth_topic):
+        infos = []
+        for image in (self.depth_topic, topic):
             own = [
                 c
                 for c in self._file.connections
@@ -172,8 +164,8 @@ class _Bag(OpenFile):
             info = self._first(max(own, key=lambda c: len(c.topic))) if own else None
             if info is None:
                 return True
-            matrices.append(intrinsics(info)[0])
-        if np.allclose(matrices[0], matrices[1], rtol=0.01, atol=0.01 * matrices[0][0, 0]):
+            infos.append(info)
+        if have_one_lens(*infos):
             return True
         hint = (
             f"; nacre reconstruct realsense:{self.path} lays colours over depth"
@@ -213,29 +205,11 @@ class _Bag(OpenFile):
 
     def depth(self, place: Path) -> npt.NDArray[np.float32]:
         """Read a depth image [m]."""
-        message = self._message(place)
-        is_raw = hasattr(message, "encoding")
-        encoding = message.encoding if is_raw else message.format.split(";")[0].strip()
-        if encoding not in MILLIMETRES + METRES:
-            known = ", ".join(MILLIMETRES + METRES)
-            raise FileFormatError(place, f"depth images are {known}, this one is {encoding}")
-        image = pixels(message, place) if is_raw else compressed_depth(message, place)
-        metres = np.array(image if encoding in METRES else image / self.depth_scale, np.float32)
-        metres[~(metres > 0) | ~np.isfinite(metres) | (image == 65535)] = np.nan
-        return metres
+        return depth_of(self._message(place), self.depth_scale, place)
 
     def color(self, place: Path) -> npt.NDArray[np.uint8]:
         """Read a colour image."""
-        message = self._message(place)
-        if not hasattr(message, "encoding"):
-            return decode_color(bytes(message.data), place)
-        if message.encoding not in CHANNELS:
-            raise FileFormatError(
-                place, f"colour images are {', '.join(CHANNELS)}, this is {message.encoding}"
-            )
-        image = pixels(message, place)
-        image = image if image.ndim == 3 else image[..., None]
-        return np.ascontiguousarray(image[..., CHANNELS[message.encoding]])
+        return color_of(self._message(place), place)
 
     def confidence(self, place: Path) -> npt.NDArray[np.uint8]:
         """Read how sure the camera is of its pixels."""

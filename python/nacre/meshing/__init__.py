@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from nacre.meshing.boundary import boundary_loops
 from nacre.meshing.closed_surface import ClosedSurface, close_surface
 from nacre.meshing.parts import largest_part
 from nacre.meshing.simplification import simplify
@@ -15,6 +16,7 @@ __all__ = [
     "ClosedSurface",
     "Texture",
     "TextureView",
+    "boundary_loops",
     "close_surface",
     "largest_part",
     "mesh_points",

@@ -4,6 +4,7 @@ The model in the browser while it grows, and afterwards; in a page of its own or
 :class:`Viewer` is the page; :class:`Timeline` what it shows: the frames, and the model after some of them.
 """
 
+from nacre.viewer.controls import Controls
 from nacre.viewer.live import LiveView
 from nacre.viewer.page import export_html
 from nacre.viewer.rerun_file import export_rrd
@@ -12,6 +13,7 @@ from nacre.viewer.server import Viewer
 from nacre.viewer.timeline import Snapshot, Timeline
 
 __all__ = [
+    "Controls",
     "LiveView",
     "Snapshot",
     "Timeline",

@@ -37,7 +37,9 @@ def depth_picture(
     -------
     (H', W', 3) uint8
     """
-    labels = label_pixels(depth, camera, parameters)
+    step = max(-(-depth.shape[1] // max_width), 1)
+    labels = label_pixels(depth, camera, parameters)[::step, ::step]
+    depth = depth[::step, ::step]
     measured = np.isfinite(depth) & (depth > 0)
     kept = measured & (labels == 0)
     picture = np.full((*depth.shape, 3), 24, dtype=np.uint8)
@@ -48,8 +50,7 @@ def depth_picture(
     for label, name in enumerate(PIXEL_LABELS):
         if label:
             picture[measured & (labels == label)] = category_rgb(reason_color(name, label))
-    step = max(-(-depth.shape[1] // max_width), 1)
-    return picture[::step, ::step]
+    return picture
 
 
 def depth_legend() -> str:

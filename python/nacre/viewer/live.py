@@ -7,6 +7,7 @@ import time
 from nacre.reconstruction import Reconstruction
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.report.reported_frame import ReportedFrame
+from nacre.viewer.controls import Controls
 from nacre.viewer.server import Viewer
 from nacre.viewer.timeline import Snapshot, Timeline
 
@@ -23,18 +24,26 @@ class LiveView:
         The run.
     title : str
         Of the page.
-    host, port : str, int
+    host, port, controls : str, int, Controls
         See :class:`Viewer`.
     """
 
     def __init__(
-        self, done: Reconstruction, title: str, *, host: str = "127.0.0.1", port: int = 8080
+        self,
+        done: Reconstruction,
+        title: str,
+        *,
+        host: str = "127.0.0.1",
+        port: int = 8080,
+        controls: Controls | None = None,
     ) -> None:
         self._done = done
         self.timeline = Timeline(
             title, done.model.camera, depth_of=lambda index: self._done.sequence[index].depth
         )
-        self.viewer = Viewer(self.timeline, host=host, port=port, parameters=done.model.parameters.depth)
+        self.viewer = Viewer(
+            self.timeline, host=host, port=port, parameters=done.model.parameters.depth, controls=controls
+        )
         self._next = 0.0
 
     def add(self, record: FrameRecord) -> None:
@@ -52,7 +61,9 @@ class LiveView:
         now = time.monotonic()
         self._next = now + _SHARE * (now - start)
 
-    def finish(self) -> None:
-        """Show the end: poses as loops have corrected them, frames that were found after all."""
+    def finish(self, message: str = "") -> None:
+        """Show the end, with a message: poses as loops have corrected them, frames found after all."""
         self.timeline.frames[:] = [ReportedFrame(**record.as_dict()) for record in self._done.frames]
         self.show()
+        if self.viewer.controls is not None:
+            self.viewer.controls.end(message, finished=True)

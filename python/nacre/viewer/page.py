@@ -17,7 +17,7 @@ from nacre.viewer.timeline import Timeline
 _WEB = Path(__file__).with_name("web")
 _SCRIPTS = (
     "linear.js", "data.js", "cloud.js", "orbit.js", "renderer.js", "cameras.js", "picking.js", "measure.js",
-    "crop.js", "deviation.js", "player.js", "panel.js", "main.js",
+    "crop.js", "deviation.js", "holes.js", "player.js", "live.js", "panel.js", "main.js",
 )  # fmt: skip
 
 
@@ -65,7 +65,7 @@ def export_html(
     other : Timeline, optional
         Another run of the same scene, in the same world frame, to compare with.
     triangles : bool
-        Whether the page can show a mesh; without, it is smaller.
+        Whether the page can show a mesh, and holes; without, it is smaller.
 
     Raises
     ------
@@ -80,7 +80,7 @@ def export_html(
     if not timeline.has_points:
         raise ValueError("timeline must hold a state of the model to export, got none")
     data = PageData([timeline] if other is None else [timeline, other])
-    names = data.names + (data.triangle_names if triangles else [])
+    names = data.names + (data.surface_names if triangles else [])
     page = page_html(timeline.title, pack_files((name, data.read(name)) for name in _by_state(names)))
     with atomic_writer(path) as stream:
         stream.write(page.encode())

@@ -18,6 +18,7 @@ from nacre.report.image_files import encode_png
 from nacre.viewer.colors import STATUS_COLORS
 from nacre.viewer.depth_picture import depth_legend, depth_picture
 from nacre.viewer.disks import deviation, disk_radii
+from nacre.viewer.holes import find_holes
 from nacre.viewer.packing import morton_order, octahedral, pack, quantized, rounded
 from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline, words
 from nacre.viewer.views import first_seen, first_view
@@ -48,6 +49,8 @@ class PageData:
         One or two.
     parameters : DepthParameters, optional
         What is marked as removed in depth images.
+    is_live : bool
+        Whether a camera runs.
 
     Raises
     ------
@@ -55,11 +58,18 @@ class PageData:
         When there is nothing to compare with.
     """
 
-    def __init__(self, timelines: Sequence[Timeline], parameters: DepthParameters | None = None) -> None:
+    def __init__(
+        self,
+        timelines: Sequence[Timeline],
+        parameters: DepthParameters | None = None,
+        *,
+        is_live: bool = False,
+    ) -> None:
         if not all(other.has_points for other in timelines[1:]):
             raise ValueError("other must hold a state of the model to compare with, got none")
         self._timelines = timelines
         self._parameters = parameters
+        self._is_live = is_live
         self._states = [
             State(run, place, cloud)
             for run, timeline in enumerate(timelines)
@@ -67,6 +77,7 @@ class PageData:
         ]
         self.document = json.dumps(self._described(), allow_nan=False).encode()
         self._last: tuple[State, Snapshot] | None = None
+        self._last_triangles: tuple[State, npt.NDArray[np.int32]] | None = None
 
     @property
     def names(self) -> list[str]:
@@ -74,10 +85,10 @@ class PageData:
         return ["document", *(f"points/{state.name}" for state in self._states)]
 
     @property
-    def triangle_names(self) -> list[str]:
-        """Of the triangles of the newest state of each run."""
-        newest = {state.run: f"triangles/{state.name}" for state in self._states}
-        return list(newest.values())
+    def surface_names(self) -> list[str]:
+        """Of the triangles of the newest state of each run, and of the holes in them."""
+        newest = {state.run: state.name for state in self._states}
+        return [f"{kind}/{name}" for name in newest.values() for kind in ("triangles", "holes")]
 
     def read(self, name: str) -> bytes:
         """
@@ -93,14 +104,12 @@ class PageData:
         kind, _, rest = name.partition("/")
         if kind == "depth":
             return self._depth(rest)
-        if kind not in ("points", "triangles"):
+        if kind not in ("points", "triangles", "holes"):
             raise KeyError(name)
         state = {state.name: state for state in self._states}[rest]
         if kind == "triangles":
-            cloud = self._prepared(state)
-            corners = triangulate(cloud.points, cloud.normals)
-            return pack({}, {"triangles": _sorted_triangles(corners)})
-        return self._points(state)
+            return pack({}, {"triangles": _sorted_triangles(self._triangulated(state))})
+        return self._holes(state) if kind == "holes" else self._points(state)
 
     def _described(self) -> dict[str, Any]:
         newest = {state.run: state for state in self._states}
@@ -109,6 +118,7 @@ class PageData:
             view = first_view(newest[0].cloud, self._timelines[0], newest[0].place).as_dict()
         return {
             "title": " and ".join(timeline.title for timeline in self._timelines),
+            "isLive": self._is_live,
             "view": view,
             "comment": "metres" if self._timelines[0].is_upright else f"metres; {CAMERA_FRAME}",
             "statusColors": STATUS_COLORS,
@@ -149,6 +159,21 @@ class PageData:
         ordered = cloud.rows(morton_order(rows), cloud.spacing)
         self._last = state, ordered
         return ordered
+
+    def _triangulated(self, state: State) -> npt.NDArray[np.int32]:
+        """Return the triangles of the points as the page gets them."""
+        last = self._last_triangles
+        if last is not None and last[0] is state:
+            return last[1]
+        cloud = self._prepared(state)
+        triangles = triangulate(cloud.points, cloud.normals, num_threads=1 if self._is_live else 0)
+        self._last_triangles = state, triangles
+        return triangles
+
+    def _holes(self, state: State) -> bytes:
+        timeline, corners = self._timelines[state.run], self._triangulated(state)
+        found = find_holes(self._prepared(state), corners, timeline, state.place)
+        return pack({"sizes": found.sizes}, {"segments": found.segments, "isHole": found.is_hole})
 
     def _points(self, state: State) -> bytes:
         cloud, timeline = self._prepared(state), self._timelines[state.run]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import threading
 from collections.abc import Sequence
@@ -11,6 +12,7 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from nacre.parameters import DepthParameters
+from nacre.viewer.controls import Controls
 from nacre.viewer.page import page_html
 from nacre.viewer.page_data import PageData
 from nacre.viewer.timeline import Timeline
@@ -32,6 +34,8 @@ class Viewer:
         Where to listen; another port is taken where this one is in use, any free one for 0.
     parameters : DepthParameters, optional
         What is marked as removed in depth images.
+    controls : Controls, optional
+        Of a camera that runs: the page shows what it sees, and buttons.
 
     Raises
     ------
@@ -49,8 +53,10 @@ class Viewer:
         host: str = "127.0.0.1",
         port: int = 8080,
         parameters: DepthParameters | None = None,
+        controls: Controls | None = None,
     ) -> None:
         self.timeline = timeline
+        self.controls = controls
         self._timelines: Sequence[Timeline] = [timeline] if other is None else [timeline, other]
         self._parameters = parameters
         self.revision = 0
@@ -68,8 +74,35 @@ class Viewer:
 
     def refresh(self) -> None:
         """Show what the timeline has gained."""
-        self.data = PageData(self._timelines, self._parameters)
+        self.data = PageData(self._timelines, self._parameters, is_live=self.controls is not None)
         self.revision += 1
+
+    def read(self, name: str) -> tuple[str, bytes]:
+        """
+        Return what a name of the page's data stands for: its type, and its bytes.
+
+        Raises
+        ------
+        KeyError
+            When there is nothing.
+        """
+        kind, _, rest = name.partition("/")
+        if self.controls is None or kind not in ("live", "picture"):
+            return "application/octet-stream", self.data.read(name)
+        if kind == "live":
+            return "application/json", json.dumps(self._live(self.controls)).encode()
+        image = self.controls.picture(rest, self._parameters)
+        return "image/jpeg" if rest == "color" else "image/png", image
+
+    def _live(self, controls: Controls) -> dict[str, Any]:
+        """Return what changes from frame to frame."""
+        frames = self.timeline.frames
+        newest = frames[-1] if frames else None
+        return controls.as_dict() | {
+            "status": newest and newest.status,
+            "reason": newest and newest.reason,
+            "numFrames": len(frames),
+        }
 
     def wait(self) -> None:
         """Serve until Ctrl-C."""
@@ -97,7 +130,7 @@ class _Server(ThreadingHTTPServer):
 
 
 class _Handler(BaseHTTPRequestHandler):
-    """Answers ``/`` with the page, and ``/data/NAME`` with what the page reads."""
+    """Answers ``/`` with the page, ``/data/NAME`` with what it reads; ``/press/NAME`` is a button."""
 
     server: _Server
     protocol_version = "HTTP/1.1"
@@ -108,7 +141,7 @@ class _Handler(BaseHTTPRequestHandler):
             return
         url = urlsplit(self.path)
         viewer = self.server.viewer
-        data, known = viewer.data, parse_qs(url.query).get("known")
+        known = parse_qs(url.query).get("known")
         if url.path == "/":
             self._answer("text/html; charset=utf-8", page_html(viewer.timeline.title).encode())
         elif url.path == "/data/document" and known == [str(viewer.revision)]:
@@ -116,11 +149,30 @@ class _Handler(BaseHTTPRequestHandler):
             self.end_headers()
         elif url.path.startswith("/data/"):
             try:
-                self._answer("application/octet-stream", data.read(url.path.removeprefix("/data/")))
+                self._answer(*viewer.read(url.path.removeprefix("/data/")))
             except KeyError:
                 self.send_error(HTTPStatus.NOT_FOUND)
         else:
             self.send_error(HTTPStatus.NOT_FOUND)
+
+    def do_POST(self) -> None:
+        """Press a button; only the page itself may: other pages have another origin."""
+        self.close_connection = True  # of what comes along nothing is read
+        controls = self.server.viewer.controls
+        button = self.path.removeprefix("/press/")
+        is_own = self.headers.get("Origin") == f"http://{self.headers.get('Host')}"
+        if not (is_own and self._is_asked_by_its_name()):
+            self.send_error(HTTPStatus.FORBIDDEN)
+            return
+        try:
+            if controls is None:
+                raise KeyError(button)
+            controls.press(button)
+        except KeyError:
+            self.send_error(HTTPStatus.NOT_FOUND)
+            return
+        self.send_response(HTTPStatus.NO_CONTENT)
+        self.end_headers()
 
     def _is_asked_by_its_name(self) -> bool:
         """Refuse pages of others, which reach this server under a name of theirs (DNS rebinding)."""

@@ -63,11 +63,42 @@ def sees(
     local = (points - pose[:3, 3]) @ pose[:3, :3]
     rays = local if camera.model == "pinhole" else np.array([[0.0, 0, 1]])
     facing = (normals @ pose[:3, :3] * rays).sum(axis=1) < 0
+    return np.asarray(facing & _in_image(camera, local))
+
+
+def _in_image(
+    camera: Camera, local: npt.NDArray[np.floating[Any]], margin: float = 0.0
+) -> npt.NDArray[np.bool_]:
+    """Say which points of a camera's frame are in its image, but for a margin, of its width and height."""
     middle = 0.5 * np.array([camera.width - 1, camera.height - 1])
-    half = 0.5 * np.array([camera.width, camera.height])
+    half = (0.5 - margin) * np.array([camera.width, camera.height])
     with np.errstate(invalid="ignore"):
         inside = (np.abs(camera.project(local) - middle) <= half).all(axis=1)
-    return np.asarray(facing & inside & (local[:, 2] > 0))
+    return np.asarray(inside & (local[:, 2] > 0))
+
+
+def were_in_image(
+    timeline: Timeline, place: int, points: npt.NDArray[np.float32], margin: float
+) -> npt.NDArray[np.bool_]:
+    """
+    Return which points (N, 3) a frame up to one had in its image, hidden or not; all, without a camera.
+
+    Parameters
+    ----------
+    timeline, place : Timeline, int
+        Of its frames up to that place 60 at most count.
+    points : (N, 3) float32
+        In the world frame [m].
+    margin : float
+        What does not count at each edge of the image: a part of its width and height.
+    """
+    places = posed_places(timeline, place)
+    if timeline.camera is None or not places:
+        return np.ones(len(points), bool)
+    seen = np.zeros(len(points), bool)
+    for pose in _poses(timeline, places):
+        seen |= _in_image(timeline.camera, (points - pose[:3, 3]) @ pose[:3, :3], margin)
+    return seen
 
 
 def first_seen(cloud: Snapshot, timeline: Timeline, place: int) -> npt.NDArray[np.uint32] | None:

@@ -145,9 +145,15 @@ class TestGrowing:
         growing.close()
 
     def test_a_recording_is_never_overwritten(self, tmp_path: Path) -> None:
-        GrowingRecording(tmp_path / "r", CAMERA, 1000, "wave").close()
+        growing = GrowingRecording(tmp_path / "r", CAMERA, 1000, "wave")
+        growing.add(frame(0))
+        growing.close()
         with pytest.raises(FileExistsError, match="holds a recording already"):
             GrowingRecording(tmp_path / "r", CAMERA, 1000, "wave")
+
+    def test_without_a_view_nothing_is_left(self, tmp_path: Path) -> None:
+        GrowingRecording(tmp_path / "r", CAMERA, 1000, "wave").close()
+        assert not (tmp_path / "r").exists()
 
     def test_a_disk_that_takes_no_more(self, tmp_path: Path) -> None:
         growing = GrowingRecording(tmp_path / "r", CAMERA, 1000, "wave")

@@ -179,6 +179,25 @@ def test_the_mesh_closes_the_gaps_between_points(exported: Browser) -> None:
     assert red > 2 * green
 
 
+def test_holes_are_outlined(browser: Browser, tmp_path: Path) -> None:
+    whole = plane()
+    cloud = whole.rows(np.flatnonzero(np.abs(whole.points[:, :2]).max(axis=1) > 4.5 * SPACING), SPACING)
+    export_html(two_looks(cloud), tmp_path / "view.html")
+    browser.open((tmp_path / "view.html").as_uri())
+    browser.wait_for(LOADED)
+    look_along_the_normal(browser)
+    for control in ("reverse", "holes"):  # so that nothing hides the lines
+        browser.press_button(control)
+    browser.wait_for("page.holes.lines(0)")
+    assert "1 hole, the largest 100.0 mm" in browser.text()
+    x, y = on_plane(browser, 0.05, 0.0)
+    browser.evaluate("page.draw()")
+    beside = [color_at(browser, x + i, y) for i in range(-4, 5)]
+    assert any(red > 200 and green < 120 and blue > 150 for red, green, blue in beside)
+    browser.press_button("holes")
+    assert browser.evaluate("page.holes.lines(0)") is None
+
+
 def test_the_model_grows_frame_by_frame(exported: Browser) -> None:
     exported.choose("frame", 0)
     exported.wait_for("page.clouds[0].numShown === 126")

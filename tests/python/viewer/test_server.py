@@ -14,11 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from nacre.datasets import SequenceFrame
 from nacre.report import ReportedFrame
-from nacre.viewer import Viewer
+from nacre.viewer import Controls, Viewer
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from viewer_scenes import plane, two_looks
+from viewer_scenes import CAMERA, plane, two_looks
 
 
 @pytest.fixture
@@ -75,6 +76,53 @@ def test_a_document_that_is_known_is_not_sent_again(viewer: Viewer) -> None:
     viewer.refresh()
     answer = ask(viewer, f"/data/document?known={known}")
     assert json.loads(answer.body)["runs"][0]["frames"][-1]["reason"] == "no overlap"
+
+
+class TestControls:
+    @pytest.fixture
+    def live(self) -> Iterator[Viewer]:
+        viewer = Viewer(two_looks(plane()), port=0, controls=Controls())
+        yield viewer
+        viewer.close()
+
+    def press(self, viewer: Viewer, button: str, **headers: str) -> int:
+        request = urllib.request.Request(f"{viewer.url}/press/{button}", headers=headers, method="POST")
+        try:
+            with urllib.request.urlopen(request) as answer:
+                return int(answer.status)
+        except urllib.error.HTTPError as error:
+            error.close()
+            return error.code
+
+    def test_the_page_presses_buttons(self, live: Viewer) -> None:
+        assert json.loads(ask(live, "/data/document").body)["isLive"]
+        assert self.press(live, "start", Origin=live.url) == 204
+        told = json.loads(ask(live, "/data/live").body)
+        assert (told["state"], told["status"], told["numFrames"]) == ("recording", "TRACKED", 2)
+        assert self.press(live, "explode", Origin=live.url) == 404
+
+    @pytest.mark.parametrize("origin", [None, "http://evil.example", "null"])
+    def test_pages_of_others_cannot(self, live: Viewer, origin: str | None) -> None:
+        headers = {} if origin is None else {"Origin": origin}
+        assert self.press(live, "stop", **headers) == 403
+        evil = {"Host": "evil.example", "Origin": "http://evil.example"}
+        assert self.press(live, "stop", **evil) == 403
+        assert live.controls is not None
+        assert live.controls.state == "ready"
+
+    def test_the_pictures(self, live: Viewer) -> None:
+        pytest.importorskip("PIL")
+        assert refused(live, "/data/picture/depth") == 404  # before the first frame
+        assert live.controls is not None
+        color = np.full((100, 100, 3), 90, np.uint8)
+        live.controls.see(SequenceFrame(0, np.ones((100, 100), np.float32), CAMERA, None, color, None))
+        assert ask(live, "/data/picture/depth").body.startswith(b"\x89PNG")
+        assert ask(live, "/data/picture/color").headers["Content-Type"] == "image/jpeg"
+        assert refused(live, "/data/picture/sound") == 404
+
+    def test_a_run_without_a_camera_has_none(self, viewer: Viewer) -> None:
+        assert refused(viewer, "/data/live") == 404
+        assert self.press(viewer, "stop", Origin=viewer.url) == 404
 
 
 def test_another_port_is_taken_where_one_is_in_use(viewer: Viewer) -> None:

@@ -15,13 +15,16 @@ class App {
     this.measure = new Measure(this);
     this.crop = new Crop(this);
     this.deviation = new Deviation(this);
+    this.holes = new Holes(this);
     this.player = new Player(this);
+    this.live = new Live(this);
     this.#listen();
   }
 
   async start() {
     this.source = await openSource();
     await this.#take(await this.source.read("document"));
+    if (this.document.isLive) this.live.poll();
     this.#poll();
   }
 
@@ -45,7 +48,9 @@ class App {
     const isFirst = !this.document;
     this.document = JSON.parse(new TextDecoder().decode(bytes));
     showDocument(this.document);
-    if (isFirst && !this.document.runs[0].frames.length) document.getElementById("reverse").checked = true;
+    const { isLive } = this.document;
+    if (isFirst && isLive) document.getElementById("holes").checked = true;
+    if (isFirst && !isLive && !this.document.runs[0].frames.length) document.getElementById("reverse").checked = true;
     this.player.update();
     this.#forget();
     const { view, runs } = this.document;
@@ -65,7 +70,7 @@ class App {
       const place = i === 0 ? this.player.place : Infinity;
       return (run.states.findLast((state) => state.place <= place) ?? run.states[0])?.name;
     });
-    if (names.some((name) => !name)) return this.#say("There is no model yet");
+    if (names.some((name) => !name)) return this.#say(this.document.isLive ? "The model appears here" : "There is no model yet");
     const request = (this.request = (this.request ?? 0) + 1);
     let clouds;
     try {
@@ -85,6 +90,7 @@ class App {
       this.color();
     }
     this.select();
+    this.holes.load();
   }
 
   async #cloud(name) {
@@ -178,6 +184,8 @@ class App {
     const lines = cameraLines(run, place, this.document.statusColors, size, chosen);
     this.crop.active?.edges.forEach(([a, b]) => lines.add(a, b, [255, 255, 255], 150));
     this.renderer.drawLines(lines.positions, lines.colors, matrices, part);
+    const holes = this.holes.lines(part.run);
+    if (holes) this.renderer.drawLines(holes.positions, holes.colors, matrices, part, HOLE_WIDTH);
     return this.#overlay(part, matrices);
   }
 

@@ -66,7 +66,8 @@ class Player {
       return row;
     });
     document.getElementById("figures").replaceChildren(...rows);
-    const depth = document.getElementById("depth"), hasDepth = run.hasDepth && this.app.source instanceof ServedSource;
+    const depth = document.getElementById("depth"), isSeenLive = this.app.document.isLive && this.isFollowing;
+    const hasDepth = run.hasDepth && this.app.source instanceof ServedSource && !isSeenLive;
     if (hasDepth) depth.src = `data/depth/${this.place}`;
     depth.hidden = !hasDepth;
     document.getElementById("depth-legend").hidden = !hasDepth;

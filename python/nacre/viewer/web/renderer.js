@@ -54,10 +54,15 @@ void main() {
 
 const LINE_VERTEX = `#version 300 es
 uniform mat4 view, clip;
+uniform vec2 shift;
 in vec3 point;
 in vec4 color;
 out vec4 shade;
-void main() { shade = color; gl_Position = clip * view * vec4(point, 1.0); }`;
+void main() {
+  shade = color;
+  gl_Position = clip * view * vec4(point, 1.0);
+  gl_Position.xy += shift * gl_Position.w;
+}`;
 
 const LINE_FRAGMENT = `#version 300 es
 precision highp float;
@@ -131,11 +136,14 @@ class Renderer {
     } else gl.drawArrays(gl.POINTS, 0, cloud.size);
   }
 
-  /** Draw segments: positions, six numbers each, and a color with opacity, four bytes for each end. */
-  drawLines(positions, colors, { view, clip }, part) {
+  /**
+   * Draw segments: positions, six numbers each, and a color with opacity, four bytes for each end. Lines of several
+   * pixels are drawn several times, side by side: WebGL has but thin ones.
+   */
+  drawLines(positions, colors, { view, clip }, part, pixels = 1) {
     const gl = this.gl, program = this.lineProgram;
     if (!positions.length) return;
-    this.#viewport(part);
+    const height = this.#viewport(part), width = part.width * this.canvas.width;
     gl.useProgram(program.id);
     gl.uniformMatrix4fv(program.at("view"), false, view);
     gl.uniformMatrix4fv(program.at("clip"), false, clip);
@@ -147,7 +155,12 @@ class Renderer {
     this.#attribute(1, this.lineBuffers[1], 4, gl.UNSIGNED_BYTE, true);
     gl.disableVertexAttribArray(2);
     gl.disableVertexAttribArray(3);
-    gl.drawArrays(gl.LINES, 0, positions.length / 3);
+    for (let x = 0; x < pixels; x++) {
+      for (let y = 0; y < pixels; y++) {
+        gl.uniform2f(program.at("shift"), (2 * x - pixels + 1) / width, (2 * y - pixels + 1) / height);
+        gl.drawArrays(gl.LINES, 0, positions.length / 3);
+      }
+    }
   }
 
   #viewport({ left, width }) {

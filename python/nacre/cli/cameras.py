@@ -1,0 +1,82 @@
+"""Live cameras by the names that the command line gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from nacre.cli.terminal import CommandError
+
+if TYPE_CHECKING:
+    from nacre import Camera
+    from nacre.datasets import SequenceFrame
+
+
+class LiveCamera(Protocol):
+    """What every live camera has."""
+
+    name: str
+    serial: str
+    camera: Camera
+    depth_scale: float
+    timeout: float
+
+    def __iter__(self) -> Iterator[SequenceFrame]:
+        """Yield frames as they come; a CameraError says that no more will."""
+        ...
+
+    def close(self) -> None:
+        """Stop the camera."""
+        ...
+
+
+def _realsense(which: str, color: bool) -> LiveCamera:
+    from nacre.datasets import RealSense
+
+    is_file = bool(Path(which).suffix) or (which != "" and Path(which).exists())
+    return RealSense(None if is_file else which or None, file=which if is_file else None, color=color)
+
+
+def _opencv(driver: str | None) -> Callable[[str, bool], LiveCamera]:
+    def opener(which: str, color: bool) -> LiveCamera:
+        from nacre.datasets import OpenCVCamera
+
+        if which and not which.isdecimal():
+            raise CommandError(f"{driver or 'opencv'} needs the camera's index, 0 or more, got {which!r}", 2)
+        return OpenCVCamera(int(which or 0), driver=driver, color=color)
+
+    return opener
+
+
+def _ros(which: str, color: bool) -> LiveCamera:
+    from nacre.datasets import RosTopic
+
+    depth, _, colors = which.partition(",")
+    if not depth:
+        raise CommandError("ros2 needs a topic of depth images: ros2:/camera/depth/image_raw", 2)
+    return RosTopic(depth, colors if color and colors else None)
+
+
+_OPENERS: dict[str, Callable[[str, bool], LiveCamera]] = {
+    "realsense": _realsense,
+    "opencv": _opencv(None),
+    "openni": _opencv("openni"),
+    "orbbec": _opencv("orbbec"),
+    "ros2": _ros,
+}
+CAMERAS = (
+    "realsense, openni, orbbec or opencv, where there are several as realsense:SERIAL or openni:INDEX; "
+    "ros2:/DEPTH/TOPIC or ros2:/DEPTH/TOPIC,/COLOUR/TOPIC"
+)
+
+
+def is_camera(source: Path) -> bool:
+    """Say whether a source is a live camera, and not a file of that name."""
+    return str(source).partition(":")[0] in _OPENERS and not source.exists()
+
+
+def open_camera(source: Path, color: bool = True) -> LiveCamera:
+    """Start a camera: the name of its kind, and behind a colon which of them."""
+    kind, _, which = str(source).partition(":")
+    return _OPENERS[kind](which, color)

@@ -1,0 +1,108 @@
+"""``nacre record``: a camera's frames become a recording and a model, before one's eyes."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from nacre.cli.cameras import CAMERAS, is_camera
+from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
+from nacre.cli.job import begun
+from nacre.cli.run import carry_out
+from nacre.cli.run_options import RunOptions
+from nacre.cli.signals import interruptible
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
+from nacre.cli.view import PortOption
+from nacre.cli.window import Window, has_browser
+
+
+def record(
+    camera: Annotated[
+        Path,
+        typer.Argument(
+            metavar="CAMERA",
+            help=f"{CAMERAS}; or a recording, which is played as its camera saw it.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[
+        Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.", show_default=False)
+    ],
+    min_depth: Annotated[
+        float | None, typer.Option(help="Nearer measurements are not used (metres).", show_default=False)
+    ] = None,
+    max_depth: Annotated[
+        float | None, typer.Option(help="Farther measurements are not used (metres).", show_default=False)
+    ] = None,
+    object: Annotated[
+        bool,
+        typer.Option(
+            "--object", help="Model only the largest thing that stands on a plane, e.g. a turntable."
+        ),
+    ] = False,
+    color: Annotated[bool, typer.Option("--color/--no-color", help="Give the model colours.")] = True,
+    last: Annotated[
+        int | None,
+        typer.Option(min=0, metavar="INDEX", help="The last frame, from 0.", show_default="when stopped"),
+    ] = None,
+    window: Annotated[
+        bool, typer.Option("--window/--no-window", help="Open a window; without, it begins at once.")
+    ] = True,
+    report: Annotated[bool, typer.Option("--report/--no-report", help="Write report.html.")] = True,
+    port: PortOption = 8080,
+    preset: PresetOption = None,
+    config: ConfigOption = None,
+    settings: SetOption = None,
+    json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = 0,
+) -> None:
+    """
+    Record a depth camera, and watch its model grow.
+
+    A window opens in the browser: what the camera sees, the model, and the holes in it; buttons start, pause
+    and stop. Ctrl-C stops, too. Without a browser, or with --no-window, recording begins at once.
+
+    OUT gets what nacre reconstruct writes, and OUT/recording keeps the frames: nacre reconstruct
+    OUT/recording goes over them again, with other options. A camera that is unplugged loses nothing of that.
+    """
+    terminal = Terminal(json, quiet, verbose)
+    from nacre.reconstruction.resume import UnfinishedRun
+
+    parameters, preset_name = model_parameters(
+        preset,
+        config,
+        settings,
+        **{
+            "depth.min_depth": min_depth,
+            "depth.max_depth": max_depth,
+            "region.object": object or None,
+        },
+    )
+    is_live = is_camera(camera)
+    if not (is_live or camera.exists()):
+        raise CommandError(f"there is no camera or recording {camera}; cameras are {CAMERAS}", 2)
+    options = RunOptions(
+        str(camera),
+        color=color,
+        last=last,
+        realtime=not is_live,
+        preset=preset_name,
+        is_camera=is_live,
+        report=report,
+    )
+    place = _window(waits=is_live, port=port) if window and has_browser() else None
+    with interruptible() as stop, closing(UnfinishedRun(out)) as unfinished:
+        job = begun(terminal, options, unfinished, parameters, stop, place.controls if place else None)
+        if window and place is None:
+            terminal.say("no window: there is no browser, or no display; Ctrl-C stops")
+        carry_out(terminal, job, stop, place)
+
+
+def _window(*, waits: bool, port: int) -> Window:
+    from nacre.viewer import Controls
+
+    return Window(port, Controls("ready" if waits else "recording"), opens=True)
