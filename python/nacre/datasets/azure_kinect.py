@@ -12,6 +12,7 @@ import numpy.typing as npt
 from nacre import Camera
 from nacre.datasets.listing import describe, files
 from nacre.datasets.overrides import Overrides
+from nacre.datasets.rational_lens import polynomial_of
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.cameras import check_lens
@@ -100,7 +101,7 @@ def _camera(path: Path, width: int, height: int) -> Camera:
         )
     side, left, top = _MODES[width, height]
     cx, cy, fx, fy, *lens = _parameters(path)
-    (k1, k2, k3), error = _polynomial(np.array(lens[:6]), np.hypot(width, height) / (2 * side * fx))
+    (k1, k2, k3), error = polynomial_of(np.array(lens[:6]), np.hypot(width, height) / (2 * side * fx))
     if error * side * fx > 1:
         _log.warning("the lens is known to %.1f pixels at the edges of the images", error * side * fx)
     # The file measures from the corner of the sensor in its sides; pixel centres are integers.
@@ -132,19 +133,3 @@ def _parameters(path: Path) -> npt.NDArray[np.float64]:
             path, f"14 finite parameters of {_MODEL} were expected, got {got} of {str(model)[:80]}"
         )
     return values[:14]
-
-
-def _polynomial(k: npt.NDArray[np.float64], radius: float) -> tuple[npt.NDArray[np.float64], float]:
-    """
-    Bring the rational lens (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) into Brown's form.
-
-    Least squares in the image, up to a radius there; returns k1 k2 k3 and the largest error [focal lengths].
-    """
-    r = np.linspace(0, 2, 2001)[1:]
-    powers = np.stack([r**2, r**4, r**6], axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):  # a radius that the lens sends to infinity
-        seen = r * (1 + powers @ k[:3]) / (1 + powers @ k[3:])
-        inside = (seen <= radius) & (np.gradient(seen) > 0)
-    terms = (powers * r[:, None])[inside]
-    fitted = np.asarray(np.linalg.lstsq(terms, (seen - r)[inside], rcond=None)[0], np.float64)
-    return fitted, float(np.abs(terms @ fitted - (seen - r)[inside]).max(initial=0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import struct
 from pathlib import Path
 from typing import Any
@@ -10,9 +11,12 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre.datasets.rational_lens import polynomial_of
 from nacre.errors import FileFormatError
 from nacre.io.cameras import check_lens
 from nacre.io.images import decode_color, decoded
+
+_log = logging.getLogger("nacre")
 
 IMAGE, COMPRESSED_IMAGE = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
@@ -95,13 +99,28 @@ def have_one_lens(info: Any, other: Any) -> bool:
 
 def camera_of(info: Any, place: Path) -> Camera:
     """Return the camera of a camera_info; a ValueError says what is wrong with it."""
-    matrix, coefficients = intrinsics(info)
-    distortion = coefficients if len(coefficients) in (4, 5) else np.zeros(5)
+    matrix, _ = intrinsics(info)
     camera = Camera(
         info.width, info.height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2],
-        distortion=list(distortion),
+        distortion=_distortion(info),
     )  # fmt: skip
     return check_lens(place, camera)
+
+
+def _distortion(info: Any) -> list[float]:
+    """Return k1 k2 p1 p2 k3; what this form can't hold is told."""
+    matrix, d = intrinsics(info)
+    model = getattr(info, "distortion_model", "") or "plumb_bob"
+    if not d.any() or (model != "equidistant" and len(d) in (4, 5)):
+        return [float(c) for c in d[:5]] if len(d) in (4, 5) else [0.0] * 5
+    if model != "rational_polynomial" or len(d) < 8 or not np.isfinite(d).all() or d[8:].any():
+        _log.warning("the distortion of the depth camera (%s, %d coefficients) is left out", model, len(d))
+        return [0.0] * 5
+    radius = np.hypot(info.width, info.height) / (2 * matrix[0, 0])
+    (k1, k2, k3), error = polynomial_of(d[[0, 1, 4, 5, 6, 7]], radius)
+    if error * matrix[0, 0] > 1:
+        _log.warning("the lens is known to %.1f pixels at the edges of the images", error * matrix[0, 0])
+    return [k1, k2, float(d[2]), float(d[3]), k3]
 
 
 def depth_of(message: Any, depth_scale: float, place: Path) -> npt.NDArray[np.float32]:
