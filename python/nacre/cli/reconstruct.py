@@ -2,27 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
-from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
-from nacre.cli.live_feed import LiveFeed, camera_feed, is_camera, real_time_feed
-from nacre.cli.run import Job, carry_out
-from nacre.cli.run_options import RunOptions, check_recording, describe, options_before, read_document
+from nacre.cli.config import ConfigOption, PresetOption, SetOption
+from nacre.cli.live_feed import is_camera
+from nacre.cli.reconstruct_options import (
+    AllPointsOption,
+    AttributeOption,
+    BoxOption,
+    CalibrateOption,
+    CheckpointOption,
+    ColorOption,
+    EveryOption,
+    FirstOption,
+    LastOption,
+    LoopClosureOption,
+    MasksOption,
+    MaxDepthOption,
+    MinDepthOption,
+    MinTrackedOption,
+    ObjectOption,
+    ReportOption,
+    RetryOption,
+    asked_for,
+)
+from nacre.cli.run import carry_out
 from nacre.cli.signals import interruptible
-from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
-from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_folder
+from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption
+from nacre.cli.start import begin_run, resume_run
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 from nacre.cli.view import PortOption
-from nacre.errors import FileFormatError
-
-if TYPE_CHECKING:
-    from nacre import ModelParameters
-    from nacre.datasets import Sequence as Recording
-    from nacre.reconstruction.resume import UnfinishedRun
 
 
 def reconstruct(
@@ -48,99 +61,32 @@ def reconstruct(
             show_default=False,
         ),
     ] = None,
-    checkpoint_every: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            metavar="N",
-            help="Save the run in OUT/unfinished after every N frames; 0: only where it is stopped.",
-            show_default="about 2 % of the time",
-        ),
-    ] = None,
+    checkpoint_every: CheckpointOption = None,
     format: FormatOption = None,
     camera: CameraOption = None,
     depth_scale: DepthScaleOption = None,
-    min_depth: Annotated[
-        float | None, typer.Option(help="Nearer measurements are not used (metres).", show_default=False)
-    ] = None,
-    max_depth: Annotated[
-        float | None, typer.Option(help="Farther measurements are not used (metres).", show_default=False)
-    ] = None,
-    box: Annotated[
-        tuple[float, float, float, float, float, float] | None,
-        typer.Option(
-            metavar="X0 X1 Y0 Y1 Z0 Z1",
-            help="Model only what is in this box of the camera's frame (metres; x right, y down, z forward).",
-            show_default=False,
-        ),
-    ] = None,
-    object: Annotated[
-        bool,
-        typer.Option(
-            "--object", help="Model only the largest thing that stands on a plane, e.g. a turntable."
-        ),
-    ] = False,
-    masks: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Images named as the depth images; black pixels are not used.",
-            show_default="the recording's",
-        ),
-    ] = None,
-    every: Annotated[int, typer.Option(min=1, metavar="N", help="Use every N-th frame.")] = 1,
-    first: Annotated[int, typer.Option(min=0, metavar="INDEX", help="The first frame, from 0.")] = 0,
-    last: Annotated[
-        int | None, typer.Option(min=0, metavar="INDEX", help="The last frame.", show_default="all")
-    ] = None,
+    min_depth: MinDepthOption = None,
+    max_depth: MaxDepthOption = None,
+    box: BoxOption = None,
+    object: ObjectOption = False,
+    masks: MasksOption = None,
+    every: EveryOption = 1,
+    first: FirstOption = 0,
+    last: LastOption = None,
     realtime: Annotated[
         bool,
         typer.Option(
             "--realtime", help="Play the recording as a camera would; frames that come too fast are dropped."
         ),
     ] = False,
-    color: Annotated[bool, typer.Option("--color/--no-color", help="Give the model colours.")] = True,
-    retry: Annotated[
-        bool,
-        typer.Option("--retry/--no-retry", help="At the end, try lost frames again while any is found."),
-    ] = True,
-    loop_closure: Annotated[
-        bool | None,
-        typer.Option(
-            "--loop-closure/--no-loop-closure",
-            help="Correct model and poses where the camera comes back to what it saw before.",
-            show_default="on",
-        ),
-    ] = None,
-    calibrate: Annotated[
-        bool | None,
-        typer.Option(
-            "--calibrate/--no-calibrate",
-            help="Where views in several directions show that depth is systematically wrong, correct it.",
-            show_default="on",
-        ),
-    ] = None,
-    attribute: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=FOLDER",
-            help="Images of anything else, named as the depth images; fused along. May be repeated.",
-        ),
-    ] = None,
-    all_points: Annotated[
-        bool,
-        typer.Option(
-            "--all-points",
-            help="Write the points, too, that are no surface: litter, and layers that surer ones cover.",
-        ),
-    ] = False,
-    report: Annotated[bool, typer.Option("--report/--no-report", help="Write report.html.")] = True,
-    min_tracked: Annotated[
-        float,
-        typer.Option(
-            min=0, max=1, metavar="PART", help="Exit with 3 where a smaller part of the frames is tracked."
-        ),
-    ] = 0.5,
+    color: ColorOption = True,
+    retry: RetryOption = True,
+    loop_closure: LoopClosureOption = None,
+    calibrate: CalibrateOption = None,
+    attribute: AttributeOption = None,
+    all_points: AllPointsOption = False,
+    report: ReportOption = True,
+    min_tracked: MinTrackedOption = 0.5,
     view: Annotated[
         bool, typer.Option("--view", help="Show the model in the browser while it grows.")
     ] = False,
@@ -170,6 +116,7 @@ def reconstruct(
     Ctrl-C (and SIGTERM) saves the run and writes what there is; --resume OUT goes on with it, and with one
     that was killed, to the same model. OUT/unfinished is there as long as a run is not finished.
     """
+    arguments = locals()
     terminal = Terminal(json, quiet, verbose)
     from nacre.reconstruction.resume import UnfinishedRun
 
@@ -177,90 +124,17 @@ def reconstruct(
         if resume is not None:
             _refuse_more_options(context, resume)
             unfinished = ends.enter_context(closing(UnfinishedRun(resume, checkpoint_every)))
-            job = _resumed(unfinished)
+            job = resume_run(unfinished)
         else:
             if source is None or out is None:
                 missing = "argument 'SOURCE'" if source is None else "option '--out' / '-o'"
                 raise CommandError(f"missing {missing} (see nacre reconstruct --help)", 2)
             unfinished = ends.enter_context(closing(UnfinishedRun(out, checkpoint_every)))
-            more: dict[str, Any] = {
-                "depth.min_depth": min_depth,
-                "depth.max_depth": max_depth,
-                "loop_closure": loop_closure,
-                "calibrate_depth": calibrate,
-            }
-            sides = ("min_x", "max_x", "min_y", "max_y", "min_z", "max_z")
-            more |= {f"region.{side}": value for side, value in zip(sides, box or (), strict=box is not None)}
-            more["region.object"] = object or None
-            parameters, preset_name = model_parameters(preset, config, settings, **more)
-            options = RunOptions(
-                str(source),
-                format=format,
-                camera=_text(camera),
-                depth_scale=depth_scale,
-                masks=_text(masks),
-                attribute=attribute or [],
-                color=color,
-                first=first,
-                last=last,
-                every=every,
-                realtime=realtime,
-                retry=retry,
-                preset=preset_name,
-                is_camera=is_camera(source),
-                all_points=all_points,
-                report=report,
-                min_tracked=_part("--min-tracked", min_tracked),
+            options, parameters = asked_for(
+                arguments, source=str(source), realtime=realtime, is_camera=is_camera(source)
             )
-            job = _begun(terminal, options, unfinished, parameters)
+            job = begin_run(terminal, options, unfinished, parameters)
         carry_out(terminal, job, stop, port if view else None)
-
-
-def _part(option: str, value: float) -> float:
-    if not 0 <= value <= 1:  # NaN, which the parser lets through
-        raise CommandError(f"{option} must be 0 to 1, got {value}", 2)
-    return value
-
-
-def _text(path: Path | None) -> str | None:
-    return None if path is None else str(path)
-
-
-def _begun(
-    terminal: Terminal, options: RunOptions, unfinished: UnfinishedRun, parameters: ModelParameters
-) -> Job:
-    """Open what is asked for, and note it in ``OUT/unfinished``."""
-    import nacre
-    from nacre.io.atomic import remove_leftovers
-    from nacre.reconstruction import Reconstruction
-    from nacre.reconstruction.runner import Run
-
-    out = unfinished.out
-    feed: LiveFeed | None = None
-    indices: Iterable[int]
-    if options.is_camera:
-        options.require_none_for_a_camera()
-        feed = camera_feed(Path(options.source), writable_folder(out), options.color, options.pick)
-        sequence, num_frames = feed.sequence, None
-        words, indices = f"live, {describe_camera(sequence.camera)}", feed
-    else:
-        sequence = options.open()
-        chosen = options.indices(sequence)
-        words, num_frames, indices = describe(sequence, chosen), len(chosen), chosen
-        if options.realtime:
-            indices = feed = real_time_feed(sequence, chosen)
-    done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
-    writable_folder(out)
-    _hold(unfinished)
-    remove_leftovers(out)
-    if unfinished.checkpoint.exists():
-        terminal.say(
-            f"{out} held an unfinished run, which --resume would have gone on with: it is begun again"
-        )
-    run = Run(done, indices, retry=options.retry)
-    unfinished.live = None if feed is None else feed.figures
-    unfinished.begin(run, options.document(sequence))
-    return Job(options, sequence, words, num_frames, run, unfinished, feed)
 
 
 def _refuse_more_options(context: typer.Context, out: Path) -> None:
@@ -269,57 +143,3 @@ def _refuse_more_options(context: typer.Context, out: Path) -> None:
         if name not in allowed and str(context.get_parameter_source(name)).endswith("COMMANDLINE"):
             option = "SOURCE" if name == "source" else "--" + name.replace("_", "-")
             raise CommandError(f"--resume takes everything from {out / 'unfinished'}: leave out {option}", 2)
-
-
-def _resumed(unfinished: UnfinishedRun) -> Job:
-    """Open what a run was asked for that was stopped or killed, and load what it had."""
-    from nacre.io.atomic import remove_leftovers
-
-    out = unfinished.out
-    if out.is_dir():
-        _hold(unfinished)
-    document = read_document(unfinished)
-    options, folder = options_before(document, unfinished.document_path)
-    indices: Sequence[int]
-    if options.is_camera:
-        from nacre.datasets.recorder import mend
-
-        mend(out / "recording")
-        sequence = open_source(out / "recording")
-        words, indices = f"live, {describe_camera(sequence.camera)}", range(len(sequence))
-    else:
-        sequence = options.open(folder)
-        check_recording(document, sequence)
-        chosen = options.indices(sequence)
-        words = describe(sequence, chosen)
-        # Of a recording in real time what it had seen; which frames come, is the clock's doing.
-        indices = _journaled_indices(unfinished, sequence) if options.realtime else chosen
-    for place in (out, unfinished.folder):
-        remove_leftovers(place)
-    compare = not options.is_camera  # its colours were kept as JPEG
-    run = unfinished.resume(sequence, indices, compare=compare, retry=options.retry)
-    live = unfinished.live
-    if live is not None and len(run.done.frames) < len(
-        unfinished.journaled_indices()
-    ):  # nobody counted since
-        unfinished.live = {**live, "num_received": None, "num_dropped": None}
-    return Job(options, sequence, words, len(indices), run, unfinished)
-
-
-def _journaled_indices(unfinished: UnfinishedRun, sequence: Recording) -> list[int]:
-    indices = unfinished.journaled_indices()
-    if max(indices, default=0) >= len(sequence):
-        reason = f"frame {max(indices)} is none of the recording's {len(sequence)}"
-        raise FileFormatError(unfinished.journal_path, reason)
-    return indices
-
-
-def _hold(unfinished: UnfinishedRun) -> None:
-    try:
-        unfinished.hold()
-    except BlockingIOError:
-        raise CommandError(
-            f"another nacre reconstruct is writing to {unfinished.out}: wait until it has ended; "
-            "a new run can go to another folder (-o)",
-            2,
-        ) from None

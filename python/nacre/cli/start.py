@@ -1,0 +1,110 @@
+"""A run of ``nacre reconstruct`` is begun, or gone on with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nacre.cli.live_feed import LiveFeed, camera_feed, real_time_feed
+from nacre.cli.run import Job
+from nacre.cli.run_options import RunOptions, check_recording, describe, options_before, read_document
+from nacre.cli.source import describe_camera, open_source
+from nacre.cli.terminal import CommandError, Terminal, writable_folder
+from nacre.errors import FileFormatError
+
+if TYPE_CHECKING:
+    from nacre import ModelParameters
+    from nacre.datasets import Sequence as Recording
+    from nacre.reconstruction.resume import UnfinishedRun
+
+
+def begin_run(
+    terminal: Terminal, options: RunOptions, unfinished: UnfinishedRun, parameters: ModelParameters
+) -> Job:
+    """Open what is asked for, and note it in ``OUT/unfinished``."""
+    import nacre
+    from nacre.io.atomic import remove_leftovers
+    from nacre.reconstruction import Reconstruction
+    from nacre.reconstruction.runner import Run
+
+    out = unfinished.out
+    feed: LiveFeed | None = None
+    indices: Iterable[int]
+    if options.is_camera:
+        options.require_none_for_a_camera()
+        feed = camera_feed(Path(options.source), writable_folder(out), options.color, options.pick)
+        sequence, num_frames = feed.sequence, None
+        words, indices = f"live, {describe_camera(sequence.camera)}", feed
+    else:
+        sequence = options.open()
+        chosen = options.indices(sequence)
+        words, num_frames, indices = describe(sequence, chosen), len(chosen), chosen
+        if options.realtime:
+            indices = feed = real_time_feed(sequence, chosen)
+    done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
+    writable_folder(out)
+    _hold(unfinished)
+    remove_leftovers(out)
+    if unfinished.checkpoint.exists():
+        terminal.say(
+            f"{out} held an unfinished run, which --resume would have gone on with: it is begun again"
+        )
+    run = Run(done, indices, retry=options.retry)
+    unfinished.live = None if feed is None else feed.figures
+    unfinished.begin(run, options.document(sequence))
+    return Job(options, sequence, words, num_frames, run, unfinished, feed)
+
+
+def resume_run(unfinished: UnfinishedRun) -> Job:
+    """Open what a run was asked for that was stopped or killed, and load what it had."""
+    from nacre.io.atomic import remove_leftovers
+
+    out = unfinished.out
+    if out.is_dir():
+        _hold(unfinished)
+    document = read_document(unfinished)
+    options, folder = options_before(document, unfinished.document_path)
+    indices: Sequence[int]
+    if options.is_camera:
+        from nacre.datasets.recorder import mend
+
+        mend(out / "recording")
+        sequence = open_source(out / "recording")
+        words, indices = f"live, {describe_camera(sequence.camera)}", range(len(sequence))
+    else:
+        sequence = options.open(folder)
+        check_recording(document, sequence)
+        chosen = options.indices(sequence)
+        words = describe(sequence, chosen)
+        # Of a recording in real time what it had seen; which frames come, is the clock's doing.
+        indices = _journaled_indices(unfinished, sequence) if options.realtime else chosen
+    for place in (out, unfinished.folder):
+        remove_leftovers(place)
+    compare = not options.is_camera  # its colours were kept as JPEG
+    run = unfinished.resume(sequence, indices, compare=compare, retry=options.retry)
+    live = unfinished.live
+    if live is not None and len(run.done.frames) < len(
+        unfinished.journaled_indices()
+    ):  # nobody counted since
+        unfinished.live = {**live, "num_received": None, "num_dropped": None}
+    return Job(options, sequence, words, len(indices), run, unfinished)
+
+
+def _journaled_indices(unfinished: UnfinishedRun, sequence: Recording) -> list[int]:
+    indices = unfinished.journaled_indices()
+    if max(indices, default=0) >= len(sequence):
+        reason = f"frame {max(indices)} is none of the recording's {len(sequence)}"
+        raise FileFormatError(unfinished.journal_path, reason)
+    return indices
+
+
+def _hold(unfinished: UnfinishedRun) -> None:
+    try:
+        unfinished.hold()
+    except BlockingIOError:
+        raise CommandError(
+            f"another nacre reconstruct is writing to {unfinished.out}: wait until it has ended; "
+            "a new run can go to another folder (-o)",
+            2,
+        ) from None

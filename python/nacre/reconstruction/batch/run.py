@@ -1,0 +1,103 @@
+"""A batch is run: its recordings are given to workers, and their results come as they are done."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Generator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nacre.io.atomic import remove_leftovers
+from nacre.io.folder_lock import lock_folder
+from nacre.reconstruction.batch.cluster import cluster_client, import_distributed
+from nacre.reconstruction.batch.index import Index
+from nacre.reconstruction.batch.result import BatchResult
+from nacre.reconstruction.batch.task import Task, reconstruct_recording
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+_RETRIES = 2  # where a disk is full or memory is short, elsewhere or a moment later it may not be
+
+
+class BatchRun:
+    """
+    The recordings of a batch, and what became of them.
+
+    Parameters
+    ----------
+    tasks : sequence of Task
+        One for each recording.
+    output : Path
+        The folder of the results.
+    workers : int, optional
+        How many local processes; None: one for each processor.
+    scheduler : str, optional
+        The address of a Dask scheduler that is there, in place of local processes.
+
+    Attributes
+    ----------
+    index : Index
+        The results up to now.
+    """
+
+    def __init__(
+        self, tasks: Sequence[Task], output: Path, workers: int | None = None, scheduler: str | None = None
+    ) -> None:
+        self.index = Index(output, [task.empty_result for task in tasks])
+        self._tasks = tasks
+        self._output = output
+        self._workers = workers
+        self._scheduler = scheduler
+
+    def results(self) -> Generator[BatchResult, None, None]:
+        """Reconstruct, and yield each result when it is there."""
+        import_distributed()
+        self._output.mkdir(parents=True, exist_ok=True)
+        lock = self._lock()
+        try:
+            remove_leftovers(self._output)
+            self.index.write()
+            with cluster_client(self._scheduler, self._workers, len(self._tasks)) as client:
+                yield from self._results_of(client)
+        finally:
+            self.index.write()
+            if lock is not None:
+                os.close(lock)
+
+    def _results_of(self, client: Client) -> Generator[BatchResult, None, None]:
+        from distributed import as_completed
+
+        futures = client.map(reconstruct_recording, self._tasks, pure=False, retries=_RETRIES)
+        tasks = {future.key: task for future, task in zip(futures, self._tasks, strict=True)}
+        for future in as_completed(futures):
+            result = _result_of(future, tasks[future.key])
+            future.release()
+            self.index.add(result)
+            yield result
+
+    def _lock(self) -> int | None:
+        try:
+            return lock_folder(self._output)
+        except BlockingIOError as error:
+            raise BlockingIOError(
+                error.errno, "another nacre batch is writing to it", os.fspath(self._output)
+            ) from None
+
+
+def _result_of(future: Future[BatchResult], task: Task) -> BatchResult:
+    """Return what a worker found, or why it found nothing."""
+    from distributed import KilledWorker
+
+    from nacre.cli.app import explain
+
+    result = task.empty_result
+    if future.status == "finished":
+        return future.result()
+    if future.status != "error":
+        return dataclasses.replace(result, message="the scheduler went away")
+    error = future.exception()
+    if isinstance(error, KilledWorker):
+        return result.failed("its worker died, and so did those that tried it again: is there enough memory?")
+    return result.failed(explain(error)[0])

@@ -1,0 +1,193 @@
+"""One recording of a batch, as a worker reconstructs it: by the code of ``nacre reconstruct``."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import nacre
+from nacre.datasets.detect import require_format
+from nacre.errors import FileFormatError
+from nacre.evaluation.result import plain
+from nacre.io.cameras import read_camera
+from nacre.reconstruction.batch.result import BatchResult, Outcome
+from nacre.reconstruction.batch.thumbnail import write_thumbnail
+from nacre.reconstruction.resume import UnfinishedRun
+from nacre.report.saved_run import SavedRun
+
+if TYPE_CHECKING:
+    from nacre.cli.run_options import RunOptions
+    from nacre.parameters import ModelParameters
+
+_PAUSE = 0.2  # [s] between two looks whether another process has left a folder
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a worker is asked for: a recording, its options, and the folder for its results."""
+
+    name: str
+    options: RunOptions
+    parameters: ModelParameters
+    folder: Path
+    overwrite: bool = False
+    checkpoint_every: int | None = None
+    version: str = nacre.__version__  #: of who asks: another one may give other bytes
+
+    @property
+    def empty_result(self) -> BatchResult:
+        """The result while nothing is done."""
+        return BatchResult(self.name, self.options.source, self.folder)
+
+
+def make_tasks(
+    recordings: Mapping[str, Path],
+    options: RunOptions,
+    parameters: ModelParameters,
+    output: Path,
+    *,
+    overwrite: bool = False,
+    checkpoint_every: int | None = None,
+) -> list[Task]:
+    """
+    Return a task for each recording, with absolute paths: workers may be anywhere.
+
+    Raises
+    ------
+    FileNotFoundError, FileFormatError, TypeError, ValueError
+        Options that no recording can have.
+    """
+    from nacre.cli.live_feed import is_camera
+    from nacre.cli.run_options import checked
+
+    for path in recordings.values():
+        if not path.exists() and is_camera(Path(path.name)):
+            raise ValueError(f"sources must be recordings, and {path.name} is a camera")
+    if options.format is not None:
+        require_format(options.format)
+    if options.camera is not None:
+        read_camera(options.camera)
+        options = dataclasses.replace(options, camera=str(Path(options.camera).absolute()))
+
+    def options_for(path: Path) -> RunOptions:
+        """Return the options with the folders of a recording."""
+        return dataclasses.replace(
+            options,
+            source=str(path),
+            masks=None if options.masks is None else str(path / options.masks),
+            attribute=[_within(path, text) for text in options.attribute],
+        )
+
+    checked(options)
+    folder = output.absolute()
+    return [
+        Task(name, options_for(path), parameters, folder / name, overwrite, checkpoint_every)
+        for name, path in recordings.items()
+    ]
+
+
+def _within(path: Path, attribute: str) -> str:
+    name, equals, images = attribute.partition("=")
+    return f"{name}{equals}{path / images}" if images else attribute
+
+
+def reconstruct_recording(task: Task) -> BatchResult:
+    """
+    Reconstruct a recording, unless that is done; go on where it was begun.
+
+    What is wrong with the recording is told by the result. Errors that may not come again (a full disk, too
+    little memory) are raised: the cluster tries again.
+    """
+    from nacre.cli.app import explain
+    from nacre.cli.terminal import CommandError, writable_folder
+
+    try:
+        if task.version != nacre.__version__:
+            raise CommandError(f"the worker has nacre {nacre.__version__}, the batch {task.version}")
+        with closing(UnfinishedRun(writable_folder(task.folder), task.checkpoint_every)) as unfinished:
+            _wait_for_the_folder(unfinished)
+            return _reconstruct(task, unfinished)
+    except Exception as error:
+        message, code = explain(error)
+        if isinstance(error, (OSError, MemoryError)) and code == 1:
+            raise
+        return task.empty_result.failed(message)
+
+
+def _wait_for_the_folder(unfinished: UnfinishedRun) -> None:
+    """Wait while another process writes to it: one that the scheduler has lost, or another program."""
+    while True:
+        try:
+            unfinished.hold()
+        except BlockingIOError:
+            time.sleep(_PAUSE)
+        else:
+            return
+
+
+def _reconstruct(task: Task, unfinished: UnfinishedRun) -> BatchResult:
+    from nacre.cli.terminal import CommandError
+
+    try:
+        outcome = _outcome_to_come(task, unfinished)
+    except (FileFormatError, CommandError) as error:
+        if not task.overwrite:
+            raise CommandError(f"{error}; --overwrite begins it again") from error
+        outcome = "reconstructed"
+    if outcome != "finished before":
+        _run(task, unfinished, resume=outcome == "resumed")
+    run = SavedRun(task.folder)
+    write_thumbnail(task.folder)
+    return task.empty_result.told_by(run, outcome, task.options.min_tracked)
+
+
+def _outcome_to_come(task: Task, unfinished: UnfinishedRun) -> Outcome:
+    """Look at what is in the folder; a CommandError says that it was made with other options."""
+    outcome: Outcome = "reconstructed"
+    before: Any = None
+    if unfinished.document_path.exists():
+        outcome, before = "resumed", unfinished.document()["options"]
+    elif _is_finished(task):
+        outcome, before = "finished before", SavedRun(task.folder).report.get("options")
+    asked = plain(dataclasses.asdict(task.options))
+    if outcome != "reconstructed" and before != asked:
+        from nacre.cli.terminal import CommandError
+
+        state = "begun" if outcome == "resumed" else "done"
+        raise CommandError(f"it was {state} with other options: {_differences(before or {}, asked)}")
+    return outcome
+
+
+def _is_finished(task: Task) -> bool:
+    names = ["model.ply", "trajectory.txt", "report.json", *["report.html"] * task.options.report]
+    if not all((task.folder / name).is_file() for name in names):
+        return False
+    return not SavedRun(task.folder).report.get("interrupted")
+
+
+def _differences(before: dict[str, Any], now: dict[str, Any]) -> str:
+    names = [name for name in now if before.get(name) != now[name]]
+    return ", ".join(f"{name} was {before.get(name)!r}, is {now[name]!r}" for name in names)
+
+
+def _run(task: Task, unfinished: UnfinishedRun, *, resume: bool) -> None:
+    from nacre.cli.run import carry_out
+    from nacre.cli.signals import Interruption
+    from nacre.cli.start import begin_run, resume_run
+    from nacre.cli.terminal import CommandError, Terminal
+
+    terminal = Terminal(quiet=True)
+    try:
+        if resume:
+            job = resume_run(unfinished)
+        else:
+            job = begin_run(terminal, task.options, unfinished, task.parameters)
+        carry_out(terminal, job, Interruption(), None)
+    except CommandError as error:
+        if error.code != 3:  # with 3 too few frames were tracked, and all is written
+            raise
