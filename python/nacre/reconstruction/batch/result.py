@@ -64,30 +64,32 @@ class BatchResult:
         """Whether the folder holds a finished reconstruction."""
         return self.outcome in ("reconstructed", "resumed", "finished before")
 
-    def told_by(self, run: SavedRun, outcome: Outcome, min_tracked: float) -> BatchResult:
-        """Return the result with what the report of a finished reconstruction says."""
-        num_tracked, total = sum(frame.is_tracked for frame in run.frames), len(run.frames)
-        too_few = num_tracked < min_tracked * total
-        verdict, error = run.report.get("verdict"), run.report.get("absolute_trajectory_error")
-        times = [frame.total_milliseconds for frame in run.frames]
-        return dataclasses.replace(
-            self,
-            outcome=outcome,
-            message=f"only {num_tracked} of {total} frames were tracked" if too_few else "",
-            level=verdict["level"] if verdict else "",
-            verdict=verdict["sentence"] if verdict else "",
-            num_frames=total,
-            num_tracked=num_tracked,
-            trajectory_error=error["rmse"] if error else None,
-            frame_seconds=sum(time for time in times if time is not None) / 1000,
-            has_page=(self.folder / "report.html").is_file(),
-            has_thumbnail=thumbnail_path(self.folder).is_file(),
-        )
-
-    def failed(self, message: str) -> BatchResult:
-        """Return the result of a recording that failed."""
-        return dataclasses.replace(self, outcome="failed", message=message)
-
     def as_dict(self) -> dict[str, Any]:
         """Return it as ``index.json`` has it."""
         return dataclasses.asdict(self) | {"folder": self.folder.name}
+
+
+def failed(result: BatchResult, message: str) -> BatchResult:
+    """Return the result of a recording that failed."""
+    return dataclasses.replace(result, outcome="failed", message=message)
+
+
+def finished(result: BatchResult, run: SavedRun, outcome: Outcome, min_tracked: float) -> BatchResult:
+    """Return the result with what the report of a finished reconstruction says."""
+    num_tracked, total = sum(frame.is_tracked for frame in run.frames), len(run.frames)
+    too_few = num_tracked < min_tracked * total
+    verdict, error = run.report.get("verdict"), run.report.get("absolute_trajectory_error")
+    times = [frame.total_milliseconds for frame in run.frames]
+    return dataclasses.replace(
+        result,
+        outcome=outcome,
+        message=f"only {num_tracked} of {total} frames were tracked" if too_few else "",
+        level=verdict["level"] if verdict else "",
+        verdict=verdict["sentence"] if verdict else "",
+        num_frames=total,
+        num_tracked=num_tracked,
+        trajectory_error=error["rmse"] if error else None,
+        frame_seconds=sum(time for time in times if time is not None) / 1000,
+        has_page=(result.folder / "report.html").is_file(),
+        has_thumbnail=thumbnail_path(result.folder).is_file(),
+    )

@@ -12,7 +12,7 @@ from nacre.io.atomic import remove_leftovers
 from nacre.io.folder_lock import lock_folder
 from nacre.reconstruction.batch.cluster import cluster_client, import_distributed
 from nacre.reconstruction.batch.index import Index
-from nacre.reconstruction.batch.result import BatchResult
+from nacre.reconstruction.batch.result import BatchResult, failed
 from nacre.reconstruction.batch.task import Task, reconstruct_recording
 
 if TYPE_CHECKING:
@@ -99,5 +99,7 @@ def _result_of(future: Future[BatchResult], task: Task) -> BatchResult:
         return dataclasses.replace(result, message="the scheduler went away")
     error = future.exception()
     if isinstance(error, KilledWorker):
-        return result.failed("its worker died, and so did those that tried it again: is there enough memory?")
-    return result.failed(explain(error)[0])
+        return failed(
+            result, "its worker died, and so did those that tried it again: is there enough memory?"
+        )
+    return failed(result, explain(error)[0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import time
 from collections.abc import Mapping
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +15,7 @@ from nacre.datasets.detect import require_format
 from nacre.errors import FileFormatError
 from nacre.evaluation.result import plain
 from nacre.io.cameras import read_camera
-from nacre.reconstruction.batch.result import BatchResult, Outcome
+from nacre.reconstruction.batch.result import BatchResult, Outcome, failed, finished
 from nacre.reconstruction.batch.thumbnail import write_thumbnail
 from nacre.reconstruction.resume import UnfinishedRun
 from nacre.report.saved_run import SavedRun
@@ -116,7 +116,9 @@ def reconstruct_recording(task: Task) -> BatchResult:
         message, code = explain(error)
         if isinstance(error, (OSError, MemoryError)) and code == 1:
             raise
-        return task.empty_result.failed(message)
+        with suppress(OSError):
+            task.folder.rmdir()  # where nothing was written
+        return failed(task.empty_result, message)
 
 
 def _wait_for_the_folder(unfinished: UnfinishedRun) -> None:
@@ -143,7 +145,7 @@ def _reconstruct(task: Task, unfinished: UnfinishedRun) -> BatchResult:
         _run(task, unfinished, resume=outcome == "resumed")
     run = SavedRun(task.folder)
     write_thumbnail(task.folder)
-    return task.empty_result.told_by(run, outcome, task.options.min_tracked)
+    return finished(task.empty_result, run, outcome, task.options.min_tracked)
 
 
 def _outcome_to_come(task: Task, unfinished: UnfinishedRun) -> Outcome:
