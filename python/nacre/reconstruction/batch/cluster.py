@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 import os
+import signal
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
 from nacre.system import default_threads
@@ -13,8 +14,10 @@ from nacre.system import default_threads
 if TYPE_CHECKING:
     from distributed import Client
 
+_log = logging.getLogger("nacre.batch")
+
 _SECONDS_TO_CONNECT = 10
-# A worker under a nanny has one thread a loop unless its environment says otherwise: here, its share.
+# A worker has one thread for each of its loops unless its environment says otherwise: here, its share.
 _THREADS = "OMP_NUM_THREADS"
 
 
@@ -44,22 +47,27 @@ def cluster_client(scheduler: str | None, workers: int | None, num_tasks: int) -
         A worker there runs several tasks in one process.
     """
     distributed = import_distributed()
-    if scheduler is None:
-        with (
-            _local_cluster(distributed, workers, num_tasks) as cluster,
-            distributed.Client(cluster) as client,
-        ):
-            yield client
-        return
-    try:
-        client = distributed.Client(scheduler, timeout=_SECONDS_TO_CONNECT)
-    except (OSError, TimeoutError) as error:
-        raise ConnectionError(
-            f"no scheduler answers at {scheduler}: dask scheduler starts one, and prints its address"
-        ) from error
-    with client:
-        _require_processes(client, scheduler)
+    from distributed.utils import silence_logging_cmgr
+
+    with ExitStack() as ends:
+        ends.enter_context(silence_logging_cmgr(logging.CRITICAL))
+        if scheduler is None:
+            cluster = ends.enter_context(_local_cluster(distributed, workers, num_tasks))
+            yield ends.enter_context(distributed.Client(cluster))
+            return
+        try:
+            client = ends.enter_context(distributed.Client(scheduler, timeout=_SECONDS_TO_CONNECT))
+        except (OSError, TimeoutError, ValueError) as error:
+            raise ConnectionError(
+                f"no scheduler answers at {scheduler}: dask scheduler starts one, and prints its address"
+            ) from error
+        _look_at_workers(client, scheduler)
         yield client
+
+
+def dask_setup(worker: object) -> None:
+    """Leave Ctrl-C to the process that started this one, which ends it; Dask calls this in each worker."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 def _local_cluster(distributed: Any, workers: int | None, num_tasks: int) -> Any:
@@ -71,14 +79,19 @@ def _local_cluster(distributed: Any, workers: int | None, num_tasks: int) -> Any
         threads_per_worker=1,
         dashboard_address="127.0.0.1:0",
         silence_logs=logging.CRITICAL,
+        preload=__name__,
         env={_THREADS: str(max(1, num_processors // num_workers))},
     )
 
 
-def _require_processes(client: Client, scheduler: str) -> None:
-    for address, worker in client.scheduler_info(n_workers=-1)["workers"].items():
+def _look_at_workers(client: Client, scheduler: str) -> None:
+    """Say where workers are missing, and refuse those that run several tasks in one process."""
+    found = client.scheduler_info(n_workers=-1)["workers"]
+    command = f"dask worker {scheduler} --nworkers {os.cpu_count()} --nthreads 1"
+    if not found:
+        _log.warning("the scheduler has no workers yet: %s starts some", command)
+    for address, worker in found.items():
         if worker["nthreads"] != 1:
-            command = f"dask worker {scheduler} --nworkers {os.cpu_count()} --nthreads 1"
             raise ValueError(
                 f"the worker {address} runs {worker['nthreads']} tasks in one process, and a recording needs "
                 f"a process of its own: {command}"

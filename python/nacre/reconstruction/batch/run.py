@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -55,16 +56,13 @@ class BatchRun:
         """Reconstruct, and yield each result when it is there."""
         import_distributed()
         self._output.mkdir(parents=True, exist_ok=True)
-        lock = self._lock()
-        try:
+        with self._lock(), cluster_client(self._scheduler, self._workers, len(self._tasks)) as client:
             remove_leftovers(self._output)
             self.index.write()
-            with cluster_client(self._scheduler, self._workers, len(self._tasks)) as client:
+            try:
                 yield from self._results_of(client)
-        finally:
-            self.index.write()
-            if lock is not None:
-                os.close(lock)
+            finally:
+                self.index.write()
 
     def _results_of(self, client: Client) -> Generator[BatchResult, None, None]:
         from distributed import as_completed
@@ -77,13 +75,19 @@ class BatchRun:
             self.index.add(result)
             yield result
 
-    def _lock(self) -> int | None:
+    @contextmanager
+    def _lock(self) -> Iterator[None]:
+        """Keep other batches from writing to the folder."""
         try:
-            return lock_folder(self._output)
+            lock = lock_folder(self._output)
         except BlockingIOError as error:
-            raise BlockingIOError(
-                error.errno, "another nacre batch is writing to it", os.fspath(self._output)
-            ) from None
+            reason = "another nacre batch is writing to it"
+            raise BlockingIOError(error.errno, reason, os.fspath(self._output)) from None
+        try:
+            yield
+        finally:
+            if lock is not None:
+                os.close(lock)
 
 
 def _result_of(future: Future[BatchResult], task: Task) -> BatchResult:
