@@ -106,4 +106,4 @@ def _result_of(future: Future[BatchResult], task: Task) -> BatchResult:
         return failed(
             result, "its worker died, and so did those that tried it again: is there enough memory?"
         )
-    return failed(result, explain(error)[0])
+    return failed(result, f"{explain(error)[0]}; the same command again goes on with it")
