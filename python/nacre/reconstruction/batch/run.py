@@ -92,18 +92,17 @@ class BatchRun:
 
 def _result_of(future: Future[BatchResult], task: Task) -> BatchResult:
     """Return what a worker found, or why it found nothing."""
-    from distributed import KilledWorker
+    from distributed import CancelledError, KilledWorker
 
     from nacre.cli.app import explain
 
     result = task.empty_result
-    if future.status == "finished":
+    try:
         return future.result()
-    if future.status != "error":
+    except CancelledError:
         return dataclasses.replace(result, message="the scheduler went away")
-    error = future.exception()
-    if isinstance(error, KilledWorker):
-        return failed(
-            result, "its worker died, and so did those that tried it again: is there enough memory?"
-        )
-    return failed(result, f"{explain(error)[0]}; the same command again goes on with it")
+    except KilledWorker:
+        reason = "its worker died, and so did those that tried it again: is there enough memory?"
+        return failed(result, reason)
+    except Exception as error:
+        return failed(result, f"{explain(error)[0]}; the same command again goes on with it")
