@@ -105,8 +105,14 @@ def batch(
         Nobody answers at the scheduler's address.
     BlockingIOError
         Another batch is writing to the folder.
+    RuntimeError
+        The local processes did not start, as in a script that is not guarded, see below.
     TypeError, ValueError
         Naming the argument, what was expected and what came.
+
+    Notes
+    -----
+    The processes import the script that calls this: there it stands below ``if __name__ == "__main__":``.
 
     Examples
     --------

@@ -45,6 +45,8 @@ def cluster_client(scheduler: str | None, workers: int | None, num_tasks: int) -
         Nobody answers at the address.
     ValueError
         A worker there runs several tasks in one process.
+    RuntimeError
+        The local processes did not start.
     """
     distributed = import_distributed()
     from distributed.utils import silence_logging_cmgr
@@ -74,14 +76,20 @@ def _local_cluster(distributed: Any, workers: int | None, num_tasks: int) -> Any
     """Return a cluster that fills the machine: its processors are divided among the workers."""
     num_processors = default_threads()
     num_workers = workers or min(num_processors, num_tasks)
-    return distributed.LocalCluster(
-        n_workers=num_workers,
-        threads_per_worker=1,
-        dashboard_address="127.0.0.1:0",
-        silence_logs=logging.CRITICAL,
-        preload=__name__,
-        env={_THREADS: str(max(1, num_processors // num_workers))},
-    )
+    try:
+        return distributed.LocalCluster(
+            n_workers=num_workers,
+            threads_per_worker=1,
+            dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL,
+            preload=__name__,
+            env={_THREADS: str(max(1, num_processors // num_workers))},
+        )
+    except RuntimeError as error:
+        raise RuntimeError(
+            "the processes that reconstruct did not start: a script must call nacre.batch below "
+            'if __name__ == "__main__":, for they import it'
+        ) from error
 
 
 def _look_at_workers(client: Client, scheduler: str) -> None:
