@@ -98,7 +98,7 @@ def _result_of(future: Future[BatchResult], task: Task) -> BatchResult:
 
     result = task.empty_result
     try:
-        return future.result()
+        found = future.result()
     except CancelledError:
         return dataclasses.replace(result, message="the scheduler went away")
     except KilledWorker:
@@ -106,3 +106,7 @@ def _result_of(future: Future[BatchResult], task: Task) -> BatchResult:
         return failed(result, reason)
     except Exception as error:
         return failed(result, f"{explain(error)[0]}; the same command again goes on with it")
+    if found.has_results and not found.folder.is_dir():
+        reason = f"the worker wrote to {found.folder}, which is not seen here: all machines need one disk"
+        return failed(result, reason)
+    return found

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import errno
 import json
 import os
@@ -12,6 +13,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,10 +21,14 @@ import pytest
 import nacre
 from nacre.io.folder_lock import lock_folder
 from nacre.reconstruction.batch import cluster as clusters
+from nacre.reconstruction.batch.run import _result_of
+from nacre.reconstruction.batch.task import make_tasks
 
 pytest.importorskip("typer")
 distributed = pytest.importorskip("distributed")
-from killed_runs import results  # noqa: E402  needs the command line
+from killed_runs import results  # noqa: E402  they need the command line
+
+from nacre.cli.run_options import RunOptions  # noqa: E402
 
 NAMES = ("bowl", "cup", "mug")
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.weekly) for seed in range(1, 6))]
@@ -271,3 +277,11 @@ def test_without_dask_the_command_that_installs_it_is_told(
     with pytest.raises(ImportError, match=r'pip install "nacre\[dask\]"'):
         nacre.batch(scans, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_results_that_a_worker_wrote_to_another_disk_are_told(scans: Path, tmp_path: Path) -> None:
+    (task,) = make_tasks({"cup": scans / "cup"}, RunOptions(""), nacre.ModelParameters(), tmp_path)
+    elsewhere = dataclasses.replace(task.empty_result, outcome="reconstructed")
+    result = _result_of(SimpleNamespace(result=lambda: elsewhere), task)  # type: ignore[arg-type]
+    assert result.outcome == "failed"
+    assert result.message.endswith("which is not seen here: all machines need one disk")
