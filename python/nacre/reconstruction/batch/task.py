@@ -21,6 +21,7 @@ from nacre.reconstruction.resume import UnfinishedRun
 from nacre.report.saved_run import SavedRun
 
 if TYPE_CHECKING:
+    from nacre.cli.run import Job
     from nacre.cli.run_options import RunOptions
     from nacre.parameters import ModelParameters
 
@@ -65,6 +66,7 @@ def make_tasks(
     from nacre.cli.live_feed import is_camera
     from nacre.cli.run_options import checked
 
+    checked(options)
     for path in recordings.values():
         if not path.exists() and is_camera(Path(path.name)):
             raise ValueError(f"sources must be recordings, and {path.name} is a camera")
@@ -83,7 +85,6 @@ def make_tasks(
             attribute=[_within(path, text) for text in options.attribute],
         )
 
-    checked(options)
     folder = output.absolute()
     return [
         Task(name, options_for(path), parameters, folder / name, overwrite, checkpoint_every)
@@ -133,63 +134,59 @@ def _wait_for_the_folder(unfinished: UnfinishedRun) -> None:
 
 
 def _reconstruct(task: Task, unfinished: UnfinishedRun) -> BatchResult:
-    from nacre.cli.terminal import CommandError
-
-    try:
-        outcome = _outcome_to_come(task, unfinished)
-    except (FileFormatError, CommandError) as error:
-        if not task.overwrite:
-            raise CommandError(f"{error}; --overwrite begins it again") from error
-        outcome = "reconstructed"
-    if outcome != "finished before":
-        _run(task, unfinished, resume=outcome == "resumed")
-    run = SavedRun(task.folder)
-    write_thumbnail(task.folder)
-    return finished(task.empty_result, run, outcome, task.options.min_tracked)
-
-
-def _outcome_to_come(task: Task, unfinished: UnfinishedRun) -> Outcome:
-    """Look at what is in the folder; a CommandError says that it was made with other options."""
-    outcome: Outcome = "reconstructed"
-    before: Any = None
-    if unfinished.document_path.exists():
-        outcome, before = "resumed", unfinished.document()["options"]
-    elif _is_finished(task):
-        outcome, before = "finished before", SavedRun(task.folder).report.get("options")
-    asked = plain(dataclasses.asdict(task.options))
-    if outcome != "reconstructed" and before != asked:
-        from nacre.cli.terminal import CommandError
-
-        state = "begun" if outcome == "resumed" else "done"
-        raise CommandError(f"it was {state} with other options: {_differences(before or {}, asked)}")
-    return outcome
-
-
-def _is_finished(task: Task) -> bool:
-    names = ["model.ply", "trajectory.txt", "report.json", *["report.html"] * task.options.report]
-    if not all((task.folder / name).is_file() for name in names):
-        return False
-    return not SavedRun(task.folder).report.get("interrupted")
-
-
-def _differences(before: dict[str, Any], now: dict[str, Any]) -> str:
-    names = [name for name in now if before.get(name) != now[name]]
-    return ", ".join(f"{name} was {before.get(name)!r}, is {now[name]!r}" for name in names)
-
-
-def _run(task: Task, unfinished: UnfinishedRun, *, resume: bool) -> None:
-    from nacre.cli.run import carry_out
-    from nacre.cli.signals import Interruption
-    from nacre.cli.start import begin_run, resume_run
+    from nacre.cli.start import begin_run
     from nacre.cli.terminal import CommandError, Terminal
 
-    terminal = Terminal(quiet=True)
     try:
-        if resume:
-            job = resume_run(unfinished)
-        else:
-            job = begin_run(terminal, task.options, unfinished, task.parameters)
-        carry_out(terminal, job, Interruption(), None)
+        outcome = _go_on(task, unfinished)
+    except (FileFormatError, CommandError) as error:
+        if not task.overwrite:
+            reason = str(error).removesuffix("; run it again without --resume")
+            raise CommandError(f"{reason}; --overwrite begins it again") from error
+        outcome = None
+    if outcome is None:
+        _carry_out(begin_run(Terminal(quiet=True), task.options, unfinished, task.parameters))
+        outcome = "reconstructed"
+    write_thumbnail(task.folder)
+    return finished(task.empty_result, SavedRun(task.folder), outcome, task.options.min_tracked)
+
+
+def _go_on(task: Task, unfinished: UnfinishedRun) -> Outcome | None:
+    """Go on with what the folder holds, and return what became of it; None: it holds nothing."""
+    if unfinished.document_path.exists():
+        from nacre.cli.start import resume_run
+
+        _require_same_options("begun", unfinished.document()["options"], task.options)
+        _carry_out(resume_run(unfinished))
+        return "resumed"
+    names = ["model.ply", "trajectory.txt", "report.json", *["report.html"] * task.options.report]
+    if not all((task.folder / name).is_file() for name in names):
+        return None
+    report = SavedRun(task.folder).report
+    if report.get("interrupted"):
+        return None
+    _require_same_options("done", report.get("options", {}), task.options)
+    return "finished before"
+
+
+def _require_same_options(state: str, before: Mapping[str, Any], options: RunOptions) -> None:
+    from nacre.cli.terminal import CommandError
+
+    now = plain(dataclasses.asdict(options))
+    names = [name for name in now if name not in before or before[name] != now[name]]
+    if names:
+        told = ", ".join(f"{name} was {before.get(name)!r}, is {now[name]!r}" for name in names)
+        raise CommandError(f"it was {state} with other options: {told}")
+
+
+def _carry_out(job: Job) -> None:
+    """Bring a run to its end; that too few frames were tracked is no error here."""
+    from nacre.cli.run import carry_out
+    from nacre.cli.signals import Interruption
+    from nacre.cli.terminal import CommandError, Terminal
+
+    try:
+        carry_out(Terminal(quiet=True), job, Interruption(), None)
     except CommandError as error:
-        if error.code != 3:  # with 3 too few frames were tracked, and all is written
+        if error.code != 3:
             raise

@@ -137,6 +137,20 @@ def test_damaged_files_are_told_and_replaced_if_wanted(task_for: MakeTask, tmp_p
     assert reconstruct_recording(task_for(overwrite=True)).outcome == "reconstructed"
 
 
+def test_what_cannot_go_on_is_told_and_begun_again_if_wanted(
+    task_for: MakeTask, scans: Path, alone: Any, tmp_path: Path
+) -> None:
+    killed_after(4, "reconstruct", scans / "cup", "-o", tmp_path / "cup", "--no-report")
+    checkpoint = tmp_path / "cup" / "unfinished" / "checkpoint"
+    checkpoint.write_bytes(checkpoint.read_bytes()[:-100])
+    result = reconstruct_recording(task_for())
+    assert result.outcome == "failed"
+    assert "unfinished/checkpoint" in result.message
+    assert result.message.endswith("; --overwrite begins it again")
+    assert reconstruct_recording(task_for(overwrite=True)).outcome == "reconstructed"
+    assert results(tmp_path / "cup") == alone["cup"]
+
+
 def test_a_recording_that_fails_is_told_and_leaves_nothing(task_for: MakeTask, tmp_path: Path) -> None:
     result = reconstruct_recording(task_for("broken"))
     assert result.outcome == "failed"
@@ -181,7 +195,7 @@ def test_a_folder_that_another_process_writes_to_is_waited_for(task_for: MakeTas
     waiting.join(0.3)
     assert waiting.is_alive()
     os.close(lock)
-    waiting.join(20)
+    waiting.join(300)
     assert found[0].outcome == "finished before"
 
 
