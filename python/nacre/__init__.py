@@ -42,6 +42,7 @@ if TYPE_CHECKING:
         RegistrationParameters,
     )
     from nacre.progress import Cancelled
+    from nacre.reconstruction.batch.batch import batch
     from nacre.reconstruction.reconstruct import reconstruct
     from nacre.region import RegionReport, select_region
     from nacre.registration import AlignResult, align
@@ -84,6 +85,7 @@ __all__ = [
     "align_global",
     "associate",
     "back_project",
+    "batch",
     "built_in_object",
     "calibrate_depth",
     "calibrate_noise",
@@ -145,6 +147,7 @@ _NAMES = {
     "parameters": "DepthParameters GlobalRegistrationParameters ModelParameters RegionParameters "
     "RegistrationParameters",
     "progress": "Cancelled",
+    "reconstruction.batch.batch": "batch",
     "reconstruction.reconstruct": "reconstruct",
     "region": "RegionReport select_region",
     "registration": "AlignResult align",

@@ -70,6 +70,7 @@ def objects(folder: Path) -> dict[str, Any]:
     truth = np.stack(poses)
     made = [
         camera, mesh, frames[0], done, done.model, done.model.parameters, done.model.noise, tree,
+        nacre.reconstruction.BatchResult("teddy", "scans/teddy", Path("models/teddy")),
         done.frames[0], done.frames[0].report, done.trajectory, samples, nacre.CameraFile(camera, 1000.0),
         mesh.closest(points[:3]), mesh.cast(points[:3], points[:3]), nacre.Cloud(points),
         nacre.consolidate(points, num_points=100), nacre.align(points, points),

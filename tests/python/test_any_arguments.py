@@ -123,8 +123,8 @@ def test_any_parameter(name: str, default: Any) -> None:
 
 # What the table does not call: results, which hold what nacre found, and what reads files.
 RESULTS = {
-    "AbsoluteTrajectoryError", "AlignResult", "CameraFile", "ClosestPoints", "Cloud", "Completeness",
-    "Consolidated",
+    "AbsoluteTrajectoryError", "AlignResult", "BatchResult", "CameraFile", "ClosestPoints", "Cloud",
+    "Completeness", "Consolidated",
     "DepthReport", "FScore", "FrameRecord", "FrameReport", "GlobalAlignResult", "NormalError", "PoseError",
     "RadiusNeighbors", "RayHits", "Reconstruction", "RegionReport", "RelativePoseError", "Sequence",
     "SequenceFrame",
@@ -141,7 +141,7 @@ FILES = {
     "nacre.model.Model.load",
     "nacre.io.cameras.read_camera", "nacre.io.meshes.read_mesh",
     "nacre.io.points.read_points", "nacre.io.trajectories.read_trajectory",
-    "nacre.reconstruction.reconstruct.reconstruct",
+    "nacre.reconstruction.batch.batch.batch", "nacre.reconstruction.reconstruct.reconstruct",
 }  # fmt: skip
 NOT_OF_ARRAYS = re.compile(
     r"\.(Sequence|Reconstruction)\.\w+$|\.(Model|Consolidated)\.cloud$|\.NoiseModel\.to_core$|\.as_dict$"

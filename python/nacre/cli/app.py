@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from nacre.cli.align import align
+from nacre.cli.batch import batch
 from nacre.cli.consolidate import consolidate
 from nacre.cli.convert import convert
 from nacre.cli.demo import demo
@@ -49,6 +50,7 @@ EXAMPLES: dict[Callable[..., None], str] = {
     demo: "nacre demo -o nacre-demo",
     reconstruct: "nacre reconstruct rgbd_dataset_freiburg3_teddy -o teddy",
     record: "nacre record realsense -o kitchen",
+    batch: 'nacre batch "scans/*" -o models',
     view: "nacre view teddy",
     mesh: "nacre mesh teddy -o teddy.glb",
     convert: "nacre convert teddy/model.ply teddy.las",

@@ -53,7 +53,7 @@ def complete_parameter(incomplete: str) -> list[str]:
     """Return the parameters that begin so, for the shell."""
     from nacre.parameters import ModelParameters
 
-    names = (name for name, _ in _leaves(dataclasses.asdict(ModelParameters())))
+    names = (name for name, _ in leaves(dataclasses.asdict(ModelParameters())))
     return [f"{name}=" for name in names if name.startswith(incomplete)]
 
 
@@ -97,7 +97,7 @@ def _told_by_file(path: Path, document: Mapping[str, Any], parameters: ModelPara
     from nacre.model import Model
 
     try:
-        changes = dict(_leaves(document))
+        changes = dict(leaves(document))
         changed = updated(
             parameters, {key: _checked(parameters, key, value) for key, value in changes.items()}
         )
@@ -144,17 +144,18 @@ def _setting(text: str) -> dict[str, Any]:
         raise CommandError(f"--set needs KEY=VALUE, such as registration.max_angle=0.5, got {text!r}", 2)
     toml = _toml()
     try:
-        return dict(_leaves({key: toml.loads(f"value = {value}")["value"]}))
+        return dict(leaves({key: toml.loads(f"value = {value}")["value"]}))
     except toml.TOMLDecodeError:
         if re.fullmatch(r"[A-Za-z_][\w+-]*", value):  # a word needs no quotes
             return {key: value}
         raise CommandError(f"--set {key}: {value!r} is no TOML value", 2) from None
 
 
-def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the dotted names and the values of nested parameters."""
     for key, value in tree.items():
         if isinstance(value, Mapping) and prefix + key != "depth.noise":
-            yield from _leaves(value, f"{prefix}{key}.")
+            yield from leaves(value, f"{prefix}{key}.")
         else:
             yield prefix + key, value
 

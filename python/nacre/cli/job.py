@@ -36,7 +36,7 @@ class Job:
     controls: Controls | None = None
 
 
-def begun(
+def begin_run(
     terminal: Terminal,
     options: RunOptions,
     unfinished: UnfinishedRun,
@@ -85,7 +85,7 @@ def begun(
     return Job(options, sequence, words, num_frames, run, unfinished, feed, controls if feed else None)
 
 
-def resumed(unfinished: UnfinishedRun) -> Job:
+def resume_run(unfinished: UnfinishedRun) -> Job:
     """Open what a run was asked for that was stopped or killed, and load what it had."""
     from nacre.io.atomic import remove_leftovers
 

@@ -4,15 +4,34 @@ from __future__ import annotations
 
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from nacre.cli.cameras import CAMERAS, is_camera
-from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
-from nacre.cli.job import begun, resumed
+from nacre.cli.config import ConfigOption, PresetOption, SetOption
+from nacre.cli.job import begin_run, resume_run
+from nacre.cli.reconstruct_options import (
+    AllPointsOption,
+    AttributeOption,
+    BoxOption,
+    CalibrateOption,
+    CheckpointOption,
+    ColorOption,
+    EveryOption,
+    FirstOption,
+    LastOption,
+    LoopClosureOption,
+    MasksOption,
+    MaxDepthOption,
+    MinDepthOption,
+    MinTrackedOption,
+    ObjectOption,
+    ReportOption,
+    RetryOption,
+    asked_for,
+)
 from nacre.cli.run import carry_out
-from nacre.cli.run_options import RunOptions
 from nacre.cli.signals import interruptible
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
@@ -43,99 +62,32 @@ def reconstruct(
             show_default=False,
         ),
     ] = None,
-    checkpoint_every: Annotated[
-        int | None,
-        typer.Option(
-            min=0,
-            metavar="N",
-            help="Save the run in OUT/unfinished after every N frames; 0: only where it is stopped.",
-            show_default="about 2 % of the time",
-        ),
-    ] = None,
+    checkpoint_every: CheckpointOption = None,
     format: FormatOption = None,
     camera: CameraOption = None,
     depth_scale: DepthScaleOption = None,
-    min_depth: Annotated[
-        float | None, typer.Option(help="Nearer measurements are not used (metres).", show_default=False)
-    ] = None,
-    max_depth: Annotated[
-        float | None, typer.Option(help="Farther measurements are not used (metres).", show_default=False)
-    ] = None,
-    box: Annotated[
-        tuple[float, float, float, float, float, float] | None,
-        typer.Option(
-            metavar="X0 X1 Y0 Y1 Z0 Z1",
-            help="Model only what is in this box of the camera's frame (metres; x right, y down, z forward).",
-            show_default=False,
-        ),
-    ] = None,
-    object: Annotated[
-        bool,
-        typer.Option(
-            "--object", help="Model only the largest thing that stands on a plane, e.g. a turntable."
-        ),
-    ] = False,
-    masks: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FOLDER",
-            help="Images named as the depth images; black pixels are not used.",
-            show_default="the recording's",
-        ),
-    ] = None,
-    every: Annotated[int, typer.Option(min=1, metavar="N", help="Use every N-th frame.")] = 1,
-    first: Annotated[int, typer.Option(min=0, metavar="INDEX", help="The first frame, from 0.")] = 0,
-    last: Annotated[
-        int | None, typer.Option(min=0, metavar="INDEX", help="The last frame.", show_default="all")
-    ] = None,
+    min_depth: MinDepthOption = None,
+    max_depth: MaxDepthOption = None,
+    box: BoxOption = None,
+    object: ObjectOption = False,
+    masks: MasksOption = None,
+    every: EveryOption = 1,
+    first: FirstOption = 0,
+    last: LastOption = None,
     realtime: Annotated[
         bool,
         typer.Option(
             "--realtime", help="Play the recording as a camera would; frames that come too fast are dropped."
         ),
     ] = False,
-    color: Annotated[bool, typer.Option("--color/--no-color", help="Give the model colours.")] = True,
-    retry: Annotated[
-        bool,
-        typer.Option("--retry/--no-retry", help="At the end, try lost frames again while any is found."),
-    ] = True,
-    loop_closure: Annotated[
-        bool | None,
-        typer.Option(
-            "--loop-closure/--no-loop-closure",
-            help="Correct model and poses where the camera comes back to what it saw before.",
-            show_default="on",
-        ),
-    ] = None,
-    calibrate: Annotated[
-        bool | None,
-        typer.Option(
-            "--calibrate/--no-calibrate",
-            help="Where views in several directions show that depth is systematically wrong, correct it.",
-            show_default="on",
-        ),
-    ] = None,
-    attribute: Annotated[
-        list[str] | None,
-        typer.Option(
-            metavar="NAME=FOLDER",
-            help="Images of anything else, named as the depth images; fused along. May be repeated.",
-        ),
-    ] = None,
-    all_points: Annotated[
-        bool,
-        typer.Option(
-            "--all-points",
-            help="Write the points, too, that are no surface: litter, and layers that surer ones cover.",
-        ),
-    ] = False,
-    report: Annotated[bool, typer.Option("--report/--no-report", help="Write report.html.")] = True,
-    min_tracked: Annotated[
-        float,
-        typer.Option(
-            min=0, max=1, metavar="PART", help="Exit with 3 where a smaller part of the frames is tracked."
-        ),
-    ] = 0.5,
+    color: ColorOption = True,
+    retry: RetryOption = True,
+    loop_closure: LoopClosureOption = None,
+    calibrate: CalibrateOption = None,
+    attribute: AttributeOption = None,
+    all_points: AllPointsOption = False,
+    report: ReportOption = True,
+    min_tracked: MinTrackedOption = 0.5,
     view: Annotated[
         bool, typer.Option("--view", help="Show the model in the browser while it grows.")
     ] = False,
@@ -165,6 +117,7 @@ def reconstruct(
     Ctrl-C (and SIGTERM) saves the run and writes what there is; --resume OUT goes on with it, and with one
     that was killed, to the same model. OUT/unfinished is there as long as a run is not finished.
     """
+    arguments = locals()
     terminal = Terminal(json, quiet, verbose)
     from nacre.reconstruction.resume import UnfinishedRun
 
@@ -173,42 +126,18 @@ def reconstruct(
         if resume is not None:
             _refuse_more_options(context, resume)
             unfinished = ends.enter_context(closing(UnfinishedRun(resume, checkpoint_every)))
-            job = resumed(unfinished)
+            job = resume_run(unfinished)
         else:
             if source is None or out is None:
                 missing = "argument 'SOURCE'" if source is None else "option '--out' / '-o'"
                 raise CommandError(f"missing {missing} (see nacre reconstruct --help)", 2)
             unfinished = ends.enter_context(closing(UnfinishedRun(out, checkpoint_every)))
-            more: dict[str, Any] = {
-                "depth.min_depth": min_depth,
-                "depth.max_depth": max_depth,
-                "loop_closure": loop_closure,
-                "calibrate_depth": calibrate,
-            }
-            sides = ("min_x", "max_x", "min_y", "max_y", "min_z", "max_z")
-            more |= {f"region.{side}": value for side, value in zip(sides, box or (), strict=box is not None)}
-            more["region.object"] = object or None
-            parameters, preset_name = model_parameters(preset, config, settings, **more)
-            options = RunOptions(
-                str(source),
-                format=format,
-                camera=_text(camera),
-                depth_scale=depth_scale,
-                masks=_text(masks),
-                attribute=attribute or [],
-                color=color,
-                first=first,
-                last=last,
-                every=every,
-                realtime=realtime,
-                retry=retry,
-                preset=preset_name,
-                is_camera=is_camera(source),
-                all_points=all_points,
-                report=report,
-                min_tracked=_part("--min-tracked", min_tracked),
+            options, parameters = asked_for(
+                arguments, source=str(source), realtime=realtime, is_camera=is_camera(source)
             )
-            job = begun(terminal, options, unfinished, parameters, stop, window.controls if window else None)
+            job = begin_run(
+                terminal, options, unfinished, parameters, stop, window.controls if window else None
+            )
         carry_out(terminal, job, stop, window)
 
 
@@ -216,16 +145,6 @@ def _window(port: int) -> Window:
     from nacre.viewer import Controls
 
     return Window(port, Controls("recording"))
-
-
-def _part(option: str, value: float) -> float:
-    if not 0 <= value <= 1:  # NaN, which the parser lets through
-        raise CommandError(f"{option} must be 0 to 1, got {value}", 2)
-    return value
-
-
-def _text(path: Path | None) -> str | None:
-    return None if path is None else str(path)
 
 
 def _refuse_more_options(context: typer.Context, out: Path) -> None:

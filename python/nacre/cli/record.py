@@ -10,9 +10,16 @@ import typer
 
 from nacre.cli.cameras import CAMERAS, is_camera
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
-from nacre.cli.job import begun
+from nacre.cli.job import begin_run
+from nacre.cli.reconstruct_options import (
+    ColorOption,
+    MaxDepthOption,
+    MinDepthOption,
+    ObjectOption,
+    ReportOption,
+)
 from nacre.cli.run import carry_out
-from nacre.cli.run_options import RunOptions
+from nacre.cli.run_options import RunOptions, changed_parameters
 from nacre.cli.signals import interruptible
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 from nacre.cli.view import PortOption
@@ -31,19 +38,10 @@ def record(
     out: Annotated[
         Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the results.", show_default=False)
     ],
-    min_depth: Annotated[
-        float | None, typer.Option(help="Nearer measurements are not used (metres).", show_default=False)
-    ] = None,
-    max_depth: Annotated[
-        float | None, typer.Option(help="Farther measurements are not used (metres).", show_default=False)
-    ] = None,
-    object: Annotated[
-        bool,
-        typer.Option(
-            "--object", help="Model only the largest thing that stands on a plane, e.g. a turntable."
-        ),
-    ] = False,
-    color: Annotated[bool, typer.Option("--color/--no-color", help="Give the model colours.")] = True,
+    min_depth: MinDepthOption = None,
+    max_depth: MaxDepthOption = None,
+    object: ObjectOption = False,
+    color: ColorOption = True,
     last: Annotated[
         int | None,
         typer.Option(min=0, metavar="INDEX", help="The last frame, from 0.", show_default="when stopped"),
@@ -51,7 +49,7 @@ def record(
     window: Annotated[
         bool, typer.Option("--window/--no-window", help="Open a window; without, it begins at once.")
     ] = True,
-    report: Annotated[bool, typer.Option("--report/--no-report", help="Write report.html.")] = True,
+    report: ReportOption = True,
     port: PortOption = 8080,
     preset: PresetOption = None,
     config: ConfigOption = None,
@@ -93,10 +91,11 @@ def record(
         preset=preset_name,
         is_camera=is_live,
         report=report,
+        parameters=changed_parameters(parameters),
     )
     place = _window(waits=is_live, port=port) if window and has_browser() else None
     with interruptible() as stop, closing(UnfinishedRun(out)) as unfinished:
-        job = begun(terminal, options, unfinished, parameters, stop, place.controls if place else None)
+        job = begin_run(terminal, options, unfinished, parameters, stop, place.controls if place else None)
         if window and place is None:
             terminal.say("no window: there is no browser, or no display; Ctrl-C stops")
         carry_out(terminal, job, stop, place)

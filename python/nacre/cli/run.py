@@ -140,6 +140,7 @@ def _write(job: Job, stop: Interruption) -> dict[str, Any]:
         document={
             "recording": describe_recording(job.sequence),
             "preset": job.options.preset,
+            "options": dataclasses.asdict(job.options),
             "advice": advice,
             "interrupted": stop.wanted,
             "depth_calibration": calibration

@@ -16,6 +16,7 @@ from nacre.errors import FileFormatError, shown
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
+    from nacre.parameters import ModelParameters
     from nacre.reconstruction.resume import UnfinishedRun
 
 _log = logging.getLogger(__name__)
@@ -42,6 +43,7 @@ class RunOptions:
     all_points: bool = False
     report: bool = True
     min_tracked: float = 0.5
+    parameters: dict[str, Any] = dataclasses.field(default_factory=dict)  # see changed_parameters
 
     @property
     def pick(self) -> tuple[int, int | None, int]:
@@ -101,13 +103,24 @@ class RunOptions:
         }
 
 
+def changed_parameters(parameters: ModelParameters) -> dict[str, Any]:
+    """Return the parameters that differ from the defaults, by their dotted names, as JSON has them."""
+    from nacre.cli.config import leaves
+    from nacre.evaluation.result import plain
+    from nacre.parameters import ModelParameters
+
+    defaults = dict(leaves(plain(dataclasses.asdict(ModelParameters()))))
+    found = leaves(plain(dataclasses.asdict(parameters)))
+    return {name: value for name, value in found if value != defaults.get(name)}
+
+
 def options_before(document: Mapping[str, Any], path: Path) -> tuple[RunOptions, Path]:
     """Return the options that ``run.json`` tells, and the folder that paths begin at."""
     try:
         recording = document["recording"]
         if not (recording is None or (isinstance(recording, dict) and "files" in recording)):
             raise TypeError("recording must be an object with files")
-        return _checked(RunOptions(**document["options"])), Path(document["folder"])
+        return checked(RunOptions(**document["options"])), Path(document["folder"])
     except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, f"it does not say what was asked for ({error})") from None
 
@@ -141,8 +154,8 @@ def describe_unfinished(out: Path) -> tuple[dict[str, Any], list[tuple[str, str]
     ]
 
 
-def _checked(options: RunOptions) -> RunOptions:
-    """Return options that a file tells; a TypeError or a ValueError says what nobody can have options for."""
+def checked(options: RunOptions) -> RunOptions:
+    """Return options that a file or a caller tells; a TypeError or a ValueError says what is wrong."""
     from nacre._internal.arrays import as_count, as_flag, as_number, as_scale
 
     for name in ("source", "preset", "format", "camera", "masks"):
@@ -161,6 +174,8 @@ def _checked(options: RunOptions) -> RunOptions:
         as_scale("depth_scale", options.depth_scale)
     if not (isinstance(options.attribute, list) and all(isinstance(text, str) for text in options.attribute)):
         raise TypeError(f"attribute must be a list of texts, got {shown(options.attribute)}")
+    if not isinstance(options.parameters, dict):
+        raise TypeError(f"parameters must be an object, got {shown(options.parameters)}")
     return options
 
 

@@ -46,6 +46,7 @@ READERS = {
         images,
     )
 }  # fmt: skip
+_OF_FILES = [module.FORMAT for module in (stanford, rosbag, record3d, azure_kinect)]
 # Recordings that are one file; .ply may be a range scan or a point file.
 FILE_SUFFIXES = (*rosbag.SUFFIXES, *record3d.SUFFIXES, *azure_kinect.SUFFIXES)
 
@@ -120,11 +121,17 @@ def open_sequence(
     if not folder.exists():
         beside = [p.name for p in folder.parent.iterdir()] if folder.parent.is_dir() else []
         raise FileNotFoundError(f"no such recording: {folder}{meant(folder.name, beside)}")
-    reader = _named(format) if format is not None else _recognised(folder, given)
+    reader = require_format(format) if format is not None else _recognised(folder, given)
     return check_first_view(reader.read(folder, given))
 
 
-def _named(format: str) -> Reader:
+def is_recording(path: Path) -> bool:
+    """Return whether a folder or a file looks like a recording; what is in it is not read."""
+    return any(READERS[name].recognise(path) for name in (READERS if path.is_dir() else _OF_FILES))
+
+
+def require_format(format: str) -> Reader:
+    """Return the reader of a format; a ValueError lists those that there are."""
     key = format.lower().replace("_", "-")
     if key not in READERS:
         known = ", ".join(map(repr, READERS))
@@ -134,9 +141,9 @@ def _named(format: str) -> Reader:
 
 def _recognised(path: Path, given: Overrides) -> Reader:
     if not path.is_dir():
-        for module in (stanford, rosbag, record3d, azure_kinect):
-            if module.recognise(path):
-                return READERS[module.FORMAT]
+        for name in _OF_FILES:
+            if READERS[name].recognise(path):
+                return READERS[name]
         raise UnknownRecordingError(
             path,
             "not a recording: a recording is a folder, a .bag, .mcap, .db3 or .r3d, or a range scan (.ply "

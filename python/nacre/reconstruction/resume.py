@@ -71,7 +71,8 @@ class UnfinishedRun:
 
     def hold(self) -> None:
         """Keep other processes from writing to ``OUT`` until this is closed; BlockingIOError: one does."""
-        self._lock = lock_folder(self.out)
+        if self._lock is None:
+            self._lock = lock_folder(self.out)
 
     def begin(self, run: Run, document: Mapping[str, Any]) -> None:
         """Begin a new run; what was left of another goes."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,7 +18,7 @@ from nacre.report.colormap import viridis
 from nacre.report.data import ModelCloud
 from nacre.report.image_files import encode_small
 from nacre.report.reported_frame import ReportedFrame
-from nacre.report.reverse_sides import reverse_parts
+from nacre.report.reverse_sides import ReverseParts, reverse_parts
 from nacre.report.text import length_unit, ticks
 
 OBLIQUE = (-0.75, -0.55, -1.0)
@@ -27,9 +27,17 @@ BEHIND = (0.75, -0.55, 1.0)
 _SIZE = (560, 560)
 _MAIN_SIZE = (680, 640)
 _CAMERA_SIZE = (640, 480)
+_THUMBNAIL_SIZE = (200, 150)
 _MAX_POINTS = 300_000
 _FITTED_POINTS = 50_000  # tell how far a model reaches
-_MAX_BYTES = {"main": 70_000, "camera": 55_000, "side": 50_000, "attribute": 60_000, "depth": 24_000}
+_MAX_BYTES = {
+    "main": 70_000,
+    "camera": 55_000,
+    "side": 50_000,
+    "attribute": 60_000,
+    "depth": 24_000,
+    "thumbnail": 8_000,
+}
 
 
 @dataclass(frozen=True)
@@ -85,8 +93,7 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
     extent = points[:: -(-len(points) // _FITTED_POINTS)]
     sides, scale = _fit_sides(extent, 0.001)
     reverse = functools.cache(functools.partial(reverse_parts, points, model.normals))
-    # A scene surrounds its cameras: two or more of its sides are seen from behind.
-    is_scene = sum(reverse(view).from_behind for view in sides.values()) >= 2
+    is_scene = _surrounds_its_cameras(reverse, sides)
     if is_scene:
         sides, scale = _fit_sides(extent, 0.02)  # what lies far away would make the rest tiny
     reach = measure_spacing(points, 5 if is_scene else 2)
@@ -106,7 +113,7 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
         return draw(caption, image, kind, note="reverse sides left out" if hidden else "", alt=alt)
 
     poses = [f for f in frames if f.world_from_camera is not None and f.status.upper() != "LOST"]
-    main = View.fit(extent, OBLIQUE, size=_MAIN_SIZE, outliers=0.004)
+    main = _main_view(extent, is_scene and bool(poses), _MAIN_SIZE)
     views = {
         "from the front": View.fit(extent, OBLIQUE, size=_SIZE, outliers=0.004),
         "from behind": View.fit(extent, BEHIND, size=_SIZE, outliers=0.004),
@@ -121,7 +128,7 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
             for frame in chosen
             if frame.world_from_camera is not None
         }
-        main, cameras = View.from_camera(extent, np.eye(4), size=_MAIN_SIZE), views
+        cameras = views
     few = list(views.items())[:2]
 
     def attribute(name: str, values: npt.NDArray[np.float64]) -> Attribute:
@@ -152,6 +159,40 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
         colors=colors,
         scale_bar=_scale_bar(scale * _SIZE[0]),
     )
+
+
+def draw_thumbnail(model: ModelCloud) -> bytes | None:
+    """Return the model as a small WebP file, from where the report shows it; None where there is no point."""
+    points = as_points("model.points", model.points)
+    rows = np.flatnonzero(np.isfinite(points).all(axis=1))
+    if not len(rows):
+        return None
+    rows = rows[:: -(-len(rows) // _FITTED_POINTS)]
+    points, normals = points[rows], None if model.normals is None else model.normals[rows]
+    sides, _ = _fit_sides(points, 0.001)
+    reverse = functools.partial(reverse_parts, points, normals)
+    view = _main_view(points, _surrounds_its_cameras(reverse, sides), _THUMBNAIL_SIZE)
+    image = render_points(
+        points,
+        normals,
+        None if model.colors is None else model.colors[rows],
+        view=view,
+        spacing=measure_spacing(points, 5),
+        hide_reverse=reverse(view).inside_out,
+        background=None,
+    )
+    return encode_small(image, _MAX_BYTES["thumbnail"])
+
+
+def _surrounds_its_cameras(reverse: Callable[[View], ReverseParts], sides: Mapping[str, View]) -> bool:
+    """Return whether a model is a scene: two or more of its sides are seen from behind."""
+    return sum(reverse(view).from_behind for view in sides.values()) >= 2
+
+
+def _main_view(points: npt.NDArray[Any], is_scene: bool, size: tuple[int, int]) -> View:
+    if is_scene:
+        return View.from_camera(points, np.eye(4), size=size)
+    return View.fit(points, OBLIQUE, size=size, outliers=0.004)
 
 
 def _capital(text: str) -> str:

@@ -59,6 +59,13 @@ def count(value: int) -> str:
     return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
 
 
+def duration(seconds: float) -> str:
+    """Return a time in the unit in which it reads well: seconds, minutes or hours."""
+    if seconds < 90:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60:.0f} min" if seconds < 90 * 60 else f"{seconds / 3600:.1f} h"
+
+
 def length_unit(metres: float) -> tuple[str, float]:
     """Return the unit in which a length reads well, and how many of it are in a metre."""
     if not math.isfinite(metres) or metres >= 2:
