@@ -7,6 +7,7 @@ The model in the browser while it grows, and afterwards; in a page of its own or
 from nacre.viewer.live import LiveView
 from nacre.viewer.page import export_html
 from nacre.viewer.rerun_file import export_rrd
+from nacre.viewer.same_frame import in_frame_of
 from nacre.viewer.saved_timeline import read_timeline
 from nacre.viewer.server import Viewer
 from nacre.viewer.timeline import Snapshot, Timeline
@@ -18,5 +19,6 @@ __all__ = [
     "Viewer",
     "export_html",
     "export_rrd",
+    "in_frame_of",
     "read_timeline",
 ]
