@@ -71,7 +71,7 @@ def skimage_cubes(scene: Scene) -> Laid:
     volume, is_known = np.ones(upper - lower, np.float32), np.zeros(upper - lower, bool)
     values = {name: grid.attribute(name).numpy().reshape(-1)[rows.numpy()] for name in ("tsdf", "weight")}
     there = tuple((cells - lower).T)
-    volume[there], is_known[there] = values["tsdf"], values["weight"] >= 1
+    volume[there], is_known[there] = values["tsdf"], values["weight"] > 1
     vertices, triangles, *_ = marching_cubes(volume, 0.0, gradient_direction="ascent")
     for axis in range(3):  # a cube counts where its eight voxels were seen
         is_known &= np.roll(is_known, -1, axis)

@@ -16,7 +16,7 @@ Array = npt.NDArray[np.float64]
 Bytes = npt.NDArray[np.uint8]
 
 SAMPLES = 50_000
-MOST_FRAMES = 60
+MOST_FRAMES = 50
 HELD_OUT = 8
 """Of the frames of a real recording each eighth is kept from the model."""
 NEAR = 0.02

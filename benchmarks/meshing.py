@@ -6,7 +6,8 @@ Each method lays triangles over what nacre tracked: `triangulate` and `close_sur
 Open3D's Poisson and ball pivoting and CGAL's advancing front over the same points, and TSDFs of the images at
 nacre's poses, in voxels of the points' spacing, by Open3D and by scikit-image's marching cubes over the same
 voxels. `mesh_scenes.py` says what is compared with the truth of an object, and with held-out images of a
-recording. Parts are what edges join, holes rings of open edges, memory is how much the peak rises.
+recording. Parts are what edges join, holes rings of open edges, memory is how much the peak rises; times are
+the processor's, of all threads, so that other work on the machine does not count.
 
     pip install open3d scikit-image cgal                         # peers, in an environment of their own
     python benchmarks/meshing.py [CASE ...] [--page docs/algorithms/meshing.md]
@@ -29,8 +30,8 @@ from mesh_scenes import Laid, Painted, Recorded, Scene
 from suite.worker import give_back_memory, memory, reset_peak
 
 OBJECTS = ["bunny-kinect36", "spot-kinect36", "homer-kinect36", "fandisk-kinect36"]
-RECORDINGS = ["icl", "teddy", "d435", "boxcan"]
-HEADS = ["", "time [s]", "memory [MB]", "triangles", "parts", "holes", "RMS [mm]", "median [mm]"]
+RECORDINGS = ["icl", "d435"]
+HEADS = ["", "CPU [s]", "memory [MB]", "triangles", "parts", "holes", "RMS [mm]", "median [mm]"]
 HEADS += ["complete", "made up", "colour"]
 MARKS = "<!-- made by benchmarks/meshing.py -->", "<!-- end -->"
 
@@ -53,17 +54,12 @@ def parts_and_holes(triangles: npt.NDArray[np.int32]) -> tuple[int, int]:
 
 
 def timed(scene: Scene, method: Callable[[Scene], Laid]) -> tuple[float, float, Laid]:
-    """Run a method once for its memory [MB], and again for its median time [s] where it is quick."""
+    """Return the processor time of a method [s], how much memory it took [MB], and its mesh."""
     give_back_memory()
     before = memory("VmRSS") if reset_peak() else np.nan
-    times = []
-    while not times or (len(times) < 3 and times[-1] < 10):
-        begin = time.perf_counter()
-        laid = method(scene)
-        times.append(time.perf_counter() - begin)
-        if len(times) == 1:
-            peak = memory("VmHWM") - before
-    return float(np.median(times)), peak / 1e6, laid
+    begin = time.process_time()
+    laid = method(scene)
+    return time.process_time() - begin, (memory("VmHWM") - before) / 1e6, laid
 
 
 def row(name: str, scene: Scene, method: Callable[[Scene], Laid]) -> str:

@@ -10,7 +10,7 @@ written), ``viewer`` and ``report`` (their pages).
 from __future__ import annotations
 
 import argparse
-import subprocess
+import contextlib
 import sys
 import tempfile
 from pathlib import Path
@@ -21,6 +21,8 @@ from PIL import Image
 from surfaces import FRONT, REVERSE
 
 import nacre
+from nacre.cli import main as nacre_command
+from nacre.rendering import render_points
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path += [str(ROOT / "benchmarks"), str(ROOT / "tests" / "python")]
@@ -29,7 +31,7 @@ import cases  # noqa: E402
 import mesh_methods  # noqa: E402
 from mesh_scenes import Laid, Scene  # noqa: E402
 
-MESHED = {"teddy": 2, "d435": 3, "icl": 2}
+MESHED = ["teddy", "d435", "icl"]
 METHODS = {
     "nacre": mesh_methods.nacre_open,
     "nacre, closed": mesh_methods.nacre_closed,
@@ -38,6 +40,7 @@ METHODS = {
 }
 CLEANED = ["teddy", "rpy", "cabinet", "d435", "robot", "sr300", "apc", "iphone", "boxcan", "icl"]
 SHOWN = ["teddy", "d435", "boxcan", "robot", "sr300", "icl"]
+FRAMES = 50
 SIDE = 0.35  # of the distance: where the picture is taken, right of the camera and above it
 PANEL = (300, 225)
 
@@ -88,11 +91,21 @@ def mesh_panel(laid: Laid, pose, size):
     return np.asarray(Image.fromarray(pixels.astype(np.uint8)).resize(size, Image.Resampling.BOX))
 
 
+def some_frames(name: str) -> cases.Case:
+    """Return a recording, of a long one some FRAMES, evenly spread."""
+    return cases.make(name, every=step_of(name))
+
+
+def step_of(name: str) -> int:
+    """Return between which frames of a recording the step is taken."""
+    return max(1, cases.REAL[name][2] // FRAMES)
+
+
 def meshes():
     """Draw meshes of the same poses, a row for each recording."""
     panels = []
-    for name, every in MESHED.items():
-        scene = Scene(cases.make(name, every=every, most=100))
+    for name in MESHED:
+        scene = Scene(some_frames(name))
         pose = beside(scene.cloud.points, middle_pose(scene.poses))
         for title, method in METHODS.items():
             panels.append((f"{name}: {title}", mesh_panel(method(scene), pose, PANEL)))
@@ -103,13 +116,13 @@ def surface():
     """Draw the models of all recordings, all points beside those that are a surface."""
     panels = []
     for name in CLEANED:
-        case = cases.make(name, most=100)
+        case = some_frames(name)
         _, model = cases.run(case, num_threads=0)
         whole, written = model.cloud(all_points=True), model.cloud()
         pose = beside(written.points, middle_pose(model.poses))
         for title, cloud in (("all points", whole), ("written", written)):
             large = draw.View.from_camera(written.points, pose, size=(2 * PANEL[0], 2 * PANEL[1]))
-            picture = nacre.render_points(cloud.points, cloud.normals, cloud.colors, view=large)
+            picture = render_points(cloud.points, cloud.normals, cloud.colors, view=large)
             small = Image.fromarray(picture).resize(PANEL, Image.Resampling.BOX)
             panels.append((f"{name}: {title}", np.asarray(small)))
     return draw.sheet(panels, columns=4)
@@ -118,10 +131,11 @@ def surface():
 def runs(folder: Path) -> dict[str, Path]:
     """Reconstruct the recordings that are shown."""
     for name in SHOWN:
-        recording, _, count = cases.REAL[name]
-        every = ["--every", str(max(1, count // 100))]
-        program = [sys.executable, "-m", "nacre", "reconstruct", str(cases.DATA / recording)]
-        subprocess.run([*program, "-o", str(folder / name), "--quiet", *every], check=False)
+        recording, every = cases.DATA / cases.REAL[name][0], str(step_of(name))
+        with contextlib.suppress(SystemExit):
+            nacre_command(
+                ["reconstruct", str(recording), "-o", str(folder / name), "--every", every, "--quiet"]
+            )
     return {name: folder / name for name in SHOWN}
 
 
@@ -152,9 +166,10 @@ def viewer():
         pages = {}
         for name, run in runs(Path(folder)).items():
             page = run / "view.html"
-            subprocess.run([sys.executable, "-m", "nacre", "view", str(run), "--html", str(page)], check=True)
+            with contextlib.suppress(SystemExit):
+                nacre_command(["view", str(run), "--html", str(page), "--quiet"])
             pages[name] = page.as_uri()
-        return screens(pages, "window.nacreViewer && document.readyState == 'complete'")
+        return screens(pages, "page.clouds.length > 0 && page.clouds[0].version > 1")
 
 
 def report():
