@@ -40,7 +40,7 @@ METHODS = {
 }
 CLEANED = ["teddy", "rpy", "cabinet", "d435", "robot", "sr300", "apc", "iphone", "boxcan", "icl"]
 SHOWN = ["teddy", "d435", "boxcan", "robot", "sr300", "icl"]
-FRAMES = 50
+FRAMES = 40
 SIDE = 0.35  # of the distance: where the picture is taken, right of the camera and above it
 PANEL = (300, 225)
 
