@@ -38,7 +38,7 @@ METHODS = {
     "Open3D, Poisson": mesh_methods.open3d_poisson,
     "Open3D, TSDF": mesh_methods.open3d_tsdf,
 }
-CLEANED = ["teddy", "rpy", "cabinet", "d435", "robot", "sr300", "apc", "iphone", "boxcan", "icl"]
+CLEANED = ["robot", "sr300", "apc", "cabinet", "teddy", "d435", "rpy", "boxcan"]
 SHOWN = ["teddy", "d435", "boxcan", "robot", "sr300", "icl"]
 FRAMES = 40
 SIDE = 0.35  # of the distance: where the picture is taken, right of the camera and above it
