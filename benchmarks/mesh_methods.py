@@ -39,7 +39,7 @@ def open3d_poisson(scene: Scene) -> Laid:
 
     extent = float(np.ptp(scene.cloud.points, axis=0).max())
     depth = int(np.ceil(np.log2(1.1 * extent / scene.spacing))) + 1
-    return _of_open3d(TriangleMesh.create_from_point_cloud_poisson(_cloud(scene), depth=depth)[0])
+    return _of_open3d(scene, TriangleMesh.create_from_point_cloud_poisson(_cloud(scene), depth=depth)[0])
 
 
 def open3d_pivoting(scene: Scene) -> Laid:
@@ -48,7 +48,7 @@ def open3d_pivoting(scene: Scene) -> Laid:
     from open3d.utility import DoubleVector
 
     radii = DoubleVector([scene.spacing, 2 * scene.spacing, 4 * scene.spacing])
-    return _of_open3d(TriangleMesh.create_from_point_cloud_ball_pivoting(_cloud(scene), radii))
+    return _of_open3d(scene, TriangleMesh.create_from_point_cloud_ball_pivoting(_cloud(scene), radii))
 
 
 def open3d_tsdf(scene: Scene) -> Laid:
@@ -127,8 +127,8 @@ def _cloud(scene: Scene) -> Any:
     return cloud
 
 
-def _of_open3d(mesh: Any) -> Laid:
-    colors = 255 * np.asarray(mesh.vertex_colors) if mesh.has_vertex_colors() else None
+def _of_open3d(scene: Scene, mesh: Any) -> Laid:
+    colors = 255 * np.asarray(mesh.vertex_colors) if scene.has_color else None
     return Laid(np.asarray(mesh.vertices), np.asarray(mesh.triangles), colors)
 
 

@@ -16,7 +16,8 @@ Array = npt.NDArray[np.float64]
 Bytes = npt.NDArray[np.uint8]
 
 SAMPLES = 50_000
-MOST_FRAMES = 50
+STEPS = {"teddy": 4, "icl": 6, "d435": 3, "rpy": 2}
+"""Between the frames of long recordings that are taken: larger ones are not tracked."""
 HELD_OUT = 8
 """Of the frames of a real recording each eighth is kept from the model."""
 NEAR = 0.02
@@ -148,7 +149,7 @@ class Recorded(Scene):
     """A real recording, of which some frames are kept from the model to measure by."""
 
     def __init__(self, name: str) -> None:
-        whole = cases.make(name, every=max(1, cases.REAL[name][2] // MOST_FRAMES))
+        whole = cases.make(name, every=STEPS.get(name, 1))
         _, tracked = cases.run(whole, num_threads=0)
         kept = [i for i in range(len(whole.depths)) if i % HELD_OUT != HELD_OUT // 2]
         super().__init__(

@@ -29,19 +29,17 @@ sys.path += [str(ROOT / "benchmarks"), str(ROOT / "tests" / "python")]
 
 import cases  # noqa: E402
 import mesh_methods  # noqa: E402
-from mesh_scenes import Laid, Scene  # noqa: E402
+from mesh_scenes import STEPS, Laid, Scene  # noqa: E402
 
 MESHED = ["teddy", "d435", "icl"]
 METHODS = {
     "nacre": mesh_methods.nacre_open,
-    "nacre, closed": mesh_methods.nacre_closed,
     "Open3D, Poisson": mesh_methods.open3d_poisson,
     "Open3D, TSDF": mesh_methods.open3d_tsdf,
 }
-CLEANED = ["robot", "sr300", "apc", "cabinet", "teddy", "d435", "rpy", "boxcan"]
+CLEANED = ["teddy", "d435", "robot", "sr300", "apc", "boxcan"]
 SHOWN = ["teddy", "d435", "boxcan", "robot", "sr300", "icl"]
-FRAMES = 40
-SIDE = 0.35  # of the distance: where the picture is taken, right of the camera and above it
+SIDE, BACK = 0.2, 0.3  # of the distance: where the picture is taken, right of the camera, and behind it
 PANEL = (300, 225)
 
 
@@ -50,7 +48,7 @@ def beside(points, pose):
     local = (points - pose[:3, 3]) @ pose[:3, :3]
     seen = local[(local[:, 2] > 0) & (np.abs(local[:, :2]) < 0.6 * local[:, 2:]).all(axis=1)]
     distance = float(np.median(seen[:, 2]))
-    eye = np.array([SIDE, -SIDE / 2, -0.1]) * distance
+    eye = np.array([SIDE, -SIDE / 2, -BACK]) * distance
     forward = np.array([0, 0, distance]) - eye
     forward /= np.linalg.norm(forward)
     right = np.cross([0, 1, 0], forward)
@@ -91,21 +89,11 @@ def mesh_panel(laid: Laid, pose, size):
     return np.asarray(Image.fromarray(pixels.astype(np.uint8)).resize(size, Image.Resampling.BOX))
 
 
-def some_frames(name: str) -> cases.Case:
-    """Return a recording, of a long one some FRAMES, evenly spread."""
-    return cases.make(name, every=step_of(name))
-
-
-def step_of(name: str) -> int:
-    """Return between which frames of a recording the step is taken."""
-    return max(1, cases.REAL[name][2] // FRAMES)
-
-
 def meshes():
     """Draw meshes of the same poses, a row for each recording."""
     panels = []
     for name in MESHED:
-        scene = Scene(some_frames(name))
+        scene = Scene(cases.make(name, every=STEPS.get(name, 1)))
         pose = beside(scene.cloud.points, middle_pose(scene.poses))
         for title, method in METHODS.items():
             panels.append((f"{name}: {title}", mesh_panel(method(scene), pose, PANEL)))
@@ -116,7 +104,7 @@ def surface():
     """Draw the models of all recordings, all points beside those that are a surface."""
     panels = []
     for name in CLEANED:
-        case = some_frames(name)
+        case = cases.make(name, every=STEPS.get(name, 1))
         _, model = cases.run(case, num_threads=0)
         whole, written = model.cloud(all_points=True), model.cloud()
         pose = beside(written.points, middle_pose(model.poses))
@@ -131,7 +119,7 @@ def surface():
 def runs(folder: Path) -> dict[str, Path]:
     """Reconstruct the recordings that are shown."""
     for name in SHOWN:
-        recording, every = cases.DATA / cases.REAL[name][0], str(step_of(name))
+        recording, every = cases.DATA / cases.REAL[name][0], str(STEPS.get(name, 1))
         with contextlib.suppress(SystemExit):
             nacre_command(
                 ["reconstruct", str(recording), "-o", str(folder / name), "--every", every, "--quiet"]
