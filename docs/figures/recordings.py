@@ -1,18 +1,15 @@
 #!/usr/bin/env python
 """
-Draw the pictures of real recordings, which ask for the recordings, Open3D and Chromium.
+Draw the pictures of real recordings, which ask for the recordings and Open3D.
 
-``python docs/figures/recordings.py --data FOLDER`` draws all into ``docs/images``; names draw some:
-``meshes`` (nacre's beside Open3D's, from the same poses), ``surface`` (all points, and those that are
-written), ``viewer`` and ``report`` (their pages).
+``python docs/figures/recordings.py --data FOLDER`` draws all into ``docs/images``; ``meshes``: nacre's beside
+Open3D's, from the same poses.
 """
 
 from __future__ import annotations
 
 import argparse
-import contextlib
 import sys
-import tempfile
 from pathlib import Path
 
 import draw
@@ -21,11 +18,9 @@ from PIL import Image
 from surfaces import FRONT, REVERSE
 
 import nacre
-from nacre.cli import main as nacre_command
-from nacre.rendering import render_points
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path += [str(ROOT / "benchmarks"), str(ROOT / "tests" / "python")]
+sys.path.append(str(ROOT / "benchmarks"))
 
 import cases  # noqa: E402
 import mesh_methods  # noqa: E402
@@ -37,8 +32,6 @@ METHODS = {
     "Open3D, Poisson": mesh_methods.open3d_poisson,
     "Open3D, TSDF": mesh_methods.open3d_tsdf,
 }
-CLEANED = ["teddy", "d435", "robot", "sr300", "apc", "boxcan"]
-SHOWN = ["teddy", "d435", "boxcan", "robot", "sr300", "icl"]
 SIDE, BACK = 0.2, 0.3  # of the distance: where the picture is taken, right of the camera, and behind it
 PANEL = (300, 225)
 
@@ -100,74 +93,7 @@ def meshes():
     return draw.sheet(panels, columns=len(METHODS))
 
 
-def surface():
-    """Draw the models of all recordings, all points beside those that are a surface."""
-    panels = []
-    for name in CLEANED:
-        case = cases.make(name, every=STEPS.get(name, 1))
-        _, model = cases.run(case, num_threads=0)
-        whole, written = model.cloud(all_points=True), model.cloud()
-        pose = beside(written.points, middle_pose(model.poses))
-        for title, cloud in (("all points", whole), ("written", written)):
-            large = draw.View.from_camera(written.points, pose, size=(2 * PANEL[0], 2 * PANEL[1]))
-            picture = render_points(cloud.points, cloud.normals, cloud.colors, view=large)
-            small = Image.fromarray(picture).resize(PANEL, Image.Resampling.BOX)
-            panels.append((f"{name}: {title}", np.asarray(small)))
-    return draw.sheet(panels, columns=4)
-
-
-def runs(folder: Path) -> dict[str, Path]:
-    """Reconstruct the recordings that are shown."""
-    for name in SHOWN:
-        recording, every = cases.DATA / cases.REAL[name][0], str(STEPS.get(name, 1))
-        with contextlib.suppress(SystemExit):
-            nacre_command(
-                ["reconstruct", str(recording), "-o", str(folder / name), "--every", every, "--quiet"]
-            )
-    return {name: folder / name for name in SHOWN}
-
-
-def screens(pages: dict[str, str], ready: str):
-    """Return what Chromium shows of pages, as a sheet."""
-    from browser import Browser
-
-    panels = []
-    with (
-        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile,
-        Browser(Path(profile)) as browser,
-    ):
-        for name, address in pages.items():
-            browser.open(address)
-            browser.wait_for(ready)
-            path = Path(profile) / "page.png"
-            path.write_bytes(browser.screenshot())
-            with Image.open(path) as shot:
-                large = shot.convert("RGB")
-                size = (600, round(600 * large.height / large.width))
-                panels.append((name, np.asarray(large.resize(size, Image.Resampling.LANCZOS))))
-    return draw.sheet(panels, columns=2)
-
-
-def viewer():
-    """Draw the first view of the pages of six recordings."""
-    with tempfile.TemporaryDirectory() as folder:
-        pages = {}
-        for name, run in runs(Path(folder)).items():
-            page = run / "view.html"
-            with contextlib.suppress(SystemExit):
-                nacre_command(["view", str(run), "--html", str(page), "--quiet"])
-            pages[name] = page.as_uri()
-        return screens(pages, "page.clouds.length > 0 && page.clouds[0].version > 1")
-
-
-def report():
-    """Draw the reports of six recordings."""
-    with tempfile.TemporaryDirectory() as folder:
-        pages = {name: (run / "report.html").as_uri() for name, run in runs(Path(folder)).items()}
-        return screens(pages, "document.readyState == 'complete'")
-
-
-FIGURES = {"meshes": meshes, "surface": surface, "viewer": viewer, "report": report}
+FIGURES = {"meshes": meshes}
 
 
 def main() -> None:
