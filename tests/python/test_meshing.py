@@ -189,6 +189,14 @@ class TestOnSurface:
 
 
 class TestCloseSurface:
+    def test_noise_of_the_points_is_averaged(self) -> None:
+        points, normals = sphere(2000)
+        noise = 0.0016  # a fifth of the distance between points
+        errors = np.random.default_rng(0).normal(0, noise, (2000, 1))
+        surface = close_surface(points + errors * normals, normals)
+        radii = np.linalg.norm(surface.vertices, axis=1)
+        assert np.sqrt(np.mean((radii - 0.1) ** 2)) < 0.37 * noise
+
     def test_a_sphere_without_its_cap_is_closed_and_the_cap_is_a_guess(self) -> None:
         points, normals = sphere(4000)
         low = points[:, 2] < 0.08

@@ -42,10 +42,11 @@ def view(
 
     The page shows the model as points or as a mesh, coloured as seen or by shading, normal, confidence or
     age, measures distances, crops and saves points, hides those of low confidence, and plays how the model
-    grew; with --compare also how far two runs are apart. --rrd needs the extra "rerun".
+    grew; with --compare also how far two runs are apart, after the other is brought into the frame of
+    the first where frames differ. --rrd needs the extra "rerun".
     """
     terminal = Terminal(False, quiet, verbose)
-    from nacre.viewer import Viewer, export_html, export_rrd, read_timeline
+    from nacre.viewer import Viewer, export_html, export_rrd, in_frame_of, read_timeline
 
     if rrd is not None and compare is not None:
         raise CommandError("--rrd writes one run: leave out --compare", 2)
@@ -57,6 +58,8 @@ def view(
     other = others[0] if others else None
     if other is not None:
         timeline.title, other.title = (source.name for source in sources)
+        other = in_frame_of(timeline, other)
+        terminal.say(f"{other.title}: {other.placement}")
     if html is not None:
         export_html(timeline, html, other=other)
         terminal.say(table([("page", str(html))]))

@@ -8,6 +8,7 @@ from nacre.viewer.controls import Controls
 from nacre.viewer.live import LiveView
 from nacre.viewer.page import export_html
 from nacre.viewer.rerun_file import export_rrd
+from nacre.viewer.same_frame import in_frame_of
 from nacre.viewer.saved_timeline import read_timeline
 from nacre.viewer.server import Viewer
 from nacre.viewer.timeline import Snapshot, Timeline
@@ -20,5 +21,6 @@ __all__ = [
     "Viewer",
     "export_html",
     "export_rrd",
+    "in_frame_of",
     "read_timeline",
 ]

@@ -63,7 +63,7 @@ def export_html(
     path : path-like
         The file, usually ``view.html``; it appears when it is complete.
     other : Timeline, optional
-        Another run of the same scene, in the same world frame, to compare with.
+        Another run of the same scene, in the same world frame (:func:`in_frame_of`), to compare with.
     triangles : bool
         Whether the page can show a mesh, and holes; without, it is smaller.
 

@@ -143,6 +143,7 @@ class PageData:
         states = [{"name": s.name, "place": s.place} for s in self._states if s.run == run]
         return {
             "title": timeline.title,
+            "placement": timeline.placement,
             "hasDepth": timeline.depth_of is not None and timeline.camera is not None,
             "frustum": frustum_corners(timeline.camera).tolist(),
             "frames": frames,

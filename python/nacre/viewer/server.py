@@ -29,7 +29,7 @@ class Viewer:
     timeline : Timeline
         May grow while it is shown; call :meth:`refresh` then.
     other : Timeline, optional
-        Another run of the same scene, in the same world frame, to compare with.
+        Another run of the same scene, in the same world frame (:func:`in_frame_of`), to compare with.
     host, port : str, int
         Where to listen; another port is taken where this one is in use, any free one for 0.
     parameters : DepthParameters, optional

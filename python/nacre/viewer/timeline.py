@@ -108,6 +108,8 @@ class Timeline:
     ----------
     frames : list of ReportedFrame
         In the order in which they came; their true poses in the world of the model.
+    placement : str
+        Of a run that is compared with another: how it came into the other's world frame; "" where not known.
     """
 
     def __init__(
@@ -127,6 +129,7 @@ class Timeline:
         self.depth_of = depth_of
         self.is_upright = is_upright
         self.frames: list[ReportedFrame] = []
+        self.placement = ""
         self._snapshots: list[tuple[int, Snapshot]] = []
         self._max_snapshots = max_snapshots
         self._max_points = max_points

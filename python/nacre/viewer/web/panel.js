@@ -12,6 +12,8 @@ function showDocument({ title, runs, depthLegend }) {
   document.title = title;
   document.getElementById("title").textContent = title;
   document.getElementById("compare").hidden = runs.length < 2;
+  const other = runs[1];
+  document.getElementById("placement").textContent = other?.placement ? `${other.title}: ${other.placement}` : "";
   document.getElementById("depth-legend").innerHTML = depthLegend;
   const { frames } = runs[0], counts = new Map();
   frames.forEach(({ status }) => counts.set(status, (counts.get(status) ?? 0) + 1));

@@ -1,0 +1,160 @@
+"""Ways to lay triangles over a scene, nacre's and others'."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mesh_scenes import Laid, Scene
+
+import nacre
+from nacre import meshing
+
+Array = npt.NDArray[Any]
+MOST_VOXELS, MOST_OF_CGAL = 200_000_000, 20_000  # budgets
+
+
+class OverBudgetError(Exception):
+    """A method would take more than its budget."""
+
+
+def nacre_open(scene: Scene) -> Laid:
+    """Join the points."""
+    cloud = scene.cloud
+    rows, triangles = meshing.used_rows(meshing.triangulate(cloud.points, cloud.normals))
+    return Laid(cloud.points[rows], triangles, None if cloud.colors is None else cloud.colors[rows])
+
+
+def nacre_closed(scene: Scene) -> Laid:
+    """Close the surface."""
+    surface = meshing.close_surface(scene.cloud.points, scene.cloud.normals)
+    return _colored(scene, surface.vertices, surface.triangles)
+
+
+def open3d_poisson(scene: Scene) -> Laid:
+    """Screened Poisson, cells of half the spacing, as `close_surface` has them."""
+    from open3d.geometry import TriangleMesh
+
+    extent = float(np.ptp(scene.cloud.points, axis=0).max())
+    depth = int(np.ceil(np.log2(1.1 * extent / scene.spacing))) + 1
+    return _of_open3d(scene, TriangleMesh.create_from_point_cloud_poisson(_cloud(scene), depth=depth)[0])
+
+
+def open3d_pivoting(scene: Scene) -> Laid:
+    """Balls of one, two and four spacings."""
+    from open3d.geometry import TriangleMesh
+    from open3d.utility import DoubleVector
+
+    radii = DoubleVector([scene.spacing, 2 * scene.spacing, 4 * scene.spacing])
+    return _of_open3d(scene, TriangleMesh.create_from_point_cloud_ball_pivoting(_cloud(scene), radii))
+
+
+def open3d_tsdf(scene: Scene) -> Laid:
+    """Fuse the images in a sparse grid of voxels of one spacing."""
+    mesh = _grid(scene).extract_triangle_mesh(weight_threshold=1.0)
+    colors = 255 * mesh.vertex.colors.numpy() if scene.has_color else None
+    return Laid(mesh.vertex.positions.numpy(), mesh.triangle.indices.numpy(), colors)
+
+
+def skimage_cubes(scene: Scene) -> Laid:
+    """Fuse the images in the same grid; scikit-image's marching cubes over its box."""
+    from skimage.measure import marching_cubes
+
+    grid = _grid(scene)
+    places, rows = grid.voxel_coordinates_and_flattened_indices()
+    cells = np.round(places.numpy() / scene.spacing).astype(np.int64)
+    lower, upper = cells.min(axis=0), cells.max(axis=0) + 1
+    if np.prod(upper - lower) > MOST_VOXELS:
+        raise OverBudgetError(f"not run: {np.prod(upper - lower)} voxels")
+    volume, is_known = np.ones(upper - lower, np.float32), np.zeros(upper - lower, bool)
+    values = {name: grid.attribute(name).numpy().reshape(-1)[rows.numpy()] for name in ("tsdf", "weight")}
+    there = tuple((cells - lower).T)
+    volume[there], is_known[there] = values["tsdf"], values["weight"] > 1
+    vertices, triangles, *_ = marching_cubes(volume, 0.0, gradient_direction="ascent")
+    for axis in range(3):  # a cube counts where its eight voxels were seen
+        is_known &= np.roll(is_known, -1, axis)
+    cubes = np.floor(vertices[triangles].mean(axis=1)).astype(np.int64)
+    rows, triangles = meshing.used_rows(triangles[is_known[tuple(cubes.T)]])
+    return _colored(scene, (vertices[rows] + lower) * scene.spacing, triangles)
+
+
+def cgal_front(scene: Scene) -> Laid:
+    """Advance a front of triangles over the points."""
+    from CGAL.CGAL_Advancing_front_surface_reconstruction import advancing_front_surface_reconstruction
+    from CGAL.CGAL_Kernel import Point_3
+    from CGAL.CGAL_Point_set_3 import Point_set_3
+
+    if len(scene.cloud) > MOST_OF_CGAL:
+        raise OverBudgetError(f"not run: minutes for more than {MOST_OF_CGAL} points")
+    points, corners = Point_set_3(), []
+    for point in scene.cloud.points.tolist():
+        points.insert(Point_3(*point))
+    advancing_front_surface_reconstruction(points, corners)
+    return Laid(scene.cloud.points, np.array(corners, np.int32).reshape(-1, 3), scene.cloud.colors)
+
+
+METHODS: dict[str, Callable[[Scene], Laid]] = {
+    "nacre": nacre_open,
+    "nacre, closed": nacre_closed,
+    "Open3D, Poisson": open3d_poisson,
+    "Open3D, ball pivoting": open3d_pivoting,
+    "Open3D, TSDF": open3d_tsdf,
+    "scikit-image, TSDF": skimage_cubes,
+    "CGAL, advancing front": cgal_front,
+}
+
+
+def _colored(scene: Scene, vertices: Array, triangles: Array) -> Laid:
+    """Give vertices the colours of the nearest points."""
+    colors = scene.cloud.colors
+    if colors is not None:
+        colors = colors[nacre.KdTree(scene.cloud.points).query(vertices, 1)[1]]
+    return Laid(vertices, triangles, colors)
+
+
+def _cloud(scene: Scene) -> Any:
+    import open3d as o3d
+
+    def rows(values: Array) -> Any:
+        return o3d.utility.Vector3dVector(values.astype(np.float64))
+
+    cloud = o3d.geometry.PointCloud(rows(scene.cloud.points))
+    cloud.normals = rows(scene.cloud.normals)
+    if scene.cloud.colors is not None:
+        cloud.colors = rows(scene.cloud.colors / 255)
+    return cloud
+
+
+def _of_open3d(scene: Scene, mesh: Any) -> Laid:
+    colors = 255 * np.asarray(mesh.vertex_colors) if scene.has_color else None
+    return Laid(np.asarray(mesh.vertices), np.asarray(mesh.triangles), colors)
+
+
+def _grid(scene: Scene) -> Any:
+    """Fuse the images at nacre's poses."""
+    import open3d as o3d
+
+    core, camera = o3d.core, scene.camera
+    names = ("tsdf", "weight", "color") if scene.has_color else ("tsdf", "weight")
+    channels = ((1,), (1,), (3,))[: len(names)]
+    types = (core.float32, core.float32, core.float32)[: len(names)]
+    grid = o3d.t.geometry.VoxelBlockGrid(names, types, channels, scene.spacing, 16, 20_000)
+    intrinsic = core.Tensor(
+        [[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]], core.float64
+    )
+
+    def image(pixels: Array) -> Any:
+        return o3d.t.geometry.Image(core.Tensor(np.ascontiguousarray(pixels, np.float32)))
+
+    for depth, color, pose in zip(scene.depths, scene.colors, scene.poses, strict=True):
+        if np.isfinite(pose).all():
+            images = [image(np.nan_to_num(depth))]
+            extrinsic = core.Tensor(np.linalg.inv(pose), core.float64)
+            blocks = grid.compute_unique_block_coordinates(images[0], intrinsic, extrinsic, 1.0, 10.0)
+            if color is not None:
+                images.append(image(color / 255))
+            cameras = (intrinsic, intrinsic)[: len(images)]
+            grid.integrate(blocks, *images, *cameras, extrinsic, 1.0, 10.0)
+    return grid

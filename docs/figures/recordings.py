@@ -1,0 +1,114 @@
+#!/usr/bin/env python
+"""
+Draw the pictures of real recordings, which ask for the recordings and Open3D.
+
+``python docs/figures/recordings.py --data FOLDER`` draws all into ``docs/images``; ``meshes``: nacre's beside
+Open3D's, from the same poses.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+import draw
+import numpy as np
+from PIL import Image
+from surfaces import FRONT, REVERSE
+
+import nacre
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.append(str(ROOT / "benchmarks"))
+
+import cases  # noqa: E402
+import mesh_methods  # noqa: E402
+from mesh_scenes import STEPS, Laid, Scene  # noqa: E402
+
+MESHED = ["teddy", "d435", "icl"]
+METHODS = {
+    "nacre": mesh_methods.nacre_open,
+    "Open3D, Poisson": mesh_methods.open3d_poisson,
+    "Open3D, TSDF": mesh_methods.open3d_tsdf,
+}
+SIDE, BACK = 0.2, 0.3  # of the distance: where the picture is taken, right of the camera, and behind it
+PANEL = (300, 225)
+
+
+def beside(points, pose):
+    """Return a camera's pose that was moved aside, towards the same middle of what it saw."""
+    local = (points - pose[:3, 3]) @ pose[:3, :3]
+    seen = local[(local[:, 2] > 0) & (np.abs(local[:, :2]) < 0.6 * local[:, 2:]).all(axis=1)]
+    distance = float(np.median(seen[:, 2]))
+    eye = np.array([SIDE, -SIDE / 2, -BACK]) * distance
+    forward = np.array([0, 0, distance]) - eye
+    forward /= np.linalg.norm(forward)
+    right = np.cross([0, 1, 0], forward)
+    right /= np.linalg.norm(right)
+    moved = np.eye(4)
+    moved[:3, :3] = pose[:3, :3] @ np.stack([right, np.cross(forward, right), forward], axis=1)
+    moved[:3, 3] = pose[:3, :3] @ eye + pose[:3, 3]
+    return moved
+
+
+def middle_pose(poses):
+    """Return the pose in the middle of those that are known."""
+    known = [pose for pose in poses if np.isfinite(pose).all()]
+    return np.asarray(known[len(known) // 2])
+
+
+def mesh_panel(laid: Laid, pose, size):
+    """Draw a mesh as a camera at a pose sees it, two rays a pixel; reverse sides are brown."""
+    width, height = 2 * size[0], 2 * size[1]
+    mesh = nacre.Mesh(laid.vertices, laid.triangles)
+    v, u = np.mgrid[0:height, 0:width]
+    rays = np.stack([u - width / 2 + 0.5, v - height / 2 + 0.5, np.full(u.shape, 1.05 * width)], axis=-1)
+    rays = rays.reshape(-1, 3) @ pose[:3, :3].T
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    hits = mesh.cast(np.tile(pose[:3, 3], (len(rays), 1)), rays)
+    is_hit = hits.triangles >= 0
+    places = pose[:3, 3] + np.nan_to_num(hits.distances)[:, None] * rays
+    corners = np.asarray(mesh.vertices, float)[mesh.triangles[np.maximum(hits.triangles, 0)]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = -np.einsum("ij,ij->i", normals, rays) / np.maximum(np.linalg.norm(normals, axis=1), 1e-30)
+    base = np.where(facing[:, None] > 0, FRONT, REVERSE)
+    if laid.colors is not None:
+        rows = np.maximum(hits.triangles, 0)
+        colors = laid.colors_at(nacre.ClosestPoints(places, normals, hits.distances, rows))
+        base = np.where(facing[:, None] > 0, colors, 0.5 * colors)
+    shade = 0.35 + 0.65 * np.abs(facing[:, None])
+    pixels = np.where(is_hit[:, None], base * shade, 255.0).reshape(height, width, 3)
+    return np.asarray(Image.fromarray(pixels.astype(np.uint8)).resize(size, Image.Resampling.BOX))
+
+
+def meshes():
+    """Draw meshes of the same poses, a row for each recording."""
+    panels = []
+    for name in MESHED:
+        scene = Scene(cases.make(name, every=STEPS.get(name, 1)))
+        pose = beside(scene.cloud.points, middle_pose(scene.poses))
+        for title, method in METHODS.items():
+            panels.append((f"{name}: {title}", mesh_panel(method(scene), pose, PANEL)))
+    return draw.sheet(panels, columns=len(METHODS))
+
+
+FIGURES = {"meshes": meshes}
+
+
+def main() -> None:
+    """Draw what the command line asks for."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[1])
+    parser.add_argument("names", nargs="*", metavar="NAME", help="all where none is named")
+    parser.add_argument("--data", type=Path, default=cases.DATA, help="where the recordings are")
+    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "images", help="folder of the pictures")
+    arguments = parser.parse_args()
+    cases.DATA = arguments.data
+    for name in arguments.names or FIGURES:
+        path = arguments.out / f"recordings-{name}.webp"
+        draw.save(path, FIGURES[name]())
+        print(f"{path}  {path.stat().st_size / 1e3:.0f} kB")
+
+
+if __name__ == "__main__":
+    main()
