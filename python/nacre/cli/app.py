@@ -20,6 +20,7 @@ from nacre.cli.doctor import doctor
 from nacre.cli.evaluate import evaluate
 from nacre.cli.info import info
 from nacre.cli.mesh import mesh
+from nacre.cli.normals import normals
 from nacre.cli.reconstruct import reconstruct
 from nacre.cli.signals import Stopped
 from nacre.cli.simulate import simulate
@@ -56,6 +57,7 @@ EXAMPLES: dict[Callable[..., None], str] = {
     evaluate: "nacre evaluate out/model.ply bunny.ply",
     align: "nacre align scan2.ply scan1.ply -o moved.ply",
     consolidate: "nacre consolidate noisy.ply thin.ply --radius 0.008 --num-points 2000",
+    normals: "nacre normals scan.las normals.ply --memory 2GB",
     info: "nacre info rgbd_dataset_freiburg3_teddy",
     doctor: "nacre doctor --json",
 }
