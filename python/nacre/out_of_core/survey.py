@@ -17,7 +17,7 @@ from nacre.io.las import default_of
 from nacre.io.points import SUFFIXES, is_streamed, read_chunks, require_point_suffix
 from nacre.kdtree import KdTree
 from nacre.out_of_core.hashes import Hashes, point_hashes
-from nacre.out_of_core.rows import Rows, row_type, to_rows
+from nacre.out_of_core.rows import Rows, row_type, to_cloud, to_rows
 
 PathLike = str | os.PathLike[str]
 
@@ -84,6 +84,8 @@ class Survey:
         The bounding box.
     spacing : float
         How far apart points are, as if they lay evenly on a surface; 0 where all are in one place.
+    sample : (S, 3) float64
+        The 100 000 points of the lowest hashes, all where there are fewer.
     """
 
     dtype: np.dtype[Any]
@@ -92,6 +94,7 @@ class Survey:
     lower: npt.NDArray[np.float64]
     upper: npt.NDArray[np.float64]
     spacing: float
+    sample: npt.NDArray[np.float64]
 
 
 def survey(source: Source, num_rows: int) -> Survey:
@@ -154,10 +157,7 @@ class _Look:
     def result(self, source: Source) -> Survey:
         if self._first is None or not self._num_points:
             raise ValueError(f"{_shown(source.paths)}: there is no finite point")
-        cloud = np.zeros(0, self._first[1])
-        from nacre.out_of_core.rows import to_cloud
-
-        dtype = row_type(to_cloud(cloud), frozenset(self._silent))
+        dtype = row_type(to_cloud(np.zeros(0, self._first[1])), frozenset(self._silent))
         return Survey(
             dtype,
             self._num_points,
@@ -165,6 +165,7 @@ class _Look:
             self._lower,
             self._upper,
             spacing_of(self._sample, len(self._sample) / self._num_points),
+            self._sample,
         )
 
 
