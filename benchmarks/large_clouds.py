@@ -44,11 +44,8 @@ RUNS = (
     ("out-of-core", 2, 7),
 )
 
-HEAD = (
-    "| what | where | workers | cells a task | cells | time [s] | processors [s] | a point [us] | memory [GB] "
-    "| SHA-256 |",
-    "|---|---|---|---|---|---|---|---|---|---|",
-)
+COLUMNS = ["what", "where", "workers", "cells a task", "cells", "time [s]", "processors [s]", "a point [us]"]
+COLUMNS += ["memory [GB]", "SHA-256"]
 
 
 def block_of_terrain(number: int, num_points: int) -> nacre.Cloud:
@@ -132,11 +129,18 @@ def rows_of(source: Path, num_points: int, memory: str, only: str, tasks: list[s
             output = source.with_name("result.ply")
             arguments = [task, where, str(workers), str(cells_per_task), memory, str(source), str(output)]
             seconds, busy, most, told = measured([sys.executable, __file__, "--run", *arguments])
-            digest = hashlib.file_digest(output.open("rb"), "sha256").hexdigest()[:16]
-            yield (
-                f"| {task} | {where} | {workers} | {cells_per_task} | {told['num_cells']} | {seconds:.1f} | {busy:.1f} | "
-                f"{1e6 * busy / num_points:.2f} | {most / 1e9:.2f} | `{digest}` |"
-            )
+            figures = [workers, cells_per_task, told["num_cells"], f"{seconds:.1f}", f"{busy:.1f}"]
+            figures += [f"{1e6 * busy / num_points:.2f}", f"{most / 1e9:.2f}", f"`{sha256(output)[:16]}`"]
+            yield f"| {' | '.join(map(str, [task, where, *figures]))} |"
+
+
+def sha256(path: Path) -> str:
+    """Return the hash of a file."""
+    digest = hashlib.sha256()
+    with path.open("rb") as stream:
+        while block := stream.read(1 << 24):
+            digest.update(block)
+    return digest.hexdigest()
 
 
 def main() -> None:
@@ -159,7 +163,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory(dir=asked.folder) as folder:
         source, num_points = Path(folder) / "terrain.ply", int(asked.points)
         write_terrain(source, num_points)
-        print("\n".join(HEAD))
+        print(f"| {' | '.join(COLUMNS)} |\n{'|---' * len(COLUMNS)}|")
         for row in rows_of(source, num_points, asked.memory, asked.only, asked.tasks):
             print(row, flush=True)
 

@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -128,8 +129,10 @@ def write_results(store: Store, dtype: np.dtype[Any], output: Path, select: Call
         num_points += len(rows)
         lower = np.minimum(lower, rows["points"].min(axis=0, initial=np.inf))
         upper = np.maximum(upper, rows["points"].max(axis=0, initial=-np.inf))
-    chunks = (to_cloud(select(rows)) for rows in read_results(store, dtype))
-    write_chunks(output, chunks, num_points, np.array([lower, upper]))
+    pieces = chain(
+        [np.zeros(0, dtype)], map(select, read_results(store, dtype))
+    )  # one at least, for the header
+    write_chunks(output, map(to_cloud, pieces), num_points, np.array([lower, upper]))
     return num_points
 
 
