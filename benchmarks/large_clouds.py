@@ -4,9 +4,9 @@ Clouds larger than memory: time, memory and bytes, whatever the workers and tile
     python benchmarks/large_clouds.py                          # 10 million points
     python benchmarks/large_clouds.py --points 50e6 --memory 2GB --only out-of-core
 
-Writes a terrain with buildings, then consolidates it to a twentieth and finds its normals: in memory, and out of
-core by one and two workers and with three sizes of tiles. Each runs in a process of its own; memory is the largest sum
-of the resident bytes of it and its children, a point's time is that of processors.
+Writes a terrain with buildings, then consolidates it to a twentieth and finds its normals: in memory, and out
+of core by one and two workers and with three sizes of tiles. Each runs in a process of its own; memory is the
+largest sum of the resident bytes of it and its children, a point's time is that of processors.
 """
 
 from __future__ import annotations
@@ -143,6 +143,26 @@ def sha256(path: Path) -> str:
     return digest.hexdigest()
 
 
+def halo_rows(num_points: int = 1_500_000) -> Iterator[str]:
+    """Yield, for growing halos, how far samples of a strip end from where they end in the whole cloud."""
+    random = np.random.default_rng(0)
+    xy = random.uniform([-100, -37.5], [100, 37.5], (num_points, 2))
+    z = 2 * np.sin(xy[:, 0] / 7) * np.cos(xy[:, 1] / 9) + random.normal(0, 0.03, num_points)
+    points = np.column_stack([xy, z])
+    samples = points[random.random(num_points) < FRACTION]
+    radius = nacre.consolidate(points, num_points=len(samples), iterations=0).radius
+    inner = np.abs(samples[:, 0]) < 3
+    for method, iterations in (("wlop", 10), ("wlop+", 10), ("cgal", 10), ("cgal", 35)):
+        options = {"radius": radius, "method": method, "iterations": iterations}
+        whole = nacre.project_samples(samples, points, **options)[inner]
+        for halo in (1, 2, 3, 4, 5, 6, 8, 10, 12, 20):
+            near = np.abs(samples[:, 0]) < 3 + halo * radius
+            around = points[np.abs(points[:, 0]) < 3 + (halo + 2) * radius]
+            cut = nacre.project_samples(samples[near], around, **options)[inner[near]]
+            most = np.linalg.norm(cut - whole, axis=1).max() / radius
+            yield f"| {method} | {iterations} | {halo} | {most:.1e} |"
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(
@@ -152,6 +172,7 @@ def main() -> None:
     parser.add_argument("--memory", default="2GB")
     parser.add_argument("--only", default="", help="in memory, or out-of-core")
     parser.add_argument("--tasks", nargs="*", default=["consolidate", "normals"])
+    parser.add_argument("--halo", action="store_true", help="how far a cut is felt, in place of all else")
     parser.add_argument("--folder", help="where the files are; some 40 bytes a point")
     parser.add_argument("--run", nargs=7, help=argparse.SUPPRESS)
     asked = parser.parse_args()
@@ -159,6 +180,10 @@ def main() -> None:
         task, where, workers, cells_per_task, memory, source, output = asked.run
         found = run(task, where, int(workers), int(cells_per_task), memory, Path(source), Path(output))
         print(json.dumps({"num_cells": found}))
+        return
+    if asked.halo:
+        print("| method | iterations | halo [h] | largest difference [h] |\n|---|---|---|---|")
+        print("\n".join(halo_rows()))
         return
     with tempfile.TemporaryDirectory(dir=asked.folder) as folder:
         source, num_points = Path(folder) / "terrain.ply", int(asked.points)

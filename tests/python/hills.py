@@ -9,9 +9,9 @@ import numpy as np
 
 import nacre
 
-NUM_POINTS = 40_000
+NUM_POINTS = 24_000
 ORIGIN = np.array([4_000_000.0, 5_400_000.0, 120.0])
-CELLS = {"points_per_cell": 9_000, "memory": "1GB"}
+CELLS = {"points_per_cell": 6_000, "memory": "1GB"}
 
 
 def sha256(path: Path) -> str:

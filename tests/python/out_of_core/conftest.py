@@ -21,6 +21,6 @@ def parts(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("parts")
     cloud = hills()
     order = np.random.default_rng(9).permutation(len(cloud))
-    for number, rows in enumerate(np.split(order, [5_000, 5_001, 30_000])):
+    for number, rows in enumerate(np.split(order, [5_000, 5_001, 17_000])):
         write(folder / f"{number}.ply", cloud[rows])
     return folder

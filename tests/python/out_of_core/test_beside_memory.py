@@ -39,8 +39,9 @@ def test_normals(scan: Path, tmp_path: Path) -> None:
 
 def test_downsampling(scan: Path, tmp_path: Path) -> None:
     out_of_core.voxel_downsample(scan, tmp_path / "v.ply", 0.3, **CELLS)
-    found, cloud = ordered(nacre.read_points(tmp_path / "v.ply")), hills()
-    expected = ordered(nacre.voxel_downsample(cloud, 0.3))
+    found, cloud = nacre.read_points(tmp_path / "v.ply"), hills()
+    expected = nacre.voxel_downsample(cloud, 0.3)  # in the order of the voxels
+    found = found[np.lexsort(np.floor(found.points / 0.3).T[::-1])]
     np.testing.assert_allclose(found.points, expected.points, rtol=0, atol=1e-8)
     np.testing.assert_array_equal(found.colors, expected.colors)
     nearest = np.asarray(nacre.KdTree(cloud.points).query(found.points, 8)[1])
@@ -63,14 +64,14 @@ def test_outliers(tmp_path: Path) -> None:
 
 
 def seam(scan: Path, folder: Path, **options: object) -> float:
-    """Return how much cutting a cloud into cells moves its samples, in radii, at most."""
+    """Return how much cutting a cloud into cells moves 99 % of its samples at most, in radii."""
     found: list[npt.NDArray[np.float64]] = []
-    for points_per_cell in (9_000, 10**9):
+    for points_per_cell in (6_000, 10**9):
         result = out_of_core.consolidate(
-            scan, folder / "w.ply", num_points=3000, points_per_cell=points_per_cell, memory="1GB", **options
+            scan, folder / "w.ply", num_points=2000, points_per_cell=points_per_cell, memory="1GB", **options
         )
         found.append(nacre.read_points(folder / "w.ply").points - ORIGIN)
-    return float(np.max(nacre.KdTree(found[0]).query(found[1], 1)[0])) / result.radius
+    return float(np.quantile(nacre.KdTree(found[0]).query(found[1], 1)[0], 0.99)) / result.radius
 
 
 @pytest.mark.parametrize("method", ["wlop", "wlop+", "cgal"])

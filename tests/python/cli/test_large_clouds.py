@@ -1,0 +1,71 @@
+"""Commands over clouds of any size."""
+
+import numpy as np
+import pytest
+from command_line import fails, run
+from hills import NUM_POINTS, hills, write
+
+import nacre
+
+
+@pytest.fixture(scope="module")
+def scan(tmp_path_factory):
+    return write(tmp_path_factory.mktemp("cli") / "hills.ply", hills())
+
+
+@pytest.mark.parametrize(
+    ("words", "num_points"),
+    [
+        (("consolidate", "--num-points", 500, "--iterations", 1, "--memory", "1GB"), 500),
+        (("normals", "--k", 8, "--viewpoint", 0, 0, 1e4), NUM_POINTS),
+        (("downsample", "--voxel-size", 1000), 1),
+        (("outliers", "--std-ratio", 1000), NUM_POINTS),
+    ],
+)
+def test_commands(words, num_points, scan, tmp_path):
+    out = tmp_path / "o.ply"
+    done = run(words[0], scan, out, *words[1:], "--json")
+    assert done.code == 0, done.err
+    assert (done.json["num_input"], done.json["num_points"]) == (NUM_POINTS, num_points)
+    found = nacre.read_points(out)
+    assert len(found) == num_points
+    assert set(found.attributes) == {"intensity", "classification", "gps_time"}
+    assert (found.normals is not None) == (words[0] == "normals")
+
+
+def test_a_folder_of_files_is_one_cloud(scan, tmp_path):
+    folder = tmp_path / "scans"
+    folder.mkdir()
+    cloud = hills()
+    write(folder / "a.ply", cloud[:5000])
+    write(folder / "b.ply", cloud[5000:])
+    options = ("--num-points", 500, "--iterations", 1)
+    assert run("consolidate", folder, tmp_path / "a.ply", *options).code == 0
+    assert run("consolidate", scan, tmp_path / "b.ply", *options, "--memory", "1GB").code == 0
+    assert (tmp_path / "a.ply").read_bytes() == (tmp_path / "b.ply").read_bytes()
+
+
+def test_alignment(scan, tmp_path):
+    cloud = hills()
+    write(tmp_path / "b.ply", nacre.Cloud(cloud.points + np.array([0.05, 0, 0])))
+    words = (
+        "align",
+        tmp_path / "b.ply",
+        scan,
+        "-o",
+        tmp_path / "o.ply",
+        "--memory",
+        "1GB",
+        "--max-distance",
+        1,
+    )
+    assert run(*words, "--json").json["converged"]
+    np.testing.assert_allclose(nacre.read_points(tmp_path / "o.ply").points, cloud.points, rtol=0, atol=0.005)
+    assert "--global needs both clouds in memory" in fails(2, *words, "--global")
+
+
+def test_wrong_usage(scan, tmp_path):
+    assert "memory must be a size" in fails(2, "normals", scan, tmp_path / "o.ply", "--memory", "much")
+    assert "output must end in" in fails(2, "outliers", scan, tmp_path / "o.npz")
+    fails(2, "downsample", scan, tmp_path / "o.ply")
+    assert list(tmp_path.iterdir()) == []
