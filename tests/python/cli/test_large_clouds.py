@@ -64,6 +64,13 @@ def test_alignment(scan, tmp_path):
     assert "--global needs both clouds in memory" in fails(2, *words, "--global")
 
 
+def test_evaluation(scan):
+    figures = run("evaluate", scan, scan, "--memory", "1GB", "--tau", 0.1, "--json").json
+    assert figures["surface_accuracy"]["max"] == 0
+    assert figures["f_score"]["f_score"] == [1.0]
+    assert "cannot be moved" in fails(2, "evaluate", scan, scan, "--memory", "1GB", "--align")
+
+
 def test_wrong_usage(scan, tmp_path):
     assert "memory must be a size" in fails(2, "normals", scan, tmp_path / "o.ply", "--memory", "much")
     assert "output must end in" in fails(2, "outliers", scan, tmp_path / "o.npz")

@@ -98,6 +98,17 @@ def test_consolidation_is_even_and_near_the_surface(scan: Path, tmp_path: Path) 
         np.testing.assert_array_equal(values, cloud.attributes[name][nearest])
 
 
+def test_evaluation(scan: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("nacre.out_of_core.evaluation._ROWS_AT_ONCE", 7_000)
+    points, reference = hills().points, hills(3000, seed=1).points
+    found = out_of_core.evaluate(scan, reference, tau=(0.1, 0.2))
+    accuracy = nacre.evaluation.surface_accuracy(points, reference)
+    for name in ("rms", "mean", "median", "p95", "max", "num_points"):
+        assert getattr(found.surface_accuracy, name) == pytest.approx(getattr(accuracy, name), rel=1e-3)
+    assert found.completeness == nacre.evaluation.completeness(points, reference, tau=(0.1, 0.2))
+    assert found.f_score == nacre.evaluation.f_score(points, reference, tau=(0.1, 0.2))
+
+
 def test_points_in_one_place_give_one_sample(tmp_path: Path) -> None:
     cloud = hills(5000)
     twice = nacre.Cloud(np.repeat(cloud.points, 2, axis=0))
