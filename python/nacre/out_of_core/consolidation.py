@@ -153,11 +153,12 @@ class Wlop:
 
     def work(self, cell: Cell) -> Rows:
         """Return the samples of a cell where they have come to."""
-        is_sample = (cell.hashes <= np.uint64(self.highest)) & (cell.distances <= self.sample_halo)
-        is_sample[1:] &= (cell.rows["points"][1:] != cell.rows["points"][:-1]).any(axis=1)
-        samples = np.flatnonzero(is_sample)
-        num_own = int(np.searchsorted(samples, cell.num_own))
         points = np.ascontiguousarray(cell.rows["points"])
+        is_near = cell.distances <= self.sample_halo
+        samples = np.flatnonzero((cell.hashes <= np.uint64(self.highest)) & is_near)
+        is_alone = (points[samples] != points[samples - 1]).any(axis=1)  # points in one place are neighbours
+        samples = samples[is_alone | (samples == 0)]
+        num_own = int(np.searchsorted(samples, cell.num_own))
         if num_own == 0:
             return cell.rows[:0]
         moved = project_samples(

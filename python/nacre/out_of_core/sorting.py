@@ -93,7 +93,7 @@ def sort_into_cells(
             if lowest is not None:
                 lowest.keep(point_hashes(rows["points"], seed))
             cubes = place_of_key[np.searchsorted(keys, grid.keys(rows["points"]))]
-            by_cube = np.argsort(cubes, kind="stable")
+            by_cube = np.argsort(cubes)
             rows, cubes = rows[by_cube], cubes[by_cube]
             begins = np.flatnonzero(np.diff(cubes, prepend=-1))
             sizes = np.diff(begins, append=len(cubes))

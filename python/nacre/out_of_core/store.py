@@ -171,7 +171,7 @@ def _store_of(folder: Path, plan: Mapping[str, npt.NDArray[Any]]) -> Store:
 
 def _canonical_order(rows: Rows, hashes: Hashes) -> npt.NDArray[np.intp]:
     """Return the order of the hashes; points in the same place by the bytes of all that they have."""
-    order = np.argsort(hashes, kind="stable")
+    order = np.argsort(hashes)
     ordered = hashes[order]
     is_tied = np.zeros(len(order), bool)
     is_tied[1:] = ordered[1:] == ordered[:-1]
@@ -186,5 +186,8 @@ def _canonical_order(rows: Rows, hashes: Hashes) -> npt.NDArray[np.intp]:
 def _distances(
     points: npt.NDArray[Any], lower: npt.NDArray[np.float64], upper: npt.NDArray[np.float64]
 ) -> npt.NDArray[np.float64]:
-    outside = np.maximum(lower - points, points - upper).max(axis=1, initial=0.0)
-    return np.asarray(np.maximum(outside, 0.0), np.float64)
+    farthest = np.zeros(len(points))
+    for axis in range(3):
+        along = points[:, axis].astype(np.float64)
+        np.maximum(farthest, np.maximum(lower[axis] - along, along - upper[axis]), out=farthest)
+    return farthest

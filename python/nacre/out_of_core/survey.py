@@ -17,7 +17,7 @@ from nacre.io.las import default_of
 from nacre.io.points import SUFFIXES, is_streamed, read_chunks, require_point_suffix
 from nacre.kdtree import KdTree
 from nacre.out_of_core.hashes import Hashes, point_hashes
-from nacre.out_of_core.rows import Rows, row_type, to_cloud, to_rows
+from nacre.out_of_core.rows import Rows, is_finite, row_type, to_cloud, to_rows
 
 PathLike = str | os.PathLike[str]
 
@@ -109,7 +109,7 @@ def finite_rows(source: Source, of: Survey, num_rows: int) -> Iterator[Rows]:
     """Yield the finite points of a cloud in pieces."""
     for _, cloud in source.chunks(num_rows):
         rows = to_rows(cloud, of.dtype)
-        yield rows[np.isfinite(rows["points"]).all(axis=1)]
+        yield rows[is_finite(rows["points"])]
 
 
 class _Look:
@@ -135,7 +135,7 @@ class _Look:
                 path, f"its fields must be those of the first file: {first}, it {_told(dtype)}"
             )
         self._silent = {n for n in self._silent if (cloud.attributes[n] == default_of(n)).all()}
-        finite = cloud.points[np.isfinite(cloud.points).all(axis=1)].astype(np.float64)
+        finite = cloud.points[is_finite(cloud.points)].astype(np.float64)
         self._num_left_out += len(cloud) - len(finite)
         if len(finite):
             self._num_points += len(finite)
@@ -150,7 +150,7 @@ class _Look:
             low = np.flatnonzero(hashes < self._hashes[-1])
             hashes, points = hashes[low], points[low]
         all_hashes = np.concatenate([self._hashes, hashes])
-        order = np.argsort(all_hashes, kind="stable")[:_SAMPLE_SIZE]
+        order = np.argsort(all_hashes)[:_SAMPLE_SIZE]
         self._sample = np.concatenate([self._sample, points])[order]
         self._hashes = all_hashes[order]
 
