@@ -55,6 +55,7 @@ def cluster_client(scheduler: str | None, workers: int | None, num_tasks: int) -
         ends.enter_context(silence_logging_cmgr(logging.CRITICAL))
         if scheduler is None:
             cluster = ends.enter_context(_local_cluster(distributed, workers, num_tasks))
+            _log.info("%d workers; dashboard: %s", len(cluster.workers), cluster.dashboard_link)
             yield ends.enter_context(distributed.Client(cluster))
             return
         try:
@@ -87,7 +88,7 @@ def _local_cluster(distributed: Any, workers: int | None, num_tasks: int) -> Any
         )
     except RuntimeError as error:
         raise RuntimeError(
-            "the processes that reconstruct did not start: a script must call nacre.batch below "
+            "the processes did not start: a script must call what starts them below "
             'if __name__ == "__main__":, for they import it'
         ) from error
 

@@ -9,7 +9,9 @@ from typing import Annotated, Any
 import typer
 
 from nacre.cli.large_clouds import (
+    POINTS_PER_CELL,
     MemoryOption,
+    PointsPerCellOption,
     SchedulerOption,
     SourceArgument,
     WorkersOption,
@@ -47,6 +49,7 @@ def consolidate(
     ] = Method.wlop,
     seed: Annotated[int, typer.Option(min=0, help="Of the choice of points.")] = 0,
     memory: MemoryOption = None,
+    points_per_cell: PointsPerCellOption = POINTS_PER_CELL,
     workers: WorkersOption = None,
     scheduler: SchedulerOption = None,
     json: Json = False,
@@ -75,6 +78,7 @@ def consolidate(
                 method=method.value,
                 seed=seed,
                 memory=memory,
+                points_per_cell=points_per_cell,
                 workers=workers,
                 scheduler=scheduler,
                 progress=progress,

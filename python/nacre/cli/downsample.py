@@ -7,8 +7,10 @@ from typing import Annotated
 import typer
 
 from nacre.cli.large_clouds import (
+    POINTS_PER_CELL,
     MemoryOption,
     OutArgument,
+    PointsPerCellOption,
     SchedulerOption,
     SourceArgument,
     WorkersOption,
@@ -25,6 +27,7 @@ def downsample(
         float, typer.Option(help="Edge of a cube, in the unit of the points.", show_default=False)
     ],
     memory: MemoryOption = None,
+    points_per_cell: PointsPerCellOption = POINTS_PER_CELL,
     workers: WorkersOption = None,
     scheduler: SchedulerOption = None,
     json: Json = False,
@@ -46,6 +49,7 @@ def downsample(
             out,
             voxel_size,
             memory=memory,
+            points_per_cell=points_per_cell,
             workers=workers,
             scheduler=scheduler,
             progress=progress,

@@ -49,6 +49,15 @@ SchedulerOption = Annotated[
         show_default=False,
     ),
 ]
+PointsPerCellOption = Annotated[
+    int,
+    typer.Option(
+        min=1,
+        metavar="N",
+        help="The most points of a piece; fewer need less memory, and change the result by rounding alone.",
+    ),
+]
+POINTS_PER_CELL = 4_000_000
 
 _BYTES_PER_BYTE = 10  # of memory, of a file that is worked on as a whole
 

@@ -7,8 +7,10 @@ from typing import Annotated
 import typer
 
 from nacre.cli.large_clouds import (
+    POINTS_PER_CELL,
     MemoryOption,
     OutArgument,
+    PointsPerCellOption,
     SchedulerOption,
     SourceArgument,
     WorkersOption,
@@ -33,6 +35,7 @@ def normals(
         tuple[float, float, float], typer.Option(metavar="X Y Z", help="Normals point to this side.")
     ] = (0.0, 0.0, 0.0),
     memory: MemoryOption = None,
+    points_per_cell: PointsPerCellOption = POINTS_PER_CELL,
     workers: WorkersOption = None,
     scheduler: SchedulerOption = None,
     json: Json = False,
@@ -56,6 +59,7 @@ def normals(
             max_radius=max_radius,
             viewpoint=viewpoint,
             memory=memory,
+            points_per_cell=points_per_cell,
             workers=workers,
             scheduler=scheduler,
             progress=progress,

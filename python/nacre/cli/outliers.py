@@ -7,8 +7,10 @@ from typing import Annotated
 import typer
 
 from nacre.cli.large_clouds import (
+    POINTS_PER_CELL,
     MemoryOption,
     OutArgument,
+    PointsPerCellOption,
     SchedulerOption,
     SourceArgument,
     WorkersOption,
@@ -34,6 +36,7 @@ def outliers(
         ),
     ] = None,
     memory: MemoryOption = None,
+    points_per_cell: PointsPerCellOption = POINTS_PER_CELL,
     workers: WorkersOption = None,
     scheduler: SchedulerOption = None,
     json: Json = False,
@@ -57,6 +60,7 @@ def outliers(
             std_ratio=std_ratio,
             max_radius=max_radius,
             memory=memory,
+            points_per_cell=points_per_cell,
             workers=workers,
             scheduler=scheduler,
             progress=progress,

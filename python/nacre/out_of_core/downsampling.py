@@ -16,7 +16,7 @@ from nacre.out_of_core.rows import Rows, to_cloud
 from nacre.out_of_core.store import Cell
 from nacre.out_of_core.survey import PathLike
 
-_BYTES_PER_POINT = 200
+_BYTES_PER_POINT = 300
 _ROUNDING = 1.001
 
 

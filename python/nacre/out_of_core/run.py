@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
 import tempfile
@@ -18,6 +19,8 @@ from nacre.io.points import STREAMED_SUFFIXES, write_chunks
 from nacre.out_of_core.memory import PER_PROCESS
 from nacre.out_of_core.rows import Rows, to_cloud
 from nacre.out_of_core.store import Cell, Store, open_store
+
+_log = logging.getLogger("nacre.out_of_core")
 
 _CELLS_PER_TASK = 1
 _ROWS_PER_CHUNK = 1 << 20
@@ -172,10 +175,13 @@ def _num_processes(store: Store, method: Method, machines: Machines) -> int:
         least = needed + (0 if is_alone else PER_PROCESS)
         raise ValueError(
             f"memory must be at least {least / 1e9:.2f}GB for the {largest} points of the largest cell with "
-            f"its halo of {method.halo:.4g}, got {machines.memory / 1e9:.2f}GB; a smaller radius, or fewer "
-            "points in a cell, need less"
+            f"its halo of {method.halo:.4g}, got {machines.memory / 1e9:.2f}GB; a smaller radius, or "
+            "fewer points_per_cell, need less"
         )
-    return int(min(machines.workers or 1, most))
+    wanted = machines.workers or 1
+    if most < wanted:
+        _log.warning("memory holds %d of %d workers, which need %.2f GB each", most, wanted, needed / 1e9)
+    return int(min(wanted, most))
 
 
 def _finished_by_cluster(

@@ -6,6 +6,8 @@ from command_line import fails, run
 from hills import NUM_POINTS, hills, write
 
 import nacre
+from nacre.cli import large_clouds
+from nacre.out_of_core import cloud_work
 
 
 @pytest.fixture(scope="module")
@@ -17,7 +19,7 @@ def scan(tmp_path_factory):
     ("words", "num_points"),
     [
         (("consolidate", "--num-points", 500, "--iterations", 1, "--memory", "1GB"), 500),
-        (("normals", "--k", 8, "--viewpoint", 0, 0, 1e4), NUM_POINTS),
+        (("normals", "--k", 8, "--viewpoint", 0, 0, 1e4, "--points-per-cell", 6000), NUM_POINTS),
         (("downsample", "--voxel-size", 1000), 1),
         (("outliers", "--std-ratio", 1000), NUM_POINTS),
     ],
@@ -27,6 +29,7 @@ def test_commands(words, num_points, scan, tmp_path):
     done = run(words[0], scan, out, *words[1:], "--json")
     assert done.code == 0, done.err
     assert (done.json["num_input"], done.json["num_points"]) == (NUM_POINTS, num_points)
+    assert (done.json["num_cells"] > 1) == (words[0] == "normals")
     found = nacre.read_points(out)
     assert len(found) == num_points
     assert set(found.attributes) == {"intensity", "classification", "gps_time"}
@@ -76,3 +79,7 @@ def test_wrong_usage(scan, tmp_path):
     assert "output must end in" in fails(2, "outliers", scan, tmp_path / "o.npz")
     fails(2, "downsample", scan, tmp_path / "o.ply")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_pieces_are_those_of_the_functions():
+    assert large_clouds.POINTS_PER_CELL == cloud_work.POINTS_PER_CELL

@@ -113,6 +113,13 @@ def test_memory_that_does_not_hold_a_cell(
         out_of_core.estimate_normals(scan, tmp_path / "o.ply", **CELLS)
 
 
+def test_as_many_workers_as_memory_holds(
+    scan: Path, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    out_of_core.estimate_normals(scan, tmp_path / "o.ply", workers=50, **{**CELLS, "memory": "750MB"})
+    assert "memory holds 1 of 50 workers" in caplog.text
+
+
 def test_a_full_disk_leaves_what_was_there(
     scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
