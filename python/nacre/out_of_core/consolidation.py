@@ -170,7 +170,7 @@ class Wlop:
             method=self.method,
             theta=self.theta,
         )[:num_own]
-        result = cell.rows[samples[:num_own]]
+        result: Rows = cell.rows[samples[:num_own]]
         if len(cell.rows.dtype.names or ()) > 1:
             result = cell.rows[np.asarray(KdTree(points).query(moved, 1)[1])]
         result["points"] = moved

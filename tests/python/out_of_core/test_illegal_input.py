@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import errno
-import subprocess
-import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -134,32 +135,26 @@ def test_a_full_disk_leaves_what_was_there(
     assert (tmp_path / "o.ply").read_text() == "of yesterday"
 
 
+def test_a_scheduler_that_goes_away(scan: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+
+    def gone() -> None:
+        raise distributed.CancelledError
+
+    @contextmanager
+    def cluster_client(*_: object) -> Iterator[SimpleNamespace]:
+        yield SimpleNamespace(map=lambda *_, **__: [SimpleNamespace(result=gone)])
+
+    monkeypatch.setattr("nacre._internal.cluster.cluster_client", cluster_client)
+    monkeypatch.setattr(distributed, "as_completed", iter)
+    with pytest.raises(ConnectionError, match="scheduler went away; nothing was written, the same command"):
+        out_of_core.estimate_normals(scan, tmp_path / "o.ply", scheduler="tcp://10.0.0.1:8786", **CELLS)
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize(
     ("text", "number"),
     [("2GB", 2 * 10**9), ("512 MiB", 512 << 20), ("1.5g", 1_500_000_000), ("600000000", 600_000_000)],
 )
 def test_sizes(text: str, number: int) -> None:
     assert as_bytes("memory", text) == number
-
-
-PROGRAM = """
-import resource, sys
-from nacre import out_of_core
-source, output = sys.argv[1:]
-out_of_core.estimate_normals(source, output, points_per_cell=100_000, memory="500MB")
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-"""
-
-
-@pytest.mark.slow
-def test_memory_stays_the_same_for_more_points(tmp_path: Path) -> None:
-    """Peak memory of 1.6 million points is that of 0.4 million, and within the bound."""
-    peaks = []
-    for count in (400_000, 1_600_000):
-        xy = np.random.default_rng(0).uniform(0, np.sqrt(count) / 10, (count, 2))
-        points = np.column_stack([xy, np.sin(xy[:, 0])]).astype(np.float32)
-        write(tmp_path / "a.ply", nacre.Cloud(points))
-        command = [sys.executable, "-c", PROGRAM, tmp_path / "a.ply", tmp_path / "o.ply"]
-        peaks.append(int(subprocess.run(command, capture_output=True, text=True, check=True).stdout) * 1024)
-    assert peaks[1] < 500e6
-    assert peaks[1] - peaks[0] < 30e6  # the points and their normals alone are 29 MB more
