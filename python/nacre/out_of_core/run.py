@@ -79,13 +79,18 @@ def scratch_folder(output: Path) -> Iterator[Path]:
     try:
         yield folder
     except OSError as error:
-        if error.filename is None or Path(os.fsdecode(error.filename)).resolve().is_relative_to(folder):
+        if error.errno is not None and _is_within(error.filename, folder):
             raise OSError(
                 error.errno, f"{error.strerror} (for cells beside the output)", str(output)
             ) from error
         raise
     finally:
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def _is_within(name: str | bytes | None, folder: Path) -> bool:
+    """Say whether an error is about a file in the folder, or names none: then it was being written."""
+    return name is None or Path(os.fsdecode(name)).resolve().is_relative_to(folder)
 
 
 def require_streamed(output: Path) -> None:
