@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from itertools import islice
 from pathlib import Path
 from threading import Lock
-from typing import Any, TypeVar
+from typing import Any, BinaryIO, TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,6 +20,8 @@ from nacre.out_of_core.survey import Source, Survey, finite_rows
 from nacre.system import default_threads
 
 Item = TypeVar("Item")
+
+_MOST_UNMERGED = 64
 
 
 def sort_into_cells(
@@ -56,21 +58,7 @@ def sort_into_cells(
         Saved in the folder.
     """
     grid = Grid.of(survey)
-    lock = Lock()
-    found: list[tuple[Keys, npt.NDArray[np.int64]]] = []
-
-    def count(rows: Rows) -> None:
-        keys, counts = np.unique(grid.keys(rows["points"]), return_counts=True)
-        hashes = None if lowest is None else point_hashes(rows["points"], seed)
-        with lock:
-            found.append((keys, counts.astype(np.int64)))
-            if len(found) > _MERGED:
-                found[:] = [_merged(found)]
-            if lowest is not None and hashes is not None:
-                lowest.count(hashes)
-
-    _for_each(count, finite_rows(source, survey, num_rows))
-    keys, counts = _merged(found)
+    keys, counts = _count(source, survey, num_rows, grid, seed, lowest)
     cells = divide_into_cells(grid.places(keys), counts, points_per_cell)
     order = np.concatenate(cells)
     store = Store(
@@ -85,30 +73,31 @@ def sort_into_cells(
     store.save()
     place_of_key = np.empty(len(keys), np.int64)
     place_of_key[order] = np.arange(len(order))
-    ends = store.starts[:-1].copy()  # up to where each cube has been written
-
     with store.points_file.open("wb") as stream:
-
-        def write(rows: Rows) -> None:
-            if lowest is not None:
-                lowest.keep(point_hashes(rows["points"], seed))
-            cubes = place_of_key[np.searchsorted(keys, grid.keys(rows["points"]))]
-            by_cube = np.argsort(cubes)
-            rows, cubes = rows[by_cube], cubes[by_cube]
-            begins = np.flatnonzero(np.diff(cubes, prepend=-1))
-            sizes = np.diff(begins, append=len(cubes))
-            with lock:
-                places = ends[cubes[begins]]
-                ends[cubes[begins]] += sizes
-                for begin, size, place in zip(begins.tolist(), sizes.tolist(), places.tolist(), strict=True):
-                    stream.seek(place * store.dtype.itemsize)
-                    stream.write(rows[begin : begin + size].view(np.uint8).data)
-
-        _for_each(write, finite_rows(source, survey, num_rows))
+        writer = _Writer(stream, store, keys, place_of_key, lowest)
+        _for_each(writer.write, finite_rows(source, survey, num_rows))
     return store
 
 
-_MERGED = 64
+def _count(
+    source: Source, survey: Survey, num_rows: int, grid: Grid, seed: int, lowest: LowestHashes | None
+) -> tuple[Keys, npt.NDArray[np.int64]]:
+    """Return the cubes that hold points, in ascending order, and how many each holds."""
+    lock = Lock()
+    found: list[tuple[Keys, npt.NDArray[np.int64]]] = []
+
+    def count(rows: Rows) -> None:
+        keys, counts = np.unique(grid.keys(rows["points"]), return_counts=True)
+        hashes = None if lowest is None else point_hashes(rows["points"], seed)
+        with lock:
+            found.append((keys, counts.astype(np.int64)))
+            if len(found) > _MOST_UNMERGED:
+                found[:] = [_merged(found)]
+            if lowest is not None and hashes is not None:
+                lowest.count(hashes)
+
+    _for_each(count, finite_rows(source, survey, num_rows))
+    return _merged(found)
 
 
 def _merged(found: list[tuple[Keys, npt.NDArray[np.int64]]]) -> tuple[Keys, npt.NDArray[np.int64]]:
@@ -117,6 +106,37 @@ def _merged(found: list[tuple[Keys, npt.NDArray[np.int64]]]) -> tuple[Keys, npt.
     counts = np.zeros(len(keys), np.int64)
     np.add.at(counts, inverse, np.concatenate([counts for _, counts in found]))
     return keys, counts
+
+
+class _Writer:
+    """Writes points where those of their cube are; in which order is left to who reads them."""
+
+    def __init__(
+        self, stream: BinaryIO, store: Store, keys: Keys, place_of_key: Keys, lowest: LowestHashes | None
+    ) -> None:
+        self._stream = stream
+        self._store = store
+        self._keys = keys
+        self._place_of_key = place_of_key
+        self._lowest = lowest
+        self._ends = store.starts[:-1].copy()  # up to where each cube has been written
+        self._lock = Lock()
+
+    def write(self, rows: Rows) -> None:
+        """Write some points; several threads may."""
+        if self._lowest is not None:
+            self._lowest.keep(point_hashes(rows["points"], self._store.seed))
+        cubes = self._place_of_key[np.searchsorted(self._keys, self._store.grid.keys(rows["points"]))]
+        by_cube = np.argsort(cubes)
+        rows, cubes = rows[by_cube], cubes[by_cube]
+        begins = np.flatnonzero(np.diff(cubes, prepend=-1))
+        sizes = np.diff(begins, append=len(cubes))
+        with self._lock:
+            places = self._ends[cubes[begins]]
+            self._ends[cubes[begins]] += sizes
+            for begin, size, place in zip(begins.tolist(), sizes.tolist(), places.tolist(), strict=True):
+                self._stream.seek(place * self._store.dtype.itemsize)
+                self._stream.write(rows[begin : begin + size].view(np.uint8).data)
 
 
 def _for_each(work: Callable[[Item], Any], items: Iterable[Item]) -> None:
