@@ -37,6 +37,20 @@ def test_normals(scan: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(found.normals, expected, atol=1e-6)
 
 
+def test_surveys_keep_their_millimetres_and_what_the_scanner_told(tmp_path: Path) -> None:
+    pytest.importorskip("laspy")
+    write(tmp_path / "a.laz", hills())
+    out_of_core.estimate_normals(tmp_path / "a.laz", tmp_path / "b.las", **CELLS)
+    out_of_core.estimate_normals(
+        tmp_path / "b.las", tmp_path / "c.laz", **{**CELLS, "points_per_cell": 3_000}
+    )
+    found, cloud = ordered(nacre.read_points(tmp_path / "c.laz")), ordered(hills())
+    np.testing.assert_allclose(found.points, cloud.points, rtol=0, atol=1e-6)
+    assert_same_points(nacre.Cloud(cloud.points, None, found.colors, found.attributes), cloud)
+    assert found.normals is not None
+    np.testing.assert_allclose(np.linalg.norm(found.normals, axis=1), 1, atol=1e-5)
+
+
 def test_downsampling(scan: Path, tmp_path: Path) -> None:
     out_of_core.voxel_downsample(scan, tmp_path / "v.ply", 0.3, **CELLS)
     found, cloud = nacre.read_points(tmp_path / "v.ply"), hills()
