@@ -139,8 +139,8 @@ class _Look:
         self._num_left_out += len(cloud) - len(finite)
         if len(finite):
             self._num_points += len(finite)
-            self._lower = np.minimum(self._lower, finite.min(axis=0))
-            self._upper = np.maximum(self._upper, finite.max(axis=0))
+            self._lower = np.minimum(self._lower, [finite[:, axis].min() for axis in range(3)])
+            self._upper = np.maximum(self._upper, [finite[:, axis].max() for axis in range(3)])
             self._keep_lowest(finite)
 
     def _keep_lowest(self, points: npt.NDArray[np.float64]) -> None:
