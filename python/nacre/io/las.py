@@ -41,10 +41,8 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
     with _opened(path) as reader:
         chunks = list(reader.chunk_iterator(_POINTS_PER_CHUNK))
         is_wide = any(map(_is_wide, chunks))
-        cloud = _cloud_of(Path(path), chunks, list(reader.header.point_format.dimension_names), is_wide)
-    for name, values in list(cloud.attributes.items()):
-        if (values == default_of(name)).all():
-            del cloud.attributes[name]
+        names = list(reader.header.point_format.dimension_names)
+        cloud = _cloud_of(Path(path), chunks, names, is_wide, keep_all=False)
     _check_count(path, len(cloud), reader.header.point_count)
     return cloud
 
@@ -57,7 +55,7 @@ def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud]:
         names = list(reader.header.point_format.dimension_names)
         for chunk in reader.chunk_iterator(num_rows):
             num_read += len(chunk)
-            yield _cloud_of(Path(path), [chunk], names, is_wide)
+            yield _cloud_of(Path(path), [chunk], names, is_wide, keep_all=True)
     _check_count(path, num_read, reader.header.point_count)
 
 
@@ -124,7 +122,7 @@ def _check_chunk_table(path: str | os.PathLike[str], stream: BinaryIO, start: in
         raise FileFormatError(path, f"{num_chunks} chunks are promised in {size} bytes", offset=max(place, 0))
 
 
-def _cloud_of(path: Path, chunks: list[Any], names: list[str], is_wide: bool) -> Cloud:
+def _cloud_of(path: Path, chunks: list[Any], names: list[str], is_wide: bool, *, keep_all: bool) -> Cloud:
     def column(name: str) -> npt.NDArray[Any]:
         parts = [np.asarray(chunk[name]) for chunk in chunks]
         return native(np.concatenate(parts)) if parts else np.zeros(0)
@@ -139,7 +137,11 @@ def _cloud_of(path: Path, chunks: list[Any], names: list[str], is_wide: bool) ->
         stored = np.column_stack([column(name) for name in _COLORS]).astype(np.uint16)
         colors = (stored >> (8 * is_wide)).astype(np.uint8)
         used.update(_COLORS)
-    attributes = {name: column(name) for name in names if name not in used}
+    attributes: Columns = {}
+    for name in (name for name in names if name not in used):
+        values = column(name)
+        if keep_all or not (values == default_of(name)).all():
+            attributes[name] = values
     return Cloud(points, normals, colors, attributes, path=path)
 
 

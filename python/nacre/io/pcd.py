@@ -188,7 +188,7 @@ def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud] 
     size = Path(path).stat().st_size
     _check_size(path, header, header.num_points * header.row_bytes, size - header.size)
     header = dataclasses.replace(header, shape=None)
-    tables = read_records(path, header.size, _row_type(header), header.num_points, num_rows)
+    tables = read_records(path, header.size, _row_type(header), header.num_points, num_rows, are_last=True)
     return (_cloud_of(path, header, _columns_of(rows, header)) for rows in tables)
 
 

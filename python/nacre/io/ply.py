@@ -115,7 +115,8 @@ def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud] 
             break
         offset += element.num_rows * dtype.itemsize
     check_table_size(path, element, dtype.itemsize * element.num_rows, Path(path).stat().st_size - offset)
-    tables = read_records(path, offset, dtype, element.num_rows, num_rows)
+    is_last = element is header.elements[-1]
+    tables = read_records(path, offset, dtype, element.num_rows, num_rows, are_last=is_last)
     names = [entry.name for entry in element.properties]
     return (
         _vertices(PlyFile(Path(path), header, {"vertex": {name: rows[name] for name in names}}))

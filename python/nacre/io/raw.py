@@ -22,6 +22,7 @@ MAX_COMMENTS = 10_000
 
 _BLOCK_BYTES = 1 << 15
 _HEAD_BYTES = 1 << 16
+_PADDING = b" \t\r\n\0"
 _BYTES_PER_ROW_GUESS = 32
 _IS_SPACE = np.zeros(256, dtype=bool)
 _IS_SPACE[list(b" \t\n\r\v\f")] = True
@@ -48,9 +49,19 @@ def read_head(path: str | os.PathLike[str], last: bytes) -> bytes:
 
 
 def read_records(
-    path: str | os.PathLike[str], offset: int, dtype: np.dtype[Any], count: int, num_rows: int
+    path: str | os.PathLike[str],
+    offset: int,
+    dtype: np.dtype[Any],
+    count: int,
+    num_rows: int,
+    *,
+    are_last: bool,
 ) -> Iterator[npt.NDArray[Any]]:
-    """Yield ``count`` records of a file from a byte on, so many at a time; of none an empty piece."""
+    """
+    Yield ``count`` records of a file from a byte on, so many at a time; of none an empty piece.
+
+    Where they are the last of the file, what follows must be padding.
+    """
     with Path(path).open("rb") as stream:
         stream.seek(offset)
         for first in range(0, max(count, 1), num_rows):
@@ -59,6 +70,9 @@ def read_records(
             if len(rows) < wanted:
                 raise FileFormatError(path, "the file became shorter while it was read", offset=offset)
             yield rows
+        end = stream.tell()
+        if are_last and stream.read(_HEAD_BYTES).strip(_PADDING):
+            raise FileFormatError(path, "bytes follow the data that the header promises", offset=end)
 
 
 def require_regular(path: str | os.PathLike[str]) -> Path:
@@ -108,7 +122,7 @@ def decode(text: bytes) -> str:
 
 def check_padding(path: str | os.PathLike[str], data: bytes, end: int) -> None:
     """Refuse a file that goes on after the data its header promises; blanks and zero bytes are padding."""
-    if data[end:].strip(b" \t\r\n\0"):
+    if data[end:].strip(_PADDING):
         raise FileFormatError(
             path, f"{len(data) - end} bytes follow the data that the header promises", offset=end
         )

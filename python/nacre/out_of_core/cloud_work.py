@@ -30,7 +30,7 @@ POINTS_PER_CELL = 4_000_000
 _ROWS_OF_A_SURVEY = 1 << 18
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class CloudResult(Value):
     """
     What was made of a cloud on disk.
@@ -63,7 +63,7 @@ class CloudWork:
     """
     A cloud on disk, what is to be written, and who works on it.
 
-    Parameters are those of the functions that nacre.out_of_core has.
+    Its arguments are those of :func:`nacre.out_of_core.consolidate`, which are checked here.
     """
 
     def __init__(

@@ -66,6 +66,18 @@ def test_big_endian_vertices_after_another_element(tmp_path: Path) -> None:
     assert second.attributes["class"] == [12]
 
 
+@pytest.mark.parametrize("suffix", [".ply", ".pcd"])
+def test_bytes_after_the_last_point(suffix: str, tmp_path: Path) -> None:
+    path = tmp_path / f"a{suffix}"
+    nacre.write_points(path, hills(10))
+    whole = path.read_bytes()
+    path.write_bytes(whole + b"\0\n")
+    assert len(list(read_chunks(path, 4))) == 3
+    path.write_bytes(whole + b"more")
+    with pytest.raises(nacre.FileFormatError, match="bytes follow the data that the header promises"):
+        list(read_chunks(path, 4))
+
+
 def test_files_that_have_to_be_read_whole(tmp_path: Path) -> None:
     cloud = hills(10)
     for name in ("a.ply", "a.pcd"):
