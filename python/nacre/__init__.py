@@ -119,7 +119,7 @@ __all__ = [
 ]
 
 # What else there is for users, in modules of its own.
-_PACKAGES = ("datasets", "io", "meshing", "reconstruction", "report", "viewer")
+_PACKAGES = ("datasets", "io", "meshing", "out_of_core", "reconstruction", "report", "viewer")
 
 # Where each name is, so that it is imported when it is first asked for: most programs need few of them.
 _NAMES = {

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 _DENSITY_NEIGHBORS = 17  # itself included
 _DENSITY_PROBES = 5000
-_SPACINGS_PER_RADIUS = 2.5
+SPACINGS_PER_RADIUS = 2.5
 
 _METHODS = {
     "wlop": _core.ConsolidationMethod.wlop,
@@ -291,7 +291,7 @@ def _radius(given: float | None, points: FloatArray, num_samples: int) -> float:
         where = "on top of each other" if reach == 0 else "too far from each other"
         raise ValueError(f"radius must be given, got None: the points lie {where}")
     per_area = k * min(num_samples / len(cloud), 1.0) / math.pi  # [1 / reach^2]
-    return _SPACINGS_PER_RADIUS * reach / math.sqrt(per_area)
+    return SPACINGS_PER_RADIUS * reach / math.sqrt(per_area)
 
 
 def _as_column(name: str, value: npt.ArrayLike, size: int) -> npt.NDArray[Any]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from nacre.cli.large_clouds import MemoryOption, is_large
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_file
 
 if TYPE_CHECKING:
@@ -28,7 +29,9 @@ def align(
     source: Annotated[
         Path,
         typer.Argument(
-            metavar="SOURCE", help="The points that move (PLY, PCD, LAS, ...).", show_default=False
+            metavar="SOURCE",
+            help="The points that move (PLY, PCD, LAS, ...), or a folder of such files.",
+            show_default=False,
         ),
     ],
     target: Annotated[
@@ -62,6 +65,7 @@ def align(
         ),
     ] = 0.0,
     max_iterations: Annotated[int, typer.Option(min=1, help="Largest number of steps.")] = 40,
+    memory: MemoryOption = None,
     json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
@@ -69,6 +73,7 @@ def align(
     """
     Find the motion that brings one cloud onto another (ICP), from a first guess or, with --global, from none.
 
+    Of clouds larger than memory, and with --memory, a random sample of 100 000 points of each is aligned.
     Prints the 4x4 matrix that takes points of SOURCE to TARGET. Exit code 1 where the clouds did not come to
     rest on each other, or with --global where no motion, or more than one, explains them.
     """
@@ -84,21 +89,31 @@ def align(
         raise CommandError("--seen-from-origin is only of use with --global", 2)
     if out is not None:
         writable_file(out)
+    if everywhere and memory is not None:
+        raise CommandError("--global needs both clouds in memory: nacre downsample makes smaller ones", 2)
     if everywhere:
         _align_globally(terminal, source, target, out, seen_from_origin)
         return
-    guess = None if initial is None else read_matrix(initial)
-    moving, still = nacre.read_points(source), nacre.read_points(target)
-    result = nacre.align(
-        moving.points,
-        still.points,
-        source_normals=moving.normals,
-        target_normals=still.normals,
-        initial=guess,
-        method=method.value,
-        max_distance=max_distance,
-        max_iterations=max_iterations,
-    )
+    options: dict[str, Any] = {
+        "initial": None if initial is None else read_matrix(initial),
+        "method": method.value,
+        "max_distance": max_distance,
+        "max_iterations": max_iterations,
+    }
+    moving = None
+    if is_large(source, memory) or is_large(target, memory):
+        from nacre.out_of_core import align as align_out_of_core
+
+        result = align_out_of_core(source, target, out, memory=memory, **options)
+    else:
+        moving, still = nacre.read_points(source), nacre.read_points(target)
+        result = nacre.align(
+            moving.points,
+            still.points,
+            source_normals=moving.normals,
+            target_normals=still.normals,
+            **options,
+        )
     pose = result.target_from_source
     angle = float(np.arccos(np.clip((np.trace(pose[:3, :3]) - 1) / 2, -1, 1)))
     figures = {
@@ -123,7 +138,8 @@ def align(
     if result.status == "too_few_pairs":
         raise CommandError("too little matched; give a better --initial or a larger --max-distance")
     if out is not None:
-        _write_moved(out, moving, pose)
+        if moving is not None:
+            _write_moved(out, moving, pose)
         terminal.say(f"moved source  {out}")
     if not result.converged:
         raise CommandError("still moving after the last step; give more --max-iterations")

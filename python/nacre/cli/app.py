@@ -18,9 +18,12 @@ from nacre.cli.consolidate import consolidate
 from nacre.cli.convert import convert
 from nacre.cli.demo import demo
 from nacre.cli.doctor import doctor
+from nacre.cli.downsample import downsample
 from nacre.cli.evaluate import evaluate
 from nacre.cli.info import info
 from nacre.cli.mesh import mesh
+from nacre.cli.normals import normals
+from nacre.cli.outliers import outliers
 from nacre.cli.reconstruct import reconstruct
 from nacre.cli.record import record
 from nacre.cli.signals import Stopped
@@ -60,6 +63,9 @@ EXAMPLES: dict[Callable[..., None], str] = {
     evaluate: "nacre evaluate out/model.ply bunny.ply",
     align: "nacre align scan2.ply scan1.ply -o moved.ply",
     consolidate: "nacre consolidate noisy.ply thin.ply --radius 0.008 --num-points 2000",
+    normals: "nacre normals scan.las normals.ply --memory 2GB",
+    downsample: "nacre downsample scans thin.laz --voxel-size 0.05 --memory 2GB",
+    outliers: "nacre outliers scan.laz clean.laz",
     info: "nacre info rgbd_dataset_freiburg3_teddy",
     doctor: "nacre doctor --json",
 }

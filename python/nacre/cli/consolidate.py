@@ -8,6 +8,17 @@ from typing import Annotated, Any
 
 import typer
 
+from nacre.cli.large_clouds import (
+    POINTS_PER_CELL,
+    MemoryOption,
+    PointsPerCellOption,
+    SchedulerOption,
+    SourceArgument,
+    WorkersOption,
+    answer,
+    following,
+    is_large,
+)
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, to_json, writable_file
 
 
@@ -20,10 +31,7 @@ class Method(str, Enum):
 
 
 def consolidate(
-    source: Annotated[
-        Path,
-        typer.Argument(metavar="IN", help="A point file (PLY, PCD, LAS, E57, XYZ, ...).", show_default=False),
-    ],
+    source: SourceArgument,
     out: Annotated[
         Path, typer.Argument(metavar="OUT", help="The file to write, in one of these.", show_default=False)
     ],
@@ -40,6 +48,10 @@ def consolidate(
         Method, typer.Option(help="wlop: Huang et al. 2009; wlop+: repaired; cgal: with CGAL's kernel.")
     ] = Method.wlop,
     seed: Annotated[int, typer.Option(min=0, help="Of the choice of points.")] = 0,
+    memory: MemoryOption = None,
+    points_per_cell: PointsPerCellOption = POINTS_PER_CELL,
+    workers: WorkersOption = None,
+    scheduler: SchedulerOption = None,
     json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
@@ -47,9 +59,32 @@ def consolidate(
     """
     Replace a noisy point set by fewer, evenly spread, denoised points (WLOP).
 
-    Normals, colours and every other field of the file are carried along.
+    Normals, colours and every other field of the file are carried along. With --memory, --workers or
+    --scheduler, of a folder, and where the cloud is larger than memory, it is done by pieces on disk.
     """
     terminal = Terminal(json, quiet, verbose)
+    if scheduler or workers or is_large(source, memory):
+        writable_file(out)
+        from nacre.out_of_core import consolidate as consolidate_out_of_core
+
+        with following(terminal) as progress:
+            done = consolidate_out_of_core(
+                source,
+                out,
+                num_points=num_points,
+                radius=radius,
+                iterations=iterations,
+                mu=mu,
+                method=method.value,
+                seed=seed,
+                memory=memory,
+                points_per_cell=points_per_cell,
+                workers=workers,
+                scheduler=scheduler,
+                progress=progress,
+            )
+        answer(terminal, out, done)
+        return
     import numpy as np
 
     import nacre

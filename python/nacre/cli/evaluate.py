@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nacre.cli.align import format_matrix, read_matrix
+from nacre.cli.large_clouds import MemoryOption, is_large
 from nacre.cli.surfaces import evaluate_surface, mesh_suffixes, point_suffixes, read_surface, transformed
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 
@@ -68,6 +69,7 @@ def evaluate(
     max_difference: Annotated[
         float, typer.Option(min=0, help="Poses farther apart in time are not compared (seconds).")
     ] = 0.02,
+    memory: MemoryOption = None,
     json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = 0,
@@ -78,7 +80,8 @@ def evaluate(
     A model: distance to the surface, completeness (of what the cameras saw, where true poses tell), F-score,
     uniformity, error of the normals. It must lie in the reference's frame: a reconstruction lies in its first
     camera's, so give its OUT folder (which moves it where the recording had true poses), --world-from-model
-    or --align.
+    or --align. One that is larger than memory, and any with --memory, is read in pieces, and must lie in the
+    reference's frame; uniformity and normals are not measured then.
 
     A trajectory: absolute error (ATE, after a rigid alignment), relative error (RPE), coverage. Of an OUT
     folder also what became of its frames, and the errors of its poses at the middle of the object.
@@ -90,6 +93,11 @@ def evaluate(
         raise CommandError(f"no such file or folder: {truth}", 2)
     is_surface = truth is not None and truth.suffix.lower() in mesh_suffixes() + point_suffixes()
     saved = None
+    if is_surface and truth is not None and (memory is not None or _is_large_cloud(estimate)):
+        if align or world_from_model is not None:
+            raise CommandError("a model that is read in pieces cannot be moved: nacre align moves it", 2)
+        terminal.answer(*_large_surface(estimate, truth, tau, scale, memory))
+        return
     if estimate.is_dir():
         from nacre.report.saved_run import SavedRun
 
@@ -163,6 +171,31 @@ def _surface(
             *zip(("world from model", "", "", ""), format_matrix(pose).splitlines(), strict=True),
         ]
     return figures, rows
+
+
+def _is_large_cloud(path: Path) -> bool:
+    """Say whether a model is to be read in pieces: more than fits in memory, or a folder that is no run."""
+    return is_large(path, None) and not (path / "report.json").is_file()
+
+
+def _large_surface(
+    estimate: Path, truth: Path, tau: list[float] | None, scale: float, memory: str | None
+) -> tuple[Figures, Rows]:
+    from nacre import out_of_core
+
+    reference, normals = read_surface(truth, scale)
+    found = out_of_core.evaluate(
+        estimate, reference, reference_normals=normals, tau=tau or (0.002, 0.005, 0.01), memory=memory
+    )
+    figures: Figures = {"kind": "surface"}
+    rows: Rows = []
+    results: dict[str, Result] = {
+        "surface_accuracy": found.surface_accuracy,
+        "completeness": found.completeness,
+        "f_score": found.f_score,
+    }
+    _add(figures, rows, results)
+    return figures, rows[1:]
 
 
 def _add(figures: Figures, rows: Rows, results: Mapping[str, Result], saved: SavedRun | None = None) -> None:

@@ -208,7 +208,7 @@ def completeness(
     Completeness
         With an empty model every fraction is 0 and every distance infinite.
     """
-    thresholds = _thresholds(tau)
+    thresholds = as_thresholds(tau)
     if isinstance(reference, Mesh):
         samples = sample_surface(reference.vertices, reference.triangles, num_samples, seed=seed).points
     else:
@@ -223,15 +223,21 @@ def completeness(
         return Completeness(thresholds, (np.nan,) * len(thresholds), np.nan, np.nan, np.nan, num_samples=0)
     model = as_points("points", points).astype(np.float64)
     model = model[np.isfinite(model).all(axis=1)]
-    distances = _nearest(model, samples)[0] if len(model) else np.full(len(samples), np.inf)
-    p95, p99 = np.percentile(distances, (95, 99)) if len(model) else (np.inf, np.inf)
+    return completeness_of(
+        _nearest(model, samples)[0] if len(model) else np.full(len(samples), np.inf), thresholds
+    )
+
+
+def completeness_of(distances: Array, tau: tuple[float, ...]) -> Completeness:
+    """Return the figures of surface samples that are so far from the model; infinite where it is empty."""
+    p95, p99 = np.percentile(distances, (95, 99)) if np.isfinite(distances).all() else (np.inf, np.inf)
     return Completeness(
-        tau=thresholds,
-        fraction=tuple(float((distances <= threshold).mean()) for threshold in thresholds),
+        tau=tau,
+        fraction=tuple(float((distances <= threshold).mean()) for threshold in tau),
         mean=float(distances.mean()),
         p95=float(p95),
         p99=float(p99),
-        num_samples=len(samples),
+        num_samples=len(distances),
     )
 
 
@@ -263,24 +269,26 @@ def f_score(
     -------
     FScore
     """
-    thresholds = _thresholds(tau)
+    thresholds = as_thresholds(tau)
     distances = surface_accuracy(points, reference, reference_normals=reference_normals).distances
     distances = distances[~np.isnan(distances)]
     precision = tuple(float((distances <= t).mean()) if len(distances) else 0.0 for t in thresholds)
     covered = completeness(points, reference, tau=thresholds, seen=seen, num_samples=num_samples, seed=seed)
-    return FScore(
-        tau=thresholds,
-        precision=precision,
-        recall=covered.fraction,
-        f_score=tuple(map(_harmonic_mean, precision, covered.fraction)),
-    )
+    return f_score_of(precision, covered)
+
+
+def f_score_of(precision: tuple[float, ...], covered: Completeness) -> FScore:
+    """Return the F-scores of precisions and recalls."""
+    f_scores = tuple(map(_harmonic_mean, precision, covered.fraction))
+    return FScore(covered.tau, precision, covered.fraction, f_scores)
 
 
 def _harmonic_mean(a: float, b: float) -> float:
     return a + b if a + b == 0 else 2 * a * b / (a + b)
 
 
-def _thresholds(tau: float | Sequence[float]) -> tuple[float, ...]:
+def as_thresholds(tau: float | Sequence[float]) -> tuple[float, ...]:
+    """Return positive distances, one or more."""
     given = np.atleast_1d(as_real("tau", tau))
     thresholds = tuple(float(t) for t in given.reshape(-1))
     if given.ndim > 1 or not thresholds or not all(np.isfinite(t) and t > 0 for t in thresholds):

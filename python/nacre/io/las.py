@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 import os
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -37,6 +38,35 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
     Coordinates are scaled and shifted as the header says. Dimensions that every file has are left out where
     they are the same as in a file that says nothing: 0, and the first of one return.
     """
+    with _opened(path) as reader:
+        chunks = list(reader.chunk_iterator(_POINTS_PER_CHUNK))
+        is_wide = any(map(_is_wide, chunks))
+        names = list(reader.header.point_format.dimension_names)
+        cloud = _cloud_of(Path(path), chunks, names, is_wide, keep_all=False)
+    _check_count(path, len(cloud), reader.header.point_count)
+    return cloud
+
+
+def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud]:
+    """Yield a LAS or LAZ file in pieces of so many points, with every dimension that it has."""
+    is_wide = _any_is_wide(path, num_rows)
+    num_read = 0
+    with _opened(path) as reader:
+        names = list(reader.header.point_format.dimension_names)
+        for chunk in reader.chunk_iterator(num_rows):
+            num_read += len(chunk)
+            yield _cloud_of(Path(path), [chunk], names, is_wide, keep_all=True)
+    _check_count(path, num_read, reader.header.point_count)
+
+
+def default_of(name: str) -> int:
+    """Return the value of a dimension of which a file says nothing."""
+    return _DEFAULTS.get(name, 0)
+
+
+@contextmanager
+def _opened(path: str | os.PathLike[str]) -> Iterator[Any]:
+    """Open a file; what laspy and lazrs raise while it is read becomes a FileFormatError."""
     laspy = _import_laspy()
     size = require_regular(path).stat().st_size
     with Path(path).open("rb") as stream:
@@ -44,19 +74,19 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
         stream.seek(0)
         try:
             with laspy.open(stream, closefd=False, read_evlrs=False) as reader:
-                expected = reader.header.point_count
-                chunks = list(reader.chunk_iterator(_POINTS_PER_CHUNK))
-                cloud = _cloud_of(Path(path), chunks, list(reader.header.point_format.dimension_names))
-        except (MemoryError, OSError):
+                yield reader
+        except (MemoryError, OSError, GeneratorExit):
             raise
         except BaseException as error:  # of laspy, and of lazrs, which panics
             if isinstance(error, KeyboardInterrupt | SystemExit):
                 raise
             raise FileFormatError(path, f"not a readable LAS file: {error}", offset=0) from error
-    if len(cloud) != expected:
-        reason = f"the header promises {expected} points, {len(cloud)} are in the file"
-        raise FileFormatError(path, reason, offset=size)
-    return cloud
+
+
+def _check_count(path: str | os.PathLike[str], found: int, expected: int) -> None:
+    if found != expected:
+        reason = f"the header promises {expected} points, {found} are in the file"
+        raise FileFormatError(path, reason, offset=Path(path).stat().st_size)
 
 
 def _check_header(path: str | os.PathLike[str], stream: BinaryIO, size: int) -> None:
@@ -92,7 +122,7 @@ def _check_chunk_table(path: str | os.PathLike[str], stream: BinaryIO, start: in
         raise FileFormatError(path, f"{num_chunks} chunks are promised in {size} bytes", offset=max(place, 0))
 
 
-def _cloud_of(path: Path, chunks: list[Any], names: list[str]) -> Cloud:
+def _cloud_of(path: Path, chunks: list[Any], names: list[str], is_wide: bool, *, keep_all: bool) -> Cloud:
     def column(name: str) -> npt.NDArray[Any]:
         parts = [np.asarray(chunk[name]) for chunk in chunks]
         return native(np.concatenate(parts)) if parts else np.zeros(0)
@@ -104,20 +134,29 @@ def _cloud_of(path: Path, chunks: list[Any], names: list[str]) -> Cloud:
         normals = np.column_stack([column(name) for name in _NORMALS])
         used.update(_NORMALS)
     if set(_COLORS) <= set(names):
-        colors = _eight_bits(np.column_stack([column(name) for name in _COLORS]))
+        stored = np.column_stack([column(name) for name in _COLORS]).astype(np.uint16)
+        colors = (stored >> (8 * is_wide)).astype(np.uint8)
         used.update(_COLORS)
     attributes: Columns = {}
     for name in (name for name in names if name not in used):
         values = column(name)
-        if not (values == _DEFAULTS.get(name, 0)).all():
+        if keep_all or not (values == default_of(name)).all():
             attributes[name] = values
     return Cloud(points, normals, colors, attributes, path=path)
 
 
-def _eight_bits(colors: npt.NDArray[Any]) -> npt.NDArray[np.uint8]:
-    """Return colours from 16 bits, or from 8 where a program has stored them so."""
-    wide = colors.astype(np.uint16)
-    return (wide >> 8 if wide.max(initial=0) > 255 else wide).astype(np.uint8)
+def _is_wide(chunk: Any) -> bool:
+    """Say whether colours fill 16 bits: some programs store 8."""
+    names = set(chunk.point_format.dimension_names)
+    return set(_COLORS) <= names and any(np.asarray(chunk[name]).max(initial=0) > 255 for name in _COLORS)
+
+
+def _any_is_wide(path: str | os.PathLike[str], num_rows: int) -> bool:
+    """Say the same of a whole file, of which mostly the first points tell it."""
+    with _opened(path) as reader:
+        if not set(_COLORS) <= set(reader.header.point_format.dimension_names):
+            return False
+        return any(map(_is_wide, reader.chunk_iterator(num_rows)))
 
 
 def write_cloud(
@@ -130,28 +169,53 @@ def write_cloud(
 
     Coordinates are whole steps of a micrometre, or coarser where the points lie more than 4 km apart.
     """
-    laspy = _import_laspy()
     if not np.isfinite(cloud.points).all():
         raise ValueError("points must be finite in a LAS file, got some that are not")
+    write_chunks(path, [cloud], len(cloud), cloud.points)
+
+
+def write_chunks(
+    path: str | os.PathLike[str], chunks: Iterable[Cloud], num_points: int, extremes: arrays.FloatArray
+) -> None:
+    """Write pieces of a cloud, all with the same fields, within the bounds of ``extremes``, as one file."""
+    laspy = _import_laspy()
+    with atomic_path(path) as temporary, temporary.open("r+b") as stream:
+        writer = None
+        for cloud in chunks:
+            if writer is None:
+                header = _las_header(laspy, cloud, extremes)
+                is_compressed = Path(path).suffix.lower() == ".laz"
+                writer = laspy.LasWriter(stream, header, do_compress=is_compressed, closefd=False)
+            writer.write_points(_las_points(laspy, cloud, header))
+        if writer is not None:
+            writer.close()
+
+
+def _las_header(laspy: Any, cloud: Cloud, extremes: arrays.FloatArray) -> Any:
+    """Return a header with a dimension for each field of a cloud."""
     header = laspy.LasHeader(version="1.4", point_format=_PLAIN if cloud.colors is None else _COLORED)
-    header.offsets, header.scales = _quantization(cloud.points)
+    header.offsets, header.scales = _quantization(extremes)
     header.generating_software = "nacre"
-    standard = set(header.point_format.dimension_names) - {"X", "Y", "Z", *_COLORS}
-    columns = _extra_columns(cloud)
-    for name, values in columns.items():
+    standard = set(header.point_format.dimension_names)
+    for name, values in _extra_columns(cloud).items():
         if name not in standard:
             dtype = values.dtype.str[1:] if values.ndim == 1 else f"{values.shape[1]}{values.dtype.str[1:]}"
             header.add_extra_dim(laspy.ExtraBytesParams(name=name, type=dtype))
-    las = laspy.LasData(header)
-    las.x, las.y, las.z = cloud.points.astype(np.float64).T
+    return header
+
+
+def _las_points(laspy: Any, cloud: Cloud, header: Any) -> Any:
+    """Return the points of a cloud as records of a file with this header."""
+    record = laspy.ScaleAwarePointRecord.zeros(len(cloud), header=header)
+    record.x, record.y, record.z = cloud.points.astype(np.float64).T
     if cloud.colors is not None:
-        las.red, las.green, las.blue = cloud.colors.T.astype(np.uint16) * 257
+        record.red, record.green, record.blue = cloud.colors.T.astype(np.uint16) * 257
     for name, value in _DEFAULTS.items():
-        las[name] = np.full(len(cloud), value)
-    for name, values in columns.items():
-        las[name] = _fitted(name, values, header.point_format) if name in standard else values
-    with atomic_path(path) as temporary, temporary.open("r+b") as stream:
-        las.write(stream, do_compress=Path(path).suffix.lower() == ".laz")
+        record[name] = np.full(len(cloud), value)
+    standard = set(header.point_format.standard_dimension_names)
+    for name, values in _extra_columns(cloud).items():
+        record[name] = _fitted(name, values, header.point_format) if name in standard else values
+    return record
 
 
 def _quantization(points: arrays.FloatArray) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import struct
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,17 @@ import numpy.typing as npt
 from nacre.errors import FileFormatError
 from nacre.io import lzf
 from nacre.io.cloud import Cloud, Columns, check_comments, gather_floats, native, with_attributes
-from nacre.io.raw import MAX_COMMENTS, TextTable, check_padding, decode, excerpt, file_writer, read_file
+from nacre.io.raw import (
+    MAX_COMMENTS,
+    TextTable,
+    check_padding,
+    decode,
+    excerpt,
+    file_writer,
+    read_file,
+    read_head,
+    read_records,
+)
 from nacre.io.rows import encode_rows
 
 _KEYWORDS = frozenset(
@@ -166,7 +177,22 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
         columns = _read_binary(path, data, header)
     else:
         columns = _read_compressed(path, data, header)
+    return _cloud_of(path, header, columns)
 
+
+def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud] | None:
+    """Return a binary PCD file in pieces of so many points; None where it is of another kind."""
+    header = _read_header(path, read_head(path, b"\nDATA"))
+    if header.encoding != "binary":
+        return None
+    size = Path(path).stat().st_size
+    _check_size(path, header, header.num_points * header.row_bytes, size - header.size)
+    header = dataclasses.replace(header, shape=None)
+    tables = read_records(path, header.size, _row_type(header), header.num_points, num_rows, are_last=True)
+    return (_cloud_of(path, header, _columns_of(rows, header)) for rows in tables)
+
+
+def _cloud_of(path: str | os.PathLike[str], header: _Header, columns: Columns) -> Cloud:
     points = gather_floats(columns, ("x", "y", "z"))
     used = {"x", "y", "z"}
     normals, colors = None, None
@@ -229,8 +255,14 @@ def _read_binary(path: str | os.PathLike[str], data: bytes, header: _Header) -> 
     num_bytes = header.num_points * header.row_bytes
     _check_size(path, header, num_bytes, len(data) - header.size)
     check_padding(path, data, header.size + num_bytes)
-    dtype = np.dtype([(f"f{i}", _stored(field)) for i, field in enumerate(header.fields)])
-    rows = np.frombuffer(data, dtype, header.num_points, header.size)
+    return _columns_of(np.frombuffer(data, _row_type(header), header.num_points, header.size), header)
+
+
+def _row_type(header: _Header) -> np.dtype[Any]:
+    return np.dtype([(f"f{i}", _stored(field)) for i, field in enumerate(header.fields)])
+
+
+def _columns_of(rows: npt.NDArray[Any], header: _Header) -> Columns:
     return {field.name: rows[f"f{i}"] for i, field in enumerate(header.fields) if not field.is_padding}
 
 
@@ -279,6 +311,23 @@ def write_cloud(
     path: str | os.PathLike[str], cloud: Cloud, *, comments: Sequence[str] = (), binary: bool = True
 ) -> None:
     """Write points as a PCD file, version 0.7; :func:`nacre.write_points` has the parameters."""
+    columns = _stored_columns(cloud, binary)
+    with file_writer(path) as stream:
+        stream.write(_header(columns, len(cloud), comments, binary))
+        stream.writelines(encode_rows(columns.values(), binary=binary))
+
+
+def write_chunks(path: str | os.PathLike[str], chunks: Iterable[Cloud], num_points: int) -> None:
+    """Write pieces of a cloud, all with the same fields and of ``num_points`` in all, as one PCD file."""
+    with file_writer(path) as stream:
+        for number, cloud in enumerate(chunks):
+            columns = _stored_columns(cloud, True)
+            if number == 0:
+                stream.write(_header(columns, num_points, (), True))
+            stream.writelines(encode_rows(columns.values(), binary=True))
+
+
+def _stored_columns(cloud: Cloud, binary: bool) -> Columns:
     columns: Columns = {name: cloud.points[:, i] for i, name in enumerate(("x", "y", "z"))}
     if cloud.normals is not None:
         columns.update({name: cloud.normals[:, i] for i, name in enumerate(_NORMALS)})
@@ -290,8 +339,10 @@ def write_cloud(
     empty = [name for name, column in cloud.attributes.items() if column.ndim == 2 and column.shape[1] == 0]
     if empty:
         raise ValueError(f"attributes[{empty[0]!r}] must have at least one value per point in a PCD file")
+    return columns
 
-    num_points = len(cloud.points)
+
+def _header(columns: Columns, num_points: int, comments: Sequence[str], binary: bool) -> bytes:
     header = {
         "VERSION": ["0.7"],
         "FIELDS": columns,
@@ -309,9 +360,7 @@ def write_cloud(
         *(f"# {line}".rstrip() for line in check_comments(comments)),
     ]
     lines += [f"{keyword} {' '.join(words)}" for keyword, words in header.items()]
-    with file_writer(path) as stream:
-        stream.write(("\n".join(lines) + "\n").encode())
-        stream.writelines(encode_rows(columns.values(), binary=binary))
+    return ("\n".join(lines) + "\n").encode()
 
 
 def _pack(colors: npt.NDArray[np.uint8], binary: bool) -> npt.NDArray[Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,8 +25,8 @@ from nacre.io.cloud import (
 )
 from nacre.io.mesh_arrays import MeshArrays, fan
 from nacre.io.ply_header import BYTE_ORDERS, TYPES, Header, read_header
-from nacre.io.ply_tables import Ragged, Table, read_binary_table, read_text_table
-from nacre.io.raw import TextTable, check_padding, file_writer, read_file
+from nacre.io.ply_tables import Ragged, Table, check_table_size, read_binary_table, read_text_table
+from nacre.io.raw import TextTable, check_padding, file_writer, read_file, read_head, read_records
 from nacre.io.rows import encode_rows
 
 _log = logging.getLogger(__name__)
@@ -97,6 +97,31 @@ def _check_vertices(path: str | os.PathLike[str], header: Header) -> None:
 def read_cloud(path: str | os.PathLike[str]) -> Cloud:
     """Read the vertices of a PLY file; :func:`nacre.read_points` says what is returned and raised."""
     return _vertices(read_ply(path))
+
+
+def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud] | None:
+    """Return a binary PLY file in pieces of so many vertices; None where their size in bytes is not known."""
+    header = read_header(path, read_head(path, b"end_header"))
+    _check_vertices(path, header)
+    if header.format not in BYTE_ORDERS:
+        return None
+    offset = header.size
+    for element in header.elements:
+        if any(entry.count_dtype is not None for entry in element.properties):
+            return None
+        order = BYTE_ORDERS[header.format]
+        dtype = np.dtype([(entry.name, entry.dtype.newbyteorder(order)) for entry in element.properties])
+        if element.name == "vertex":
+            break
+        offset += element.num_rows * dtype.itemsize
+    check_table_size(path, element, dtype.itemsize * element.num_rows, Path(path).stat().st_size - offset)
+    is_last = element is header.elements[-1]
+    tables = read_records(path, offset, dtype, element.num_rows, num_rows, are_last=is_last)
+    names = [entry.name for entry in element.properties]
+    return (
+        _vertices(PlyFile(Path(path), header, {"vertex": {name: rows[name] for name in names}}))
+        for rows in tables
+    )
 
 
 def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
@@ -246,18 +271,34 @@ def write_ply(
     binary : bool
         binary_little_endian, else ascii.
     """
+    sizes = {name: len(next(iter(columns.values()))) for name, columns in tables.items()}
+    with file_writer(path) as stream:
+        stream.write(_header(tables, sizes, comments, binary))
+        for columns in tables.values():
+            stream.writelines(encode_rows(_with_counts(columns), binary=binary))
+
+
+def write_chunks(path: str | os.PathLike[str], chunks: Iterable[Cloud], num_points: int) -> None:
+    """Write pieces of a cloud, all with the same fields and of ``num_points`` in all, as one PLY file."""
+    with file_writer(path) as stream:
+        for number, cloud in enumerate(chunks):
+            columns = _vertex_columns(cloud)
+            if number == 0:
+                stream.write(_header({"vertex": columns}, {"vertex": num_points}, (), True))
+            stream.writelines(encode_rows(_with_counts(columns), binary=True))
+
+
+def _header(
+    tables: Mapping[str, Columns], sizes: Mapping[str, int], comments: Sequence[str], binary: bool
+) -> bytes:
     lines = ["ply", f"format {'binary_little_endian' if binary else 'ascii'} 1.0"]
     lines += [f"comment {comment}".rstrip() for comment in check_comments(comments)]
     for name, columns in tables.items():
-        lines.append(f"element {name} {len(next(iter(columns.values())))}")
+        lines.append(f"element {name} {sizes[name]}")
         for column_name, column in columns.items():
             list_part = f"list {_type_name(_count_dtype(column))} " if column.ndim == 2 else ""
             lines.append(f"property {list_part}{_type_name(column.dtype)} {column_name}")
-    lines.append("end_header\n")
-    with file_writer(path) as stream:
-        stream.write("\n".join(lines).encode())
-        for columns in tables.values():
-            stream.writelines(encode_rows(_with_counts(columns), binary=binary))
+    return "\n".join([*lines, "end_header\n"]).encode()
 
 
 def _type_name(dtype: np.dtype[Any]) -> str:

@@ -42,7 +42,7 @@ Table = dict[str, "npt.NDArray[Any] | Ragged"]
 
 def read_text_table(text: TextTable, element: Element) -> Table:
     """Read the next rows of a text as the table of ``element``."""
-    _check_size(
+    check_table_size(
         text.path, element, element.num_rows * 2 * len(element.properties) - 1, len(text.data) - text.offset
     )
     columns = {
@@ -113,12 +113,12 @@ def read_binary_table(
     if not element.properties:
         return {}, position
     row_bytes = sum((entry.count_dtype or entry.dtype).itemsize for entry in element.properties)
-    _check_size(path, element, element.num_rows * row_bytes, len(data) - position)
+    check_table_size(path, element, element.num_rows * row_bytes, len(data) - position)
     found = _read_equal_rows(data, position, element, byte_order)
     return found or _read_unequal_rows(path, data, position, element, byte_order)
 
 
-def _check_size(path: str | os.PathLike[str], element: Element, smallest: int, num_bytes: int) -> None:
+def check_table_size(path: str | os.PathLike[str], element: Element, smallest: int, num_bytes: int) -> None:
     """Refuse a number of rows that cannot be in the rest of the file, before memory is set aside for it."""
     if smallest > num_bytes:
         raise FileFormatError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,21 @@ from nacre._internal.guided import guided
 from nacre.io import e57, las, npz, pcd, ply, xyz
 from nacre.io.cloud import Cloud, check_cloud, cloud_of
 
-_FORMATS = {".ply": ply, ".pcd": pcd, ".las": las, ".laz": las, ".e57": e57, ".xyz": xyz, ".npz": npz}
+_FORMATS: dict[str, Any] = {
+    ".ply": ply,
+    ".pcd": pcd,
+    ".las": las,
+    ".laz": las,
+    ".e57": e57,
+    ".xyz": xyz,
+    ".npz": npz,
+}
 
 SUFFIXES = tuple(_FORMATS)
 FINITE_SUFFIXES = (".las", ".laz", ".e57")
 """Of formats that have no points that are not finite."""
+STREAMED_SUFFIXES = (".ply", ".pcd", ".las", ".laz")
+"""Of formats that can be written in pieces."""
 
 
 def read_points(path: str | os.PathLike[str]) -> Cloud:
@@ -129,6 +139,62 @@ def write_points(
         own.attributes if attributes is None else attributes,
     )
     _FORMATS[Path(path).suffix.lower()].write_cloud(path, cloud, comments=comments, binary=binary)
+
+
+def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud]:
+    """
+    Yield a point file in pieces of so many points, all with the same fields.
+
+    Binary PLY and PCD files, LAS and LAZ are never in memory as a whole; :func:`is_streamed` tells it. Of LAS
+    files every dimension comes. Errors are those of :func:`read_points`.
+    """
+    require_point_suffix(path)
+    format = _FORMATS[Path(path).suffix.lower()]
+    chunks = format.read_chunks(path, num_rows) if hasattr(format, "read_chunks") else None
+    if chunks is not None:
+        yield from chunks
+        return
+    cloud = read_points(path)
+    for first in range(0, max(len(cloud), 1), num_rows):
+        yield cloud[first : first + num_rows]
+
+
+def is_streamed(path: str | os.PathLike[str]) -> bool:
+    """Say whether a point file can be read in pieces."""
+    require_point_suffix(path)
+    format = _FORMATS[Path(path).suffix.lower()]
+    if format is las:
+        return True
+    return hasattr(format, "read_chunks") and format.read_chunks(path, 1) is not None
+
+
+def write_chunks(
+    path: str | os.PathLike[str], chunks: Iterable[Cloud], num_points: int, extremes: npt.NDArray[Any]
+) -> None:
+    """
+    Write pieces of a cloud one after the other, whole or not at all.
+
+    Parameters
+    ----------
+    path : path-like
+        A file whose name ends in one of :data:`STREAMED_SUFFIXES`.
+    chunks : iterable of Cloud
+        At least one, all with the same fields.
+    num_points : int
+        Of all pieces.
+    extremes : (2, 3) array
+        Points between which all coordinates lie, from which a LAS file has its steps.
+
+    Raises
+    ------
+    ValueError, OSError
+        As :func:`write_points` does.
+    """
+    format = _FORMATS[Path(path).suffix.lower()]
+    if format is las:
+        las.write_chunks(path, chunks, num_points, extremes)
+    else:
+        format.write_chunks(path, chunks, num_points)
 
 
 def holds(path: str | os.PathLike[str], field: str) -> bool:

@@ -21,6 +21,8 @@ from nacre.io.atomic import atomic_writer
 MAX_COMMENTS = 10_000
 
 _BLOCK_BYTES = 1 << 15
+_HEAD_BYTES = 1 << 16
+_PADDING = b" \t\r\n\0"
 _BYTES_PER_ROW_GUESS = 32
 _IS_SPACE = np.zeros(256, dtype=bool)
 _IS_SPACE[list(b" \t\n\r\v\f")] = True
@@ -32,6 +34,45 @@ def read_file(path: str | os.PathLike[str], most: int | None = None) -> bytes:
     if most is not None and size > most:
         raise FileFormatError(path, f"larger than what it can hold: {size} bytes, more than {most}")
     return Path(path).read_bytes()
+
+
+def read_head(path: str | os.PathLike[str], last: bytes) -> bytes:
+    """Return the bytes of a regular file to the end of a header, whose last line begins so, or beyond."""
+    head = b""
+    with require_regular(path).open("rb") as stream:
+        while block := stream.read(_HEAD_BYTES):
+            head += block
+            at = head.find(last)
+            if at >= 0 and (head.find(b"\n", at + 1) >= 0 or len(block) < _HEAD_BYTES):
+                break
+    return head
+
+
+def read_records(
+    path: str | os.PathLike[str],
+    offset: int,
+    dtype: np.dtype[Any],
+    count: int,
+    num_rows: int,
+    *,
+    are_last: bool,
+) -> Iterator[npt.NDArray[Any]]:
+    """
+    Yield ``count`` records of a file from a byte on, so many at a time; of none an empty piece.
+
+    Where they are the last of the file, what follows must be padding.
+    """
+    with Path(path).open("rb") as stream:
+        stream.seek(offset)
+        for first in range(0, max(count, 1), num_rows):
+            wanted = min(num_rows, count - first)
+            rows = np.fromfile(stream, dtype, wanted)
+            if len(rows) < wanted:
+                raise FileFormatError(path, "the file became shorter while it was read", offset=offset)
+            yield rows
+        end = stream.tell()
+        if are_last and stream.read(_HEAD_BYTES).strip(_PADDING):
+            raise FileFormatError(path, "bytes follow the data that the header promises", offset=end)
 
 
 def require_regular(path: str | os.PathLike[str]) -> Path:
@@ -81,7 +122,7 @@ def decode(text: bytes) -> str:
 
 def check_padding(path: str | os.PathLike[str], data: bytes, end: int) -> None:
     """Refuse a file that goes on after the data its header promises; blanks and zero bytes are padding."""
-    if data[end:].strip(b" \t\r\n\0"):
+    if data[end:].strip(_PADDING):
         raise FileFormatError(
             path, f"{len(data) - end} bytes follow the data that the header promises", offset=end
         )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from nacre.io.atomic import remove_leftovers
 from nacre.io.folder_lock import lock_folder
-from nacre.reconstruction.batch.cluster import cluster_client, import_distributed
+from nacre._internal.cluster import cluster_client, import_distributed
 from nacre.reconstruction.batch.index import Index
 from nacre.reconstruction.batch.result import BatchResult, failed
 from nacre.reconstruction.batch.task import Task, reconstruct_recording

@@ -20,7 +20,7 @@ import pytest
 
 import nacre
 from nacre.io.folder_lock import lock_folder
-from nacre.reconstruction.batch import cluster as clusters
+from nacre._internal import cluster as clusters
 from nacre.reconstruction.batch.run import _result_of
 from nacre.reconstruction.batch.task import make_tasks
 

@@ -1,4 +1,4 @@
-"""The processes that reconstruct: of a Dask cluster on this machine, or of one that is there."""
+"""Processes that work: of a Dask cluster on this machine, or of one that is there."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from nacre.system import default_threads
 if TYPE_CHECKING:
     from distributed import Client
 
-_log = logging.getLogger("nacre.batch")
+_log = logging.getLogger("nacre.cluster")
 
 _SECONDS_TO_CONNECT = 10
 # A worker has one thread for each of its loops unless its environment says otherwise: here, its share.
@@ -27,7 +27,7 @@ def import_distributed() -> Any:
         import distributed
     except ImportError as error:
         raise ImportError(
-            'many recordings need Dask: pip install "nacre[dask]"', name="distributed"
+            'several processes need Dask: pip install "nacre[dask]"', name="distributed"
         ) from error
     return distributed
 
@@ -88,7 +88,7 @@ def _local_cluster(distributed: Any, workers: int | None, num_tasks: int) -> Any
         )
     except RuntimeError as error:
         raise RuntimeError(
-            "the processes that reconstruct did not start: a script must call nacre.batch below "
+            "the processes did not start: a script must call what starts them below "
             'if __name__ == "__main__":, for they import it'
         ) from error
 
@@ -102,6 +102,6 @@ def _look_at_workers(client: Client, scheduler: str) -> None:
     for address, worker in found.items():
         if worker["nthreads"] != 1:
             raise ValueError(
-                f"the worker {address} runs {worker['nthreads']} tasks in one process, and a recording needs "
+                f"the worker {address} runs {worker['nthreads']} tasks in one process, and each task needs "
                 f"a process of its own: {command}"
             )

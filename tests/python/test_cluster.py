@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from nacre.reconstruction.batch import cluster as clusters
+from nacre._internal import cluster as clusters
 
 
 @pytest.mark.parametrize(
@@ -42,7 +42,7 @@ def test_a_worker_has_its_share_of_threads_and_leaves_ctrl_c_to_the_batch(tmp_pa
     script = tmp_path / "script.py"
     script.write_text(
         "import os, signal, nacre\n"
-        "from nacre.reconstruction.batch import cluster\n"
+        "from nacre._internal import cluster\n"
         "def look():\n"
         "    return nacre.default_threads(), signal.getsignal(signal.SIGINT) is signal.SIG_IGN\n"
         "if __name__ == '__main__':\n"
