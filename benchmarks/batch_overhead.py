@@ -23,8 +23,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import nacre
-from nacre.cli.run_options import RunOptions
 from nacre._internal.cluster import cluster_client
+from nacre.cli.run_options import RunOptions
 from nacre.reconstruction.batch.index import Index
 from nacre.reconstruction.batch.result import BatchResult
 from nacre.reconstruction.batch.sources import find_recordings

@@ -60,4 +60,4 @@ def test_a_script_without_a_guard_is_told_about_it(tmp_path: Path) -> None:
     script.write_text("import nacre\nnacre.batch('scan', 'out', workers=1)\n")
     done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode != 0
-    assert 'must call nacre.batch below if __name__ == "__main__":' in done.stderr
+    assert 'must call what starts them below if __name__ == "__main__":' in done.stderr

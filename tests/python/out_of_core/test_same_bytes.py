@@ -55,8 +55,14 @@ from nacre import out_of_core
 
 killed = []
 
+def is_worker(process):
+    try:
+        return "spawn_main" in " ".join(process.cmdline())
+    except psutil.Error:  # it has just ended
+        return False
+
 def kill_one(done, total):
-    workers = [p for p in psutil.Process().children(recursive=True) if "spawn_main" in " ".join(p.cmdline())]
+    workers = [process for process in psutil.Process().children(recursive=True) if is_worker(process)]
     if not killed and len(workers) == 2:
         os.kill(workers[0].pid, signal.SIGKILL)
         killed.append(done)

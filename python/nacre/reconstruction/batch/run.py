@@ -9,9 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from nacre._internal.cluster import cluster_client, import_distributed
 from nacre.io.atomic import remove_leftovers
 from nacre.io.folder_lock import lock_folder
-from nacre._internal.cluster import cluster_client, import_distributed
 from nacre.reconstruction.batch.index import Index
 from nacre.reconstruction.batch.result import BatchResult, failed
 from nacre.reconstruction.batch.task import Task, reconstruct_recording

@@ -19,8 +19,8 @@ from typing import Any
 import pytest
 
 import nacre
-from nacre.io.folder_lock import lock_folder
 from nacre._internal import cluster as clusters
+from nacre.io.folder_lock import lock_folder
 from nacre.reconstruction.batch.run import _result_of
 from nacre.reconstruction.batch.task import make_tasks
 
