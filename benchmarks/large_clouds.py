@@ -23,6 +23,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import psutil
@@ -82,7 +83,7 @@ def run(
         else:
             nacre.write_points(output, nacre.consolidate(cloud.points, num_points=num_points).points)
         return 1
-    options = {"memory": memory, "workers": workers, "cells_per_task": cells_per_task}
+    options: dict[str, Any] = {"memory": memory, "workers": workers, "cells_per_task": cells_per_task}
     if task == "normals":
         return out_of_core.estimate_normals(source, output, **options).num_cells
     return out_of_core.consolidate(source, output, num_points=num_points, **options).num_cells
@@ -153,7 +154,7 @@ def halo_rows(num_points: int = 1_500_000) -> Iterator[str]:
     radius = nacre.consolidate(points, num_points=len(samples), iterations=0).radius
     inner = np.abs(samples[:, 0]) < 3
     for method, iterations in (("wlop", 10), ("wlop+", 10), ("cgal", 10), ("cgal", 35)):
-        options = {"radius": radius, "method": method, "iterations": iterations}
+        options: dict[str, Any] = {"radius": radius, "method": method, "iterations": iterations}
         whole = nacre.project_samples(samples, points, **options)[inner]
         for halo in (1, 2, 3, 4, 5, 6, 8, 10, 12, 20):
             near = np.abs(samples[:, 0]) < 3 + halo * radius

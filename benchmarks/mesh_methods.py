@@ -23,12 +23,14 @@ class OverBudgetError(Exception):
 def nacre_open(scene: Scene) -> Laid:
     """Join the points."""
     cloud = scene.cloud
+    assert cloud.normals is not None
     rows, triangles = meshing.used_rows(meshing.triangulate(cloud.points, cloud.normals))
     return Laid(cloud.points[rows], triangles, None if cloud.colors is None else cloud.colors[rows])
 
 
 def nacre_closed(scene: Scene) -> Laid:
     """Close the surface."""
+    assert scene.cloud.normals is not None
     surface = meshing.close_surface(scene.cloud.points, scene.cloud.normals)
     return _colored(scene, surface.vertices, surface.triangles)
 
@@ -60,8 +62,9 @@ def open3d_tsdf(scene: Scene) -> Laid:
 
 def skimage_cubes(scene: Scene) -> Laid:
     """Fuse the images in the same grid; scikit-image's marching cubes over its box."""
-    from skimage.measure import marching_cubes
+    from skimage import measure
 
+    marching_cubes: Any = measure.marching_cubes
     grid = _grid(scene)
     places, rows = grid.voxel_coordinates_and_flattened_indices()
     cells = np.round(places.numpy() / scene.spacing).astype(np.int64)
@@ -88,7 +91,8 @@ def cgal_front(scene: Scene) -> Laid:
 
     if len(scene.cloud) > MOST_OF_CGAL:
         raise OverBudgetError(f"not run: minutes for more than {MOST_OF_CGAL} points")
-    points, corners = Point_set_3(), []
+    points = Point_set_3()
+    corners: list[int] = []
     for point in scene.cloud.points.tolist():
         points.insert(Point_3(*point))
     advancing_front_surface_reconstruction(points, corners)
@@ -120,6 +124,7 @@ def _cloud(scene: Scene) -> Any:
     def rows(values: Array) -> Any:
         return o3d.utility.Vector3dVector(values.astype(np.float64))
 
+    assert scene.cloud.normals is not None
     cloud = o3d.geometry.PointCloud(rows(scene.cloud.points))
     cloud.normals = rows(scene.cloud.normals)
     if scene.cloud.colors is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cases
 import numpy as np
@@ -12,7 +13,7 @@ import nacre
 from nacre import evaluation
 from nacre.io.cloud import Cloud
 
-Array = npt.NDArray[np.float64]
+Array = npt.NDArray[Any]
 Bytes = npt.NDArray[np.uint8]
 
 SAMPLES = 50_000

@@ -21,6 +21,7 @@ import importlib
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import cases
 import numpy as np
@@ -41,7 +42,7 @@ def parts_and_holes(triangles: npt.NDArray[np.int32]) -> tuple[int, int]:
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
-    def components(a: npt.NDArray[np.int32], b: npt.NDArray[np.int32]) -> int:
+    def components(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> int:
         used, ends = np.unique(np.stack([a, b]), return_inverse=True)
         a, b = ends.reshape(2, -1)
         graph = coo_matrix((np.ones(len(a)), (a, b)), shape=(len(used), len(used)))
