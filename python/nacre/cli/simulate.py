@@ -117,8 +117,10 @@ def simulate(
         elevation=math.radians(elevation),
     )
     farthest = _check_size(surface, poses[0], mesh)
+    reach = math.inf
     if depth_scale is None:
         depth_scale = next((s for s in _SCALES if 1.1 * farthest * s <= 65534), _SCALES[-1])
+        reach = 65534 / depth_scale  # errors far beyond the mesh: cameras have a longest distance, too
     writable_folder(out)
     terminal.say(f"{mesh}: {surface!r}\n{views} views every {step:g} degrees, {describe_camera(camera)}")
     empty = []
@@ -136,6 +138,7 @@ def simulate(
                     dropout=dropout,
                     seed=seed + i,
                 )
+                image[image > reach] = math.nan
                 if not (image > 0).any():
                     empty.append(i)
                 yield image

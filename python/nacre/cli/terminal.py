@@ -59,7 +59,7 @@ class Terminal:
     def say(self, text: str = "") -> None:
         """Print a line that a person likes to see but that is not the command's answer."""
         if not (self.json or self.quiet):
-            print(text)
+            print(text, flush=True)  # a program that reads it may wait for it
 
     def answer(self, figures: Mapping[str, Any], rows: Sequence[tuple[str, str]]) -> None:
         """Print what the command is for: as JSON, or as lines of a name and a value."""

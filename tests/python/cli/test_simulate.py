@@ -51,6 +51,13 @@ def test_a_sensor(tmp_path):
     assert np.nanstd(first.depth - second.depth) > 0.001
 
 
+def test_errors_beyond_what_a_file_holds_are_no_measurement(tmp_path):
+    views = ("--views", 1, "--width", 160, "--height", 120, "--fx", 150, "--distance", 1)
+    run("simulate", "built-in", "-o", tmp_path / "r", *views, "--noise", 0.5)
+    sequence = nacre.open_sequence(tmp_path / "r")
+    assert 1.2 < np.nanmax(sequence[0].depth) <= 65534 / sequence.depth_scale
+
+
 def test_a_mesh_in_millimetres_is_told_and_scaled(tmp_path):
     mesh = nacre.built_in_object()
     path = tmp_path / "mm.ply"
