@@ -152,14 +152,18 @@ def _main_part(cloud: Snapshot, num_views: npt.NDArray[np.integer] | Array) -> n
 
 
 def _view(points: npt.NDArray[np.float32], core: npt.NDArray[np.bool_], toward: Array, up: Array) -> View:
-    """Return a view of the core, with some of what is around it."""
-    target = np.median(points[core], axis=0).astype(np.float64)
-    distances = np.linalg.norm(points - target, axis=1)
+    """Return a view of the core, with some of what is around it, which is in the middle of the picture."""
+    middle = np.median(points[core], axis=0).astype(np.float64)
+    distances = np.linalg.norm(points - middle, axis=1)
     radius = min(np.quantile(distances, 0.99), 2.1 * np.median(distances[core]))
     direction = _unit(toward, -_FORWARD)
     upward = _unit(up, -_DOWN)
     if abs(upward @ direction) > 0.98:
         upward = _unit(np.cross(direction, (1.0, 0, 0)), -_DOWN)
+    right = _unit(np.cross(upward, direction), _DOWN)
+    across = np.stack([right, np.cross(direction, right)])
+    shown = (points[distances <= radius] - middle) @ across.T
+    target = middle + np.quantile(shown, (0.02, 0.98), axis=0).mean(axis=0) @ across
     return View(target, direction, upward, max(float(radius), 1e-6))
 
 
