@@ -2,14 +2,18 @@
 """
 Draw the pictures of real recordings, which ask for the recordings and Open3D.
 
-``python docs/figures/recordings.py --data FOLDER`` draws all into ``docs/images``; ``meshes``: nacre's beside
-Open3D's, from the same poses.
+``python docs/figures/recordings.py --data FOLDER`` draws all into ``docs/images``. ``meshes``: nacre's beside
+Open3D's, from the same poses. ``surfaces``: all points of models, and those that are written. ``screens``:
+the viewer and the report as they open.
 """
 
 from __future__ import annotations
 
 import argparse
+import io
+import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import draw
@@ -18,12 +22,15 @@ from PIL import Image
 from surfaces import FRONT, REVERSE
 
 import nacre
+from nacre.meshing import on_surface
+from nacre.viewer import export_html, read_timeline
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.append(str(ROOT / "benchmarks"))
+sys.path += [str(ROOT / "benchmarks"), str(ROOT / "tests" / "python")]
 
 import cases  # noqa: E402
 import mesh_methods  # noqa: E402
+from browser import Browser  # noqa: E402
 from mesh_scenes import STEPS, Laid, Scene  # noqa: E402
 
 MESHED = ["teddy", "d435", "icl"]
@@ -34,6 +41,22 @@ METHODS = {
 }
 SIDE, BACK = 0.2, 0.3  # of the distance: where the picture is taken, right of the camera, and behind it
 PANEL = (300, 225)
+RECORDINGS = [
+    "tum-fr3-teddy",
+    "d435-t265-shelf",
+    "iphone-lidar-office-a",
+    "icl-livingroom-loop-fast",
+    "realsense-robot-objects",
+    "truedepth-boxcan",
+    "tum-fr3-cabinet-kf",
+    "sr300-shelf",
+    "apc-shelf-f200",
+    "tum-fr1-rpy",
+]
+SHOWN = 6  # of them, whose screens are drawn
+LOADED = "page.clouds.length > 0 && page.clouds[0].version > 1"
+PAGE, VIEW = (1200, 657), (900, 657)  # pixels; beside the view are the viewer's tools
+WIDTH = {PAGE: 370, VIEW: 235}  # of their pictures
 
 
 def beside(points, pose):
@@ -93,7 +116,59 @@ def meshes():
     return draw.sheet(panels, columns=len(METHODS))
 
 
-FIGURES = {"meshes": meshes}
+def reconstructed(name, folder, *options):
+    """Reconstruct a recording; where few frames are tracked that is shown, too."""
+    command = [
+        Path(sys.executable).with_name("nacre"),
+        "reconstruct",
+        cases.DATA / name,
+        "-o",
+        folder,
+        *options,
+    ]
+    code = subprocess.run(command, check=False, stdout=subprocess.DEVNULL).returncode
+    assert code in (0, 3), command
+    return folder
+
+
+def photograph(browser, page, size, loaded="true"):
+    """Return a page as the browser shows it, smaller."""
+    browser.open(page.as_uri())
+    browser.wait_for(loaded)
+    picture = Image.open(io.BytesIO(browser.screenshot())).convert("RGB")
+    picture = picture.crop((0, 0, *size))
+    width = WIDTH[size]
+    return np.asarray(picture.resize((width, width * size[1] // size[0]), Image.Resampling.LANCZOS))
+
+
+def surfaces():
+    """Draw models with all their points and as they are written, side by side."""
+    panels = []
+    with tempfile.TemporaryDirectory() as scratch, Browser(Path(scratch) / "profile") as browser:
+        for name in RECORDINGS:
+            out = reconstructed(name, Path(scratch) / name, "--all-points", "--no-report")
+            cloud = nacre.read_points(out / "model.ply")
+            written = cloud[on_surface(cloud.points, cloud.normals, cloud.attributes["confidence"])]
+            for title, points in (("all points", cloud), ("as written", written)):
+                nacre.write_points(out / "model.ply", points)
+                export_html(read_timeline(out), out / "page.html")
+                panels.append((f"{name}: {title}", photograph(browser, out / "page.html", VIEW, LOADED)))
+    return draw.sheet(panels, columns=2)
+
+
+def screens():
+    """Draw the viewer and the report as they open, a row for each recording."""
+    panels = []
+    with tempfile.TemporaryDirectory() as scratch, Browser(Path(scratch) / "profile") as browser:
+        for name in RECORDINGS[:SHOWN]:
+            out = reconstructed(name, Path(scratch) / name)
+            export_html(read_timeline(out), out / "page.html")
+            panels.append((f"{name}: the viewer", photograph(browser, out / "page.html", PAGE, LOADED)))
+            panels.append((f"{name}: the report", photograph(browser, out / "report.html", PAGE)))
+    return draw.sheet(panels, columns=2)
+
+
+FIGURES = {"meshes": meshes, "surfaces": surfaces, "screens": screens}
 
 
 def main() -> None:
