@@ -150,8 +150,8 @@ def _follow(terminal: Terminal, results: Iterable[BatchResult], total: int) -> N
         for number, result in enumerate(results, 1):
             num_reconstructed += result.outcome != "finished before"
             left = (total - number) * (time.monotonic() - start) / max(1, num_reconstructed)
-            more = f"; about {duration(left)} left" if number < total and num_reconstructed else ""
-            words = result.verdict if result.has_results else result.message
+            more = f" (about {duration(left)} left)" if number < total and num_reconstructed else ""
+            words = (result.verdict if result.has_results else result.message).removesuffix(".")
             terminal.say(f"{number} of {total}: {result.name}: {result.outcome}: {words}{more}")
             advance(result.name)
 

@@ -28,7 +28,7 @@ def test_it_tells_of_each_recording_and_how_long_it_will_take(scans, tmp_path):
     assert first.code == 1
     lines = first.out.splitlines()
     assert lines[0].startswith("1 of 2: broken: failed: ")
-    assert lines[0].endswith(" left")
+    assert lines[0].endswith(" left)")
     assert lines[1].startswith("2 of 2: cup: reconstructed: ")
     assert first.err.startswith("error: 1 of 2 recordings failed: broken: ")
     again = run(*words[:-1], "--no-report", "--json")
