@@ -71,10 +71,6 @@ class Scene:
         self.depths, self.colors = case.depths, case.colors
         self.has_color = case.colors[0] is not None
 
-    def measure(self, laid: Laid) -> Figures:
-        """Compare a mesh with the truth."""
-        raise NotImplementedError
-
 
 class Painted(Scene):
     """An object of known shape with a painted surface, seen by a simulated camera."""

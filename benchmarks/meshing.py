@@ -63,7 +63,7 @@ def timed(scene: Scene, method: Callable[[Scene], Laid]) -> tuple[float, float, 
     return time.process_time() - begin, (memory("VmHWM") - before) / 1e6, laid
 
 
-def row(name: str, scene: Scene, method: Callable[[Scene], Laid]) -> str:
+def row(name: str, scene: Painted | Recorded, method: Callable[[Scene], Laid]) -> str:
     """Measure a method; one line of a table."""
     seconds, megabytes, laid = timed(scene, method)
     laid.vertices = np.asarray(laid.vertices, np.float64)
@@ -79,7 +79,7 @@ def row(name: str, scene: Scene, method: Callable[[Scene], Laid]) -> str:
 
 def table(name: str) -> Iterator[str]:
     """Run a case; the lines of its table."""
-    scene: Scene = Recorded(name) if name in cases.REAL else Painted(name)
+    scene: Painted | Recorded = Recorded(name) if name in cases.REAL else Painted(name)
     yield f"{name}: {len(scene.cloud)} points, {1000 * scene.spacing:.1f} mm apart\n"
     yield f"| {' | '.join(HEADS)} |"
     yield f"|{' --- |' * len(HEADS)}"

@@ -15,9 +15,8 @@ from nacre.cli.large_clouds import (
     SchedulerOption,
     SourceArgument,
     WorkersOption,
-    answer,
-    following,
     is_large,
+    write_cloud,
 )
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, to_json, writable_file
 
@@ -64,11 +63,12 @@ def consolidate(
     """
     terminal = Terminal(json, quiet, verbose)
     if scheduler or workers or is_large(source, memory):
-        writable_file(out)
         from nacre.out_of_core import consolidate as consolidate_out_of_core
 
-        with following(terminal) as progress:
-            done = consolidate_out_of_core(
+        write_cloud(
+            terminal,
+            out,
+            lambda progress: consolidate_out_of_core(
                 source,
                 out,
                 num_points=num_points,
@@ -82,8 +82,8 @@ def consolidate(
                 workers=workers,
                 scheduler=scheduler,
                 progress=progress,
-            )
-        answer(terminal, out, done)
+            ),
+        )
         return
     import numpy as np
 

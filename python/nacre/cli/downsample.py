@@ -14,10 +14,9 @@ from nacre.cli.large_clouds import (
     SchedulerOption,
     SourceArgument,
     WorkersOption,
-    answer,
-    following,
+    write_cloud,
 )
-from nacre.cli.terminal import Json, Quiet, Terminal, Verbose, writable_file
+from nacre.cli.terminal import Json, Quiet, Terminal, Verbose
 
 
 def downsample(
@@ -42,9 +41,10 @@ def downsample(
     terminal = Terminal(json, quiet, verbose)
     from nacre.out_of_core import voxel_downsample
 
-    writable_file(out)
-    with following(terminal) as progress:
-        result = voxel_downsample(
+    write_cloud(
+        terminal,
+        out,
+        lambda progress: voxel_downsample(
             source,
             out,
             voxel_size,
@@ -53,5 +53,5 @@ def downsample(
             workers=workers,
             scheduler=scheduler,
             progress=progress,
-        )
-    answer(terminal, out, result)
+        ),
+    )

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from nacre.cli.terminal import Terminal
+from nacre.cli.terminal import Terminal, writable_file
 
 if TYPE_CHECKING:
     from nacre.out_of_core import CloudResult
@@ -63,7 +63,7 @@ _BYTES_PER_BYTE = 10  # of memory, of a file that is worked on as a whole
 
 
 @contextmanager
-def following(terminal: Terminal) -> Iterator[Callable[[int, int], None]]:
+def _following(terminal: Terminal) -> Iterator[Callable[[int, int], None]]:
     """Show how many cells are done; how many there are is known with the first."""
     with ExitStack() as bar:
         advance: list[Callable[[str], None]] = []
@@ -85,10 +85,15 @@ def is_large(source: Path, memory: str | None) -> bool:
     return source.is_file() and source.stat().st_size * _BYTES_PER_BYTE > as_bytes("memory", None)
 
 
-def answer(terminal: Terminal, out: Path, result: CloudResult) -> None:
-    """Say what became of a cloud."""
+def write_cloud(
+    terminal: Terminal, out: Path, method: Callable[[Callable[[int, int], None]], CloudResult]
+) -> None:
+    """Write what a method makes of a cloud, which tells its progress; say what became of the cloud."""
     from nacre.report.text import count
 
+    writable_file(out)
+    with _following(terminal) as progress:
+        result = method(progress)
     figures = {
         "out": out, "num_input": result.num_input, "num_left_out": result.num_left_out,
         "num_points": result.num_points, "num_cells": result.num_cells, "radius": result.radius,

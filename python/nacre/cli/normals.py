@@ -14,10 +14,9 @@ from nacre.cli.large_clouds import (
     SchedulerOption,
     SourceArgument,
     WorkersOption,
-    answer,
-    following,
+    write_cloud,
 )
-from nacre.cli.terminal import Json, Quiet, Terminal, Verbose, writable_file
+from nacre.cli.terminal import Json, Quiet, Terminal, Verbose
 
 
 def normals(
@@ -50,9 +49,10 @@ def normals(
     terminal = Terminal(json, quiet, verbose)
     from nacre.out_of_core import estimate_normals
 
-    writable_file(out)
-    with following(terminal) as progress:
-        result = estimate_normals(
+    write_cloud(
+        terminal,
+        out,
+        lambda progress: estimate_normals(
             source,
             out,
             k=k,
@@ -63,5 +63,5 @@ def normals(
             workers=workers,
             scheduler=scheduler,
             progress=progress,
-        )
-    answer(terminal, out, result)
+        ),
+    )

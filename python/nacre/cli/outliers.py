@@ -14,10 +14,9 @@ from nacre.cli.large_clouds import (
     SchedulerOption,
     SourceArgument,
     WorkersOption,
-    answer,
-    following,
+    write_cloud,
 )
-from nacre.cli.terminal import Json, Quiet, Terminal, Verbose, writable_file
+from nacre.cli.terminal import Json, Quiet, Terminal, Verbose
 
 
 def outliers(
@@ -51,9 +50,10 @@ def outliers(
     terminal = Terminal(json, quiet, verbose)
     from nacre.out_of_core import remove_outliers
 
-    writable_file(out)
-    with following(terminal) as progress:
-        result = remove_outliers(
+    write_cloud(
+        terminal,
+        out,
+        lambda progress: remove_outliers(
             source,
             out,
             k=k,
@@ -64,5 +64,5 @@ def outliers(
             workers=workers,
             scheduler=scheduler,
             progress=progress,
-        )
-    answer(terminal, out, result)
+        ),
+    )

@@ -1,13 +1,18 @@
 """Commands over clouds of any size."""
 
+import inspect
+
 import numpy as np
 import pytest
 from command_line import fails, run
 from hills import NUM_POINTS, hills, write
 
 import nacre
-from nacre.cli import large_clouds
-from nacre.out_of_core import cloud_work
+from nacre import out_of_core
+from nacre.cli.consolidate import consolidate
+from nacre.cli.downsample import downsample
+from nacre.cli.normals import normals
+from nacre.cli.outliers import outliers
 
 
 @pytest.fixture(scope="module")
@@ -81,5 +86,19 @@ def test_wrong_usage(scan, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_pieces_are_those_of_the_functions():
-    assert large_clouds.POINTS_PER_CELL == cloud_work.POINTS_PER_CELL
+@pytest.mark.parametrize(
+    ("command", "function"),
+    [
+        (consolidate, out_of_core.consolidate),
+        (downsample, out_of_core.voxel_downsample),
+        (normals, out_of_core.estimate_normals),
+        (outliers, out_of_core.remove_outliers),
+    ],
+)
+def test_commands_and_functions_have_the_same_defaults(command, function):
+    ours, theirs = (inspect.signature(each).parameters for each in (command, function))
+    shared = {
+        name for name in ours.keys() & theirs.keys() if theirs[name].default is not inspect.Parameter.empty
+    }
+    assert {"memory", "points_per_cell", "workers", "scheduler"} <= shared
+    assert {name: ours[name].default for name in shared} == {name: theirs[name].default for name in shared}
