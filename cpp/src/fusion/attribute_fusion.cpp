@@ -76,8 +76,8 @@ void AttributePlanes::observe(ObservationBlock& block, float* averages) const {
   }
 }
 
-void fuse_attributes(PointModel& model, std::int64_t first, const RegisteredFrame& now, const AttributePlanes& planes,
-                     int num_threads) {
+void fuse_attributes(PointModel& model, const std::vector<PointRange>& ranges, const RegisteredFrame& now,
+                     const AttributePlanes& planes, int num_threads) {
   const SurfaceObserver& observer = now.observer;
   std::vector<PointAttribute*> targets;
   for (const AttributePlanes::Part& part : planes.parts()) {
@@ -92,41 +92,40 @@ void fuse_attributes(PointModel& model, std::int64_t first, const RegisteredFram
 
   const PointProjection view(now.camera, now.world_from_camera);
   constexpr std::int64_t block_size = PointProjection::capacity;
-  parallel_blocks(
-      model.size() - first, block_size, num_threads, [&](std::int64_t, std::int64_t begin, std::int64_t end) {
-        const auto start = static_cast<std::size_t>(first + begin);
-        PointProjection::Block points;
-        view.project(model.points[start].data(), model.normals[start].data(), static_cast<int>(end - begin), points);
-        ObservationBlock block;
-        std::size_t seen[block_size];
-        for (int j = 0; j < static_cast<int>(end - begin); ++j) {
-          if (!is_observable(points, j, now.frame, observer)) continue;
-          seen[block.size()] = start + static_cast<std::size_t>(j);
-          observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma_at(now.frame, points.pixel[j]));
+  parallel_for(static_cast<std::int64_t>(ranges.size()), 1, num_threads, [&](std::int64_t number) {
+    const PointRange& range = ranges[static_cast<std::size_t>(number)];
+    const std::size_t start = range.first;
+    PointProjection::Block points;
+    view.project(model.points[start].data(), model.normals[start].data(), range.count, points);
+    ObservationBlock block;
+    std::size_t seen[block_size];
+    for (int j = 0; j < range.count; ++j) {
+      if (!is_observable(points, j, now.frame, observer)) continue;
+      seen[block.size()] = start + static_cast<std::size_t>(j);
+      observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma_at(now.frame, points.pixel[j]));
+    }
+    if (block.size() == 0) return;
+    std::vector<float> averages(static_cast<std::size_t>(planes.num_planes()) * ObservationBlock::capacity);
+    planes.observe(block, averages.data());
+    for (int k = 0; k < block.size(); ++k) {
+      const float weight = block[k].weight;
+      if (!(weight > fusion_limits::least_weight * observer.frontal_weight(block.sigma(k)))) continue;
+      const auto average = [&](int plane) {
+        return averages[static_cast<std::size_t>(plane * ObservationBlock::capacity + k)];
+      };
+      for (std::size_t p = 0; p < targets.size(); ++p) {
+        const AttributePlanes::Part& part = planes.parts()[p];
+        const float coverage = part.coverage < 0 ? 1.0F : average(part.coverage);
+        if (!(coverage > 0.0F)) continue;
+        const float gain = weight * coverage / (model.confidence[seen[k]] + weight * coverage);
+        float* const value = targets[p]->values.data() + seen[k] * static_cast<std::size_t>(targets[p]->num_channels);
+        for (int c = 0; c < targets[p]->num_channels; ++c) {
+          const float observed = average(part.first + c) / coverage;
+          value[c] = std::isfinite(value[c]) ? value[c] + gain * (observed - value[c]) : observed;
         }
-        if (block.size() == 0) return;
-        std::vector<float> averages(static_cast<std::size_t>(planes.num_planes()) * ObservationBlock::capacity);
-        planes.observe(block, averages.data());
-        for (int k = 0; k < block.size(); ++k) {
-          const float weight = block[k].weight;
-          if (!(weight > fusion_limits::least_weight * observer.frontal_weight(block.sigma(k)))) continue;
-          const auto average = [&](int plane) {
-            return averages[static_cast<std::size_t>(plane * ObservationBlock::capacity + k)];
-          };
-          for (std::size_t p = 0; p < targets.size(); ++p) {
-            const AttributePlanes::Part& part = planes.parts()[p];
-            const float coverage = part.coverage < 0 ? 1.0F : average(part.coverage);
-            if (!(coverage > 0.0F)) continue;
-            const float gain = weight * coverage / (model.confidence[seen[k]] + weight * coverage);
-            float* const value =
-                targets[p]->values.data() + seen[k] * static_cast<std::size_t>(targets[p]->num_channels);
-            for (int c = 0; c < targets[p]->num_channels; ++c) {
-              const float observed = average(part.first + c) / coverage;
-              value[c] = std::isfinite(value[c]) ? value[c] + gain * (observed - value[c]) : observed;
-            }
-          }
-        }
-      });
+      }
+    }
+  });
 }
 
 }  // namespace nacre

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "fusion/block_index.hpp"
 #include "fusion/registered_frame.hpp"
 #include "nacre/fusion.hpp"
 
@@ -38,9 +39,9 @@ class AttributePlanes {
   int num_planes_ = 0;
 };
 
-// Adds what a frame says about the attributes of the model's points from `first` on. Before the points themselves are
-// updated: their confidence is the weight of what is known already.
-void fuse_attributes(PointModel& model, std::int64_t first, const RegisteredFrame& now, const AttributePlanes& planes,
-                     int num_threads);
+// Adds what a frame says about the attributes of some of the model's points. Before the points themselves are updated:
+// their confidence is the weight of what is known already.
+void fuse_attributes(PointModel& model, const std::vector<PointRange>& ranges, const RegisteredFrame& now,
+                     const AttributePlanes& planes, int num_threads);
 
 }  // namespace nacre

@@ -34,22 +34,24 @@ float significant_gain(std::vector<float> ratios) {
 
 }  // namespace
 
-Eigen::Vector3f color_gain(const PointModel& model, const RegisteredFrame& now, double spacing) {
+Eigen::Vector3f color_gain(const PointModel& model, const std::vector<PointRange>& in_view, const RegisteredFrame& now,
+                           double spacing) {
   if (!now.observer.has_colors() || model.colors.empty()) return Eigen::Vector3f::Ones();
   const PointProjection view(now.camera, now.world_from_camera);
   std::array<std::vector<float>, 3> ratios;
   constexpr std::size_t block_size = PointProjection::capacity;
   PointProjection::Block points;
-  for (std::size_t first = 0; first < model.points.size(); first += fusion_limits::exposure_blocks * block_size) {
-    const std::size_t count = std::min(block_size, model.points.size() - first);
-    view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(count), points);
-    for (int j = 0; j < static_cast<int>(count); ++j) {
+  for (const PointRange& range : in_view) {
+    view.project(model.points[range.first].data(), model.normals[range.first].data(), range.count, points);
+    for (int j = 0; j < range.count; ++j) {
+      const std::size_t i = range.first + static_cast<std::size_t>(j);
+      if (i / block_size % fusion_limits::exposure_blocks != 0) continue;
       if (!points.inside[j] || !(points.facing[j] > fusion_limits::least_facing)) continue;
       const std::int32_t pixel = points.pixel[j];
       const float margin = std::max(static_cast<float>(camera_limits::surface_spacings * spacing),
                                     base_limits::noise_sigmas * sigma_at(now.frame, pixel));
       if (visibility(now.frame.points(pixel, 2) - points.z[j], margin) != Visibility::agrees) continue;
-      const Eigen::Vector3f known = model.colors[first + static_cast<std::size_t>(j)];
+      const Eigen::Vector3f known = model.colors[i];
       const Eigen::Vector3f seen = now.observer.color(pixel % now.frame.width, pixel / now.frame.width);
       if (!known.allFinite() || !is_well_exposed(known) || !is_well_exposed(seen)) continue;
       for (int c = 0; c < 3; ++c) ratios[static_cast<std::size_t>(c)].push_back(std::log(known[c] / seen[c]));
@@ -61,8 +63,9 @@ Eigen::Vector3f color_gain(const PointModel& model, const RegisteredFrame& now, 
   return gain;
 }
 
-Eigen::Vector3f share_exposure(PointModel& model, const RegisteredFrame& now, double spacing) {
-  const Eigen::Vector3f gain = color_gain(model, now, spacing);
+Eigen::Vector3f share_exposure(PointModel& model, const std::vector<PointRange>& in_view, const RegisteredFrame& now,
+                               double spacing) {
+  const Eigen::Vector3f gain = color_gain(model, in_view, now, spacing);
   if (gain == Eigen::Vector3f::Ones()) return Eigen::Vector3f::Ones();
   const float share = -1.0F / std::max(1.0F, static_cast<float>(now.index) + 1.0F);
   const Eigen::Vector3f moved = gain.array().pow(share);

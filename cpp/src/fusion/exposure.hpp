@@ -1,6 +1,9 @@
 // How bright a frame's colours are beside the model's.
 #pragma once
 
+#include <vector>
+
+#include "fusion/block_index.hpp"
 #include "fusion/registered_frame.hpp"
 #include "nacre/fusion.hpp"
 
@@ -12,11 +15,13 @@ inline Eigen::Vector3f exposed(const Eigen::Vector3f& color, const Eigen::Vector
 }
 
 // By what a frame's colours are to be multiplied, channel by channel, to be as the model's: the median over points that
-// both show, as exposure and white balance change the whole image alike. 1 where chance explains it.
-Eigen::Vector3f color_gain(const PointModel& model, const RegisteredFrame& now, double spacing);
+// both show (of those in view), as exposure and white balance change the whole image alike. 1 where chance explains it.
+Eigen::Vector3f color_gain(const PointModel& model, const std::vector<PointRange>& in_view, const RegisteredFrame& now,
+                           double spacing);
 
 // Brings a frame and the model to one exposure, the mean of all frames': returns what the frame's colours are to be
 // multiplied by, and multiplies the model's.
-Eigen::Vector3f share_exposure(PointModel& model, const RegisteredFrame& now, double spacing);
+Eigen::Vector3f share_exposure(PointModel& model, const std::vector<PointRange>& in_view, const RegisteredFrame& now,
+                               double spacing);
 
 }  // namespace nacre

@@ -36,8 +36,8 @@ bool reaches_image(const PointProjection::Block& points, int i, const Camera& ca
 }
 
 // Moves the model's points by what the frame says about them.
-KnownSurface update(PointModel& model, const RegisteredFrame& now, double spacing, const FusionOptions& options,
-                    FusionReport& report, int num_threads) {
+KnownSurface update(PointModel& model, const std::vector<PointRange>& ranges, const RegisteredFrame& now,
+                    double spacing, const FusionOptions& options, FusionReport& report, int num_threads) {
   const Frame& frame = now.frame;
   const Camera& camera = now.camera;
   const SurfaceObserver& observer = now.observer;
@@ -50,68 +50,67 @@ KnownSurface update(PointModel& model, const RegisteredFrame& now, double spacin
     std::int32_t pixel;
     PixelWindow window;
   };
-  const auto num_blocks = static_cast<std::size_t>((model.size() + block_size - 1) / block_size);
-  std::vector<std::vector<Cover>> covers(num_blocks);
-  std::vector<std::vector<KnownSurface::Point>> beside(num_blocks);  // the image
+  std::vector<std::vector<Cover>> covers(ranges.size());
+  std::vector<std::vector<KnownSurface::Point>> beside(ranges.size());  // the image
 
-  parallel_blocks(
-      model.size(), block_size, num_threads, [&](std::int64_t number, std::int64_t begin, std::int64_t end) {
-        const auto first = static_cast<std::size_t>(begin);
-        PointProjection::Block points;
-        view.project(model.points[first].data(), model.normals[first].data(), static_cast<int>(end - begin), points);
-        const auto note_free_space_violation = [&](int j, float sigma) {
-          const std::size_t i = first + static_cast<std::size_t>(j);
-          const float margin = std::max(static_cast<float>(camera_limits::surface_spacings * spacing),
-                                        base_limits::noise_sigmas * sigma);
-          const bool is_confirmed = model.observations[i] >= options.min_observations;
-          const Visibility is = visibility(frame.points(points.pixel[j], 2) - points.z[j], margin);
-          const bool is_missed = is_confirmed ? observer.sees_through(points.point(j), points.pixel[j], margin)
-                                              : is == Visibility::agrees || is == Visibility::seen_through;
-          if (is_missed) count_up(model.free_space_violations[i]);
-        };
-        ObservationBlock block;
-        int seen[block_size];  // of the points
-        for (int j = 0; j < static_cast<int>(end - begin); ++j) {
-          if (!points.inside[j] && reaches_image(points, j, camera, spacing)) {
-            beside[static_cast<std::size_t>(number)].push_back({first + static_cast<std::size_t>(j), points.pixel[j]});
-          }
-          if (!points.inside[j] || !(points.facing[j] > fusion_limits::least_facing)) continue;
-          const float measured_sigma = frame.sigma[points.pixel[j]];
-          const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
-          if (!observer.may_observe(points.point(j), points.pixel[j], sigma,
-                                    fusion_limits::least_weight * observer.frontal_weight(sigma))) {
-            note_free_space_violation(j, sigma);
-            continue;
-          }
-          seen[block.size()] = j;
-          observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma,
-                       spacing_at(points.z[j], sigma, camera, spacing));
+  parallel_for(static_cast<std::int64_t>(ranges.size()), 1, num_threads, [&](std::int64_t number) {
+    const PointRange& range = ranges[static_cast<std::size_t>(number)];
+    const std::size_t first = range.first;
+    PointProjection::Block points;
+    view.project(model.points[first].data(), model.normals[first].data(), range.count, points);
+    const auto note_free_space_violation = [&](int j, float sigma) {
+      const std::size_t i = first + static_cast<std::size_t>(j);
+      const float margin =
+          std::max(static_cast<float>(camera_limits::surface_spacings * spacing), base_limits::noise_sigmas * sigma);
+      const bool is_confirmed = model.observations[i] >= options.min_observations;
+      const Visibility is = visibility(frame.points(points.pixel[j], 2) - points.z[j], margin);
+      const bool is_missed = is_confirmed ? observer.sees_through(points.point(j), points.pixel[j], margin)
+                                          : is == Visibility::agrees || is == Visibility::seen_through;
+      if (is_missed) count_up(model.free_space_violations[i]);
+    };
+    ObservationBlock block;
+    int seen[block_size];  // of the points
+    for (int j = 0; j < range.count; ++j) {
+      if (!points.inside[j] && reaches_image(points, j, camera, spacing)) {
+        beside[static_cast<std::size_t>(number)].push_back({first + static_cast<std::size_t>(j), points.pixel[j]});
+      }
+      if (!points.inside[j] || !(points.facing[j] > fusion_limits::least_facing)) continue;
+      const float measured_sigma = frame.sigma[points.pixel[j]];
+      const float sigma = std::isfinite(measured_sigma) ? measured_sigma : 0.0F;
+      if (!observer.may_observe(points.point(j), points.pixel[j], sigma,
+                                fusion_limits::least_weight * observer.frontal_weight(sigma))) {
+        note_free_space_violation(j, sigma);
+        continue;
+      }
+      seen[block.size()] = j;
+      observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma,
+                   spacing_at(points.z[j], sigma, camera, spacing));
+    }
+    observer.observe_and_cover(block, fusion_limits::sheet_cosine);
+    for (int k = 0; k < block.size(); ++k) {
+      const int j = seen[k];  // NOLINT(clang-analyzer-core.uninitialized.Assign): filled with the block
+      const std::size_t i = first + static_cast<std::size_t>(j);
+      const Observation observed = block[k];
+      if (observed.weight > fusion_limits::least_weight * observer.frontal_weight(block.sigma(k))) {
+        const float gain = observed.weight / (model.confidence[i] + observed.weight);
+        model.points[i] += world_rotation * (gain * observed.offset * points.normal(j));
+        model.normals[i] = (model.confidence[i] * model.normals[i] + world_rotation * observed.normal).normalized();
+        if (observer.has_colors()) {
+          Eigen::Vector3f& color = model.colors[i];
+          const Eigen::Vector3f seen_color = exposed(observed.color, now.color_gain);
+          color = color.allFinite() ? Eigen::Vector3f(color + gain * (seen_color - color)) : seen_color;
         }
-        observer.observe_and_cover(block, fusion_limits::sheet_cosine);
-        for (int k = 0; k < block.size(); ++k) {
-          const int j = seen[k];  // NOLINT(clang-analyzer-core.uninitialized.Assign): filled with the block
-          const std::size_t i = first + static_cast<std::size_t>(j);
-          const Observation observed = block[k];
-          if (observed.weight > fusion_limits::least_weight * observer.frontal_weight(block.sigma(k))) {
-            const float gain = observed.weight / (model.confidence[i] + observed.weight);
-            model.points[i] += world_rotation * (gain * observed.offset * points.normal(j));
-            model.normals[i] = (model.confidence[i] * model.normals[i] + world_rotation * observed.normal).normalized();
-            if (observer.has_colors()) {
-              Eigen::Vector3f& color = model.colors[i];
-              const Eigen::Vector3f seen_color = exposed(observed.color, now.color_gain);
-              color = color.allFinite() ? Eigen::Vector3f(color + gain * (seen_color - color)) : seen_color;
-            }
-            model.confidence[i] =
-                std::min(model.confidence[i] + observed.weight, static_cast<float>(options.max_confidence));
-            model.last_seen[i] = now.index;
-            count_up(model.observations[i]);
-            model.free_space_violations[i] = 0;
-            covers[static_cast<std::size_t>(number)].push_back({i, points.pixel[j], block.cover(k)});
-          } else {
-            note_free_space_violation(j, block.sigma(k));
-          }
-        }
-      });
+        model.confidence[i] =
+            std::min(model.confidence[i] + observed.weight, static_cast<float>(options.max_confidence));
+        model.last_seen[i] = now.index;
+        count_up(model.observations[i]);
+        model.free_space_violations[i] = 0;
+        covers[static_cast<std::size_t>(number)].push_back({i, points.pixel[j], block.cover(k)});
+      } else {
+        note_free_space_violation(j, block.sigma(k));
+      }
+    }
+  });
 
   KnownSurface known{PixelSet(frame.width, frame.height), concatenate(beside)};
   for (const std::vector<Cover>& block : covers) {
@@ -124,41 +123,60 @@ KnownSurface update(PointModel& model, const RegisteredFrame& now, double spacin
   return known;
 }
 
-void remove_violated(PointModel& model, const FusionOptions& options, FusionReport& report) {
-  std::vector<std::uint8_t> flags(model.points.size(), 1);
-  for (std::size_t i = 0; i < flags.size(); ++i) {
-    if (model.free_space_violations[i] < options.max_free_space_violations) continue;
-    flags[i] = 0;
-    ++report.num_removed;
-  }
-  if (report.num_removed > 0) model.keep(flags);
+void remove_violated(PointModel& model, BlockIndex& blocks, const FusionOptions& options, FusionReport& report) {
+  const auto is_violated = [&](std::uint8_t count) { return count >= options.max_free_space_violations; };
+  const std::vector<std::uint8_t>& counts = model.free_space_violations;
+  report.num_removed = std::count_if(counts.begin(), counts.end(), is_violated);
+  if (report.num_removed == 0) return;
+  std::vector<std::uint8_t> flags(counts.size());
+  std::transform(counts.begin(), counts.end(), flags.begin(), [&](std::uint8_t count) { return !is_violated(count); });
+  model.keep(flags);
+  blocks.keep(flags);
 }
 
-// So many values a point.
-template <class Value>
-void keep_flagged(std::vector<Value>& values, const std::vector<std::uint8_t>& flags, std::size_t count = 1) {
-  if (values.empty()) return;
-  std::size_t kept = 0;
-  for (std::size_t i = 0; i < flags.size(); ++i) {
-    if (!flags[i]) continue;
-    for (std::size_t c = 0; c < count; ++c) values[kept++] = values[i * count + c];
+// Points in a row that stay.
+struct KeptRun {
+  std::size_t first, count;
+};
+
+std::vector<KeptRun> runs_of(const std::vector<std::uint8_t>& flags) {
+  std::vector<KeptRun> runs;
+  const auto is_kept = [](std::uint8_t flag) { return flag != 0; };
+  for (auto begin = std::find_if(flags.begin(), flags.end(), is_kept); begin != flags.end();) {
+    const auto end = std::find(begin, flags.end(), std::uint8_t{0});
+    runs.push_back({static_cast<std::size_t>(begin - flags.begin()), static_cast<std::size_t>(end - begin)});
+    begin = std::find_if(end, flags.end(), is_kept);
   }
-  values.resize(kept);
+  return runs;
+}
+
+// So many values a point. What is before the first that goes stays where it is.
+template <class Value>
+void keep_runs(std::vector<Value>& values, const std::vector<KeptRun>& runs, std::size_t count = 1) {
+  if (values.empty()) return;
+  auto end = values.begin();
+  for (const KeptRun& run : runs) {
+    const auto first = values.begin() + static_cast<std::ptrdiff_t>(run.first * count);
+    const auto last = first + static_cast<std::ptrdiff_t>(run.count * count);
+    end = first == end ? last : std::copy(first, last, end);
+  }
+  values.erase(end, values.end());
 }
 
 }  // namespace
 
 void PointModel::keep(const std::vector<std::uint8_t>& flags) {
-  keep_flagged(points, flags);
-  keep_flagged(normals, flags);
-  keep_flagged(colors, flags);
+  const std::vector<KeptRun> runs = runs_of(flags);
+  keep_runs(points, runs);
+  keep_runs(normals, runs);
+  keep_runs(colors, runs);
   for (PointAttribute& attribute : attributes) {
-    keep_flagged(attribute.values, flags, static_cast<std::size_t>(attribute.num_channels));
+    keep_runs(attribute.values, runs, static_cast<std::size_t>(attribute.num_channels));
   }
-  keep_flagged(confidence, flags);
-  keep_flagged(last_seen, flags);
-  keep_flagged(observations, flags);
-  keep_flagged(free_space_violations, flags);
+  keep_runs(confidence, runs);
+  keep_runs(last_seen, runs);
+  keep_runs(observations, runs);
+  keep_runs(free_space_violations, runs);
 }
 
 void FusionOptions::check() const {
@@ -171,22 +189,26 @@ void FusionOptions::check() const {
   require(reference_sigma >= 0.0, "reference_sigma", "0 (automatic) or positive metres", reference_sigma);
 }
 
-FusionReport fuse_observed(PointModel& model, RegisteredFrame now, double spacing, const FusionOptions& options,
-                           int num_threads, const std::vector<FrameAttribute>& attributes) {
+FusionReport fuse_observed(PointModel& model, BlockIndex& blocks, RegisteredFrame now, double spacing,
+                           const FusionOptions& options, int num_threads,
+                           const std::vector<FrameAttribute>& attributes) {
   FusionReport report;
-  now.color_gain = share_exposure(model, now, spacing);
+  const std::vector<PointRange> seen = blocks.in_view(observed_volume(now, options, spacing));
+  now.color_gain = share_exposure(model, seen, now, spacing);
   const bool with_colors = now.observer.has_colors() || !model.colors.empty();
   if (with_colors) {
     model.colors.resize(model.points.size(), Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));
   }
   const AttributePlanes planes(attributes, now.observer, now.camera, num_threads);
   const bool with_attributes = !attributes.empty() || !model.attributes.empty();
-  if (with_attributes) fuse_attributes(model, 0, now, planes, num_threads);
-  KnownSurface known = update(model, now, spacing, options, report, num_threads);
-  const std::int64_t num_known = model.size();
+  if (with_attributes) fuse_attributes(model, seen, now, planes, num_threads);
+  KnownSurface known = update(model, seen, now, spacing, options, report, num_threads);
+  blocks.measure(model, seen);
+  const std::size_t num_known = model.points.size();
   report.num_inserted = insert_points(model, std::move(known), now, spacing, with_colors, num_threads);
-  if (with_attributes) fuse_attributes(model, num_known, now, planes, num_threads);
-  remove_violated(model, options, report);
+  blocks.add_new(model);
+  if (with_attributes) fuse_attributes(model, blocks.from(num_known), now, planes, num_threads);
+  remove_violated(model, blocks, options, report);
   return report;
 }
 
@@ -202,8 +224,9 @@ FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, c
   check_attributes(attributes, camera, model);
   SurfaceObserver observer(camera, options);
   observer.look_at(frame, colors, num_threads);
-  return fuse_observed(model, {frame, camera, observer, world_from_camera, frame_index}, spacing, options, num_threads,
-                       attributes);
+  BlockIndex blocks(model);
+  return fuse_observed(model, blocks, {frame, camera, observer, world_from_camera, frame_index}, spacing, options,
+                       num_threads, attributes);
 }
 
 void thin(PointModel& model, double spacing) {

@@ -225,7 +225,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   if (options.registration.method == Metric::paper) {
     return PaperLoop{options, static_cast<std::int32_t>(history.size())}.register_frame(
         {frame, cells, camera, observer, now, noise_factor},
-        {cloud, spacing, before, still_scene, 0, usual_contradiction.mean()}, guesses(extras).front());
+        {cloud, blocks, spacing, before, still_scene, 0, usual_contradiction.mean()}, guesses(extras).front());
   }
   const Expectation expectation = was_lost() || jumped() ? Expectation::near_lost : Expectation::expected;
   const bool is_predicted = !was_lost() || extras.guess.has_value();
@@ -248,7 +248,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
 TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
   const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
   const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
-  const TrackingTarget target{cloud, spacing, before, still_scene, oldest_frame, usual_contradiction.mean()};
+  const TrackingTarget target{cloud, blocks, spacing, before, still_scene, oldest_frame, usual_contradiction.mean()};
   TrackingResult result;
   TrackingOptions nearby = options;
   nearby.relocalise = false;
@@ -359,6 +359,7 @@ void Pipeline::move_all(const std::vector<Pose>& corrections, FrameReport& repor
   report.corrects_earlier = true;
   history.move(corrections);
   move_points(cloud, corrections, options.num_threads);
+  blocks.renew(cloud);
   report.world_from_camera = corrections.back() * report.world_from_camera;
   still_scene.move(corrections.back());
   turn_uncertainty(report, corrections.back().linear());
@@ -405,6 +406,7 @@ void Pipeline::close_loops(const TrackingResult& tracking, bool is_given, FrameR
     const double sigma = noise * farther * farther;  // noise grows with the square
     return spacing_at(static_cast<float>(distance), static_cast<float>(sigma), camera, spacing);
   });
+  blocks.renew(cloud);
   for (ObjectView& view : views) {
     view.world_from_camera = loop.corrections[static_cast<std::size_t>(view.frame)] * view.world_from_camera;
   }
@@ -417,7 +419,7 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
     const Stopwatch watch(report.milliseconds.fuse);
     if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
     if (options.fusion_method == FusionMethod::fuse) {
-      report.fusion = fuse_observed(cloud, {frame, camera, observer, report.world_from_camera, index}, spacing,
+      report.fusion = fuse_observed(cloud, blocks, {frame, camera, observer, report.world_from_camera, index}, spacing,
                                     options.fusion, options.num_threads, extras.attributes);
     } else {
       consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
@@ -425,11 +427,13 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
     while (options.fusion_method == FusionMethod::fuse && cloud.size() > options.max_points) {
       spacing *= model_limits::coarsening;
       thin(cloud, spacing);
+      blocks.renew(cloud);
     }
   }
   if (options.fusion_method == FusionMethod::fuse) return;
   const Stopwatch watch(report.milliseconds.normals);
   renew_normals(cloud, options);
+  blocks.renew(cloud);
 }
 
 // What the camera saw is what the next frame is held against.

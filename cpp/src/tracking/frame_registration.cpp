@@ -103,7 +103,8 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
 }
 
 PointsInView FrameRegistration::in_view(const Pose& world_from_camera) const {
-  return points_in_view(target_.model, now_.camera, world_from_camera, target_.oldest_frame, options_.num_threads);
+  return points_in_view(target_.model, target_.blocks, now_.camera, world_from_camera, target_.oldest_frame,
+                        options_.num_threads);
 }
 
 // A match may be about as far along the surface as the model's points are apart, and as far across it as noise and the

@@ -28,6 +28,7 @@ struct CurrentFrame {
 // What it is registered to.
 struct TrackingTarget {
   const PointModel& model;
+  const BlockIndex& blocks;    // of the model
   double spacing;              // of the model [m]
   const DepthView& last_view;  // what the camera saw when it was last registered
   const StillScene& still_scene;

@@ -5,6 +5,7 @@
 
 #include "base/point_rows.hpp"
 #include "camera/point_projection.hpp"
+#include "fusion/block_index.hpp"
 #include "nacre/fusion.hpp"
 
 namespace nacre {
@@ -28,7 +29,7 @@ struct PointsInView {
 
 // Points in the image widened by a third on each side, turned away from the camera by at most 120 degrees, and last
 // seen by oldest_frame or later: one of every n of them, so that no more are left than a frame is registered to.
-PointsInView points_in_view(const PointModel& model, const Camera& camera, const Pose& world_from_camera,
-                            std::int32_t oldest_frame, int num_threads);
+PointsInView points_in_view(const PointModel& model, const BlockIndex& blocks, const Camera& camera,
+                            const Pose& world_from_camera, std::int32_t oldest_frame, int num_threads);
 
 }  // namespace nacre

@@ -410,6 +410,7 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   archive.require(PrivateState::is_sound(state.calibration) && PrivateState::is_sound(state.confidence_noise) &&
                       PrivateState::is_sound(state.residual_noise) && PrivateState::is_sound(state.usual_contradiction),
                   "the noise is not finite");
+  state.blocks.renew(state.cloud);
   if (note != nullptr) *note = std::move(kept);
   return pipeline;
 }

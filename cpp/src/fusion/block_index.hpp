@@ -1,0 +1,55 @@
+// Where a model's points are, block by block: a frame has to do with those that its camera sees, however many there
+// are.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "camera/view_volume.hpp"
+#include "fusion/registered_frame.hpp"
+#include "nacre/fusion.hpp"
+
+namespace nacre {
+
+// Points of a model in a row, at most as many as are projected at once.
+struct PointRange {
+  std::size_t block;  // of the index
+  std::size_t first;  // of the model's points
+  int count;
+};
+
+// Points that were inserted one after the other are near each other: blocks of them in a row, each with its bounds. It
+// follows the model: whoever changes points, adds or removes them tells it.
+class BlockIndex {
+ public:
+  BlockIndex() = default;
+  explicit BlockIndex(const PointModel& model) { renew(model); }
+
+  void renew(const PointModel& model);                                          // all of it has changed
+  void measure(const PointModel& model, const std::vector<PointRange>& moved);  // points of these have
+  void add_new(const PointModel& model);                                        // points were added behind
+  void keep(const std::vector<std::uint8_t>& flags);                            // see PointModel::keep
+
+  // Those that may have points in a volume, last seen by oldest_frame or later; in the model's order.
+  std::vector<PointRange> in_view(const ViewVolume& volume, std::int32_t oldest_frame = 0) const;
+  // Those from a point on.
+  std::vector<PointRange> from(std::size_t first) const;
+
+ private:
+  struct Block {
+    int count = 0;
+    Box box;
+    std::int32_t newest = 0;  // frame that last observed one of the points
+  };
+  void measure(const PointModel& model, std::size_t first, Block& block) const;
+
+  std::vector<Block> blocks_;
+  std::size_t size_ = 0;  // of the model
+};
+
+// What a frame can say anything about: points of the model elsewhere are as if they were not there. spacing: of the
+// model [m].
+ViewVolume observed_volume(const RegisteredFrame& now, const FusionOptions& options, double spacing);
+
+}  // namespace nacre
