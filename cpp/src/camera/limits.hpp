@@ -13,7 +13,7 @@ constexpr double least_point_pixels = 1.5;  // [pixel] tuned: of the sensor, bet
 constexpr float least_facing = 0.3F;  // [cosine] tuned: at which a surface should be seen; test_global_registration, dog
 constexpr double surface_spacings = 2.75;  // [spacing] tuned: across a surface, within which points are of it; teddy, test_deformation
 constexpr double new_direction = 0.35;  // [rad] tuned: between views from different sides, and from a guess to a place that was not expected; dog, teddy-cut, unrelated
-constexpr double projection_rounding = 1e-5;  // [1] derived: of a coordinate, that turning it into a camera's frame in single precision costs at most: a dozen roundings of 2^-24, ten times; test_view_volume
+constexpr double projection_rounding = 1e-5;  // [1] derived: of a coordinate, that turning it into a camera's frame in single precision costs at most: a dozen roundings of 2^-24, ten times; test_block_index
 
 }  // namespace nacre::camera_limits
 // clang-format on

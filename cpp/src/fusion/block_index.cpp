@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "base/limits.hpp"
+#include "base/pose_check.hpp"
 #include "camera/point_projection.hpp"
 #include "fusion/limits.hpp"
 
@@ -14,6 +14,16 @@ namespace {
 constexpr int largest_block = PointProjection::capacity;
 
 }  // namespace
+
+BlockIndex BlockIndex::unbounded(const PointModel& model) {
+  BlockIndex index(model);
+  for (Block& block : index.blocks_) {
+    const auto far = static_cast<float>(farthest_place);
+    block.box = Box(Eigen::Vector3f::Constant(-far), Eigen::Vector3f::Constant(far));
+    block.newest = std::numeric_limits<std::int32_t>::max();
+  }
+  return index;
+}
 
 void BlockIndex::renew(const PointModel& model) {
   blocks_.clear();

@@ -44,7 +44,8 @@ float mean_level(const PointModel& model, int channel) {
 
 Eigen::Vector3f gain_of(const Eigen::Vector3f& gain) {
   const PointModel model = fused({Eigen::Vector3f::Ones()});
-  SurfaceObserver observer(orthographic, {});
+  const FusionOptions options;  // the observer keeps a reference
+  SurfaceObserver observer(orthographic, options);
   const Colors colors = painted(gain);
   observer.look_at(plane(), colors, 1);
   const Pose at = Pose::Identity();
