@@ -197,6 +197,11 @@ def write_chunks(
         format.write_chunks(path, chunks, num_points)
 
 
+def needs_extremes(path: str | os.PathLike[str]) -> bool:
+    """Say whether :func:`write_chunks` uses the bounds of the points."""
+    return _FORMATS[Path(path).suffix.lower()] is las
+
+
 def holds(path: str | os.PathLike[str], field: str) -> bool:
     """Say whether the format of a file has a place for a field: normals, colors, or an attribute."""
     return field in getattr(_FORMATS[Path(path).suffix.lower()], "FIELDS", (field,))

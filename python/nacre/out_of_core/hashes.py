@@ -7,12 +7,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre import _core
+
 Hashes = npt.NDArray[np.uint64]
 
 _BINS = 20  # bits
 
 
-def point_hashes(points: npt.NDArray[Any], seed: int) -> Hashes:
+def point_hashes(points: npt.NDArray[Any], seed: int, num_threads: int = 1) -> Hashes:
     """
     Return a random number for each point that depends on the seed and its exact coordinates alone.
 
@@ -21,6 +23,8 @@ def point_hashes(points: npt.NDArray[Any], seed: int) -> Hashes:
     points : (N, 3) float32 or float64
     seed : int
         Not negative.
+    num_threads : int
+        0 uses all.
 
     Returns
     -------
@@ -31,20 +35,8 @@ def point_hashes(points: npt.NDArray[Any], seed: int) -> Hashes:
     Each coordinate's bits are mixed in by the finalizer of Steele, Lea and Flood, "Fast splittable
     pseudorandom number generators", 2014, with the constants of splitmix64.
     """
-    hashes = np.full(len(points), seed & 0xFFFFFFFFFFFFFFFF, np.uint64)
-    for axis in range(3):
-        hashes ^= (points[:, axis].astype(np.float64) + 0.0).view(np.uint64)  # -0 becomes 0
-        _mix(hashes)
+    hashes: Hashes = _core.point_hashes(np.ascontiguousarray(points), seed & 0xFFFFFFFFFFFFFFFF, num_threads)
     return hashes
-
-
-def _mix(words: Hashes) -> None:
-    words += np.uint64(0x9E3779B97F4A7C15)
-    words ^= words >> np.uint64(30)
-    words *= np.uint64(0xBF58476D1CE4E5B9)
-    words ^= words >> np.uint64(27)
-    words *= np.uint64(0x94D049BB133111EB)
-    words ^= words >> np.uint64(31)
 
 
 class LowestHashes:

@@ -11,9 +11,10 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
+from nacre import _core
 from nacre.out_of_core.grid import Grid
 from nacre.out_of_core.hashes import Hashes, point_hashes
-from nacre.out_of_core.rows import Rows
+from nacre.out_of_core.rows import Rows, take
 
 _PLAN, _POINTS = "plan.npz", "points.bin"
 
@@ -100,18 +101,35 @@ class Store:
     def read(self, cell: int, halo: float) -> Cell:
         """Read a cell and the points that are not farther from its box than the halo."""
         own = np.arange(self.cells[cell], self.cells[cell + 1])
-        lower, upper = self._box(cell)
+        around = self._cubes_around(cell, halo)
         with self.points_file.open("rb") as stream:
-            inside = self._read_cubes(stream, own)
-            around = self._read_cubes(stream, self._cubes_around(cell, halo))
-        distances = _distances(around[0]["points"], lower, upper)
-        near = distances <= halo
+            inside, own_counts = self._load(stream, own)
+            outside, counts = self._load(stream, around)
+        distances = _distances(outside["points"], *self._box(cell))
+        near = np.flatnonzero(distances <= halo)
+        near_counts = np.diff(np.searchsorted(near, np.concatenate([[0], np.cumsum(counts)])))
+        rows = np.concatenate([inside, take(outside, near)])
+        del inside, outside
+        hashes = point_hashes(rows["points"], self.seed, num_threads=0)
+        starts = np.concatenate([[0], np.cumsum(own_counts), own_counts.sum() + np.cumsum(near_counts)])
+        order = _canonical_order(rows, hashes, starts)
+        num_own = int(own_counts.sum())
         return Cell(
-            np.concatenate([inside[0], around[0][near]]),
-            np.concatenate([inside[1], around[1][near]]),
-            len(inside[0]),
-            np.concatenate([np.zeros(len(inside[0])), distances[near]]),
+            take(rows, order),
+            hashes[order],
+            num_own,
+            np.concatenate([np.zeros(num_own), distances[near]])[order],
         )
+
+    def _load(self, stream: BinaryIO, cubes: npt.NDArray[np.intp]) -> tuple[Rows, npt.NDArray[np.int64]]:
+        """Return the points of cubes as they are in the file, and how many each has."""
+        counts = self.starts[cubes + 1] - self.starts[cubes]
+        pieces = [np.zeros(0, self.dtype)]
+        for run in np.split(cubes, np.flatnonzero(np.diff(cubes) != 1) + 1) if len(cubes) else []:
+            first, last = int(self.starts[run[0]]), int(self.starts[run[-1] + 1])
+            stream.seek(first * self.dtype.itemsize)
+            pieces.append(np.fromfile(stream, self.dtype, last - first))
+        return np.concatenate(pieces) if len(pieces) > 2 else pieces[-1], counts
 
     def _box(self, cell: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         places = self.places[self.cells[cell] : self.cells[cell + 1]]
@@ -130,24 +148,6 @@ class Store:
             is_near &= along <= places[:, axis].max() + reach
         is_near[begin:end] = False
         return np.flatnonzero(is_near)
-
-    def _read_cubes(self, stream: BinaryIO, cubes: npt.NDArray[np.intp]) -> tuple[Rows, Hashes]:
-        """Return the points of cubes, sorted by their hashes within each."""
-        rows = np.empty(int((self.starts[cubes + 1] - self.starts[cubes]).sum()), self.dtype)
-        hashes = np.empty(len(rows), np.uint64)
-        at = 0
-        for run in np.split(cubes, np.flatnonzero(np.diff(cubes) != 1) + 1) if len(cubes) else []:
-            first, last = self.starts[run[0]], self.starts[run[-1] + 1]
-            stream.seek(int(first) * self.dtype.itemsize)
-            found = np.fromfile(stream, self.dtype, int(last - first))
-            drawn = point_hashes(found["points"], self.seed)
-            for cube in run:
-                here = slice(int(self.starts[cube] - first), int(self.starts[cube + 1] - first))
-                order = _canonical_order(found[here], drawn[here])
-                there = slice(at, at + len(order))
-                rows[there], hashes[there] = found[here][order], drawn[here][order]
-                at = there.stop
-        return rows, hashes
 
 
 @lru_cache(maxsize=1)
@@ -169,17 +169,18 @@ def _store_of(folder: Path, plan: Mapping[str, npt.NDArray[Any]]) -> Store:
     )
 
 
-def _canonical_order(rows: Rows, hashes: Hashes) -> npt.NDArray[np.intp]:
-    """Return the order of the hashes; points in the same place by the bytes of all that they have."""
-    order = np.argsort(hashes)
+def _canonical_order(rows: Rows, hashes: Hashes, starts: npt.NDArray[np.int64]) -> npt.NDArray[np.intp]:
+    """Return the order of the hashes in each cube; points in one place by the bytes of all that they have."""
+    order: npt.NDArray[np.intp] = _core.order_by_hash(starts, hashes, num_threads=0)
     ordered = hashes[order]
     is_tied = np.zeros(len(order), bool)
     is_tied[1:] = ordered[1:] == ordered[:-1]
     if is_tied.any():
         is_tied[:-1] |= is_tied[1:]
+        cubes = np.searchsorted(starts, np.flatnonzero(is_tied), side="right")
         tied = order[is_tied]
-        contents = np.ascontiguousarray(rows[tied]).view(np.uint8).reshape(len(tied), -1)
-        order[is_tied] = tied[np.lexsort((*contents.T[::-1], hashes[tied]))]
+        contents = take(rows, tied).view(np.uint8).reshape(len(tied), -1)
+        order[is_tied] = tied[np.lexsort((*contents.T[::-1], hashes[tied], cubes))]
     return order
 
 
