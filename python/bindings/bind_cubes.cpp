@@ -41,14 +41,13 @@ py::tuple group_by_number(const Array<std::int64_t>& numbers) {
                         as_array(std::move(groups.rows)));
 }
 
-py::array_t<std::int64_t> order_by_hash(const std::vector<std::int64_t>& starts, const Array<std::uint64_t>& hashes,
-                                        int num_threads) {
-  std::vector<std::int64_t> order;
+py::tuple order_by_hash(const std::vector<std::int64_t>& starts, const Array<std::uint64_t>& hashes, int num_threads) {
+  nacre::HashOrder order;
   {
     const Released release;
     order = nacre::order_by_hash(starts, hashes.data(), hashes.size(), num_threads);
   }
-  return as_array(std::move(order));
+  return py::make_tuple(as_array(std::move(order.rows)), as_array(std::move(order.hashes)));
 }
 
 }  // namespace

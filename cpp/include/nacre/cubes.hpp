@@ -36,9 +36,15 @@ struct NumberGroups {
 /// Groups rows by their numbers, of which few are different.
 NumberGroups group_by_number(const std::int64_t* numbers, std::int64_t count);
 
+/// Rows in the order of their hashes.
+struct HashOrder {
+  std::vector<std::int64_t> rows;
+  std::vector<std::uint64_t> hashes;  ///< of these rows
+};
+
 /// The rows [starts[i], starts[i + 1]) of each stretch by ascending hash, equal ones in the order of the rows. Throws
 /// std::invalid_argument where starts do not ascend from 0 to the number of hashes.
-std::vector<std::int64_t> order_by_hash(const std::vector<std::int64_t>& starts, const std::uint64_t* hashes,
-                                        std::int64_t count, int num_threads = 0);
+HashOrder order_by_hash(const std::vector<std::int64_t>& starts, const std::uint64_t* hashes, std::int64_t count,
+                        int num_threads = 0);
 
 }  // namespace nacre

@@ -96,7 +96,7 @@ struct HashedRow {
 };
 
 // Hashes are evenly spread: as many buckets as there are rows, by the leading bits, have one or two each.
-void sort_stretch(const std::uint64_t* hashes, std::int64_t first, std::int64_t count, std::int64_t* sorted,
+void sort_stretch(const std::uint64_t* hashes, std::int64_t first, std::int64_t count, HashOrder& sorted,
                   std::vector<HashedRow>& rows, std::vector<std::int64_t>& ends) {
   int bits = 0;
   while (bits < 20 && (std::int64_t{1} << (bits + 1)) <= count) ++bits;
@@ -116,7 +116,10 @@ void sort_stretch(const std::uint64_t* hashes, std::int64_t first, std::int64_t 
     if (ends[bucket] - begin > 1) std::sort(rows.begin() + begin, rows.begin() + ends[bucket]);
     begin = ends[bucket];
   }
-  for (std::int64_t i = 0; i < count; ++i) sorted[i] = rows[static_cast<std::size_t>(i)].row;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    sorted.rows[static_cast<std::size_t>(first) + i] = rows[i].row;
+    sorted.hashes[static_cast<std::size_t>(first) + i] = rows[i].hash;
+  }
 }
 
 }  // namespace
@@ -166,12 +169,14 @@ NumberGroups group_by_number(const std::int64_t* numbers, std::int64_t count) {
   return groups;
 }
 
-std::vector<std::int64_t> order_by_hash(const std::vector<std::int64_t>& starts, const std::uint64_t* hashes,
-                                        std::int64_t count, int num_threads) {
+HashOrder order_by_hash(const std::vector<std::int64_t>& starts, const std::uint64_t* hashes, std::int64_t count,
+                        int num_threads) {
   require(!starts.empty() && starts.front() == 0, "starts", "from 0 on", starts.empty() ? -1 : starts.front());
   require(std::is_sorted(starts.begin(), starts.end()), "starts", "ascending", "some that are not");
   require(starts.back() == count, "starts", "up to the number of hashes", starts.back());
-  std::vector<std::int64_t> order(static_cast<std::size_t>(count));
+  HashOrder order;
+  order.rows.resize(static_cast<std::size_t>(count));
+  order.hashes.resize(static_cast<std::size_t>(count));
   constexpr std::int64_t stretches_per_block = 16;
   const auto num_stretches = static_cast<std::int64_t>(starts.size()) - 1;
   parallel_blocks(num_stretches, stretches_per_block, num_threads, [&](auto, std::int64_t begin, std::int64_t end) {
@@ -180,7 +185,7 @@ std::vector<std::int64_t> order_by_hash(const std::vector<std::int64_t>& starts,
     for (std::int64_t stretch = begin; stretch < end; ++stretch) {
       const std::int64_t first = starts[static_cast<std::size_t>(stretch)];
       const std::int64_t size = starts[static_cast<std::size_t>(stretch) + 1] - first;
-      sort_stretch(hashes, first, size, order.data() + first, rows, ends);
+      sort_stretch(hashes, first, size, order, rows, ends);
     }
   });
   return order;

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -31,7 +31,7 @@ class Cell:
         Of the points.
     num_own : int
         How many belong to the cell: the first.
-    distances : (N,) float64
+    distances : (N - num_own,) float64
         How far points of the halo are from the cell's box, as the largest of the distances along the axes; 0
         within.
     """
@@ -102,34 +102,33 @@ class Store:
         """Read a cell and the points that are not farther from its box than the halo."""
         own = np.arange(self.cells[cell], self.cells[cell + 1])
         around = self._cubes_around(cell, halo)
-        with self.points_file.open("rb") as stream:
-            inside, own_counts = self._load(stream, own)
-            outside, counts = self._load(stream, around)
-        distances = _distances(outside["points"], *self._box(cell))
-        near = np.flatnonzero(distances <= halo)
-        near_counts = np.diff(np.searchsorted(near, np.concatenate([[0], np.cumsum(counts)])))
-        rows = np.concatenate([inside, take(outside, near)])
-        del inside, outside
-        hashes = point_hashes(rows["points"], self.seed, num_threads=0)
-        starts = np.concatenate([[0], np.cumsum(own_counts), own_counts.sum() + np.cumsum(near_counts)])
-        order = _canonical_order(rows, hashes, starts)
+        own_counts, counts = (self.starts[cubes + 1] - self.starts[cubes] for cubes in (own, around))
         num_own = int(own_counts.sum())
-        return Cell(
-            take(rows, order),
-            hashes[order],
-            num_own,
-            np.concatenate([np.zeros(num_own), distances[near]])[order],
-        )
+        rows = self._load(np.concatenate([own, around]), num_own + int(counts.sum()))
+        distances = _distances(rows["points"][num_own:], *self._box(cell))
+        near = np.flatnonzero(distances <= halo)
+        rows[num_own : num_own + len(near)] = take(rows[num_own:], near)
+        rows = rows[: num_own + len(near)]
+        near_counts = np.diff(np.searchsorted(near, np.concatenate([[0], np.cumsum(counts)])))
+        starts = np.concatenate([[0], np.cumsum(np.concatenate([own_counts, near_counts]))])
+        order, hashes = _canonical_order(rows, point_hashes(rows["points"], self.seed, num_threads=0), starts)
+        return Cell(take(rows, order), hashes, num_own, distances[near][order[num_own:] - num_own])
 
-    def _load(self, stream: BinaryIO, cubes: npt.NDArray[np.intp]) -> tuple[Rows, npt.NDArray[np.int64]]:
-        """Return the points of cubes as they are in the file, and how many each has."""
-        counts = self.starts[cubes + 1] - self.starts[cubes]
-        pieces = [np.zeros(0, self.dtype)]
-        for run in np.split(cubes, np.flatnonzero(np.diff(cubes) != 1) + 1) if len(cubes) else []:
-            first, last = int(self.starts[run[0]]), int(self.starts[run[-1] + 1])
-            stream.seek(first * self.dtype.itemsize)
-            pieces.append(np.fromfile(stream, self.dtype, last - first))
-        return np.concatenate(pieces) if len(pieces) > 2 else pieces[-1], counts
+    def _load(self, cubes: npt.NDArray[np.intp], num_points: int) -> Rows:
+        """Return the points of cubes as they are in the file."""
+        rows = np.empty(num_points, self.dtype)
+        content, at = rows.view(np.uint8).data, 0
+        with self.points_file.open("rb", buffering=0) as stream:
+            for run in np.split(cubes, np.flatnonzero(np.diff(cubes) != 1) + 1) if num_points else []:
+                first, last = int(self.starts[run[0]]), int(self.starts[run[-1] + 1])
+                end = at + (last - first) * self.dtype.itemsize
+                stream.seek(first * self.dtype.itemsize)
+                while at < end:
+                    num_read = stream.readinto(content[at:end])
+                    if not num_read:
+                        raise EOFError(f"{self.points_file} became shorter while it was read")
+                    at += num_read
+        return rows
 
     def _box(self, cell: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         places = self.places[self.cells[cell] : self.cells[cell + 1]]
@@ -169,10 +168,15 @@ def _store_of(folder: Path, plan: Mapping[str, npt.NDArray[Any]]) -> Store:
     )
 
 
-def _canonical_order(rows: Rows, hashes: Hashes, starts: npt.NDArray[np.int64]) -> npt.NDArray[np.intp]:
-    """Return the order of the hashes in each cube; points in one place by the bytes of all that they have."""
-    order: npt.NDArray[np.intp] = _core.order_by_hash(starts, hashes, num_threads=0)
-    ordered = hashes[order]
+def _canonical_order(
+    rows: Rows, hashes: Hashes, starts: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.intp], Hashes]:
+    """
+    Return the order of the hashes in each cube, and the hashes in it.
+
+    Points in one place are in the order of the bytes of all that they have.
+    """
+    order, ordered = _core.order_by_hash(starts.tolist(), hashes, num_threads=0)
     is_tied = np.zeros(len(order), bool)
     is_tied[1:] = ordered[1:] == ordered[:-1]
     if is_tied.any():
@@ -181,7 +185,7 @@ def _canonical_order(rows: Rows, hashes: Hashes, starts: npt.NDArray[np.int64]) 
         tied = order[is_tied]
         contents = take(rows, tied).view(np.uint8).reshape(len(tied), -1)
         order[is_tied] = tied[np.lexsort((*contents.T[::-1], hashes[tied], cubes))]
-    return order
+    return order, ordered
 
 
 def _distances(
