@@ -11,7 +11,7 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from nacre import _core
+from nacre._internal.cubes import Hashes, group_by_number, point_hashes
 
 Records = npt.NDArray[Any]
 Codes = npt.NDArray[np.int64]
@@ -134,7 +134,7 @@ class _Blocks:
         unsorted.seek(0)
         while len(records := np.fromfile(unsorted, dtype, _ROWS_AT_ONCE)):
             places = np.searchsorted(self.codes, cube.codes(records) >> 3 * (_BITS - _DEEPEST_BLOCK))
-            blocks, counts, order = _core.group_by_number(self.owners[places])
+            blocks, counts, order = group_by_number(self.owners[places])
             content = _taken(records, order)
             for block, begin, count in zip(blocks, np.cumsum(counts) - counts, counts, strict=True):
                 stream.seek(int(ends[block]) * dtype.itemsize)
@@ -155,7 +155,7 @@ def _keep(records: Iterable[Records], cube: Cube, stream: BinaryIO) -> tuple[_Bl
     for piece in records:
         dtype = piece.dtype
         piece.tofile(stream)
-        codes, counts, _ = _core.group_by_number(cube.codes(piece) >> 3 * (_BITS - _DEEPEST_BLOCK))
+        codes, counts, _ = group_by_number(cube.codes(piece) >> 3 * (_BITS - _DEEPEST_BLOCK))
         for code, count in zip(codes.tolist(), counts.tolist(), strict=True):
             totals[code] = totals.get(code, 0) + count
     stream.flush()
@@ -168,10 +168,10 @@ class _Above:
 
     def __init__(self, levels: npt.NDArray[np.int64]) -> None:
         self._levels = levels
-        self._parts: list[tuple[Records, Codes, npt.NDArray[np.uint64], npt.NDArray[np.int64]]] = []
+        self._parts: list[tuple[Records, Codes, Hashes, npt.NDArray[np.int64]]] = []
         self._taken: list[npt.NDArray[np.int64]] = []
 
-    def look_at(self, block: int, records: Records, codes: Codes, hashes: npt.NDArray[np.uint64]) -> None:
+    def look_at(self, block: int, records: Records, codes: Codes, hashes: Hashes) -> None:
         """Note the points of a block that nodes above it may have, which are those of its own cells."""
         order = _order(codes, hashes)
         rows = order[_lowest_of_cells(codes[order], hashes[order], int(self._levels[block]))]
@@ -203,9 +203,7 @@ class _Above:
         return is_left
 
 
-def _divided(
-    records: Records, codes: Codes, hashes: npt.NDArray[np.uint64], level: int
-) -> Iterator[tuple[Key, Records]]:
+def _divided(records: Records, codes: Codes, hashes: Hashes, level: int) -> Iterator[tuple[Key, Records]]:
     """Yield the nodes from a level on, of points that are those of whole nodes there."""
     left = _order(codes, hashes)
     while len(left):
@@ -233,7 +231,7 @@ def _of_level(
         yield (level, x, y, z), _taken(records, rows[begin:end])
 
 
-def _lowest_of_cells(codes: Codes, hashes: npt.NDArray[np.uint64], level: int) -> npt.NDArray[np.intp]:
+def _lowest_of_cells(codes: Codes, hashes: Hashes, level: int) -> npt.NDArray[np.intp]:
     """Return where the point of the lowest hash of each cell of a level is, of points ordered by codes."""
     if not len(codes):
         return np.zeros(0, np.intp)
@@ -245,14 +243,13 @@ def _lowest_of_cells(codes: Codes, hashes: npt.NDArray[np.uint64], level: int) -
     return first
 
 
-def _order(codes: Codes, hashes: npt.NDArray[np.uint64]) -> npt.NDArray[np.intp]:
+def _order(codes: Codes, hashes: Hashes) -> npt.NDArray[np.intp]:
     return np.lexsort((hashes, codes))
 
 
-def _hashes(records: Records) -> npt.NDArray[np.uint64]:
+def _hashes(records: Records) -> Hashes:
     points = np.column_stack([records[name].astype(np.float64) for name in "XYZ"])
-    hashes: npt.NDArray[np.uint64] = _core.point_hashes(points, 0, 1)
-    return hashes
+    return point_hashes(points, seed=0)
 
 
 def _taken(records: Records, rows: npt.NDArray[np.intp]) -> Records:

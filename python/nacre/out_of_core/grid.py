@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from nacre import _core
+from nacre._internal.cubes import cube_numbers
 from nacre.out_of_core.survey import Survey
 
 Keys = npt.NDArray[np.int64]
@@ -48,10 +48,7 @@ class Grid:
 
     def keys(self, points: npt.NDArray[np.floating]) -> Keys:
         """Return the number of the cube that each point lies in."""
-        keys: Keys = _core.cube_numbers(
-            np.ascontiguousarray(points), self.origin, self.side, self.shape.tolist(), num_threads=1
-        )
-        return keys
+        return cube_numbers(points, self.origin, self.side, self.shape)
 
     def places(self, keys: Keys) -> npt.NDArray[np.int64]:
         """Return where cubes stand along the three axes, (K, 3)."""

@@ -1,42 +1,13 @@
-"""Random numbers that points have by where they are, whatever their place in a file."""
+"""Which of many hashes are the lowest."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from nacre import _core
-
-Hashes = npt.NDArray[np.uint64]
+from nacre._internal.cubes import Hashes
 
 _BINS = 20  # bits
-
-
-def point_hashes(points: npt.NDArray[Any], seed: int, num_threads: int = 1) -> Hashes:
-    """
-    Return a random number for each point that depends on the seed and its exact coordinates alone.
-
-    Parameters
-    ----------
-    points : (N, 3) float32 or float64
-    seed : int
-        Not negative.
-    num_threads : int
-        0 uses all.
-
-    Returns
-    -------
-    (N,) uint64
-
-    Notes
-    -----
-    Each coordinate's bits are mixed in by the finalizer of Steele, Lea and Flood, "Fast splittable
-    pseudorandom number generators", 2014, with the constants of splitmix64.
-    """
-    hashes: Hashes = _core.point_hashes(np.ascontiguousarray(points), seed & 0xFFFFFFFFFFFFFFFF, num_threads)
-    return hashes
 
 
 class LowestHashes:

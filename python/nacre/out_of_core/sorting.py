@@ -12,9 +12,9 @@ from typing import Any, BinaryIO, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from nacre import _core
+from nacre._internal.cubes import group_by_number, point_hashes
 from nacre.out_of_core.grid import Grid, Keys, divide_into_cells
-from nacre.out_of_core.hashes import LowestHashes, point_hashes
+from nacre.out_of_core.hashes import LowestHashes
 from nacre.out_of_core.rows import Rows, take
 from nacre.out_of_core.store import Store
 from nacre.out_of_core.survey import Source, Survey, finite_rows
@@ -88,7 +88,7 @@ def _count(
     found: list[tuple[Keys, npt.NDArray[np.int64]]] = []
 
     def count(rows: Rows) -> None:
-        keys, counts, _ = _core.group_by_number(grid.keys(rows["points"]))
+        keys, counts, _ = group_by_number(grid.keys(rows["points"]))
         hashes = None if lowest is None else point_hashes(rows["points"], seed)
         with lock:
             found.append((keys, counts))
@@ -127,7 +127,7 @@ class _Writer:
         """Write some points; several threads may."""
         if self._lowest is not None:
             self._lowest.keep(point_hashes(rows["points"], self._store.seed))
-        keys, counts, by_cube = _core.group_by_number(self._store.grid.keys(rows["points"]))
+        keys, counts, by_cube = group_by_number(self._store.grid.keys(rows["points"]))
         cubes = self._place_of_key[np.searchsorted(self._keys, keys)]
         content = take(rows, by_cube).view(np.uint8).data
         itemsize = self._store.dtype.itemsize

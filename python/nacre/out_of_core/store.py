@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import _core
+from nacre._internal.cubes import Hashes, order_by_hash, point_hashes
 from nacre.out_of_core.grid import Grid
-from nacre.out_of_core.hashes import Hashes, point_hashes
 from nacre.out_of_core.rows import Rows, take
 
 _PLAN, _POINTS = "plan.npz", "points.bin"
@@ -176,7 +175,7 @@ def _canonical_order(
 
     Points in one place are in the order of the bytes of all that they have.
     """
-    order, ordered = _core.order_by_hash(starts.tolist(), hashes, num_threads=0)
+    order, ordered = order_by_hash(starts, hashes)
     is_tied = np.zeros(len(order), bool)
     is_tied[1:] = ordered[1:] == ordered[:-1]
     if is_tied.any():

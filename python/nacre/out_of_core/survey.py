@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre._internal.cubes import Hashes, point_hashes
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Cloud
 from nacre.io.las import default_of
 from nacre.io.points import SUFFIXES, is_streamed, read_chunks, require_point_suffix
 from nacre.kdtree import KdTree
-from nacre.out_of_core.hashes import Hashes, point_hashes
 from nacre.out_of_core.rows import Rows, finite_among, row_type, to_cloud, to_rows
 
 PathLike = str | os.PathLike[str]

@@ -21,7 +21,7 @@ def cloud() -> nacre.Cloud:
     random = np.random.default_rng(0)
     xy = random.uniform(0, 100, (150_000, 2))
     z = 3 * np.sin(xy[:, 0] / 9) + random.normal(0, 0.02, len(xy))
-    points = np.column_stack([xy, z]) + [4_000_000, 5_400_000, 100]
+    points = np.column_stack([xy, z]) + np.array([4_000_000, 5_400_000, 100])
     colors = random.integers(0, 256, (len(xy), 3)).astype(np.uint8)
     attributes = {"intensity": random.integers(0, 60_000, len(xy)).astype(np.uint16)}
     return nacre.Cloud(points, colors=colors, attributes=attributes)
