@@ -49,7 +49,7 @@ def cube_numbers(
 
 
 def group_by_number(numbers: Numbers) -> tuple[Numbers, Numbers, Numbers]:
-    """Return the numbers that occur, ascending, how many rows have each, and these rows, group after group."""
+    """Return the numbers that occur, ascending, how many rows have each, and these, group by group."""
     groups: tuple[Numbers, Numbers, Numbers] = _core.group_by_number(numbers)
     return groups
 
