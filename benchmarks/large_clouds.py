@@ -5,8 +5,8 @@ Clouds larger than memory: time, memory and bytes, whatever the workers and tile
     python benchmarks/large_clouds.py --points 50e6 --memory 2GB --only out-of-core
 
 Writes a terrain with buildings, then consolidates it to a twentieth and finds its normals: in memory, and out
-of core by one and two workers and with three sizes of tiles. Each runs in a process of its own; memory is the
-largest sum of the resident bytes of it and its children, a point's time is that of processors.
+of core by one, two and four workers and with three sizes of tiles. Each runs in a process of its own; memory
+is the largest sum of the resident bytes of it and its children, a point's time is that of processors.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ RUNS = (
     ("in memory", 1, 1),
     ("out-of-core", 1, 1),
     ("out-of-core", 2, 1),
+    ("out-of-core", 4, 1),
     ("out-of-core", 1, 3),
     ("out-of-core", 2, 7),
 )

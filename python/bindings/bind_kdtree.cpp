@@ -7,14 +7,6 @@ using nacre::KdTree;
 using nacre::PointsDoubleRef;
 using nacre::PointsRef;
 
-// A NumPy array that takes over the vector's memory.
-template <class T>
-py::array_t<T> as_array(std::vector<T>&& values) {
-  auto* owned = new std::vector<T>(std::move(values));
-  const py::capsule free(owned, [](void* vector) { delete static_cast<std::vector<T>*>(vector); });
-  return py::array_t<T>(static_cast<py::ssize_t>(owned->size()), owned->data(), free);
-}
-
 // In NumPy's own memory, which is in large pages where it is large.
 template <class Points>
 py::tuple query(const KdTree& tree, const Points& queries, int k, double max_distance, int num_threads) {

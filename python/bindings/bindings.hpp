@@ -38,11 +38,20 @@ using PoseMatrix = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
 inline PoseMatrix to_matrix(const nacre::Pose& pose) { return pose.matrix(); }
 inline nacre::Pose to_pose(const PoseMatrix& matrix) { return nacre::Pose(matrix); }
 
+// A NumPy array that takes over the vector's memory.
+template <class T>
+py::array_t<T> as_array(std::vector<T>&& values) {
+  auto* owned = new std::vector<T>(std::move(values));
+  const py::capsule free(owned, [](void* vector) { delete static_cast<std::vector<T>*>(vector); });
+  return py::array_t<T>(static_cast<py::ssize_t>(owned->size()), owned->data(), free);
+}
+
 // One row per weak direction, as NumPy users expect.
 using Twists = Eigen::Matrix<double, Eigen::Dynamic, 6, Eigen::RowMajor>;
 
 void bind_camera(py::module_& m);
 void bind_consolidation(py::module_& m);
+void bind_cubes(py::module_& m);
 void bind_depth(py::module_& m);
 void bind_kdtree(py::module_& m);
 void bind_mesh(py::module_& m);

@@ -6,6 +6,7 @@ PYBIND11_MODULE(_core, m) {
   m.attr("__version__") = NACRE_VERSION;
   bind_system(m);
   bind_camera(m);
+  bind_cubes(m);
   bind_depth(m);
   bind_kdtree(m);
   bind_normals(m);

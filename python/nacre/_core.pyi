@@ -935,6 +935,26 @@ def correct_depth(
     tilt: typing.SupportsFloat | typing.SupportsIndex,
     num_threads: typing.SupportsInt | typing.SupportsIndex,
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]"]: ...
+@typing.overload
+def cube_numbers(
+    points: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
+    origin: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    side: typing.SupportsFloat | typing.SupportsIndex,
+    shape: typing.Annotated[
+        collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"
+    ],
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.int64]: ...
+@typing.overload
+def cube_numbers(
+    points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"],
+    origin: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
+    side: typing.SupportsFloat | typing.SupportsIndex,
+    shape: typing.Annotated[
+        collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex], "FixedSize(3)"
+    ],
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.int64]: ...
 def default_threads() -> int: ...
 def depth_from_raw(
     raw: typing.Annotated[numpy.typing.NDArray[numpy.uint16], "[m, n]", "flags.c_contiguous"],
@@ -963,6 +983,7 @@ def estimate_normals(
     options: NormalOptions,
     viewpoint: typing.Annotated[numpy.typing.ArrayLike, numpy.float64, "[3, 1]"],
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]"]: ...
+def group_by_number(numbers: numpy.typing.NDArray[numpy.int64]) -> tuple[typing.Any, ...]: ...
 def instruction_set() -> str: ...
 def label_pixels(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
@@ -983,7 +1004,24 @@ def on_surface(
     confidence: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 1]"],
     num_threads: typing.SupportsInt | typing.SupportsIndex,
 ) -> typing.Annotated[numpy.typing.NDArray[numpy.uint8], "[m, 1]"]: ...
+def order_by_hash(
+    starts: collections.abc.Sequence[typing.SupportsInt | typing.SupportsIndex],
+    hashes: numpy.typing.NDArray[numpy.uint64],
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
+) -> tuple[typing.Any, ...]: ...
 def parallel_backend() -> str: ...
+@typing.overload
+def point_hashes(
+    points: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, 3]", "flags.c_contiguous"],
+    seed: typing.SupportsInt | typing.SupportsIndex,
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.uint64]: ...
+@typing.overload
+def point_hashes(
+    points: typing.Annotated[numpy.typing.NDArray[numpy.float64], "[m, 3]", "flags.c_contiguous"],
+    seed: typing.SupportsInt | typing.SupportsIndex,
+    num_threads: typing.SupportsInt | typing.SupportsIndex,
+) -> numpy.typing.NDArray[numpy.uint64]: ...
 def preprocess_depth(
     depth: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],
     camera: Camera,

@@ -19,7 +19,7 @@ import limit_lines  # noqa: E402 - of the documentation
 # The folder of cpp/src that a public header belongs to.
 PUBLIC = {
     "base": ["cancel", "checkpoint", "system", "types", "version"],
-    "spatial": ["kdtree", "normals"],
+    "spatial": ["cubes", "kdtree", "normals"],
     "mesh": ["mesh"],
     "camera": ["camera"],
     "depth": ["depth", "depth_calibration"],

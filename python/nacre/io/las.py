@@ -7,6 +7,7 @@ import os
 import struct
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import chain
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -15,6 +16,7 @@ import numpy.typing as npt
 
 from nacre._internal import arrays
 from nacre.errors import FileFormatError
+from nacre.io import copc
 from nacre.io.atomic import atomic_path
 from nacre.io.cloud import Cloud, Columns, native
 from nacre.io.raw import require_regular
@@ -163,7 +165,7 @@ def write_cloud(
     path: str | os.PathLike[str], cloud: Cloud, *, comments: Sequence[str] = (), binary: bool = True
 ) -> None:
     """
-    Write points as a LAS 1.4 file, compressed where it ends in ``.laz``.
+    Write points as a LAS 1.4 file, compressed where it ends in ``.laz``, COPC where in ``.copc.laz``.
 
     :func:`nacre.write_points` has the parameters.
 
@@ -179,16 +181,28 @@ def write_chunks(
 ) -> None:
     """Write pieces of a cloud, all with the same fields, within the bounds of ``extremes``, as one file."""
     laspy = _import_laspy()
+    pieces = iter(chunks)
+    first = next(pieces)
+    header = _las_header(laspy, first, extremes)
+    records = (_las_points(laspy, cloud, header) for cloud in chain([first], pieces))
     with atomic_path(path) as temporary, temporary.open("r+b") as stream:
-        writer = None
-        for cloud in chunks:
-            if writer is None:
-                header = _las_header(laspy, cloud, extremes)
-                is_compressed = Path(path).suffix.lower() == ".laz"
-                writer = laspy.LasWriter(stream, header, do_compress=is_compressed, closefd=False)
-            writer.write_points(_las_points(laspy, cloud, header))
-        if writer is not None:
-            writer.close()
+        if copc.is_copc(path):
+            arrays_of_records = (record.array for record in records)
+            copc.write(stream, header, arrays_of_records, num_points, _bounds(extremes), temporary.parent)
+            return
+        is_compressed = Path(path).suffix.lower() == ".laz"
+        writer = laspy.LasWriter(stream, header, do_compress=is_compressed, closefd=False)
+        for record in records:
+            writer.write_points(record)
+        writer.close()
+
+
+def _bounds(points: arrays.FloatArray) -> npt.NDArray[np.float64]:
+    """Return the lowest and the highest coordinates."""
+    extremes = np.zeros((2, 3))
+    if len(points):
+        extremes[:] = points.min(axis=0), points.max(axis=0)
+    return extremes
 
 
 def _las_header(laspy: Any, cloud: Cloud, extremes: arrays.FloatArray) -> Any:

@@ -97,7 +97,8 @@ def write_points(
         - ``.ply``: ``x y z nx ny nz red green blue``, then the attributes.
         - ``.pcd``, version 0.7: ``x y z normal_x normal_y normal_z rgb``, then the attributes.
         - ``.las``, ``.laz``, version 1.4 (extra ``las``): coordinates in steps of a micrometre, coarser where
-          points lie more than 4 km apart; colours, attributes that LAS knows (``intensity``,
+          points lie more than 4 km apart; ``.copc.laz`` is a COPC file, whose octree has levels of detail;
+          colours, attributes that LAS knows (``intensity``,
           ``classification``, ``gps_time``, ...), and all else, the normals too, as extra bytes.
         - ``.e57`` (extra ``e57``): one scan, coordinates in float32 about an origin in float64; colours and
           ``intensity``. What else there is has no place, which a warning in the log tells.
@@ -195,6 +196,11 @@ def write_chunks(
         las.write_chunks(path, chunks, num_points, extremes)
     else:
         format.write_chunks(path, chunks, num_points)
+
+
+def needs_extremes(path: str | os.PathLike[str]) -> bool:
+    """Say whether :func:`write_chunks` uses the bounds of the points."""
+    return _FORMATS[Path(path).suffix.lower()] is las
 
 
 def holds(path: str | os.PathLike[str], field: str) -> bool:

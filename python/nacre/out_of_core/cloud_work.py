@@ -111,7 +111,7 @@ class CloudWork:
         store: Store,
         method: Method,
         radius: float,
-        select: Callable[[Rows], Rows] = lambda rows: rows,
+        select: Callable[[Rows], Rows] | None = None,
     ) -> CloudResult:
         """Write what came out, or what is selected of it."""
         num_points = write_results(store, method.row_type(store.dtype), self.output, select)

@@ -154,8 +154,9 @@ class Wlop:
     def work(self, cell: Cell) -> Rows:
         """Return the samples of a cell where they have come to."""
         points = np.ascontiguousarray(cell.rows["points"])
-        is_near = cell.distances <= self.sample_halo
-        samples = np.flatnonzero((cell.hashes <= np.uint64(self.highest)) & is_near)
+        is_sample = cell.hashes <= np.uint64(self.highest)
+        is_sample[cell.num_own :] &= cell.distances <= self.sample_halo
+        samples = np.flatnonzero(is_sample)
         is_alone = (points[samples] != points[samples - 1]).any(axis=1)  # points in one place are neighbours
         samples = samples[is_alone | (samples == 0)]
         num_own = int(np.searchsorted(samples, cell.num_own))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from nacre._internal.cubes import cube_numbers
 from nacre.out_of_core.survey import Survey
 
 Keys = npt.NDArray[np.int64]
@@ -47,12 +48,7 @@ class Grid:
 
     def keys(self, points: npt.NDArray[np.floating]) -> Keys:
         """Return the number of the cube that each point lies in."""
-        keys = np.zeros(len(points), np.int64)
-        for axis in range(3):  # column by column, for NumPy is slow on rows of three
-            along = (points[:, axis].astype(np.float64) - self.origin[axis]) / self.side
-            keys *= self.shape[axis]
-            keys += np.clip(along.astype(np.int64), 0, self.shape[axis] - 1)
-        return keys
+        return cube_numbers(points, self.origin, self.side, self.shape)
 
     def places(self, keys: Keys) -> npt.NDArray[np.int64]:
         """Return where cubes stand along the three axes, (K, 3)."""

@@ -1,50 +1,13 @@
-"""Random numbers that points have by where they are, whatever their place in a file."""
+"""Which of many hashes are the lowest."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-Hashes = npt.NDArray[np.uint64]
+from nacre._internal.cubes import Hashes
 
 _BINS = 20  # bits
-
-
-def point_hashes(points: npt.NDArray[Any], seed: int) -> Hashes:
-    """
-    Return a random number for each point that depends on the seed and its exact coordinates alone.
-
-    Parameters
-    ----------
-    points : (N, 3) float32 or float64
-    seed : int
-        Not negative.
-
-    Returns
-    -------
-    (N,) uint64
-
-    Notes
-    -----
-    Each coordinate's bits are mixed in by the finalizer of Steele, Lea and Flood, "Fast splittable
-    pseudorandom number generators", 2014, with the constants of splitmix64.
-    """
-    hashes = np.full(len(points), seed & 0xFFFFFFFFFFFFFFFF, np.uint64)
-    for axis in range(3):
-        hashes ^= (points[:, axis].astype(np.float64) + 0.0).view(np.uint64)  # -0 becomes 0
-        _mix(hashes)
-    return hashes
-
-
-def _mix(words: Hashes) -> None:
-    words += np.uint64(0x9E3779B97F4A7C15)
-    words ^= words >> np.uint64(30)
-    words *= np.uint64(0xBF58476D1CE4E5B9)
-    words ^= words >> np.uint64(27)
-    words *= np.uint64(0x94D049BB133111EB)
-    words ^= words >> np.uint64(31)
 
 
 class LowestHashes:

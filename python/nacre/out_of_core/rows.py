@@ -31,7 +31,9 @@ def row_type(cloud: Cloud, leave_out: frozenset[str] = frozenset()) -> np.dtype[
 
 
 def to_rows(cloud: Cloud, dtype: np.dtype[Any]) -> Rows:
-    """Return a cloud as records of this type."""
+    """Return a cloud as records of this type, where points are all that they have as a view."""
+    if _names(dtype) == ("points",):
+        return np.ascontiguousarray(cloud.points).reshape(-1).view(dtype)
     rows = np.empty(len(cloud), dtype)
     for name in _names(dtype):
         is_attribute = name.startswith(_ATTRIBUTE)
@@ -40,8 +42,8 @@ def to_rows(cloud: Cloud, dtype: np.dtype[Any]) -> Rows:
 
 
 def to_cloud(rows: Rows) -> Cloud:
-    """Return records as a cloud."""
-    columns = {name: np.ascontiguousarray(rows[name]) for name in _names(rows.dtype)}
+    """Return records as a cloud of views."""
+    columns = {name: rows[name] for name in _names(rows.dtype)}
     attributes = {
         name[len(_ATTRIBUTE) :]: values for name, values in columns.items() if name.startswith(_ATTRIBUTE)
     }
@@ -54,11 +56,17 @@ def with_normals(dtype: np.dtype[Any]) -> np.dtype[Any]:
     return np.dtype([("points", dtype["points"]), ("normals", np.float32, (3,)), *others])
 
 
-def is_finite(points: npt.NDArray[Any]) -> npt.NDArray[np.bool_]:
-    """Say which points are finite; column by column, for NumPy is slow on rows of three."""
-    x, y, z = np.isfinite(points).T
-    finite: npt.NDArray[np.bool_] = x & y & z
-    return finite
+def finite_among(rows: Rows, points: npt.NDArray[Any]) -> Rows:
+    """Return the rows whose points are finite: mostly all of them, as they are."""
+    is_finite = np.isfinite(points)
+    return rows if is_finite.all() else rows[is_finite.all(axis=1)]
+
+
+def take(rows: Rows, order: npt.NDArray[np.intp]) -> Rows:
+    """Return rows in this order; as plain bytes, for NumPy takes records field by field."""
+    plain = np.ascontiguousarray(rows).view(f"V{rows.dtype.itemsize}")
+    taken: Rows = plain.take(order).view(rows.dtype)
+    return taken
 
 
 def copy_fields(source: Rows, target: Rows, but: tuple[str, ...] = ()) -> None:

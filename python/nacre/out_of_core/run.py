@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from nacre.io.points import STREAMED_SUFFIXES, write_chunks
+from nacre.io.points import STREAMED_SUFFIXES, needs_extremes, write_chunks
 from nacre.out_of_core.memory import PER_PROCESS
 from nacre.out_of_core.rows import Rows, to_cloud
 from nacre.out_of_core.store import Cell, Store, open_store
@@ -129,18 +129,29 @@ def work_on_cells(
             progress(num_done, store.num_cells)
 
 
-def write_results(store: Store, dtype: np.dtype[Any], output: Path, select: Callable[[Rows], Rows]) -> int:
+def write_results(
+    store: Store, dtype: np.dtype[Any], output: Path, select: Callable[[Rows], Rows] | None = None
+) -> int:
     """Write what is selected of what came out of the cells as one file, in their order; return the number."""
-    lower, upper = np.full(3, np.inf), np.full(3, -np.inf)
-    num_points = 0
-    for rows in map(select, read_results(store, dtype)):
-        num_points += len(rows)
-        lower = np.minimum(lower, rows["points"].min(axis=0, initial=np.inf))
-        upper = np.maximum(upper, rows["points"].max(axis=0, initial=-np.inf))
-    pieces = chain(
-        [np.zeros(0, dtype)], map(select, read_results(store, dtype))
-    )  # one at least, for the header
-    write_chunks(output, map(to_cloud, pieces), num_points, np.array([lower, upper]))
+
+    def selected() -> Iterator[Rows]:
+        pieces = read_results(store, dtype)
+        return pieces if select is None else map(select, pieces)
+
+    extremes = np.array([np.full(3, np.inf), np.full(3, -np.inf)])
+    if select is None:
+        sizes = (_result_file(store.folder, cell).stat().st_size for cell in range(store.num_cells))
+        num_points = sum(sizes) // dtype.itemsize
+    else:
+        num_points = sum(map(len, selected()))
+    if needs_extremes(output):
+        for rows in selected():
+            for axis in range(3):  # column by column, for NumPy is slow on rows of three
+                along = rows["points"][:, axis]
+                extremes[0, axis] = along.min(initial=extremes[0, axis])
+                extremes[1, axis] = along.max(initial=extremes[1, axis])
+    pieces = chain([np.zeros(0, dtype)], selected())  # one at least, for the header
+    write_chunks(output, map(to_cloud, pieces), num_points, extremes)
     return num_points
 
 

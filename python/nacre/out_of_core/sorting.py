@@ -12,9 +12,10 @@ from typing import Any, BinaryIO, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from nacre._internal.cubes import group_by_number, point_hashes
 from nacre.out_of_core.grid import Grid, Keys, divide_into_cells
-from nacre.out_of_core.hashes import LowestHashes, point_hashes
-from nacre.out_of_core.rows import Rows
+from nacre.out_of_core.hashes import LowestHashes
+from nacre.out_of_core.rows import Rows, take
 from nacre.out_of_core.store import Store
 from nacre.out_of_core.survey import Source, Survey, finite_rows
 from nacre.system import default_threads
@@ -87,10 +88,10 @@ def _count(
     found: list[tuple[Keys, npt.NDArray[np.int64]]] = []
 
     def count(rows: Rows) -> None:
-        keys, counts = np.unique(grid.keys(rows["points"]), return_counts=True)
+        keys, counts, _ = group_by_number(grid.keys(rows["points"]))
         hashes = None if lowest is None else point_hashes(rows["points"], seed)
         with lock:
-            found.append((keys, counts.astype(np.int64)))
+            found.append((keys, counts))
             if len(found) > _MOST_UNMERGED:
                 found[:] = [_merged(found)]
             if lowest is not None and hashes is not None:
@@ -126,17 +127,17 @@ class _Writer:
         """Write some points; several threads may."""
         if self._lowest is not None:
             self._lowest.keep(point_hashes(rows["points"], self._store.seed))
-        cubes = self._place_of_key[np.searchsorted(self._keys, self._store.grid.keys(rows["points"]))]
-        by_cube = np.argsort(cubes)
-        rows, cubes = rows[by_cube], cubes[by_cube]
-        begins = np.flatnonzero(np.diff(cubes, prepend=-1))
-        sizes = np.diff(begins, append=len(cubes))
+        keys, counts, by_cube = group_by_number(self._store.grid.keys(rows["points"]))
+        cubes = self._place_of_key[np.searchsorted(self._keys, keys)]
+        content = take(rows, by_cube).view(np.uint8).data
+        itemsize = self._store.dtype.itemsize
+        ends = np.cumsum(counts) * itemsize
         with self._lock:
-            places = self._ends[cubes[begins]]
-            self._ends[cubes[begins]] += sizes
-            for begin, size, place in zip(begins.tolist(), sizes.tolist(), places.tolist(), strict=True):
-                self._stream.seek(place * self._store.dtype.itemsize)
-                self._stream.write(rows[begin : begin + size].view(np.uint8).data)
+            places = self._ends[cubes] * itemsize
+            self._ends[cubes] += counts
+            for begin, end, place in zip([0, *ends.tolist()], ends.tolist(), places.tolist(), strict=False):
+                self._stream.seek(place)
+                self._stream.write(content[begin:end])
 
 
 def _for_each(work: Callable[[Item], Any], items: Iterable[Item]) -> None:

@@ -6,14 +6,14 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from nacre._internal.cubes import Hashes, order_by_hash, point_hashes
 from nacre.out_of_core.grid import Grid
-from nacre.out_of_core.hashes import Hashes, point_hashes
-from nacre.out_of_core.rows import Rows
+from nacre.out_of_core.rows import Rows, take
 
 _PLAN, _POINTS = "plan.npz", "points.bin"
 
@@ -30,7 +30,7 @@ class Cell:
         Of the points.
     num_own : int
         How many belong to the cell: the first.
-    distances : (N,) float64
+    distances : (N - num_own,) float64
         How far points of the halo are from the cell's box, as the largest of the distances along the axes; 0
         within.
     """
@@ -100,18 +100,34 @@ class Store:
     def read(self, cell: int, halo: float) -> Cell:
         """Read a cell and the points that are not farther from its box than the halo."""
         own = np.arange(self.cells[cell], self.cells[cell + 1])
-        lower, upper = self._box(cell)
-        with self.points_file.open("rb") as stream:
-            inside = self._read_cubes(stream, own)
-            around = self._read_cubes(stream, self._cubes_around(cell, halo))
-        distances = _distances(around[0]["points"], lower, upper)
-        near = distances <= halo
-        return Cell(
-            np.concatenate([inside[0], around[0][near]]),
-            np.concatenate([inside[1], around[1][near]]),
-            len(inside[0]),
-            np.concatenate([np.zeros(len(inside[0])), distances[near]]),
-        )
+        around = self._cubes_around(cell, halo)
+        own_counts, counts = (self.starts[cubes + 1] - self.starts[cubes] for cubes in (own, around))
+        num_own = int(own_counts.sum())
+        rows = self._load(np.concatenate([own, around]), num_own + int(counts.sum()))
+        distances = _distances(rows["points"][num_own:], *self._box(cell))
+        near = np.flatnonzero(distances <= halo)
+        rows[num_own : num_own + len(near)] = take(rows[num_own:], near)
+        rows = rows[: num_own + len(near)]
+        near_counts = np.diff(np.searchsorted(near, np.concatenate([[0], np.cumsum(counts)])))
+        starts = np.concatenate([[0], np.cumsum(np.concatenate([own_counts, near_counts]))])
+        order, hashes = _canonical_order(rows, point_hashes(rows["points"], self.seed, num_threads=0), starts)
+        return Cell(take(rows, order), hashes, num_own, distances[near][order[num_own:] - num_own])
+
+    def _load(self, cubes: npt.NDArray[np.intp], num_points: int) -> Rows:
+        """Return the points of cubes as they are in the file."""
+        rows = np.empty(num_points, self.dtype)
+        content, at = rows.view(np.uint8).data, 0
+        with self.points_file.open("rb", buffering=0) as stream:
+            for run in np.split(cubes, np.flatnonzero(np.diff(cubes) != 1) + 1) if num_points else []:
+                first, last = int(self.starts[run[0]]), int(self.starts[run[-1] + 1])
+                end = at + (last - first) * self.dtype.itemsize
+                stream.seek(first * self.dtype.itemsize)
+                while at < end:
+                    num_read = stream.readinto(content[at:end])
+                    if not num_read:
+                        raise EOFError(f"{self.points_file} became shorter while it was read")
+                    at += num_read
+        return rows
 
     def _box(self, cell: int) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         places = self.places[self.cells[cell] : self.cells[cell + 1]]
@@ -130,24 +146,6 @@ class Store:
             is_near &= along <= places[:, axis].max() + reach
         is_near[begin:end] = False
         return np.flatnonzero(is_near)
-
-    def _read_cubes(self, stream: BinaryIO, cubes: npt.NDArray[np.intp]) -> tuple[Rows, Hashes]:
-        """Return the points of cubes, sorted by their hashes within each."""
-        rows = np.empty(int((self.starts[cubes + 1] - self.starts[cubes]).sum()), self.dtype)
-        hashes = np.empty(len(rows), np.uint64)
-        at = 0
-        for run in np.split(cubes, np.flatnonzero(np.diff(cubes) != 1) + 1) if len(cubes) else []:
-            first, last = self.starts[run[0]], self.starts[run[-1] + 1]
-            stream.seek(int(first) * self.dtype.itemsize)
-            found = np.fromfile(stream, self.dtype, int(last - first))
-            drawn = point_hashes(found["points"], self.seed)
-            for cube in run:
-                here = slice(int(self.starts[cube] - first), int(self.starts[cube + 1] - first))
-                order = _canonical_order(found[here], drawn[here])
-                there = slice(at, at + len(order))
-                rows[there], hashes[there] = found[here][order], drawn[here][order]
-                at = there.stop
-        return rows, hashes
 
 
 @lru_cache(maxsize=1)
@@ -169,18 +167,24 @@ def _store_of(folder: Path, plan: Mapping[str, npt.NDArray[Any]]) -> Store:
     )
 
 
-def _canonical_order(rows: Rows, hashes: Hashes) -> npt.NDArray[np.intp]:
-    """Return the order of the hashes; points in the same place by the bytes of all that they have."""
-    order = np.argsort(hashes)
-    ordered = hashes[order]
+def _canonical_order(
+    rows: Rows, hashes: Hashes, starts: npt.NDArray[np.int64]
+) -> tuple[npt.NDArray[np.intp], Hashes]:
+    """
+    Return the order of the hashes in each cube, and the hashes in it.
+
+    Points in one place are in the order of the bytes of all that they have.
+    """
+    order, ordered = order_by_hash(starts, hashes)
     is_tied = np.zeros(len(order), bool)
     is_tied[1:] = ordered[1:] == ordered[:-1]
     if is_tied.any():
         is_tied[:-1] |= is_tied[1:]
+        cubes = np.searchsorted(starts, np.flatnonzero(is_tied), side="right")
         tied = order[is_tied]
-        contents = np.ascontiguousarray(rows[tied]).view(np.uint8).reshape(len(tied), -1)
-        order[is_tied] = tied[np.lexsort((*contents.T[::-1], hashes[tied]))]
-    return order
+        contents = take(rows, tied).view(np.uint8).reshape(len(tied), -1)
+        order[is_tied] = tied[np.lexsort((*contents.T[::-1], hashes[tied], cubes))]
+    return order, ordered
 
 
 def _distances(

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre._internal.cubes import Hashes, point_hashes
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Cloud
 from nacre.io.las import default_of
 from nacre.io.points import SUFFIXES, is_streamed, read_chunks, require_point_suffix
 from nacre.kdtree import KdTree
-from nacre.out_of_core.hashes import Hashes, point_hashes
-from nacre.out_of_core.rows import Rows, is_finite, row_type, to_cloud, to_rows
+from nacre.out_of_core.rows import Rows, finite_among, row_type, to_cloud, to_rows
 
 PathLike = str | os.PathLike[str]
 
@@ -109,7 +109,7 @@ def finite_rows(source: Source, of: Survey, num_rows: int) -> Iterator[Rows]:
     """Yield the finite points of a cloud in pieces."""
     for _, cloud in source.chunks(num_rows):
         rows = to_rows(cloud, of.dtype)
-        yield rows[is_finite(rows["points"])]
+        yield finite_among(rows, rows["points"])
 
 
 class _Look:
@@ -135,12 +135,13 @@ class _Look:
                 path, f"its fields must be those of the first file: {first}, it {_told(dtype)}"
             )
         self._silent = {n for n in self._silent if (cloud.attributes[n] == default_of(n)).all()}
-        finite = cloud.points[is_finite(cloud.points)].astype(np.float64)
+        finite = finite_among(cloud.points, cloud.points)
         self._num_left_out += len(cloud) - len(finite)
         if len(finite):
             self._num_points += len(finite)
-            self._lower = np.minimum(self._lower, [finite[:, axis].min() for axis in range(3)])
-            self._upper = np.maximum(self._upper, [finite[:, axis].max() for axis in range(3)])
+            for axis in range(3):  # column by column, for NumPy is slow on rows of three
+                self._lower[axis] = min(self._lower[axis], finite[:, axis].min())
+                self._upper[axis] = max(self._upper[axis], finite[:, axis].max())
             self._keep_lowest(finite)
 
     def _keep_lowest(self, points: npt.NDArray[np.float64]) -> None:

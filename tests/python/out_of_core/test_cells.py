@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from nacre._internal.cubes import point_hashes
 from nacre.out_of_core.grid import divide_into_cells
-from nacre.out_of_core.hashes import LowestHashes, point_hashes
+from nacre.out_of_core.hashes import LowestHashes
 
 
 def test_a_hash_is_of_the_coordinates_alone() -> None:
