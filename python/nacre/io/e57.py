@@ -50,10 +50,11 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
     except Exception as error:  # of several kinds, the library's own among them
         raise FileFormatError(path, f"not a readable E57 file: {_reason(error)}", offset=0) from error
     points = _joined(scans, AXES)
+    known = [rows for rows in normals if rows is not None]
     colors, intensity = _joined(scans, COLORS), _joined(scans, ("intensity",))
     return Cloud(
         np.zeros((0, 3)) if points is None else points,
-        None if not normals or any(rows is None for rows in normals) else np.concatenate(normals),
+        np.concatenate(known) if known and len(known) == len(normals) else None,
         colors=None if colors is None else colors.astype(np.uint8),
         attributes={} if intensity is None else {"intensity": intensity[:, 0]},
         path=Path(path),
