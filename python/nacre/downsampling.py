@@ -44,7 +44,8 @@ def voxel_downsample(
     colors : (N, 3) array of integers from 0 to 255, or of floats from 0 to 1, optional
         Averaged and rounded.
     attributes : mapping of str to (N,) or (N, A) array, optional
-        Averaged in their own types, integers rounded; values that are not finite are left out.
+        In their own types: of integers, which may be classes, the most common (of several, the one nearest
+        to the mean); of others the mean of those that are finite.
 
     Returns
     -------
@@ -71,14 +72,14 @@ def voxel_downsample(
     if not 0 < size < np.inf:
         raise ValueError(f"voxel_size must be positive and finite, got {size}")
     is_finite = np.isfinite(cloud.points).all(axis=1)
-    means = _VoxelMeans(cloud.points[is_finite], size)
+    voxels = _Voxels(cloud.points[is_finite], size)
 
     thin_normals = thin_colors = None
     if (given := cloud.normals if normals is None else normals) is not None:
         rows = as_unit_rows("normals", given, "points", count)[is_finite]
-        thin_normals = _unit_length(means.of(rows, rows.dtype))
+        thin_normals = _unit_length(voxels.mean(rows, rows.dtype))
     if (given := cloud.colors if colors is None else colors) is not None:
-        thin_colors = means.of(as_colors("colors", given, (count, 3))[is_finite], np.dtype(np.uint8))
+        thin_colors = voxels.mean(as_colors("colors", given, (count, 3))[is_finite], np.dtype(np.uint8))
     thin_attributes = {}
     for name, values in (cloud.attributes if attributes is None else attributes).items():
         array = as_real(f"attributes[{name!r}]", values)
@@ -87,14 +88,15 @@ def voxel_downsample(
                 f"attributes[{name!r}] must have one row per point, ({count},) or ({count}, A), "
                 f"got {array.shape}"
             )
-        thin_attributes[name] = means.of(array[is_finite], array.dtype)
+        rows = array[is_finite]
+        thin_attributes[name] = voxels.mean(rows, rows.dtype) if rows.dtype.kind == "f" else voxels.mode(rows)
     return Cloud(
-        means.of(cloud.points[is_finite], cloud.points.dtype), thin_normals, thin_colors, thin_attributes
+        voxels.mean(cloud.points[is_finite], cloud.points.dtype), thin_normals, thin_colors, thin_attributes
     )
 
 
-class _VoxelMeans:
-    """The rows that share a voxel, and the means of what they have."""
+class _Voxels:
+    """The rows that share a voxel, and what stands for them."""
 
     def __init__(self, points: npt.NDArray[Any], size: float) -> None:
         with np.errstate(over="ignore"):
@@ -107,7 +109,7 @@ class _VoxelMeans:
         begins[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
         self._starts = np.flatnonzero(begins)
 
-    def of(self, values: npt.NDArray[Any], dtype: np.dtype[Any]) -> npt.NDArray[Any]:
+    def mean(self, values: npt.NDArray[Any], dtype: np.dtype[Any]) -> npt.NDArray[Any]:
         """Return the mean of each voxel's finite values, NaN where there are none."""
         rows = values.astype(np.float64)[self._order]
         if not len(rows):
@@ -116,6 +118,28 @@ class _VoxelMeans:
         counts = np.add.reduceat(is_known, self._starts, axis=0, dtype=np.int64)
         sums = np.add.reduceat(np.where(is_known, rows, 0.0), self._starts, axis=0)
         return as_dtype(np.divide(sums, counts, out=np.full_like(sums, np.nan), where=counts > 0), dtype)
+
+    def mode(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """Return each voxel's most common values; of several, the one nearest to the mean."""
+        if not len(values):
+            return values
+        columns = values.reshape(len(values), -1).T
+        modes = [self._mode(column[self._order]) for column in columns]
+        return np.stack(modes, axis=1).reshape(-1, *values.shape[1:])
+
+    def _mode(self, ordered: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        sizes = np.diff(self._starts, append=len(ordered))
+        voxel = np.repeat(np.arange(len(sizes)), sizes)
+        means = np.add.reduceat(ordered, self._starts, dtype=np.float64) / sizes
+        by_value = np.lexsort((ordered, voxel))
+        values, voxel = ordered[by_value], voxel[by_value]
+        begins = np.ones(len(values), bool)
+        begins[1:] = (voxel[1:] != voxel[:-1]) | (values[1:] != values[:-1])
+        runs = np.flatnonzero(begins)
+        counts = np.diff(runs, append=len(values))
+        values, voxel = values[runs], voxel[runs]
+        best = np.lexsort((values, np.abs(values - means[voxel]), -counts, voxel))
+        return values[best[np.searchsorted(voxel, np.arange(len(sizes)))]]
 
 
 def _unit_length(normals: npt.NDArray[Any]) -> npt.NDArray[Any]:

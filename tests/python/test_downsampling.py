@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import statistics
 from pathlib import Path
 
 import numpy as np
@@ -34,17 +35,38 @@ def test_each_voxel_has_the_mean_of_its_points_in_the_order_of_the_voxels() -> N
 
 def test_normals_colours_and_attributes_come_along() -> None:
     rows = voxels(POINTS)
-    values = {"height": POINTS[:, 2], "ring": np.arange(500, dtype=np.int16), "pair": POINTS[:, :2]}
+    kinds = RNG.integers(0, 4, 500).astype(np.int16)
+    values = {"height": POINTS[:, 2], "kind": kinds, "pair": POINTS[:, :2]}
     thin = nacre.voxel_downsample(POINTS, SIZE, normals=NORMALS, colors=COLORS, attributes=values)
     unit = NORMALS / np.linalg.norm(NORMALS, axis=1, keepdims=True)
     for i, voxel in enumerate(sorted(rows)):
         mean = unit[rows[voxel]].mean(axis=0)
         np.testing.assert_allclose(thin.normals[i], mean / np.linalg.norm(mean), atol=1e-5)
         np.testing.assert_array_equal(thin.colors[i], np.rint(COLORS[rows[voxel]].mean(axis=0)))
-        assert thin.attributes["ring"][i] == np.rint(np.mean(rows[voxel]))
-    assert thin.attributes["ring"].dtype == np.int16
+        assert thin.attributes["kind"][i] in statistics.multimode(kinds[rows[voxel]].tolist())
+    assert thin.attributes["kind"].dtype == np.int16
     np.testing.assert_allclose(thin.attributes["height"], thin.points[:, 2])
     np.testing.assert_allclose(thin.attributes["pair"], thin.points[:, :2])
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ([2, 6, 6], 6),  # ground and building are not vegetation between them
+        ([1, 9, 2, 9, 1], 1),  # of two that are as common, the one nearer to the mean 4.4
+        ([100, 110, 300], 110),  # of intensities that are all different likewise: mean 170
+    ],
+)
+def test_classes_are_not_averaged(values: list[int], expected: int) -> None:
+    classes = np.array(values, np.uint16)
+    points = np.full((len(values), 3), 0.1)
+    both = {"class": classes, "two": np.stack([classes, classes[::-1]], axis=1)}
+    for order in (slice(None), slice(None, None, -1)):
+        rows = {name: column[order] for name, column in both.items()}
+        thin = nacre.voxel_downsample(points, SIZE, attributes=rows).attributes
+        assert thin["class"].tolist() == [expected]
+        assert thin["two"].tolist() == [[expected, expected]]
+        assert thin["class"].dtype == thin["two"].dtype == np.uint16
 
 
 def test_a_cloud_brings_its_own(tmp_path: Path) -> None:

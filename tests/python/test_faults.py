@@ -130,7 +130,7 @@ def failing(count: int, code: int) -> Iterator[list[int]]:
         return Broken(stream) if mode == "wb" else stream
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(atomic.tempfile, "mkstemp", counted(atomic.tempfile.mkstemp))
+        patch.setattr(atomic, "_new_file_beside", counted(atomic._new_file_beside))
         patch.setattr(Path, "open", open_broken)
         patch.setattr(os, "fsync", counted(os.fsync))
         patch.setattr(Path, "replace", counted(Path.replace))

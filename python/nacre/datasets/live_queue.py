@@ -5,15 +5,15 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from types import TracebackType
 from typing import Generic, TypeVar
 
+from nacre.datasets.closable import Closable
 from nacre.errors import CameraError
 
 Item = TypeVar("Item")
 
 
-class LiveQueue(Iterator[Item], Generic[Item]):
+class LiveQueue(Closable, Iterator[Item], Generic[Item]):
     """
     Fetches items in a thread of its own and hands them on in their order, through a bounded queue.
 
@@ -68,14 +68,6 @@ class LiveQueue(Iterator[Item], Generic[Item]):
     def __enter__(self) -> LiveQueue[Item]:
         self._start()
         return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def __iter__(self) -> Iterator[Item]:
         return self

@@ -6,13 +6,13 @@ import logging
 import threading
 import time
 from collections.abc import Iterator
-from types import TracebackType
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre.datasets.closable import Closable
 from nacre.datasets.sequence import SequenceFrame
 from nacre.errors import CameraError
 
@@ -49,7 +49,7 @@ _DRIVERS = {
 }  # fmt: skip
 
 
-class OpenCVCamera:
+class OpenCVCamera(Closable):
     """
     A depth camera that OpenCV drives, which must be built with its driver: that from pip is not, on Linux.
 
@@ -111,14 +111,6 @@ class OpenCVCamera:
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> OpenCVCamera:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Stop the camera."""

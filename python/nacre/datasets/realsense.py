@@ -7,12 +7,12 @@ import os
 import time
 from collections.abc import Iterator
 from contextlib import suppress
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 
 from nacre import Camera
+from nacre.datasets.closable import Closable
 from nacre.datasets.sequence import SequenceFrame
 from nacre.errors import CameraError, FileFormatError
 
@@ -20,7 +20,7 @@ _log = logging.getLogger(__name__)
 _MISSING = 'RealSense cameras need pyrealsense2: pip install "nacre[realsense]"'
 
 
-class RealSense:
+class RealSense(Closable):
     """
     A RealSense camera that runs: depth, and colour laid over it where the camera has colour.
 
@@ -101,17 +101,6 @@ class RealSense:
         self.camera = _camera(profile.get_stream(rs.stream.depth).as_video_stream_profile().get_intrinsics())
         self._align = rs.align(rs.stream.depth)
         self._closed = False
-
-    def __enter__(self) -> RealSense:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Stop the camera."""

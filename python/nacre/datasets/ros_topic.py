@@ -10,12 +10,13 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from types import SimpleNamespace, TracebackType
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from nacre.datasets.closable import Closable
 from nacre.datasets.ros_messages import METRES, camera_of, color_of, depth_of, have_one_lens
 from nacre.datasets.sequence import SequenceFrame
 from nacre.errors import CameraError, FileFormatError
@@ -35,7 +36,7 @@ _SCALE_OF_FLOATS = 5000.0  # stored units per metre: 0.2 mm, up to 13 m
 _MILLIMETRES = 1000.0
 
 
-class RosTopic:
+class RosTopic(Closable):
     """
     A depth camera that other programs run on ROS 2.
 
@@ -104,14 +105,6 @@ class RosTopic:
         except BaseException:
             self.close()
             raise
-
-    def __enter__(self) -> RosTopic:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Leave the topics."""

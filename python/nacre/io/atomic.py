@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 import os
 import re
-import tempfile
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -46,15 +46,10 @@ def atomic_path(path: str | os.PathLike[str], *, named: bool = True) -> Iterator
     target = Path(path)
     temporary: Path | None = None
     try:
-        descriptor, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.", suffix=".tmp")
-        os.close(descriptor)
-        temporary = Path(name)
+        temporary = _new_file_beside(target)
         yield temporary
         with temporary.open("r+b") as stream:
             os.fsync(stream.fileno())
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
         temporary.replace(target)
         if named:
             _sync_folder(target.parent)
@@ -65,6 +60,15 @@ def atomic_path(path: str | os.PathLike[str], *, named: bool = True) -> Iterator
         if isinstance(error, OSError) and error.errno is not None and _is_about(error, target):
             raise OSError(error.errno, error.strerror, os.fspath(path)) from error
         raise
+
+
+def _new_file_beside(target: Path) -> Path:
+    """Create an empty file of a new name, with the permissions that the process gives its files."""
+    while True:
+        path = target.with_name(f".{target.name}.{secrets.token_hex(4)}.tmp")
+        with suppress(FileExistsError):
+            os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+            return path
 
 
 def _is_about(error: OSError, target: Path) -> bool:
@@ -90,5 +94,5 @@ def remove_leftovers(folder: Path) -> None:
     """Remove what :func:`atomic_writer` left in a folder when its process was killed."""
     with suppress(OSError):
         for path in list(folder.iterdir()):
-            if re.fullmatch(r"\..+\.[a-z0-9_]{8}\.tmp", path.name) and path.is_file():
+            if re.fullmatch(r"\..+\.[0-9a-f]{8}\.tmp", path.name) and path.is_file():
                 path.unlink(missing_ok=True)

@@ -16,15 +16,14 @@ from nacre._internal.arrays import localize
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_path
 from nacre.io.cloud import Cloud
+from nacre.io.e57_scan import AXES, COLORS, NORMALS, read_normals, write_scan
 from nacre.io.raw import require_regular
 
 _log = logging.getLogger(__name__)
 
 _MISSING = 'E57 files need pye57: pip install "nacre[e57]"'
-FIELDS = ("colors", "intensity")
+FIELDS = ("normals", "colors", "intensity")
 """What there is a place for beside coordinates."""
-_AXES = ("cartesianX", "cartesianY", "cartesianZ")
-_COLORS = ("colorRed", "colorGreen", "colorBlue")
 
 
 def read_cloud(path: str | os.PathLike[str]) -> Cloud:
@@ -45,14 +44,17 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
                 file.read_scan(i, intensity=True, colors=True, ignore_missing_fields=True)
                 for i in range(file.scan_count)
             ]
+            normals = [read_normals(file, pye57.libe57, i) for i in range(file.scan_count)]
     except (MemoryError, FileFormatError):
         raise
     except Exception as error:  # of several kinds, the library's own among them
         raise FileFormatError(path, f"not a readable E57 file: {_reason(error)}", offset=0) from error
-    points = _joined(scans, _AXES)
-    colors, intensity = _joined(scans, _COLORS), _joined(scans, ("intensity",))
+    points = _joined(scans, AXES)
+    known = [rows for rows in normals if rows is not None]
+    colors, intensity = _joined(scans, COLORS), _joined(scans, ("intensity",))
     return Cloud(
         np.zeros((0, 3)) if points is None else points,
+        np.concatenate(known) if known and len(known) == len(normals) else None,
         colors=None if colors is None else colors.astype(np.uint8),
         attributes={} if intensity is None else {"intensity": intensity[:, 0]},
         path=Path(path),
@@ -84,13 +86,16 @@ def write_cloud(
     if not len(cloud) or not np.isfinite(cloud.points).all():
         raise ValueError("points must be finite, and at least one, in an E57 file, got others")
     local, origin = localize(cloud.points)
-    data = dict(zip(_AXES, local.T.astype(np.float64), strict=True))
+    columns = dict(zip(AXES, _columns(local, np.float32), strict=True))
+    if cloud.normals is not None:  # 0, where one is not known
+        known = np.isfinite(cloud.normals).all(axis=1, keepdims=True)
+        columns.update(zip(NORMALS, _columns(np.where(known, cloud.normals, 0), np.float32), strict=True))
     if cloud.colors is not None:
-        data.update(zip(_COLORS, cloud.colors.T, strict=True))
-    left_out = ["normals"] * (cloud.normals is not None)
+        columns.update(zip(COLORS, _columns(cloud.colors, np.uint8), strict=True))
+    left_out = []
     for name, values in cloud.attributes.items():
         if name == "intensity" and values.ndim == 1 and np.isfinite(values).all():
-            data[name] = values.astype(np.float32)
+            columns[name] = values.astype(np.float32)
         else:
             left_out.append(name)
     if left_out:
@@ -98,9 +103,13 @@ def write_cloud(
     with atomic_path(path) as temporary:
         try:
             with pye57.E57(os.fspath(temporary), mode="w") as file:
-                file.write_scan_raw(data, name=Path(path).stem, translation=origin)
+                write_scan(file, pye57.libe57, columns, Path(path).stem, origin)
         except pye57.libe57.E57Exception as error:
             raise OSError(errno.EIO, _reason(error), os.fspath(path)) from error
+
+
+def _columns(rows: npt.NDArray[Any], dtype: npt.DTypeLike) -> npt.NDArray[Any]:
+    return np.ascontiguousarray(rows.T, dtype)
 
 
 def _reason(error: Exception) -> str:

@@ -43,7 +43,8 @@ def read_points(path: str | os.PathLike[str]) -> Cloud:
         - ``.pcd``: ascii, binary, binary_compressed.
         - ``.las``, ``.laz`` (extra ``las``): any version; colours as 8 bits, all else as attributes.
           What the header says of the coordinate system is left out.
-        - ``.e57`` (extra ``e57``): all scans, each in its place; colours and ``intensity``.
+        - ``.e57`` (extra ``e57``): all scans, each in its place; normals (libE57's extension
+          ``nor``), colours and ``intensity``.
         - ``.xyz``: text, a point a line, values between blanks, commas or semicolons: x y z, then r g b from
           0 to 255, then nx ny nz; or as a first line of names says.
         - ``.npz``: arrays ``points``, and ``normals``, ``colors`` and others if there are any.
@@ -100,8 +101,9 @@ def write_points(
           points lie more than 4 km apart; ``.copc.laz`` is a COPC file, whose octree has levels of detail;
           colours, attributes that LAS knows (``intensity``,
           ``classification``, ``gps_time``, ...), and all else, the normals too, as extra bytes.
-        - ``.e57`` (extra ``e57``): one scan, coordinates in float32 about an origin in float64; colours and
-          ``intensity``. What else there is has no place, which a warning in the log tells.
+        - ``.e57`` (extra ``e57``): one scan, coordinates in float32 about an origin in float64; normals
+          (libE57's extension ``nor``), colours and ``intensity``. What else there is has no place, which a
+          warning in the log tells.
         - ``.xyz``: text with a first line of names.
         - ``.npz``: each field an array, exactly.
     points : (N, 3) array, or Cloud, Model, Reconstruction or Consolidated

@@ -50,8 +50,9 @@ def test_normals_and_confidence_are_read_again(tmp_path, suffix, caplog):
     path = written(tmp_path / f"a{suffix}", normals=NORMALS, attributes=attributes)
     cloud = nacre.read_points(path)
     if suffix == ".e57":
-        assert (cloud.normals, cloud.attributes) == (None, {})
-        assert "no place for normals, confidence" in caplog.text
+        np.testing.assert_array_equal(cloud.normals, NORMALS.astype(np.float32))
+        assert cloud.attributes == {}
+        assert "no place for confidence" in caplog.text
         return
     np.testing.assert_array_equal(cloud.normals, NORMALS)
     np.testing.assert_array_equal(cloud.attributes["confidence"].astype(np.float32), CONFIDENCE)
@@ -117,9 +118,16 @@ def test_points_far_apart_get_coarser_steps(tmp_path):
 
 def test_pye57_sees_one_scan(tmp_path):
     pye57 = pytest.importorskip("pye57")
-    path = written(tmp_path / "a.e57", GEOREFERENCED, colors=COLORS, attributes={"intensity": CONFIDENCE})
+    path = written(
+        tmp_path / "a.e57",
+        GEOREFERENCED,
+        normals=NORMALS,
+        colors=COLORS,
+        attributes={"intensity": CONFIDENCE},
+    )
     with pye57.E57(str(path)) as file:
         assert file.scan_count == 1
+        assert set(file.get_header(0).point_fields) >= {"nor:normalX", "nor:normalY", "nor:normalZ"}
         scan = file.read_scan(0, intensity=True, colors=True, ignore_missing_fields=True)
     np.testing.assert_allclose(scan["cartesianX"], GEOREFERENCED[:, 0], rtol=0, atol=5e-6)
     np.testing.assert_array_equal(scan["colorGreen"], COLORS[:, 1])
@@ -139,6 +147,46 @@ def test_scans_of_e57_come_together_in_their_places(tmp_path):
     cloud = nacre.read_points(tmp_path / "a.e57")
     np.testing.assert_allclose(cloud.points[:3], np.eye(3) + 1)
     np.testing.assert_allclose(cloud.points[3:], (np.eye(3) + 1) * (-1, -1, 1) + (9, 0, 0), atol=1e-6)
+
+
+def test_normals_of_e57_turn_with_their_scan(tmp_path):
+    """Two scans of another program, the second by a quarter of a turn about z, with an invalid point."""
+    pye57 = pytest.importorskip("pye57")
+    lib = pye57.libe57
+    quarter = np.array([np.sqrt(0.5), 0, 0, np.sqrt(0.5)])  # w x y z
+    with pye57.E57(str(tmp_path / "a.e57"), mode="w") as file:
+        image = file.image_file
+        image.extensionsAdd("nor", "http://www.libe57.org/E57_NOR_surface_normals.txt")
+        for rotation in (np.array([1.0, 0, 0, 0]), quarter):
+            columns = dict(zip(("cartesianX", "cartesianY", "cartesianZ"), np.eye(3) + 1, strict=True))
+            columns |= dict(zip(("nor:normalX", "nor:normalY", "nor:normalZ"), np.eye(3)[::-1], strict=True))
+            columns["cartesianInvalidState"] = np.array([0, 2, 0], np.uint8)
+            prototype, buffers = lib.StructureNode(image), lib.VectorSourceDestBuffer()
+            for name, values in columns.items():
+                is_state = name == "cartesianInvalidState"
+                node = lib.IntegerNode(image, 0, 0, 2) if is_state else lib.FloatNode(image, 0.0)
+                prototype.set(name, node)
+                buffers.append(lib.SourceDestBuffer(image, name, values, 3, True, True))
+            turn, pose, scan = (lib.StructureNode(image) for _ in range(3))
+            for axis, part in zip("wxyz", rotation, strict=True):
+                turn.set(axis, lib.FloatNode(image, part))
+            pose.set("rotation", turn)
+            scan.set("pose", pose)
+            points = lib.CompressedVectorNode(image, prototype, lib.VectorNode(image, True))
+            scan.set("points", points)
+            file.data3d.append(scan)
+            writer = points.writer(buffers)
+            writer.write(3)
+            writer.close()
+    normals = nacre.read_points(tmp_path / "a.e57").normals
+    np.testing.assert_allclose(normals, [[0, 0, 1], [1, 0, 0], [0, 0, 1], [0, 1, 0]], atol=1e-6)
+
+
+def test_a_normal_that_is_not_known_stays_so(tmp_path):
+    normals = NORMALS.copy()
+    normals[7] = np.nan
+    found = nacre.read_points(written(tmp_path / "a.e57", normals=normals)).normals
+    np.testing.assert_array_equal(found, normals.astype(np.float32))
 
 
 def test_numpy_sees_the_arrays(tmp_path):
@@ -289,7 +337,7 @@ def test_an_e57_file_that_cannot_be_written_is_named(tmp_path, monkeypatch):
     def fail(*_, **__):
         raise pye57.libe57.E57Exception("write() failed\nin a source file")
 
-    monkeypatch.setattr(pye57.E57, "write_scan_raw", fail)
+    monkeypatch.setattr(pye57.libe57, "CompressedVectorNode", fail)
     (tmp_path / "a.e57").write_bytes(b"before")
     with pytest.raises(OSError, match=r"write\(\) failed: '.*a\.e57'") as caught:
         nacre.write_points(tmp_path / "a.e57", POINTS)
