@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from nacre.cli.cameras import CAMERAS, is_camera
+from nacre._internal.live_cameras import CAMERAS, is_camera
+from nacre._internal.signals import interruptible
 from nacre.cli.config import ConfigOption, PresetOption, SetOption
-from nacre.cli.job import begin_run, resume_run
 from nacre.cli.reconstruct_options import (
     AllPointsOption,
     AttributeOption,
@@ -32,8 +32,7 @@ from nacre.cli.reconstruct_options import (
     asked_for,
 )
 from nacre.cli.run import carry_out
-from nacre.cli.signals import interruptible
-from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption
+from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, in_option_words
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 from nacre.cli.view import PortOption
 from nacre.cli.window import Window
@@ -119,6 +118,7 @@ def reconstruct(
     """
     arguments = locals()
     terminal = Terminal(json, quiet, verbose)
+    from nacre.reconstruction.job import begin_run, resume_run
     from nacre.reconstruction.resume import UnfinishedRun
 
     window = _window(port) if view else None
@@ -126,7 +126,8 @@ def reconstruct(
         if resume is not None:
             _refuse_more_options(context, resume)
             unfinished = ends.enter_context(closing(UnfinishedRun(resume, checkpoint_every)))
-            job = resume_run(unfinished)
+            with in_option_words():
+                job = resume_run(unfinished)
         else:
             if source is None or out is None:
                 missing = "argument 'SOURCE'" if source is None else "option '--out' / '-o'"
@@ -135,9 +136,8 @@ def reconstruct(
             options, parameters = asked_for(
                 arguments, source=str(source), realtime=realtime, is_camera=is_camera(source)
             )
-            job = begin_run(
-                terminal, options, unfinished, parameters, stop, window.controls if window else None
-            )
+            with in_option_words():
+                job = begin_run(options, unfinished, parameters, stop, window.controls if window else None)
         carry_out(terminal, job, stop, window)
 
 

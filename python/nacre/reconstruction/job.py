@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nacre.cli.live_feed import LiveFeed, camera_feed, real_time_feed
-from nacre.cli.run_options import RunOptions, check_recording, describe, options_before, read_document
-from nacre.cli.signals import Interruption
-from nacre.cli.source import describe_camera, open_source
-from nacre.cli.terminal import CommandError, Terminal, writable_folder
-from nacre.errors import FileFormatError
+from nacre._internal.signals import Interruption
+from nacre.datasets import Sequence as Recording
+from nacre.datasets import open_sequence
+from nacre.datasets.recorder import mend
+from nacre.errors import FileFormatError, RunError
+from nacre.io.atomic import remove_leftovers
+from nacre.io.writable_folder import writable_folder
+from nacre.model import Model
+from nacre.parameters import ModelParameters
+from nacre.reconstruction.description import describe, describe_camera
+from nacre.reconstruction.live_feed import LiveFeed, camera_feed, real_time_feed
+from nacre.reconstruction.reconstruction import Reconstruction
+from nacre.reconstruction.resume import UnfinishedRun
+from nacre.reconstruction.run_options import RunOptions, check_recording, options_before, read_document
+from nacre.reconstruction.runner import Run
 
 if TYPE_CHECKING:
-    from nacre import ModelParameters
-    from nacre.datasets import Sequence as Recording
-    from nacre.reconstruction.resume import UnfinishedRun
-    from nacre.reconstruction.runner import Run
     from nacre.viewer import Controls
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass
@@ -37,24 +45,18 @@ class Job:
 
 
 def begin_run(
-    terminal: Terminal,
     options: RunOptions,
     unfinished: UnfinishedRun,
     parameters: ModelParameters,
-    stop: Interruption,
+    stop: Interruption | None = None,
     controls: Controls | None = None,
 ) -> Job:
     """Open what is asked for, and note it in ``OUT/unfinished``."""
-    import nacre
-    from nacre.io.atomic import remove_leftovers
-    from nacre.reconstruction import Reconstruction
-    from nacre.reconstruction.runner import Run
-
     out = unfinished.out
+    stop = stop or Interruption()
     feed: LiveFeed | None = None
     indices: Iterable[int]
     if options.is_camera:
-        options.require_none_for_a_camera()
         feed = camera_feed(
             Path(options.source),
             writable_folder(out),
@@ -71,14 +73,12 @@ def begin_run(
         words, num_frames, indices = describe(sequence, chosen), len(chosen), chosen
         if options.realtime:
             indices = feed = real_time_feed(sequence, chosen, stop=stop, controls=controls)
-    done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
+    done = Reconstruction(sequence, Model(sequence.camera, parameters=parameters))
     writable_folder(out)
     _hold(unfinished)
     remove_leftovers(out)
     if unfinished.checkpoint.exists():
-        terminal.say(
-            f"{out} held an unfinished run, which --resume would have gone on with: it is begun again"
-        )
+        _log.warning("%s held an unfinished run, which could have gone on: it is begun again", out)
     run = Run(done, indices, retry=options.retry)
     unfinished.live = None if feed is None else feed.figures
     unfinished.begin(run, options.document(sequence))
@@ -87,8 +87,6 @@ def begin_run(
 
 def resume_run(unfinished: UnfinishedRun) -> Job:
     """Open what a run was asked for that was stopped or killed, and load what it had."""
-    from nacre.io.atomic import remove_leftovers
-
     out = unfinished.out
     if out.is_dir():
         _hold(unfinished)
@@ -96,10 +94,8 @@ def resume_run(unfinished: UnfinishedRun) -> Job:
     options, folder = options_before(document, unfinished.document_path)
     indices: Sequence[int]
     if options.is_camera:
-        from nacre.datasets.recorder import mend
-
         mend(out / "recording")
-        sequence = open_source(out / "recording")
+        sequence = open_sequence(out / "recording")
         words, indices = f"live, {describe_camera(sequence.camera)}", range(len(sequence))
     else:
         sequence = options.open(folder)
@@ -132,7 +128,7 @@ def _hold(unfinished: UnfinishedRun) -> None:
     try:
         unfinished.hold()
     except BlockingIOError:
-        raise CommandError(
+        raise RunError(
             f"another nacre reconstruct is writing to {unfinished.out}: wait until it has ended; "
             "a new run can go to another folder (-o)",
             2,
