@@ -87,6 +87,23 @@ def reconstruct(
     all_points: AllPointsOption = False,
     report: ReportOption = True,
     min_tracked: MinTrackedOption = 0.5,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Cut the recording into pieces, which so many processes on this machine track at once.",
+            show_default=False,
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="The same by the workers of a Dask scheduler, e.g. tcp://10.0.0.1:8786; all see one disk.",
+            show_default=False,
+        ),
+    ] = None,
     view: Annotated[
         bool, typer.Option("--view", help="Show the model in the browser while it grows.")
     ] = False,
@@ -119,6 +136,7 @@ def reconstruct(
     arguments = locals()
     terminal = Terminal(json, quiet, verbose)
     from nacre.reconstruction.job import begin_run, resume_run
+    from nacre.reconstruction.pieces.workers import Cluster
     from nacre.reconstruction.resume import UnfinishedRun
 
     window = _window(port) if view else None
@@ -127,17 +145,28 @@ def reconstruct(
             _refuse_more_options(context, resume)
             unfinished = ends.enter_context(closing(UnfinishedRun(resume, checkpoint_every)))
             with in_option_words():
-                job = resume_run(unfinished)
+                job = resume_run(unfinished, Cluster(workers, scheduler))
         else:
             if source is None or out is None:
                 missing = "argument 'SOURCE'" if source is None else "option '--out' / '-o'"
                 raise CommandError(f"missing {missing} (see nacre reconstruct --help)", 2)
             unfinished = ends.enter_context(closing(UnfinishedRun(out, checkpoint_every)))
             options, parameters = asked_for(
-                arguments, source=str(source), realtime=realtime, is_camera=is_camera(source)
+                arguments,
+                source=str(source),
+                realtime=realtime,
+                is_camera=is_camera(source),
+                pieces=workers is not None or scheduler is not None,
             )
             with in_option_words():
-                job = begin_run(options, unfinished, parameters, stop, window.controls if window else None)
+                job = begin_run(
+                    options,
+                    unfinished,
+                    parameters,
+                    stop,
+                    Cluster(workers, scheduler),
+                    window.controls if window else None,
+                )
         carry_out(terminal, job, stop, window)
 
 
@@ -148,7 +177,17 @@ def _window(port: int) -> Window:
 
 
 def _refuse_more_options(context: typer.Context, out: Path) -> None:
-    allowed = ("resume", "checkpoint_every", "view", "port", "json", "quiet", "verbose")
+    allowed = (
+        "resume",
+        "checkpoint_every",
+        "workers",
+        "scheduler",
+        "view",
+        "port",
+        "json",
+        "quiet",
+        "verbose",
+    )
     for name in context.params:
         if name not in allowed and str(context.get_parameter_source(name)).endswith("COMMANDLINE"):
             option = "SOURCE" if name == "source" else "--" + name.replace("_", "-")

@@ -97,7 +97,7 @@ def record(
     place = _window(waits=is_live, port=port) if window and has_browser() else None
     with interruptible() as stop, closing(UnfinishedRun(out)) as unfinished:
         with in_option_words():
-            job = begin_run(options, unfinished, parameters, stop, place.controls if place else None)
+            job = begin_run(options, unfinished, parameters, stop, controls=place.controls if place else None)
         if window and place is None:
             terminal.say("no window: there is no browser, or no display; Ctrl-C stops")
         carry_out(terminal, job, stop, place)

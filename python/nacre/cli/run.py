@@ -39,6 +39,7 @@ def carry_out(terminal: Terminal, job: Job, stop: Interruption, window: Window |
             report = carry_out_job(job, stop, listeners)
     except (OSError, MemoryError) as error:
         what = "files can be written again" if isinstance(error, OSError) else "there is more memory"
+        what = "workers are there" if isinstance(error, ConnectionError) else what
         terminal.say(f"nacre reconstruct --resume {out} goes on where {what}")
         raise
     if terminal.json:

@@ -19,6 +19,10 @@ from nacre.model import Model
 from nacre.parameters import ModelParameters
 from nacre.reconstruction.description import describe, describe_camera
 from nacre.reconstruction.live_feed import LiveFeed, camera_feed, real_time_feed
+from nacre.reconstruction.pieces.cut import cut
+from nacre.reconstruction.pieces.motions import PieceMotions
+from nacre.reconstruction.pieces.track import Piece
+from nacre.reconstruction.pieces.workers import Cluster, Workers
 from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.resume import UnfinishedRun
 from nacre.reconstruction.run_options import RunOptions, check_recording, options_before, read_document
@@ -49,6 +53,7 @@ def begin_run(
     unfinished: UnfinishedRun,
     parameters: ModelParameters,
     stop: Interruption | None = None,
+    cluster: Cluster | None = None,
     controls: Controls | None = None,
 ) -> Job:
     """Open what is asked for, and note it in ``OUT/unfinished``."""
@@ -56,6 +61,7 @@ def begin_run(
     stop = stop or Interruption()
     feed: LiveFeed | None = None
     indices: Iterable[int]
+    chosen = range(0)
     if options.is_camera:
         feed = camera_feed(
             Path(options.source),
@@ -80,12 +86,14 @@ def begin_run(
     if unfinished.checkpoint.exists():
         _log.warning("%s held an unfinished run, which could have gone on: it is begun again", out)
     run = Run(done, indices, retry=options.retry)
+    if options.pieces:
+        run.motions = _motions(run, options, Path.cwd(), chosen, unfinished, cluster)
     unfinished.live = None if feed is None else feed.figures
     unfinished.begin(run, options.document(sequence))
     return Job(options, sequence, words, num_frames, run, unfinished, feed, controls if feed else None)
 
 
-def resume_run(unfinished: UnfinishedRun) -> Job:
+def resume_run(unfinished: UnfinishedRun, cluster: Cluster | None = None) -> Job:
     """Open what a run was asked for that was stopped or killed, and load what it had."""
     out = unfinished.out
     if out.is_dir():
@@ -93,6 +101,7 @@ def resume_run(unfinished: UnfinishedRun) -> Job:
     document = read_document(unfinished)
     options, folder = options_before(document, unfinished.document_path)
     indices: Sequence[int]
+    chosen = range(0)
     if options.is_camera:
         mend(out / "recording")
         sequence = open_sequence(out / "recording")
@@ -108,6 +117,8 @@ def resume_run(unfinished: UnfinishedRun) -> Job:
         remove_leftovers(place)
     compare = not options.is_camera  # its colours were kept as JPEG
     run = unfinished.resume(sequence, indices, compare=compare, retry=options.retry)
+    if options.pieces:
+        run.motions = _motions(run, options, folder, chosen, unfinished, cluster)
     live = unfinished.live
     if live is not None and len(run.done.frames) < len(
         unfinished.journaled_indices()
@@ -122,6 +133,24 @@ def _journaled_indices(unfinished: UnfinishedRun, sequence: Recording) -> list[i
         reason = f"frame {max(indices)} is none of the recording's {len(sequence)}"
         raise FileFormatError(unfinished.journal_path, reason)
     return indices
+
+
+def _motions(
+    run: Run,
+    options: RunOptions,
+    folder: Path,
+    indices: range,
+    unfinished: UnfinishedRun,
+    cluster: Cluster | None,
+) -> PieceMotions:
+    """Return what the workers of a cluster will find; the first piece of the frames is the run's own."""
+    if options.is_camera or options.realtime:
+        raise RunError(
+            "pieces are cut of a recording that is there, not of frames that come by themselves", 2
+        )
+    parameters = run.done.model.parameters
+    pieces = [Piece(options, folder, parameters, part) for part in cut(indices)[1:]]
+    return PieceMotions(Workers(pieces, unfinished.folder, cluster or Cluster()))
 
 
 def _hold(unfinished: UnfinishedRun) -> None:

@@ -39,6 +39,7 @@ class RunOptions:
     last: int | None = None
     every: int = 1
     realtime: bool = False
+    pieces: bool = False
     retry: bool = True
     preset: str = "default"
     is_camera: bool = False
@@ -127,7 +128,7 @@ def checked(options: RunOptions) -> RunOptions:
         may_be_none = name not in ("source", "preset")
         if not (isinstance(value, str) and "\0" not in value) and not (value is None and may_be_none):
             raise TypeError(f"{name} must be a text, got {shown(value)}")
-    for name in ("color", "realtime", "retry", "is_camera", "all_points", "report"):
+    for name in ("color", "realtime", "pieces", "retry", "is_camera", "all_points", "report"):
         as_flag(name, getattr(options, name))
     for name, minimum in (("first", 0), ("last", 0), ("every", 1)):
         if getattr(options, name) is not None or name != "last":
