@@ -140,12 +140,14 @@ def reconstruct(
     from nacre.reconstruction.resume import UnfinishedRun
 
     window = _window(port) if view else None
+    cluster = Cluster(workers, scheduler)
+    controls = window.controls if window else None
     with interruptible() as stop, ExitStack() as ends:
         if resume is not None:
             _refuse_more_options(context, resume)
             unfinished = ends.enter_context(closing(UnfinishedRun(resume, checkpoint_every)))
             with in_option_words():
-                job = resume_run(unfinished, Cluster(workers, scheduler))
+                job = resume_run(unfinished, cluster)
         else:
             if source is None or out is None:
                 missing = "argument 'SOURCE'" if source is None else "option '--out' / '-o'"
@@ -159,14 +161,7 @@ def reconstruct(
                 pieces=workers is not None or scheduler is not None,
             )
             with in_option_words():
-                job = begin_run(
-                    options,
-                    unfinished,
-                    parameters,
-                    stop,
-                    Cluster(workers, scheduler),
-                    window.controls if window else None,
-                )
+                job = begin_run(options, unfinished, parameters, stop, cluster, controls)
         carry_out(terminal, job, stop, window)
 
 
@@ -177,17 +172,8 @@ def _window(port: int) -> Window:
 
 
 def _refuse_more_options(context: typer.Context, out: Path) -> None:
-    allowed = (
-        "resume",
-        "checkpoint_every",
-        "workers",
-        "scheduler",
-        "view",
-        "port",
-        "json",
-        "quiet",
-        "verbose",
-    )
+    allowed = {"resume", "checkpoint_every", "workers", "scheduler", "view", "port"}
+    allowed |= {"json", "quiet", "verbose"}
     for name in context.params:
         if name not in allowed and str(context.get_parameter_source(name)).endswith("COMMANDLINE"):
             option = "SOURCE" if name == "source" else "--" + name.replace("_", "-")

@@ -73,7 +73,7 @@ def reconstruct(
         of workers, but not that of one process alone. A script that calls this does so below
         ``if __name__ == "__main__":``.
     scheduler : str, optional
-        The same by the workers of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``, which see the same disk.
+        The same by the workers of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``; all see one disk.
 
     Returns
     -------

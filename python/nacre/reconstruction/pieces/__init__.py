@@ -1,1 +1,1 @@
-"""A recording is cut into overlapping pieces, which the processes of a Dask cluster track at the same time."""
+"""A recording is cut into overlapping pieces, which processes of a Dask cluster track at once."""

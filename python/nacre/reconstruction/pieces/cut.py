@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-# Two seconds of a camera's frames. Each piece begins with a model of its own, and what neighbours share is tracked
-# twice: shorter pieces repeat more of the work, longer ones leave workers of a short recording idle.
+# Two seconds of a camera's frames. What neighbours share is tracked twice: shorter pieces repeat more of the
+# work, longer ones leave workers of a short recording idle.
 PIECE = 60
 # Each shared frame measures how two pieces lie to each other: ten of them, to a third of one's error.
 SHARED = 10

@@ -24,7 +24,7 @@ class Place:
     world_from_camera : (4, 4) float64
         Its pose.
     is_first : bool
-        Whether its piece places no frame before it: how the piece lies is then to be confirmed by registration.
+        Whether its piece has placed none before it: registration is to confirm how the piece lies.
     """
 
     world_from_camera: npt.NDArray[np.float64]
@@ -61,9 +61,9 @@ class PieceMotions:
         """
         Return where a frame is to be; None: only registration can tell.
 
-        A piece lies as the frames say that it shares with what is placed, in the mean; from then on each frame
-        follows the one before, wherever that has been moved to. What this depends on is told by the frames
-        alone: a run that was interrupted goes on alike.
+        A piece lies as the frames say that it shares with what is placed, in the mean; from then on each
+        frame follows the one before, wherever that has been moved to. It depends on the frames alone: a run
+        that was interrupted goes on alike.
         """
         for number, piece in enumerate(self._workers.pieces):
             if index not in piece.indices:
