@@ -61,9 +61,10 @@ class PieceMotions:
         """
         Return where a frame is to be; None: only registration can tell.
 
-        A piece lies as the frames say that it shares with what is placed, in the mean; from then on each
-        frame follows the one before, wherever that has been moved to. It depends on the frames alone: a run
-        that was interrupted goes on alike.
+        A piece lies as the frames say that it shares with what is placed, in the mean. One registration
+        confirms that; it alone would hand its error on to the whole piece. From then on each frame follows
+        the one before, wherever that has been moved to. It depends on the frames alone: a run that was
+        interrupted goes on alike.
         """
         for number, piece in enumerate(self._workers.pieces):
             if index not in piece.indices:
@@ -72,12 +73,11 @@ class PieceMotions:
             shared = sorted(poses.keys() & placed.keys())
             if index not in poses or not shared:
                 continue
-            newest, begins = shared[-1], piece.indices[:SHARED]
-            is_first = newest in begins
-            if is_first:
-                world_from_piece = joint(placed, poses)
+            own = [i for i in shared if i not in piece.indices[:SHARED]]
+            if len(own) > 1:
+                world_from_piece = placed[own[-1]] @ np.linalg.inv(poses[own[-1]])
             else:
-                world_from_piece = placed[newest] @ np.linalg.inv(poses[newest])
+                world_from_piece = joint(placed, poses)
             assert world_from_piece is not None
-            return Place(world_from_piece @ poses[index], is_first)
+            return Place(world_from_piece @ poses[index], is_first=not own)
         return None
