@@ -24,11 +24,11 @@ from pathlib import Path
 
 import nacre
 from nacre._internal.cluster import cluster_client
-from nacre.cli.run_options import RunOptions
 from nacre.reconstruction.batch.index import Index
 from nacre.reconstruction.batch.result import BatchResult
 from nacre.reconstruction.batch.sources import find_recordings
 from nacre.reconstruction.batch.task import Task, make_tasks, reconstruct_recording
+from nacre.reconstruction.run_options import RunOptions
 
 COSTS: dict[str, float] = {}
 

@@ -48,7 +48,7 @@ py::dict milliseconds(const FrameReport& report) {
 FrameReport add_frame(Model& model, const DepthRef& depth, const MaskRef& mask, const MaskRef& confidence,
                       const ColorsRef& colors, const std::vector<std::pair<std::string, Attributes>>& attributes,
                       std::optional<double> timestamp, const std::optional<PoseMatrix>& guess, bool keep_guess,
-                      bool search) {
+                      bool movable, bool search) {
   FrameExtras extras;
   extras.mask = mask;
   extras.confidence = confidence;
@@ -57,6 +57,7 @@ FrameReport add_frame(Model& model, const DepthRef& depth, const MaskRef& mask, 
   extras.timestamp = timestamp;
   if (guess) extras.guess = to_pose(*guess);
   extras.keep_guess = keep_guess;
+  extras.movable = movable;
   extras.search = search;
   return model.add_frame(depth, extras);
 }

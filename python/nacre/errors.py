@@ -49,6 +49,23 @@ class UnknownRecordingError(FileFormatError):
     """What was given is no recording, or not one without more options: not the files are wrong."""
 
 
+class RunError(Exception):
+    """
+    What ends a run, in one line.
+
+    Parameters
+    ----------
+    message : str
+        What is wrong, and what to do.
+    code : int
+        The exit code of a program that ends by it; docs/conventions.md says what each means.
+    """
+
+    def __init__(self, message: str, code: int = 1) -> None:
+        super().__init__(message)
+        self.code = code
+
+
 _repr = reprlib.Repr()
 _repr.maxlist = _repr.maxdict = 10
 _repr.maxstring = _repr.maxother = 60
@@ -72,3 +89,27 @@ def meant(word: object, known: Iterable[str]) -> str:
     """Return " (did you mean 'x'?)" with the known word that is nearest to a wrong one, or nothing."""
     near = difflib.get_close_matches(str(word), list(known), 1)
     return f" (did you mean {near[0]!r}?)" if near else ""
+
+
+def explain(error: Exception) -> tuple[str, int]:
+    """Return what to say about an error, and the exit code."""
+    if isinstance(error, RunError):
+        return str(error), error.code
+    if isinstance(error, (CameraError, FileFormatError)):
+        return str(error), 1
+    if isinstance(error, OSError):
+        name = f": {os.fspath(error.filename)}" if error.filename is not None else ""
+        text = f"{error.strerror[:1].lower()}{error.strerror[1:]}{name}" if error.strerror else str(error)
+        wrong_usage = (
+            FileNotFoundError,
+            FileExistsError,
+            IsADirectoryError,
+            NotADirectoryError,
+            PermissionError,
+        )
+        return text, 2 if isinstance(error, wrong_usage) else 1
+    if isinstance(error, MemoryError):
+        return f"not enough memory: {error}".removesuffix(": "), 1
+    if isinstance(error, (ImportError, ValueError, TypeError)):
+        return str(error), 2
+    return f"{type(error).__name__}: {error} (this should not happen; -v -v shows where)", 1

@@ -123,6 +123,7 @@ class Model(ExchangeablePoints, Checkpointed):
         attributes: Mapping[str, npt.ArrayLike] | None = None,
         guess: npt.ArrayLike | None = None,
         keep_guess: bool = False,
+        movable: bool = False,
         search: bool = True,
     ) -> FrameReport:
         """
@@ -150,6 +151,9 @@ class Model(ExchangeablePoints, Checkpointed):
             A pose (world_from_camera) to start the registration from, in place of the last one.
         keep_guess : bool
             Take the guess for the pose, without registration.
+        movable : bool
+            Whether loops that close may move a guess that is kept: where it is as good as the motion since
+            the frame before. Without it the frame stays where it is given.
         search : bool
             Whether a frame that is lost near its guess is looked for elsewhere, too, where ``relocalise`` is
             on.
@@ -177,7 +181,7 @@ class Model(ExchangeablePoints, Checkpointed):
         if timestamp is not None and not isinstance(timestamp, numbers.Real):
             raise TypeError(f"timestamp must be a number of seconds or None, got {timestamp!r}")
         time = None if timestamp is None else as_number("timestamp", timestamp)
-        flags = as_flag("keep_guess", keep_guess), as_flag("search", search)
+        flags = as_flag("keep_guess", keep_guess), as_flag("movable", movable), as_flag("search", search)
         with self._lock:
             before = self._core.tilt
             report = report_from(self._core.add_frame(image, pixels, sure, colors, more, time, pose, *flags))

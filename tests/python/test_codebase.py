@@ -235,6 +235,12 @@ def test_python_modules_import_what_is_below_them(path: Path) -> None:
     assert {module for module in imported_modules(path) if room(module) in above} == set()
 
 
+def test_nothing_below_the_command_line_knows_it() -> None:
+    """Not even a function, when it is called: who embeds nacre has no command line."""
+    below = [path for path in files("python/nacre", suffixes={".py"}) if "cli" not in path.parts]
+    assert lines_matching(r"(from|import) nacre\.cli", below) == []
+
+
 def test_no_build_depends_on_the_machine() -> None:
     # What nacre is measured against may be built for the machine: nothing of it is installed.
     paths = [path for path in files(suffixes=CODE) if path.parent.name != "cpp_peers"]

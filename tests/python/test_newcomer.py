@@ -137,7 +137,7 @@ MISTAKES: dict[str, tuple[Callable[[Path], str], list[str]]] = {
     ),
     "an output that is a file": (
         lambda d: ((d / "out").write_text(""), camera_folder(d / "r"), reconstruct(d / "r"))[-1],
-        ["it is a file; give another folder with -o"],
+        ["it is a file; give another folder"],
     ),
     "an unknown parameter": (
         lambda d: reconstruct(camera_folder(d / "r"), "--set", "registration.max_angel=1"),

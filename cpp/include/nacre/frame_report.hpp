@@ -26,6 +26,7 @@ struct FrameExtras {
   std::optional<double> timestamp;         ///< [s]
   std::optional<Pose> guess;               ///< world_from_camera to start the registration from
   bool keep_guess = false;                 ///< take the guess for the pose, without registration
+  bool movable = false;                    ///< whether loops that close later may move a guess that is kept
   bool search = true;                      ///< look elsewhere, too, for a frame lost near its guess (relocalise)
 };
 

@@ -62,6 +62,7 @@ void check_extras(const Camera& camera, const FrameExtras& extras, const PointMo
   if (extras.mask.size() > 0) require_camera_size("mask", extras.mask.rows(), extras.mask.cols(), camera);
   check_attributes(extras.attributes, camera, model);
   require(!extras.keep_guess || extras.guess.has_value(), "keep_guess", "used with a guess", "no guess");
+  require(!extras.movable || extras.keep_guess, "movable", "used with a guess that is kept", "none");
   if (extras.guess) require_rigid(*extras.guess, "guess");
 }
 
@@ -124,7 +125,7 @@ FrameReport Pipeline::add_worked_on(const DepthRef& depth, const FrameExtras& ex
     observe(extras, report);
     const TrackingResult tracking = locate(extras, report);
     if (report.status == FrameStatus::tracked) leave_out_moving(tracking, extras.colors, report);
-    if (report.status != FrameStatus::lost) close_loops(tracking, extras.keep_guess, report);
+    if (report.status != FrameStatus::lost) close_loops(tracking, extras.keep_guess && !extras.movable, report);
     if (report.status == FrameStatus::tracked) {
       if (was_lost()) report.status = FrameStatus::relocalised;
       confidence_noise.add(extras.confidence, frame, cloud, report.world_from_camera, camera);

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar, get_args, get_type_hints
 
 import numpy as np
@@ -99,6 +99,15 @@ def updated(parameters: Parameters, changes: Mapping[str, Any]) -> Parameters:
             value = as_number(name, value)
         parameters = dataclasses.replace(parameters, **{head: value})  # type: ignore[type-var]
     return parameters
+
+
+def leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the dotted names and the values of nested parameters."""
+    for key, value in tree.items():
+        if isinstance(value, Mapping) and prefix + key != "depth.noise":
+            yield from leaves(value, f"{prefix}{key}.")
+        else:
+            yield prefix + key, value
 
 
 def _meant(word: str, parameters: Any) -> str:

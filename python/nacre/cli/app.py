@@ -12,6 +12,7 @@ from typing import Annotated
 
 import typer
 
+from nacre._internal.signals import Stopped
 from nacre.cli.align import align
 from nacre.cli.batch import batch
 from nacre.cli.consolidate import consolidate
@@ -26,11 +27,10 @@ from nacre.cli.normals import normals
 from nacre.cli.outliers import outliers
 from nacre.cli.reconstruct import reconstruct
 from nacre.cli.record import record
-from nacre.cli.signals import Stopped
 from nacre.cli.simulate import simulate
-from nacre.cli.terminal import CommandError, set_verbosity
+from nacre.cli.terminal import set_verbosity
 from nacre.cli.view import view
-from nacre.errors import CameraError, FileFormatError, meant
+from nacre.errors import explain, meant
 
 
 def _version(wanted: bool) -> None:
@@ -113,7 +113,7 @@ def run(arguments: Sequence[str] | None = None) -> int:
         print("error: stopped", file=sys.stderr)
         return 128 + stopped.number
     except Exception as error:
-        message, code = explain(error)
+        message, code = _explain(error)
         if message:
             print(f"error: {message}", file=sys.stderr)
         if logging.getLogger("nacre").isEnabledFor(logging.DEBUG):
@@ -123,37 +123,18 @@ def run(arguments: Sequence[str] | None = None) -> int:
         set_verbosity(None)
 
 
-def explain(error: Exception) -> tuple[str, int]:
-    """Return what to say about an error, and the exit code."""
-    if hasattr(error, "format_message"):  # the parser's: wrong usage, or help where arguments are missing
-        context = getattr(error, "ctx", None)
-        message = error.format_message().replace("Value error, ", "")
-        if type(error).__name__ == "NoArgsIsHelpError":
-            print(message)
-            return "", 0 if context is not None and context.parent is None else 2
-        hint = f" (see {context.command_path} --help)" if context is not None else ""
-        choice = re.search(r"(\S+) is not one of (.+)", message)
-        near = meant(choice[1].strip("'"), re.findall(r"'([^']+)'", choice[2])) if choice else ""
-        return message.rstrip(".") + near + hint, 2
-    if isinstance(error, CommandError):
-        return str(error), error.code
+def _explain(error: Exception) -> tuple[str, int]:
+    """Return what to say about an error, the parser's ones included, and the exit code."""
     if type(error).__name__ == "Abort":  # the parser's for Ctrl-C
         return "stopped", 130
-    if isinstance(error, (CameraError, FileFormatError)):
-        return str(error), 1
-    if isinstance(error, OSError):
-        name = f": {os.fspath(error.filename)}" if error.filename is not None else ""
-        text = f"{error.strerror[:1].lower()}{error.strerror[1:]}{name}" if error.strerror else str(error)
-        wrong_usage = (
-            FileNotFoundError,
-            FileExistsError,
-            IsADirectoryError,
-            NotADirectoryError,
-            PermissionError,
-        )
-        return text, 2 if isinstance(error, wrong_usage) else 1
-    if isinstance(error, MemoryError):
-        return f"not enough memory: {error}".removesuffix(": "), 1
-    if isinstance(error, (ImportError, ValueError, TypeError)):
-        return str(error), 2
-    return f"{type(error).__name__}: {error} (this should not happen; -v -v shows where)", 1
+    if not hasattr(error, "format_message"):
+        return explain(error)
+    context = getattr(error, "ctx", None)
+    message = error.format_message().replace("Value error, ", "")
+    if type(error).__name__ == "NoArgsIsHelpError":
+        print(message)
+        return "", 0 if context is not None and context.parent is None else 2
+    hint = f" (see {context.command_path} --help)" if context is not None else ""
+    choice = re.search(r"(\S+) is not one of (.+)", message)
+    near = meant(choice[1].strip("'"), re.findall(r"'([^']+)'", choice[2])) if choice else ""
+    return message.rstrip(".") + near + hint, 2

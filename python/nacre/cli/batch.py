@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from nacre._internal.signals import Stopped, interruptible
 from nacre.cli.config import ConfigOption, PresetOption, SetOption
 from nacre.cli.reconstruct_options import (
     AllPointsOption,
@@ -32,9 +33,8 @@ from nacre.cli.reconstruct_options import (
     RetryOption,
     asked_for,
 )
-from nacre.cli.signals import Stopped, interruptible
-from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption
-from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
+from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, option_words
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, table
 
 if TYPE_CHECKING:
     from nacre.reconstruction.batch.index import Index
@@ -116,6 +116,7 @@ def batch(
     """
     arguments = locals()
     terminal = Terminal(json, quiet, verbose)
+    from nacre.io.writable_folder import writable_folder
     from nacre.reconstruction.batch.run import BatchRun
     from nacre.reconstruction.batch.sources import find_recordings
     from nacre.reconstruction.batch.task import make_tasks
@@ -151,7 +152,7 @@ def _follow(terminal: Terminal, results: Iterable[BatchResult], total: int) -> N
             num_reconstructed += result.outcome != "finished before"
             left = (total - number) * (time.monotonic() - start) / max(1, num_reconstructed)
             more = f" (about {duration(left)} left)" if number < total and num_reconstructed else ""
-            words = (result.verdict if result.has_results else result.message).removesuffix(".")
+            words = (result.verdict if result.has_results else option_words(result.message)).removesuffix(".")
             terminal.say(f"{number} of {total}: {result.name}: {result.outcome}: {words}{more}")
             advance(result.name)
 
@@ -161,6 +162,8 @@ def _tell(terminal: Terminal, out: Path, index: Index) -> None:
     from nacre.reconstruction.batch.sources import INDEX_FILE, INDEX_PAGE
 
     if terminal.json:
+        from nacre.io.json_files import to_json
+
         print(to_json(index.as_dict()))
     counts = Counter(result.outcome for result in index.results)
     rows = [(outcome, str(number)) for outcome, number in counts.items()]

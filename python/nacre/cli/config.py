@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -51,6 +51,7 @@ ConfigOption = Annotated[
 
 def complete_parameter(incomplete: str) -> list[str]:
     """Return the parameters that begin so, for the shell."""
+    from nacre._internal.core_options import leaves
     from nacre.parameters import ModelParameters
 
     names = (name for name, _ in leaves(dataclasses.asdict(ModelParameters())))
@@ -93,7 +94,7 @@ def model_parameters(
 def _told_by_file(path: Path, document: Mapping[str, Any], parameters: ModelParameters) -> ModelParameters:
     """Return the parameters with the changes of a file, which must make a model."""
     from nacre import Camera
-    from nacre._internal.core_options import updated
+    from nacre._internal.core_options import leaves, updated
     from nacre.model import Model
 
     try:
@@ -142,6 +143,8 @@ def _setting(text: str) -> dict[str, Any]:
     key, equals, value = (part.strip() for part in text.partition("="))
     if not equals or not key or not value:
         raise CommandError(f"--set needs KEY=VALUE, such as registration.max_angle=0.5, got {text!r}", 2)
+    from nacre._internal.core_options import leaves
+
     toml = _toml()
     try:
         return dict(leaves({key: toml.loads(f"value = {value}")["value"]}))
@@ -149,15 +152,6 @@ def _setting(text: str) -> dict[str, Any]:
         if re.fullmatch(r"[A-Za-z_][\w+-]*", value):  # a word needs no quotes
             return {key: value}
         raise CommandError(f"--set {key}: {value!r} is no TOML value", 2) from None
-
-
-def leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the dotted names and the values of nested parameters."""
-    for key, value in tree.items():
-        if isinstance(value, Mapping) and prefix + key != "depth.noise":
-            yield from leaves(value, f"{prefix}{key}.")
-        else:
-            yield prefix + key, value
 
 
 def _checked(parameters: Any, key: str, value: Any) -> Any:

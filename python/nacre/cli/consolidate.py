@@ -18,7 +18,7 @@ from nacre.cli.large_clouds import (
     is_large,
     write_cloud,
 )
-from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, to_json, writable_file
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_file
 
 
 class Method(str, Enum):
@@ -147,4 +147,6 @@ def consolidate(
             "uniformity": after.as_dict(), "uniformity_before": before.as_dict(), "carried": carried,
             "left_out": left_out,
         }  # fmt: skip
+        from nacre.io.json_files import to_json
+
         print(to_json(figures))

@@ -9,11 +9,11 @@ from typing import Annotated, Any, overload
 
 import typer
 
+from nacre._internal.signals import interruptible
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
-from nacre.cli.follow import follow
-from nacre.cli.outputs import file_rows, require_tracked, trajectory_rows, verdict_rows, write_results
-from nacre.cli.signals import interruptible
-from nacre.cli.terminal import Json, Quiet, Terminal, Verbose, table, to_json, writable_folder
+from nacre.cli.follow import Bars
+from nacre.cli.outputs import file_rows, require_tracked, trajectory_rows, verdict_rows
+from nacre.cli.terminal import Json, Quiet, Terminal, Verbose, table
 
 
 def demo(
@@ -47,7 +47,11 @@ def demo(
     import nacre
     from nacre import evaluation
     from nacre.cli.surfaces import evaluate_surface, transformed
+    from nacre.io.json_files import to_json
+    from nacre.io.writable_folder import writable_folder
     from nacre.reconstruction import Reconstruction
+    from nacre.reconstruction.carry_out import follow
+    from nacre.reconstruction.results import write_results
     from nacre.reconstruction.runner import Run
 
     mesh = nacre.built_in_object()
@@ -67,8 +71,9 @@ def demo(
         start = leads if of_paper else f"{start}, and from {leads}"
     alone = ": the algorithm of Blackburn, Kubacki and Stratton 2010, alone" if of_paper else ""
     terminal.say(f"{words}; preset {preset_name}{alone}\neach view is registered starting from {start}")
-    with interruptible() as stop:
-        follow(terminal, Run(done, range(views), retry=False), stop)
+    run = Run(done, range(views), retry=False)
+    with interruptible() as stop, Bars(terminal, run) as bars:
+        follow(run, stop, [bars.show])
     done.evaluate_trajectory()
     figures: dict[str, Any] = {}
     cloud = done.cloud

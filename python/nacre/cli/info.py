@@ -8,9 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from nacre.cli.cameras import is_camera, open_camera
-from nacre.cli.run_options import describe_unfinished
-from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, describe_camera, open_source
+from nacre._internal.live_cameras import is_camera, open_camera
+from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, open_source
 from nacre.cli.surfaces import has_faces, mesh_suffixes, point_suffixes
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 
@@ -75,6 +74,8 @@ def _camera(source: Path) -> tuple[dict[str, Any], Rows]:
         "kind": "camera", "name": camera.name, "serial": camera.serial, "depth_scale": camera.depth_scale,
         "color": frame.color is not None, "confidence": frame.confidence is not None,
     }  # fmt: skip
+    from nacre.reconstruction.description import describe_camera
+
     return figures, [
         ("camera", camera.name + f", serial number {camera.serial}" * bool(camera.serial)),
         ("depth", describe_camera(camera.camera)),
@@ -87,8 +88,8 @@ def _camera(source: Path) -> tuple[dict[str, Any], Rows]:
 def _recording(sequence: Any) -> tuple[dict[str, Any], Rows]:
     import numpy as np
 
-    from nacre.cli.outputs import describe_recording
     from nacre.errors import FileFormatError
+    from nacre.reconstruction.description import describe_camera, describe_recording
 
     figures = {"kind": "recording", **describe_recording(sequence), "timestamps": sequence.has_timestamps}
     rows = [
@@ -180,3 +181,21 @@ def _geometry(points: Any) -> tuple[dict[str, Any], Rows]:
     if len(finite) < len(points):
         rows.append(("not finite", f"{len(points) - len(finite):,} points"))
     return figures, rows
+
+
+def describe_unfinished(out: Path) -> tuple[dict[str, Any], list[tuple[str, str]]]:
+    """Return what there is to tell of an unfinished run."""
+    from nacre.reconstruction.journal import read_journal
+    from nacre.reconstruction.resume import UnfinishedRun
+    from nacre.reconstruction.run_options import options_before, read_document
+
+    unfinished = UnfinishedRun(out)
+    source = options_before(read_document(unfinished), unfinished.document_path)[0].source
+    entries, _ = read_journal(unfinished.journal_path)
+    figures = {"kind": "unfinished run", "path": str(out), "source": source, "num_done": len(entries)}
+    lost = sum(entry[2] == "LOST" for entry in entries)
+    return figures, [
+        ("unfinished run", f"of {source}"),
+        ("frames done", f"{len(entries)}" + f", {lost} lost" * bool(lost)),
+        ("go on", f"nacre reconstruct --resume {out}"),
+    ]

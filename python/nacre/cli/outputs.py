@@ -1,89 +1,15 @@
-"""The files of ``OUT/``."""
+"""What a run says when it is done."""
 
 from __future__ import annotations
 
-import base64
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nacre.cli.terminal import CommandError, to_json
+from nacre.cli.terminal import CommandError
 
 if TYPE_CHECKING:
-    from nacre.datasets import Sequence
     from nacre.reconstruction import Reconstruction
-
-_PICTURE_NAMES = {
-    "the-model": "model",
-    "as-measured": "depth-before",
-    "what-was-removed": "depth-removed",
-    "as-used": "depth-after",
-}
-
-
-def write_results(
-    folder: Path,
-    done: Reconstruction,
-    *,
-    title: str,
-    source: str,
-    document: Mapping[str, Any],
-    figures: Mapping[str, Any] | None = None,
-    pictures: bool = False,
-    page: bool = True,
-    min_tracked: float = 0.5,
-) -> dict[str, Any]:
-    """Write the files of a run, the page if wanted, and return what report.json, the last one, holds."""
-    import nacre
-
-    nacre.write_points(
-        folder / "model.ply",
-        done.cloud,
-        comments=[f"nacre {nacre.__version__}", "metres; the world is the first camera's frame"],
-    )
-    nacre.write_trajectory(folder / "trajectory.txt", done.trajectory)
-    if page:
-        from nacre.report import render_page
-
-        interrupted = bool(document.get("interrupted"))
-        text = render_page(
-            done.report_data(title, source, figures, interrupted=interrupted, min_tracked=min_tracked)
-        )
-        _write(folder / "report.html", text.encode())
-        if pictures:
-            _write_pictures(folder / "pictures", text)
-    else:
-        (folder / "report.html").unlink(missing_ok=True)  # of an earlier model
-    report = done.as_dict(title=title, source=source, min_tracked=min_tracked, **document)
-    _write(folder / "report.json", (to_json(report) + "\n").encode())
-    return report
-
-
-def _write(path: Path, data: bytes) -> None:
-    from nacre.io.atomic import atomic_writer
-
-    with atomic_writer(path) as stream:
-        stream.write(data)
-
-
-def _write_pictures(folder: Path, page: str) -> None:
-    """Write the pictures that a page holds as PNG files, as they are named there."""
-    from nacre.report.image_files import as_png
-
-    folder.mkdir(exist_ok=True)
-    pattern = r'<img src="data:image/webp;base64,([^"]+)"[^>]* data-name="([^"]+)"'
-    for data, name in reversed(re.findall(pattern, page)):  # of pictures of one name the first stays
-        _write(folder / f"{_PICTURE_NAMES.get(name, name)}.png", as_png(base64.b64decode(data)))
-
-
-def depth_rows(done: Reconstruction) -> list[tuple[str, str]]:
-    """Return what there is to tell of a systematic error of the depth that was corrected."""
-    if not done.model.corrects_depth:
-        return []
-    found = done.model.depth_calibration
-    assert found is not None
-    return [("depth corrected", f"its inverse is tilted by {found.tilt:.4f} ± {found.sigma:.4f} per metre")]
 
 
 def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
@@ -116,24 +42,6 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
             ("time per frame", f"{quantity(float(np.median(times)), 'ms')} (median; 99 % within {slow})")
         )
     return rows
-
-
-def describe_recording(sequence: Sequence) -> dict[str, Any]:
-    """Return what report.json says about the recording."""
-    camera = sequence.camera
-    names: tuple[str, ...] = ("model", "width", "height", "pixel_size")
-    if camera.model != "orthographic":
-        names = ("model", "width", "height", "fx", "fy", "cx", "cy", "distortion", "depth")
-    return {
-        "path": str(sequence.path),
-        "name": sequence.name,
-        "format": sequence.format,
-        "num_frames": len(sequence),
-        "camera": {name: getattr(camera, name) for name in names},
-        "depth_scale": sequence.depth_scale,
-        "color": sequence.has_color,
-        "truth": sequence.truth is not None,
-    }
 
 
 def verdict_rows(report: Mapping[str, Any]) -> list[tuple[str, str]]:

@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from nacre.cli.cameras import CAMERAS, is_camera
+from nacre._internal.live_cameras import CAMERAS, is_camera
+from nacre._internal.signals import interruptible
 from nacre.cli.config import ConfigOption, PresetOption, SetOption
-from nacre.cli.job import begin_run, resume_run
 from nacre.cli.reconstruct_options import (
     AllPointsOption,
     AttributeOption,
@@ -32,8 +32,7 @@ from nacre.cli.reconstruct_options import (
     asked_for,
 )
 from nacre.cli.run import carry_out
-from nacre.cli.signals import interruptible
-from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption
+from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, in_option_words
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 from nacre.cli.view import PortOption
 from nacre.cli.window import Window
@@ -88,6 +87,23 @@ def reconstruct(
     all_points: AllPointsOption = False,
     report: ReportOption = True,
     min_tracked: MinTrackedOption = 0.5,
+    workers: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Cut the recording into pieces, which so many processes on this machine track at once.",
+            show_default=False,
+        ),
+    ] = None,
+    scheduler: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="The same by the workers of a Dask scheduler, e.g. tcp://10.0.0.1:8786; all see one disk.",
+            show_default=False,
+        ),
+    ] = None,
     view: Annotated[
         bool, typer.Option("--view", help="Show the model in the browser while it grows.")
     ] = False,
@@ -119,25 +135,33 @@ def reconstruct(
     """
     arguments = locals()
     terminal = Terminal(json, quiet, verbose)
+    from nacre.reconstruction.job import begin_run, resume_run
+    from nacre.reconstruction.pieces.workers import Cluster
     from nacre.reconstruction.resume import UnfinishedRun
 
     window = _window(port) if view else None
+    cluster = Cluster(workers, scheduler)
+    controls = window.controls if window else None
     with interruptible() as stop, ExitStack() as ends:
         if resume is not None:
             _refuse_more_options(context, resume)
             unfinished = ends.enter_context(closing(UnfinishedRun(resume, checkpoint_every)))
-            job = resume_run(unfinished)
+            with in_option_words():
+                job = resume_run(unfinished, cluster)
         else:
             if source is None or out is None:
                 missing = "argument 'SOURCE'" if source is None else "option '--out' / '-o'"
                 raise CommandError(f"missing {missing} (see nacre reconstruct --help)", 2)
             unfinished = ends.enter_context(closing(UnfinishedRun(out, checkpoint_every)))
             options, parameters = asked_for(
-                arguments, source=str(source), realtime=realtime, is_camera=is_camera(source)
+                arguments,
+                source=str(source),
+                realtime=realtime,
+                is_camera=is_camera(source),
+                pieces=workers is not None or scheduler is not None,
             )
-            job = begin_run(
-                terminal, options, unfinished, parameters, stop, window.controls if window else None
-            )
+            with in_option_words():
+                job = begin_run(options, unfinished, parameters, stop, cluster, controls)
         carry_out(terminal, job, stop, window)
 
 
@@ -148,7 +172,8 @@ def _window(port: int) -> Window:
 
 
 def _refuse_more_options(context: typer.Context, out: Path) -> None:
-    allowed = ("resume", "checkpoint_every", "view", "port", "json", "quiet", "verbose")
+    allowed = {"resume", "checkpoint_every", "workers", "scheduler", "view", "port"}
+    allowed |= {"json", "quiet", "verbose"}
     for name in context.params:
         if name not in allowed and str(context.get_parameter_source(name)).endswith("COMMANDLINE"):
             option = "SOURCE" if name == "source" else "--" + name.replace("_", "-")

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nacre.cli.config import model_parameters
-from nacre.cli.run_options import RunOptions, changed_parameters
 from nacre.cli.terminal import CommandError
 
 if TYPE_CHECKING:
     from nacre.parameters import ModelParameters
+    from nacre.reconstruction.run_options import RunOptions
 
 CheckpointOption = Annotated[
     int | None,
@@ -101,6 +101,8 @@ MinTrackedOption = Annotated[
 
 def asked_for(arguments: Mapping[str, Any], **more: Any) -> tuple[RunOptions, ModelParameters]:
     """Return the options of a run and the model's parameters from a command's arguments by their names."""
+    from nacre.reconstruction.run_options import RunOptions, changed_parameters
+
     changes: dict[str, Any] = {
         "depth.min_depth": arguments["min_depth"],
         "depth.max_depth": arguments["max_depth"],
@@ -132,7 +134,24 @@ def asked_for(arguments: Mapping[str, Any], **more: Any) -> tuple[RunOptions, Mo
         parameters=changed_parameters(parameters),
         **more,
     )
+    _require_recording(options)
     return options, parameters
+
+
+def _require_recording(options: RunOptions) -> None:
+    """Refuse, for a camera, the options that only recordings have."""
+    if not options.is_camera:
+        return
+    for option, value in (
+        ("--format", options.format),
+        ("--camera", options.camera),
+        ("--depth-scale", options.depth_scale),
+        ("--masks", options.masks),
+        ("--attribute", options.attribute or None),
+        ("--realtime", options.realtime or None),
+    ):
+        if value is not None:
+            raise CommandError(f"{option} is for recordings, and {options.source} is a camera", 2)
 
 
 def _part(option: str, value: float) -> float:

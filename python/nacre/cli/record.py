@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-from nacre.cli.cameras import CAMERAS, is_camera
+from nacre._internal.live_cameras import CAMERAS, is_camera
+from nacre._internal.signals import interruptible
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
-from nacre.cli.job import begin_run
 from nacre.cli.reconstruct_options import (
     ColorOption,
     MaxDepthOption,
@@ -19,8 +19,7 @@ from nacre.cli.reconstruct_options import (
     ReportOption,
 )
 from nacre.cli.run import carry_out
-from nacre.cli.run_options import RunOptions, changed_parameters
-from nacre.cli.signals import interruptible
+from nacre.cli.source import in_option_words
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 from nacre.cli.view import PortOption
 from nacre.cli.window import Window, has_browser
@@ -68,7 +67,9 @@ def record(
     OUT/recording goes over them again, with other options. A camera that is unplugged loses nothing of that.
     """
     terminal = Terminal(json, quiet, verbose)
+    from nacre.reconstruction.job import begin_run
     from nacre.reconstruction.resume import UnfinishedRun
+    from nacre.reconstruction.run_options import RunOptions, changed_parameters
 
     parameters, preset_name = model_parameters(
         preset,
@@ -95,7 +96,8 @@ def record(
     )
     place = _window(waits=is_live, port=port) if window and has_browser() else None
     with interruptible() as stop, closing(UnfinishedRun(out)) as unfinished:
-        job = begin_run(terminal, options, unfinished, parameters, stop, place.controls if place else None)
+        with in_option_words():
+            job = begin_run(options, unfinished, parameters, stop, controls=place.controls if place else None)
         if window and place is None:
             terminal.say("no window: there is no browser, or no display; Ctrl-C stops")
         carry_out(terminal, job, stop, place)

@@ -2,29 +2,21 @@
 
 from __future__ import annotations
 
-import dataclasses
 import webbrowser
+from collections.abc import Callable
 from contextlib import suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
-from nacre.cli.follow import follow
-from nacre.cli.job import Job
-from nacre.cli.outputs import (
-    depth_rows,
-    describe_recording,
-    file_rows,
-    require_tracked,
-    trajectory_rows,
-    verdict_rows,
-    write_results,
-)
-from nacre.cli.signals import Interruption, Stopped
-from nacre.cli.terminal import CommandError, Terminal, table, to_json
+from nacre._internal.signals import Interruption, Stopped
+from nacre.cli.follow import Bars
+from nacre.cli.outputs import file_rows, require_tracked, trajectory_rows, verdict_rows
+from nacre.cli.terminal import CommandError, Terminal, table
 from nacre.cli.window import Window
 
 if TYPE_CHECKING:
+    from nacre.reconstruction.job import Job
     from nacre.reconstruction.reconstruction import Reconstruction
     from nacre.reconstruction.runner import Step
     from nacre.viewer import LiveView
@@ -32,38 +24,35 @@ if TYPE_CHECKING:
 
 def carry_out(terminal: Terminal, job: Job, stop: Interruption, window: Window | None) -> None:
     """Bring a run to its end, or to where it is stopped; in a window, if there is one."""
-    from nacre.reconstruction.journal import ChangedRunError
+    from nacre.io.json_files import to_json
+    from nacre.reconstruction.carry_out import carry_out as carry_out_job
+    from nacre.reconstruction.results import depth_rows
 
     terminal.say(f"{job.sequence.name}: {job.words}")
     if job.run.done.frames:
         terminal.say(f"going on after {len(job.run.done.frames)} frames")
     live = None if window is None else _show(terminal, job, window)
+    out = job.unfinished.out
     try:
-        try:
-            _run(terminal, job, stop, live)
-        except ChangedRunError as error:
-            raise CommandError(f"{error}; run it again without --resume") from error
-        if job.feed is not None and not (job.run.done.frames or stop.wanted):
-            raise CommandError(f"{job.feed.error or 'stopped before the first frame'}: nothing was recorded")
-        if not stop.wanted:
-            with suppress(Stopped), stop.at_once():
-                report = _write(job, stop)
-        if stop.wanted:
-            _save(terminal, job, stop)
-            raise typer.Exit(stop.exit_code)
-    except CommandError:
-        if all(frame.report is None for frame in job.run.done.frames):
-            job.unfinished.remove()
-        raise
+        with Bars(terminal, job.run) as bars:
+            listeners = [bars.show] if live is None else [_added_to(live), bars.show]
+            report = carry_out_job(job, stop, listeners)
     except (OSError, MemoryError) as error:
         what = "files can be written again" if isinstance(error, OSError) else "there is more memory"
-        terminal.say(f"nacre reconstruct --resume {job.unfinished.out} goes on where {what}")
+        what = "workers are there" if isinstance(error, ConnectionError) else what
+        terminal.say(f"nacre reconstruct --resume {out} goes on where {what}")
         raise
-    job.unfinished.remove()
     if terminal.json:
         print(to_json(report))
+    if stop.wanted:
+        total = "" if job.num_frames is None else f" of {job.num_frames}"
+        terminal.say(
+            f"interrupted after {len(job.run.done.frames)}{total} frames; what there is was written, but "
+            f"report.html\nnacre reconstruct --resume {out} goes on"
+        )
+        raise typer.Exit(stop.exit_code)
     rows = depth_rows(job.run.done) + ([] if job.feed is None else job.feed.rows)
-    files = file_rows(job.unfinished.out, page=job.options.report)
+    files = file_rows(out, page=job.options.report)
     terminal.say(table([*verdict_rows(report), *trajectory_rows(job.run.done), *rows, *files]))
     if live is not None:
         live.finish(_ending(job))
@@ -96,74 +85,15 @@ def _ending(job: Job) -> str:
     )
 
 
-def _run(terminal: Terminal, job: Job, stop: Interruption, live: LiveView | None) -> None:
-    """Run the frames that are not done yet, and lost ones again."""
+def _added_to(live: LiveView) -> Callable[[Step], None]:
+    """Return what shows each frame that is done."""
     from nacre.reconstruction.runner import FrameDone
 
-    def note(step: Step) -> None:
+    def add(step: Step) -> None:
         if isinstance(step, FrameDone):
-            job.unfinished.add(step.frame)
-            if live is not None:
-                live.add(step.frame)
+            live.add(step.frame)
 
-    feed = job.feed
-    if feed is None:
-        follow(terminal, job.run, stop, [note])
-        return
-
-    def tend(step: Step) -> None:
-        feed.tend(step)
-        job.unfinished.live = feed.figures
-
-    try:
-        follow(terminal, job.run, stop, [tend, note])
-    finally:
-        feed.close()
-    job.unfinished.live = feed.figures
-
-
-def _write(job: Job, stop: Interruption) -> dict[str, Any]:
-    """Write the results; of a run that is stopped without the page, whose pictures take long."""
-    done = job.run.done
-    done.all_points = job.options.all_points
-    done.evaluate_trajectory()
-    feed, calibration = job.feed, done.depth_calibration
-    advice = done.advice
-    figures = dict(depth_rows(done))
-    if advice:
-        figures["camera"] = "; ".join(advice)
-    return write_results(
-        job.unfinished.out,
-        done,
-        title=job.sequence.name,
-        source=job.words if feed is None else f"{job.words}; {feed.summary}",
-        document={
-            "recording": describe_recording(job.sequence),
-            "preset": job.options.preset,
-            "options": dataclasses.asdict(job.options),
-            "advice": advice,
-            "interrupted": stop.wanted,
-            "depth_calibration": calibration
-            and dataclasses.asdict(calibration) | {"used": done.model.corrects_depth},
-            "live": job.unfinished.live,
-        },
-        figures=figures if feed is None else {**figures, **dict(feed.rows)},
-        page=job.options.report and not stop.wanted,
-        min_tracked=job.options.min_tracked,
-    )
-
-
-def _save(terminal: Terminal, job: Job, stop: Interruption) -> None:
-    """Save a run that is stopped, and write what there is."""
-    job.unfinished.save()
-    report = _write(job, stop)
-    if terminal.json:
-        print(to_json(report))
-    total = "" if job.num_frames is None else f" of {job.num_frames}"
-    terminal.say(
-        f"interrupted after {len(job.run.done.frames)}{total} frames; what there is was written, but "
-        f"report.html\nnacre reconstruct --resume {job.unfinished.out} goes on"
-    )
+    return add
 
 
 def _complain(job: Job) -> None:

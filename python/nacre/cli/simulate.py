@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from nacre.cli.source import describe_camera
-from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, to_json, writable_folder
+from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
 
 if TYPE_CHECKING:
     from nacre import Camera, Mesh
@@ -104,6 +103,9 @@ def simulate(
     """
     terminal = Terminal(json, quiet, verbose)
     import nacre
+    from nacre.io.json_files import to_json
+    from nacre.io.writable_folder import writable_folder
+    from nacre.reconstruction.description import describe_camera
 
     surface = _mesh(mesh, scale)
     camera = _camera(surface, orthographic, width, height, pixel_size, fx, fy, cx, cy)

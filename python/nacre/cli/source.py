@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -63,22 +64,32 @@ def open_source(
     """Open a recording, or say which option is missing."""
     import nacre
 
-    try:
+    with in_option_words():
         return nacre.open_sequence(source, format=format, camera=camera, depth_scale=depth_scale)
+
+
+@contextmanager
+def in_option_words() -> Iterator[None]:
+    """Name the options where the library names the arguments that a recording needs."""
+    try:
+        yield
     except FileFormatError as error:
         code = 2 if isinstance(error, UnknownRecordingError) else 1
-        text, *layouts = str(error).split(" Known formats:")
-        if layouts:
-            names = ", ".join(line.split(":")[0].strip() for line in layouts[0].splitlines() if line)
-            text += f" Known formats: {names}; see nacre reconstruct --help."
-        text = text.replace("camera and depth_scale not known", "--camera and --depth-scale are needed")
-        text = text.replace("Give camera= and depth_scale=", "Give --camera FILE.json and --depth-scale")
-        for name in ("camera", "depth_scale"):
-            option = name.replace("_", "-")
-            text = text.replace(f"{name} not known", f"--{option} is needed").replace(
-                f"{name}=", f"--{option} "
-            )
-        raise CommandError(text, code) from error
+        raise CommandError(option_words(str(error)), code) from error
+
+
+def option_words(reason: str) -> str:
+    """Return what is said of a recording with the command line's options in place of arguments."""
+    text, *layouts = reason.split(" Known formats:")
+    if layouts:
+        names = ", ".join(line.split(":")[0].strip() for line in layouts[0].splitlines() if line)
+        text += f" Known formats: {names}; see nacre reconstruct --help."
+    text = text.replace("camera and depth_scale not known", "--camera and --depth-scale are needed")
+    text = text.replace("Give camera= and depth_scale=", "Give --camera FILE.json and --depth-scale")
+    for name in ("camera", "depth_scale"):
+        option = name.replace("_", "-")
+        text = text.replace(f"{name} not known", f"--{option} is needed").replace(f"{name}=", f"--{option} ")
+    return text
 
 
 def reopen(
@@ -113,11 +124,3 @@ def reopen(
             raise CommandError(f"{run.folder}: its recording {path} has only {len(sequence)} views by now")
         poses[frame.index] = pose
     return sequence, poses
-
-
-def describe_camera(camera: Camera) -> str:
-    """Return a camera in words."""
-    size = f"{camera.model} camera {camera.width} x {camera.height}"
-    if camera.model == "orthographic":
-        return f"{size}, {1000 * camera.pixel_size:g} mm per pixel"
-    return f"{size}, fx {camera.fx:g}, fy {camera.fy:g}"

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import logging
-import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,6 +11,8 @@ from typing import Annotated, Any
 
 import typer
 
+from nacre.errors import RunError
+
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout, for programs.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress, no summary, no warnings.")]
 Verbose = Annotated[
@@ -20,12 +20,8 @@ Verbose = Annotated[
 ]
 
 
-class CommandError(Exception):
-    """An error that is told in one line, with the exit code; docs/conventions.md says what each means."""
-
-    def __init__(self, message: str, code: int = 1) -> None:
-        super().__init__(message)
-        self.code = code
+class CommandError(RunError):
+    """An error of a command, which is told in one line."""
 
 
 class _Format(logging.Formatter):
@@ -64,6 +60,8 @@ class Terminal:
     def answer(self, figures: Mapping[str, Any], rows: Sequence[tuple[str, str]]) -> None:
         """Print what the command is for: as JSON, or as lines of a name and a value."""
         if self.json:
+            from nacre.io.json_files import to_json
+
             print(to_json(figures))
         else:
             print(table(rows))
@@ -89,15 +87,6 @@ class Terminal:
             yield lambda note: bar.update(task, advance=1, note=note)
 
 
-def to_json(figures: Mapping[str, Any]) -> str:
-    """Return a JSON object; numbers that are not finite are null."""
-    from nacre.evaluation.result import plain
-
-    text = json.dumps(plain(figures), indent=2, allow_nan=False, default=str)
-    # Lists of numbers on one line; a line break is never part of a string.
-    return re.sub(r"\[\n\s+([^\[\]{}]*?)\n\s+\]", lambda m: "[" + re.sub(r"\n\s+", " ", m[1]) + "]", text)
-
-
 def table(rows: Sequence[tuple[str, str]]) -> str:
     """Return names and values in two columns."""
     width = max((len(name) for name, _ in rows), default=0)
@@ -110,22 +99,6 @@ def written_file(folder: Path, name: str) -> Path:
     if not path.is_file():
         what = f"{folder} has no {name}" if folder.is_dir() else f"there is no folder {folder}"
         raise CommandError(f"{what}; give the folder that nacre reconstruct wrote to (its -o)", 2)
-    return path
-
-
-def writable_folder(path: Path) -> Path:
-    """Make a folder for results, or say at once that nothing can be written there."""
-    import tempfile
-
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path):
-            pass
-    except OSError as error:
-        reason = (
-            "it is a file" if isinstance(error, (FileExistsError, NotADirectoryError)) else error.strerror
-        )
-        raise CommandError(f"cannot write to {path}: {reason}; give another folder with -o", 2) from error
     return path
 
 

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import json
 import os
+import re
+from collections.abc import Mapping
 from typing import Any
 
 from nacre.errors import FileFormatError
+from nacre.evaluation.result import plain
 from nacre.io.raw import excerpt, read_file, text_of
 
 
@@ -42,6 +45,13 @@ def parse_json(path: str | os.PathLike[str], data: bytes) -> Any:
         raise FileFormatError(path, "not a JSON file that can be read: it is nested too deep") from None
     except ValueError as error:  # two keys, or a number of more digits than Python reads
         raise FileFormatError(path, f"not a JSON file that can be read: {error}") from None
+
+
+def to_json(figures: Mapping[str, Any]) -> str:
+    """Return a JSON object; numbers that are not finite are null."""
+    text = json.dumps(plain(figures), indent=2, allow_nan=False, default=str)
+    # Lists of numbers on one line; a line break is never part of a string.
+    return re.sub(r"\[\n\s+([^\[\]{}]*?)\n\s+\]", lambda m: "[" + re.sub(r"\n\s+", " ", m[1]) + "]", text)
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from nacre import Camera
+from nacre._internal.arrays import as_count
 from nacre._internal.guided import guided
 from nacre.datasets import Sequence as Recording
 from nacre.datasets import SequenceFrame, open_sequence
@@ -17,7 +19,12 @@ from nacre.io.cameras import read_camera
 from nacre.model import Model
 from nacre.parameters import ModelParameters, Preset
 from nacre.reconstruction.frame_record import FrameRecord
+from nacre.reconstruction.pieces.cut import cut
+from nacre.reconstruction.pieces.motions import PieceMotions
+from nacre.reconstruction.pieces.track import Piece
+from nacre.reconstruction.pieces.workers import Cluster, Workers
 from nacre.reconstruction.reconstruction import Reconstruction
+from nacre.reconstruction.run_options import RunOptions
 from nacre.reconstruction.runner import Run
 
 
@@ -32,6 +39,8 @@ def reconstruct(
     parameters: ModelParameters | None = None,
     progress: Callable[[FrameRecord], bool | None] | None = None,
     retry: bool = True,
+    workers: int | None = None,
+    scheduler: str | None = None,
     **changes: Any,
 ) -> Reconstruction:
     """
@@ -58,6 +67,13 @@ def reconstruct(
         raise :class:`nacre.Cancelled`, ends the run; what is done is the result, whose ``cancelled`` says so.
     retry : bool
         Whether lost frames are tried again at the end.
+    workers : int, optional
+        Cut the recording into overlapping pieces, which so many local processes track at the same time; needs
+        a path for the source, and Dask: ``pip install "nacre[dask]"``. The result is the same for any number
+        of workers, but not that of one process alone. A script that calls this does so below
+        ``if __name__ == "__main__":``.
+    scheduler : str, optional
+        The same by the workers of a Dask scheduler, such as ``"tcp://10.0.0.1:8786"``; all see one disk.
 
     Returns
     -------
@@ -72,6 +88,8 @@ def reconstruct(
     TypeError, ValueError
         Naming the argument, what was expected and what came. Where the model refuses every frame, what it
         says of the first.
+    ImportError, ConnectionError
+        Dask is missing; nobody answers at the scheduler's address, it went away, or worker after worker died.
 
     Examples
     --------
@@ -81,7 +99,24 @@ def reconstruct(
     """
     frames, of_all, indices = _opened(source, format, camera, depth_scale)
     model = Model(of_all, preset, parameters=parameters, **changes)
-    done = Run(Reconstruction(frames, model), indices, retry=retry).to_end(progress)
+    run = Run(Reconstruction(frames, model), indices, retry=retry)
+    if workers is not None or scheduler is not None:
+        if not isinstance(source, str | os.PathLike):
+            raise TypeError(f"source must be a path where workers open it too, got {type(source).__name__}")
+        if not isinstance(camera, str | os.PathLike | None):
+            raise TypeError("camera must be a file where workers read it too, got a Camera")
+        if not isinstance(scheduler, str | None):
+            raise TypeError(f"scheduler must be an address, got {scheduler!r}")
+        cluster = Cluster(None if workers is None else as_count("workers", workers, minimum=1), scheduler)
+        options = RunOptions(
+            os.path.abspath(source),  # noqa: PTH100  links keep their names
+            format,
+            None if camera is None else os.path.abspath(camera),  # noqa: PTH100
+            depth_scale,
+        )
+        pieces = [Piece(options, Path.cwd(), model.parameters, part) for part in cut(range(len(frames)))[1:]]
+        run.motions = PieceMotions(Workers(pieces, None, cluster))
+    done = run.to_end(progress)
     errors = [frame.error for frame in done.frames]
     if errors and errors[0] is not None and None not in errors:
         raise errors[0]

@@ -35,6 +35,7 @@ from nacre.report.run_figures import run_dict, run_report
 from nacre.trajectory import Trajectory
 
 if TYPE_CHECKING:
+    from nacre.reconstruction.pieces.motions import PieceMotions
     from nacre.report import ReportData
 
 _log = logging.getLogger("nacre.reconstruction")
@@ -142,13 +143,23 @@ class Reconstruction(Checkpointed):
         rest = range(len(self.sequence)) if indices is None else iter(indices)
         return Run(self, rest, retry=retry).to_end(progress)
 
-    def run(self, indices: Iterable[int] | None = None) -> Iterator[FrameRecord]:
-        """Add frames to the model, those with the given indices or all, and yield each when it is done."""
+    def run(
+        self, indices: Iterable[int] | None = None, *, motions: PieceMotions | None = None
+    ) -> Iterator[FrameRecord]:
+        """
+        Add frames to the model, those with the given indices or all, and yield each when it is done.
+
+        Where motions tell how the camera went on, that spares the registration.
+        """
         if indices is None:
             done = {frame.index for frame in self.frames}
             indices = [index for index in range(len(self.sequence)) if index not in done]
         for index, read in read_ahead(self.sequence, indices):
-            record = self._add(index, read)
+            place = None if motions is None else motions.place(index, self._newest_poses(motions.reach))
+            if place is None:
+                record = self._add(index, read)
+            else:
+                record = self._add(index, read, place.world_from_camera, keep_guess=not place.is_first)
             self.frames.append(record)
             yield record
 
@@ -197,6 +208,17 @@ class Reconstruction(Checkpointed):
                 break
             self._retry = state = _Retry(state.are_apart)
         self._retry = None
+
+    def _newest_poses(self, count: int) -> dict[int, npt.NDArray[np.float64]]:
+        """Return the poses of those of the newest frames that are part of the model, by their indices."""
+        places = range(max(0, len(self.frames) - count), len(self.frames))
+        poses = {self.frames[place].index: self._pose_at(place) for place in places}
+        return {index: pose for index, pose in poses.items() if pose is not None}
+
+    @property
+    def fused_poses(self) -> dict[int, npt.NDArray[np.float64]]:
+        """(4, 4) ``world_from_camera`` of the frames that are part of the model, by their indices."""
+        return self._newest_poses(len(self.frames))
 
     def _pose_at(self, place: int) -> npt.NDArray[np.float64] | None:
         """Return the pose of a frame that is part of the model."""
@@ -277,6 +299,7 @@ class Reconstruction(Checkpointed):
         guess: npt.NDArray[np.float64] | None = None,
         *,
         search: bool = True,
+        keep_guess: bool = False,
     ) -> FrameRecord:
         try:
             frame = read()
@@ -291,6 +314,8 @@ class Reconstruction(Checkpointed):
                 confidence=frame.confidence,
                 timestamp=frame.timestamp,
                 guess=guess,
+                keep_guess=keep_guess,
+                movable=keep_guess,
                 search=search,
                 attributes=frame.attributes,
             )

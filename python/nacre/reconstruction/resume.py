@@ -158,7 +158,13 @@ class UnfinishedRun:
 
     def _clear(self) -> None:
         remove_leftovers(self.folder)
-        for path in (self.document_path, self.checkpoint, self.journal_path):  # no run without the first
+        pieces = self.folder.glob("piece-*.json")
+        for path in (
+            self.document_path,
+            self.checkpoint,
+            self.journal_path,
+            *pieces,
+        ):  # no run without the first
             path.unlink(missing_ok=True)
         with suppress(OSError):
             self.folder.rmdir()

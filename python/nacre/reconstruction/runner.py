@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from nacre.progress import as_progress
 from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.reconstruction import Reconstruction
+
+if TYPE_CHECKING:
+    from nacre.reconstruction.pieces.motions import PieceMotions
 
 _log = logging.getLogger("nacre.reconstruction")
 
@@ -45,11 +48,15 @@ class Run:
         The frames to run. Of a sequence, those that are done are left out; others are run as they come.
     retry : bool
         Whether lost frames are tried again at the end.
+    motions : PieceMotions, optional
+        What others have found of the camera's way.
 
     Attributes
     ----------
     done : Reconstruction
         The run up to now.
+    motions : PieceMotions or None
+        As given.
     """
 
     def __init__(
@@ -58,14 +65,17 @@ class Run:
         indices: Iterable[int],
         *,
         retry: bool = True,
+        motions: PieceMotions | None = None,
     ) -> None:
         self.done = done
         self._indices = indices
         self._retry = retry
+        self.motions = motions
 
     def steps(self) -> Generator[Step, None, None]:
         """Do one thing after the other, and yield each when it is done (a stage, when it begins)."""
-        yield from self._frames()
+        with nullcontext() if self.motions is None else self.motions.at_work():
+            yield from self._frames()
         if self._retry:
             yield StageBegun("lost frames", self.done.counts["LOST"] or None)
             yield from map(FrameDone, self.done.retry_lost())
@@ -92,4 +102,4 @@ class Run:
             if not rest:
                 return
         yield StageBegun("frames", len(rest) if isinstance(rest, Sequence) else None)
-        yield from map(FrameDone, self.done.run(rest))
+        yield from map(FrameDone, self.done.run(rest, motions=self.motions))

@@ -96,7 +96,7 @@ def read_output(path: Path) -> Any:
 
 def read_run(path: Path) -> Any:
     """Read what an unfinished run left, as ``nacre info`` does."""
-    from nacre.cli.run_options import describe_unfinished
+    from nacre.cli.info import describe_unfinished
 
     return describe_unfinished(path)
 

@@ -174,8 +174,8 @@ def write_wave(folder: Path, count: int = 8, seconds: float | None = 1 / 30) -> 
 
 class TestFeed:
     def test_where_nothing_is_dropped_it_is_the_same_run(self, tmp_path: Path) -> None:
-        from nacre.cli.live_feed import LiveFeed, real_time_feed
         from nacre.reconstruction import Reconstruction
+        from nacre.reconstruction.live_feed import LiveFeed, real_time_feed
 
         sequence = nacre.open_sequence(write_wave(tmp_path / "r", 6, 0.001))
         plain = Reconstruction(sequence, nacre.Model(CAMERA))
@@ -193,7 +193,7 @@ class TestFeed:
             np.testing.assert_array_equal(run.poses, plain.poses)
 
     def test_frames_are_picked(self, tmp_path: Path) -> None:
-        from nacre.cli.live_feed import LiveFeed
+        from nacre.reconstruction.live_feed import LiveFeed
 
         growing = GrowingRecording(tmp_path / "r", CAMERA, 1000, "wave")
         frames = LiveQueue((frame(i) for i in range(9)), size=9)

@@ -72,7 +72,7 @@ class TestKilled:
 
         for name in ("write_points", "write_trajectory"):
             with monkeypatch.context() as patch:
-                patch.setattr(nacre, name, kill)
+                patch.setattr(f"nacre.reconstruction.results.{name}", kill)
                 with pytest.raises(Killed):
                     command("reconstruct", recording, "-o", tmp_path / name)
             assert command("reconstruct", "--resume", tmp_path / name)[0] == 0
@@ -89,7 +89,7 @@ class TestKilled:
             ),
         ],
     )
-    @pytest.mark.parametrize("name", ["write_points", "Model.add_frame"])
+    @pytest.mark.parametrize("name", ["reconstruction.results.write_points", "Model.add_frame"])
     def test_it_goes_on_where_there_is_what_it_lacked(
         self,
         recording: Path,
@@ -142,7 +142,7 @@ class TestKilled:
         self, recording: Path, undisturbed: Any, tmp_path: Path
     ) -> None:
         killed_after(4, "reconstruct", recording, "-o", tmp_path / "o")
-        code, told, _ = command("reconstruct", recording, "-o", tmp_path / "o")
+        code, _, told = command("reconstruct", recording, "-o", tmp_path / "o")
         assert code == 0
         assert "held an unfinished run" in told
         assert results(tmp_path / "o") == undisturbed

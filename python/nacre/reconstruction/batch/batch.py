@@ -17,6 +17,7 @@ from nacre.reconstruction.batch.result import BatchResult
 from nacre.reconstruction.batch.run import BatchRun
 from nacre.reconstruction.batch.sources import Sources, find_recordings
 from nacre.reconstruction.batch.task import make_tasks
+from nacre.reconstruction.run_options import RunOptions, changed_parameters
 
 
 @guided("recordings, and the folder for the results")
@@ -119,8 +120,6 @@ def batch(
     >>> results = nacre.batch("scans/*", "models", every=2, progress=print)  # doctest: +SKIP
     >>> [result.name for result in results if result.level != "ok"]  # doctest: +SKIP
     """
-    from nacre.cli.run_options import RunOptions, changed_parameters
-
     if parameters is not None and not isinstance(parameters, ModelParameters):
         raise TypeError(f"parameters must be nacre.ModelParameters, got {type(parameters).__name__}")
     of_model = updated(ModelParameters.preset(preset) if parameters is None else parameters, changes)

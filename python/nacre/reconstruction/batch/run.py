@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nacre._internal.cluster import cluster_client, import_distributed
+from nacre.errors import explain
 from nacre.io.atomic import remove_leftovers
 from nacre.io.folder_lock import lock_folder
 from nacre.reconstruction.batch.index import Index
@@ -93,8 +94,6 @@ class BatchRun:
 def _result_of(future: Future[BatchResult], task: Task) -> BatchResult:
     """Return what a worker found, or why it found nothing."""
     from distributed import CancelledError, KilledWorker
-
-    from nacre.cli.app import explain
 
     result = task.empty_result
     try:

@@ -11,18 +11,21 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import nacre
+from nacre._internal.live_cameras import is_camera
 from nacre.datasets.detect import require_format
-from nacre.errors import FileFormatError
+from nacre.errors import FileFormatError, RunError, explain
 from nacre.evaluation.result import plain
 from nacre.io.cameras import read_camera
+from nacre.io.writable_folder import writable_folder
 from nacre.reconstruction.batch.result import BatchResult, Outcome, failed, finished
 from nacre.reconstruction.batch.thumbnail import write_thumbnail
+from nacre.reconstruction.carry_out import carry_out
+from nacre.reconstruction.job import begin_run, resume_run
 from nacre.reconstruction.resume import UnfinishedRun
+from nacre.reconstruction.run_options import RunOptions, checked
 from nacre.report.saved_run import SavedRun
 
 if TYPE_CHECKING:
-    from nacre.cli.job import Job
-    from nacre.cli.run_options import RunOptions
     from nacre.parameters import ModelParameters
 
 _PAUSE = 0.2  # [s] between two looks whether another process has left a folder
@@ -63,9 +66,6 @@ def make_tasks(
     FileNotFoundError, FileFormatError, TypeError, ValueError
         Options that no recording can have.
     """
-    from nacre.cli.cameras import is_camera
-    from nacre.cli.run_options import checked
-
     checked(options)
     for path in recordings.values():
         if not path.exists() and is_camera(Path(path.name)):
@@ -104,12 +104,9 @@ def reconstruct_recording(task: Task) -> BatchResult:
     What is wrong with the recording is told by the result. Errors that may not come again (a full disk, too
     little memory) are raised: the cluster tries again.
     """
-    from nacre.cli.app import explain
-    from nacre.cli.terminal import CommandError, writable_folder
-
     try:
         if task.version != nacre.__version__:
-            raise CommandError(f"the worker has nacre {nacre.__version__}, the batch {task.version}")
+            raise RunError(f"the worker has nacre {nacre.__version__}, the batch {task.version}")
         with closing(UnfinishedRun(writable_folder(task.folder), task.checkpoint_every)) as unfinished:
             _wait_for_the_folder(unfinished)
             return _reconstruct(task, unfinished)
@@ -134,20 +131,15 @@ def _wait_for_the_folder(unfinished: UnfinishedRun) -> None:
 
 
 def _reconstruct(task: Task, unfinished: UnfinishedRun) -> BatchResult:
-    from nacre.cli.job import begin_run
-    from nacre.cli.signals import Interruption
-    from nacre.cli.terminal import CommandError, Terminal
-
     try:
         outcome = _go_on(task, unfinished)
-    except (FileFormatError, CommandError) as error:
+    except (FileFormatError, RunError) as error:
         if not task.overwrite:
             reason = str(error).removesuffix("; run it again without --resume")
-            raise CommandError(f"{reason}; --overwrite begins it again") from error
+            raise RunError(f"{reason}; --overwrite begins it again") from error
         outcome = None
     if outcome is None:
-        stop = Interruption()
-        _carry_out(begin_run(Terminal(quiet=True), task.options, unfinished, task.parameters, stop))
+        carry_out(begin_run(task.options, unfinished, task.parameters))
         outcome = "reconstructed"
     write_thumbnail(task.folder)
     return finished(task.empty_result, SavedRun(task.folder), outcome, task.options.min_tracked)
@@ -156,10 +148,8 @@ def _reconstruct(task: Task, unfinished: UnfinishedRun) -> BatchResult:
 def _go_on(task: Task, unfinished: UnfinishedRun) -> Outcome | None:
     """Go on with what the folder holds, and return what became of it; None: it holds nothing."""
     if unfinished.document_path.exists():
-        from nacre.cli.job import resume_run
-
         _require_same_options("begun", unfinished.document()["options"], task.options)
-        _carry_out(resume_run(unfinished))
+        carry_out(resume_run(unfinished))
         return "resumed"
     names = ["model.ply", "trajectory.txt", "report.json", *["report.html"] * task.options.report]
     if not all((task.folder / name).is_file() for name in names):
@@ -172,23 +162,8 @@ def _go_on(task: Task, unfinished: UnfinishedRun) -> Outcome | None:
 
 
 def _require_same_options(state: str, before: Mapping[str, Any], options: RunOptions) -> None:
-    from nacre.cli.terminal import CommandError
-
     now = plain(dataclasses.asdict(options))
     names = [name for name in now if name not in before or before[name] != now[name]]
     if names:
         told = ", ".join(f"{name} was {before.get(name)!r}, is {now[name]!r}" for name in names)
-        raise CommandError(f"it was {state} with other options: {told}")
-
-
-def _carry_out(job: Job) -> None:
-    """Bring a run to its end; that too few frames were tracked is no error here."""
-    from nacre.cli.run import carry_out
-    from nacre.cli.signals import Interruption
-    from nacre.cli.terminal import CommandError, Terminal
-
-    try:
-        carry_out(Terminal(quiet=True), job, Interruption(), None)
-    except CommandError as error:
-        if error.code != 3:
-            raise
+        raise RunError(f"it was {state} with other options: {told}")

@@ -28,7 +28,7 @@ pytest.importorskip("typer")
 distributed = pytest.importorskip("distributed")
 from killed_runs import results  # noqa: E402  they need the command line
 
-from nacre.cli.run_options import RunOptions  # noqa: E402
+from nacre.reconstruction.run_options import RunOptions  # noqa: E402
 
 NAMES = ("bowl", "cup", "mug")
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.weekly) for seed in range(1, 6))]

@@ -18,11 +18,11 @@ pytest.importorskip("typer")
 from killed_runs import command, killed_after, results
 
 import nacre
-from nacre.cli.run_options import RunOptions
 from nacre.io.folder_lock import lock_folder
 from nacre.io.images import write_color_png
 from nacre.reconstruction.batch.task import Task, make_tasks, reconstruct_recording
 from nacre.reconstruction.journal import read_journal
+from nacre.reconstruction.run_options import RunOptions
 
 MakeTask = Callable[..., Task]
 

@@ -2,24 +2,36 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from nacre.cli.live_feed import LiveFeed, camera_feed, real_time_feed
-from nacre.cli.run_options import RunOptions, check_recording, describe, options_before, read_document
-from nacre.cli.signals import Interruption
-from nacre.cli.source import describe_camera, open_source
-from nacre.cli.terminal import CommandError, Terminal, writable_folder
-from nacre.errors import FileFormatError
+from nacre._internal.signals import Interruption
+from nacre.datasets import Sequence as Recording
+from nacre.datasets import open_sequence
+from nacre.datasets.recorder import mend
+from nacre.errors import FileFormatError, RunError
+from nacre.io.atomic import remove_leftovers
+from nacre.io.writable_folder import writable_folder
+from nacre.model import Model
+from nacre.parameters import ModelParameters
+from nacre.reconstruction.description import describe, describe_camera
+from nacre.reconstruction.live_feed import LiveFeed, camera_feed, real_time_feed
+from nacre.reconstruction.pieces.cut import cut
+from nacre.reconstruction.pieces.motions import PieceMotions
+from nacre.reconstruction.pieces.track import Piece
+from nacre.reconstruction.pieces.workers import Cluster, Workers
+from nacre.reconstruction.reconstruction import Reconstruction
+from nacre.reconstruction.resume import UnfinishedRun
+from nacre.reconstruction.run_options import RunOptions, check_recording, options_before, read_document
+from nacre.reconstruction.runner import Run
 
 if TYPE_CHECKING:
-    from nacre import ModelParameters
-    from nacre.datasets import Sequence as Recording
-    from nacre.reconstruction.resume import UnfinishedRun
-    from nacre.reconstruction.runner import Run
     from nacre.viewer import Controls
+
+_log = logging.getLogger(__name__)
 
 
 @dataclass
@@ -37,24 +49,20 @@ class Job:
 
 
 def begin_run(
-    terminal: Terminal,
     options: RunOptions,
     unfinished: UnfinishedRun,
     parameters: ModelParameters,
-    stop: Interruption,
+    stop: Interruption | None = None,
+    cluster: Cluster | None = None,
     controls: Controls | None = None,
 ) -> Job:
     """Open what is asked for, and note it in ``OUT/unfinished``."""
-    import nacre
-    from nacre.io.atomic import remove_leftovers
-    from nacre.reconstruction import Reconstruction
-    from nacre.reconstruction.runner import Run
-
     out = unfinished.out
+    stop = stop or Interruption()
     feed: LiveFeed | None = None
     indices: Iterable[int]
+    chosen = range(0)
     if options.is_camera:
-        options.require_none_for_a_camera()
         feed = camera_feed(
             Path(options.source),
             writable_folder(out),
@@ -71,35 +79,32 @@ def begin_run(
         words, num_frames, indices = describe(sequence, chosen), len(chosen), chosen
         if options.realtime:
             indices = feed = real_time_feed(sequence, chosen, stop=stop, controls=controls)
-    done = Reconstruction(sequence, nacre.Model(sequence.camera, parameters=parameters))
+    done = Reconstruction(sequence, Model(sequence.camera, parameters=parameters))
     writable_folder(out)
     _hold(unfinished)
     remove_leftovers(out)
     if unfinished.checkpoint.exists():
-        terminal.say(
-            f"{out} held an unfinished run, which --resume would have gone on with: it is begun again"
-        )
+        _log.warning("%s held an unfinished run, which could have gone on: it is begun again", out)
     run = Run(done, indices, retry=options.retry)
+    if options.pieces:
+        run.motions = _motions(run, options, Path.cwd(), chosen, unfinished, cluster)
     unfinished.live = None if feed is None else feed.figures
     unfinished.begin(run, options.document(sequence))
     return Job(options, sequence, words, num_frames, run, unfinished, feed, controls if feed else None)
 
 
-def resume_run(unfinished: UnfinishedRun) -> Job:
+def resume_run(unfinished: UnfinishedRun, cluster: Cluster | None = None) -> Job:
     """Open what a run was asked for that was stopped or killed, and load what it had."""
-    from nacre.io.atomic import remove_leftovers
-
     out = unfinished.out
     if out.is_dir():
         _hold(unfinished)
     document = read_document(unfinished)
     options, folder = options_before(document, unfinished.document_path)
     indices: Sequence[int]
+    chosen = range(0)
     if options.is_camera:
-        from nacre.datasets.recorder import mend
-
         mend(out / "recording")
-        sequence = open_source(out / "recording")
+        sequence = open_sequence(out / "recording")
         words, indices = f"live, {describe_camera(sequence.camera)}", range(len(sequence))
     else:
         sequence = options.open(folder)
@@ -112,6 +117,8 @@ def resume_run(unfinished: UnfinishedRun) -> Job:
         remove_leftovers(place)
     compare = not options.is_camera  # its colours were kept as JPEG
     run = unfinished.resume(sequence, indices, compare=compare, retry=options.retry)
+    if options.pieces:
+        run.motions = _motions(run, options, folder, chosen, unfinished, cluster)
     live = unfinished.live
     if live is not None and len(run.done.frames) < len(
         unfinished.journaled_indices()
@@ -128,11 +135,29 @@ def _journaled_indices(unfinished: UnfinishedRun, sequence: Recording) -> list[i
     return indices
 
 
+def _motions(
+    run: Run,
+    options: RunOptions,
+    folder: Path,
+    indices: range,
+    unfinished: UnfinishedRun,
+    cluster: Cluster | None,
+) -> PieceMotions:
+    """Return what the workers of a cluster will find; the first piece of the frames is the run's own."""
+    if options.is_camera or options.realtime:
+        raise RunError(
+            "pieces are cut of a recording that is there, not of frames that come by themselves", 2
+        )
+    parameters = run.done.model.parameters
+    pieces = [Piece(options, folder, parameters, part) for part in cut(indices)[1:]]
+    return PieceMotions(Workers(pieces, unfinished.folder, cluster or Cluster()))
+
+
 def _hold(unfinished: UnfinishedRun) -> None:
     try:
         unfinished.hold()
     except BlockingIOError:
-        raise CommandError(
+        raise RunError(
             f"another nacre reconstruct is writing to {unfinished.out}: wait until it has ended; "
             "a new run can go to another folder (-o)",
             2,

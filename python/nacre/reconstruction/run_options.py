@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import logging
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nacre.cli.source import describe_camera, open_source
-from nacre.cli.terminal import CommandError
-from nacre.errors import FileFormatError, shown
+from nacre import __version__
+from nacre._internal.arrays import as_count, as_flag, as_number, as_scale
+from nacre._internal.core_options import leaves
+from nacre.datasets import open_sequence
+from nacre.errors import FileFormatError, RunError, shown
+from nacre.evaluation.result import plain
+from nacre.parameters import ModelParameters
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
-    from nacre.parameters import ModelParameters
     from nacre.reconstruction.resume import UnfinishedRun
 
 _log = logging.getLogger(__name__)
@@ -37,6 +39,7 @@ class RunOptions:
     last: int | None = None
     every: int = 1
     realtime: bool = False
+    pieces: bool = False
     retry: bool = True
     preset: str = "default"
     is_camera: bool = False
@@ -50,37 +53,24 @@ class RunOptions:
         """Which frames, as a slice."""
         return self.first, None if self.last is None else self.last + 1, self.every
 
-    def require_none_for_a_camera(self) -> None:
-        """Refuse the options that only recordings have."""
-        for option, value in (
-            ("--format", self.format),
-            ("--camera", self.camera),
-            ("--depth-scale", self.depth_scale),
-            ("--masks", self.masks),
-            ("--attribute", self.attribute or None),
-            ("--realtime", self.realtime or None),
-        ):
-            if value is not None:
-                raise CommandError(f"{option} is for recordings, and {self.source} is a camera", 2)
-
     def open(self, folder: Path | None = None) -> Sequence:
         """Open the recording; paths that are not absolute begin at a folder, or where we are."""
 
         def path(name: str) -> Path:
             return Path(name) if folder is None or folder == Path.cwd() else folder / name
 
-        sequence = open_source(
+        sequence = open_sequence(
             path(self.source),
-            self.format,
-            None if self.camera is None else path(self.camera),
-            self.depth_scale,
+            format=self.format,
+            camera=None if self.camera is None else path(self.camera),
+            depth_scale=self.depth_scale,
         )
         if self.masks is not None:
             sequence = sequence.with_masks(path(self.masks))
         for text in self.attribute:
             name, equals, images = text.partition("=")
             if not (name and equals and images):
-                raise CommandError(f"--attribute needs NAME=FOLDER, got {text!r}", 2)
+                raise RunError(f"--attribute needs NAME=FOLDER, got {text!r}", 2)
             sequence = sequence.with_attribute(name, path(images))
         return sequence if self.color else sequence.without_color()
 
@@ -88,15 +78,13 @@ class RunOptions:
         """Return which frames to run."""
         indices = range(len(sequence))[slice(*self.pick)]
         if not indices:
-            raise CommandError(f"no frames are left of {len(sequence)} (0 to {len(sequence) - 1})", 2)
+            raise RunError(f"no frames are left of {len(sequence)} (0 to {len(sequence) - 1})", 2)
         return indices
 
     def document(self, sequence: Sequence) -> dict[str, Any]:
         """Return what ``run.json`` says."""
-        import nacre
-
         return {
-            "nacre": nacre.__version__,
+            "nacre": __version__,
             "folder": str(Path.cwd()),
             "options": dataclasses.asdict(self),
             "recording": None if self.is_camera else sequence.digests(),
@@ -105,10 +93,6 @@ class RunOptions:
 
 def changed_parameters(parameters: ModelParameters) -> dict[str, Any]:
     """Return the parameters that differ from the defaults, by their dotted names, as JSON has them."""
-    from nacre.cli.config import leaves
-    from nacre.evaluation.result import plain
-    from nacre.parameters import ModelParameters
-
     defaults = dict(leaves(plain(dataclasses.asdict(ModelParameters()))))
     found = leaves(plain(dataclasses.asdict(parameters)))
     return {name: value for name, value in found if value != defaults.get(name)}
@@ -132,38 +116,19 @@ def read_document(unfinished: UnfinishedRun) -> dict[str, Any]:
         return unfinished.document()
     except FileNotFoundError:
         if (out / "report.json").exists():
-            raise CommandError(f"{out} holds a run that is finished: there is nothing to resume", 2) from None
+            raise RunError(f"{out} holds a run that is finished: there is nothing to resume", 2) from None
         what = f"{out} holds no unfinished run" if out.is_dir() else f"there is no folder {out}"
-        raise CommandError(f"{what}; give the folder that nacre reconstruct wrote to (its -o)", 2) from None
-
-
-def describe_unfinished(out: Path) -> tuple[dict[str, Any], list[tuple[str, str]]]:
-    """Return what there is to tell of an unfinished run."""
-    from nacre.reconstruction.journal import read_journal
-    from nacre.reconstruction.resume import UnfinishedRun
-
-    unfinished = UnfinishedRun(out)
-    source = options_before(read_document(unfinished), unfinished.document_path)[0].source
-    entries, _ = read_journal(unfinished.journal_path)
-    figures = {"kind": "unfinished run", "path": os.fspath(out), "source": source, "num_done": len(entries)}
-    lost = sum(entry[2] == "LOST" for entry in entries)
-    return figures, [
-        ("unfinished run", f"of {source}"),
-        ("frames done", f"{len(entries)}" + f", {lost} lost" * bool(lost)),
-        ("go on", f"nacre reconstruct --resume {out}"),
-    ]
+        raise RunError(f"{what}; give the folder that nacre reconstruct wrote to (its -o)", 2) from None
 
 
 def checked(options: RunOptions) -> RunOptions:
     """Return options that a file or a caller tells; a TypeError or a ValueError says what is wrong."""
-    from nacre._internal.arrays import as_count, as_flag, as_number, as_scale
-
     for name in ("source", "preset", "format", "camera", "masks"):
         value = getattr(options, name)
         may_be_none = name not in ("source", "preset")
         if not (isinstance(value, str) and "\0" not in value) and not (value is None and may_be_none):
             raise TypeError(f"{name} must be a text, got {shown(value)}")
-    for name in ("color", "realtime", "retry", "is_camera", "all_points", "report"):
+    for name in ("color", "realtime", "pieces", "retry", "is_camera", "all_points", "report"):
         as_flag(name, getattr(options, name))
     for name, minimum in (("first", 0), ("last", 0), ("every", 1)):
         if getattr(options, name) is not None or name != "last":
@@ -180,30 +145,15 @@ def checked(options: RunOptions) -> RunOptions:
 
 
 def check_recording(document: Mapping[str, Any], sequence: Sequence) -> None:
-    """Compare a recording with what it was; a CommandError says that it is another one."""
-    import nacre
-
-    if document.get("nacre") != nacre.__version__:
-        _log.warning(
-            "the run began with nacre %s; this is nacre %s", document.get("nacre"), nacre.__version__
-        )
+    """Compare a recording with what it was; a RunError says that it is another one."""
+    if document.get("nacre") != __version__:
+        _log.warning("the run began with nacre %s; this is nacre %s", document.get("nacre"), __version__)
     before, now = document.get("recording"), sequence.digests()
     if before is None or before == now:
         return
     if before.get("files") != now["files"]:
-        raise CommandError(
+        raise RunError(
             f"{sequence.path} is not the recording that it was: files were added, removed or have another "
             "size; run it again without --resume",
         )
     _log.warning("%s: files were written again since the run began", sequence.path)
-
-
-def describe(sequence: Sequence, indices: range) -> str:
-    """Return in words where the frames come from."""
-    step = f", every {indices.step} frames" if indices.step > 1 else ""
-    part = "" if len(indices) == len(sequence) else f" (frames {indices[0]} to {indices[-1]}{step})"
-    truth = ", with true poses" if sequence.truth is not None else ""
-    return (
-        f"{len(indices)} of {len(sequence)} frames{part}, {sequence.format} format, "
-        f"{describe_camera(sequence.camera)}{truth}"
-    )

@@ -9,10 +9,9 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nacre.cli.cameras import open_camera
-from nacre.cli.signals import Interruption
-from nacre.cli.terminal import CommandError
-from nacre.errors import CameraError, FileFormatError
+from nacre._internal.live_cameras import open_camera
+from nacre._internal.signals import Interruption
+from nacre.errors import CameraError, FileFormatError, RunError
 
 if TYPE_CHECKING:
     from nacre.datasets import LiveQueue, Sequence, SequenceFrame
@@ -157,7 +156,7 @@ def camera_feed(
         sequence = GrowingRecording(out / "recording", camera.camera, camera.depth_scale, title)
     except FileExistsError as error:
         camera.close()
-        raise CommandError(f"{error}; -o names the folder", 2) from error
+        raise RunError(f"{error}; -o names the folder", 2) from error
 
     def seen() -> Iterator[SequenceFrame]:
         for frame in camera:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from nacre.cli.terminal import CommandError
+from nacre.errors import RunError
 
 if TYPE_CHECKING:
     from nacre import Camera
@@ -43,7 +43,7 @@ def _opencv(driver: str | None) -> Callable[[str, bool], LiveCamera]:
         from nacre.datasets import OpenCVCamera
 
         if which and not which.isdecimal():
-            raise CommandError(f"{driver or 'opencv'} needs the camera's index, 0 or more, got {which!r}", 2)
+            raise RunError(f"{driver or 'opencv'} needs the camera's index, 0 or more, got {which!r}", 2)
         return OpenCVCamera(int(which or 0), driver=driver, color=color)
 
     return opener
@@ -54,7 +54,7 @@ def _ros(which: str, color: bool) -> LiveCamera:
 
     depth, _, colors = which.partition(",")
     if not depth:
-        raise CommandError("ros2 needs a topic of depth images: ros2:/camera/depth/image_raw", 2)
+        raise RunError("ros2 needs a topic of depth images: ros2:/camera/depth/image_raw", 2)
     return RosTopic(depth, colors if color and colors else None)
 
 

@@ -1,0 +1,83 @@
+"""Where pieces say that the camera was; they come while it is asked for."""
+
+from __future__ import annotations
+
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from nacre.reconstruction.pieces.cut import PIECE, SHARED
+from nacre.reconstruction.pieces.joint import joint
+from nacre.reconstruction.pieces.track import Poses
+from nacre.reconstruction.pieces.workers import Workers
+
+
+@dataclass(frozen=True)
+class Place:
+    """
+    Where a frame is to be.
+
+    Attributes
+    ----------
+    world_from_camera : (4, 4) float64
+        Its pose.
+    is_first : bool
+        Whether its piece has placed none before it: registration is to confirm how the piece lies.
+    """
+
+    world_from_camera: npt.NDArray[np.float64]
+    is_first: bool
+
+
+class PieceMotions:
+    """
+    Places frames by the motions of the pieces that have tracked them.
+
+    The first piece of a recording is not among them: it is the beginning of the run itself.
+
+    Parameters
+    ----------
+    workers : Workers
+        Give the poses of each piece.
+
+    Attributes
+    ----------
+    reach : int
+        How many of the newest frames :meth:`place` wants to know.
+    """
+
+    reach = PIECE
+
+    def __init__(self, workers: Workers) -> None:
+        self._workers = workers
+
+    def at_work(self) -> AbstractContextManager[None]:
+        """While this lasts the workers track."""
+        return self._workers.at_work()
+
+    def place(self, index: int, placed: Poses) -> Place | None:
+        """
+        Return where a frame is to be; None: only registration can tell.
+
+        A piece lies as the frames say that it shares with what is placed, in the mean. One registration
+        confirms that; it alone would hand its error on to the whole piece. From then on each frame follows
+        the one before, wherever that has been moved to. It depends on the frames alone: a run that was
+        interrupted goes on alike.
+        """
+        for number, piece in enumerate(self._workers.pieces):
+            if index not in piece.indices:
+                continue
+            poses = self._workers.poses(number)
+            shared = sorted(poses.keys() & placed.keys())
+            if index not in poses or not shared:
+                continue
+            own = [i for i in shared if i not in piece.indices[:SHARED]]
+            if len(own) > 1:
+                world_from_piece = placed[own[-1]] @ np.linalg.inv(poses[own[-1]])
+            else:
+                world_from_piece = joint(placed, poses)
+            assert world_from_piece is not None
+            return Place(world_from_piece @ poses[index], is_first=not own)
+        return None
