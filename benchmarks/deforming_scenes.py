@@ -12,15 +12,13 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from cases import SENSORS, Array, object_mesh
 
 import nacre
-
-SIZES = {"kinect": "320 x 240", "structured_light": "640 x 480", "stereo": "640 x 480"}
-"""The sensors of these recordings, and their images."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +57,9 @@ def record(
     """
     thing = THINGS[name](np.random.default_rng(seed))
     camera = SENSORS[sensor]
-    errors = {"noise": "kinect", "edge_mixing": 1.0} if sensor == "kinect" else {"sensor": sensor}
+    errors: dict[str, Any] = (
+        {"noise": "kinect", "edge_mixing": 1.0} if sensor == "kinect" else {"sensor": sensor}
+    )
     depths, vertices = [], []
     for i in range(num_frames):
         time = i / num_frames
@@ -69,7 +69,7 @@ def record(
         local = (shape - centre) @ about((0.0, 1.0, 0.0), angle).T
         seen = local * (1, -1, -1) + (0, 0, thing.distance)  # y up and z forward become y down and z away
         mesh = nacre.Mesh(seen, thing.triangles)
-        depths.append(mesh.simulate_depth(camera, np.eye(4), seed=1000 * seed + i, **errors))  # type: ignore[arg-type]
+        depths.append(mesh.simulate_depth(camera, np.eye(4), seed=1000 * seed + i, **errors))
         vertices.append(seen)
     return Recording(name, camera, depths, vertices, thing.triangles)
 
@@ -195,14 +195,12 @@ def about(axis: tuple[float, float, float], angle: float) -> Array:
     return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
 
 
-def _bumps(
-    rng: np.random.Generator, places: Array, *, period: tuple[float, float], number: int
-) -> Array:
-    """Return a relief over a surface whose places (..., 2) are in metres: round bumps and dents of some mm."""
+def _bumps(rng: np.random.Generator, places: Array, *, period: tuple[float, float], number: int) -> Array:
+    """Return a relief over a surface whose places (..., 2) are in metres: round bumps and dents."""
     middles = rng.uniform(places.min(axis=(0, 1)), places.max(axis=(0, 1)), (number, 2))
     heights = rng.choice([-1, 1], number) * rng.uniform(0.002, 0.005, number)
     widths = rng.uniform(0.007, 0.014, number)
-    relief = np.zeros(places.shape[:-1])
+    relief: Array = np.zeros(places.shape[:-1])
     for middle, height, width in zip(middles, heights, widths, strict=True):
         apart = np.abs(places - middle)
         apart = np.minimum(apart, np.array(period) - apart)
@@ -240,5 +238,5 @@ def _along_surface(vertices: Array, triangles: npt.NDArray[np.int32], start: int
 
 def _smooth(x: Array) -> Array:
     """Return a step from 0 at 0 to 1 at 1 (Perlin's, whose first two derivatives are continuous)."""
-    t = np.clip(x, 0, 1)
+    t: Array = np.clip(x, 0, 1)
     return t**3 * (t * (6 * t - 15) + 10)
