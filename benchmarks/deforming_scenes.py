@@ -200,12 +200,12 @@ def _bumps(rng: np.random.Generator, places: Array, *, period: tuple[float, floa
     middles = rng.uniform(places.min(axis=(0, 1)), places.max(axis=(0, 1)), (number, 2))
     heights = rng.choice([-1, 1], number) * rng.uniform(0.002, 0.005, number)
     widths = rng.uniform(0.007, 0.014, number)
-    relief: Array = np.zeros(places.shape[:-1])
+    relief = np.zeros(places.shape[:-1])
     for middle, height, width in zip(middles, heights, widths, strict=True):
         apart = np.abs(places - middle)
         apart = np.minimum(apart, np.array(period) - apart)
         relief += height * np.exp(-0.5 * (apart**2).sum(axis=-1) / width**2)
-    return relief
+    return np.asarray(relief)
 
 
 def _grid(rows: int, columns: int, *, wraps: bool) -> npt.NDArray[np.int32]:
@@ -238,5 +238,5 @@ def _along_surface(vertices: Array, triangles: npt.NDArray[np.int32], start: int
 
 def _smooth(x: Array) -> Array:
     """Return a step from 0 at 0 to 1 at 1 (Perlin's, whose first two derivatives are continuous)."""
-    t: Array = np.clip(x, 0, 1)
-    return t**3 * (t * (6 * t - 15) + 10)
+    t = np.clip(x, 0, 1)
+    return np.asarray(t**3 * (t * (6 * t - 15) + 10))
