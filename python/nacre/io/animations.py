@@ -35,8 +35,8 @@ def write_animation(
     Parameters
     ----------
     path : path-like
-        A ``.glb`` file (glTF 2.0): viewers and modelling programs play it. A reader without animation, such as
-        :func:`nacre.read_mesh`, gets the first frame.
+        A ``.glb`` file (glTF 2.0): viewers and modelling programs play it. A reader without animation, such
+        as :func:`nacre.read_mesh`, gets the first frame.
     vertices : (F, N, 3) array
         The vertices at each frame [m].
     triangles : (M, 3) array of integers
@@ -68,8 +68,8 @@ def write_animation(
 
     References
     ----------
-    .. [1] M. Alexa, W. Müller: Representing animations by principal components. Computer Graphics Forum 19(3),
-       2000.
+    .. [1] M. Alexa, W. Müller: Representing animations by principal components. Computer Graphics Forum
+       19(3), 2000.
     """
     if Path(path).suffix.lower() != ".glb":
         raise ValueError(f"animations are written to .glb, got {os.fspath(path)!r}")
@@ -78,7 +78,7 @@ def write_animation(
     shades = None if normals is None else _as_frames("normals", normals)
     if shades is not None and shades.shape != shapes.shape:
         raise ValueError(f"normals must have shape {shapes.shape} as vertices, got {shades.shape}")
-    first = check_cloud(shapes[0], None if shades is None else shades[0], colors)
+    first = check_cloud(shapes[0], None if shades is None else shades[0], colors, None)
     seconds = _as_times(times, len(shapes))
     allowed = arrays.as_number("tolerance", tolerance)
     if not 0 <= allowed < np.inf:
