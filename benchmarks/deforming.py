@@ -79,9 +79,9 @@ HEAD = (
 )
 
 
-def run_nacre(camera: nacre.Camera, depths: Sequence[Array], **options: Any) -> tuple[nacre.Model, Run]:
+def run_nacre(camera: nacre.Camera, depths: Sequence[Array], **options: Any) -> tuple[Any, Run]:
     """Run the loop; where it deforms, the model at a frame is what it knows of that frame at the end."""
-    model = nacre.Model(camera, num_threads=2, **options)
+    model: Any = nacre.Model(camera, num_threads=2, **options)
     for depth in depths:
         model.add_frame(depth)
     deforms = bool(options.get("deform"))

@@ -192,7 +192,7 @@ def about(axis: tuple[float, float, float], angle: float) -> Array:
     """Return the rotation about a unit axis (Rodrigues)."""
     x, y, z = axis
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
+    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross)
 
 
 def _bumps(rng: np.random.Generator, places: Array, *, period: tuple[float, float], number: int) -> Array:
