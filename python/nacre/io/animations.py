@@ -158,9 +158,15 @@ def _as_times(times: npt.ArrayLike | None, count: int) -> npt.NDArray[np.float32
     given = arrays.as_real("times", times)
     if given.shape != (count,):
         raise ValueError(f"times must have one entry per frame ({count}), got shape {given.shape}")
-    seconds = np.asarray(given.astype(np.float64) - float(given[0]), np.float32)
-    if not (np.isfinite(seconds).all() and (np.diff(seconds) > 0).all()):
-        raise ValueError("times must be finite and increase from frame to frame")
+    with np.errstate(over="ignore", invalid="ignore"):
+        seconds = np.asarray(given.astype(np.float64) - float(given[0]), np.float32)
+        steps = np.diff(seconds)
+    wrong = np.flatnonzero(~(np.isfinite(steps) & (steps > 0)))
+    if not np.isfinite(seconds[0]) or len(wrong):
+        place = int(wrong[0]) + 1 if len(wrong) else 0
+        raise ValueError(
+            f"times must be finite and increase from frame to frame, got {given[place]} at frame {place}"
+        )
     return seconds
 
 
