@@ -39,6 +39,7 @@ REAL = {
     "cabinet": ("tum-fr3-cabinet-kf", 1, 58),
     "icl": ("icl-livingroom-loop-fast", 1, 300),
     "door": ("record3d-door", 1, 300),
+    "deform-pipe": ("deform-pipe", 1, 80),
     "scans": ("stanford-bunny/data", 1, 10),
     "teddy-5": ("tum-fr3-teddy", 5, 40),
     "rpy-5": ("tum-fr1-rpy", 5, 20),

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from nacre.errors import CameraError, FileFormatError
     from nacre.frame_report import FrameReport
     from nacre.global_registration import GlobalAlignResult, align_global
+    from nacre.io.animations import write_animation
     from nacre.io.cameras import CameraFile, read_camera, write_camera
     from nacre.io.cloud import Cloud
     from nacre.io.meshes import read_mesh, write_mesh
@@ -111,6 +112,7 @@ __all__ = [
     "simulate_depth",
     "turntable_poses",
     "voxel_downsample",
+    "write_animation",
     "write_camera",
     "write_mesh",
     "write_points",
@@ -133,6 +135,7 @@ _NAMES = {
     "errors": "CameraError FileFormatError",
     "frame_report": "FrameReport",
     "global_registration": "GlobalAlignResult align_global",
+    "io.animations": "write_animation",
     "io.cameras": "CameraFile read_camera write_camera",
     "io.cloud": "Cloud",
     "io.meshes": "read_mesh write_mesh",

@@ -306,6 +306,12 @@ RECIPES: dict[str, Recipe] = {
         _aligned,
         grows=("num_rotations", "num_candidates"),
     ),
+    "nacre.io.animations.write_animation": Recipe(
+        functools.partial(nacre.write_animation, FOLDER / "moving.glb"),
+        {"vertices": np.stack([VERTICES, 1.1 * VERTICES]), "triangles": TRIANGLES,
+         "normals": np.stack([unit(4), unit(4)]), "colors": np.full((4, 3), 7, np.uint8),
+         "times": np.array([0.0, 0.1]), "tolerance": 1e-5},
+    ),
     "nacre.io.cameras.write_camera": Recipe(
         functools.partial(nacre.write_camera, FOLDER / "camera.json"), {"camera": CAMERA,
         "depth_scale": 1000.0}

@@ -24,7 +24,7 @@ JSON_CHUNK, BINARY_CHUNK = b"JSON", b"BIN\0"
 FLOAT, UNSIGNED_INT = 5126, 5125
 CLAMP_TO_EDGE = 33071
 TRIANGLES = 4
-_VERTEX_BUFFER, _INDEX_BUFFER = 34962, 34963
+VERTEX_BUFFER, _INDEX_BUFFER = 34962, 34963
 # Both sides are seen, and light is scattered as by paper: a surface that is open, of unknown gloss.
 _MATERIAL: dict[str, Any] = {
     "doubleSided": True,
@@ -40,26 +40,34 @@ def write_mesh(
 
     Coordinates are float32 about a place that the node's ``translation`` gives in float64.
     """
+    document, buffer = document_of(mesh, comments)
+    if mesh.texture is not None:
+        _add_image(document, buffer, encode_jpeg(mesh.texture.image))
+    store(path, document, buffer)
+
+
+def document_of(mesh: MeshArrays, comments: Sequence[str] = ()) -> tuple[dict[str, Any], Buffer]:
+    """Return what a file says of a mesh, but for the image that is painted on it, and its binary chunk."""
     mesh, uv = _split(mesh)
     vertices, origin = localize(mesh.vertices)
     if not np.isfinite(vertices).all():
         raise ValueError("vertices must be finite, and fit float32 in a GLB file, got some that do not")
-    buffer = _Buffer()
+    buffer = Buffer()
     bounds = {"min": vertices.min(axis=0).tolist(), "max": vertices.max(axis=0).tolist()}
-    attributes = {"POSITION": buffer.add(vertices, "VEC3", _VERTEX_BUFFER, **bounds)}
+    attributes = {"POSITION": buffer.add(vertices, "VEC3", VERTEX_BUFFER, **bounds)}
     if mesh.normals is not None:
-        attributes["NORMAL"] = buffer.add(_unit(mesh.normals), "VEC3", _VERTEX_BUFFER)
+        attributes["NORMAL"] = buffer.add(unit(mesh.normals), "VEC3", VERTEX_BUFFER)
     if uv is not None:
-        attributes["TEXCOORD_0"] = buffer.add(uv, "VEC2", _VERTEX_BUFFER)
+        attributes["TEXCOORD_0"] = buffer.add(uv, "VEC2", VERTEX_BUFFER)
     elif mesh.colors is not None:
-        attributes["COLOR_0"] = buffer.add(linear_from_srgb(mesh.colors), "VEC3", _VERTEX_BUFFER)
+        attributes["COLOR_0"] = buffer.add(linear_from_srgb(mesh.colors), "VEC3", VERTEX_BUFFER)
     corners = mesh.triangles.reshape(-1).astype(np.uint32)
     indices = buffer.add(corners, "SCALAR", _INDEX_BUFFER)
     primitive = {"attributes": attributes, "indices": indices, "material": 0, "mode": TRIANGLES}
     asset: dict[str, Any] = {"version": "2.0", "generator": "nacre"}
     if comments:
         asset["extras"] = {"comments": check_comments(comments)}
-    document: dict[str, Any] = {
+    return {
         "asset": asset,
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -68,9 +76,11 @@ def write_mesh(
         "materials": [_MATERIAL],
         "accessors": buffer.accessors,
         "bufferViews": buffer.views,
-    }
-    if mesh.texture is not None:
-        _add_image(document, buffer, encode_jpeg(mesh.texture.image))
+    }, buffer
+
+
+def store(path: str | os.PathLike[str], document: dict[str, Any], buffer: Buffer) -> None:
+    """Write a file of two chunks: what it says, and its arrays."""
     document["buffers"] = [{"byteLength": buffer.size}]
     text = json.dumps(document, separators=(",", ":")).encode()
     text += b" " * (-len(text) % 4)
@@ -100,7 +110,7 @@ def _split(mesh: MeshArrays) -> tuple[MeshArrays, npt.NDArray[np.float32] | None
     return split, texture.uv[places]
 
 
-def _add_image(document: dict[str, Any], buffer: _Buffer, data: bytes) -> None:
+def _add_image(document: dict[str, Any], buffer: Buffer, data: bytes) -> None:
     """Paint the mesh with a JPEG image."""
     material: dict[str, Any] = document["materials"][0]
     document["images"] = [{"bufferView": buffer.add_bytes(data), "mimeType": "image/jpeg"}]
@@ -110,7 +120,7 @@ def _add_image(document: dict[str, Any], buffer: _Buffer, data: bytes) -> None:
     document["materials"] = [material | {"pbrMetallicRoughness": reflectance}]
 
 
-class _Buffer:
+class Buffer:
     """The binary chunk as it grows, and what says where each array is."""
 
     def __init__(self) -> None:
@@ -119,11 +129,12 @@ class _Buffer:
         self.views: list[dict[str, Any]] = []
         self.accessors: list[dict[str, Any]] = []
 
-    def add(self, array: npt.NDArray[Any], kind: str, target: int, **bounds: Any) -> int:
+    def add(self, array: npt.NDArray[Any], kind: str, target: int | None = None, **bounds: Any) -> int:
         """Take in an array of float32 or uint32, all of 4 bytes, and return its accessor."""
         component = FLOAT if array.dtype.kind == "f" else UNSIGNED_INT
         stored = np.ascontiguousarray(array, array.dtype.newbyteorder("<"))
-        view = self._add_view(stored.reshape(-1).view(np.uint8).data, target=target)
+        of_vertices = {} if target is None else {"target": target}
+        view = self._add_view(stored.reshape(-1).view(np.uint8).data, **of_vertices)
         accessor = {"bufferView": view, "componentType": component, "count": len(array)}
         self.accessors.append({**accessor, "type": kind, **bounds})
         return len(self.accessors) - 1
@@ -143,9 +154,9 @@ class _Buffer:
         return len(self.views) - 1
 
 
-def _unit(normals: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
+def unit(normals: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     """Return vectors of unit length, as glTF has them; what has no direction becomes the z axis."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        unit = normals / np.linalg.norm(normals.astype(np.float64), axis=1, keepdims=True)
-    unit[~np.isfinite(unit).all(axis=1)] = (0.0, 0.0, 1.0)
-    return np.asarray(unit, np.float32)
+        directions = normals / np.linalg.norm(normals.astype(np.float64), axis=1, keepdims=True)
+    directions[~np.isfinite(directions).all(axis=1)] = (0.0, 0.0, 1.0)
+    return np.asarray(directions, np.float32)
