@@ -1,15 +1,15 @@
 #!/usr/bin/env python3
 """
-Measure models of things that bend (`nacre.Model(camera, deform=True)`) against the exact truth.
+Measure what a rigid loop makes of things that bend, against the exact truth.
 
     python benchmarks/deforming.py                                  # every scene, sensor and contender
     python benchmarks/deforming.py pipe homer sensor=stereo seeds=3 frames=80
     python benchmarks/deforming.py deform-pipe pictures=FOLDER      # a real pipe that two hands bend
 
-Of every frame the model as it was then is compared with the true surface, in the camera's frame: all of its
-points, and those on what the camera saw; and points are followed, from the first frame that saw them, as
-pieces of the material. Beside it the rigid loop, on the same frames and on those of the thing held still,
-and Open3D's TSDF, where it is installed.
+At every frame the model is compared with the true surface, in the camera's frame: all of its points, and
+those on what the camera saw; and points are followed, from the first frame that saw them, as pieces of the
+material. Beside it the same loop on the frames of the thing held still, and Open3D's TSDF, where it is
+installed.
 """
 
 from __future__ import annotations
@@ -47,7 +47,6 @@ class Run:
     points_at: Callable[[int], Array | None]
     num_points: int
     milliseconds: float  # of a frame, median
-    num_nodes: int = 0
 
 
 @dataclass(frozen=True)
@@ -69,33 +68,28 @@ class Figures:
         return (
             f"{self.tracked:3d} of {self.frames} | {self.rms:6.2f} | {self.worst:6.2f} | {self.seen:6.2f} | "
             f"{self.followed:5.2f} | {self.followed_p95:5.2f} | {self.complete:6.1%} | "
-            f"{self.run.num_points:6d} | {self.run.num_nodes:4d} | {self.run.milliseconds:6.1f}"
+            f"{self.run.num_points:6d} | {self.run.milliseconds:6.1f}"
         )
 
 
 HEAD = (
     "| frames | loop | tracked | RMS [mm] | worst frame | seen | followed [pixels] | 95 % | complete "
-    "| points | nodes | ms |"
+    "| points | ms |"
 )
 
 
-def run_nacre(camera: nacre.Camera, depths: Sequence[Array], **options: Any) -> tuple[Any, Run]:
-    """Run the loop; where it deforms, the model at a frame is what it knows of that frame at the end."""
-    model: Any = nacre.Model(camera, num_threads=2, **options)
+def run_nacre(camera: nacre.Camera, depths: Sequence[Array]) -> tuple[nacre.Model, Run]:
+    """Run the loop; the model at a frame is what is there at the end."""
+    model = nacre.Model(camera, num_threads=2)
     for depth in depths:
         model.add_frame(depth)
-    deforms = bool(options.get("deform"))
 
     def points_at(index: int) -> Array | None:
         report = model.frames[index]
-        if not report.tracked:
-            return None
-        points = model.points_at(index) if deforms else model.points
-        return moved(np.linalg.inv(report.world_from_camera), points)
+        return moved(np.linalg.inv(report.world_from_camera), model.points) if report.tracked else None
 
-    nodes = model.frames[-1].deformation.num_nodes if deforms else 0
     spent = float(np.median([report.milliseconds["total"] for report in model.frames]))
-    return model, Run(points_at, len(model), spent, nodes)
+    return model, Run(points_at, len(model), spent)
 
 
 def run_peer(name: str, camera: nacre.Camera, depths: Sequence[Array]) -> Run:
@@ -213,31 +207,19 @@ def look_up(camera: nacre.Camera, depth: Array, points: Array) -> Array:
 
 
 def contest(name: str, sensor: str, seed: int, num_frames: int) -> None:
-    """Print the rows of one recording, and whether the goals are met."""
+    """Print the rows of one recording."""
     bent, rigid = (
         record(name, num_frames, sensor=sensor, seed=seed, is_rigid=is_rigid) for is_rigid in (False, True)
     )
     title = f"{name}, {sensor}, seed {seed}"
 
-    def row(loop: str, recording: Recording, run: Run) -> Figures:
-        figures = measure(recording, run)
-        print(f"| {title} | {loop} | {figures} |", flush=True)
-        return figures
+    def row(loop: str, recording: Recording, run: Run) -> None:
+        print(f"| {title} | {loop} | {measure(recording, run)} |", flush=True)
 
-    _, run = run_nacre(bent.camera, bent.depths, deform=True)
-    ours = row("nacre, deform", bent, run)
-    row("nacre, rigid", bent, run_nacre(bent.camera, bent.depths)[1])
+    row("nacre", bent, run_nacre(bent.camera, bent.depths)[1])
+    row("nacre, held still", rigid, run_nacre(rigid.camera, rigid.depths)[1])
     if importlib.util.find_spec("open3d") is not None:
         row("Open3D, TSDF", bent, run_peer("open3d_slam", bent.camera, bent.depths))
-    still = row("nacre, rigid, held still", rigid, run_nacre(rigid.camera, rigid.depths)[1])
-    both = row("nacre, deform, held still", rigid, run_nacre(rigid.camera, rigid.depths, deform=True)[1])
-    for what, value, most in (
-        ("RMS, of the rigid one held still", ours.rms / still.rms, 2.0),
-        ("followed [pixels]", ours.followed, 3.0),
-        ("held still: RMS with deform, of that without", both.rms / still.rms, 1.2),
-    ):
-        verdict = "met" if value <= most else "MISSED"
-        print(f"  {title}: {what}: {value:.2f}, at most {most:g}: {verdict}", flush=True)
 
 
 @dataclass(frozen=True)
@@ -277,27 +259,22 @@ def robust(values: Array) -> float:
 
 
 def real_pipe(pictures: Path | None) -> None:
-    """Print residuals of the real pipe, deforming and rigid, and draw the model at some frames."""
+    """Print residuals of the real pipe, and draw the model at some frames."""
     case = recorded("deform-pipe")
-    print("| loop | tracked | to image [sigma] | to model | unexplained | ghosts | points | nodes | ms |")
-    for loop, options in (("nacre, deform", {"deform": True}), ("nacre, rigid", {})):
-        model, run = run_nacre(case.camera, case.depths, **options)
-        found = [
-            residual(case.camera, depth, model.noise, run, index) for index, depth in enumerate(case.depths)
-        ]
-        means = [
-            float(np.nanmean([getattr(one, name) for one in found]))
-            for name in ("to_image", "to_model", "unexplained", "ghosts")
-        ]
-        tracked = sum(report.tracked for report in model.frames)
-        figures = f"{means[0]:.2f} | {means[1]:.2f} | {means[2]:.1%} | {means[3]:.1%}"
-        print(
-            f"| {loop} | {tracked} of {len(found)} | {figures} | {run.num_points} | {run.num_nodes} "
-            f"| {run.milliseconds:.0f} |",
-            flush=True,
-        )
-        if pictures is not None:
-            draw(case.camera, case.depths, run, pictures / f"{loop.replace(', ', '-')}.png")
+    print("| tracked | to image [sigma] | to model | unexplained | ghosts | points | ms |")
+    model, run = run_nacre(case.camera, case.depths)
+    found = [
+        residual(case.camera, depth, model.noise, run, index) for index, depth in enumerate(case.depths)
+    ]
+    means = [
+        float(np.nanmean([getattr(one, name) for one in found]))
+        for name in ("to_image", "to_model", "unexplained", "ghosts")
+    ]
+    tracked = sum(report.tracked for report in model.frames)
+    figures = f"{means[0]:.2f} | {means[1]:.2f} | {means[2]:.1%} | {means[3]:.1%}"
+    print(f"| {tracked} of {len(found)} | {figures} | {run.num_points} | {run.milliseconds:.0f} |", flush=True)
+    if pictures is not None:
+        draw(case.camera, case.depths, run, pictures / "deform-pipe.png")
 
 
 def draw(camera: nacre.Camera, depths: Sequence[Array], run: Run, path: Path) -> None:
