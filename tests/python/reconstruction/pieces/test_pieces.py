@@ -119,6 +119,17 @@ def test_it_is_nearly_as_good_as_in_one_go(recording: Path, in_pieces: Any, tmp_
     assert errors[0] <= 2 * errors[1], errors
 
 
+def test_loops_between_pieces_are_closed(in_pieces: Any) -> None:
+    loops = [frame for frame in in_pieces[2]["frames"] if frame["loop_frame"] is not None]
+    assert any(frame["index"] >= PIECE > frame["loop_frame"] for frame in loops)
+
+
+def test_only_a_pose_that_is_kept_is_movable(recording: Path) -> None:
+    first = nacre.open_sequence(recording)[0]
+    with pytest.raises(ValueError, match="movable must be used with a guess that is kept"):
+        nacre.Model(first.camera).add_frame(first.depth, movable=True)
+
+
 def test_the_bytes_do_not_depend_on_who_works(recording: Path, in_pieces: Any, tmp_path: Path) -> None:
     code, _, said = run(recording, tmp_path / "o", "--workers", 1)
     assert code == 0, said
