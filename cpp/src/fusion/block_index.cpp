@@ -9,12 +9,6 @@
 #include "fusion/limits.hpp"
 
 namespace nacre {
-namespace {
-
-constexpr int largest_block = PointProjection::capacity;
-
-}  // namespace
-
 BlockIndex BlockIndex::unbounded(const PointModel& model) {
   BlockIndex index(model);
   for (Block& block : index.blocks_) {
@@ -46,10 +40,10 @@ void BlockIndex::measure(const PointModel& model, std::size_t first, Block& bloc
 
 void BlockIndex::add_new(const PointModel& model) {
   while (size_ < model.points.size()) {
-    if (blocks_.empty() || blocks_.back().count == largest_block) blocks_.emplace_back();
+    if (blocks_.empty() || blocks_.back().count == PointProjection::capacity) blocks_.emplace_back();
     Block& block = blocks_.back();
     const std::size_t first = size_ - static_cast<std::size_t>(block.count);
-    const std::size_t added = std::min<std::size_t>(largest_block, model.points.size() - first);
+    const std::size_t added = std::min<std::size_t>(PointProjection::capacity, model.points.size() - first);
     size_ = first + added;
     block.count = static_cast<int>(added);
     measure(model, first, block);
@@ -65,7 +59,7 @@ void BlockIndex::keep(const std::vector<std::uint8_t>& flags) {
     left.count = static_cast<int>(block.count - std::count(first, first + block.count, std::uint8_t{0}));
     next += static_cast<std::size_t>(block.count);
     if (left.count == 0) continue;
-    if (kept > 0 && blocks_[kept - 1].count + left.count <= largest_block) {
+    if (kept > 0 && blocks_[kept - 1].count + left.count <= PointProjection::capacity) {
       Block& before = blocks_[kept - 1];
       before.count += left.count;
       before.box.extend(left.box);
