@@ -20,7 +20,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -263,16 +262,16 @@ def real_pipe(pictures: Path | None) -> None:
     case = recorded("deform-pipe")
     print("| tracked | to image [sigma] | to model | unexplained | ghosts | points | ms |")
     model, run = run_nacre(case.camera, case.depths)
-    found = [
-        residual(case.camera, depth, model.noise, run, index) for index, depth in enumerate(case.depths)
-    ]
+    found = [residual(case.camera, depth, model.noise, run, index) for index, depth in enumerate(case.depths)]
     means = [
         float(np.nanmean([getattr(one, name) for one in found]))
         for name in ("to_image", "to_model", "unexplained", "ghosts")
     ]
     tracked = sum(report.tracked for report in model.frames)
     figures = f"{means[0]:.2f} | {means[1]:.2f} | {means[2]:.1%} | {means[3]:.1%}"
-    print(f"| {tracked} of {len(found)} | {figures} | {run.num_points} | {run.milliseconds:.0f} |", flush=True)
+    print(
+        f"| {tracked} of {len(found)} | {figures} | {run.num_points} | {run.milliseconds:.0f} |", flush=True
+    )
     if pictures is not None:
         draw(case.camera, case.depths, run, pictures / "deform-pipe.png")
 
