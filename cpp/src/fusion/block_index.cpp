@@ -9,6 +9,7 @@
 #include "fusion/limits.hpp"
 
 namespace nacre {
+
 BlockIndex BlockIndex::unbounded(const PointModel& model) {
   BlockIndex index(model);
   for (Block& block : index.blocks_) {
