@@ -9,6 +9,8 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from nacre.meshing.texture_exposure import colors_at
+
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
 Ints = npt.NDArray[np.intp]
@@ -19,6 +21,7 @@ MOST_PIXELS = 8192
 
 CELL = 4  # [pixels] in width and height, for a triangle without an image: three corners and a border
 _BORDER = 2  # [pixels] around a patch: smaller copies of a texture mix neighbors
+_ROUNDING = -1e-9  # of barycentric weights
 _AT_ONCE = 1_000_000  # budget: pixels that are tested together
 
 
@@ -107,36 +110,88 @@ def paint_cells(atlas: Image, cells: Ints, colors: Array) -> Array:
     return cells[:, None] + offsets
 
 
-def add_to(atlas: Image, triangles: Array, corrections: Array) -> None:
+class Changes:
     """
-    Add to an atlas what is given at the corners of triangles.
+    What is to be added to the pixels of an atlas, in triangles.
 
     Parameters
     ----------
     atlas : (H, W, 3) uint8
-        Changed in place.
-    triangles : (T, 3, 2)
-        Their corners, columns and rows [pixels].
-    corrections : (T, 3, 3)
-        Of each corner and channel; interpolated between them.
+        As it is until :meth:`apply`.
     """
-    sums = np.zeros(atlas.shape, np.float32)
-    is_covered = np.zeros(atlas.shape[:2], bool)
-    for rows, pixels, weights in _covered_pixels(triangles):
-        sums[pixels[:, 1], pixels[:, 0]] = np.einsum("pc,pck->pk", weights, corrections[rows])
-        is_covered[pixels[:, 1], pixels[:, 0]] = True
-    for _ in range(_BORDER):
-        _grow(sums, is_covered)
-    lines = max(1, _AT_ONCE // atlas.shape[1])
-    for start in range(0, len(atlas), lines):
-        part = slice(start, start + lines)
-        atlas[part] = np.clip(np.rint(atlas[part] + sums[part]), 0, 255).astype(np.uint8)
+
+    def __init__(self, atlas: Image) -> None:
+        self._atlas = atlas
+        self._sums = np.zeros(atlas.shape, np.float32)
+        self._is_covered = np.zeros(atlas.shape[:2], bool)
+        self._num_beside = np.zeros(atlas.shape[:2], np.uint8)
+
+    def add(self, triangles: Array, changes: Array) -> None:
+        """Add to (T, 3, 2) triangles, columns and rows [pixels], the (T, 3, 3) changes of their corners."""
+        for rows, pixels, weights in _covered_pixels(triangles):
+            x, y = pixels.T
+            self._sums[y, x] = np.einsum("pc,pck->pk", weights, changes[rows])
+            self._is_covered[y, x] = True
+
+    def add_beside(self, triangles: Array, changes: Array) -> None:
+        """Add the same, after all others, to the pixels beside triangles, which lookups at their edges mix."""
+        for rows, pixels, weights in _covered_pixels(triangles, _BORDER):
+            x, y = pixels.T
+            beside = ~self._is_covered[y, x]
+            x, y = x[beside], y[beside]
+            np.add.at(self._sums, (y, x), np.einsum("pc,pck->pk", weights, changes[rows])[beside])
+            np.add.at(self._num_beside, (y, x), 1)
+
+    def blend(self, triangles: Array, image: Image, pixels: Array, shares: Array, changes: Array) -> None:
+        """
+        Let another image have a share of triangles, which were added before, and of what is beside them.
+
+        Parameters
+        ----------
+        triangles : (T, 3, 2)
+            On the atlas.
+        image : (H, W, 3) uint8
+            The other one.
+        pixels : (T, 3, 2)
+            Where it shows the corners.
+        shares : (T, 3)
+            Its weights at the corners.
+        changes : (T, 3, 3)
+            What is added to its colours at the corners, less what is added to those of the atlas.
+        """
+        for rows, targets, weights in _covered_pixels(triangles, _BORDER):
+            x, y = targets.T
+            inside = (weights >= _ROUNDING).all(axis=1)
+            is_taken = inside | ~self._is_covered[y, x]
+            rows, weights, x, y = rows[is_taken], weights[is_taken], x[is_taken], y[is_taken]
+            colors = colors_at(image.astype(np.float32), np.einsum("pc,pck->pk", weights, pixels[rows]))
+            colors += np.einsum("pc,pck->pk", weights, changes[rows]) - self._atlas[y, x]
+            share = np.clip((weights * shares[rows]).sum(axis=1), 0, 1)
+            np.add.at(self._sums, (y, x), share[:, None] * colors)
+
+    def apply(self) -> None:
+        """Add all of it, and to the borders of the triangles what is beside them."""
+        beside = self._num_beside > 0
+        self._sums[beside] /= self._num_beside[beside, None]
+        self._is_covered |= beside
+        for _ in range(_BORDER):
+            _grow(self._sums, self._is_covered)
+        lines = max(1, _AT_ONCE // self._atlas.shape[1])
+        for start in range(0, len(self._atlas), lines):
+            part = slice(start, start + lines)
+            changed = np.rint(self._atlas[part] + self._sums[part])
+            self._atlas[part] = np.clip(changed, 0, 255).astype(np.uint8)
 
 
-def _covered_pixels(triangles: Array) -> Iterator[tuple[Ints, Ints, Array]]:
-    """Yield pixels within triangles: the triangle's row, column and row of the pixel, barycentric weights."""
-    first = np.ceil(triangles.min(axis=1)).astype(np.intp)
-    sizes = np.maximum(np.floor(triangles.max(axis=1)).astype(np.intp) + 1 - first, 0)
+def _covered_pixels(triangles: Array, margin: float = 0.0) -> Iterator[tuple[Ints, Ints, Array]]:
+    """
+    Yield pixels within triangles: the triangle's row, column and row of the pixel, barycentric weights.
+
+    Those within a margin [pixels] of them, too.
+    """
+    first = np.ceil(triangles.min(axis=1) - margin).astype(np.intp)
+    sizes = np.maximum(np.floor(triangles.max(axis=1) + margin).astype(np.intp) + 1 - first, 0)
+    least = _ROUNDING - margin / np.maximum(_heights(triangles), 1e-3)
     counts = sizes.prod(axis=1)
     ends = np.cumsum(counts)
     starts = np.searchsorted(ends, np.arange(0, int(counts.sum()), _AT_ONCE))
@@ -147,8 +202,16 @@ def _covered_pixels(triangles: Array) -> Iterator[tuple[Ints, Ints, Array]]:
         )
         pixels = first[rows] + np.stack([within % sizes[rows, 0], within // sizes[rows, 0]], axis=1)
         weights = _barycentric(triangles[rows], pixels)
-        inside = (weights >= -1e-9).all(axis=1)
+        inside = (weights >= least[rows]).all(axis=1)
         yield rows[inside], pixels[inside], weights[inside]
+
+
+def _heights(triangles: Array) -> Array:
+    """Return how far each corner is from the side across."""
+    opposite = triangles[:, [2, 0, 1]] - triangles[:, [1, 2, 0]]
+    area = np.abs(_cross(opposite[:, 0], opposite[:, 1]))
+    heights: Array = area[:, None] / np.maximum(np.linalg.norm(opposite, axis=2), 1e-12)
+    return heights
 
 
 def _barycentric(triangles: Array, pixels: Ints) -> Array:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre.meshing.texture import Texture
-from nacre.meshing.texture_atlas import CELL, MOST_PIXELS, add_to, cut, pack, paint_cells, rectangles
+from nacre.meshing.texture_atlas import CELL, MOST_PIXELS, Changes, cut, pack, paint_cells, rectangles
+from nacre.meshing.texture_blending import Layer
 from nacre.meshing.texture_labels import NO_VIEW
 from nacre.meshing.texture_patches import Patches
 from nacre.meshing.texture_views import TextureView
@@ -21,7 +22,12 @@ _SHRINKING = 0.97  # what is scaled down to an area does not fill it evenly
 
 
 def paint(
-    patches: Patches, views: Sequence[TextureView], gains: Array, node_colors: Array, corrections: Array
+    patches: Patches,
+    views: Sequence[TextureView],
+    gains: Array,
+    node_colors: Array,
+    corrections: Array,
+    layers: Iterable[Layer] = (),
 ) -> Texture:
     """
     Return the texture of patches.
@@ -38,6 +44,8 @@ def paint(
         Of the nodes, for the patches without a view.
     corrections : (N, 3)
         What is added at the nodes, and between them.
+    layers : iterable of Layer
+        What other images have a share in.
     """
     is_cell = patches.view_of_triangle == NO_VIEW
     num_cells = int(is_cell.sum())
@@ -64,8 +72,20 @@ def paint(
             atlas[top : top + height, left : left + width] = cut(image, first[i], size[i])
     places = np.zeros((len(patches.pixels), 2))
     places[seen] = pixels - first[group] + layout.corners[group]
-    corners = patches.corners[~is_cell]
-    add_to(atlas, places[corners], corrections[corners])
+    shown = patches.corners[~is_cell]
+    changes = Changes(atlas)
+    changes.add(places[shown], corrections[shown])
+    layers = list(layers)
+    if layers:
+        at_seams = patches.corners[np.unique(np.concatenate([layer.triangles for layer in layers]))]
+        changes.add_beside(places[at_seams], corrections[at_seams])
+    for layer in layers:
+        image = _exposed(_scaled(views[layer.view].color, scale), gains[layer.view])
+        corners = patches.corners[layer.triangles]
+        pixels = scale * (layer.pixels + 0.5) - 0.5
+        added = layer.corrections - corrections[corners]
+        changes.blend(places[corners], image, pixels, layer.weights, added)
+    changes.apply()
     corners = patches.corners[is_cell]
     cell_places = paint_cells(atlas, layout.cells, (node_colors + corrections)[corners])
     rows = patches.corners.astype(np.int32)

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from nacre._internal import arrays
 from nacre.mesh import Mesh
 from nacre.meshing.texture import Texture
+from nacre.meshing.texture_blending import layers_at_seams
 from nacre.meshing.texture_exposure import blurred, colors_at, detail_at, image_gains, seam_corrections
 from nacre.meshing.texture_labels import NO_VIEW, choose_labels, neighbors_of
 from nacre.meshing.texture_painting import paint
@@ -71,20 +72,21 @@ def texture_mesh(
     is_guess = np.zeros(len(mesh.vertices), np.bool_)
     if is_seen is not None:
         is_guess = arrays.as_values("is_seen", is_seen, len(mesh.vertices), "vertex") == 0
-    labels, gains = _choose_views(mesh, checked, is_guess)
+    labels, gains, is_shown = _choose_views(mesh, checked, is_guess)
     patches = Patches.of(mesh, labels, checked)
     node_colors = _node_colors(patches, checked, gains, fallback)
     edges = patches.corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     is_photographed = patches.view_of_node != NO_VIEW
     corrections = seam_corrections(node_colors, patches.vertex_of_node, edges, is_photographed)
     corrections[is_guess[patches.vertex_of_node]] = 0
-    return paint(patches, checked, gains, node_colors, corrections)
+    layers = layers_at_seams(patches, mesh.vertices, mesh.triangles, checked, is_shown, corrections)
+    return paint(patches, checked, gains, node_colors, corrections, layers)
 
 
 def _choose_views(
     mesh: Mesh, views: Sequence[TextureView], is_guess: Bools
-) -> tuple[npt.NDArray[np.int32], Array]:
-    """Return the view of each triangle, and the gains of the views' channels."""
+) -> tuple[npt.NDArray[np.int32], Array, Bools]:
+    """Return the view of each triangle, the gains of the views' channels, and which view shows which."""
     tolerance = edge_lengths(mesh)
     places = np.unique(np.linspace(0, len(mesh.vertices) - 1, _PLACES).astype(np.intp))
     scores = np.empty((len(views), len(mesh.triangles)), np.float32)
@@ -101,7 +103,8 @@ def _choose_views(
         raise ValueError("views show no triangle of the mesh: check that their poses are of its frame")
     a, b, c = (mesh.vertices[mesh.triangles[:, i]].astype(np.float64) for i in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return choose_labels(scores, areas, neighbors_of(mesh.triangles)), image_gains(colors, is_visible)
+    labels = choose_labels(scores, areas, neighbors_of(mesh.triangles))
+    return labels, image_gains(colors, is_visible), scores > 0
 
 
 def _node_colors(

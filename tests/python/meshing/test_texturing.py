@@ -61,6 +61,38 @@ def test_exposures_meet_without_a_step(change):
         assert np.abs(painted(texture)[is_in_images()] - 120 * np.sqrt(1.3)).max() < 2
 
 
+def colors_along_seams(texture):
+    """Return the colours of both sides at seven places of each edge where patches meet."""
+    sides = [(0, 1), (1, 2), (2, 0)]
+    ends = np.concatenate([TRIANGLES[:, side] for side in sides])
+    nodes = np.concatenate([texture.triangles[:, side] for side in sides])
+    flipped = ends[:, 0] > ends[:, 1]
+    ends[flipped], nodes[flipped] = ends[flipped][:, ::-1], nodes[flipped][:, ::-1]
+    order = np.lexsort(ends.T)
+    ends, nodes = ends[order], nodes[order]
+    twins = np.flatnonzero((ends[1:] == ends[:-1]).all(axis=1))
+    twins = twins[(nodes[twins] != nodes[twins + 1]).all(axis=1)]
+    uv = texture.uv[nodes].astype(float)
+    places = [(1 - part) * uv[:, 0] + part * uv[:, 1] for part in np.linspace(0.05, 0.95, 7)]
+    return [np.stack([lookup(texture, place[rows]) for place in places]) for rows in (twins, twins + 1)]
+
+
+def test_images_beside_their_places_fade_into_each_other():
+    """Both show the same stripes, one of them 4 mm, a pixel, beside its place: so a text would break."""
+
+    def stripes(points, shift=0.0):
+        return 128 + 90 * np.sin(300 * (points[:, [0]] - points[:, [1]] - shift)) * np.ones(3)
+
+    views = [
+        look(pose_at(x), paint=functools.partial(stripes, shift=shift))
+        for x, shift in ((-0.22, 0.0), (0.22, 0.004))
+    ]
+    left, right = colors_along_seams(texture_mesh(VERTICES, TRIANGLES, views))
+    assert left.shape[1] > SIDE / 2
+    assert left.std() > 20  # the stripes are still there
+    assert np.abs(left - right).mean() < 10  # 47 where they are cut
+
+
 def test_gains_of_images_that_overlap_in_a_chain():
     colors = np.random.default_rng(0).uniform(40, 100, (300, 3))
     truth = np.array([[1.0, 1.1, 0.9], [1.5, 1.4, 1.2], [0.8, 0.9, 1.0], [2.0, 1.9, 1.8]])
