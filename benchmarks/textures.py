@@ -1,8 +1,8 @@
 """
 How far seams of textures show: how colours change across the edges at which patches meet.
 
-For each edge, two places of its triangles, so many pixels of the atlas beside its middle on either side: the mean
-absolute difference of their colours, at seams and, for comparison, at the edges within patches::
+For each edge, two places of its triangles, so many pixels of the atlas beside its middle on either side: the
+mean absolute difference of their colours, at seams and, for comparison, at the edges within patches::
 
     python benchmarks/textures.py OUT [OUT ...] [--simplify N]
 
@@ -63,6 +63,7 @@ def changes_across_edges(texture: Texture, triangles: npt.NDArray[np.int32]) -> 
 
 
 def main() -> None:
+    """Texture each run's mesh and print how its seams differ from other edges."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("outs", nargs="+", type=Path, metavar="OUT")
     parser.add_argument("--simplify", type=int, metavar="N")

@@ -134,7 +134,7 @@ class Changes:
             self._is_covered[y, x] = True
 
     def add_beside(self, triangles: Array, changes: Array) -> None:
-        """Add the same, after all others, to the pixels beside triangles, which lookups at their edges mix."""
+        """Add the same, after all others, to pixels beside triangles, which lookups at edges mix."""
         for rows, pixels, weights in _covered_pixels(triangles, _BORDER):
             x, y = pixels.T
             beside = ~self._is_covered[y, x]
