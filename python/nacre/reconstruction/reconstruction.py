@@ -147,9 +147,18 @@ class Reconstruction(Checkpointed):
         self, indices: Iterable[int] | None = None, *, motions: PieceMotions | None = None
     ) -> Iterator[FrameRecord]:
         """
-        Add frames to the model, those with the given indices or all, and yield each when it is done.
+        Add frames to the model, and yield each when it is done.
 
-        Where motions tell how the camera went on, that spares the registration.
+        Parameters
+        ----------
+        indices : iterable of int, optional
+            Of the frames; by default all that were not added yet.
+        motions : PieceMotions, optional
+            How the camera went on, where it is known: that spares the registration.
+
+        Yields
+        ------
+        FrameRecord
         """
         if indices is None:
             done = {frame.index for frame in self.frames}

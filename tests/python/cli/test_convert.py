@@ -70,11 +70,12 @@ def test_points_with_all_that_belongs_to_them(cloud, tmp_path, suffix):
     assert found.comments == ("mine",)
 
 
-def test_what_a_format_has_no_place_for_is_told(cloud, tmp_path):
+def test_what_a_format_has_no_place_for_is_told(tmp_path):
     pytest.importorskip("pye57")
-    done = run("convert", cloud, tmp_path / "b.e57", "--json")
-    assert done.json["fields"] == ["colors", "intensity"]
-    assert "no place for normals" in done.err
+    nacre.write_points(tmp_path / "a.ply", POINTS, colors=COLORS, attributes={"heat": np.arange(30.0)})
+    done = run("convert", tmp_path / "a.ply", tmp_path / "b.e57", "--json")
+    assert done.json["fields"] == ["colors"]
+    assert "no place for heat" in done.err
 
 
 def test_points_that_are_not_finite_stay_behind_where_they_must(tmp_path):

@@ -134,8 +134,8 @@ def test_unwritable_out_fails_before_the_work(recording, tmp_path, monkeypatch):
 def test_interrupted_runs_write_what_there_is(recording, tmp_path, monkeypatch):
     whole = Reconstruction.run
 
-    def interrupted(self, indices=None):
-        for record in whole(self, indices):
+    def interrupted(self, *given, **named):
+        for record in whole(self, *given, **named):
             if record.index == 1:
                 signal.raise_signal(signal.SIGINT)
             yield record
