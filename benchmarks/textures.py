@@ -63,7 +63,6 @@ def changes_across_edges(texture: Texture, triangles: npt.NDArray[np.int32]) -> 
 
 
 def main() -> None:
-    """Print a table."""
     """Texture each run's mesh and print how its seams differ from other edges."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("outs", nargs="+", type=Path, metavar="OUT")
