@@ -3,6 +3,7 @@
 import contextlib
 import io
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,9 @@ from test_wide_views import view
 import nacre
 from nacre.cli import main
 from nacre.reconstruction.resume import UnfinishedRun
+
+NACRE = [sys.executable, "-c", "from nacre.cli import main; main()"]
+"""The command line as a process of its own."""
 
 
 class Killed(BaseException):

@@ -25,7 +25,7 @@ class BlockIndex {
  public:
   BlockIndex() = default;
   explicit BlockIndex(const PointModel& model) { renew(model); }
-  static BlockIndex unbounded(const PointModel& model);  // all points may be anywhere
+  static BlockIndex unbounded(const PointModel& model);  // all points may be anywhere: no block is left out
 
   void renew(const PointModel& model);                                          // all of it has changed
   void measure(const PointModel& model, const std::vector<PointRange>& moved);  // points of these have

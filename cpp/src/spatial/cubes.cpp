@@ -13,7 +13,9 @@
 namespace nacre {
 namespace {
 
+// Budgets of a thread's work at a time; no result depends on them.
 constexpr std::int64_t points_per_hash_block = 1 << 14;
+constexpr std::int64_t stretches_per_hash_block = 16;
 
 template <class T>
 std::vector<std::uint64_t> hashes_of(const Rows<T>& points, std::uint64_t seed, int num_threads) {
@@ -177,17 +179,17 @@ HashOrder order_by_hash(const std::vector<std::int64_t>& starts, const std::uint
   HashOrder order;
   order.rows.resize(static_cast<std::size_t>(count));
   order.hashes.resize(static_cast<std::size_t>(count));
-  constexpr std::int64_t stretches_per_block = 16;
   const auto num_stretches = static_cast<std::int64_t>(starts.size()) - 1;
-  parallel_blocks(num_stretches, stretches_per_block, num_threads, [&](auto, std::int64_t begin, std::int64_t end) {
-    std::vector<HashedRow> rows;
-    std::vector<std::int64_t> ends;
-    for (std::int64_t stretch = begin; stretch < end; ++stretch) {
-      const std::int64_t first = starts[static_cast<std::size_t>(stretch)];
-      const std::int64_t size = starts[static_cast<std::size_t>(stretch) + 1] - first;
-      sort_stretch(hashes, first, size, order, rows, ends);
-    }
-  });
+  parallel_blocks(num_stretches, stretches_per_hash_block, num_threads,
+                  [&](auto, std::int64_t begin, std::int64_t end) {
+                    std::vector<HashedRow> rows;
+                    std::vector<std::int64_t> ends;
+                    for (std::int64_t stretch = begin; stretch < end; ++stretch) {
+                      const std::int64_t first = starts[static_cast<std::size_t>(stretch)];
+                      const std::int64_t size = starts[static_cast<std::size_t>(stretch) + 1] - first;
+                      sort_stretch(hashes, first, size, order, rows, ends);
+                    }
+                  });
   return order;
 }
 

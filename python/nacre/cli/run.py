@@ -12,6 +12,7 @@ import typer
 from nacre._internal.signals import Interruption, Stopped
 from nacre.cli.follow import Bars
 from nacre.cli.outputs import file_rows, require_tracked, trajectory_rows, verdict_rows
+from nacre.cli.source import in_option_words
 from nacre.cli.terminal import CommandError, Terminal, table
 from nacre.cli.window import Window
 
@@ -34,7 +35,7 @@ def carry_out(terminal: Terminal, job: Job, stop: Interruption, window: Window |
     live = None if window is None else _show(terminal, job, window)
     out = job.unfinished.out
     try:
-        with Bars(terminal, job.run) as bars:
+        with in_option_words(), Bars(terminal, job.run) as bars:
             listeners = [bars.show] if live is None else [_added_to(live), bars.show]
             report = carry_out_job(job, stop, listeners)
     except (OSError, MemoryError) as error:

@@ -139,19 +139,17 @@ def _write(job: Job, stop: Interruption) -> dict[str, Any]:
 def _refuse_a_wrong_recording(done: Reconstruction, step: Step) -> None:
     """End the run where the model cannot use even the first frames: wrong size or wrong depth scale."""
     if isinstance(step, FrameDone) and step.frame.refused and all(f.report is None for f in done.frames):
-        raise RunError(f"frame {step.frame.index}: {advice(step.frame.reason, done.sequence)}")
+        reason = _with_scales_that_fit(step.frame.reason, done.sequence)
+        raise RunError(f"frame {step.frame.index}: {reason}")
 
 
-def advice(reason: str, recording: object = None) -> str:
-    """Return a message of the library in the words of the command line, with a depth scale that fits."""
-    words = reason.replace("check depth_scale,", "give --depth-scale,").replace(
-        "depth_scale", "--depth-scale"
-    )
+def _with_scales_that_fit(reason: str, recording: object) -> str:
+    """Return why the model refused a frame, with depth scales that would make sense of it."""
     found = re.search(r"got a median of ([\d.e+-]+) m", reason)
     scale = getattr(recording, "depth_scale", None)
     if found is None or scale is None:
-        return words
+        return reason
     stored = float(found[1]) * scale
     fitting = [f"{s:g} ({stored / s:.2g} m)" for s in (1, 1000, 5000, 10000, 1e6) if 0.2 < stored / s < 10]
     tried = f"; it was read with {scale:g}"
-    return words + tried + (f", and would make sense with {' or '.join(fitting)}" if fitting else "")
+    return reason + tried + (f", and would make sense with {' or '.join(fitting)}" if fitting else "")

@@ -19,10 +19,8 @@ from nacre.model import Model
 from nacre.parameters import ModelParameters
 from nacre.reconstruction.description import describe, describe_camera
 from nacre.reconstruction.live_feed import LiveFeed, camera_feed, real_time_feed
-from nacre.reconstruction.pieces.cut import cut
 from nacre.reconstruction.pieces.motions import PieceMotions
-from nacre.reconstruction.pieces.track import Piece
-from nacre.reconstruction.pieces.workers import Cluster, Workers
+from nacre.reconstruction.pieces.workers import Cluster
 from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.resume import UnfinishedRun
 from nacre.reconstruction.run_options import RunOptions, check_recording, options_before, read_document
@@ -148,9 +146,14 @@ def _motions(
         raise RunError(
             "pieces are cut of a recording that is there, not of frames that come by themselves", 2
         )
-    parameters = run.done.model.parameters
-    pieces = [Piece(options, folder, parameters, part) for part in cut(indices)[1:]]
-    return PieceMotions(Workers(pieces, unfinished.folder, cluster or Cluster()))
+    return PieceMotions.of(
+        options,
+        run.done.model.parameters,
+        indices,
+        folder=folder,
+        kept_in=unfinished.folder,
+        cluster=cluster or Cluster(),
+    )
 
 
 def _hold(unfinished: UnfinishedRun) -> None:

@@ -19,10 +19,8 @@ from nacre.io.cameras import read_camera
 from nacre.model import Model
 from nacre.parameters import ModelParameters, Preset
 from nacre.reconstruction.frame_record import FrameRecord
-from nacre.reconstruction.pieces.cut import cut
 from nacre.reconstruction.pieces.motions import PieceMotions
-from nacre.reconstruction.pieces.track import Piece
-from nacre.reconstruction.pieces.workers import Cluster, Workers
+from nacre.reconstruction.pieces.workers import Cluster
 from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.run_options import RunOptions
 from nacre.reconstruction.runner import Run
@@ -114,8 +112,9 @@ def reconstruct(
             None if camera is None else os.path.abspath(camera),  # noqa: PTH100
             depth_scale,
         )
-        pieces = [Piece(options, Path.cwd(), model.parameters, part) for part in cut(range(len(frames)))[1:]]
-        run.motions = PieceMotions(Workers(pieces, None, cluster))
+        run.motions = PieceMotions.of(
+            options, model.parameters, range(len(frames)), folder=Path.cwd(), kept_in=None, cluster=cluster
+        )
     done = run.to_end(progress)
     errors = [frame.error for frame in done.frames]
     if errors and errors[0] is not None and None not in errors:

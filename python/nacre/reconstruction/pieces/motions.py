@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
-from nacre.reconstruction.pieces.cut import PIECE, SHARED
+from nacre.parameters import ModelParameters
+from nacre.reconstruction.pieces.cut import PIECE, SHARED, cut
 from nacre.reconstruction.pieces.joint import joint
-from nacre.reconstruction.pieces.track import Poses
-from nacre.reconstruction.pieces.workers import Workers
+from nacre.reconstruction.pieces.track import Piece, Poses
+from nacre.reconstruction.pieces.workers import Cluster, Workers
+from nacre.reconstruction.run_options import RunOptions
 
 
 @dataclass(frozen=True)
@@ -52,6 +56,36 @@ class PieceMotions:
 
     def __init__(self, workers: Workers) -> None:
         self._workers = workers
+
+    @classmethod
+    def of(
+        cls,
+        options: RunOptions,
+        parameters: ModelParameters,
+        indices: Sequence[int],
+        *,
+        folder: Path,
+        kept_in: Path | None,
+        cluster: Cluster,
+    ) -> PieceMotions:
+        """
+        Return what the workers of a cluster will find out about frames of a recording.
+
+        Parameters
+        ----------
+        options : RunOptions
+            Which recording; their paths begin at ``folder``.
+        parameters : ModelParameters
+            Of each piece's model.
+        indices : sequence of int
+            The frames.
+        folder : Path
+        kept_in : Path, optional
+            Where pieces that are done are kept, for a run that is interrupted.
+        cluster : Cluster
+        """
+        pieces = [Piece(options, folder, parameters, part) for part in cut(indices)[1:]]
+        return cls(Workers(pieces, kept_in, cluster))
 
     def at_work(self) -> AbstractContextManager[None]:
         """While this lasts the workers track."""

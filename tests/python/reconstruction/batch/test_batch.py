@@ -26,22 +26,12 @@ from nacre.reconstruction.batch.task import make_tasks
 
 pytest.importorskip("typer")
 distributed = pytest.importorskip("distributed")
-from killed_runs import results  # noqa: E402  they need the command line
+from killed_runs import NACRE, results  # noqa: E402  they need the command line
 
 from nacre.reconstruction.run_options import RunOptions  # noqa: E402
 
 NAMES = ("bowl", "cup", "mug")
 SEEDS = [0, *(pytest.param(seed, marks=pytest.mark.weekly) for seed in range(1, 6))]
-NACRE = [sys.executable, "-c", "from nacre.cli import main; main()"]
-
-
-@pytest.fixture(scope="module", name="cluster")
-def two_workers() -> Iterator[Any]:
-    """Return a cluster of two processes, as somebody else may have started it."""
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50
-    ) as cluster:
-        yield cluster
 
 
 @pytest.fixture(name="client")

@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,9 +24,8 @@ from nacre.reconstruction.pieces.track import read_poses, write_poses
 
 pytest.importorskip("typer")
 distributed = pytest.importorskip("distributed")
-from killed_runs import command, results  # noqa: E402  they need the command line
+from killed_runs import NACRE, command, results  # noqa: E402  they need the command line
 
-NACRE = [sys.executable, "-c", "from nacre.cli import main; main()"]
 SILENT = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 NUM_FRAMES = 150  # three pieces, all around
 
@@ -41,14 +40,6 @@ def once_around(tmp_path_factory: pytest.TempPathFactory) -> Path:
     depths = [mesh.simulate_depth(camera, pose, noise=0.0005, seed=k) for k, pose in enumerate(poses)]
     nacre.write_recording(folder, camera, depths, depth_scale=20000, poses=poses)
     return folder
-
-
-@pytest.fixture(scope="module", name="cluster")
-def two_workers() -> Iterator[Any]:
-    with distributed.LocalCluster(
-        n_workers=2, threads_per_worker=1, dashboard_address="127.0.0.1:0", silence_logs=50
-    ) as cluster:
-        yield cluster
 
 
 @pytest.fixture(scope="module", name="in_pieces")
