@@ -77,15 +77,20 @@ HEAD = (
 )
 
 
-def run_nacre(camera: nacre.Camera, depths: Sequence[Array]) -> tuple[nacre.Model, Run]:
-    """Run the loop; the model at a frame is what is there at the end."""
-    model = nacre.Model(camera, num_threads=2)
+def run_nacre(
+    camera: nacre.Camera, depths: Sequence[Array], *, deform: bool = False
+) -> tuple[nacre.Model, Run]:
+    """Run the loop; the model at a frame is what is there at the end, as it was then where it deforms."""
+    model = nacre.Model(camera, num_threads=2, deform=deform)
     for depth in depths:
         model.add_frame(depth)
 
     def points_at(index: int) -> Array | None:
         report = model.frames[index]
-        return moved(np.linalg.inv(report.world_from_camera), model.points) if report.tracked else None
+        if not report.tracked:
+            return None
+        points = model.points_at(index) if deform else model.points
+        return moved(np.linalg.inv(report.world_from_camera), points)
 
     spent = float(np.median([report.milliseconds["total"] for report in model.frames]))
     return model, Run(points_at, len(model), spent)
@@ -215,6 +220,8 @@ def contest(name: str, sensor: str, seed: int, num_frames: int) -> None:
     def row(loop: str, recording: Recording, run: Run) -> None:
         print(f"| {title} | {loop} | {measure(recording, run)} |", flush=True)
 
+    row("nacre, deforming", bent, run_nacre(bent.camera, bent.depths, deform=True)[1])
+    row("nacre, deforming, held still", rigid, run_nacre(rigid.camera, rigid.depths, deform=True)[1])
     row("nacre", bent, run_nacre(bent.camera, bent.depths)[1])
     row("nacre, held still", rigid, run_nacre(rigid.camera, rigid.depths)[1])
     if importlib.util.find_spec("open3d") is not None:
@@ -261,7 +268,7 @@ def real_pipe(pictures: Path | None) -> None:
     """Print residuals of the real pipe, and draw the model at some frames."""
     case = recorded("deform-pipe")
     print("| tracked | to image [sigma] | to model | unexplained | ghosts | points | ms |")
-    model, run = run_nacre(case.camera, case.depths)
+    model, run = run_nacre(case.camera, case.depths, deform=True)
     found = [residual(case.camera, depth, model.noise, run, index) for index, depth in enumerate(case.depths)]
     means = [
         float(np.nanmean([getattr(one, name) for one in found]))

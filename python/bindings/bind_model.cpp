@@ -102,6 +102,7 @@ void bind_model(py::module_& m) {
       .def_readwrite("wlop", &ModelOptions::wlop)
       .def_readwrite("binning", &ModelOptions::binning)
       .def_readwrite("calibrate_depth", &ModelOptions::calibrate_depth)
+      .def_readwrite("deform", &ModelOptions::deform)
       .def_readwrite("spacing", &ModelOptions::spacing)
       .def_readwrite("max_points", &ModelOptions::max_points)
       .def_readwrite("predict_motion", &ModelOptions::predict_motion)
@@ -121,6 +122,16 @@ void bind_model(py::module_& m) {
       .def_property_readonly("observations", [](const PointModel& cloud) { return copy_values(cloud.observations); })
       .def_property_readonly("last_seen", [](const PointModel& cloud) { return copy_values(cloud.last_seen); })
       .def("__len__", &PointModel::size);
+
+  py::class_<DeformationReport>(m, "DeformationReport")
+      .def_readonly("num_nodes", &DeformationReport::num_nodes)
+      .def_readonly("explained", &DeformationReport::explained)
+      .def_readonly("strain", &DeformationReport::strain);
+
+  py::class_<ShapeAtFrame>(m, "ShapeAtFrame")
+      .def_property_readonly("points", [](const ShapeAtFrame& shape) { return copy_rows(shape.points); })
+      .def_property_readonly("normals", [](const ShapeAtFrame& shape) { return copy_rows(shape.normals); })
+      .def_property_readonly("nodes", [](const ShapeAtFrame& shape) { return copy_rows(shape.nodes); });
 
   py::class_<FrameReport>(m, "FrameReport")
       .def_readonly("index", &FrameReport::index)
@@ -148,6 +159,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("num_updated", [](const FrameReport& report) { return report.fusion.num_updated; })
       .def_property_readonly("num_inserted", [](const FrameReport& report) { return report.fusion.num_inserted; })
       .def_property_readonly("num_removed", [](const FrameReport& report) { return report.fusion.num_removed; })
+      .def_readonly("deformation", &FrameReport::deformation)
       .def_readonly("num_points", &FrameReport::num_points)
       .def_readonly("spacing", &FrameReport::spacing)
       .def_property_readonly("milliseconds", &milliseconds);
@@ -189,6 +201,7 @@ void bind_model(py::module_& m) {
       .def_property_readonly("given_options", &Model::given_options)
       .def_property_readonly("camera", &Model::camera)
       .def_property_readonly("cloud", &Model::cloud, py::return_value_policy::reference_internal)
+      .def("shape_at", &Model::shape_at, ReleaseGil())
       .def("cloud_in_camera", &Model::cloud_in_camera)
       .def_property_readonly("depth_calibration", &Model::depth_calibration)
       .def_property_readonly("tilt", [](const Model& model) { return model.options().depth.tilt; })

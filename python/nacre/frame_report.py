@@ -21,6 +21,26 @@ if TYPE_CHECKING:
 STATUSES = ("TRACKED", "WEAK", "LOST", "RELOCALISED")
 
 
+@dataclass(frozen=True)
+class DeformationReport:
+    """
+    How a model that deforms is at a frame; zeros where it does not.
+
+    Attributes
+    ----------
+    num_nodes : int
+        Of the warp field.
+    explained : float
+        Part of the model's points in view that the frame shows where they were bent to.
+    strain : float
+        Root mean square of how much the distances of neighbouring nodes changed, as a part of them.
+    """
+
+    num_nodes: int = 0
+    explained: float = 0.0
+    strain: float = 0.0
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class FrameReport(Value):
     """
@@ -68,6 +88,8 @@ class FrameReport(Value):
         Pixels that were left out after that, since what they show moved before the scene.
     num_updated, num_inserted, num_removed : int
         Points of the model that the frame moved, added and removed.
+    deformation : DeformationReport
+        How the model is bent, where it deforms.
     num_points : int
         Points of the model after the frame.
     spacing : float
@@ -98,6 +120,7 @@ class FrameReport(Value):
     num_updated: int
     num_inserted: int
     num_removed: int
+    deformation: DeformationReport
     num_points: int
     spacing: float
     milliseconds: dict[str, float]
@@ -132,7 +155,8 @@ class FrameReport(Value):
 def report_from(core: Any) -> FrameReport:
     """Return the report that C++ made."""
     depth, region = mirrored(DepthReport, core.depth), mirrored(RegionReport, core.region)
-    return mirrored(FrameReport, core, depth=depth, region=region)
+    deformation = mirrored(DeformationReport, core.deformation)
+    return mirrored(FrameReport, core, depth=depth, region=region, deformation=deformation)
 
 
 class _HasStatus(Protocol):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import numbers
+import operator
 import os
 import threading
 from collections.abc import Mapping, Sequence
@@ -427,6 +428,46 @@ class Model(ExchangeablePoints, Checkpointed):
             None if colors is None else colors[rows],
             {name: values[rows] for name, values in more.items()},
         )
+
+    def points_at(self, frame: int) -> npt.NDArray[np.float32]:
+        """
+        Return the points as they were at a frame, where the model deforms (``deform=True``).
+
+        Parameters
+        ----------
+        frame : int
+            Its index. At a frame that is lost the shape is that of the one before; surface that was first seen
+            later is carried by what was there.
+
+        Returns
+        -------
+        (N, 3) float32
+            In the order of :attr:`points`, which are the canonical shape; in the world frame [m].
+
+        Raises
+        ------
+        ValueError
+            Where the model does not deform, or has no such frame.
+
+        Notes
+        -----
+        After Sumner, Schmid and Pauly 2007 (embedded deformation) and Newcombe, Fox and Seitz 2015
+        (DynamicFusion).
+        """
+        return self._shape_at(frame).points
+
+    def normals_at(self, frame: int) -> npt.NDArray[np.float32]:
+        """Return the (N, 3) unit normals of :meth:`points_at`."""
+        return self._shape_at(frame).normals
+
+    def nodes_at(self, frame: int) -> npt.NDArray[np.float32]:
+        """Return where the (K, 3) nodes of the warp field were at a frame [m]; see :meth:`points_at`."""
+        return self._shape_at(frame).nodes
+
+    def _shape_at(self, frame: int) -> Any:
+        index = operator.index(frame)
+        with self._lock:
+            return self._core.shape_at(index)
 
     def in_camera(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
         """Return points and normals in the newest registered camera's frame, as the paper keeps its model."""

@@ -191,6 +191,10 @@ class ModelParameters:
         Of a pinhole camera that sees one scene (no ``region``), depth along its axis: where views in several
         directions show that its depth is systematically wrong, correct it from then on, and what was there
         (:func:`nacre.calibrate_depth`).
+    deform : bool
+        The object bends: the model is its canonical shape, and how it was at each frame is known
+        (:meth:`nacre.Model.points_at`). Where ``fusion_method`` is "fuse"; without ``loop_closure`` and
+        ``calibrate_depth``.
     spacing : float
         Distance between model points [m]; 0: twice a pixel on the first frame's nearer surfaces. New points
         are also at least a pixel and a half apart in the frame that brings them, and an averaged pixel.
@@ -223,6 +227,7 @@ class ModelParameters:
     wlop: WlopParameters = field(default_factory=WlopParameters)
     binning: int = 0
     calibrate_depth: bool = True
+    deform: bool = False
     spacing: float = 0.0
     max_points: int = 500000
     predict_motion: bool = True

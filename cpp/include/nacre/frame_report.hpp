@@ -36,6 +36,13 @@ struct StepTimes {
          total = 0;
 };
 
+/// How a model that deforms is at a frame.
+struct DeformationReport {
+  std::int64_t num_nodes = 0;  ///< of the warp field
+  double explained = 0.0;      ///< part of the model's points in view that the frame shows where they were bent to
+  double strain = 0.0;         ///< root mean square of how much the distances of neighbouring nodes changed, as a part
+};
+
 /// What became of one frame.
 struct FrameReport : TrackingReport {
   std::int64_t index = 0;
@@ -47,6 +54,7 @@ struct FrameReport : TrackingReport {
   RegionReport region;
   std::int64_t num_moving = 0;  ///< pixels that were left out, since what they show moved before the scene
   FusionReport fusion;
+  DeformationReport deformation;
   std::int64_t num_points = 0;  ///< of the model, after the frame
   double spacing = 0.0;         ///< of the model [m]
   StepTimes milliseconds;

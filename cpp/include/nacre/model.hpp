@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "nacre/camera.hpp"
 #include "nacre/checkpoint.hpp"
@@ -16,6 +17,12 @@
 namespace nacre {
 
 struct Pipeline;
+
+/// How a model that deforms was at a frame, in the world frame [m].
+struct ShapeAtFrame {
+  std::vector<Eigen::Vector3f> points, normals;  ///< of the model's points, in their order
+  std::vector<Eigen::Vector3f> nodes;            ///< of the warp field
+};
 
 /// A 3D model that grows with every depth frame. The world is the first camera's frame unless the first frame comes
 /// with a guess. Frames that cannot be registered change nothing; where the first explains no other, three frames in a
@@ -36,6 +43,10 @@ class Model {
   const ModelOptions& given_options() const;  ///< as given
   const PointModel& cloud() const;            ///< in the world frame
   PointModel cloud_in_camera() const;         ///< in the newest registered camera's frame
+  /// Of a model with options().deform, which cloud() has in its canonical shape. What was added later is carried by what
+  /// was there; a frame that is lost has the shape of the one before. Throws std::invalid_argument where the model does
+  /// not deform, or has no such frame.
+  ShapeAtFrame shape_at(std::int64_t frame) const;
   /// One report per frame that was added. Where a later frame corrected it, it says what is known since.
   FrameReports frames() const;
   /// What the views so far say of systematic errors of the depth as it comes. Where it is significant, depth is

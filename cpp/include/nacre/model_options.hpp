@@ -52,6 +52,7 @@ struct ModelOptions : TrackingOptions {
   /// Distance between model points [m]. 0: twice the camera's pixel on the first frame's nearer surfaces; new points
   /// are also at least 1.5 pixels apart in their frame, and an averaged one.
   double spacing = 0.0;
+  bool deform = false;      ///< the object bends: grow its canonical shape, and follow how it is at each frame
   int max_points = 500000;  ///< the model never grows beyond: its spacing is widened instead
 
   /// "default" (what measures best) or "paper" (the 2010 paper's algorithm and numbers, alone);

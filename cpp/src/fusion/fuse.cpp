@@ -123,17 +123,6 @@ KnownSurface update(PointModel& model, const std::vector<PointRange>& ranges, co
   return known;
 }
 
-void remove_violated(PointModel& model, BlockIndex& blocks, const FusionOptions& options, FusionReport& report) {
-  const auto is_violated = [&](std::uint8_t count) { return count >= options.max_free_space_violations; };
-  const std::vector<std::uint8_t>& counts = model.free_space_violations;
-  report.num_removed = std::count_if(counts.begin(), counts.end(), is_violated);
-  if (report.num_removed == 0) return;
-  std::vector<std::uint8_t> flags(counts.size());
-  std::transform(counts.begin(), counts.end(), flags.begin(), [&](std::uint8_t count) { return !is_violated(count); });
-  model.keep(flags);
-  blocks.keep(flags);
-}
-
 // Points in a row that stay.
 struct KeptRun {
   std::size_t first, count;
@@ -189,6 +178,19 @@ void FusionOptions::check() const {
   require(reference_sigma >= 0.0, "reference_sigma", "0 (automatic) or positive metres", reference_sigma);
 }
 
+std::vector<std::uint8_t> remove_violated(PointModel& model, BlockIndex& blocks, const FusionOptions& options,
+                                          FusionReport& report) {
+  const auto is_violated = [&](std::uint8_t count) { return count >= options.max_free_space_violations; };
+  const std::vector<std::uint8_t>& counts = model.free_space_violations;
+  report.num_removed = std::count_if(counts.begin(), counts.end(), is_violated);
+  if (report.num_removed == 0) return {};
+  std::vector<std::uint8_t> flags(counts.size());
+  std::transform(counts.begin(), counts.end(), flags.begin(), [&](std::uint8_t count) { return !is_violated(count); });
+  model.keep(flags);
+  blocks.keep(flags);
+  return flags;
+}
+
 FusionReport fuse_observed(PointModel& model, BlockIndex& blocks, RegisteredFrame now, double spacing,
                            const FusionOptions& options, int num_threads,
                            const std::vector<FrameAttribute>& attributes) {
@@ -208,7 +210,6 @@ FusionReport fuse_observed(PointModel& model, BlockIndex& blocks, RegisteredFram
   report.num_inserted = insert_points(model, std::move(known), now, spacing, with_colors, num_threads);
   blocks.add_new(model);
   if (with_attributes) fuse_attributes(model, blocks.from(num_known), now, planes, num_threads);
-  remove_violated(model, blocks, options, report);
   return report;
 }
 
@@ -225,11 +226,13 @@ FusionReport fuse(PointModel& model, const Frame& frame, const Camera& camera, c
   SurfaceObserver observer(camera, options);
   observer.look_at(frame, colors, num_threads);
   BlockIndex blocks(model);
-  return fuse_observed(model, blocks, {frame, camera, observer, world_from_camera, frame_index}, spacing, options,
-                       num_threads, attributes);
+  FusionReport report = fuse_observed(model, blocks, {frame, camera, observer, world_from_camera, frame_index}, spacing,
+                                      options, num_threads, attributes);
+  remove_violated(model, blocks, options, report);
+  return report;
 }
 
-void thin(PointModel& model, double spacing) {
+std::vector<std::uint8_t> thinned(const PointModel& model, double spacing) {
   require(spacing > 0.0, "spacing", "a positive distance in metres", spacing);
   PointGrid grid(spacing, model.points.size());
   std::vector<std::size_t> kept;
@@ -245,7 +248,9 @@ void thin(PointModel& model, double spacing) {
     kept.push_back(i);
     flags[i] = 1;
   }
-  model.keep(flags);
+  return flags;
 }
+
+void thin(PointModel& model, double spacing) { model.keep(thinned(model, spacing)); }
 
 }  // namespace nacre

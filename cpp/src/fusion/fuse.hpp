@@ -9,9 +9,17 @@
 
 namespace nacre {
 
-// fuse() with the observer of the frame, and the index of the model. Colours are the observer's.
+// fuse() with the observer of the frame, and the index of the model, but for what is removed. Colours are the
+// observer's.
 FusionReport fuse_observed(PointModel& model, BlockIndex& blocks, RegisteredFrame now, double spacing,
                            const FusionOptions& options, int num_threads,
                            const std::vector<FrameAttribute>& attributes);
+// Points that cameras saw through, or looked for in vain, go. Returns a flag for each, 0 where it goes; none if all
+// stay.
+std::vector<std::uint8_t> remove_violated(PointModel& model, BlockIndex& blocks, const FusionOptions& options,
+                                          FusionReport& report);
+
+// Which points thin() keeps: a flag for each.
+std::vector<std::uint8_t> thinned(const PointModel& model, double spacing);
 
 }  // namespace nacre

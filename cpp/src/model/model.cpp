@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "base/check.hpp"
 #include "depth/pixel_binning.hpp"
 #include "model/checkpoint/checkpoint.hpp"
 #include "model/new_start.hpp"
@@ -59,6 +60,21 @@ PointModel Model::cloud_in_camera() const {
   for (Eigen::Vector3f& point : moved.points) point = camera_from_world * point;
   for (Eigen::Vector3f& normal : moved.normals) normal = camera_from_world.linear() * normal;
   return moved;
+}
+
+ShapeAtFrame Model::shape_at(std::int64_t frame) const {
+  const std::optional<DeformingShape>& shape = pipeline_->shape;
+  require(shape.has_value(), "deform", "on for a model that has a shape at each frame", "a model that is rigid");
+  require(frame >= 0 && frame < static_cast<std::int64_t>(shape->num_frames()), "frame",
+          "one of the " + std::to_string(shape->num_frames()) + " that were added, from 0", frame);
+  const WarpField field = shape->field_at(static_cast<std::size_t>(frame));
+  ShapeAtFrame result;
+  const PointModel& cloud = pipeline_->cloud;
+  OrientedPoints moved = warped(field, cloud.points, cloud.normals, pipeline_->options.num_threads);
+  result.points = std::move(moved.points);
+  result.normals = std::move(moved.normals);
+  for (const WarpNode& node : field.nodes) result.nodes.push_back(node.position.cast<float>());
+  return result;
 }
 
 std::string Model::save(const std::string& note) const { return save_checkpoint(*pipeline_, note); }

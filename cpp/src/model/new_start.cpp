@@ -29,6 +29,7 @@ std::unique_ptr<Pipeline> begun_with(const std::vector<StartFrame>& frames, cons
   for (const StartFrame& frame : frames) {
     for (auto i = begun->history.size(); i < static_cast<std::size_t>(frame.index); ++i) {
       begun->history.add(without_model(model.history[i]));
+      if (begun->shape) begun->shape->end_frame();
     }
     try {
       if (begun->add_frame(frame.depth, frame.extras).status != FrameStatus::tracked) return nullptr;

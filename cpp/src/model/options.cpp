@@ -69,6 +69,8 @@ void ModelOptions::check() const {
   require(binning >= 0, "binning", "0 (automatic) or more", binning);
   require(spacing >= 0.0 && spacing < farthest_place, "spacing",
           "0 (automatic) or a positive distance in metres below 1e30", spacing);
+  require(!deform || fusion_method == FusionMethod::fuse, "deform", "used with fusion_method fuse", deform);
+  require(!deform || registration.method != Metric::paper, "deform", "used with another method than paper", deform);
   require(max_points >= 100, "max_points", "at least 100", max_points);
   require(min_score >= 0.0, "min_score", "0 or more", min_score);
   require(num_threads >= 0, "num_threads", "0 (all) or more", num_threads);

@@ -76,6 +76,36 @@ FrameExtras averaged(const FrameExtras& extras, const PixelBinning& pixels) {
   return result;
 }
 
+// The model's points that a camera looks at, and that nothing it measured hides.
+std::vector<std::int32_t> rows_seen_from(const PointModel& model, const Camera& camera, const Pose& world_from_camera,
+                                         const Frame& frame) {
+  const PointProjection projection(camera, world_from_camera);
+  std::vector<std::int32_t> rows;
+  visit_points_in_view(as_rows(model.points), as_rows(model.normals), 0, model.size(), projection,
+                       [&](Eigen::Index i, const PointProjection::Block& block, int k) {
+                         if (block.facing[k] > 0.2F && frame.valid.size() > 0)
+                           rows.push_back(static_cast<std::int32_t>(i));
+                       });
+  return rows;
+}
+
+// What a frame shows, in the world.
+ShownSurface shown_surface(const FrameSamples& samples, const Pose& world_from_camera, const Camera& camera,
+                           double spacing) {
+  const Eigen::Isometry3f to_world(world_from_camera.cast<float>());
+  ShownSurface shown{samples.points, samples.normals, samples.sigma, samples.sigma};
+  for (Eigen::Index i = 0; i < shown.points.rows(); ++i) {
+    const Eigen::Vector3f point = samples.points.row(i).transpose(), normal = samples.normals.row(i).transpose();
+    const float sigma = samples.noise[i];
+    shown.points.row(i) = (to_world * point).transpose();
+    shown.normals.row(i) = (to_world.linear() * normal).transpose();
+    const double apart = spacing_at(point.z(), sigma, camera, spacing);
+    shown.reach[i] = static_cast<float>(
+        std::max(camera_limits::surface_spacings * apart, base_limits::noise_sigmas * static_cast<double>(sigma)));
+  }
+  return shown;
+}
+
 }  // namespace
 
 Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in, int binning)
@@ -87,7 +117,8 @@ Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in, int 
   require(options.depth.tilt == 0.0 || can_calibrate_depth(camera), "depth.tilt",
           "0 unless the camera is a pinhole with depth along its axis", options.depth.tilt);
   const bool sees_one_scene = !options.region.is_limited();  // what turns before a camera is none with what is around
-  if (options.calibrate_depth && sees_one_scene && can_calibrate_depth(camera)) depth_views.emplace(camera);
+  if (options.deform) shape.emplace();
+  if (options.calibrate_depth && sees_one_scene && !shape && can_calibrate_depth(camera)) depth_views.emplace(camera);
 }
 
 // Pixels are averaged, and their systematic error is taken away, before all else.
@@ -123,8 +154,9 @@ FrameReport Pipeline::add_worked_on(const DepthRef& depth, const FrameExtras& ex
     organise(depth, clean, report);
     keep_region(report);
     observe(extras, report);
+    if (shape) deform(extras, report);
     const TrackingResult tracking = locate(extras, report);
-    if (report.status == FrameStatus::tracked) leave_out_moving(tracking, extras.colors, report);
+    if (report.status == FrameStatus::tracked && !shape) leave_out_moving(tracking, extras.colors, report);
     if (report.status != FrameStatus::lost) close_loops(tracking, extras.keep_guess && !extras.movable, report);
     if (report.status == FrameStatus::tracked) {
       if (was_lost()) report.status = FrameStatus::relocalised;
@@ -135,6 +167,7 @@ FrameReport Pipeline::add_worked_on(const DepthRef& depth, const FrameExtras& ex
       remember_view(report);
       calibrate_depth(report);
     }
+    if (shape) straighten_shape(report);
     odometry.end_frame(report.status, report.world_from_camera, report.weak_directions);
     const bool is_lost = report.status == FrameStatus::lost && history.num_registered() > 0;
     num_lost = is_lost ? num_lost + 1 : 0;
@@ -191,6 +224,27 @@ void Pipeline::set_noise_factor(double factor) {
   frame.sigma *= static_cast<float>(factor / noise_factor);
   now.sigma = frame.sigma;
   noise_factor = factor;
+}
+
+// What the camera may see of the shape, from where it most likely is, is bent until it lies on the frame.
+void Pipeline::deform(const FrameExtras& extras, FrameReport& report) {
+  if (!shape->has_nodes()) return;
+  const Stopwatch watch(report.milliseconds.registration);
+  shape->bend(cloud, options.num_threads);
+  blocks.renew(cloud);
+  if (frame.valid.size() < base_limits::least_points) return;
+  const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
+  const TrackingTarget target{cloud, blocks, spacing, before, still_scene, 0, usual_contradiction.mean()};
+  const Pose pose = extras.keep_guess
+                        ? *extras.guess
+                        : FrameRegistration(current, target, options)
+                              .from(guesses(extras).front(), FrameRegistration::Gate::narrow, Expectation::expected)
+                              .alignment.target_from_source;
+  const WarpFit fit =
+      shape->follow(cloud, rows_seen_from(cloud, camera, pose, frame),
+                    shown_surface(sample_frame(frame, observer, options), pose, camera, spacing), options.num_threads);
+  report.deformation.explained = fit.explained;
+  blocks.renew(cloud);
 }
 
 // Where the camera is. A lost one is reported where it was last.
@@ -422,12 +476,16 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
     if (options.fusion_method == FusionMethod::fuse) {
       report.fusion = fuse_observed(cloud, blocks, {frame, camera, observer, report.world_from_camera, index}, spacing,
                                     options.fusion, options.num_threads, extras.attributes);
+      const std::vector<std::uint8_t> kept = remove_violated(cloud, blocks, options.fusion, report.fusion);
+      if (shape && !kept.empty()) shape->keep(kept);
     } else {
       consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
     }
     while (options.fusion_method == FusionMethod::fuse && cloud.size() > options.max_points) {
       spacing *= model_limits::coarsening;
-      thin(cloud, spacing);
+      const std::vector<std::uint8_t> kept = thinned(cloud, spacing);
+      cloud.keep(kept);
+      if (shape) shape->keep(kept);
       blocks.renew(cloud);
     }
   }
@@ -435,6 +493,16 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
   const Stopwatch watch(report.milliseconds.normals);
   renew_normals(cloud, options);
   blocks.renew(cloud);
+}
+
+// The shape is as it was, where the camera is lost.
+void Pipeline::straighten_shape(FrameReport& report) {
+  if (report.status == FrameStatus::lost && shape->has_nodes()) shape->go_back(cloud, options.num_threads);
+  shape->straighten(cloud, camera, report.world_from_camera, spacing, static_cast<std::int32_t>(report.index),
+                    options.num_threads);
+  shape->end_frame();
+  report.deformation.num_nodes = static_cast<std::int64_t>(shape->num_nodes());
+  report.deformation.strain = shape->strain();
 }
 
 // What the camera saw is what the next frame is held against.

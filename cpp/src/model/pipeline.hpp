@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "deformation/deforming_shape.hpp"
 #include "fusion/observer.hpp"
 #include "loops/loop_closure.hpp"
 #include "model/frame_history.hpp"
@@ -40,6 +41,7 @@ struct Pipeline {
   std::vector<std::int32_t> depth_view_frames;  // their numbers
   PointModel cloud;
   BlockIndex blocks;  // of the cloud
+  std::optional<DeformingShape> shape;  // of a cloud that deforms
   LoopClosure loops{camera, options};
   FrameHistory history;
   StillScene still_scene{camera};
@@ -75,19 +77,23 @@ struct Pipeline {
   void organise(const DepthRef& depth, const DepthImage& clean, FrameReport& report);
   void keep_region(FrameReport& report);
   void observe(const FrameExtras& extras, FrameReport& report);
+  void deform(const FrameExtras& extras, FrameReport& report);
   TrackingResult locate(const FrameExtras& extras, FrameReport& report);
   void leave_out_moving(const TrackingResult& tracking, const ColorsRef& colors, FrameReport& report);
   void close_loops(const TrackingResult& tracking, bool is_given, FrameReport& report);
   void keep_view(const FrameReport& report);
   void adjust_views(FrameReport& report);
   void fuse_frame(const FrameExtras& extras, FrameReport& report);
+  void straighten_shape(FrameReport& report);
   void remember_view(const FrameReport& report);
   void calibrate_depth(FrameReport& report);
 
   // What they need.
   bool was_lost() const { return num_lost > 0; }
   bool jumped() const;
-  bool keeps_key_frames() const { return options.loop_closure && options.fusion_method == FusionMethod::fuse; }
+  bool keeps_key_frames() const {
+    return options.loop_closure && options.fusion_method == FusionMethod::fuse && !shape;
+  }
   TrackingResult register_frame(const FrameExtras& extras, const RegionReport& region_report);
   bool learns_noise() const;
   void set_noise_factor(double factor);

@@ -116,6 +116,7 @@ void exchange_state(Archive& archive, Pipeline& state) {
           state.loops, state.history, state.before, state.still_scene, state.odometry, state.hypothesis, state.views,
           state.spacing, state.num_lost, state.num_vain, state.start_frames);
   if (state.depth_views) archive(*state.depth_views);
+  if (state.shape) archive(*state.shape);
 }
 
 // Space that the table of rays may take before a frame was fused: see load.
@@ -289,6 +290,40 @@ bool PrivateState::is_sound(const FrameOdometry& odometry) {
           (odometry.path_->uncertainty.shift >= 0.0 && odometry.path_->uncertainty.turn.allFinite()));
 }
 
+bool PrivateState::is_sound(const DeformingShape& shape, std::size_t num_points, std::size_t num_frames) {
+  const WarpField& field = shape.field_;
+  const std::size_t count = field.nodes.size();
+  if (field.bindings.size() != num_points || shape.states_.size() != num_frames || !std::isfinite(field.node_spacing) ||
+      (count > 0 && !(field.node_spacing > 0.0))) {
+    return false;
+  }
+  const auto is_bound = [](const WarpBinding& binding, std::size_t most) {  // to some of the first nodes
+    const int num_nodes = binding.count();
+    for (int k = 0; k < num_nodes; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      if (!is_within(binding.nodes[i], most) || !(binding.distances[i] >= 0.0F)) return false;
+    }
+    return true;
+  };
+  for (std::size_t i = 0; i < count; ++i) {
+    const WarpNode& node = field.nodes[i];
+    const bool is_turned = (node.rotation.transpose() * node.rotation).isIdentity(1e-6);
+    if (!is_bound(node.parents, i) || !node.rest.allFinite() || !node.position.allFinite() || !is_turned) return false;
+  }
+  for (const NodeStates& states : shape.states_) {
+    if (states.size() > count) return false;
+    for (const std::array<float, 7>& state : states) {
+      if (!are_all(std::vector<float>(state.begin(), state.end()), [](float value) { return std::isfinite(value); })) {
+        return false;
+      }
+    }
+  }
+  return are_all(field.bindings, [&](const WarpBinding& binding) { return is_bound(binding, count); }) &&
+         are_all(field.edges, [&](const WarpEdge& edge) {
+           return is_within(edge.first, count) && is_within(edge.second, count) && edge.first < edge.second;
+         });
+}
+
 bool PrivateState::is_sound(const NoiseCalibration& calibration) {
   const auto is_mean = [](const NoiseCalibration::Mean& mean) {
     return std::isfinite(mean.value) && std::isfinite(mean.count) && mean.count >= 0.0;
@@ -406,6 +441,8 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
                       (!state.depth_views || PrivateState::is_sound(*state.depth_views)),
                   "the views that calibrate depth contradict the camera");
   archive.require(PrivateState::is_sound(state.still_scene), "the still scene has another size than the camera");
+  archive.require(!state.shape || PrivateState::is_sound(*state.shape, state.cloud.points.size(), num_frames),
+                  "the shape contradicts the points or itself");
   archive.require(PrivateState::is_sound(state.odometry), "the frame before contradicts itself");
   archive.require(PrivateState::is_sound(state.calibration) && PrivateState::is_sound(state.confidence_noise) &&
                       PrivateState::is_sound(state.residual_noise) && PrivateState::is_sound(state.usual_contradiction),

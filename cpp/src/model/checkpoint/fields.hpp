@@ -62,9 +62,9 @@ template <class Archive>
 void exchange(Archive& archive, ModelOptions& options) {
   archive(options.depth, options.region, options.registration);
   archive.choice(options.fusion_method, FusionMethod::wlop_plus);
-  archive(options.fusion, options.wlop, options.binning, options.calibrate_depth, options.spacing, options.max_points,
-          options.predict_motion, options.relocalise, options.loop_closure, options.denoise_samples, options.verify,
-          options.min_score, options.num_threads);
+  archive(options.fusion, options.wlop, options.binning, options.calibrate_depth, options.deform, options.spacing,
+          options.max_points, options.predict_motion, options.relocalise, options.loop_closure, options.denoise_samples,
+          options.verify, options.min_score, options.num_threads);
 }
 
 template <class Archive>
@@ -106,6 +106,12 @@ void exchange(Archive& archive, FusionReport& report) {
   exchange_counts(archive, report.num_updated, report.num_inserted, report.num_removed);
 }
 
+template <class Archive>
+void exchange(Archive& archive, DeformationReport& report) {
+  exchange_counts(archive, report.num_nodes);
+  archive.single(report.explained, report.strain);
+}
+
 // As whole nanoseconds.
 template <class Archive>
 void exchange(Archive& archive, StepTimes& times) {
@@ -140,7 +146,7 @@ void exchange(Archive& archive, FrameReport& report) {
   archive.single(report.overlap, report.consistency, report.score, report.rmse, report.loop_distance);
   exchange_symmetric(archive, report.information);
   archive(report.weak_directions, report.loop_frame, report.corrects_earlier, report.depth, report.region,
-          report.num_moving, report.fusion, report.num_points, report.spacing, report.milliseconds);
+          report.num_moving, report.fusion, report.deformation, report.num_points, report.spacing, report.milliseconds);
 }
 
 }  // namespace nacre

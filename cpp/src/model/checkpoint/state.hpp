@@ -2,6 +2,7 @@
 // of these structs adds it here, and raises the format's version in model/checkpoint/checkpoint.cpp.
 #pragma once
 
+#include "deformation/deforming_shape.hpp"
 #include "loops/loop_closure.hpp"
 #include "model/checkpoint/fields.hpp"
 #include "model/frame_history.hpp"
@@ -55,6 +56,26 @@ void exchange(Archive& archive, StartFrame& frame) {
   FrameExtras& extras = frame.extras;
   archive(frame.depth, frame.index, extras.colors, extras.attributes, extras.mask, extras.confidence, extras.timestamp,
           extras.guess);
+}
+
+template <class Archive>
+void exchange(Archive& archive, WarpBinding& binding) {
+  archive(binding.nodes, binding.distances);
+}
+
+template <class Archive>
+void exchange(Archive& archive, WarpNode& node) {
+  archive(node.rest, node.parents, node.rotation, node.position);
+}
+
+template <class Archive>
+void exchange(Archive& archive, WarpEdge& edge) {
+  archive(edge.first, edge.second);
+}
+
+template <class Archive>
+void exchange(Archive& archive, WarpField& field) {
+  archive(field.node_spacing, field.nodes, field.edges, field.bindings);
 }
 
 // Of classes that keep theirs to themselves.
@@ -158,6 +179,11 @@ struct PrivateState {
     archive(scene.scene_, scene.all_, scene.moved_);
   }
 
+  template <class Archive>
+  static void exchange(Archive& archive, DeformingShape& shape) {
+    archive(shape.field_, shape.states_);
+  }
+
   // Whether what was read can be gone on with.
   static bool is_sound(const NoiseCalibration& calibration);
   static bool is_sound(const DepthCalibrator& calibrator);
@@ -168,6 +194,7 @@ struct PrivateState {
   static bool is_sound(const PoseGraph& graph);
   static bool is_sound(const LoopClosure& loops, std::size_t num_frames);
   static bool is_sound(const FrameOdometry& odometry);
+  static bool is_sound(const DeformingShape& shape, std::size_t num_points, std::size_t num_frames);
   static bool is_sound(const StillScene& scene);
 };
 

@@ -1,0 +1,94 @@
+#include "deformation/deforming_shape.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/parallel.hpp"
+#include "camera/point_spacing.hpp"
+#include "deformation/limits.hpp"
+#include "deformation/node_growth.hpp"
+
+namespace nacre {
+namespace {
+
+template <class Value>
+void keep_flagged(std::vector<Value>& values, const std::vector<std::uint8_t>& flags) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    if (flags[i] != 0) values[count++] = values[i];
+  }
+  values.resize(count);
+}
+
+// So that what the first frame shows gets about so many nodes.
+double first_node_spacing(std::size_t num_points, double spacing) {
+  const double area = static_cast<double>(num_points) * spacing * spacing;
+  return std::max(deformation_limits::node_spacings * spacing, std::sqrt(area / deformation_limits::first_nodes));
+}
+
+}  // namespace
+
+// The model is as the field says.
+void DeformingShape::show(PointModel& model, int num_threads) {
+  bent_ = warped(field_, canonical_.points, canonical_.normals, num_threads);
+  model.points = bent_.points;
+  model.normals = bent_.normals;
+}
+
+void DeformingShape::bend(PointModel& model, int num_threads) {
+  nodes_before_ = field_.nodes;
+  canonical_ = {std::move(model.points), std::move(model.normals)};
+  show(model, num_threads);
+}
+
+WarpFit DeformingShape::follow(PointModel& model, const std::vector<std::int32_t>& in_view, const ShownSurface& shown,
+                               int num_threads) {
+  const WarpFit fit = register_warp(field_, canonical_, in_view, shown, num_threads);
+  show(model, num_threads);
+  return fit;
+}
+
+void DeformingShape::go_back(PointModel& model, int num_threads) {
+  field_.nodes = nodes_before_;
+  show(model, num_threads);
+}
+
+void DeformingShape::keep(const std::vector<std::uint8_t>& flags) {
+  for (OrientedPoints* shape : {&canonical_, &bent_}) {
+    keep_flagged(shape->points, flags);
+    keep_flagged(shape->normals, flags);
+  }
+  keep_flagged(field_.bindings, flags);
+}
+
+void DeformingShape::straighten(PointModel& model, const Camera& camera, const Pose& world_from_camera, double spacing,
+                                std::int32_t frame, int num_threads) {
+  constexpr std::int64_t block_size = 1024;
+  const std::size_t num_known = field_.bindings.size();
+  if (field_.nodes.empty() && !model.points.empty())
+    field_.node_spacing = first_node_spacing(model.points.size(), spacing);
+  const Eigen::Isometry3f camera_from_world(world_from_camera.inverse().cast<float>());
+  std::vector<float> spacings;
+  for (std::size_t i = num_known; i < model.points.size(); ++i) {
+    spacings.push_back(spacing_at((camera_from_world * model.points[i]).z(), 0.0F, camera, spacing));
+  }
+  grow(field_, {model.points, model.normals, spacings, model.last_seen, frame});
+  canonical_.points.resize(model.points.size());
+  canonical_.normals.resize(model.points.size());
+  parallel_for(static_cast<std::int64_t>(model.points.size()), block_size, num_threads, [&](std::int64_t number) {
+    const auto i = static_cast<std::size_t>(number);
+    const bool has_changed =
+        i >= num_known || model.points[i] != bent_.points[i] || model.normals[i] != bent_.normals[i];
+    if (!has_changed) return;
+    const OrientedPoint rest = unwarped(field_.at(field_.bindings[i]), {model.points[i], model.normals[i]});
+    canonical_.points[i] = rest.point;
+    canonical_.normals[i] = rest.normal;
+  });
+  model.points = std::move(canonical_.points);
+  model.normals = std::move(canonical_.normals);
+  canonical_ = bent_ = {};
+}
+
+void DeformingShape::end_frame() { states_.push_back(field_.states()); }
+
+}  // namespace nacre

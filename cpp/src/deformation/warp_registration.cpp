@@ -1,0 +1,274 @@
+#include "deformation/warp_registration.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "base/parallel.hpp"
+#include "base/random.hpp"
+#include "base/se3.hpp"
+#include "deformation/limits.hpp"
+#include "deformation/node_equations.hpp"
+#include "spatial/nearest_batch.hpp"
+
+namespace nacre {
+namespace {
+
+constexpr std::int64_t rows_per_block = 256;
+constexpr std::int64_t nodes_per_block = 8;
+
+// A point of the model, and what the frame shows next to it.
+struct WarpRow {
+  OrientedPoint canonical;
+  int num_nodes;
+  std::array<std::int32_t, WarpBinding::blended> nodes;
+  std::array<double, WarpBinding::blended> weights;
+  std::array<Vector6, WarpBinding::blended> jacobian;  // of the residual, by each node's motion
+  double residual = 0.0;                               // [m]
+  double weight = 0.0;                                 // [1/m^2]; 0: matched with nothing
+};
+
+class WarpRegistration {
+ public:
+  WarpRegistration(WarpField& field, const OrientedPoints& canonical, const std::vector<std::int32_t>& in_view,
+                   const ShownSurface& shown, int num_threads)
+      : field_(field),
+        shown_(shown),
+        num_threads_(num_threads),
+        tree_(shown.points.data(), shown.points.rows(), num_threads),
+        rows_(chosen_rows(field, canonical, in_view)),
+        nearest_(rows_.size(), no_slot),
+        equations_(field.nodes.size(), pairs()) {
+    uses_.resize(field.nodes.size());
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      const WarpRow& row = rows_[i];
+      for (int k = 0; k < row.num_nodes; ++k) {
+        Use use{i, k, {}};
+        const std::int32_t node = row.nodes[static_cast<std::size_t>(k)];
+        for (int m = 0; m < row.num_nodes; ++m) {
+          use.blocks[static_cast<std::size_t>(m)] = equations_.block_at(node, row.nodes[static_cast<std::size_t>(m)]);
+        }
+        uses_[static_cast<std::size_t>(node)].push_back(use);
+      }
+    }
+    neighbors_.resize(field.nodes.size());
+    for (const WarpEdge& edge : field.edges) {
+      for (const auto& [a, b] : {std::pair(edge.first, edge.second), std::pair(edge.second, edge.first)}) {
+        neighbors_[static_cast<std::size_t>(a)].push_back({b, equations_.block_at(a, a), equations_.block_at(a, b)});
+      }
+    }
+  }
+
+  WarpFit fit() {
+    const double widest = 0.5 * field_.node_spacing;
+    WarpFit found;
+    found.num_rows = static_cast<std::int64_t>(rows_.size());
+    if (rows_.empty()) return found;
+    for (int step = 0; step < deformation_limits::steps; ++step) {
+      const double part = 1.0 - static_cast<double>(step + 1) / deformation_limits::steps;  // to 0
+      match(part * widest);
+      move(1.0 + part * (deformation_limits::first_stiffness - 1.0));
+    }
+    match(0.0);
+    const auto num_matched =
+        std::count_if(rows_.begin(), rows_.end(), [](const WarpRow& row) { return row.weight > 0.0; });
+    found.explained = static_cast<double>(num_matched) / static_cast<double>(rows_.size());
+    return found;
+  }
+
+ private:
+  struct Use {  // of a node, by a row
+    std::size_t row;
+    int k;  // of the row's nodes
+    std::array<std::size_t, WarpBinding::blended> blocks;
+  };
+  struct Neighbor {
+    std::int32_t node;
+    std::size_t own_block, shared_block;
+  };
+
+  static std::vector<WarpRow> chosen_rows(const WarpField& field, const OrientedPoints& canonical,
+                                          const std::vector<std::int32_t>& in_view) {
+    const std::size_t step =
+        std::max<std::size_t>(1, (in_view.size() + deformation_limits::most_rows - 1) / deformation_limits::most_rows);
+    std::vector<WarpRow> rows;
+    for (std::size_t begin = 0; begin + step <= in_view.size(); begin += step) {
+      const auto i = static_cast<std::size_t>(in_view[begin + random_bits(0, begin) % step]);
+      const WarpBinding& binding = field.bindings[i];
+      WarpRow row;
+      row.canonical = {canonical.points[i], canonical.normals[i]};
+      row.num_nodes = binding.num_blended();
+      row.weights = binding.weights(field.reach());
+      std::copy_n(binding.nodes.begin(), WarpBinding::blended, row.nodes.begin());
+      rows.push_back(row);
+    }
+    return rows;
+  }
+
+  std::vector<std::pair<std::int32_t, std::int32_t>> pairs() const {
+    std::vector<std::pair<std::int32_t, std::int32_t>> found;
+    for (const WarpEdge& edge : field_.edges) found.emplace_back(edge.first, edge.second);
+    for (const WarpRow& row : rows_) {
+      for (int a = 0; a < row.num_nodes; ++a) {
+        for (int b = a + 1; b < row.num_nodes; ++b) {
+          found.emplace_back(
+              std::minmax(row.nodes[static_cast<std::size_t>(a)], row.nodes[static_cast<std::size_t>(b)]));
+        }
+      }
+    }
+    return found;
+  }
+
+  // Residuals and their derivatives at the field as it is.
+  void match(double gate) {
+    const double widest = std::max(gate, static_cast<double>(shown_.reach.maxCoeff()));
+    parallel_blocks(static_cast<std::int64_t>(rows_.size()), rows_per_block, num_threads_,
+                    [&](std::int64_t, std::int64_t begin, std::int64_t end) {
+                      float x[rows_per_block], y[rows_per_block], z[rows_per_block], squares[rows_per_block];
+                      Eigen::Vector3f normals[rows_per_block];
+                      for (std::int64_t i = begin; i < end; ++i) {
+                        const auto k = i - begin;
+                        const OrientedPoint moved = now(rows_[static_cast<std::size_t>(i)]);
+                        x[k] = moved.point.x();
+                        y[k] = moved.point.y();
+                        z[k] = moved.point.z();
+                        normals[k] = moved.normal;
+                      }
+                      find_nearest_points(tree_, {x, y, z, nearest_.data() + begin, squares, nullptr}, 0, end - begin,
+                                          widest);
+                      for (std::int64_t i = begin; i < end; ++i) {
+                        const auto k = i - begin;
+                        linearise(rows_[static_cast<std::size_t>(i)], {x[k], y[k], z[k]}, normals[k],
+                                  nearest_[static_cast<std::size_t>(i)], gate);
+                      }
+                    });
+  }
+
+  OrientedPoint now(const WarpRow& row) const {
+    Eigen::Matrix3d linear = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d place = Eigen::Vector3d::Zero();
+    const Eigen::Vector3d point = row.canonical.point.cast<double>();
+    for (int k = 0; k < row.num_nodes; ++k) {
+      const WarpNode& node = node_of(row, k);
+      const double weight = row.weights[static_cast<std::size_t>(k)];
+      linear += weight * node.rotation;
+      place += weight * (node.rotation * (point - node.rest) + node.position);
+    }
+    return {place.cast<float>(), (linear * row.canonical.normal.cast<double>()).normalized().cast<float>()};
+  }
+
+  void linearise(WarpRow& row, const Eigen::Vector3f& point, const Eigen::Vector3f& normal, std::uint32_t slot,
+                 double gate) const {
+    row.weight = 0.0;
+    if (slot == no_slot) return;
+    const auto found = static_cast<Eigen::Index>(tree_.id(slot));
+    const Eigen::Vector3f other = shown_.normals.row(found).transpose();
+    if (!(normal.dot(other) > deformation_limits::least_neighbor_cosine)) return;
+    const Eigen::Vector3f apart = shown_.points.row(found).transpose() - point;
+    const double reach = std::max(gate, static_cast<double>(shown_.reach[found]));
+    row.residual = static_cast<double>(other.dot(apart));
+    const double part = row.residual / reach;
+    if (!(std::abs(part) < 1.0) || static_cast<double>(apart.norm()) > std::max(gate, std::sqrt(2.0) * reach)) return;
+    const double sigma = static_cast<double>(shown_.sigma[found]);
+    const double robust = (1.0 - part * part) * (1.0 - part * part);  // Tukey's
+    row.weight = robust / (sigma * sigma);
+    const Eigen::Vector3d direction = other.cast<double>();
+    const Eigen::Vector3d canonical = row.canonical.point.cast<double>();
+    for (int k = 0; k < row.num_nodes; ++k) {
+      const WarpNode& node = node_of(row, k);
+      const double weight = row.weights[static_cast<std::size_t>(k)];
+      row.jacobian[static_cast<std::size_t>(k)] << weight * (node.rotation * (canonical - node.rest)).cross(direction),
+          weight * direction;
+    }
+  }
+
+  const WarpNode& node_of(const WarpRow& row, int k) const {
+    return field_.nodes[static_cast<std::size_t>(row.nodes[static_cast<std::size_t>(k)])];
+  }
+
+  // One step of Gauss and Newton.
+  void move(double stiffness) {
+    equations_.set_zero();
+    parallel_for(static_cast<std::int64_t>(field_.nodes.size()), nodes_per_block, num_threads_,
+                 [&](std::int64_t number) {
+                   const auto node = static_cast<std::int32_t>(number);
+                   add_rows(node);
+                   add_edges(node, stiffness);
+                   add_prior(node);
+                 });
+    const std::vector<Vector6> motion =
+        equations_.solve(deformation_limits::solver_tolerance, deformation_limits::most_solver_steps, num_threads_);
+    for (std::size_t i = 0; i < field_.nodes.size(); ++i) {
+      WarpNode& node = field_.nodes[i];
+      const Eigen::Vector3d axis = motion[i].head<3>();
+      const double angle = std::min(axis.norm(), deformation_limits::largest_turn);
+      node.rotation = nearest_rotation(rotation(axis, angle) * node.rotation);
+      node.position += motion[i].tail<3>();
+    }
+  }
+
+  void add_rows(std::int32_t number) {
+    const auto node = static_cast<std::size_t>(number);
+    for (const Use& use : uses_[node]) {
+      const WarpRow& row = rows_[use.row];
+      if (!(row.weight > 0.0)) continue;
+      const Vector6 own = row.weight * row.jacobian[static_cast<std::size_t>(use.k)];
+      equations_.right_side(node) += row.residual * own;
+      for (int m = 0; m < row.num_nodes; ++m) {
+        const auto other = static_cast<std::size_t>(m);
+        equations_.block(use.blocks[other]).noalias() += own * row.jacobian[other].transpose();
+      }
+    }
+  }
+
+  void add_edges(std::int32_t number, double stiffness) {
+    const auto i = static_cast<std::size_t>(number);
+    const WarpNode& a = field_.nodes[i];
+    for (const Neighbor& neighbor : neighbors_[i]) {
+      const WarpNode& b = field_.nodes[static_cast<std::size_t>(neighbor.node)];
+      const double length = deformation_limits::strain * (b.rest - a.rest).norm();
+      const double weight = length > 0.0 ? stiffness / (length * length) : 0.0;
+      const Eigen::Vector3d from_a = a.rotation * (b.rest - a.rest), from_b = b.rotation * (a.rest - b.rest);
+      const Eigen::Vector3d gap_a = from_a + a.position - b.position, gap_b = from_b + b.position - a.position;
+      Eigen::Matrix<double, 3, 6> by_own;  // of gap_a, by the node's own motion
+      by_own << -cross_matrix(from_a), Eigen::Matrix3d::Identity();
+      Matrix6& own = equations_.block(neighbor.own_block);
+      own.noalias() += weight * by_own.transpose() * by_own;
+      own.bottomRightCorner<3, 3>().diagonal().array() += weight;  // of gap_b
+      Matrix6& shared = equations_.block(neighbor.shared_block);
+      shared.rightCols<3>() -= weight * by_own.transpose();
+      shared.bottomRows<3>().leftCols<3>() += weight * cross_matrix(from_b);
+      shared.bottomRightCorner<3, 3>().diagonal().array() -= weight;
+      equations_.right_side(i).noalias() -= weight * by_own.transpose() * gap_a;
+      equations_.right_side(i).tail<3>() += weight * gap_b;
+    }
+  }
+
+  // No step is longer than where the field is anything like linear: what nothing holds stays.
+  void add_prior(std::int32_t node) {
+    Matrix6& own = equations_.block(equations_.block_at(node, node));
+    const double turn = 1.0 / (deformation_limits::largest_turn * deformation_limits::largest_turn);
+    own.topLeftCorner<3, 3>().diagonal().array() += turn;
+    own.bottomRightCorner<3, 3>().diagonal().array() += 1.0 / (field_.node_spacing * field_.node_spacing);
+  }
+
+  WarpField& field_;
+  const ShownSurface& shown_;
+  int num_threads_;
+  BlockTree<float> tree_;
+  std::vector<WarpRow> rows_;
+  std::vector<std::uint32_t> nearest_;  // of the rows, in the tree
+  NodeEquations equations_;
+  std::vector<std::vector<Use>> uses_;            // of each node
+  std::vector<std::vector<Neighbor>> neighbors_;  // likewise
+};
+
+}  // namespace
+
+WarpFit register_warp(WarpField& field, const OrientedPoints& canonical, const std::vector<std::int32_t>& in_view,
+                      const ShownSurface& shown, int num_threads) {
+  if (shown.points.rows() == 0) return {};
+  return WarpRegistration(field, canonical, in_view, shown, num_threads).fit();
+}
+
+}  // namespace nacre

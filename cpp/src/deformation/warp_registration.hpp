@@ -1,0 +1,30 @@
+// How has the shape bent? Registration of a deformable model to a frame.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "deformation/warp_field.hpp"
+
+namespace nacre {
+
+// What a frame shows, in the world frame.
+struct ShownSurface {
+  Points points, normals;
+  Values sigma;  // standard deviation of each point along its normal [m]
+  Values reach;  // how far off the surface that a point shows may be, at last [m]
+};
+
+struct WarpFit {
+  double explained = 0.0;  // part of the points in view that the frame shows where they are
+  std::int64_t num_rows = 0;
+};
+
+// Bends the field until the model's points in view (their rows; canonical) lie on what the frame shows: Gauss and
+// Newton's method on point-to-plane residuals, and as rigid as possible between nodes (Sorkine and Alexa 2007):
+//   sum of w (n . (q - phi(x)))^2 / sigma^2 + sum over edges, both ways, |R_l (g_m - g_l) + p_l - p_m|^2 / strain^2
+// with the nearest points q of what is shown, within a gate that narrows from half the distance between nodes.
+WarpFit register_warp(WarpField& field, const OrientedPoints& canonical, const std::vector<std::int32_t>& in_view,
+                      const ShownSurface& shown, int num_threads);
+
+}  // namespace nacre
