@@ -44,7 +44,7 @@ ORDER = [
     "registration",
     "outlines",
 ]
-ORDER += ["consolidation", "fusion", "tracking", "loops", "model"]
+ORDER += ["consolidation", "fusion", "tracking", "loops", "deformation", "model"]
 FOLDER = {name: folder for folder, names in PUBLIC.items() for name in names}
 HEADERS = sorted((ROOT / "cpp" / "include" / "nacre").glob("*.hpp"))
 CPP = ROOT / "cpp" / "src"
@@ -132,7 +132,7 @@ def test_no_modules_include_each_other_in_a_circle() -> None:
 
 # Folders whose numbers decide about data, and stand in their limits.hpp; those before only decide how fast.
 DECIDING = ["camera", "depth", "simulation", "region", "registration", "outlines", "consolidation", "fusion"]
-DECIDING += ["tracking", "loops", "model"]
+DECIDING += ["tracking", "loops", "deformation", "model"]
 # What decides nothing about data: sizes of blocks and arrays, names of values.
 STRUCTURE = "block_size capacity border right_border tile_size size side radius shift group per_chunk"
 STRUCTURE += " version_at bytes_per_pixel none any nothing missing largest infinity nan reach step kWordBits"

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/parallel.hpp"
 #include "camera/point_spacing.hpp"
@@ -37,6 +38,7 @@ void DeformingShape::show(PointModel& model, int num_threads) {
 
 void DeformingShape::bend(PointModel& model, int num_threads) {
   nodes_before_ = field_.nodes;
+  nodes_bent_.clear();
   canonical_ = {std::move(model.points), std::move(model.normals)};
   show(model, num_threads);
 }
@@ -44,8 +46,16 @@ void DeformingShape::bend(PointModel& model, int num_threads) {
 WarpFit DeformingShape::follow(PointModel& model, const std::vector<std::int32_t>& in_view, const ShownSurface& shown,
                                int num_threads) {
   const WarpFit fit = register_warp(field_, canonical_, in_view, shown, num_threads);
+  if (!fit.is_bent) nodes_bent_ = fit.bent;
   show(model, num_threads);
   return fit;
+}
+
+bool DeformingShape::follow_at_any_rate(PointModel& model, int num_threads) {
+  if (nodes_bent_.empty()) return false;
+  field_.nodes = std::exchange(nodes_bent_, {});
+  show(model, num_threads);
+  return true;
 }
 
 void DeformingShape::go_back(PointModel& model, int num_threads) {

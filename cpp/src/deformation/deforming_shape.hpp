@@ -23,6 +23,8 @@ class DeformingShape {
   // Bends a model that is bent on, until it lies on what a frame shows.
   WarpFit follow(PointModel& model, const std::vector<std::int32_t>& in_view, const ShownSurface& shown,
                  int num_threads);
+  // Where follow() left the shape as it was: as the frame would have it. Returns whether that is another.
+  bool follow_at_any_rate(PointModel& model, int num_threads);
   // As it was at the frame before.
   void go_back(PointModel& model, int num_threads);
   void keep(const std::vector<std::uint8_t>& flags);  // see PointModel::keep
@@ -41,9 +43,9 @@ class DeformingShape {
   void show(PointModel& model, int num_threads);
 
   WarpField field_;
-  std::vector<WarpNode> nodes_before_;
-  OrientedPoints canonical_, bent_;  // in the course of a frame
-  std::vector<NodeStates> states_;   // of each frame
+  std::vector<WarpNode> nodes_before_, nodes_bent_;  // empty: as the field has them
+  OrientedPoints canonical_, bent_;                  // in the course of a frame
+  std::vector<NodeStates> states_;                   // of each frame
 };
 
 }  // namespace nacre

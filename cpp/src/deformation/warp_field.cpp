@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "base/parallel.hpp"
+#include "base/se3.hpp"
 #include "deformation/limits.hpp"
 
 namespace nacre {
@@ -54,6 +55,27 @@ std::array<double, WarpBinding::blended> WarpBinding::weights(double reach) cons
     result[0] = sum = 1.0;
   }
   for (double& weight : result) weight /= sum;
+  return result;
+}
+
+void move(WarpNode& node, const Vector6& motion) {
+  const Eigen::Vector3d axis = motion.head<3>();
+  node.rotation =
+      nearest_rotation(rotation(axis, std::min(axis.norm(), deformation_limits::largest_turn)) * node.rotation);
+  node.position += motion.tail<3>();
+}
+
+Vector6 derivative(const WarpNode& node, const Eigen::Vector3d& canonical, const Eigen::Vector3d& direction) {
+  Vector6 result;
+  result << (node.rotation * (canonical - node.rest)).cross(direction), direction;
+  return result;
+}
+
+WarpGap gap_between(const WarpNode& first, const WarpNode& second) {
+  const Eigen::Vector3d expected = first.rotation * (second.rest - first.rest);
+  WarpGap result;
+  result.gap = expected + first.position - second.position;
+  result.by_first << -cross_matrix(expected), Eigen::Matrix3d::Identity();
   return result;
 }
 

@@ -34,6 +34,18 @@ struct WarpNode {
   Eigen::Vector3d position;  // where it is
 };
 
+// Turns a node about itself, by less than is about linear, and shifts it.
+void move(WarpNode& node, const Vector6& motion);
+// How far along a direction the node takes a canonical point, by its motion.
+Vector6 derivative(const WarpNode& node, const Eigen::Vector3d& canonical, const Eigen::Vector3d& direction);
+
+// Where the first node expects the second, from there: 0 in a shape that only turned and moved.
+struct WarpGap {
+  Eigen::Vector3d gap;
+  Eigen::Matrix<double, 3, 6> by_first;  // derivative by the first node's motion; by the second's shift it is -1
+};
+WarpGap gap_between(const WarpNode& first, const WarpNode& second);
+
 struct WarpEdge {
   std::int32_t first, second;  // first < second
   bool operator<(const WarpEdge& other) const {

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <utility>
 
+#include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "base/random.hpp"
-#include "base/se3.hpp"
 #include "deformation/limits.hpp"
 #include "deformation/node_equations.hpp"
 #include "spatial/nearest_batch.hpp"
@@ -14,8 +14,8 @@
 namespace nacre {
 namespace {
 
-constexpr std::int64_t rows_per_block = 256;
-constexpr std::int64_t nodes_per_block = 8;
+// Of a match that is as bad as none.
+constexpr double largest_misfit = base_limits::noise_sigmas * base_limits::noise_sigmas;
 
 // A point of the model, and what the frame shows next to it.
 struct WarpRow {
@@ -26,6 +26,7 @@ struct WarpRow {
   std::array<Vector6, WarpBinding::blended> jacobian;  // of the residual, by each node's motion
   double residual = 0.0;                               // [m]
   double weight = 0.0;                                 // [1/m^2]; 0: matched with nothing
+  double misfit = 0.0;                                 // [1]
 };
 
 class WarpRegistration {
@@ -60,16 +61,26 @@ class WarpRegistration {
   }
 
   WarpFit fit() {
-    const double widest = 0.5 * field_.node_spacing;
+    const double widest = deformation_limits::first_gate * field_.node_spacing;
     WarpFit found;
-    found.num_rows = static_cast<std::int64_t>(rows_.size());
     if (rows_.empty()) return found;
+    const std::vector<WarpNode> before = field_.nodes;
+    match(0.0);
+    const double misfit_before = misfit();
     for (int step = 0; step < deformation_limits::steps; ++step) {
       const double part = 1.0 - static_cast<double>(step + 1) / deformation_limits::steps;  // to 0
       match(part * widest);
       move(1.0 + part * (deformation_limits::first_stiffness - 1.0));
     }
     match(0.0);
+    // Akaike's criterion: what the shape as it was explains as well, noise may have bent.
+    found.bent = field_.nodes;
+    found.is_bent =
+        misfit_before - misfit() > deformation_limits::misfit_per_unknown * static_cast<double>(num_unknowns());
+    if (!found.is_bent) {
+      field_.nodes = before;
+      match(0.0);
+    }
     const auto num_matched =
         std::count_if(rows_.begin(), rows_.end(), [](const WarpRow& row) { return row.weight > 0.0; });
     found.explained = static_cast<double>(num_matched) / static_cast<double>(rows_.size());
@@ -121,11 +132,12 @@ class WarpRegistration {
 
   // Residuals and their derivatives at the field as it is.
   void match(double gate) {
+    constexpr std::int64_t block_size = 256;
     const double widest = std::max(gate, static_cast<double>(shown_.reach.maxCoeff()));
-    parallel_blocks(static_cast<std::int64_t>(rows_.size()), rows_per_block, num_threads_,
+    parallel_blocks(static_cast<std::int64_t>(rows_.size()), block_size, num_threads_,
                     [&](std::int64_t, std::int64_t begin, std::int64_t end) {
-                      float x[rows_per_block], y[rows_per_block], z[rows_per_block], squares[rows_per_block];
-                      Eigen::Vector3f normals[rows_per_block];
+                      float x[block_size], y[block_size], z[block_size], squares[block_size];
+                      Eigen::Vector3f normals[block_size];
                       for (std::int64_t i = begin; i < end; ++i) {
                         const auto k = i - begin;
                         const OrientedPoint moved = now(rows_[static_cast<std::size_t>(i)]);
@@ -144,6 +156,17 @@ class WarpRegistration {
                     });
   }
 
+  // The residuals' squares in standard deviations, robustly (Tukey's).
+  double misfit() const {
+    double sum = 0.0;
+    for (const WarpRow& row : rows_) sum += row.misfit;
+    return sum;
+  }
+
+  std::int64_t num_unknowns() const {
+    return 6 * std::count_if(uses_.begin(), uses_.end(), [](const auto& uses) { return !uses.empty(); });
+  }
+
   OrientedPoint now(const WarpRow& row) const {
     Eigen::Matrix3d linear = Eigen::Matrix3d::Zero();
     Eigen::Vector3d place = Eigen::Vector3d::Zero();
@@ -160,6 +183,7 @@ class WarpRegistration {
   void linearise(WarpRow& row, const Eigen::Vector3f& point, const Eigen::Vector3f& normal, std::uint32_t slot,
                  double gate) const {
     row.weight = 0.0;
+    row.misfit = largest_misfit;
     if (slot == no_slot) return;
     const auto found = static_cast<Eigen::Index>(tree_.id(slot));
     const Eigen::Vector3f other = shown_.normals.row(found).transpose();
@@ -172,13 +196,13 @@ class WarpRegistration {
     const double sigma = static_cast<double>(shown_.sigma[found]);
     const double robust = (1.0 - part * part) * (1.0 - part * part);  // Tukey's
     row.weight = robust / (sigma * sigma);
+    row.misfit = std::min(largest_misfit, reach * reach / (3.0 * sigma * sigma) * (1.0 - robust * (1.0 - part * part)));
     const Eigen::Vector3d direction = other.cast<double>();
     const Eigen::Vector3d canonical = row.canonical.point.cast<double>();
     for (int k = 0; k < row.num_nodes; ++k) {
       const WarpNode& node = node_of(row, k);
       const double weight = row.weights[static_cast<std::size_t>(k)];
-      row.jacobian[static_cast<std::size_t>(k)] << weight * (node.rotation * (canonical - node.rest)).cross(direction),
-          weight * direction;
+      row.jacobian[static_cast<std::size_t>(k)] = weight * derivative(node, canonical, direction);
     }
   }
 
@@ -188,23 +212,17 @@ class WarpRegistration {
 
   // One step of Gauss and Newton.
   void move(double stiffness) {
+    constexpr std::int64_t block_size = 8;
     equations_.set_zero();
-    parallel_for(static_cast<std::int64_t>(field_.nodes.size()), nodes_per_block, num_threads_,
-                 [&](std::int64_t number) {
-                   const auto node = static_cast<std::int32_t>(number);
-                   add_rows(node);
-                   add_edges(node, stiffness);
-                   add_prior(node);
-                 });
+    parallel_for(static_cast<std::int64_t>(field_.nodes.size()), block_size, num_threads_, [&](std::int64_t number) {
+      const auto node = static_cast<std::int32_t>(number);
+      add_rows(node);
+      add_edges(node, stiffness);
+      add_prior(node);
+    });
     const std::vector<Vector6> motion =
         equations_.solve(deformation_limits::solver_tolerance, deformation_limits::most_solver_steps, num_threads_);
-    for (std::size_t i = 0; i < field_.nodes.size(); ++i) {
-      WarpNode& node = field_.nodes[i];
-      const Eigen::Vector3d axis = motion[i].head<3>();
-      const double angle = std::min(axis.norm(), deformation_limits::largest_turn);
-      node.rotation = nearest_rotation(rotation(axis, angle) * node.rotation);
-      node.position += motion[i].tail<3>();
-    }
+    for (std::size_t i = 0; i < field_.nodes.size(); ++i) nacre::move(field_.nodes[i], motion[i]);
   }
 
   void add_rows(std::int32_t number) {
@@ -228,19 +246,15 @@ class WarpRegistration {
       const WarpNode& b = field_.nodes[static_cast<std::size_t>(neighbor.node)];
       const double length = deformation_limits::strain * (b.rest - a.rest).norm();
       const double weight = length > 0.0 ? stiffness / (length * length) : 0.0;
-      const Eigen::Vector3d from_a = a.rotation * (b.rest - a.rest), from_b = b.rotation * (a.rest - b.rest);
-      const Eigen::Vector3d gap_a = from_a + a.position - b.position, gap_b = from_b + b.position - a.position;
-      Eigen::Matrix<double, 3, 6> by_own;  // of gap_a, by the node's own motion
-      by_own << -cross_matrix(from_a), Eigen::Matrix3d::Identity();
+      const WarpGap out = gap_between(a, b), back = gap_between(b, a);
       Matrix6& own = equations_.block(neighbor.own_block);
-      own.noalias() += weight * by_own.transpose() * by_own;
-      own.bottomRightCorner<3, 3>().diagonal().array() += weight;  // of gap_b
+      own.noalias() += weight * out.by_first.transpose() * out.by_first;
+      own.bottomRightCorner<3, 3>().diagonal().array() += weight;
       Matrix6& shared = equations_.block(neighbor.shared_block);
-      shared.rightCols<3>() -= weight * by_own.transpose();
-      shared.bottomRows<3>().leftCols<3>() += weight * cross_matrix(from_b);
-      shared.bottomRightCorner<3, 3>().diagonal().array() -= weight;
-      equations_.right_side(i).noalias() -= weight * by_own.transpose() * gap_a;
-      equations_.right_side(i).tail<3>() += weight * gap_b;
+      shared.rightCols<3>() -= weight * out.by_first.transpose();
+      shared.bottomRows<3>() -= weight * back.by_first;
+      equations_.right_side(i).noalias() -= weight * out.by_first.transpose() * out.gap;
+      equations_.right_side(i).tail<3>() += weight * back.gap;
     }
   }
 

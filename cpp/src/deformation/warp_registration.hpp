@@ -16,8 +16,9 @@ struct ShownSurface {
 };
 
 struct WarpFit {
-  double explained = 0.0;  // part of the points in view that the frame shows where they are
-  std::int64_t num_rows = 0;
+  double explained = 0.0;      // part of the points in view that the frame shows where they are
+  bool is_bent = false;        // or the shape as it was explains as much as noise lets it, and stays
+  std::vector<WarpNode> bent;  // the nodes as the frame would have them, in any case
 };
 
 // Bends the field until the model's points in view (their rows; canonical) lie on what the frame shows: Gauss and

@@ -18,6 +18,7 @@
 #include "fusion/attribute_fusion.hpp"
 #include "fusion/deformation.hpp"
 #include "fusion/fuse.hpp"
+#include "fusion/limits.hpp"
 #include "model/limits.hpp"
 #include "model/object_views.hpp"
 #include "model/paper_loop.hpp"
@@ -76,16 +77,14 @@ FrameExtras averaged(const FrameExtras& extras, const PixelBinning& pixels) {
   return result;
 }
 
-// The model's points that a camera looks at, and that nothing it measured hides.
-std::vector<std::int32_t> rows_seen_from(const PointModel& model, const Camera& camera, const Pose& world_from_camera,
-                                         const Frame& frame) {
+// The model's points that a camera looks at.
+std::vector<std::int32_t> rows_seen_from(const PointModel& model, const Camera& camera, const Pose& world_from_camera) {
   const PointProjection projection(camera, world_from_camera);
   std::vector<std::int32_t> rows;
-  visit_points_in_view(as_rows(model.points), as_rows(model.normals), 0, model.size(), projection,
-                       [&](Eigen::Index i, const PointProjection::Block& block, int k) {
-                         if (block.facing[k] > 0.2F && frame.valid.size() > 0)
-                           rows.push_back(static_cast<std::int32_t>(i));
-                       });
+  const auto add = [&](Eigen::Index i, const PointProjection::Block& block, int k) {
+    if (block.facing[k] > fusion_limits::least_facing) rows.push_back(static_cast<std::int32_t>(i));
+  };
+  visit_points_in_view(as_rows(model.points), as_rows(model.normals), 0, model.size(), projection, add);
   return rows;
 }
 
@@ -155,7 +154,11 @@ FrameReport Pipeline::add_worked_on(const DepthRef& depth, const FrameExtras& ex
     keep_region(report);
     observe(extras, report);
     if (shape) deform(extras, report);
-    const TrackingResult tracking = locate(extras, report);
+    TrackingResult tracking = locate(extras, report);
+    if (report.status == FrameStatus::lost && shape && shape->follow_at_any_rate(cloud, options.num_threads)) {
+      blocks.renew(cloud);
+      tracking = locate(extras, report);
+    }
     if (report.status == FrameStatus::tracked && !shape) leave_out_moving(tracking, extras.colors, report);
     if (report.status != FrameStatus::lost) close_loops(tracking, extras.keep_guess && !extras.movable, report);
     if (report.status == FrameStatus::tracked) {
@@ -241,7 +244,7 @@ void Pipeline::deform(const FrameExtras& extras, FrameReport& report) {
                               .from(guesses(extras).front(), FrameRegistration::Gate::narrow, Expectation::expected)
                               .alignment.target_from_source;
   const WarpFit fit =
-      shape->follow(cloud, rows_seen_from(cloud, camera, pose, frame),
+      shape->follow(cloud, rows_seen_from(cloud, camera, pose),
                     shown_surface(sample_frame(frame, observer, options), pose, camera, spacing), options.num_threads);
   report.deformation.explained = fit.explained;
   blocks.renew(cloud);

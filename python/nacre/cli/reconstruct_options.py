@@ -76,6 +76,10 @@ CalibrateOption = Annotated[
         show_default="on",
     ),
 ]
+DeformOption = Annotated[
+    bool,
+    typer.Option("--deform", help="What is seen bends: grow its shape at rest, and follow how it is."),
+]
 AttributeOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -108,6 +112,7 @@ def asked_for(arguments: Mapping[str, Any], **more: Any) -> tuple[RunOptions, Mo
         "depth.max_depth": arguments["max_depth"],
         "loop_closure": arguments["loop_closure"],
         "calibrate_depth": arguments["calibrate"],
+        "deform": arguments["deform"] or None,
         "region.object": arguments["object"] or None,
     }
     if arguments["box"] is not None:
