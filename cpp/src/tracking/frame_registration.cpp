@@ -185,7 +185,7 @@ std::vector<Pose> FrameRegistration::around(const Pose& world_from_camera) const
 }
 
 bool FrameRegistration::may_be_beside(const TrackingResult& found, const Pose& guess) const {
-  if (found.is_lost()) return true;
+  if (found.is_lost() || found.decision == Decision::undetermined) return true;
   const double distance = view_distance(guess, found.alignment.target_from_source, depth_);
   return !found.is_clear_cut && distance * camera_limits::view_turn > 0.5 * tracking_limits::beside_turn;
 }
