@@ -261,8 +261,8 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
     through += part_of(counts.seen_through, other);
   }
   const double consistency = seen > 0.0 ? seen / (seen + through) : 0.0;
-  found.relocalisation_score = accept(found.alignment, consistency, Expectation::expected,
-                                      {options_.min_score, true, registration_limits::wrong_contradiction})
+  found.relocalisation_score = accept(found.alignment, {consistency}, Expectation::expected,
+                                      {options_.min_score, true, Consistency{1.0 - registration_limits::wrong_contradiction}})
                                    .relocalisation_score;
   const bool is_determined = found.alignment.weak_directions.cols() == 0;
   if (!is_determined || !PlaceOdds::is_for(found.relocalisation_score)) return std::nullopt;

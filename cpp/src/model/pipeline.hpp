@@ -16,7 +16,7 @@
 #include "tracking/residual_noise.hpp"
 #include "tracking/still_scene.hpp"
 #include "tracking/tracking.hpp"
-#include "tracking/usual_contradiction.hpp"
+#include "tracking/usual_consistency.hpp"
 
 namespace nacre {
 
@@ -49,7 +49,7 @@ struct Pipeline {
   DepthView before;                        // of the newest frame that was fused
   ConfidenceNoise confidence_noise;        // of registered frames
   ResidualNoise residual_noise;            // of registered frames, against what images show
-  UsualContradiction usual_contradiction;  // likewise, between them and the model
+  UsualConsistency usual_consistency;  // likewise, between them and the model
   double noise_factor = 1.0;               // of the newest frame
   FrameOdometry odometry;                  // up to the newest
   PlaceHypothesis hypothesis;              // while the camera is lost

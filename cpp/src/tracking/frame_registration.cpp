@@ -94,11 +94,11 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   result.alignment = align_to(target, source, start, align_options);
   determine_open_directions(view, target, source, align_options, result.alignment);
   const Pose& pose = result.alignment.target_from_source;
-  result.consistency = consistency(view, pose);
+  result.consistency = consistency(surfaces, pose);
   const bool is_far = view_distance(guess, pose, depth_) > camera_limits::new_direction / camera_limits::view_turn;
-  const bool has_jumped = expectation == Expectation::expected && target_.usual_contradiction;
+  const bool has_jumped = expectation == Expectation::expected && target_.usual;
   result.expectation = !is_far ? expectation : has_jumped ? Expectation::beside : Expectation::unexpected;
-  result.test(options_, target_.usual_contradiction);
+  result.test(options_, target_.usual);
   return result;
 }
 
@@ -146,13 +146,22 @@ void FrameRegistration::determine_open_directions(const PointsInView& view, cons
   }
 }
 
-// 0 where too few of the points are seen.
-double FrameRegistration::consistency(const PointsInView& view, const Pose& world_from_camera) const {
-  const double margin = camera_limits::surface_spacings * target_.spacing;
-  const double part =
-      compare(view.points, view.normals, now_.view, world_from_camera, now_.camera, {margin}, options_.num_threads)
-          .consistency(tracking_limits::least_judged);
-  return std::isfinite(part) ? part : 0.0;
+// 0 where too few of the model's points are seen: then nothing is known.
+Consistency FrameRegistration::consistency(const Surfaces& surfaces, const Pose& world_from_camera) const {
+  const VisibilityMargin margin = {camera_limits::surface_spacings * target_.spacing};
+  const PointsInView& model = surfaces.view;
+  const IcpCloud& samples = surfaces.samples.cloud;
+  const auto part_or = [](const VisibilityCounts& counts, double otherwise) {
+    const double part = counts.consistency(tracking_limits::least_judged);
+    return std::isfinite(part) ? part : otherwise;
+  };
+  const DepthView& last = target_.last_view;
+  return {part_or(compare(model.points, model.normals, now_.view, world_from_camera, now_.camera, margin,
+                          options_.num_threads),
+                  0.0),
+          part_or(compare(samples.points, samples.normals, last, world_from_camera.inverse() * last.world_from_camera,
+                          now_.camera, margin, options_.num_threads, take_rows<Values>(noise_, samples.rows)),
+                  1.0)};
 }
 
 const OutlinePair& FrameRegistration::outlines() const {

@@ -33,7 +33,7 @@ struct TrackingTarget {
   const DepthView& last_view;  // what the camera saw when it was last registered
   const StillScene& still_scene;
   std::int32_t oldest_frame;  // points that no later frame has seen may have drifted away: they are left out
-  std::optional<double> usual_contradiction;  // of registered frames: see AcceptanceOptions
+  std::optional<Consistency> usual;  // of registered frames: see AcceptanceOptions
 };
 
 class FrameRegistration {
@@ -86,7 +86,7 @@ class FrameRegistration {
   IcpSource gated(IcpSource source, const PointsInView& view, const IcpTarget& target) const;
   void determine_open_directions(const PointsInView& view, const IcpTarget& target, const IcpSource& gated,
                                  const AlignOptions& options, IcpResult& result) const;
-  double consistency(const PointsInView& view, const Pose& world_from_camera) const;
+  Consistency consistency(const Surfaces& surfaces, const Pose& world_from_camera) const;
   const OutlinePair& outlines() const;
 
   CurrentFrame now_;

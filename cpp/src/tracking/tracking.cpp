@@ -59,9 +59,9 @@ std::optional<TrackingResult> turned_on_plane(const TrackingTarget& target, cons
   if (!fit) return std::nullopt;
   TrackingResult result;
   result.alignment = fit->alignment;
-  result.consistency = fit->consistency;
+  result.consistency.of_target = fit->consistency;
   result.expectation = Expectation::only_place;
-  result.test(options, target.usual_contradiction);
+  result.test(options, target.usual);
   result.is_to_whole_model = result.is_on_plane = true;
   return result;
 }
@@ -84,7 +84,7 @@ void try_beside(const FrameRegistration& registration, const PointModel& model, 
 std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& registration,
                                                     const FrameOdometry& odometry, TrackingPrior& prior,
                                                     const TrackingOptions& options,
-                                                    std::optional<double> usual_contradiction) {
+                                                    const std::optional<Consistency>& usual) {
   if (!prior.has_moved || !prior.followed || !prior.followed->is_determined) return std::nullopt;
   const Pose& followed = prior.followed->world_from_camera;
   prior.tried.push_back(registration.from(followed, FrameRegistration::Gate::narrow, prior.expectation));
@@ -92,7 +92,7 @@ std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& reg
   for (TrackingResult place : prior.tried) {
     if (!odometry.allows(place.alignment.target_from_source, tracking_limits::least_new_view)) continue;
     place.expectation = Expectation::confirmed;
-    place.test(options, usual_contradiction);
+    place.test(options, usual);
     if (place.decision == Decision::accepted) keep_better(place, best);
   }
   return best.is_lost() ? std::nullopt : std::optional(best);
@@ -115,12 +115,12 @@ TrackingResult around_key_poses(const FrameRegistration& registration, const Poi
 }  // namespace
 
 std::optional<TrackingResult> only_near(const TrackingPrior& prior, const TrackingOptions& options,
-                                        std::optional<double> usual_contradiction) {
+                                        const std::optional<Consistency>& usual) {
   if (!options.relocalise || !prior.has_moved || !prior.elsewhere.beside) return std::nullopt;
   std::vector<TrackingResult> places = prior.tried;
   for (TrackingResult& place : places) {
     place.expectation = Expectation::only_near;
-    place.test(options, usual_contradiction);
+    place.test(options, usual);
   }
   const auto is_lower = [](const TrackingResult& a, const TrackingResult& b) { return a.score < b.score; };
   const auto best = std::max_element(places.begin(), places.end(), is_lower);
@@ -161,13 +161,13 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   if (prior.elsewhere.beside && registration.may_be_beside(best, prior.guesses.front())) {
     try_beside(registration, target.model, prior, options, best);
     if (best.is_lost()) {
-      if (const auto only = only_near(prior, options, target.usual_contradiction)) return *only;
+      if (const auto only = only_near(prior, options, target.usual)) return *only;
     }
   }
   if (!best.is_lost()) return best;
   follow();
   if (const auto confirmed =
-          confirmed_by_odometry(registration, odometry, prior, options, target.usual_contradiction)) {
+          confirmed_by_odometry(registration, odometry, prior, options, target.usual)) {
     return *confirmed;
   }
 
