@@ -28,13 +28,17 @@ FrameRegistration::FrameRegistration(const CurrentFrame& now, const TrackingTarg
       depth_(median_depth(samples.points)) {}
 
 TrackingResult FrameRegistration::from(const Pose& guess, Gate gate, Expectation expectation) const {
-  const PointsInView view = in_view(guess);
-  const TrackingResult whole = registered({source_, view, 0.0}, guess, guess, gate, expectation);
+  return from(guess, guess, gate, expectation);
+}
+
+TrackingResult FrameRegistration::from(const Pose& start, const Pose& guess, Gate gate, Expectation expectation) const {
+  const PointsInView view = in_view(start);
+  const TrackingResult whole = registered({source_, view, 0.0}, start, guess, gate, expectation);
   const bool is_near = expectation == Expectation::expected || expectation == Expectation::near_lost;
   if (!is_near || gate == Gate::wide) return whole;
   // Where something moves, what stays is registered, too; the better of both tells whether it does.
   TrackingResult best = whole;
-  for (const Pose& pose : {guess, whole.alignment.target_from_source}) {
+  for (const Pose& pose : {start, whole.alignment.target_from_source}) {
     const auto still = still_at(pose, view);
     if (!still) continue;
     const TrackingResult found =
@@ -95,7 +99,9 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   determine_open_directions(view, target, source, align_options, result.alignment);
   const Pose& pose = result.alignment.target_from_source;
   result.consistency = consistency(surfaces, pose);
-  const bool is_far = view_distance(guess, pose, depth_) > camera_limits::new_direction / camera_limits::view_turn;
+  const double starts = expectation == Expectation::beside ? 2.0 : 1.0;  // as far from the guess as from a start again
+  const bool is_far =
+      view_distance(guess, pose, depth_) > starts * camera_limits::new_direction / camera_limits::view_turn;
   const bool has_jumped = expectation == Expectation::expected && target_.usual;
   result.expectation = !is_far ? expectation : has_jumped ? Expectation::beside : Expectation::unexpected;
   result.test(options_, target_.usual);

@@ -45,8 +45,10 @@ class FrameRegistration {
     narrow,  // the guess is about right
     wide,    // it is not
   };
-  // expectation: of the guess (world_from_camera).
+  // expectation: of the guess (world_from_camera), and of what is found near it.
   TrackingResult from(const Pose& guess, Gate gate, Expectation expectation) const;
+  // The same from a start beside the guess.
+  TrackingResult from(const Pose& start, const Pose& guess, Gate gate, Expectation expectation) const;
 
   // A gate that the user has set is neither narrow nor wide.
   bool has_automatic_gate() const { return !(options_.registration.max_distance > 0.0); }

@@ -69,12 +69,12 @@ std::optional<TrackingResult> turned_on_plane(const TrackingTarget& target, cons
 // Beside the last pose, as where the camera turned fast. Directions that stay open could be those of any candidate.
 void try_beside(const FrameRegistration& registration, const PointModel& model, TrackingPrior& prior,
                 const TrackingOptions& options, TrackingResult& best) {
+  const Pose& last = prior.guesses.back();
   if (!prior.beside) {
-    prior.beside =
-        most_promising(model, registration.source(), registration.beside(prior.guesses.back()), options.registration);
+    prior.beside = most_promising(model, registration.source(), registration.beside(last), options.registration);
   }
   for (const Pose& candidate : *prior.beside) {
-    const TrackingResult found = registration.from(candidate, FrameRegistration::Gate::narrow, Expectation::beside);
+    const TrackingResult found = registration.from(candidate, last, FrameRegistration::Gate::narrow, Expectation::beside);
     if (found.decision == Decision::accepted) keep_better(found, best);
     prior.tried.push_back(found);
   }
