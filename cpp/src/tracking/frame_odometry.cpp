@@ -18,7 +18,7 @@ void FrameOdometry::look_at(const IcpSource& frame) {
 }
 
 void FrameOdometry::follow(const IcpSource& frame, const DepthView& view, const Camera& camera, double margin,
-                           const TrackingOptions& options) {
+                           const std::optional<Consistency>& usual, const TrackingOptions& options) {
   if (is_followed_ || !before_) return;
   is_followed_ = true;
   const IcpTarget target(AlignCloud(before_->points, before_->normals), options.registration);
@@ -28,7 +28,7 @@ void FrameOdometry::follow(const IcpSource& frame, const DepthView& view, const 
       compare(before_->points, before_->normals, view, moved.target_from_source, camera, {margin}, options.num_threads)
           .consistency(tracking_limits::least_judged);
   const auto is_believed = [&](Expectation expectation) {
-    return accept(moved, {consistency}, expectation, {options.min_score, true, {}}).decision != Decision::rejected;
+    return accept(moved, {consistency}, expectation, {options.min_score, true, usual}).decision != Decision::rejected;
   };
   if (is_believed(Expectation::expected)) {
     step_ = Step{moved.target_from_source, moved.weak_directions};

@@ -36,7 +36,9 @@ TrackingResult FrameRegistration::from(const Pose& start, const Pose& guess, Gat
   const TrackingResult whole = registered({source_, view, 0.0}, start, guess, gate, expectation);
   const bool is_near = expectation == Expectation::expected || expectation == Expectation::near_lost;
   if (!is_near || gate == Gate::wide) return whole;
-  // Where something moves, what stays is registered, too; the better of both tells whether it does.
+  // Where something moves, what stays is registered, too; the better of both tells whether it does. Scores count what
+  // hides the scene in the whole as new, and what is left out in the rest as untold, which is as much.
+  const auto fit = [](const TrackingResult& result) { return result.score * result.alignment.overlap; };
   TrackingResult best = whole;
   for (const Pose& pose : {start, whole.alignment.target_from_source}) {
     const auto still = still_at(pose, view);
@@ -45,7 +47,7 @@ TrackingResult FrameRegistration::from(const Pose& start, const Pose& guess, Gat
         registered({still->samples, view.part(still->points), still->moving}, pose, guess, gate, expectation);
     const bool is_better = best.is_lost()
                                ? found.rank() > best.rank()
-                               : !found.is_lost() && best.score < tracking_limits::clearly_better * found.score;
+                               : !found.is_lost() && fit(best) < tracking_limits::clearly_better * fit(found);
     if (is_better && still_at(found.alignment.target_from_source, view)) best = found;
     if (!best.is_lost()) break;
   }
