@@ -92,15 +92,16 @@ Acceptance accept(const IcpResult& alignment, const Consistency& consistency, Ex
   const double beyond_planes = demands.beyond_planes ? part_beyond_planes(alignment) : 1.0;
   acceptance.score = overlap * consistent * per_match * beyond_planes;
   if (expectation == Expectation::unexpected) acceptance.score *= unlikely;
-  acceptance.relocalisation_score = overlap * std::pow(consistency.of_target, relocalisation_consistency_power) * per_match /
-                                    (bent * bent) * alignment.normal_information * unlikely * beyond_planes;
+  acceptance.relocalisation_score = overlap * std::pow(consistency.of_target, relocalisation_consistency_power) *
+                                    per_match / (bent * bent) * alignment.normal_information * unlikely * beyond_planes;
   if (options.verify && is_other_size(alignment.size_difference, expectation)) {
     acceptance.relocalisation_score = 0.0;
     reason << "the frame is " << 1.0 / (1.0 + alignment.size_difference.relative)
            << " times as large as the part of the model that it fits";
   } else if (options.verify && !(acceptance.score >= least)) {
     reason << "registration score " << acceptance.score << " is below " << least << ": overlap " << overlap
-           << ", consistency " << consistency.of_target << " and " << consistency.of_source << ", residuals " << ratio << " of the largest that match";
+           << ", consistency " << consistency.of_target << " and " << consistency.of_source << ", residuals " << ratio
+           << " of the largest that match";
     if (bent > 1.0) reason << ", bent " << bent << " times as much as true matches may be";
     if (beyond_planes < 1.0) reason << ", all but " << alignment.off_planes << " on three planes";
   } else if (options.verify && !is_determined) {

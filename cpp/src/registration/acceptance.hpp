@@ -36,7 +36,7 @@ struct AcceptanceOptions {
   double min_score;
   bool verify;
   std::optional<Consistency> usual;  // the mean of what has been accepted, where it is known
-  double moving = 0.0;                        // part of the source that is left out, since it moves
+  double moving = 0.0;               // part of the source that is left out, since it moves
 };
 
 enum class Decision {

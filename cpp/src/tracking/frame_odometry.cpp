@@ -99,7 +99,8 @@ void FrameOdometry::end_frame(FrameStatus status, const Pose& world_from_camera,
   path_ = Path{world_from_camera, {}};
   if (!last || status == FrameStatus::relocalised) return;
   motion_ = last->world_from_camera.inverse() * world_from_camera;
-  if (!is_tracked_) {  // where no step tells what is open, the pose goes on as before, and is wrong by what that changes
+  // Where no step tells what is open, the pose goes on as before, and is wrong by what that changes.
+  if (!is_tracked_) {
     const bool is_followed = step && step->weak_directions.cols() == 0;
     path_->uncertainty = followed && is_followed ? followed->uncertainty : last->uncertainty;
     if (!is_followed) path_->uncertainty.add(reach(motion_), weak_directions, Eigen::Matrix3d::Identity());

@@ -32,7 +32,7 @@ struct TrackingTarget {
   double spacing;              // of the model [m]
   const DepthView& last_view;  // what the camera saw when it was last registered
   const StillScene& still_scene;
-  std::int32_t oldest_frame;  // points that no later frame has seen may have drifted away: they are left out
+  std::int32_t oldest_frame;         // points that no later frame has seen may have drifted away: they are left out
   std::optional<Consistency> usual;  // of registered frames: see AcceptanceOptions
 };
 

@@ -74,7 +74,8 @@ void try_beside(const FrameRegistration& registration, const PointModel& model, 
     prior.beside = most_promising(model, registration.source(), registration.beside(last), options.registration);
   }
   for (const Pose& candidate : *prior.beside) {
-    const TrackingResult found = registration.from(candidate, last, FrameRegistration::Gate::narrow, Expectation::beside);
+    const TrackingResult found =
+        registration.from(candidate, last, FrameRegistration::Gate::narrow, Expectation::beside);
     if (found.decision == Decision::accepted) keep_better(found, best);
     prior.tried.push_back(found);
   }
@@ -178,8 +179,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   if (best.decision == Decision::accepted) return best;
   follow();
   if (!best.is_lost()) return held_by_odometry(registration, best, prior);
-  if (const auto confirmed =
-          confirmed_by_odometry(registration, odometry, prior, options, target.usual)) {
+  if (const auto confirmed = confirmed_by_odometry(registration, odometry, prior, options, target.usual)) {
     return *confirmed;
   }
 

@@ -120,7 +120,7 @@ TEST_CASE("along a wall it may have gone, or turned, as far as it ever did in a 
   CHECK_FALSE(camera.odometry.allows(turned_by(camera_at(3), 0.11, Eigen::Vector3d::UnitY()), 0.0));
 }
 
-TEST_CASE("where directions were open when it was registered, it is unsure of them, unless the frame before tells them") {
+TEST_CASE("it is unsure of directions that were open when it was registered, unless the frame before tells them") {
   FrameOdometry::WeakDirections along_x = Vector6::Unit(3);
   const auto allows_shift = [&](bool is_followed, FrameStatus next = FrameStatus::lost) {
     Camcorder camera;

@@ -102,7 +102,7 @@ def test_seeing_through_the_model_speaks_against_a_pose() -> None:
 
 @pytest.mark.parametrize(("is_same", "status"), [(True, "TRACKED"), (False, "LOST")])
 def test_most_of_an_image_may_be_new_where_the_rest_contradicts_nothing(is_same: bool, status: str) -> None:
-    """A camera goes slowly, until it is known how much is seen through; then by four fifths of the image at once."""
+    """A camera goes slowly, until it is known what contradicts; then by four fifths of the image at once."""
     rng = np.random.default_rng(3)
     model = nacre.Model(FLAT, num_threads=1, relocalise=False)
     for pose in map(shifted, [0.0, 0.004, 0.008, 0.012, 0.016, 0.020, 0.024, 0.104]):
