@@ -32,7 +32,7 @@ def test_it_follows_from_the_score() -> None:
     model = nacre.Model(CAMERA)
     model.add_frame(view(0.0))
     report = model.add_frame(view(0.01))
-    assert report.probability == pytest.approx(1 / (1 + (0.037 / report.score) ** 1.73), rel=1e-6)
+    assert report.probability == pytest.approx(1 / (1 + (0.092 / report.score) ** 3.13), rel=1e-6)
 
 
 def test_of_a_lost_frame_it_is_small() -> None:

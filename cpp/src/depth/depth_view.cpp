@@ -40,14 +40,15 @@ Visibility visibility_in(const DepthView& view, const PointProjection::Block& bl
 
 VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, const DepthView& view,
                          const Pose& points_from_camera, const Camera& camera, const VisibilityMargin& margin,
-                         int num_threads) {
+                         int num_threads, const Values& sigma) {
   const PointProjection projection(camera, points_from_camera);
   return block_reduce(points.rows(), PointProjection::capacity, num_threads, VisibilityCounts{},
                       [&](std::int64_t begin, std::int64_t end) {
                         VisibilityCounts counts;
                         visit_points_in_view(points, normals, begin, end - begin, projection,
-                                             [&](auto, const PointProjection::Block& block, int i) {
-                                               counts.add(visibility_in(view, block, i, margin));
+                                             [&](auto row, const PointProjection::Block& block, int i) {
+                                               const float own = sigma.size() > 0 ? sigma[row] : 0.0F;
+                                               counts.add(visibility_in(view, block, i, margin, own));
                                              });
                         return counts;
                       });

@@ -56,10 +56,11 @@ struct VisibilityMargin {
 Visibility visibility_in(const DepthView& view, const PointProjection::Block& block, int i,
                          const VisibilityMargin& margin, float sigma = 0.0F);
 
-// Of oriented points, as a camera at a pose in their frame sees them: what it measured there says of each.
+// Of oriented points, as a camera at a pose in their frame sees them: what it measured there says of each. sigma: of
+// the points [m], or none.
 VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, const DepthView& view,
                          const Pose& points_from_camera, const Camera& camera, const VisibilityMargin& margin,
-                         int num_threads);
+                         int num_threads, const Values& sigma = Values());
 
 // Calls visit(i, block, k) for each of `count` points i, from the first on, that is in the image of a camera at a pose
 // in their frame: the k-th of a block.

@@ -261,9 +261,10 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
     through += part_of(counts.seen_through, other);
   }
   const double consistency = seen > 0.0 ? seen / (seen + through) : 0.0;
-  found.relocalisation_score = accept(found.alignment, consistency, Expectation::expected,
-                                      {options_.min_score, true, registration_limits::wrong_contradiction})
-                                   .relocalisation_score;
+  found.relocalisation_score =
+      accept(found.alignment, {consistency}, Expectation::expected,
+             {options_.min_score, true, Consistency{1.0 - registration_limits::wrong_contradiction}})
+          .relocalisation_score;
   const bool is_determined = found.alignment.weak_directions.cols() == 0;
   if (!is_determined || !PlaceOdds::is_for(found.relocalisation_score)) return std::nullopt;
   found.distance = rms_distance(cloud.points, pose, frame.alignment.target_from_source);

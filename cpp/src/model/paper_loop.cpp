@@ -72,8 +72,8 @@ TrackingResult PaperLoop::register_frame(const CurrentFrame& now, const Tracking
   const double part = compare(as_rows(target.model.points), as_rows(target.model.normals), now.view,
                               result.alignment.target_from_source, now.camera, {margin}, options.num_threads)
                           .consistency(tracking_limits::least_judged);
-  result.consistency = std::isfinite(part) ? part : 0.0;
-  result.test(options, target.usual_contradiction);
+  result.consistency.of_target = std::isfinite(part) ? part : 0.0;
+  result.test(options, target.usual);
   return result;
 }
 

@@ -277,13 +277,14 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
     result.decision = Decision::accepted;
     result.alignment.target_from_source = extras.guess.value_or(Pose::Identity());
     result.alignment.rmse = 0.0;
-    result.alignment.overlap = result.consistency = 1.0;
+    result.alignment.overlap = 1.0;
+    result.consistency = {};
     return result;
   }
   if (options.registration.method == Metric::paper) {
     return PaperLoop{options, static_cast<std::int32_t>(history.size())}.register_frame(
         {frame, cells, camera, observer, now, noise_factor},
-        {cloud, blocks, spacing, before, still_scene, 0, usual_contradiction.mean()}, guesses(extras).front());
+        {cloud, blocks, spacing, before, still_scene, 0, usual_consistency.mean()}, guesses(extras).front());
   }
   const Expectation expectation = was_lost() || jumped() ? Expectation::near_lost : Expectation::expected;
   const bool is_predicted = !was_lost() || extras.guess.has_value();
@@ -306,7 +307,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
 TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
   const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
   const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
-  const TrackingTarget target{cloud, blocks, spacing, before, still_scene, oldest_frame, usual_contradiction.mean()};
+  const TrackingTarget target{cloud, blocks, spacing, before, still_scene, oldest_frame, usual_consistency.mean()};
   TrackingResult result;
   TrackingOptions nearby = options;
   nearby.relocalise = false;
@@ -330,13 +331,13 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
     if (!is_found()) {
       const auto is_too_quiet = [&](const TrackingResult& place) { return !is_as_noisy(place); };
       prior.tried.erase(std::remove_if(prior.tried.begin(), prior.tried.end(), is_too_quiet), prior.tried.end());
-      result = only_near(prior, options, usual_contradiction.mean()).value_or(TrackingResult());
+      result = only_near(prior, options, usual_consistency.mean()).value_or(TrackingResult());
       set_noise_factor(result.is_lost() ? known_noise_factor() : result.noise_factor);
     }
   }
   if (result.is_lost()) result = track(current, target, prior, odometry, hypothesis, may_search ? options : nearby);
   if (result.decision == Decision::accepted && result.expectation == Expectation::expected) {
-    usual_contradiction.add(1.0 - result.consistency);
+    usual_consistency.add(result.consistency);
   }
   if (learns_noise() && result.decision == Decision::accepted && !result.is_on_plane) {
     residual_noise.add(noise_factor * result.alignment.residual_sigmas);

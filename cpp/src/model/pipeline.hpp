@@ -17,7 +17,7 @@
 #include "tracking/residual_noise.hpp"
 #include "tracking/still_scene.hpp"
 #include "tracking/tracking.hpp"
-#include "tracking/usual_contradiction.hpp"
+#include "tracking/usual_consistency.hpp"
 
 namespace nacre {
 
@@ -45,17 +45,17 @@ struct Pipeline {
   LoopClosure loops{camera, options};
   FrameHistory history;
   StillScene still_scene{camera};
-  CoarseFrame cells;                       // of the newest frame
-  DepthView now;                           // of the newest, from the origin: where the camera is, is to be found
-  std::vector<OutlinePoint> outline;       // of the newest
-  DepthView before;                        // of the newest frame that was fused
-  ConfidenceNoise confidence_noise;        // of registered frames
-  ResidualNoise residual_noise;            // of registered frames, against what images show
-  UsualContradiction usual_contradiction;  // likewise, between them and the model
-  double noise_factor = 1.0;               // of the newest frame
-  FrameOdometry odometry;                  // up to the newest
-  PlaceHypothesis hypothesis;              // while the camera is lost
-  std::vector<ObjectView> views;           // of an object that stands on a plane, from different directions
+  CoarseFrame cells;                   // of the newest frame
+  DepthView now;                       // of the newest, from the origin: where the camera is, is to be found
+  std::vector<OutlinePoint> outline;   // of the newest
+  DepthView before;                    // of the newest frame that was fused
+  ConfidenceNoise confidence_noise;    // of registered frames
+  ResidualNoise residual_noise;        // of registered frames, against what images show
+  UsualConsistency usual_consistency;  // likewise, between them and the model
+  double noise_factor = 1.0;           // of the newest frame
+  FrameOdometry odometry;              // up to the newest
+  PlaceHypothesis hypothesis;          // while the camera is lost
+  std::vector<ObjectView> views;       // of an object that stands on a plane, from different directions
   double spacing = 0.0;
   std::int64_t num_lost = 0;             // frames in a row, up to the newest
   std::int64_t num_vain = 0;             // of them, those that showed something

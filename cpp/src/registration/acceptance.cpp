@@ -38,10 +38,10 @@ Demands demands_on(Expectation expectation) {
   }
 }
 
-// Of places near a guess, how much more what they contradict speaks for one than for another.
-double consistency_weight(double contradiction, double usual) {
+// Of places near a guess, how much more what either side sees through speaks for one than for another.
+double consistency_weight(const Consistency& found, const Consistency& usual) {
   using namespace registration_limits;
-  return usual_weight * (usual + least_contradiction) / (contradiction + least_contradiction);
+  return usual_weight * (usual.contradiction() + least_contradiction) / (found.contradiction() + least_contradiction);
 }
 
 // Of what matches tell, the part that three planes do not.
@@ -50,9 +50,10 @@ double part_beyond_planes(const IcpResult& alignment) {
 }
 
 // Of a right place to a wrong one; at most 1, and never 0.
-double likelihood_ratio(double contradiction, std::optional<double> usual) {
-  const double wrong = registration_limits::wrong_contradiction;
-  const double right = std::clamp(usual.value_or(wrong), registration_limits::least_ratio * wrong, wrong);
+double likelihood_ratio(const Consistency& found, const std::optional<Consistency>& usual) {
+  const double wrong = registration_limits::wrong_contradiction, contradiction = 1.0 - found.of_target;
+  const double right =
+      std::clamp(usual ? 1.0 - usual->of_target : wrong, registration_limits::least_ratio * wrong, wrong);
   return std::min(1.0, wrong / right * std::exp(-contradiction * (1.0 / right - 1.0 / wrong)));
 }
 
@@ -65,7 +66,7 @@ bool is_other_size(const SizeDifference& size, Expectation expectation) {
 
 }  // namespace
 
-Acceptance accept(const IcpResult& alignment, double consistency, Expectation expectation,
+Acceptance accept(const IcpResult& alignment, const Consistency& consistency, Expectation expectation,
                   const AcceptanceOptions& options) {
   using namespace registration_limits;
   Acceptance acceptance;
@@ -81,24 +82,26 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
   const double bent = std::max(1.0, alignment.misfit / demands.largest_misfit);
   const double per_match = std::max(0.0, std::log(chance_ratio / ratio)) / (bent * bent);
   const double least = demands.score * options.min_score;
-  const double unlikely = likelihood_ratio(1.0 - consistency, options.usual_contradiction);
+  const double unlikely = likelihood_ratio(consistency, options.usual);
   const bool is_near = expectation != Expectation::unexpected && expectation != Expectation::only_place;
   const bool is_determined = alignment.weak_directions.cols() == 0;
-  const double consistent = is_near && is_determined && options.usual_contradiction
-                                ? consistency_weight(1.0 - consistency, *options.usual_contradiction)
-                                : std::pow(consistency, demands.consistency_power);
+  const double consistent =
+      is_near && is_determined && options.usual
+          ? consistency_weight(consistency, *options.usual)
+          : alignment.overlap * std::pow(consistency.of_target * consistency.of_source, demands.consistency_power);
   const double beyond_planes = demands.beyond_planes ? part_beyond_planes(alignment) : 1.0;
-  acceptance.score = overlap * alignment.overlap * consistent * per_match * beyond_planes;
+  acceptance.score = overlap * consistent * per_match * beyond_planes;
   if (expectation == Expectation::unexpected) acceptance.score *= unlikely;
-  acceptance.relocalisation_score = overlap * std::pow(consistency, relocalisation_consistency_power) * per_match /
-                                    (bent * bent) * alignment.normal_information * unlikely * beyond_planes;
+  acceptance.relocalisation_score = overlap * std::pow(consistency.of_target, relocalisation_consistency_power) *
+                                    per_match / (bent * bent) * alignment.normal_information * unlikely * beyond_planes;
   if (options.verify && is_other_size(alignment.size_difference, expectation)) {
     acceptance.relocalisation_score = 0.0;
     reason << "the frame is " << 1.0 / (1.0 + alignment.size_difference.relative)
            << " times as large as the part of the model that it fits";
   } else if (options.verify && !(acceptance.score >= least)) {
     reason << "registration score " << acceptance.score << " is below " << least << ": overlap " << overlap
-           << ", consistency " << consistency << ", residuals " << ratio << " of the largest that match";
+           << ", consistency " << consistency.of_target << " and " << consistency.of_source << ", residuals " << ratio
+           << " of the largest that match";
     if (bent > 1.0) reason << ", bent " << bent << " times as much as true matches may be";
     if (beyond_planes < 1.0) reason << ", all but " << alignment.off_planes << " on three planes";
   } else if (options.verify && !is_determined) {
@@ -108,7 +111,7 @@ Acceptance accept(const IcpResult& alignment, double consistency, Expectation ex
     if (expectation == Expectation::unexpected) reason << ", far from all guesses";
   } else {
     acceptance.decision = Decision::accepted;
-    acceptance.is_clear_cut = options.verify && acceptance.score >= clear_cut_score * options.min_score;
+    acceptance.is_clear_cut = options.verify && overlap * acceptance.score >= clear_cut_score * options.min_score;
   }
   acceptance.reason = reason.str();
   return acceptance;

@@ -23,11 +23,20 @@ enum class Expectation {
   only_place,  // of all places, which a search has compared, the only one: see accept_best
 };
 
+// Of what either side should see of the other, the part that it does not see through.
+struct Consistency {
+  double of_target = 1.0;  // of the target's points, in the source's image
+  double of_source = 1.0;  // of the source's points, in the last image of the target; 1 where that shows too few
+
+  // What both see through, together.
+  double contradiction() const { return (1.0 - of_target) + (1.0 - of_source); }
+};
+
 struct AcceptanceOptions {
   double min_score;
   bool verify;
-  std::optional<double> usual_contradiction;  // mean 1 - consistency of what has been accepted, where it is known
-  double moving = 0.0;                        // part of the source that is left out, since it moves
+  std::optional<Consistency> usual;  // the mean of what has been accepted, where it is known
+  double moving = 0.0;               // part of the source that is left out, since it moves
 };
 
 enum class Decision {
@@ -50,7 +59,8 @@ struct Acceptance {
 // would have matched, ln(0.58 / ratio), where chance gives a ratio of 0.58; times overlap^2, since any two surfaces
 // touch somewhere, and consistency^4, since true ones contradict nowhere; by misfit^2 where it is above 1, since a
 // shape that only resembles is bent another way. Once it is known how much right places contradict, near a guess
-// the usual contradiction to this one takes the place of consistency^4. After a loss more is asked for. Beside the last
+// the usual contradictions to these ones, of either side, take the place of consistency^4, and overlap that of its
+// square: what is new is told from what should match and does not. After a loss more is asked for. Beside the last
 // pose misfit above half counts, too; far from all guesses, where many places resemble, so does consistency^8, and the
 // score is the lower, the more of the matches lie on three planes: see share_off_planes.
 //
@@ -70,8 +80,8 @@ struct Acceptance {
 // A source that is clearly larger or smaller than what it fits is lost: its depth is wrong, or it is another thing.
 //
 // A registration score of min_score is enough where everything speaks for the place; without `verify` whatever matches
-// is accepted. consistency: the part of what both sides should see that they do not see through.
-Acceptance accept(const IcpResult& alignment, double consistency, Expectation expectation,
+// is accepted.
+Acceptance accept(const IcpResult& alignment, const Consistency& consistency, Expectation expectation,
                   const AcceptanceOptions& options);
 
 // Views of one place, each of which may say too little alone (a sequential test, Wald 1945).

@@ -18,7 +18,7 @@ void FrameOdometry::look_at(const IcpSource& frame) {
 }
 
 void FrameOdometry::follow(const IcpSource& frame, const DepthView& view, const Camera& camera, double margin,
-                           const TrackingOptions& options) {
+                           const std::optional<Consistency>& usual, const TrackingOptions& options) {
   if (is_followed_ || !before_) return;
   is_followed_ = true;
   const IcpTarget target(AlignCloud(before_->points, before_->normals), options.registration);
@@ -28,7 +28,7 @@ void FrameOdometry::follow(const IcpSource& frame, const DepthView& view, const 
       compare(before_->points, before_->normals, view, moved.target_from_source, camera, {margin}, options.num_threads)
           .consistency(tracking_limits::least_judged);
   const auto is_believed = [&](Expectation expectation) {
-    return accept(moved, consistency, expectation, {options.min_score, true, {}}).decision != Decision::rejected;
+    return accept(moved, {consistency}, expectation, {options.min_score, true, usual}).decision != Decision::rejected;
   };
   if (is_believed(Expectation::expected)) {
     step_ = Step{moved.target_from_source, moved.weak_directions};
@@ -99,9 +99,11 @@ void FrameOdometry::end_frame(FrameStatus status, const Pose& world_from_camera,
   path_ = Path{world_from_camera, {}};
   if (!last || status == FrameStatus::relocalised) return;
   motion_ = last->world_from_camera.inverse() * world_from_camera;
-  if (!is_tracked_) {  // where directions are open the pose goes on as before, and is wrong by what that changes
-    path_->uncertainty = last->uncertainty;
-    path_->uncertainty.add(reach(motion_), weak_directions, Eigen::Matrix3d::Identity());
+  // Where no step tells what is open, the pose goes on as before, and is wrong by what that changes.
+  if (!is_tracked_) {
+    const bool is_followed = step && step->weak_directions.cols() == 0;
+    path_->uncertainty = followed && is_followed ? followed->uncertainty : last->uncertainty;
+    if (!is_followed) path_->uncertainty.add(reach(motion_), weak_directions, Eigen::Matrix3d::Identity());
   } else if (was_tracked) {
     largest_step_ = reach(motion_);
   }

@@ -28,20 +28,26 @@ FrameRegistration::FrameRegistration(const CurrentFrame& now, const TrackingTarg
       depth_(median_depth(samples.points)) {}
 
 TrackingResult FrameRegistration::from(const Pose& guess, Gate gate, Expectation expectation) const {
-  const PointsInView view = in_view(guess);
-  const TrackingResult whole = registered({source_, view, 0.0}, guess, guess, gate, expectation);
+  return from(guess, guess, gate, expectation);
+}
+
+TrackingResult FrameRegistration::from(const Pose& start, const Pose& guess, Gate gate, Expectation expectation) const {
+  const PointsInView view = in_view(start);
+  const TrackingResult whole = registered({source_, view, 0.0}, start, guess, gate, expectation);
   const bool is_near = expectation == Expectation::expected || expectation == Expectation::near_lost;
   if (!is_near || gate == Gate::wide) return whole;
-  // Where something moves, what stays is registered, too; the better of both tells whether it does.
+  // Where something moves, what stays is registered, too; the better of both tells whether it does. Scores count what
+  // hides the scene in the whole as new, and what is left out in the rest as untold, which is as much.
+  const auto fit = [](const TrackingResult& result) { return result.score * result.alignment.overlap; };
   TrackingResult best = whole;
-  for (const Pose& pose : {guess, whole.alignment.target_from_source}) {
+  for (const Pose& pose : {start, whole.alignment.target_from_source}) {
     const auto still = still_at(pose, view);
     if (!still) continue;
     const TrackingResult found =
         registered({still->samples, view.part(still->points), still->moving}, pose, guess, gate, expectation);
     const bool is_better = best.is_lost()
                                ? found.rank() > best.rank()
-                               : !found.is_lost() && best.score < tracking_limits::clearly_better * found.score;
+                               : !found.is_lost() && fit(best) < tracking_limits::clearly_better * fit(found);
     if (is_better && still_at(found.alignment.target_from_source, view)) best = found;
     if (!best.is_lost()) break;
   }
@@ -94,11 +100,13 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   result.alignment = align_to(target, source, start, align_options);
   determine_open_directions(view, target, source, align_options, result.alignment);
   const Pose& pose = result.alignment.target_from_source;
-  result.consistency = consistency(view, pose);
-  const bool is_far = view_distance(guess, pose, depth_) > camera_limits::new_direction / camera_limits::view_turn;
-  const bool has_jumped = expectation == Expectation::expected && target_.usual_contradiction;
+  result.consistency = consistency(surfaces, pose);
+  const double starts = expectation == Expectation::beside ? 2.0 : 1.0;  // as far from the guess as from a start again
+  const bool is_far =
+      view_distance(guess, pose, depth_) > starts * camera_limits::new_direction / camera_limits::view_turn;
+  const bool has_jumped = expectation == Expectation::expected && target_.usual;
   result.expectation = !is_far ? expectation : has_jumped ? Expectation::beside : Expectation::unexpected;
-  result.test(options_, target_.usual_contradiction);
+  result.test(options_, target_.usual);
   return result;
 }
 
@@ -146,13 +154,22 @@ void FrameRegistration::determine_open_directions(const PointsInView& view, cons
   }
 }
 
-// 0 where too few of the points are seen.
-double FrameRegistration::consistency(const PointsInView& view, const Pose& world_from_camera) const {
-  const double margin = camera_limits::surface_spacings * target_.spacing;
-  const double part =
-      compare(view.points, view.normals, now_.view, world_from_camera, now_.camera, {margin}, options_.num_threads)
-          .consistency(tracking_limits::least_judged);
-  return std::isfinite(part) ? part : 0.0;
+// 0 where too few of the model's points are seen: then nothing is known.
+Consistency FrameRegistration::consistency(const Surfaces& surfaces, const Pose& world_from_camera) const {
+  const VisibilityMargin margin = {camera_limits::surface_spacings * target_.spacing};
+  const PointsInView& model = surfaces.view;
+  const IcpCloud& samples = surfaces.samples.cloud;
+  const auto part_or = [](const VisibilityCounts& counts, double otherwise) {
+    const double part = counts.consistency(tracking_limits::least_judged);
+    return std::isfinite(part) ? part : otherwise;
+  };
+  const DepthView& last = target_.last_view;
+  return {part_or(compare(model.points, model.normals, now_.view, world_from_camera, now_.camera, margin,
+                          options_.num_threads),
+                  0.0),
+          part_or(compare(samples.points, samples.normals, last, world_from_camera.inverse() * last.world_from_camera,
+                          now_.camera, margin, options_.num_threads, take_rows<Values>(noise_, samples.rows)),
+                  1.0)};
 }
 
 const OutlinePair& FrameRegistration::outlines() const {
@@ -185,7 +202,7 @@ std::vector<Pose> FrameRegistration::around(const Pose& world_from_camera) const
 }
 
 bool FrameRegistration::may_be_beside(const TrackingResult& found, const Pose& guess) const {
-  if (found.is_lost()) return true;
+  if (found.is_lost() || found.decision == Decision::undetermined) return true;
   const double distance = view_distance(guess, found.alignment.target_from_source, depth_);
   return !found.is_clear_cut && distance * camera_limits::view_turn > 0.5 * tracking_limits::beside_turn;
 }

@@ -32,8 +32,8 @@ struct TrackingTarget {
   double spacing;              // of the model [m]
   const DepthView& last_view;  // what the camera saw when it was last registered
   const StillScene& still_scene;
-  std::int32_t oldest_frame;  // points that no later frame has seen may have drifted away: they are left out
-  std::optional<double> usual_contradiction;  // of registered frames: see AcceptanceOptions
+  std::int32_t oldest_frame;         // points that no later frame has seen may have drifted away: they are left out
+  std::optional<Consistency> usual;  // of registered frames: see AcceptanceOptions
 };
 
 class FrameRegistration {
@@ -45,8 +45,10 @@ class FrameRegistration {
     narrow,  // the guess is about right
     wide,    // it is not
   };
-  // expectation: of the guess (world_from_camera).
+  // expectation: of the guess (world_from_camera), and of what is found near it.
   TrackingResult from(const Pose& guess, Gate gate, Expectation expectation) const;
+  // The same from a start beside the guess.
+  TrackingResult from(const Pose& start, const Pose& guess, Gate gate, Expectation expectation) const;
 
   // A gate that the user has set is neither narrow nor wide.
   bool has_automatic_gate() const { return !(options_.registration.max_distance > 0.0); }
@@ -86,7 +88,7 @@ class FrameRegistration {
   IcpSource gated(IcpSource source, const PointsInView& view, const IcpTarget& target) const;
   void determine_open_directions(const PointsInView& view, const IcpTarget& target, const IcpSource& gated,
                                  const AlignOptions& options, IcpResult& result) const;
-  double consistency(const PointsInView& view, const Pose& world_from_camera) const;
+  Consistency consistency(const Surfaces& surfaces, const Pose& world_from_camera) const;
   const OutlinePair& outlines() const;
 
   CurrentFrame now_;

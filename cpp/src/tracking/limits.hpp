@@ -36,8 +36,8 @@ constexpr double climb_lever = 3.0;  // [1/size] derived: turns by what shifts a
 constexpr double least_view_overlap = 0.1;  // [1] tuned: with the view that agrees most; dog
 constexpr double least_view_consistency = 0.75;  // [1] tuned: with all views; dog
 
-constexpr double even_odds = 0.037;  // [1] tuned: score of a registration that is right or wrong with the same probability; test_probability
-constexpr double odds_power = 1.73;  // [1] tuned: of the score, by which the odds grow; test_probability
+constexpr double even_odds = 0.092;  // [1] tuned: score of a registration that is right or wrong with the same probability; test_probability
+constexpr double odds_power = 3.13;  // [1] tuned: of the score, by which the odds grow; test_probability
 
 constexpr int most_cells = 5000;  // [cells] budget: of an image in which things move; benchmarks/run.py
 constexpr int largest_cell = 24;  // [pixel] budget: their side; benchmarks/run.py

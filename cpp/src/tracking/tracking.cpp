@@ -59,9 +59,9 @@ std::optional<TrackingResult> turned_on_plane(const TrackingTarget& target, cons
   if (!fit) return std::nullopt;
   TrackingResult result;
   result.alignment = fit->alignment;
-  result.consistency = fit->consistency;
+  result.consistency.of_target = fit->consistency;
   result.expectation = Expectation::only_place;
-  result.test(options, target.usual_contradiction);
+  result.test(options, target.usual);
   result.is_to_whole_model = result.is_on_plane = true;
   return result;
 }
@@ -69,22 +69,33 @@ std::optional<TrackingResult> turned_on_plane(const TrackingTarget& target, cons
 // Beside the last pose, as where the camera turned fast. Directions that stay open could be those of any candidate.
 void try_beside(const FrameRegistration& registration, const PointModel& model, TrackingPrior& prior,
                 const TrackingOptions& options, TrackingResult& best) {
+  const Pose& last = prior.guesses.back();
   if (!prior.beside) {
-    prior.beside =
-        most_promising(model, registration.source(), registration.beside(prior.guesses.back()), options.registration);
+    prior.beside = most_promising(model, registration.source(), registration.beside(last), options.registration);
   }
   for (const Pose& candidate : *prior.beside) {
-    const TrackingResult found = registration.from(candidate, FrameRegistration::Gate::narrow, Expectation::beside);
+    const TrackingResult found =
+        registration.from(candidate, last, FrameRegistration::Gate::narrow, Expectation::beside);
     if (found.decision == Decision::accepted) keep_better(found, best);
     prior.tried.push_back(found);
   }
+}
+
+// The frame before may tell what the model leaves open: it shows what has not become part of that.
+TrackingResult held_by_odometry(const FrameRegistration& registration, const TrackingResult& open,
+                                const TrackingPrior& prior) {
+  if (prior.guesses_followed || !prior.followed || !prior.followed->is_determined) return open;
+  const Pose& followed = prior.followed->world_from_camera;
+  const TrackingResult held = registration.from(followed, FrameRegistration::Gate::narrow, prior.expectation);
+  const bool fits = !held.is_lost() && held.score > GlobalAlignOptions().max_rivalry * open.score;
+  return fits ? held : open;
 }
 
 // A place that the model alone says too little of, but to which the frame before leads, too.
 std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& registration,
                                                     const FrameOdometry& odometry, TrackingPrior& prior,
                                                     const TrackingOptions& options,
-                                                    std::optional<double> usual_contradiction) {
+                                                    const std::optional<Consistency>& usual) {
   if (!prior.has_moved || !prior.followed || !prior.followed->is_determined) return std::nullopt;
   const Pose& followed = prior.followed->world_from_camera;
   prior.tried.push_back(registration.from(followed, FrameRegistration::Gate::narrow, prior.expectation));
@@ -92,7 +103,7 @@ std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& reg
   for (TrackingResult place : prior.tried) {
     if (!odometry.allows(place.alignment.target_from_source, tracking_limits::least_new_view)) continue;
     place.expectation = Expectation::confirmed;
-    place.test(options, usual_contradiction);
+    place.test(options, usual);
     if (place.decision == Decision::accepted) keep_better(place, best);
   }
   return best.is_lost() ? std::nullopt : std::optional(best);
@@ -115,12 +126,12 @@ TrackingResult around_key_poses(const FrameRegistration& registration, const Poi
 }  // namespace
 
 std::optional<TrackingResult> only_near(const TrackingPrior& prior, const TrackingOptions& options,
-                                        std::optional<double> usual_contradiction) {
+                                        const std::optional<Consistency>& usual) {
   if (!options.relocalise || !prior.has_moved || !prior.elsewhere.beside) return std::nullopt;
   std::vector<TrackingResult> places = prior.tried;
   for (TrackingResult& place : places) {
     place.expectation = Expectation::only_near;
-    place.test(options, usual_contradiction);
+    place.test(options, usual);
   }
   const auto is_lower = [](const TrackingResult& a, const TrackingResult& b) { return a.score < b.score; };
   const auto best = std::max_element(places.begin(), places.end(), is_lower);
@@ -140,7 +151,8 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   FrameRegistration registration(now, target, options);
   const IcpSource& source = registration.source();
   const auto follow = [&] {
-    odometry.follow(source, now.view, now.camera, camera_limits::surface_spacings * target.spacing, options);
+    odometry.follow(source, now.view, now.camera, camera_limits::surface_spacings * target.spacing, target.usual,
+                    options);
     prior.followed = odometry.place();
   };
   odometry.look_at(source);
@@ -161,13 +173,13 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   if (prior.elsewhere.beside && registration.may_be_beside(best, prior.guesses.front())) {
     try_beside(registration, target.model, prior, options, best);
     if (best.is_lost()) {
-      if (const auto only = only_near(prior, options, target.usual_contradiction)) return *only;
+      if (const auto only = only_near(prior, options, target.usual)) return *only;
     }
   }
-  if (!best.is_lost()) return best;
+  if (best.decision == Decision::accepted) return best;
   follow();
-  if (const auto confirmed =
-          confirmed_by_odometry(registration, odometry, prior, options, target.usual_contradiction)) {
+  if (!best.is_lost()) return held_by_odometry(registration, best, prior);
+  if (const auto confirmed = confirmed_by_odometry(registration, odometry, prior, options, target.usual)) {
     return *confirmed;
   }
 

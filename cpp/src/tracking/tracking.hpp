@@ -39,7 +39,7 @@ struct TrackingPrior {
 // Of all places near the guesses that were tried, none of which was believed alone, the one that fits best: where no
 // other comes near it.
 std::optional<TrackingResult> only_near(const TrackingPrior& prior, const TrackingOptions& options,
-                                        std::optional<double> usual_contradiction);
+                                        const std::optional<Consistency>& usual);
 
 // Tries the guesses until one registers the frame; when none does, searches elsewhere. Where no single registration is
 // convincing, that to the frame before may confirm it, or `hypothesis` may become so over several frames. Nowhere is

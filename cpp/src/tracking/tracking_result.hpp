@@ -11,17 +11,16 @@ namespace nacre {
 
 struct TrackingResult : Acceptance {
   IcpResult alignment;  // world_from_camera as target_from_source
-  // Part of the model's points in view that the frame does not see through.
-  double consistency = 0.0;
+  Consistency consistency = {0.0};
   Expectation expectation = Expectation::expected;  // of where it ended
   double noise_factor = 1.0;                        // of the frame's noise, with which it was found
   double moving = 0.0;                              // part of the frame that moves before the scene, and is left out
   bool is_to_whole_model = false;                   // older points included
   bool is_on_plane = false;                         // found by the search on the plane
 
-  void test(const TrackingOptions& options, std::optional<double> usual_contradiction) {
+  void test(const TrackingOptions& options, const std::optional<Consistency>& usual) {
     static_cast<Acceptance&>(*this) =
-        accept(alignment, consistency, expectation, {options.min_score, options.verify, usual_contradiction, moving});
+        accept(alignment, consistency, expectation, {options.min_score, options.verify, usual, moving});
   }
 
   FrameStatus status() const {
@@ -39,7 +38,7 @@ struct TrackingResult : Acceptance {
             alignment.target_from_source,
             alignment.num_inliers,
             alignment.overlap,
-            consistency,
+            consistency.of_target,
             score,
             alignment.rmse,
             alignment.information,

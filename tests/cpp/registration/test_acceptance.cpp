@@ -12,7 +12,7 @@ namespace {
 // Of a frame most of which fits a curved surface well.
 struct Registration {
   IcpResult alignment;
-  double consistency = 1.0;
+  Consistency consistency;
 
   Registration() {
     alignment.status = AlignStatus::converged;
@@ -50,7 +50,7 @@ TEST_CASE("a good registration is tracked, wherever it is") {
 
 TEST_CASE("the more speaks for a place, the less is asked of the frame") {
   const auto bent = [](Registration& result) { result.alignment.misfit = 0.9; };
-  const auto contradicted = [](Registration& result) { result.consistency = 0.85; };
+  const auto contradicted = [](Registration& result) { result.consistency.of_target = 0.85; };
   const auto faint = [](Registration& result) { result.alignment.overlap = 0.49; };
   const std::function<void(Registration&)> changes[] = {bent, contradicted};
   for (const auto& change : changes) {
@@ -175,20 +175,20 @@ TEST_CASE("the best of a search is believed where it agrees and no other comes n
 }
 
 TEST_CASE("where the camera contradicts little, a far place that contradicts more is lost") {
-  const auto contradicts = [](Registration& registration) { registration.consistency = 0.95; };
-  const AcceptanceOptions exact{0.3, true, 0.001}, noisy{0.3, true, 0.05};
+  const auto contradicts = [](Registration& registration) { registration.consistency.of_target = 0.95; };
+  const AcceptanceOptions exact{0.3, true, Consistency{0.999}}, noisy{0.3, true, Consistency{0.95}};
   CHECK(tested(contradicts, Expectation::unexpected).decision == Decision::accepted);
   CHECK(tested(contradicts, Expectation::unexpected, noisy).decision == Decision::accepted);
   CHECK(tested(contradicts, Expectation::unexpected, exact).decision == Decision::rejected);
   CHECK(tested(contradicts, Expectation::unexpected, exact).relocalisation_score < 1e-6);
   // What contradicts as little as ever is not held against the place.
-  const auto agrees = [](Registration& registration) { registration.consistency = 0.999; };
+  const auto agrees = [](Registration& registration) { registration.consistency.of_target = 0.999; };
   CHECK(tested(agrees, Expectation::unexpected, exact).score == tested(agrees, Expectation::unexpected).score);
 }
 
 TEST_CASE("near a guess, what contradicts is held against what right places contradict") {
-  const auto contradicts = [](Registration& registration) { registration.consistency = 0.93; };
-  const AcceptanceOptions exact{0.3, true, 0.0}, noisy{0.3, true, 0.07};
+  const auto contradicts = [](Registration& registration) { registration.consistency.of_target = 0.93; };
+  const AcceptanceOptions exact{0.3, true, Consistency{}}, noisy{0.3, true, Consistency{0.93}};
   CHECK(tested(contradicts, Expectation::expected).decision == Decision::accepted);
   CHECK(tested(contradicts, Expectation::expected, exact).score <
         0.5 * tested(contradicts, Expectation::expected).score);
@@ -199,6 +199,32 @@ TEST_CASE("near a guess, what contradicts is held against what right places cont
     registration.alignment.weak_directions = Eigen::MatrixXd::Identity(6, 1);
   };
   CHECK(tested(open, Expectation::expected, exact).score == tested(open, Expectation::expected).score);
+}
+
+TEST_CASE("new surface does not speak against a place, but surface where the last image saw none does") {
+  const AcceptanceOptions known{0.3, true, Consistency{0.99, 0.99}};
+  const auto turned = [](Registration& registration) { registration.alignment.overlap = 0.35; };
+  const auto shifted = [&](Registration& registration) {
+    turned(registration);
+    registration.consistency = {0.99, 0.92};
+  };
+  CHECK(tested(turned, Expectation::expected).decision == Decision::rejected);
+  CHECK(tested(turned, Expectation::expected, known).decision == Decision::accepted);
+  CHECK(tested(shifted, Expectation::expected, known).decision == Decision::rejected);
+  CHECK(tested(shifted, Expectation::expected, known).reason.find("consistency 0.99 and 0.92") != std::string::npos);
+  // What was seen elsewhere the last image does not tell of far places.
+  CHECK(tested(shifted, Expectation::unexpected).relocalisation_score ==
+        tested([&](Registration& registration) { shifted(registration), registration.consistency.of_source = 1.0; },
+               Expectation::unexpected)
+            .relocalisation_score);
+}
+
+TEST_CASE("where little of a frame matches, other guesses are tried, however little contradicts") {
+  const AcceptanceOptions known{0.3, true, Consistency{}};
+  const auto half = [](Registration& registration) { registration.alignment.overlap = 0.4; };
+  CHECK(tested(half, Expectation::expected, known).score > 2.0 * 0.3);
+  CHECK_FALSE(tested(half, Expectation::expected, known).is_clear_cut);
+  CHECK(tested(as_it_is, Expectation::expected, known).is_clear_cut);
 }
 
 TEST_CASE("views of a place add up, by how much they differ") {

@@ -15,7 +15,7 @@ TrackingResult found_at(double angle, double overlap) {
   found.alignment.residual_ratio = 0.2;
   found.alignment.normal_information = 2.0;
   found.alignment.misfit = 0.1;
-  found.consistency = 1.0;
+  found.consistency.of_target = 1.0;
   found.test({}, std::nullopt);
   return found;
 }

@@ -100,6 +100,22 @@ def test_seeing_through_the_model_speaks_against_a_pose() -> None:
     assert report.reason.startswith("registration score ")
 
 
+@pytest.mark.parametrize(("is_same", "status"), [(True, "TRACKED"), (False, "LOST")])
+def test_most_of_an_image_may_be_new_where_the_rest_contradicts_nothing(is_same: bool, status: str) -> None:
+    """A camera goes slowly, until it is known what contradicts; then by four fifths of the image at once."""
+    rng = np.random.default_rng(3)
+    model = nacre.Model(FLAT, num_threads=1, relocalise=False)
+    for pose in map(shifted, [0.0, 0.004, 0.008, 0.012, 0.016, 0.020, 0.024, 0.104]):
+        is_far = pose[0, 3] > 0.1
+        surface = relief(pose) if is_same or not is_far else 0.6 - relief(pose)
+        noisy = surface + 0.0005 * rng.standard_normal(surface.shape)
+        report = model.add_frame(noisy, guess=pose if is_far else None)
+    assert report.status == status
+    if is_same:
+        assert 0.2 < report.overlap < 0.3
+        assert np.linalg.norm(report.world_from_camera - pose) < 0.02
+
+
 def test_something_that_comes_before_the_camera_does_not_lose_it() -> None:
     x, y = flat_grid()
     wall = relief() + 0.1

@@ -112,7 +112,7 @@ void exchange(Archive& archive, CameraFields& fields) {
 template <class Archive>
 void exchange_state(Archive& archive, Pipeline& state) {
   archive(state.options.fusion.reference_sigma, state.options.depth.tilt, state.depth_view_frames, state.region,
-          state.calibration, state.confidence_noise, state.residual_noise, state.usual_contradiction, state.cloud,
+          state.calibration, state.confidence_noise, state.residual_noise, state.usual_consistency, state.cloud,
           state.loops, state.history, state.before, state.still_scene, state.odometry, state.hypothesis, state.views,
           state.spacing, state.num_lost, state.num_vain, state.start_frames);
   if (state.depth_views) archive(*state.depth_views);
@@ -359,9 +359,10 @@ bool PrivateState::is_sound(const ResidualNoise& noise) {
   return std::isfinite(noise.log_scale_) && std::isfinite(noise.count_) && noise.count_ >= 0.0;
 }
 
-bool PrivateState::is_sound(const UsualContradiction& contradiction) {
-  return contradiction.mean_ >= 0.0 && contradiction.mean_ <= 1.0 && contradiction.count_ >= 0.0 &&
-         std::isfinite(contradiction.count_);
+bool PrivateState::is_sound(const UsualConsistency& usual) {
+  const auto is_part = [](double value) { return value >= 0.0 && value <= 1.0; };
+  return is_part(usual.mean_.of_target) && is_part(usual.mean_.of_source) && usual.count_ >= 0.0 &&
+         std::isfinite(usual.count_);
 }
 
 std::string save_checkpoint(Pipeline& pipeline, const std::string& note) {
@@ -445,7 +446,7 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
                   "the shape contradicts the points or itself");
   archive.require(PrivateState::is_sound(state.odometry), "the frame before contradicts itself");
   archive.require(PrivateState::is_sound(state.calibration) && PrivateState::is_sound(state.confidence_noise) &&
-                      PrivateState::is_sound(state.residual_noise) && PrivateState::is_sound(state.usual_contradiction),
+                      PrivateState::is_sound(state.residual_noise) && PrivateState::is_sound(state.usual_consistency),
                   "the noise is not finite");
   state.blocks.renew(state.cloud);
   if (note != nullptr) *note = std::move(kept);

@@ -121,8 +121,8 @@ struct PrivateState {
   }
 
   template <class Archive>
-  static void exchange(Archive& archive, UsualContradiction& contradiction) {
-    archive(contradiction.mean_, contradiction.count_);
+  static void exchange(Archive& archive, UsualConsistency& usual) {
+    archive(usual.mean_.of_target, usual.mean_.of_source, usual.count_);
   }
 
   template <class Archive>
@@ -189,7 +189,7 @@ struct PrivateState {
   static bool is_sound(const DepthCalibrator& calibrator);
   static bool is_sound(const ConfidenceNoise& noise);
   static bool is_sound(const ResidualNoise& noise);
-  static bool is_sound(const UsualContradiction& contradiction);
+  static bool is_sound(const UsualConsistency& usual);
   static bool is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options);
   static bool is_sound(const PoseGraph& graph);
   static bool is_sound(const LoopClosure& loops, std::size_t num_frames);
