@@ -1,6 +1,7 @@
 """The programs that measure reliability, small: they run, and their limits hold."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -64,6 +65,20 @@ def test_three_hundred_frames(scene: str) -> None:
     said = run("soak.py", "--scene", scene, "--frames", "300", *left_out)
     assert f"{scene}: every limit holds" in said
     assert "tracked=300" in said
+
+
+def test_a_walk_through_a_flat() -> None:
+    """The camera is followed to millimetres, and a model that is full keeps its size and becomes coarser."""
+    parts = {}
+    for most in (1_000_000, 30_000):
+        said = run("flat.py", *f"--frames 1250 --laps 1 --only 60 --part 30 --max-points {most}".split())
+        numbers = [[float(n) for n in re.findall(r"[\d.]+", line)] for line in said.splitlines()]
+        assert all(line[1:3] == [30, 30] for line in numbers[:2])  # tracked
+        assert numbers[-1][1] < 5  # mm, the worst
+        parts[most] = dict(zip(("points", "spacing"), numbers[1][5:7], strict=True))
+    free, full = parts.values()
+    assert free["points"] > 30_000 >= full["points"]
+    assert full["spacing"] > free["spacing"]
 
 
 def test_a_missed_limit_is_an_error() -> None:
