@@ -436,7 +436,7 @@ class Model(ExchangeablePoints, Checkpointed):
         Parameters
         ----------
         frame : int
-            Its index. At a frame that is lost the shape is that of the one before; surface that was first seen
+            Its index. At a frame that is lost the shape is that of the one before; surface first seen
             later is carried by what was there.
 
         Returns

@@ -81,6 +81,13 @@ def add_frame(**arguments: Any) -> nacre.FrameReport:
     return model.add_frame(**arguments)
 
 
+def bent_model() -> nacre.Model:
+    """Return a model that deforms, of one frame."""
+    model = nacre.Model(CAMERA, num_threads=1, deform=True)
+    model.add_frame(DEPTH)
+    return model
+
+
 def is_finite(result: Any, **arguments: Any) -> None:
     """Check that an array is finite."""
     assert np.isfinite(result).all()
@@ -361,6 +368,9 @@ RECIPES: dict[str, Recipe] = {
         _report,
         lists=("color",),
     ),
+    "nacre.model.Model.points_at": Recipe(lambda frame: bent_model().points_at(frame), {"frame": 0}),
+    "nacre.model.Model.normals_at": Recipe(lambda frame: bent_model().normals_at(frame), {"frame": 0}),
+    "nacre.model.Model.nodes_at": Recipe(lambda frame: bent_model().nodes_at(frame), {"frame": 0}),
     "nacre.model.Model.in_camera": Recipe(lambda: nacre.Model(CAMERA).in_camera(), {}),
     "nacre.parameters.ModelParameters.preset": Recipe(
         lambda preset: nacre.ModelParameters.preset(preset), {"preset": "paper"}

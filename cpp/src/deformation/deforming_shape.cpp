@@ -39,6 +39,7 @@ void DeformingShape::show(PointModel& model, int num_threads) {
 void DeformingShape::bend(PointModel& model, int num_threads) {
   nodes_before_ = field_.nodes;
   nodes_bent_.clear();
+  is_bent_ = false;
   canonical_ = {std::move(model.points), std::move(model.normals)};
   show(model, num_threads);
 }
@@ -46,7 +47,8 @@ void DeformingShape::bend(PointModel& model, int num_threads) {
 WarpFit DeformingShape::follow(PointModel& model, const std::vector<std::int32_t>& in_view, const ShownSurface& shown,
                                int num_threads) {
   const WarpFit fit = register_warp(field_, canonical_, in_view, shown, num_threads);
-  if (!fit.is_bent) nodes_bent_ = fit.bent;
+  is_bent_ = fit.is_bent;
+  if (!is_bent_) nodes_bent_ = fit.bent;
   show(model, num_threads);
   return fit;
 }
@@ -54,12 +56,14 @@ WarpFit DeformingShape::follow(PointModel& model, const std::vector<std::int32_t
 bool DeformingShape::follow_at_any_rate(PointModel& model, int num_threads) {
   if (nodes_bent_.empty()) return false;
   field_.nodes = std::exchange(nodes_bent_, {});
+  is_bent_ = true;
   show(model, num_threads);
   return true;
 }
 
 void DeformingShape::go_back(PointModel& model, int num_threads) {
   field_.nodes = nodes_before_;
+  is_bent_ = false;
   show(model, num_threads);
 }
 

@@ -25,6 +25,7 @@ class DeformingShape {
                  int num_threads);
   // Where follow() left the shape as it was: as the frame would have it. Returns whether that is another.
   bool follow_at_any_rate(PointModel& model, int num_threads);
+  bool is_bent() const { return is_bent_; }  // otherwise than at the frame before
   // As it was at the frame before.
   void go_back(PointModel& model, int num_threads);
   void keep(const std::vector<std::uint8_t>& flags);  // see PointModel::keep
@@ -43,6 +44,7 @@ class DeformingShape {
   void show(PointModel& model, int num_threads);
 
   WarpField field_;
+  bool is_bent_ = false;
   std::vector<WarpNode> nodes_before_, nodes_bent_;  // empty: as the field has them
   OrientedPoints canonical_, bent_;                  // in the course of a frame
   std::vector<NodeStates> states_;                   // of each frame

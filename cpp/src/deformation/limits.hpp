@@ -7,6 +7,7 @@
 // clang-format off
 namespace nacre::deformation_limits {
 
+constexpr int blended_nodes = 4;  // [nodes] budget: that move a point (Sumner 2007); test_warp_field
 constexpr double first_nodes = 150.0;  // [nodes] budget: of what the first frame shows; benchmarks/deforming.py
 constexpr double node_spacings = 6.0;  // [spacing] derived: between nodes at least: fewer points do not tell a node's turn from noise; test_node_growth
 constexpr double node_reach = 3.0;  // [node spacing] derived: along the surface, within which a point's five nearest nodes are; test_node_growth

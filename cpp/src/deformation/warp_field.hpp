@@ -7,14 +7,15 @@
 #include <cstdint>
 #include <vector>
 
+#include "deformation/limits.hpp"
 #include "nacre/types.hpp"
 
 namespace nacre {
 
 // The nodes nearest to a point along the surface. The last only tells how far the others' influence reaches.
 struct WarpBinding {
-  static constexpr int size = 5;
-  static constexpr int blended = size - 1;
+  static constexpr int blended = deformation_limits::blended_nodes;
+  static constexpr int size = blended + 1;
 
   std::array<std::int32_t, size> nodes = {-1, -1, -1, -1, -1};  // nearest first; -1: none
   std::array<float, size> distances = {};                       // [m]

@@ -15,7 +15,7 @@ namespace nacre {
 namespace {
 
 // Of a match that is as bad as none.
-constexpr double largest_misfit = base_limits::noise_sigmas * base_limits::noise_sigmas;
+const double largest_misfit = base_limits::noise_sigmas * base_limits::noise_sigmas;
 
 // A point of the model, and what the frame shows next to it.
 struct WarpRow {
@@ -73,10 +73,8 @@ class WarpRegistration {
       move(1.0 + part * (deformation_limits::first_stiffness - 1.0));
     }
     match(0.0);
-    // Akaike's criterion: what the shape as it was explains as well, noise may have bent.
     found.bent = field_.nodes;
-    found.is_bent =
-        misfit_before - misfit() > deformation_limits::misfit_per_unknown * static_cast<double>(num_unknowns());
+    found.is_bent = shown_.is_sigma_known && misfit_before - misfit() > misfit_by_chance();
     if (!found.is_bent) {
       field_.nodes = before;
       match(0.0);
@@ -163,8 +161,13 @@ class WarpRegistration {
     return sum;
   }
 
-  std::int64_t num_unknowns() const {
-    return 6 * std::count_if(uses_.begin(), uses_.end(), [](const auto& uses) { return !uses.empty(); });
+  // What a bend may explain of noise: so much for each unknown (Akaike's criterion), where rows err on their own. An
+  // error that all rows of a node share counts as often as there are rows.
+  double misfit_by_chance() const {
+    const auto num_used = std::count_if(uses_.begin(), uses_.end(), [](const auto& uses) { return !uses.empty(); });
+    const auto num_rows = static_cast<double>(rows_.size());
+    const double num_unknowns = std::min(6.0 * static_cast<double>(num_used), num_rows);
+    return deformation_limits::misfit_per_unknown * (num_unknowns + shown_.shared_error * (num_rows - num_unknowns));
   }
 
   OrientedPoint now(const WarpRow& row) const {

@@ -237,15 +237,16 @@ void Pipeline::deform(const FrameExtras& extras, FrameReport& report) {
   blocks.renew(cloud);
   if (frame.valid.size() < base_limits::least_points) return;
   const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
-  const TrackingTarget target{cloud, blocks, spacing, before, still_scene, 0, usual_contradiction.mean()};
+  const TrackingTarget target{cloud, blocks, spacing, before, still_scene, 0, usual_consistency.mean()};
   const Pose pose = extras.keep_guess
                         ? *extras.guess
                         : FrameRegistration(current, target, options)
                               .from(guesses(extras).front(), FrameRegistration::Gate::narrow, Expectation::expected)
                               .alignment.target_from_source;
-  const WarpFit fit =
-      shape->follow(cloud, rows_seen_from(cloud, camera, pose),
-                    shown_surface(sample_frame(frame, observer, options), pose, camera, spacing), options.num_threads);
+  ShownSurface shown = shown_surface(sample_frame(frame, observer, options), pose, camera, spacing);
+  shown.is_sigma_known = !learns_noise() || residual_noise.is_known();
+  shown.shared_error = 1.0 - 1.0 / (noise_factor * noise_factor);  // what frames err by beyond one image's noise
+  const WarpFit fit = shape->follow(cloud, rows_seen_from(cloud, camera, pose), shown, options.num_threads);
   report.deformation.explained = fit.explained;
   blocks.renew(cloud);
 }
@@ -339,7 +340,7 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
   if (result.decision == Decision::accepted && result.expectation == Expectation::expected) {
     usual_consistency.add(result.consistency);
   }
-  if (learns_noise() && result.decision == Decision::accepted && !result.is_on_plane) {
+  if (learns_noise() && result.decision == Decision::accepted && !result.is_on_plane && !(shape && shape->is_bent())) {
     residual_noise.add(noise_factor * result.alignment.residual_sigmas);
     set_noise_factor(residual_noise.factor());
   }

@@ -40,7 +40,7 @@ struct Pipeline {
   std::optional<DepthCalibrator> depth_views;   // where depth is to be calibrated
   std::vector<std::int32_t> depth_view_frames;  // their numbers
   PointModel cloud;
-  BlockIndex blocks;  // of the cloud
+  BlockIndex blocks;                    // of the cloud
   std::optional<DeformingShape> shape;  // of a cloud that deforms
   LoopClosure loops{camera, options};
   FrameHistory history;

@@ -1,0 +1,129 @@
+"""A model that bends: its canonical shape, and how it was at each frame."""
+
+import numpy as np
+import pytest
+
+import nacre
+
+CAMERA = nacre.Camera(160, 120, 140, 140, 79.5, 59.5)
+CURVATURES = (0.0, 0.25, 0.5, 0.75, 1.0, 1.25)  # of a sheet, frame by frame [1/m]
+
+
+def sheet(curvature: float) -> nacre.Mesh:
+    """Return a sheet with relief, rolled up around an axis along y without stretching."""
+    x, y = np.meshgrid(np.linspace(-0.25, 0.25, 101), np.linspace(-0.2, 0.2, 81))
+    height = 0.012 * np.sin(35 * x) * np.cos(30 * y)
+    angle = curvature * x
+    along = x * np.sinc(angle / np.pi)
+    back = x * np.sin(angle / 2) * np.sinc(angle / 2 / np.pi)
+    vertices = np.stack(
+        [along + height * np.sin(angle), y, 0.6 + back - height * np.cos(angle)], axis=-1
+    ).reshape(-1, 3)
+    rows = np.arange(81 * 101).reshape(81, 101)
+    a, b, c, d = (part.ravel() for part in (rows[:-1, :-1], rows[:-1, 1:], rows[1:, :-1], rows[1:, 1:]))
+    triangles = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([b, d, c], axis=-1)])
+    return nacre.Mesh(vertices.astype(np.float32), triangles.astype(np.int32))
+
+
+@pytest.fixture(scope="module")
+def depths() -> list:
+    """Return what a camera that stands still sees of the sheet."""
+    return [
+        sheet(curvature).simulate_depth(CAMERA, np.eye(4), noise="kinect", seed=index)
+        for index, curvature in enumerate(CURVATURES)
+    ]
+
+
+def grown(depths, **changes) -> nacre.Model:
+    model = nacre.Model(CAMERA, deform=True, **changes)
+    for depth in depths:
+        model.add_frame(depth)
+    return model
+
+
+def in_camera(model: nacre.Model, frame: int) -> np.ndarray:
+    pose = np.linalg.inv(model.frames[frame].world_from_camera)
+    return model.points_at(frame) @ pose[:3, :3].T + pose[:3, 3]
+
+
+def error(points, mesh) -> float:
+    return float(np.sqrt((mesh.closest(points.astype(np.float32)).distances ** 2).mean()))
+
+
+@pytest.fixture(scope="module")
+def model(depths) -> nacre.Model:
+    return grown(depths)
+
+
+def test_the_model_is_where_the_surface_was_at_each_frame(model) -> None:
+    assert [frame.status for frame in model.frames] == ["TRACKED"] * len(CURVATURES)
+    for frame, curvature in enumerate(CURVATURES):
+        assert error(in_camera(model, frame), sheet(curvature)) < 0.0015
+    rigid_error = error(in_camera(model, 0), sheet(CURVATURES[-1]))
+    assert error(in_camera(model, len(CURVATURES) - 1), sheet(CURVATURES[-1])) < 0.25 * rigid_error
+
+
+def test_points_are_the_canonical_shape(model) -> None:
+    assert error(model.points, sheet(CURVATURES[0])) < 0.002  # of the first frame
+    assert model.points_at(0).shape == model.points.shape
+    np.testing.assert_allclose(np.linalg.norm(model.normals_at(3), axis=1), 1, atol=1e-5)
+    assert model.nodes_at(0).shape == (model.frames[-1].deformation.num_nodes, 3)
+
+
+def test_reports_tell_how_it_is_bent(model) -> None:
+    first, last = model.frames[0].deformation, model.frames[-1].deformation
+    assert 10 < first.num_nodes <= last.num_nodes
+    assert last.explained > 0.8
+    assert 0 < last.strain < 0.05
+
+
+def test_any_number_of_threads_gives_the_same_bits(depths, model) -> None:
+    for threads in (1, 3):
+        other = grown(depths, num_threads=threads)
+        assert other.points.tobytes() == model.points.tobytes()
+        assert other.points_at(2).tobytes() == model.points_at(2).tobytes()
+
+
+def test_a_saved_model_goes_on_to_the_same_bits(depths, model, tmp_path) -> None:
+    half = grown(depths[:3])
+    half.save(tmp_path / "half.nacre")
+    loaded = nacre.Model.load(tmp_path / "half.nacre")
+    for depth in depths[3:]:
+        loaded.add_frame(depth)
+    assert loaded.points_at(4).tobytes() == model.points_at(4).tobytes()
+    assert [f.deformation for f in loaded.frames] == [f.deformation for f in model.frames]
+
+
+def test_a_rigid_thing_is_the_rigid_model() -> None:
+    images = [sheet(0.5).simulate_depth(CAMERA, np.eye(4), noise="kinect", seed=seed) for seed in range(4)]
+    bending, rigid = grown(images), nacre.Model(CAMERA)
+    for image in images:
+        rigid.add_frame(image)
+    assert error(bending.points, sheet(0.5)) < 1.05 * error(rigid.points, sheet(0.5))
+    assert bending.frames[-1].deformation.strain < 1e-6
+
+
+def test_a_lost_frame_leaves_the_shape(depths) -> None:
+    model = grown(depths[:3])
+    before = model.points
+    report = model.add_frame(np.zeros((120, 160), np.float32))
+    assert report.status == "LOST"
+    assert model.points.tobytes() == before.tobytes()
+    assert model.points_at(3).tobytes() == model.points_at(2).tobytes()
+    assert model.add_frame(depths[3]).tracked
+
+
+@pytest.mark.parametrize("frame", [-1, 6])
+def test_frames_that_are_not_there_are_refused(model, frame) -> None:
+    with pytest.raises(ValueError, match="frame must be one of the 6"):
+        model.points_at(frame)
+
+
+def test_a_rigid_model_has_one_shape() -> None:
+    with pytest.raises(ValueError, match="deform must be on"):
+        nacre.Model(CAMERA).points_at(0)
+
+
+def test_the_paper_is_rigid() -> None:
+    with pytest.raises(ValueError, match="deform must be used with"):
+        nacre.Model(CAMERA, "paper", deform=True)
