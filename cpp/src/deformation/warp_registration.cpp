@@ -74,7 +74,7 @@ class WarpRegistration {
     }
     match(0.0);
     found.bent = field_.nodes;
-    found.is_bent = shown_.is_sigma_known && misfit_before - misfit() > misfit_by_chance();
+    found.is_bent = misfit_before - misfit() > misfit_by_chance();
     if (!found.is_bent) {
       field_.nodes = before;
       match(0.0);

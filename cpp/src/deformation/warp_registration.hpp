@@ -11,10 +11,9 @@ namespace nacre {
 // What a frame shows, in the world frame.
 struct ShownSurface {
   Points points, normals;
-  Values sigma;                // standard deviation of each point along its normal [m]
-  Values reach;                // how far off the surface that a point shows may be, at last [m]
-  bool is_sigma_known = true;  // or what looks bent may be noise
-  double shared_error = 0.0;   // part of the variance that neighbouring points share
+  Values sigma;               // standard deviation of each point along its normal [m]
+  Values reach;               // how far off the surface that a point shows may be, at last [m]
+  double shared_error = 0.0;  // part of the variance that neighbouring points share
 };
 
 struct WarpFit {
