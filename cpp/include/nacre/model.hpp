@@ -43,9 +43,9 @@ class Model {
   const ModelOptions& given_options() const;  ///< as given
   const PointModel& cloud() const;            ///< in the world frame
   PointModel cloud_in_camera() const;         ///< in the newest registered camera's frame
-  /// Of a model with options().deform, which cloud() has in its canonical shape. What was added later is carried by what
-  /// was there; a frame that is lost has the shape of the one before. Throws std::invalid_argument where the model does
-  /// not deform, or has no such frame.
+  /// Of a model with options().deform, which cloud() has in its canonical shape. What was added later is carried by
+  /// what was there; a frame that is lost has the shape of the one before. Throws std::invalid_argument where the model
+  /// does not deform, or has no such frame.
   ShapeAtFrame shape_at(std::int64_t frame) const;
   /// One report per frame that was added. Where a later frame corrected it, it says what is known since.
   FrameReports frames() const;
