@@ -146,7 +146,7 @@ void exchange(Archive& archive, FrameReport& report) {
   archive.single(report.overlap, report.consistency, report.score, report.rmse, report.loop_distance);
   exchange_symmetric(archive, report.information);
   archive(report.weak_directions, report.loop_frame, report.corrects_earlier, report.depth, report.region,
-          report.num_moving, report.fusion, report.deformation, report.num_points, report.spacing, report.milliseconds);
+          report.num_moving, report.fusion, report.num_points, report.spacing, report.milliseconds, report.deformation);
 }
 
 }  // namespace nacre
