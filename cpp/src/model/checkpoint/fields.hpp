@@ -109,7 +109,7 @@ void exchange(Archive& archive, FusionReport& report) {
 template <class Archive>
 void exchange(Archive& archive, DeformationReport& report) {
   exchange_counts(archive, report.num_nodes);
-  archive.single(report.explained, report.strain);
+  if (report.num_nodes > 0) archive.single(report.explained, report.strain);
 }
 
 // As whole nanoseconds.
