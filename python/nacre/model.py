@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import numbers
-import operator
 import os
 import threading
 from collections.abc import Mapping, Sequence
@@ -19,6 +18,7 @@ from nacre._internal.arrays import (
     as_attributes,
     as_camera,
     as_colors,
+    as_count,
     as_depth,
     as_flag,
     as_levels,
@@ -465,8 +465,15 @@ class Model(ExchangeablePoints, Checkpointed):
         return self._shape_at(frame)["nodes"]
 
     def _shape_at(self, frame: int) -> dict[str, npt.NDArray[np.float32]]:
-        index = operator.index(frame)
+        index = as_count("frame", frame)
         with self._lock:
+            if not self.parameters.deform:
+                raise ValueError(
+                    "deform must be on for a model that has a shape at each frame, got a rigid one"
+                )
+            if index >= self._core.num_frames:
+                count = self._core.num_frames
+                raise ValueError(f"frame must be one of the {count} that were added, from 0, got {index}")
             shape = self._core.shape_at(index)
         return {"points": shape.points, "normals": shape.normals, "nodes": shape.nodes}
 

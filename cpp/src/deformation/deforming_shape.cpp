@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "base/parallel.hpp"
-#include "camera/point_spacing.hpp"
 #include "deformation/limits.hpp"
 #include "deformation/node_growth.hpp"
 
@@ -75,8 +74,8 @@ void DeformingShape::keep(const std::vector<std::uint8_t>& flags) {
   keep_flagged(field_.bindings, flags);
 }
 
-void DeformingShape::straighten(PointModel& model, const Camera& camera, const Pose& world_from_camera, double spacing,
-                                std::int32_t frame, int num_threads) {
+void DeformingShape::straighten(PointModel& model, const Pose& world_from_camera, double spacing,
+                                const std::function<float(float)>& spacing_of, std::int32_t frame, int num_threads) {
   constexpr std::int64_t block_size = 1024;
   const std::size_t num_known = field_.bindings.size();
   if (field_.nodes.empty() && !model.points.empty())
@@ -84,7 +83,7 @@ void DeformingShape::straighten(PointModel& model, const Camera& camera, const P
   const Eigen::Isometry3f camera_from_world(world_from_camera.inverse().cast<float>());
   std::vector<float> spacings;
   for (std::size_t i = num_known; i < model.points.size(); ++i) {
-    spacings.push_back(spacing_at((camera_from_world * model.points[i]).z(), 0.0F, camera, spacing));
+    spacings.push_back(spacing_of((camera_from_world * model.points[i]).z()));
   }
   grow(field_, {model.points, model.normals, spacings, model.last_seen, frame});
   canonical_.points.resize(model.points.size());

@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "deformation/warp_field.hpp"
 #include "deformation/warp_registration.hpp"
-#include "nacre/camera.hpp"
 #include "nacre/fusion.hpp"
 
 namespace nacre {
@@ -29,10 +29,10 @@ class DeformingShape {
   // As it was at the frame before.
   void go_back(PointModel& model, int num_threads);
   void keep(const std::vector<std::uint8_t>& flags);  // see PointModel::keep
-  // What was observed of the bent model changes its canonical shape; what was added gets nodes. spacing: of points at a
-  // place [m].
-  void straighten(PointModel& model, const Camera& camera, const Pose& world_from_camera, double spacing,
-                  std::int32_t frame, int num_threads);
+  // What was observed of the bent model changes its canonical shape; what was added gets nodes. spacing_of: of the
+  // points at a depth [m].
+  void straighten(PointModel& model, const Pose& world_from_camera, double spacing,
+                  const std::function<float(float)>& spacing_of, std::int32_t frame, int num_threads);
   void end_frame();  // the next
 
   // Points and normals of a model in its canonical shape, and nodes, as they were at a frame.

@@ -75,8 +75,10 @@ class SurfaceGraph {
 // Dijkstra's algorithm for many nodes at once: a way goes on from where its node is among the nearest.
 class NodeDistances {
  public:
-  NodeDistances(const SurfaceGraph& graph, std::vector<WarpBinding>& bindings, std::size_t first, float reach)
-      : graph_(graph), bindings_(bindings), first_(first), reach_(reach) {}
+  // apart: of nodes around each new point [m].
+  NodeDistances(const SurfaceGraph& graph, std::vector<WarpBinding>& bindings, std::size_t first,
+                const std::vector<float>& apart)
+      : graph_(graph), bindings_(bindings), first_(first), apart_(apart) {}
 
   void start(std::size_t new_point, std::int32_t node, float distance) { open_.emplace(distance, new_point, node); }
 
@@ -84,7 +86,8 @@ class NodeDistances {
     while (!open_.empty()) {
       const auto [distance, point, node] = open_.top();
       open_.pop();
-      if (distance > reach_ || !bindings_[first_ + point].offer(node, distance)) continue;
+      const float reach = static_cast<float>(deformation_limits::node_reach) * apart_[point];
+      if (distance > reach || !bindings_[first_ + point].offer(node, distance)) continue;
       for (const SurfaceStep& step : graph_.from(point)) {
         const WarpBinding& next = bindings_[first_ + step.to];
         if (next.count() == WarpBinding::size && next.distances.back() < distance + step.length) continue;
@@ -98,7 +101,7 @@ class NodeDistances {
   const SurfaceGraph& graph_;
   std::vector<WarpBinding>& bindings_;
   std::size_t first_;
-  float reach_;
+  const std::vector<float>& apart_;
   std::priority_queue<Way, std::vector<Way>, std::greater<Way>> open_;
 };
 
@@ -130,7 +133,12 @@ void grow(WarpField& field, const GrownSurface& surface) {
   if (surface.points.size() == first) return;
   const SurfaceGraph graph(field, surface);
   field.bindings.resize(surface.points.size());
-  NodeDistances ways(graph, field.bindings, first, static_cast<float>(field.reach()));
+  std::vector<float> apart;  // nodes, around each point: as far as hold enough points
+  for (const float spacing : surface.spacings) {
+    apart.push_back(std::max(static_cast<float>(field.node_spacing),
+                             static_cast<float>(deformation_limits::node_spacings) * spacing));
+  }
+  NodeDistances ways(graph, field.bindings, first, apart);
   for (const SurfaceGraph::Border& border : graph.borders()) {
     const WarpBinding& bound = field.bindings[border.from];
     for (int k = 0; k < bound.count(); ++k) {
@@ -141,7 +149,7 @@ void grow(WarpField& field, const GrownSurface& surface) {
   ways.spread();
   for (std::size_t i = first; i < surface.points.size(); ++i) {
     const WarpBinding near = field.bindings[i];
-    if (near.count() > 0 && static_cast<double>(near.distances[0]) < field.node_spacing) continue;
+    if (near.count() > 0 && near.distances[0] < apart[i - first]) continue;
     add_node(field, near, surface.points[i].cast<double>());
     ways.start(i - first, static_cast<std::int32_t>(field.nodes.size()) - 1, 0.0F);
     ways.spread();

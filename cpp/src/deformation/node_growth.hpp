@@ -18,8 +18,8 @@ struct GrownSurface {
   std::int32_t frame;
 };
 
-// Adds nodes a spacing apart along the new surface, and bindings of its points. Distances along the surface are the
-// shortest ways over neighbouring points.
+// Adds nodes a spacing apart along the new surface, farther where its points are, and bindings of its points. Distances
+// along the surface are the shortest ways over neighbouring points.
 void grow(WarpField& field, const GrownSurface& surface);
 
 }  // namespace nacre

@@ -504,7 +504,12 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
 // The shape is as it was, where the camera is lost.
 void Pipeline::straighten_shape(FrameReport& report) {
   if (report.status == FrameStatus::lost && shape->has_nodes()) shape->go_back(cloud, options.num_threads);
-  shape->straighten(cloud, camera, report.world_from_camera, spacing, static_cast<std::int32_t>(report.index),
+  const NoiseModel model = noise();
+  const auto spacing_of = [&](float z) {
+    const double sigma = noise_factor * model.sigma(static_cast<double>(z));
+    return spacing_at(z, static_cast<float>(sigma), camera, spacing);
+  };
+  shape->straighten(cloud, report.world_from_camera, spacing, spacing_of, static_cast<std::int32_t>(report.index),
                     options.num_threads);
   shape->end_frame();
   report.deformation.num_nodes = static_cast<std::int64_t>(shape->num_nodes());

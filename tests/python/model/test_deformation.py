@@ -115,7 +115,7 @@ def test_a_lost_frame_leaves_the_shape(depths) -> None:
 
 @pytest.mark.parametrize("frame", [-1, 6])
 def test_frames_that_are_not_there_are_refused(model, frame) -> None:
-    with pytest.raises(ValueError, match="frame must be one of the 6"):
+    with pytest.raises(ValueError, match="frame must be"):
         model.points_at(frame)
 
 
