@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """
-Measure what a rigid loop makes of things that bend, against the exact truth.
+Measure models of things that bend, and what a rigid loop makes of them, against the exact truth.
 
     python benchmarks/deforming.py                                  # every scene, sensor and contender
     python benchmarks/deforming.py pipe homer sensor=stereo seeds=3 frames=80
@@ -8,8 +8,8 @@ Measure what a rigid loop makes of things that bend, against the exact truth.
 
 At every frame the model is compared with the true surface, in the camera's frame: all of its points, and
 those on what the camera saw; and points are followed, from the first frame that saw them, as pieces of the
-material. Beside it the same loop on the frames of the thing held still, and Open3D's TSDF, where it is
-installed.
+material. Beside it the rigid loop on the same frames, both on those of the thing held still, and Open3D's
+TSDF, where it is installed.
 """
 
 from __future__ import annotations

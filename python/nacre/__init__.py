@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from nacre.depth_calibration import DepthCalibration, calibrate_depth
     from nacre.downsampling import voxel_downsample
     from nacre.errors import CameraError, FileFormatError
-    from nacre.frame_report import FrameReport
+    from nacre.frame_report import DeformationReport, FrameReport
     from nacre.global_registration import GlobalAlignResult, align_global
     from nacre.io.animations import write_animation
     from nacre.io.cameras import CameraFile, read_camera, write_camera
@@ -61,6 +61,7 @@ __all__ = [
     "ClosestPoints",
     "Cloud",
     "Consolidated",
+    "DeformationReport",
     "DepthCalibration",
     "DepthParameters",
     "DepthReport",
@@ -133,7 +134,7 @@ _NAMES = {
     "depth_calibration": "DepthCalibration calibrate_depth",
     "downsampling": "voxel_downsample",
     "errors": "CameraError FileFormatError",
-    "frame_report": "FrameReport",
+    "frame_report": "DeformationReport FrameReport",
     "global_registration": "GlobalAlignResult align_global",
     "io.animations": "write_animation",
     "io.cameras": "CameraFile read_camera write_camera",

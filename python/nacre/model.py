@@ -454,28 +454,20 @@ class Model(ExchangeablePoints, Checkpointed):
         After Sumner, Schmid and Pauly 2007 (embedded deformation) and Newcombe, Fox and Seitz 2015
         (DynamicFusion).
         """
-        return self._shape_at(frame)["points"]
+        return self._shape_at(frame).points
 
     def normals_at(self, frame: int) -> npt.NDArray[np.float32]:
         """Return the (N, 3) unit normals of :meth:`points_at`."""
-        return self._shape_at(frame)["normals"]
+        return self._shape_at(frame).normals
 
     def nodes_at(self, frame: int) -> npt.NDArray[np.float32]:
         """Return where the (K, 3) nodes of the warp field were at a frame [m]; see :meth:`points_at`."""
-        return self._shape_at(frame)["nodes"]
+        return self._shape_at(frame).nodes
 
-    def _shape_at(self, frame: int) -> dict[str, npt.NDArray[np.float32]]:
+    def _shape_at(self, frame: int) -> _core.ShapeAtFrame:
         index = as_count("frame", frame)
         with self._lock:
-            if not self.parameters.deform:
-                raise ValueError(
-                    "deform must be on for a model that has a shape at each frame, got a rigid one"
-                )
-            if index >= self._core.num_frames:
-                count = self._core.num_frames
-                raise ValueError(f"frame must be one of the {count} that were added, from 0, got {index}")
-            shape = self._core.shape_at(index)
-        return {"points": shape.points, "normals": shape.normals, "nodes": shape.nodes}
+            return self._core.shape_at(index)
 
     def in_camera(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.float32]]:
         """Return points and normals in the newest registered camera's frame, as the paper keeps its model."""

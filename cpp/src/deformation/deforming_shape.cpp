@@ -4,21 +4,13 @@
 #include <cmath>
 #include <utility>
 
+#include "base/kept_rows.hpp"
 #include "base/parallel.hpp"
 #include "deformation/limits.hpp"
 #include "deformation/node_growth.hpp"
 
 namespace nacre {
 namespace {
-
-template <class Value>
-void keep_flagged(std::vector<Value>& values, const std::vector<std::uint8_t>& flags) {
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < values.size(); ++i) {
-    if (flags[i] != 0) values[count++] = values[i];
-  }
-  values.resize(count);
-}
 
 // So that what the first frame shows gets about so many nodes.
 double first_node_spacing(std::size_t num_points, double spacing) {
@@ -67,15 +59,18 @@ void DeformingShape::go_back(PointModel& model, int num_threads) {
 }
 
 void DeformingShape::keep(const std::vector<std::uint8_t>& flags) {
+  // Without those that are new, which are behind and are kept.
+  const std::vector<KeptRun> runs =
+      runs_of({flags.begin(), flags.begin() + static_cast<std::ptrdiff_t>(field_.bindings.size())});
   for (OrientedPoints* shape : {&canonical_, &bent_}) {
-    keep_flagged(shape->points, flags);
-    keep_flagged(shape->normals, flags);
+    keep_runs(shape->points, runs);
+    keep_runs(shape->normals, runs);
   }
-  keep_flagged(field_.bindings, flags);
+  keep_runs(field_.bindings, runs);
 }
 
-void DeformingShape::straighten(PointModel& model, const Pose& world_from_camera, double spacing,
-                                const std::function<float(float)>& spacing_of, std::int32_t frame, int num_threads) {
+void DeformingShape::unbend(PointModel& model, const Pose& world_from_camera, double spacing,
+                            const std::function<float(float)>& spacing_of, std::int32_t frame, int num_threads) {
   constexpr std::int64_t block_size = 1024;
   const std::size_t num_known = field_.bindings.size();
   if (field_.nodes.empty() && !model.points.empty())

@@ -12,7 +12,7 @@
 namespace nacre {
 
 // Between frames the model is in its canonical shape, in the course of one it is as the camera sees it: bend() and
-// straighten() take it there and back.
+// unbend() take it there and back.
 class DeformingShape {
  public:
   bool has_nodes() const { return !field_.nodes.empty(); }
@@ -31,8 +31,8 @@ class DeformingShape {
   void keep(const std::vector<std::uint8_t>& flags);  // see PointModel::keep
   // What was observed of the bent model changes its canonical shape; what was added gets nodes. spacing_of: of the
   // points at a depth [m].
-  void straighten(PointModel& model, const Pose& world_from_camera, double spacing,
-                  const std::function<float(float)>& spacing_of, std::int32_t frame, int num_threads);
+  void unbend(PointModel& model, const Pose& world_from_camera, double spacing,
+              const std::function<float(float)>& spacing_of, std::int32_t frame, int num_threads);
   void end_frame();  // the next
 
   // Points and normals of a model in its canonical shape, and nodes, as they were at a frame.

@@ -1,11 +1,10 @@
 // New surface gets nodes, and its points are bound to the nearest.
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "deformation/warp_field.hpp"
-#include "nacre/camera.hpp"
 
 namespace nacre {
 

@@ -17,9 +17,10 @@ struct WarpBinding {
   static constexpr int blended = deformation_limits::blended_nodes;
   static constexpr int size = blended + 1;
 
-  std::array<std::int32_t, size> nodes = {-1, -1, -1, -1, -1};  // nearest first; -1: none
-  std::array<float, size> distances = {};                       // [m]
+  std::array<std::int32_t, size> nodes;    // nearest first; -1: none
+  std::array<float, size> distances = {};  // [m]
 
+  WarpBinding() { nodes.fill(-1); }
   int count() const;
   int num_blended() const { return std::min(count(), blended); }
   // Takes a node in, where it is among the nearest. Of equally near ones that with the lower number is nearer.

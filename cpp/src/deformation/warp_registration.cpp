@@ -20,8 +20,8 @@ const double largest_misfit = base_limits::noise_sigmas * base_limits::noise_sig
 // A point of the model, and what the frame shows next to it.
 struct WarpRow {
   OrientedPoint canonical;
-  int num_nodes;
-  std::array<std::int32_t, WarpBinding::blended> nodes;
+  WarpBinding binding;
+  int num_nodes;  // that move it
   std::array<double, WarpBinding::blended> weights;
   std::array<Vector6, WarpBinding::blended> jacobian;  // of the residual, by each node's motion
   double residual = 0.0;                               // [m]
@@ -45,9 +45,10 @@ class WarpRegistration {
       const WarpRow& row = rows_[i];
       for (int k = 0; k < row.num_nodes; ++k) {
         Use use{i, k, {}};
-        const std::int32_t node = row.nodes[static_cast<std::size_t>(k)];
+        const std::int32_t node = row.binding.nodes[static_cast<std::size_t>(k)];
         for (int m = 0; m < row.num_nodes; ++m) {
-          use.blocks[static_cast<std::size_t>(m)] = equations_.block_at(node, row.nodes[static_cast<std::size_t>(m)]);
+          use.blocks[static_cast<std::size_t>(m)] =
+              equations_.block_at(node, row.binding.nodes[static_cast<std::size_t>(m)]);
         }
         uses_[static_cast<std::size_t>(node)].push_back(use);
       }
@@ -106,9 +107,9 @@ class WarpRegistration {
       const WarpBinding& binding = field.bindings[i];
       WarpRow row;
       row.canonical = {canonical.points[i], canonical.normals[i]};
+      row.binding = binding;
       row.num_nodes = binding.num_blended();
       row.weights = binding.weights(field.reach());
-      std::copy_n(binding.nodes.begin(), WarpBinding::blended, row.nodes.begin());
       rows.push_back(row);
     }
     return rows;
@@ -120,8 +121,8 @@ class WarpRegistration {
     for (const WarpRow& row : rows_) {
       for (int a = 0; a < row.num_nodes; ++a) {
         for (int b = a + 1; b < row.num_nodes; ++b) {
-          found.emplace_back(
-              std::minmax(row.nodes[static_cast<std::size_t>(a)], row.nodes[static_cast<std::size_t>(b)]));
+          found.emplace_back(std::minmax(row.binding.nodes[static_cast<std::size_t>(a)],
+                                         row.binding.nodes[static_cast<std::size_t>(b)]));
         }
       }
     }
@@ -138,7 +139,8 @@ class WarpRegistration {
                       Eigen::Vector3f normals[block_size];
                       for (std::int64_t i = begin; i < end; ++i) {
                         const auto k = i - begin;
-                        const OrientedPoint moved = now(rows_[static_cast<std::size_t>(i)]);
+                        const WarpRow& row = rows_[static_cast<std::size_t>(i)];
+                        const OrientedPoint moved = warped(field_.at(row.binding), row.canonical);
                         x[k] = moved.point.x();
                         y[k] = moved.point.y();
                         z[k] = moved.point.z();
@@ -170,19 +172,6 @@ class WarpRegistration {
     return deformation_limits::misfit_per_unknown * (num_unknowns + shown_.shared_error * (num_rows - num_unknowns));
   }
 
-  OrientedPoint now(const WarpRow& row) const {
-    Eigen::Matrix3d linear = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d place = Eigen::Vector3d::Zero();
-    const Eigen::Vector3d point = row.canonical.point.cast<double>();
-    for (int k = 0; k < row.num_nodes; ++k) {
-      const WarpNode& node = node_of(row, k);
-      const double weight = row.weights[static_cast<std::size_t>(k)];
-      linear += weight * node.rotation;
-      place += weight * (node.rotation * (point - node.rest) + node.position);
-    }
-    return {place.cast<float>(), (linear * row.canonical.normal.cast<double>()).normalized().cast<float>()};
-  }
-
   void linearise(WarpRow& row, const Eigen::Vector3f& point, const Eigen::Vector3f& normal, std::uint32_t slot,
                  double gate) const {
     row.weight = 0.0;
@@ -210,7 +199,7 @@ class WarpRegistration {
   }
 
   const WarpNode& node_of(const WarpRow& row, int k) const {
-    return field_.nodes[static_cast<std::size_t>(row.nodes[static_cast<std::size_t>(k)])];
+    return field_.nodes[static_cast<std::size_t>(row.binding.nodes[static_cast<std::size_t>(k)])];
   }
 
   // One step of Gauss and Newton.

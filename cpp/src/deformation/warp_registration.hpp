@@ -4,17 +4,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "deformation/shown_surface.hpp"
 #include "deformation/warp_field.hpp"
 
 namespace nacre {
-
-// What a frame shows, in the world frame.
-struct ShownSurface {
-  Points points, normals;
-  Values sigma;               // standard deviation of each point along its normal [m]
-  Values reach;               // how far off the surface that a point shows may be, at last [m]
-  double shared_error = 0.0;  // part of the variance that neighbouring points share
-};
 
 struct WarpFit {
   double explained = 0.0;      // part of the points in view that the frame shows where they are

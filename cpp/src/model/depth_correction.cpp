@@ -5,7 +5,7 @@
 #include "base/se3.hpp"
 #include "depth/limits.hpp"
 #include "depth/tilt.hpp"
-#include "fusion/deformation.hpp"
+#include "fusion/correction.hpp"
 #include "model/limits.hpp"
 #include "model/pipeline.hpp"
 

@@ -12,13 +12,13 @@
 #include "base/se3.hpp"
 #include "camera/limits.hpp"
 #include "camera/point_spacing.hpp"
+#include "deformation/shown_surface.hpp"
 #include "depth/cleaning.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/pixel_binning.hpp"
 #include "fusion/attribute_fusion.hpp"
-#include "fusion/deformation.hpp"
+#include "fusion/correction.hpp"
 #include "fusion/fuse.hpp"
-#include "fusion/limits.hpp"
 #include "model/limits.hpp"
 #include "model/object_views.hpp"
 #include "model/paper_loop.hpp"
@@ -75,34 +75,6 @@ FrameExtras averaged(const FrameExtras& extras, const PixelBinning& pixels) {
   if (extras.confidence.size() > 0) result.confidence = pixels.commonest(extras.confidence);
   for (FrameAttribute& attribute : result.attributes) attribute.values = pixels.mean(attribute.values);
   return result;
-}
-
-// The model's points that a camera looks at.
-std::vector<std::int32_t> rows_seen_from(const PointModel& model, const Camera& camera, const Pose& world_from_camera) {
-  const PointProjection projection(camera, world_from_camera);
-  std::vector<std::int32_t> rows;
-  const auto add = [&](Eigen::Index i, const PointProjection::Block& block, int k) {
-    if (block.facing[k] > fusion_limits::least_facing) rows.push_back(static_cast<std::int32_t>(i));
-  };
-  visit_points_in_view(as_rows(model.points), as_rows(model.normals), 0, model.size(), projection, add);
-  return rows;
-}
-
-// What a frame shows, in the world.
-ShownSurface shown_surface(const FrameSamples& samples, const Pose& world_from_camera, const Camera& camera,
-                           double spacing) {
-  const Eigen::Isometry3f to_world(world_from_camera.cast<float>());
-  ShownSurface shown{samples.points, samples.normals, samples.sigma, samples.sigma};
-  for (Eigen::Index i = 0; i < shown.points.rows(); ++i) {
-    const Eigen::Vector3f point = samples.points.row(i).transpose(), normal = samples.normals.row(i).transpose();
-    const float sigma = samples.noise[i];
-    shown.points.row(i) = (to_world * point).transpose();
-    shown.normals.row(i) = (to_world.linear() * normal).transpose();
-    const double apart = spacing_at(point.z(), sigma, camera, spacing);
-    shown.reach[i] = static_cast<float>(
-        std::max(camera_limits::surface_spacings * apart, base_limits::noise_sigmas * static_cast<double>(sigma)));
-  }
-  return shown;
 }
 
 }  // namespace
@@ -170,7 +142,7 @@ FrameReport Pipeline::add_worked_on(const DepthRef& depth, const FrameExtras& ex
       remember_view(report);
       calibrate_depth(report);
     }
-    if (shape) straighten_shape(report);
+    if (shape) unbend(report);
     odometry.end_frame(report.status, report.world_from_camera, report.weak_directions);
     const bool is_lost = report.status == FrameStatus::lost && history.num_registered() > 0;
     num_lost = is_lost ? num_lost + 1 : 0;
@@ -247,7 +219,7 @@ void Pipeline::deform(const FrameExtras& extras, FrameReport& report) {
   // What registered frames err by beyond one image's noise, neighbours share; until they tell, it may be all.
   const bool is_noise_known = !learns_noise() || residual_noise.is_known();
   shown.shared_error = is_noise_known ? 1.0 - 1.0 / (noise_factor * noise_factor) : 1.0;
-  const WarpFit fit = shape->follow(cloud, rows_seen_from(cloud, camera, pose), shown, options.num_threads);
+  const WarpFit fit = shape->follow(cloud, rows_facing(cloud, camera, pose), shown, options.num_threads);
   report.deformation.explained = fit.explained;
   blocks.renew(cloud);
 }
@@ -502,15 +474,15 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
 }
 
 // The shape is as it was, where the camera is lost.
-void Pipeline::straighten_shape(FrameReport& report) {
+void Pipeline::unbend(FrameReport& report) {
   if (report.status == FrameStatus::lost && shape->has_nodes()) shape->go_back(cloud, options.num_threads);
   const NoiseModel model = noise();
   const auto spacing_of = [&](float z) {
     const double sigma = noise_factor * model.sigma(static_cast<double>(z));
     return spacing_at(z, static_cast<float>(sigma), camera, spacing);
   };
-  shape->straighten(cloud, report.world_from_camera, spacing, spacing_of, static_cast<std::int32_t>(report.index),
-                    options.num_threads);
+  shape->unbend(cloud, report.world_from_camera, spacing, spacing_of, static_cast<std::int32_t>(report.index),
+                options.num_threads);
   shape->end_frame();
   report.deformation.num_nodes = static_cast<std::int64_t>(shape->num_nodes());
   report.deformation.strain = shape->strain();

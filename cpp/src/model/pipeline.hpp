@@ -84,7 +84,7 @@ struct Pipeline {
   void keep_view(const FrameReport& report);
   void adjust_views(FrameReport& report);
   void fuse_frame(const FrameExtras& extras, FrameReport& report);
-  void straighten_shape(FrameReport& report);
+  void unbend(FrameReport& report);
   void remember_view(const FrameReport& report);
   void calibrate_depth(FrameReport& report);
 

@@ -132,8 +132,7 @@ IcpSource FrameRegistration::gated(IcpSource source, const PointsInView& view, c
     source.noise[i] = sigma;
     const double apart = spacing_at(points(i, 2), sigma, now_.camera, target_.spacing);
     const double along = tracking_limits::reach_spacings * view.thinning * apart;
-    const double across =
-        std::max(camera_limits::surface_spacings * apart, base_limits::noise_sigmas * static_cast<double>(sigma));
+    const double across = largest_offset(apart, sigma);
     source.reach[i] = static_cast<float>(set > 0.0 ? set : std::min(along, largest));
     source.largest_residual[i] = static_cast<float>(set > 0.0 ? set : std::min(across, largest));
   }

@@ -313,9 +313,7 @@ bool PrivateState::is_sound(const DeformingShape& shape, std::size_t num_points,
   for (const NodeStates& states : shape.states_) {
     if (states.size() > count) return false;
     for (const std::array<float, 7>& state : states) {
-      if (!are_all(std::vector<float>(state.begin(), state.end()), [](float value) { return std::isfinite(value); })) {
-        return false;
-      }
+      if (!std::all_of(state.begin(), state.end(), [](float value) { return std::isfinite(value); })) return false;
     }
   }
   return are_all(field.bindings, [&](const WarpBinding& binding) { return is_bound(binding, count); }) &&

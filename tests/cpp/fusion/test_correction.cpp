@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "doctest/doctest.h"
-#include "fusion/deformation.hpp"
+#include "fusion/correction.hpp"
 
 using namespace nacre;
 

@@ -1,4 +1,4 @@
-#include "fusion/deformation.hpp"
+#include "fusion/correction.hpp"
 
 #include <algorithm>
 #include <cmath>

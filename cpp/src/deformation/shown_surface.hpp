@@ -1,0 +1,27 @@
+// What a frame shows of a shape, and what of the shape it may show.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "nacre/camera.hpp"
+#include "nacre/fusion.hpp"
+#include "tracking/frame_samples.hpp"
+
+namespace nacre {
+
+struct ShownSurface {
+  Points points, normals;     // world frame
+  Values sigma;               // standard deviation of each point along its normal [m]
+  Values reach;               // how far off the surface that a point shows may be, at last [m]
+  double shared_error = 0.0;  // part of the variance that neighbouring points share
+};
+
+// spacing: of the model [m].
+ShownSurface shown_surface(const FrameSamples& samples, const Pose& world_from_camera, const Camera& camera,
+                           double spacing);
+
+// The rows of the model's points that are in the camera's image and turned towards it.
+std::vector<std::int32_t> rows_facing(const PointModel& model, const Camera& camera, const Pose& world_from_camera);
+
+}  // namespace nacre
