@@ -77,6 +77,7 @@ def objects(folder: Path) -> dict[str, Any]:
         nacre.align_global(points, points), nacre.DepthCalibration(0.01, 0.001, 7),
         nacre.DepthParameters(), nacre.RegionParameters(), nacre.RegistrationParameters(),
         nacre.GlobalRegistrationParameters(), done.frames[0].report.depth, done.frames[0].report.region,
+        done.frames[0].report.deformation,
         nacre.FileFormatError("a.ply", "is cut short", line=3), nacre.Cancelled("enough"),
         nacre.CameraError("no camera"),
         tree.query_radius(points[:5], 0.01),
