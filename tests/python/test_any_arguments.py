@@ -125,7 +125,8 @@ def test_any_parameter(name: str, default: Any) -> None:
 RESULTS = {
     "AbsoluteTrajectoryError", "AlignResult", "BatchResult", "CameraFile", "ClosestPoints", "Cloud",
     "Completeness", "Consolidated",
-    "DeformationReport", "DepthReport", "FScore", "FrameRecord", "FrameReport", "GlobalAlignResult", "NormalError", "PoseError",
+    "DeformationReport", "DepthReport", "FScore", "FrameRecord", "FrameReport", "GlobalAlignResult",
+    "NormalError", "PoseError",
     "RadiusNeighbors", "RayHits", "Reconstruction", "RegionReport", "RelativePoseError", "Sequence",
     "SequenceFrame",
     "SurfaceAccuracy", "SurfaceSamples", "Uniformity", "DepthCalibration",
