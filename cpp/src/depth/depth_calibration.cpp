@@ -262,6 +262,15 @@ DepthCalibrator::Fit DepthCalibrator::begun() const {
   return fit;
 }
 
+// The median of the first view.
+double DepthCalibrator::typical_depth() const {
+  std::vector<double> depths;
+  for (const float z : views_.front().blocks.col(2)) {
+    if (std::isfinite(z)) depths.push_back(static_cast<double>(z));
+  }
+  return depths.empty() ? 0.0 : median_of(depths);
+}
+
 // The views' result where they are at rest, or may not come to it.
 std::optional<DepthCalibration> DepthCalibrator::iterate(Fit& fit, int num_threads) const {
   const Distortion distortion{fit.tilt, fit.stretch};
@@ -300,6 +309,8 @@ std::optional<DepthCalibration> DepthCalibrator::iterate(Fit& fit, int num_threa
   const Eigen::Array2d sigmas = (2.0 * (covariance * scatter * covariance).diagonal().array()).sqrt();
   step *= std::min(1.0, depth_limits::largest_stretch_step / std::max(std::abs(step(1)), 1e-12));
   fit.tilt += step(0);
+  // What lies across the axis looks turned by so much: by more than the views are, and turns and tilt change places.
+  if (!(std::abs(fit.tilt) * typical_depth() <= depth_limits::least_turn)) return DepthCalibration{};
   fit.stretch += step(1);
   result.tilt = fit.tilt;
   result.sigma = sigmas(0);
