@@ -19,9 +19,12 @@ inline Eigen::Vector3f exposed(const Eigen::Vector3f& color, const Eigen::Vector
 Eigen::Vector3f color_gain(const PointModel& model, const std::vector<PointRange>& in_view, const RegisteredFrame& now,
                            double spacing);
 
+// Multiplies the model's colours.
+void expose_points(PointModel& model, const Eigen::Vector3f& gain);
+
 // Brings a frame and the model to one exposure, the mean of all frames': returns what the frame's colours are to be
-// multiplied by, and multiplies the model's.
+// multiplied by, and multiplies the model's, by `model_gain`.
 Eigen::Vector3f share_exposure(PointModel& model, const std::vector<PointRange>& in_view, const RegisteredFrame& now,
-                               double spacing);
+                               double spacing, Eigen::Vector3f& model_gain);
 
 }  // namespace nacre
