@@ -20,16 +20,6 @@ BlockIndex BlockIndex::unbounded(const PointModel& model) {
   return index;
 }
 
-BlockIndex BlockIndex::unbounded(const PointModel& model) {
-  BlockIndex index(model);
-  for (Block& block : index.blocks_) {
-    const auto far = static_cast<float>(farthest_place);
-    block.box = Box(Eigen::Vector3f::Constant(-far), Eigen::Vector3f::Constant(far));
-    block.newest = std::numeric_limits<std::int32_t>::max();
-  }
-  return index;
-}
-
 void BlockIndex::renew(const PointModel& model) {
   blocks_.clear();
   size_ = 0;
@@ -62,8 +52,9 @@ void BlockIndex::add_new(const PointModel& model) {
 }
 
 std::size_t BlockIndex::add_mark(std::size_t place) {
-  const auto next = std::upper_bound(marks_.begin(), marks_.end(), place);
-  return static_cast<std::size_t>(marks_.insert(next, place) - marks_.begin());
+  const auto number = std::upper_bound(marks_.begin(), marks_.end(), place) - marks_.begin();
+  marks_.insert(marks_.begin() + number, place);
+  return static_cast<std::size_t>(number);
 }
 
 std::size_t BlockIndex::first_mark_behind(std::size_t place) const {

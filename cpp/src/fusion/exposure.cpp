@@ -70,7 +70,6 @@ Eigen::Vector3f share_exposure(PointModel& model, const std::vector<PointRange>&
   const float share = -1.0F / std::max(1.0F, static_cast<float>(now.index) + 1.0F);
   const Eigen::Vector3f moved = gain.array().pow(share);
   expose_points(model, moved);
-  model_gain = moved;
   return gain.cwiseProduct(moved);
 }
 

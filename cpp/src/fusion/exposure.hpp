@@ -23,8 +23,8 @@ Eigen::Vector3f color_gain(const PointModel& model, const std::vector<PointRange
 void expose_points(PointModel& model, const Eigen::Vector3f& gain);
 
 // Brings a frame and the model to one exposure, the mean of all frames': returns what the frame's colours are to be
-// multiplied by, and multiplies the model's, by `model_gain`.
+// multiplied by, and multiplies the model's.
 Eigen::Vector3f share_exposure(PointModel& model, const std::vector<PointRange>& in_view, const RegisteredFrame& now,
-                               double spacing, Eigen::Vector3f& model_gain);
+                               double spacing);
 
 }  // namespace nacre

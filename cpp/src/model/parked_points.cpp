@@ -15,7 +15,9 @@
 #include "fusion/exposure.hpp"
 #include "model/checkpoint/checkpoint.hpp"
 #include "model/checkpoint/fields.hpp"
+#include "model/checkpoint/seal.hpp"
 #include "model/limits.hpp"
+#include "nacre/checkpoint.hpp"
 
 #ifdef _WIN32
 #include <io.h>
@@ -150,7 +152,7 @@ PointModel ParkedPoints::read(const Parcel& parcel) const {
     StateReader archive(bytes, sealed_header_size);
     archive(points);
     archive.require_end();
-    archive.require(points.size() == parcel.count && is_sound(points, std::numeric_limits<std::int32_t>::max()),
+    archive.require(points.size() == parcel.count && is_surface(points, std::numeric_limits<std::int32_t>::max()),
                     "the points are not all there, or no surface");
   } catch (const CheckpointError& error) {
     throw CheckpointError("points of the model in " + path.string() + ": " + error.what(), error.offset());
@@ -194,11 +196,10 @@ void ParkedPoints::park(PointModel& model, BlockIndex& blocks, std::int64_t most
   if (!is_on() || model.size() <= most_points) return;
   blocks.renew(model);
   std::vector<BlockIndex::Summary> candidates = blocks.summaries();
-  candidates.erase(std::remove_if(candidates.begin(), candidates.end(),
-                                  [&](const auto& block) {
-                                    return block.newest >= oldest_frame || view.may_hold(block.box);
-                                  }),
-                   candidates.end());
+  candidates.erase(
+      std::remove_if(candidates.begin(), candidates.end(),
+                     [&](const auto& block) { return block.newest >= oldest_frame || view.may_hold(block.box); }),
+      candidates.end());
   std::stable_sort(candidates.begin(), candidates.end(),
                    [](const auto& a, const auto& b) { return a.newest < b.newest; });
   const auto wanted =
@@ -218,8 +219,8 @@ void ParkedPoints::park(PointModel& model, BlockIndex& blocks, std::int64_t most
     for (std::size_t k = 0; k < candidates.size();) {
       const std::size_t first = candidates[k].range.first;
       std::size_t end = first;
-      for (; k < candidates.size() && candidates[k].range.first == end &&
-             end - first < model_limits::parcel_points && (end == first || !blocks.has_mark_within(first, end + 1));
+      for (; k < candidates.size() && candidates[k].range.first == end && end - first < model_limits::parcel_points &&
+             (end == first || !blocks.has_mark_within(first, end + 1));
            ++k) {
         end += static_cast<std::size_t>(candidates[k].range.count);
         if (blocks.has_mark_within(first, end)) {  // what is parked between two of its points divides it

@@ -49,10 +49,10 @@ class ParkedPoints {
   struct Parcel {
     std::string file;
     std::int64_t count = 0;
-    Eigen::Vector3f lowest, highest;        // bounds of the points
-    std::vector<std::int32_t> frames;       // that last observed them
-    std::int64_t first_change = 0;          // of those since it left
-    bool is_named = false;                  // by a checkpoint
+    Eigen::Vector3f lowest, highest;   // bounds of the points
+    std::vector<std::int32_t> frames;  // that last observed them
+    std::int64_t first_change = 0;     // of those since it left
+    bool is_named = false;             // by a checkpoint
   };
   struct Change {
     std::vector<Pose> poses;  // corrections; or, where the tilt is not 0, poses
