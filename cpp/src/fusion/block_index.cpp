@@ -51,8 +51,34 @@ void BlockIndex::add_new(const PointModel& model) {
   }
 }
 
+std::size_t BlockIndex::add_mark(std::size_t place) {
+  const auto number = std::upper_bound(marks_.begin(), marks_.end(), place) - marks_.begin();
+  marks_.insert(marks_.begin() + number, place);
+  return static_cast<std::size_t>(number);
+}
+
+std::size_t BlockIndex::first_mark_behind(std::size_t place) const {
+  const auto next = std::upper_bound(marks_.begin(), marks_.end(), place);
+  return next == marks_.end() ? std::numeric_limits<std::size_t>::max() : *next;
+}
+
+std::vector<BlockIndex::Summary> BlockIndex::summaries() const {
+  std::vector<Summary> all;
+  std::size_t first = 0;
+  for (std::size_t k = 0; k < blocks_.size(); ++k) {
+    all.push_back({{k, first, blocks_[k].count}, blocks_[k].box, blocks_[k].newest});
+    first += static_cast<std::size_t>(blocks_[k].count);
+  }
+  return all;
+}
+
 // Neighbours that have become small become one.
 void BlockIndex::keep(const std::vector<std::uint8_t>& flags) {
+  std::size_t place = 0, num_before = 0;
+  for (std::size_t& mark : marks_) {
+    for (; place < mark; ++place) num_before += static_cast<std::size_t>(flags[place] != 0);
+    mark = num_before;
+  }
   std::size_t kept = 0, next = 0;
   for (const Block& block : blocks_) {
     Block left = block;

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "camera/view_volume.hpp"
@@ -34,6 +35,20 @@ class BlockIndex {
 
   // Those that may have points in a volume, last seen by oldest_frame or later; in the model's order.
   std::vector<PointRange> in_view(const ViewVolume& volume, std::int32_t oldest_frame = 0) const;
+  struct Summary {
+    PointRange range;
+    Box box;
+    std::int32_t newest;  // frame that last observed one of the points
+  };
+  std::vector<Summary> summaries() const;
+
+  // Places between points, in order: each the number of points before it. They stay between the same points.
+  const std::vector<std::size_t>& marks() const { return marks_; }
+  std::size_t add_mark(std::size_t place);  // behind those at the same place; returns its number
+  void set_marks(std::vector<std::size_t> marks) { marks_ = std::move(marks); }
+  std::size_t first_mark_behind(std::size_t place) const;
+  bool has_mark_within(std::size_t first, std::size_t end) const { return first_mark_behind(first) < end; }
+
   // Those from a point on.
   std::vector<PointRange> from(std::size_t first) const;
 
@@ -47,6 +62,7 @@ class BlockIndex {
 
   std::vector<Block> blocks_;
   std::size_t size_ = 0;  // of the model
+  std::vector<std::size_t> marks_;
 };
 
 // What a frame can say anything about: points of the model elsewhere are as if they were not there. spacing: of the

@@ -69,10 +69,14 @@ Eigen::Vector3f share_exposure(PointModel& model, const std::vector<PointRange>&
   if (gain == Eigen::Vector3f::Ones()) return Eigen::Vector3f::Ones();
   const float share = -1.0F / std::max(1.0F, static_cast<float>(now.index) + 1.0F);
   const Eigen::Vector3f moved = gain.array().pow(share);
-  for (Eigen::Vector3f& color : model.colors) {
-    if (color.allFinite()) color = exposed(color, moved);
-  }
+  expose_points(model, moved);
   return gain.cwiseProduct(moved);
+}
+
+void expose_points(PointModel& model, const Eigen::Vector3f& gain) {
+  for (Eigen::Vector3f& color : model.colors) {
+    if (color.allFinite()) color = exposed(color, gain);
+  }
 }
 
 }  // namespace nacre

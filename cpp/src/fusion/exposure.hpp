@@ -19,6 +19,9 @@ inline Eigen::Vector3f exposed(const Eigen::Vector3f& color, const Eigen::Vector
 Eigen::Vector3f color_gain(const PointModel& model, const std::vector<PointRange>& in_view, const RegisteredFrame& now,
                            double spacing);
 
+// Multiplies the model's colours.
+void expose_points(PointModel& model, const Eigen::Vector3f& gain);
+
 // Brings a frame and the model to one exposure, the mean of all frames': returns what the frame's colours are to be
 // multiplied by, and multiplies the model's.
 Eigen::Vector3f share_exposure(PointModel& model, const std::vector<PointRange>& in_view, const RegisteredFrame& now,

@@ -3,80 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
 
-#include "base/random.hpp"
 #include "depth/limits.hpp"
+#include "model/checkpoint/seal.hpp"
 #include "model/checkpoint/state.hpp"
 #include "model/limits.hpp"
-#include "nacre/version.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr char magic[] = {'n', 'a', 'c', 'r', 'e', 'm', 'd', 'l'};
-constexpr std::size_t version_at = 12, length_at = 32, checksum_at = 40, header_size = 48;
-
-std::uint64_t checksum_of(std::string_view bytes) {
-  std::uint64_t sum = bytes.size();
-  for (std::size_t i = 0; i < bytes.size(); i += sizeof(std::uint64_t)) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, bytes.data() + i, std::min(sizeof(word), bytes.size() - i));
-    sum = mix64(sum ^ word);
-  }
-  return sum;
-}
-
-template <class Number>
-Number number_at(std::string_view bytes, std::size_t offset) {
-  Number number;
-  std::memcpy(&number, bytes.data() + offset, sizeof(number));
-  return number;
-}
-
-template <class Number>
-void set_number(std::string& bytes, std::size_t offset, Number number) {
-  std::memcpy(bytes.data() + offset, &number, sizeof(number));
-}
-
-std::string sealed(std::string bytes) {
-  std::copy(std::begin(magic), std::end(magic), bytes.begin());
-  set_number(bytes, sizeof(magic), checkpoint_format);
-  const std::string version = NACRE_VERSION;
-  version.copy(bytes.data() + version_at, length_at - version_at - 1);
-  set_number(bytes, length_at, static_cast<std::uint64_t>(bytes.size()));
-  set_number(bytes, checksum_at, checksum_of(std::string_view(bytes).substr(header_size)));
-  return bytes;
-}
-
-void check_seal(std::string_view bytes) {
-  if (bytes.size() < header_size || !std::equal(std::begin(magic), std::end(magic), bytes.begin())) {
-    throw CheckpointError("it is no model that nacre saved", 0);
-  }
-  const auto format = number_at<std::uint32_t>(bytes, sizeof(magic));
-  if (format != checkpoint_format) {
-    std::string writer(bytes.substr(version_at, length_at - version_at));
-    writer = writer.substr(0, writer.find('\0'));
-    writer.erase(std::remove_if(writer.begin(), writer.end(), [](char c) { return c < ' ' || c > '~'; }), writer.end());
-    std::ostringstream reason;
-    reason << "it has checkpoint format " << format << " (nacre " << writer << " wrote it), and nacre " << NACRE_VERSION
-           << " reads format " << checkpoint_format << ": use that version, or run the recording again";
-    throw CheckpointError(reason.str(), sizeof(magic));
-  }
-  const auto length = number_at<std::uint64_t>(bytes, length_at);
-  if (length != bytes.size()) {
-    std::ostringstream reason;
-    if (length > bytes.size()) {
-      reason << "it has " << bytes.size() << " of its " << length << " bytes: it was not written or copied to the end";
-    } else {
-      reason << "it has " << bytes.size() << " bytes and says that they are " << length << ": it is damaged";
-    }
-    throw CheckpointError(reason.str(), static_cast<std::int64_t>(std::min<std::uint64_t>(length, bytes.size())));
-  }
-  if (number_at<std::uint64_t>(bytes, checksum_at) != checksum_of(bytes.substr(header_size))) {
-    throw CheckpointError("it is damaged: its checksum does not fit", checksum_at);
-  }
-}
 
 struct CameraFields {
   Camera::Model model = Camera::Model::pinhole;
@@ -142,7 +76,9 @@ bool is_place(const Eigen::Vector3f& point) {
 
 bool is_unit(const Eigen::Vector3f& normal) { return std::abs(normal.squaredNorm() - 1.0F) < 0.01F; }
 
-bool is_sound(const PointModel& cloud, std::size_t num_frames) {
+}  // namespace
+
+bool is_surface(const PointModel& cloud, std::size_t num_frames) {
   const std::size_t count = cloud.points.size();
   if (cloud.normals.size() != count || (!cloud.colors.empty() && cloud.colors.size() != count) ||
       cloud.confidence.size() != count || cloud.last_seen.size() != count || cloud.observations.size() != count ||
@@ -160,6 +96,8 @@ bool is_sound(const PointModel& cloud, std::size_t num_frames) {
          are_all(cloud.observations, is_count) && are_all(cloud.free_space_violations, is_count) &&
          are_all(cloud.last_seen, [&](std::int32_t frame) { return is_within(frame, num_frames); });
 }
+
+namespace {
 
 // Whether all numbers are counts, of at most so many.
 template <class... Counts>
@@ -364,7 +302,7 @@ bool PrivateState::is_sound(const UsualConsistency& usual) {
 }
 
 std::string save_checkpoint(Pipeline& pipeline, const std::string& note) {
-  std::string bytes(header_size, '\0'), kept = note;
+  std::string bytes(sealed_header_size, '\0'), kept = note;
   StateWriter archive(bytes);
   CameraFields camera = fields_of(pipeline.given_camera);
   exchange(archive, camera);
@@ -377,7 +315,7 @@ std::string save_checkpoint(Pipeline& pipeline, const std::string& note) {
 
 std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* note) {
   check_seal(bytes);
-  StateReader archive(bytes, header_size);
+  StateReader archive(bytes, sealed_header_size);
   CameraFields camera;
   ModelOptions given;
   int binning = 1;
@@ -409,7 +347,7 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   const bool is_first = state.cloud.size() == 0 && before.depth.size() == 0;
   archive.require(filler == filler_of(camera, state), "its length does not fit the camera");
   archive.require(state.region.size() == 0 || is_image(state.region, state.camera), "the region has another size");
-  archive.require(is_sound(state.cloud, num_frames), "the points are not all there, or no surface");
+  archive.require(is_surface(state.cloud, num_frames), "the points are not all there, or no surface");
   archive.require(is_first || (is_pixels(before.depth) && is_pixels(before.sigma) && is_pixels(before.measured)),
                   "the newest view has another size than the camera");
   archive.require(is_first || state.history.num_registered() > 0, "the poses are missing");

@@ -13,4 +13,7 @@ namespace nacre {
 std::string save_checkpoint(Pipeline& pipeline, const std::string& note);
 std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* note);
 
+// Whether points are all there, and a surface, of so many frames.
+bool is_surface(const PointModel& cloud, std::size_t num_frames);
+
 }  // namespace nacre
