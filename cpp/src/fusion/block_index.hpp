@@ -42,12 +42,17 @@ class BlockIndex {
   };
   std::vector<Summary> summaries() const;
 
-  // Places between points, in order: each the number of points before it. They stay between the same points.
-  const std::vector<std::size_t>& marks() const { return marks_; }
-  std::size_t add_mark(std::size_t place);  // behind those at the same place; returns its number
-  void set_marks(std::vector<std::size_t> marks) { marks_ = std::move(marks); }
-  std::size_t first_mark_behind(std::size_t place) const;
-  bool has_mark_within(std::size_t first, std::size_t end) const { return first_mark_behind(first) < end; }
+  // Gaps between points, in order: how many points are before each, and how many have left from it. They stay between
+  // the same points.
+  struct Gap {
+    std::size_t place;
+    std::size_t count;
+  };
+  const std::vector<Gap>& gaps() const { return gaps_; }
+  std::size_t add_gap(Gap gap);  // behind those at the same place; returns its number
+  void set_gaps(std::vector<Gap> gaps) { gaps_ = std::move(gaps); }
+  std::size_t first_gap_behind(std::size_t place) const;
+  std::size_t num_left_before(std::size_t place) const;  // from gaps up to there
 
   // Those from a point on.
   std::vector<PointRange> from(std::size_t first) const;
@@ -62,7 +67,7 @@ class BlockIndex {
 
   std::vector<Block> blocks_;
   std::size_t size_ = 0;  // of the model
-  std::vector<std::size_t> marks_;
+  std::vector<Gap> gaps_;
 };
 
 // What a frame can say anything about: points of the model elsewhere are as if they were not there. spacing: of the

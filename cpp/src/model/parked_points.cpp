@@ -11,8 +11,7 @@
 #include <system_error>
 #include <utility>
 
-#include "fusion/deformation.hpp"
-#include "fusion/exposure.hpp"
+#include "fusion/correction.hpp"
 #include "model/checkpoint/checkpoint.hpp"
 #include "model/checkpoint/fields.hpp"
 #include "model/checkpoint/seal.hpp"
@@ -34,33 +33,47 @@ namespace fs = std::filesystem;
   throw fs::filesystem_error(what, path, std::error_code(errno, std::generic_category()));
 }
 
-// The file is complete, or not there.
+constexpr const char* parcel_ending = ".points";
+constexpr const char* cannot_write = "points that leave the model cannot be written";
+constexpr const char* cannot_read = "points that left the model cannot be read";
+
 void write_file(const fs::path& path, const std::string& bytes) {
-  fs::path unfinished = path;
-  unfinished += ".tmp";
-  std::FILE* const file = std::fopen(unfinished.string().c_str(), "wb");
-  if (file == nullptr) fail("points cannot be written", path);
-  bool is_good = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size() && std::fflush(file) == 0;
+  errno = 0;
+  std::FILE* const file = std::fopen(path.string().c_str(), "wb");
+  if (file == nullptr) fail(cannot_write, path);
+  bool is_good = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
+  is_good = std::fclose(file) == 0 && is_good;
+  if (is_good) return;
+  const int error = errno;
+  std::remove(path.string().c_str());
+  errno = error;
+  fail(cannot_write, path);
+}
+
+// Until the power may go.
+void flush_to_disk(const fs::path& path) {
+  errno = 0;
+  std::FILE* const file = std::fopen(path.string().c_str(), "rb+");
+  if (file == nullptr) fail(cannot_write, path);
 #ifdef _WIN32
-  is_good = is_good && _commit(_fileno(file)) == 0;
+  const bool is_good = _commit(_fileno(file)) == 0;
 #else
-  is_good = is_good && fsync(fileno(file)) == 0;
+  const bool is_good = fsync(fileno(file)) == 0;
 #endif
   const int error = errno;
-  is_good = std::fclose(file) == 0 && is_good;
-  if (!is_good) {
-    std::remove(unfinished.string().c_str());
-    errno = error;
-    fail("points cannot be written", path);
-  }
-  fs::rename(unfinished, path);
+  std::fclose(file);
+  errno = error;
+  if (!is_good) fail(cannot_write, path);
 }
 
 std::string read_file(const fs::path& path) {
   errno = 0;
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) fail("points of the model that were written cannot be read", path);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
+  std::ifstream stream(path, std::ios::binary | std::ios::ate);
+  if (!stream) fail(cannot_read, path);
+  std::string bytes(static_cast<std::size_t>(stream.tellg()), '\0');
+  stream.seekg(0);
+  if (!stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) fail(cannot_read, path);
+  return bytes;
 }
 
 void remove_file(const std::string& folder, const std::string& file) {
@@ -72,6 +85,24 @@ template <class Value>
 void append_values(std::vector<Value>& to, const std::vector<Value>& from, std::size_t first, std::size_t count) {
   const auto begin = from.begin() + static_cast<std::ptrdiff_t>(first);
   to.insert(to.end(), begin, begin + static_cast<std::ptrdiff_t>(count));
+}
+
+// As expose_points one after the other, all at once: as many gains as there were frames would take long.
+void expose_points(PointModel& points, const std::vector<Eigen::Vector3f>& gains, std::size_t first) {
+  constexpr std::size_t lanes = 16;
+  using Lanes = Eigen::Array<float, 3, lanes>;
+  for (std::size_t i = 0; i < points.colors.size(); i += lanes) {
+    const std::size_t count = std::min(lanes, points.colors.size() - i);
+    Lanes colors = Lanes::Zero();
+    for (std::size_t k = 0; k < count; ++k) colors.col(static_cast<Eigen::Index>(k)) = points.colors[i + k];
+    for (std::size_t g = first; g < gains.size(); ++g) {
+      colors = (colors.colwise() * gains[g].array()).min(255.0F);
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      Eigen::Vector3f& color = points.colors[i + k];
+      if (color.allFinite()) color = colors.col(static_cast<Eigen::Index>(k));
+    }
+  }
 }
 
 std::string new_token() {
@@ -134,8 +165,9 @@ ParkedPoints::Parcel ParkedPoints::write(PointModel points) {
   parcel.frames = points.last_seen;
   std::sort(parcel.frames.begin(), parcel.frames.end());
   parcel.frames.erase(std::unique(parcel.frames.begin(), parcel.frames.end()), parcel.frames.end());
-  parcel.first_change = static_cast<std::int64_t>(changes_.size());
-  parcel.file = token_ + "-" + std::to_string(next_++) + ".points";
+  parcel.first_motion = static_cast<std::int64_t>(motions_.size());
+  parcel.first_gain = static_cast<std::int64_t>(gains_.size());
+  parcel.file = token_ + "-" + std::to_string(next_++) + parcel_ending;
   std::string bytes(sealed_header_size, '\0');
   StateWriter archive(bytes);
   archive(points);
@@ -152,22 +184,19 @@ PointModel ParkedPoints::read(const Parcel& parcel) const {
     StateReader archive(bytes, sealed_header_size);
     archive(points);
     archive.require_end();
-    archive.require(points.size() == parcel.count && is_surface(points, std::numeric_limits<std::int32_t>::max()),
+    const auto num_frames = static_cast<std::size_t>(parcel.frames.back()) + 1;
+    archive.require(points.size() == parcel.count && is_surface(points, num_frames),
                     "the points are not all there, or no surface");
   } catch (const CheckpointError& error) {
-    throw CheckpointError("points of the model in " + path.string() + ": " + error.what(), error.offset());
+    throw fs::filesystem_error(std::string(cannot_read) + ": " + error.what(), path,
+                               std::make_error_code(std::errc::io_error));
   }
-  for (auto i = static_cast<std::size_t>(parcel.first_change); i < changes_.size(); ++i) {
-    const Change& change = changes_[i];
-    if (change.tilt != 0.0) {
-      straighten_points(points, change.poses, change.tilt, 1);
-    } else if (!change.poses.empty()) {
-      move_points(points, change.poses, 1);
-    }
-    if (change.gain != Eigen::Vector3f::Ones()) expose_points(points, change.gain);
-    if (change.forgets_violations) {
-      std::fill(points.free_space_violations.begin(), points.free_space_violations.end(), std::uint8_t{0});
-    }
+  for (auto i = static_cast<std::size_t>(parcel.first_motion); i < motions_.size(); ++i) {
+    move_points(points, motions_[i], 1);
+  }
+  expose_points(points, gains_, static_cast<std::size_t>(parcel.first_gain));
+  if (parcel.forgets_violations) {
+    std::fill(points.free_space_violations.begin(), points.free_space_violations.end(), std::uint8_t{0});
   }
   return points;
 }
@@ -181,6 +210,9 @@ void ParkedPoints::release(const Parcel& parcel) {
 }
 
 void ParkedPoints::note_checkpoint() {
+  for (const Parcel& parcel : parcels_) {
+    if (!parcel.is_named) flush_to_disk(fs::path(folder_) / parcel.file);
+  }
   ++num_checkpoints_;
   for (Parcel& parcel : parcels_) parcel.is_named = true;
   const auto is_old = [&](const Released& released) { return released.checkpoint + 2 <= num_checkpoints_; };
@@ -220,11 +252,11 @@ void ParkedPoints::park(PointModel& model, BlockIndex& blocks, std::int64_t most
       const std::size_t first = candidates[k].range.first;
       std::size_t end = first;
       for (; k < candidates.size() && candidates[k].range.first == end && end - first < model_limits::parcel_points &&
-             (end == first || !blocks.has_mark_within(first, end + 1));
+             (end == first || blocks.first_gap_behind(first) > end);
            ++k) {
         end += static_cast<std::size_t>(candidates[k].range.count);
-        if (blocks.has_mark_within(first, end)) {  // what is parked between two of its points divides it
-          end = blocks.first_mark_behind(first);
+        if (blocks.first_gap_behind(first) < end) {  // what has left from between two of its points divides it
+          end = blocks.first_gap_behind(first);
           ++k;
           break;
         }
@@ -241,16 +273,20 @@ void ParkedPoints::park(PointModel& model, BlockIndex& blocks, std::int64_t most
   }
   for (auto& [place, parcel] : leaving) {
     size_ += parcel.count;
-    const std::size_t k = blocks.add_mark(place);
+    const std::size_t k = blocks.add_gap({place, static_cast<std::size_t>(parcel.count)});
     parcels_.insert(parcels_.begin() + static_cast<std::ptrdiff_t>(k), std::move(parcel));
   }
   model.keep(flags);
   blocks.keep(flags);
 }
 
-void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const ViewVolume& volume) {
+void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vector<ViewVolume>& volumes) {
   std::vector<std::uint8_t> is_wanted;
-  for (const Parcel& parcel : parcels_) is_wanted.push_back(volume.may_hold(Box(parcel.lowest, parcel.highest)));
+  for (const Parcel& parcel : parcels_) {
+    const Box box(parcel.lowest, parcel.highest);
+    is_wanted.push_back(std::any_of(volumes.begin(), volumes.end(),
+                                    [&](const ViewVolume& volume) { return volume.may_hold(box); }));
+  }
   recall(model, blocks, is_wanted);
 }
 
@@ -268,16 +304,16 @@ void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vect
   if (std::find(is_wanted.begin(), is_wanted.end(), std::uint8_t{1}) == is_wanted.end()) return;
   PointModel whole;
   append_range(whole, model, 0, 0);  // its colours and attributes
-  std::vector<std::size_t> marks;
+  std::vector<BlockIndex::Gap> gaps;
   std::vector<Parcel> left;
   std::size_t done = 0;
   std::int64_t num_back = 0;
   for (std::size_t k = 0; k < parcels_.size(); ++k) {
-    const std::size_t place = blocks.marks()[k];
+    const auto [place, count] = blocks.gaps()[k];
     append_range(whole, model, done, place - done);
     done = place;
     if (!is_wanted[k]) {
-      marks.push_back(whole.points.size());
+      gaps.push_back({whole.points.size(), count});
       continue;
     }
     const PointModel back = read(parcels_[k]);
@@ -294,18 +330,13 @@ void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vect
   }
   size_ -= num_back;
   parcels_ = std::move(left);
-  if (parcels_.empty()) changes_.clear();
+  if (parcels_.empty()) {
+    motions_.clear();
+    gains_.clear();
+  }
   model = std::move(whole);
   blocks.renew(model);
-  blocks.set_marks(std::move(marks));
-}
-
-void ParkedPoints::add(Change change) {
-  if (parcels_.empty()) return;
-  changes_.push_back(std::move(change));
-  std::size_t num_poses = 0;
-  for (const Change& kept : changes_) num_poses += kept.poses.size();
-  if (num_poses > model_limits::most_kept_motions) settle();
+  blocks.set_gaps(std::move(gaps));
 }
 
 // Each point moves with the frame that last observed it: bounds hold those of the box with each of these.
@@ -322,41 +353,45 @@ void ParkedPoints::move(const std::vector<Pose>& corrections) {
     parcel.lowest = after.min();
     parcel.highest = after.max();
   }
-  Change change;
-  change.poses = corrections;
-  add(std::move(change));
+  if (parcels_.empty()) return;
+  motions_.push_back(corrections);
+  std::size_t num_poses = 0;
+  for (const std::vector<Pose>& motion : motions_) num_poses += motion.size();
+  if (num_poses > model_limits::most_kept_motions) settle();
 }
 
 // Bounds are not known before it is done.
 void ParkedPoints::straighten(const std::vector<Pose>& poses, double tilt) {
-  if (parcels_.empty()) return;
-  Change change;
-  change.poses = poses;
-  change.tilt = tilt;
-  changes_.push_back(std::move(change));
-  settle();
+  std::vector<Parcel> straight;
+  for (const Parcel& parcel : parcels_) {
+    PointModel points = read(parcel);
+    straighten_points(points, poses, tilt, 1);
+    straight.push_back(write(std::move(points)));
+  }
+  replace_all(std::move(straight));
 }
 
 void ParkedPoints::expose(const Eigen::Vector3f& gain) {
-  Change change;
-  change.gain = gain;
-  add(std::move(change));
+  if (!parcels_.empty() && gain != Eigen::Vector3f::Ones()) gains_.push_back(gain);
 }
 
 void ParkedPoints::forget_violations() {
-  Change change;
-  change.forgets_violations = true;
-  add(std::move(change));
+  for (Parcel& parcel : parcels_) parcel.forgets_violations = true;
 }
 
-// Writes all anew, so that nothing is left to be done.
+// So that nothing is left to be done.
 void ParkedPoints::settle() {
   std::vector<Parcel> settled;
   for (const Parcel& parcel : parcels_) settled.push_back(write(read(parcel)));
+  replace_all(std::move(settled));
+}
+
+void ParkedPoints::replace_all(std::vector<Parcel> parcels) {
   for (const Parcel& parcel : parcels_) release(parcel);
-  for (Parcel& parcel : settled) parcel.first_change = 0;
-  parcels_ = std::move(settled);
-  changes_.clear();
+  for (Parcel& parcel : parcels) parcel.first_motion = parcel.first_gain = 0;
+  parcels_ = std::move(parcels);
+  motions_.clear();
+  gains_.clear();
 }
 
 }  // namespace nacre

@@ -9,10 +9,10 @@
 
 namespace nacre {
 
-// Blocks of points that leave a model, each parcel a file, and come back to their place among the others when a camera
-// looks at them: the model goes on as if they had stayed. What happens to the model meanwhile happens to them when they
-// come back. A file is complete or not there, is checked when it is read, and is never changed: one that a checkpoint
-// names stays until two later ones do without it.
+// Points that leave a model, each parcel a file, and come back to their place among the others when a camera looks at
+// them: the model goes on as if they had stayed. What happens to the model meanwhile happens to them when they come
+// back. A file is complete before anything names it, is checked when it is read, and is never changed: one that a
+// checkpoint names stays until two later ones do without it.
 class ParkedPoints {
  public:
   explicit ParkedPoints(const std::string& folder);  // "": none leave
@@ -27,11 +27,14 @@ class ParkedPoints {
   // that have not been seen for longest.
   void park(PointModel& model, BlockIndex& blocks, std::int64_t most_points, std::int32_t oldest_frame,
             const ViewVolume& view);
-  // Those come back that may have points in a volume, or in one of some boxes.
-  void recall(PointModel& model, BlockIndex& blocks, const ViewVolume& volume);
+  // Those come back that may have points in one of some volumes, or boxes.
+  void recall(PointModel& model, BlockIndex& blocks, const std::vector<ViewVolume>& volumes);
   void recall(PointModel& model, BlockIndex& blocks, const std::vector<Box>& near);
+  void recall_all(PointModel& model, BlockIndex& blocks) {
+    recall(model, blocks, std::vector<std::uint8_t>(parcels_.size(), 1));
+  }
 
-  // What has happened to the model; see move_points, straighten_points, share_exposure, merge_layers.
+  // What has happened to the model; see move_points, straighten_points, expose_points, merge_layers.
   void move(const std::vector<Pose>& corrections);
   void straighten(const std::vector<Pose>& poses, double tilt);
   void expose(const Eigen::Vector3f& gain);
@@ -41,7 +44,7 @@ class ParkedPoints {
   template <class Visit>
   void for_each_part(const PointModel& model, const BlockIndex& blocks, Visit&& visit) const;
 
-  // A checkpoint names the files that there are.
+  // A checkpoint is about to name the files that there are: they are flushed to disk.
   void note_checkpoint();
 
  private:
@@ -50,15 +53,11 @@ class ParkedPoints {
     std::string file;
     std::int64_t count = 0;
     Eigen::Vector3f lowest, highest;   // bounds of the points
-    std::vector<std::int32_t> frames;  // that last observed them
-    std::int64_t first_change = 0;     // of those since it left
-    bool is_named = false;             // by a checkpoint
-  };
-  struct Change {
-    std::vector<Pose> poses;  // corrections; or, where the tilt is not 0, poses
-    double tilt = 0.0;
-    Eigen::Vector3f gain = Eigen::Vector3f::Ones();
+    std::vector<std::int32_t> frames;  // that last observed them, in order
+    std::int64_t first_motion = 0;     // of those since it left
+    std::int64_t first_gain = 0;       // likewise
     bool forgets_violations = false;
+    bool is_named = false;  // by a checkpoint
   };
   struct Released {
     std::string file;
@@ -67,8 +66,8 @@ class ParkedPoints {
 
   PointModel read(const Parcel& parcel) const;
   Parcel write(PointModel points);
-  void add(Change change);
   void settle();
+  void replace_all(std::vector<Parcel> parcels);
   void release(const Parcel& parcel);
   void recall(PointModel& model, BlockIndex& blocks, const std::vector<std::uint8_t>& is_wanted);
 
@@ -77,8 +76,9 @@ class ParkedPoints {
   std::int64_t next_ = 0;
   std::int64_t size_ = 0;
   std::int64_t num_checkpoints_ = 0;
-  std::vector<Parcel> parcels_;  // in the model's order; their places are the index's marks
-  std::vector<Change> changes_;
+  std::vector<Parcel> parcels_;             // in the model's order; their places are the index's gaps
+  std::vector<std::vector<Pose>> motions_;  // corrections, by frame
+  std::vector<Eigen::Vector3f> gains_;
   std::vector<Released> released_;
 };
 
@@ -96,7 +96,7 @@ void ParkedPoints::for_each_part(const PointModel& model, const BlockIndex& bloc
     done = end;
   };
   for (std::size_t k = 0; k < parcels_.size(); ++k) {
-    visit_until(blocks.marks()[k]);
+    visit_until(blocks.gaps()[k].place);
     PointModel part;
     const PointModel parked = read(parcels_[k]);
     append_range(part, model, 0, 0);  // its colours and attributes

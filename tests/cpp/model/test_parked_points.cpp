@@ -6,7 +6,7 @@
 
 #include "base/random.hpp"
 #include "doctest/doctest.h"
-#include "fusion/deformation.hpp"
+#include "fusion/correction.hpp"
 #include "fusion/exposure.hpp"
 #include "model/checkpoint/fields.hpp"
 #include "model/parked_points.hpp"
@@ -83,7 +83,7 @@ struct Parked {
   ParkedPoints parked{folder.path.string()};
   Parked() { parked.park(model, blocks, num_points / 2, num_frames, view_at(19.0)); }
   void recall_all() {
-    parked.recall(model, blocks, {Box(Eigen::Vector3f::Constant(-99.0F), Eigen::Vector3f::Constant(99.0F))});
+    parked.recall(model, blocks, std::vector{Box(Eigen::Vector3f::Constant(-99.0F), Eigen::Vector3f::Constant(99.0F))});
   }
 };
 
@@ -94,9 +94,9 @@ TEST_CASE("points that leave a model are those that were not seen for longest, a
   CHECK(there.model.size() <= num_points / 2);
   CHECK(there.model.size() + there.parked.size() == num_points);
   CHECK(there.model.points.front().x() > 5.0F);  // the oldest part of the wall has left
-  there.parked.recall(there.model, there.blocks, view_at(19.0));
+  there.parked.recall(there.model, there.blocks, std::vector{view_at(19.0)});
   CHECK(there.model.size() <= num_points / 2);  // nothing of it is in this view
-  there.parked.recall(there.model, there.blocks, view_at(3.0));
+  there.parked.recall(there.model, there.blocks, std::vector{view_at(3.0)});
   const std::int64_t some = there.model.size();
   CHECK(some > num_points / 2);
   CHECK(some < num_points);
@@ -138,7 +138,7 @@ TEST_CASE("a file that is damaged or missing is named, and the model stays as it
     stream.seekp(200);
     stream.put('!');
   }
-  CHECK_THROWS_WITH_AS(there.recall_all(), doctest::Contains(file.filename().string().c_str()), CheckpointError);
+  CHECK_THROWS_WITH_AS(there.recall_all(), doctest::Contains(file.filename().string().c_str()), fs::filesystem_error);
   fs::remove(file);
   CHECK_THROWS_WITH_AS(there.recall_all(), doctest::Contains(file.filename().string().c_str()), fs::filesystem_error);
   CHECK(bytes_of(there.model) == before);

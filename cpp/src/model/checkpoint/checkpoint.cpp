@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
+#include "base/check.hpp"
 #include "depth/limits.hpp"
 #include "model/checkpoint/seal.hpp"
 #include "model/checkpoint/state.hpp"
@@ -49,6 +51,9 @@ void exchange_state(Archive& archive, Pipeline& state) {
           state.calibration, state.confidence_noise, state.residual_noise, state.usual_consistency, state.cloud,
           state.loops, state.history, state.before, state.still_scene, state.odometry, state.hypothesis, state.views,
           state.spacing, state.num_lost, state.num_vain, state.start_frames);
+  std::vector<BlockIndex::Gap> gaps = state.blocks.gaps();
+  if (state.parked.is_on()) archive(state.parked, gaps);
+  state.blocks.set_gaps(std::move(gaps));
   if (state.depth_views) archive(*state.depth_views);
   if (state.shape) archive(*state.shape);
 }
@@ -154,6 +159,8 @@ bool is_sound(const ObjectView& view, const Camera& camera, std::size_t num_fram
 bool PrivateState::is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options) {
   const std::int64_t num_pixels = static_cast<std::int64_t>(camera.width()) * camera.height();
   const std::size_t num_frames = history.size();
+  const bool is_bounded = options.points_folder.empty();  // of those on disk a report may tell as many as it likes
+  const std::int64_t most_points = is_bounded ? options.max_points : std::numeric_limits<std::int64_t>::max() / 2;
   for (const FrameHistory::Chunk& chunk : history.chunks_) {
     const bool is_last = &chunk == &history.chunks_.back();
     if (chunk.ends.empty() || chunk.ends.size() > FrameHistory::per_chunk ||
@@ -166,7 +173,7 @@ bool PrivateState::is_sound(const FrameHistory& history, const Camera& camera, c
   try {
     for (std::size_t i = 0; i < num_frames; ++i) {
       const FrameReport report = history[i];
-      if (!nacre::is_sound(report, num_pixels, options.max_points)) return false;
+      if (!nacre::is_sound(report, num_pixels, most_points)) return false;
       if (report.status != FrameStatus::lost) registered.push_back(static_cast<std::int32_t>(i));
     }
   } catch (const CheckpointError&) {  // whose place is none in the file
@@ -301,19 +308,60 @@ bool PrivateState::is_sound(const UsualConsistency& usual) {
          std::isfinite(usual.count_);
 }
 
+// A file is none but one of its own folder's.
+static bool is_points_file(const std::string& name) {
+  const std::size_t dash = name.find('-');
+  if (dash != 16 || name.size() < dash + 9 || name.compare(name.size() - 7, 7, ".points") != 0) return false;
+  const std::string token = name.substr(0, dash), number = name.substr(dash + 1, name.size() - 7 - (dash + 1));
+  return token.find_first_not_of("0123456789abcdef") == std::string::npos &&
+         number.find_first_not_of("0123456789") == std::string::npos;
+}
+
+bool PrivateState::is_sound(const ParkedPoints& parked, const BlockIndex& blocks, std::size_t num_points,
+                            std::size_t num_frames) {
+  const std::vector<BlockIndex::Gap>& gaps = blocks.gaps();
+  const auto is_frame = [&](std::int32_t frame) { return is_within(frame, num_frames); };
+  if (gaps.size() != parked.parcels_.size() || parked.num_checkpoints_ < 0) return false;
+  std::size_t place = 0;
+  std::int64_t size = 0;
+  for (std::size_t k = 0; k < gaps.size(); ++k) {
+    const ParkedPoints::Parcel& parcel = parked.parcels_[k];
+    if (gaps[k].place < place || gaps[k].place > num_points || parcel.count <= 0 ||
+        static_cast<std::uint64_t>(parcel.count) != gaps[k].count || parcel.count > (std::int64_t{1} << 32) ||
+        !is_points_file(parcel.file) || !is_place(parcel.lowest) || !is_place(parcel.highest) ||
+        !(parcel.lowest.array() <= parcel.highest.array()).all() || parcel.frames.empty() ||
+        !std::is_sorted(parcel.frames.begin(), parcel.frames.end()) || !are_all(parcel.frames, is_frame) ||
+        !is_within(parcel.first_motion, parked.motions_.size() + 1) ||
+        !is_within(parcel.first_gain, parked.gains_.size() + 1)) {
+      return false;
+    }
+    for (auto i = static_cast<std::size_t>(parcel.first_motion); i < parked.motions_.size(); ++i) {
+      if (!is_within(parcel.frames.back(), parked.motions_[i].size())) return false;
+    }
+    place = gaps[k].place;
+    size += parcel.count;
+  }
+  return size == parked.size_ && are_all(parked.released_, [](const ParkedPoints::Released& released) {
+           return is_points_file(released.file);
+         });
+}
+
 std::string save_checkpoint(Pipeline& pipeline, const std::string& note) {
+  pipeline.require_whole();
+  pipeline.parked.note_checkpoint();
   std::string bytes(sealed_header_size, '\0'), kept = note;
   StateWriter archive(bytes);
   CameraFields camera = fields_of(pipeline.given_camera);
   exchange(archive, camera);
   std::string filler = filler_of(camera, pipeline);
-  archive(pipeline.given, pipeline.options.binning, filler);
+  bool has_folder = pipeline.parked.is_on();
+  archive(pipeline.given, pipeline.options.binning, has_folder, filler);
   exchange_state(archive, pipeline);
   archive(kept);
   return sealed(std::move(bytes));
 }
 
-std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* note) {
+std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* note, const std::string& points_folder) {
   check_seal(bytes);
   StateReader archive(bytes, sealed_header_size);
   CameraFields camera;
@@ -325,7 +373,12 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   archive.require(!camera.has_table() || (camera.width > 0 && camera.height > 0 &&
                                           static_cast<std::size_t>(camera.num_pixels()) <= archive.left() / 8),
                   "the camera is larger than what is left");
-  archive(given, binning, filler);
+  bool has_folder = false;
+  archive(given, binning, has_folder, filler);
+  require(has_folder == !points_folder.empty(), "points_folder",
+          has_folder ? "the folder of the points that left the model's memory" : "empty for a model that had none",
+          points_folder);
+  given.points_folder = points_folder;
   archive.require(binning >= 1 && (given.binning == 0 || binning == given.binning), "pixels are averaged otherwise");
   std::unique_ptr<Pipeline> pipeline;
   try {
@@ -351,7 +404,9 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   archive.require(is_first || (is_pixels(before.depth) && is_pixels(before.sigma) && is_pixels(before.measured)),
                   "the newest view has another size than the camera");
   archive.require(is_first || state.history.num_registered() > 0, "the poses are missing");
-  archive.require(num_frames == 0 || state.history.back().num_points == state.cloud.size(),
+  archive.require(PrivateState::is_sound(state.parked, state.blocks, state.cloud.points.size(), num_frames),
+                  "the points that left memory contradict the others");
+  archive.require(num_frames == 0 || state.history.back().num_points == state.num_points() || state.parked.is_on(),
                   "the newest report has another number of points");
   archive.require(is_within(state.num_lost, num_frames + 1), "more frames are lost than there are");
   archive.require(is_within(state.num_vain, static_cast<std::size_t>(state.num_lost) + 1),
