@@ -28,7 +28,7 @@ _LEAST_SECONDS = 5.0
 
 class UnfinishedRun:
     """
-    The folder ``OUT/unfinished``: run.json (what was asked for), journal.txt, checkpoint, and points that left memory.
+    The folder ``OUT/unfinished``: run.json (what was asked for), journal.txt, checkpoint, points.
 
     Parameters
     ----------
