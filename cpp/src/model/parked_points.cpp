@@ -12,9 +12,9 @@
 #include <utility>
 
 #include "fusion/correction.hpp"
-#include "model/checkpoint/checkpoint.hpp"
 #include "model/checkpoint/fields.hpp"
 #include "model/checkpoint/seal.hpp"
+#include "model/checkpoint/surface_check.hpp"
 #include "model/limits.hpp"
 #include "nacre/checkpoint.hpp"
 
@@ -89,10 +89,10 @@ void append_values(std::vector<Value>& to, const std::vector<Value>& from, std::
 
 // As expose_points one after the other, all at once: as many gains as there were frames would take long.
 void expose_points(PointModel& points, const std::vector<Eigen::Vector3f>& gains, std::size_t first) {
-  constexpr std::size_t lanes = 16;
-  using Lanes = Eigen::Array<float, 3, lanes>;
-  for (std::size_t i = 0; i < points.colors.size(); i += lanes) {
-    const std::size_t count = std::min(lanes, points.colors.size() - i);
+  constexpr std::size_t group = 16;
+  using Lanes = Eigen::Array<float, 3, group>;
+  for (std::size_t i = 0; i < points.colors.size(); i += group) {
+    const std::size_t count = std::min(group, points.colors.size() - i);
     Lanes colors = Lanes::Zero();
     for (std::size_t k = 0; k < count; ++k) colors.col(static_cast<Eigen::Index>(k)) = points.colors[i + k];
     for (std::size_t g = first; g < gains.size(); ++g) {
@@ -284,8 +284,8 @@ void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vect
   std::vector<std::uint8_t> is_wanted;
   for (const Parcel& parcel : parcels_) {
     const Box box(parcel.lowest, parcel.highest);
-    is_wanted.push_back(std::any_of(volumes.begin(), volumes.end(),
-                                    [&](const ViewVolume& volume) { return volume.may_hold(box); }));
+    is_wanted.push_back(
+        std::any_of(volumes.begin(), volumes.end(), [&](const ViewVolume& volume) { return volume.may_hold(box); }));
   }
   recall(model, blocks, is_wanted);
 }

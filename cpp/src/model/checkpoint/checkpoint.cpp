@@ -9,6 +9,7 @@
 #include "depth/limits.hpp"
 #include "model/checkpoint/seal.hpp"
 #include "model/checkpoint/state.hpp"
+#include "model/checkpoint/surface_check.hpp"
 #include "model/limits.hpp"
 
 namespace nacre {
@@ -64,45 +65,6 @@ std::string filler_of(const CameraFields& camera, const Pipeline& state) {
   const bool is_needed = camera.has_table() && state.before.depth.size() == 0;
   return std::string(is_needed ? bytes_per_pixel * static_cast<std::size_t>(camera.num_pixels()) : 0, '\0');
 }
-
-template <class Number>
-bool is_within(Number number, std::size_t count) {
-  return number >= 0 && static_cast<std::uint64_t>(number) < count;
-}
-
-template <class T, class Test>
-bool are_all(const std::vector<T>& values, Test&& test) {
-  return std::all_of(values.begin(), values.end(), test);
-}
-
-bool is_place(const Eigen::Vector3f& point) {
-  return (point.array().abs() < static_cast<float>(4.0 * farthest_place)).all();  // of a camera, and, turned, from it
-}
-
-bool is_unit(const Eigen::Vector3f& normal) { return std::abs(normal.squaredNorm() - 1.0F) < 0.01F; }
-
-}  // namespace
-
-bool is_surface(const PointModel& cloud, std::size_t num_frames) {
-  const std::size_t count = cloud.points.size();
-  if (cloud.normals.size() != count || (!cloud.colors.empty() && cloud.colors.size() != count) ||
-      cloud.confidence.size() != count || cloud.last_seen.size() != count || cloud.observations.size() != count ||
-      cloud.free_space_violations.size() != count) {
-    return false;
-  }
-  for (const PointAttribute& attribute : cloud.attributes) {
-    if (attribute.num_channels < 1 || attribute.values.size() % static_cast<std::size_t>(attribute.num_channels) != 0 ||
-        attribute.values.size() / static_cast<std::size_t>(attribute.num_channels) != count) {
-      return false;
-    }
-  }
-  const auto is_count = [](auto number) { return number >= 0 && std::isfinite(static_cast<float>(number)); };
-  return are_all(cloud.points, is_place) && are_all(cloud.normals, is_unit) && are_all(cloud.confidence, is_count) &&
-         are_all(cloud.observations, is_count) && are_all(cloud.free_space_violations, is_count) &&
-         are_all(cloud.last_seen, [&](std::int32_t frame) { return is_within(frame, num_frames); });
-}
-
-namespace {
 
 // Whether all numbers are counts, of at most so many.
 template <class... Counts>

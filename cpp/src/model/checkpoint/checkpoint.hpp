@@ -13,7 +13,4 @@ namespace nacre {
 std::string save_checkpoint(Pipeline& pipeline, const std::string& note);
 std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* note, const std::string& points_folder);
 
-// Whether points are all there, and a surface, of so many frames.
-bool is_surface(const PointModel& cloud, std::size_t num_frames);
-
 }  // namespace nacre

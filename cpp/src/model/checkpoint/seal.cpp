@@ -7,7 +7,6 @@
 #include <sstream>
 
 #include "base/random.hpp"
-#include "model/checkpoint/checkpoint.hpp"
 #include "nacre/checkpoint.hpp"
 #include "nacre/version.hpp"
 
