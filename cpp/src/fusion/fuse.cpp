@@ -164,8 +164,8 @@ std::vector<std::uint8_t> remove_violated(PointModel& model, BlockIndex& blocks,
 }
 
 FusionReport fuse_observed(PointModel& model, BlockIndex& blocks, RegisteredFrame now, double spacing,
-                           const FusionOptions& options, int num_threads,
-                           const std::vector<FrameAttribute>& attributes, Eigen::Vector3f* model_gain) {
+                           const FusionOptions& options, int num_threads, const std::vector<FrameAttribute>& attributes,
+                           Eigen::Vector3f* model_gain) {
   FusionReport report;
   const std::vector<PointRange> seen = blocks.in_view(observed_volume(now, options, spacing));
   const SharedExposure exposure = share_exposure(model, blocks, seen, now, spacing);

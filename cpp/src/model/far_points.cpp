@@ -13,9 +13,9 @@ namespace nacre {
 
 void Pipeline::require_whole() const {
   if (torn.empty()) return;
-  throw std::filesystem::filesystem_error("the newest frame became part of the model in part alone (" + torn +
-                                              "): load what was saved before it",
-                                          std::make_error_code(std::errc::io_error));
+  throw std::filesystem::filesystem_error(
+      "the newest frame became part of the model in part alone (" + torn + "): load what was saved before it",
+      std::make_error_code(std::errc::io_error));
 }
 
 // Before a frame changes anything: where the disk is full, all is as it was.
@@ -48,8 +48,8 @@ void Pipeline::recall_where_camera_may_be(const FrameExtras& extras) {
 
 // The older surface that newer surface may lie on; see merge_layers.
 void Pipeline::recall_layers(std::int32_t oldest_frame) {
-  const double reach = std::ldexp(spacing, fusion_limits::layer_levels - 1) *
-                       std::hypot(1.0, camera_limits::surface_spacings);
+  const double reach =
+      std::ldexp(spacing, fusion_limits::layer_levels - 1) * std::hypot(1.0, camera_limits::surface_spacings);
   const Eigen::Vector3f margin = Eigen::Vector3f::Constant(static_cast<float>(reach));
   std::vector<Box> newer;
   for (const BlockIndex::Summary& block : blocks.summaries()) {

@@ -81,7 +81,11 @@ FrameExtras averaged(const FrameExtras& extras, const PixelBinning& pixels) {
 }  // namespace
 
 Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in, int binning)
-    : given_camera(camera_in), camera(camera_in.binned(binning)), given(options_in), options(options_in), parked(options_in.points_folder) {
+    : given_camera(camera_in),
+      camera(camera_in.binned(binning)),
+      given(options_in),
+      options(options_in),
+      parked(options_in.points_folder) {
   options.check();
   options.binning = binning;
   options.registration.num_threads = options.num_threads;
@@ -470,10 +474,11 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
     if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
     if (options.fusion_method == FusionMethod::fuse) {
       const RegisteredFrame registered{frame, camera, observer, report.world_from_camera, index};
-      if (parked.size() > 0) parked.recall(cloud, blocks, std::vector{observed_volume(registered, options.fusion, spacing)});
+      if (parked.size() > 0)
+        parked.recall(cloud, blocks, std::vector{observed_volume(registered, options.fusion, spacing)});
       Eigen::Vector3f gain;
-      report.fusion =
-          fuse_observed(cloud, blocks, registered, spacing, options.fusion, options.num_threads, extras.attributes, &gain);
+      report.fusion = fuse_observed(cloud, blocks, registered, spacing, options.fusion, options.num_threads,
+                                    extras.attributes, &gain);
       parked.expose(gain);
       const std::vector<std::uint8_t> kept = remove_violated(cloud, blocks, options.fusion, report.fusion);
       if (shape && !kept.empty()) shape->keep(kept);

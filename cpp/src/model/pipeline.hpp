@@ -41,10 +41,10 @@ struct Pipeline {
   NoiseCalibration calibration{camera};
   std::optional<DepthCalibrator> depth_views;   // where depth is to be calibrated
   std::vector<std::int32_t> depth_view_frames;  // their numbers
-  PointModel cloud;                     // in memory
-  BlockIndex blocks;                    // of the cloud
-  ParkedPoints parked;                  // the rest of the model
-  std::optional<DeformingShape> shape;  // of a cloud that deforms
+  PointModel cloud;                             // in memory
+  BlockIndex blocks;                            // of the cloud
+  ParkedPoints parked;                          // the rest of the model
+  std::optional<DeformingShape> shape;          // of a cloud that deforms
   LoopClosure loops{camera, options};
   FrameHistory history;
   StillScene still_scene{camera};
@@ -72,7 +72,7 @@ struct Pipeline {
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
   std::optional<DepthCalibration> depth_calibration() const;
   std::int64_t num_points() const { return cloud.size() + parked.size(); }
-  void require_whole() const;           // as it was after its newest frame
+  void require_whole() const;         // as it was after its newest frame
   double known_noise_factor() const;  // of the frames so far
   NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
 
