@@ -4,6 +4,7 @@ A camera goes round and round through the four rooms of a flat: what that takes,
     python benchmarks/flat.py                                # 10 000 frames, eight rounds
     python benchmarks/flat.py --frames 1250 --laps 1         # one round, as fast
     python benchmarks/flat.py --max-points 300000            # what a model that is full does
+    python benchmarks/flat.py --max-points 300000 --points-folder parked  # points leave memory instead
 
 Prints a line for each part of the recording: frames that were tracked and loops that were closed in it,
 processor time of a frame on one thread, and at its end points, spacing and memory of the process, and the
@@ -92,10 +93,20 @@ def memory_mb() -> float:
     return int(line.split()[1]) / 1024
 
 
-def run(frames: int, laps: int, only: int | None, part: int, spacing: float, max_points: int) -> None:
+def run(
+    frames: int,
+    laps: int,
+    only: int | None,
+    part: int,
+    spacing: float,
+    max_points: int,
+    points_folder: str | None,
+) -> None:
     """Grow the model of the flat, and print what it takes."""
     mesh, truth = flat_mesh(), path(frames, laps)[:only]
-    model = nacre.Model(CAMERA, num_threads=1, spacing=spacing, max_points=max_points)
+    model = nacre.Model(
+        CAMERA, num_threads=1, spacing=spacing, max_points=max_points, points_folder=points_folder
+    )
     tracked, loops, seconds = 0, 0, 0.0
     for k in range(len(truth)):
         depth = mesh.simulate_depth(CAMERA, truth[k], noise="kinect", seed=k)
@@ -133,6 +144,9 @@ def main() -> None:
         "--spacing", type=float, default=0.0, help="of points [m]; by default the model's own"
     )
     parser.add_argument("--max-points", type=int, default=20_000_000, help="of the model; default 20 million")
+    parser.add_argument(
+        "--points-folder", help="where points go beyond --max-points that are far from the camera"
+    )
     run(**vars(parser.parse_args()))
 
 

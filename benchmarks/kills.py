@@ -92,8 +92,9 @@ def check_whole(out: Path, recording: Path) -> int:
     checkpoint = out / "unfinished" / "checkpoint"
     if not checkpoint.exists():
         return 0
-    Reconstruction.load(checkpoint, open_sequence(recording))
-    return int(Model._loaded(checkpoint)[1]["num_journaled"])
+    points = checkpoint.with_name("points")
+    Reconstruction.load(checkpoint, open_sequence(recording), points_folder=points)
+    return int(Model._loaded(checkpoint, points)[1]["num_journaled"])
 
 
 def num_logged(log: Path) -> int:

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 
 #include "bindings.hpp"
 #include "nacre/model.hpp"
@@ -105,6 +106,7 @@ void bind_model(py::module_& m) {
       .def_readwrite("deform", &ModelOptions::deform)
       .def_readwrite("spacing", &ModelOptions::spacing)
       .def_readwrite("max_points", &ModelOptions::max_points)
+      .def_readwrite("points_folder", &ModelOptions::points_folder)
       .def_readwrite("predict_motion", &ModelOptions::predict_motion)
       .def_readwrite("relocalise", &ModelOptions::relocalise)
       .def_readwrite("loop_closure", &ModelOptions::loop_closure)
@@ -175,6 +177,16 @@ void bind_model(py::module_& m) {
     }
   });
 
+  py::register_local_exception_translator([](std::exception_ptr pointer) {
+    try {
+      if (pointer) std::rethrow_exception(pointer);
+    } catch (const std::filesystem::filesystem_error& error) {
+      const std::string path = error.path1().string();
+      const py::tuple arguments = py::make_tuple(error.code().value(), error.what(), path);
+      PyErr_SetObject(PyExc_OSError, path.empty() ? py::make_tuple(error.what()).ptr() : arguments.ptr());
+    }
+  });
+
   py::class_<Model>(m, "Model")
       .def(py::init<const Camera&, const ModelOptions&>())
       .def("add_frame", &add_frame, ReleaseGil())
@@ -188,19 +200,22 @@ void bind_model(py::module_& m) {
              return py::bytes(bytes);
            })
       .def_static("load",
-                  [](const py::bytes& bytes) {
+                  [](const py::bytes& bytes, const std::string& points_folder) {
                     std::string note;
                     const auto data = static_cast<std::string_view>(bytes);
                     std::optional<Model> model;
                     {
                       const py::gil_scoped_release unlocked;
-                      model.emplace(Model::load(data, &note));
+                      model.emplace(Model::load(data, &note, points_folder));
                     }
                     return std::make_pair(std::move(*model), py::bytes(note));
                   })
       .def_property_readonly("given_options", &Model::given_options)
       .def_property_readonly("camera", &Model::camera)
       .def_property_readonly("cloud", &Model::cloud, py::return_value_policy::reference_internal)
+      .def_property_readonly("num_points", &Model::num_points)
+      .def("whole_cloud", &Model::whole_cloud, ReleaseGil())
+      .def("recall_all", &Model::recall_all, ReleaseGil())
       .def("shape_at", &Model::shape_at, ReleaseGil())
       .def("cloud_in_camera", &Model::cloud_in_camera)
       .def_property_readonly("depth_calibration", &Model::depth_calibration)

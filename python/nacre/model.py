@@ -67,6 +67,11 @@ class Model(ExchangeablePoints, Checkpointed):
     depth_scale : float
         Stored units per metre of the depth images that will come: 1 for metres, 1000 for millimetres, 5000
         for TUM.
+    points_folder : path-like, optional
+        Where points go, beyond ``max_points``, that the camera has left behind; they come back when it does.
+        Without it the spacing is widened at ``max_points``. The folder is made where it is needed, and the
+        model's files in it go when they are needed no more. Used with ``loop_closure``, where
+        ``fusion_method`` is "fuse" and without ``deform``.
     **changes
         Fields of :class:`ModelParameters` to change, such as ``spacing=0.002``.
 
@@ -88,6 +93,7 @@ class Model(ExchangeablePoints, Checkpointed):
         *,
         parameters: ModelParameters | None = None,
         depth_scale: float = 1.0,
+        points_folder: str | os.PathLike[str] | None = None,
         **changes: Any,
     ) -> None:
         given = as_camera("camera", camera)
@@ -99,7 +105,11 @@ class Model(ExchangeablePoints, Checkpointed):
         self.parameters = replace(parameters, depth=parameters.depth.for_camera(camera))
         self._camera = given if isinstance(given, Camera) else camera_of(given)
         self._depth_scale = as_scale("depth_scale", depth_scale)
-        self._core = _core.Model(camera, to_core(self.parameters, _core.ModelOptions()))
+        options = to_core(self.parameters, _core.ModelOptions())
+        options.points_folder = "" if points_folder is None else os.path.abspath(points_folder)  # noqa: PTH100
+        self._core = _core.Model(camera, options)
+        self.parks_points = points_folder is not None
+        self._whole: _core.PointModel | None = None  # while more than one thing is asked of all points
         self._calibration: tuple[int, DepthCalibration | None] | None = None  # by so many frames
         self._lock = threading.RLock()  # the handler of a signal may come into a call
 
@@ -170,6 +180,10 @@ class Model(ExchangeablePoints, Checkpointed):
         TypeError, ValueError
             Arrays of the wrong type or shape; a median depth outside 0.05-50 m (the depth scale cannot be
             right). Nothing is changed.
+        OSError
+            Where there is a ``points_folder``: points cannot be written there, and nothing is changed; or
+            what was written cannot be read, or is damaged. Then the model takes no more frames, and
+            :meth:`load` goes on from what was saved before.
         """
         image = as_depth("depth", depth, self._depth_scale)
         pixels = as_mask("mask", mask, image.shape)
@@ -197,7 +211,9 @@ class Model(ExchangeablePoints, Checkpointed):
             return checkpoint_of(self._core, self._depth_scale, more)
 
     @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> Model:
+    def load(
+        cls, path: str | os.PathLike[str], *, points_folder: str | os.PathLike[str] | None = None
+    ) -> Model:
         """
         Read a model that :meth:`save` wrote.
 
@@ -206,6 +222,8 @@ class Model(ExchangeablePoints, Checkpointed):
         path : path-like
             The file. It may come from anybody: nothing in it is run, and no more memory is taken than it
             fills.
+        points_folder : path-like, optional
+            Of a model that had one, where that is now. It keeps the files of its two newest saves.
 
         Returns
         -------
@@ -215,26 +233,38 @@ class Model(ExchangeablePoints, Checkpointed):
         ------
         FileFormatError
             It is no saved model, it is damaged or not all there, or another version's; with the place.
+        ValueError
+            The model had a ``points_folder``, and none is given; or the other way round.
         OSError
             It cannot be read.
         """
-        return cls._loaded(path)[0]
+        return cls._loaded(path, points_folder)[0]
 
     @classmethod
-    def _loaded(cls, path: str | os.PathLike[str]) -> tuple[Model, dict[str, Any]]:
-        core, scale, more = read_checkpoint(path)
+    def _loaded(
+        cls, path: str | os.PathLike[str], points_folder: str | os.PathLike[str] | None
+    ) -> tuple[Model, dict[str, Any]]:
+        core, scale, more = read_checkpoint(path, points_folder)
         model = cls(
             camera_of(core.camera),
             parameters=from_core(ModelParameters, core.given_options),
             depth_scale=scale,
         )
         model._core = core
+        model.parks_points = points_folder is not None
         return model, more
 
     def __len__(self) -> int:
         """Return the number of points."""
         with self._lock:
-            return len(self._core.cloud)
+            return self._core.num_points
+
+    @property
+    def _points(self) -> _core.PointModel:
+        """All points: those that left memory are read."""
+        if self._core.num_points == len(self._core.cloud):
+            return self._core.cloud
+        return self._core.whole_cloud() if self._whole is None else self._whole
 
     def __reduce_ex__(self, protocol: Any) -> Any:
         raise TypeError(
@@ -249,6 +279,18 @@ class Model(ExchangeablePoints, Checkpointed):
         frames = f"{tracked} of {count} frames tracked"
         return f"Model({len(self)} points, {frames}, spacing={self.spacing:.4g} m)"
 
+    def recall_points(self) -> None:
+        """
+        Bring all points back to memory from ``points_folder``, until more frames are added.
+
+        Raises
+        ------
+        OSError
+            A file cannot be read, or is damaged; nothing is changed.
+        """
+        with self._lock:
+            self._core.recall_all()
+
     @property
     def camera(self) -> Camera:
         """The camera of all frames."""
@@ -256,21 +298,21 @@ class Model(ExchangeablePoints, Checkpointed):
 
     @property
     def points(self) -> npt.NDArray[np.float32]:
-        """(N, 3) points in the world frame [m]; a copy."""
+        """(N, 3) points in the world frame [m]; a copy. Those in ``points_folder``, too."""
         with self._lock:
-            return self._core.cloud.points
+            return self._points.points
 
     @property
     def normals(self) -> npt.NDArray[np.float32]:
         """(N, 3) unit normals towards the cameras that saw the points; a copy."""
         with self._lock:
-            return self._core.cloud.normals
+            return self._points.normals
 
     @property
     def colors(self) -> npt.NDArray[np.uint8] | None:
         """(N, 3) colours, or None when no frame had any; a copy."""
         with self._lock:
-            colors = self._core.cloud.colors
+            colors = self._points.colors
         if len(colors) == 0:
             return None
         return np.clip(np.rint(np.nan_to_num(colors)), 0, 255).astype(np.uint8)
@@ -279,14 +321,14 @@ class Model(ExchangeablePoints, Checkpointed):
     def attributes(self) -> dict[str, npt.NDArray[np.float32]]:
         """(N,) or (N, C) for each attribute that a frame had, by name; NaN where never seen; a copy."""
         with self._lock:
-            attributes = self._core.cloud.attributes
+            attributes = self._points.attributes
         return {name: values[:, 0] if values.shape[1] == 1 else values for name, values in attributes.items()}
 
     @property
     def confidence(self) -> npt.NDArray[np.float32]:
         """(N,) frontal observations that each point stands for; a copy."""
         with self._lock:
-            return self._core.cloud.confidence
+            return self._points.confidence
 
     @property
     def point_sigma(self) -> npt.NDArray[np.float64]:
@@ -305,7 +347,7 @@ class Model(ExchangeablePoints, Checkpointed):
     def last_seen(self) -> npt.NDArray[np.int32]:
         """(N,) the index of the last frame that observed each point; a copy."""
         with self._lock:
-            return self._core.cloud.last_seen
+            return self._points.last_seen
 
     @property
     def poses(self) -> npt.NDArray[np.float64]:
@@ -414,13 +456,17 @@ class Model(ExchangeablePoints, Checkpointed):
         from nacre.io.cloud import Cloud
 
         with self._lock:
-            points, normals, colors = self.points, self.normals, self.colors
-            more = {
-                "confidence": self.confidence,
-                "last_seen": self.last_seen,
-                "sigma": self.point_sigma.astype(np.float32),
-                **self.attributes,
-            }
+            self._whole = self._points
+            try:
+                points, normals, colors = self.points, self.normals, self.colors
+                more = {
+                    "confidence": self.confidence,
+                    "last_seen": self.last_seen,
+                    "sigma": self.point_sigma.astype(np.float32),
+                    **self.attributes,
+                }
+            finally:
+                self._whole = None
         rows = slice(None) if all_points else on_surface(points, normals, more["confidence"])
         return Cloud(
             points[rows],

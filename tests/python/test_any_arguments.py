@@ -145,7 +145,8 @@ FILES = {
     "nacre.reconstruction.batch.batch.batch", "nacre.reconstruction.reconstruct.reconstruct",
 }  # fmt: skip
 NOT_OF_ARRAYS = re.compile(
-    r"\.(Sequence|Reconstruction)\.\w+$|\.(Model|Consolidated)\.cloud$|\.NoiseModel\.to_core$|\.as_dict$"
+    r"\.(Sequence|Reconstruction)\.\w+$|\.(Model|Consolidated)\.cloud$|\.Model\.recall_points$"
+    r"|\.NoiseModel\.to_core$|\.as_dict$"
 )
 
 

@@ -138,7 +138,7 @@ STRUCTURE = "block_size capacity border right_border tile_size size side radius 
 STRUCTURE += " version_at bytes_per_pixel none any nothing missing largest infinity nan reach step kWordBits"
 STRUCTURE += " unknown never no_limit step_block equation_block cloud_block phi"
 STRUCTURE += " kBorder kOverhang kRadius kStep num_bins band_rows points_per_block nodes_per_task"
-STRUCTURE += " blended dropout_stream log2_e planes_at_once nobody magic not_measured"
+STRUCTURE += " blended dropout_stream log2_e planes_at_once nobody magic not_measured sealed_header_size"
 
 
 @pytest.mark.parametrize("folder", DECIDING)

@@ -1,6 +1,7 @@
 /// The loop: depth frames in, a growing point model and a camera trajectory out.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -35,14 +36,22 @@ class Model {
   Model& operator=(Model&&) noexcept;
 
   /// Depth [m], NaN or values that are not positive mean "no measurement". Throws std::invalid_argument when sizes do
-  /// not fit or the depth scale cannot be right, before anything is changed.
+  /// not fit or the depth scale cannot be right, before anything is changed. Of a model with points_folder, throws
+  /// std::filesystem::filesystem_error where points cannot be written, before anything is changed, or read: the model
+  /// then takes no more frames, and is to be loaded as it was saved.
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras = {});
 
   Camera camera() const;                      ///< as given
   const ModelOptions& options() const;        ///< with what the first frame decided
   const ModelOptions& given_options() const;  ///< as given
-  const PointModel& cloud() const;            ///< in the world frame
-  PointModel cloud_in_camera() const;         ///< in the newest registered camera's frame
+  const PointModel& cloud() const;            ///< in the world frame; of ModelOptions::points_folder: in memory
+  std::int64_t num_points() const;            ///< those on disk, too
+  /// All points, in the order in which they came, those on disk too: in parts, whose memory is used again. Throws
+  /// std::filesystem::filesystem_error where a file cannot be read, or is damaged.
+  void for_each_part(const std::function<void(const PointModel& part)>& visit) const;
+  PointModel whole_cloud() const;      ///< the same, at once
+  void recall_all();                   ///< all points come back to memory, until more frames are added
+  PointModel cloud_in_camera() const;  ///< likewise, in the newest registered camera's frame
   /// Of a model with options().deform, which cloud() has in its canonical shape. What was added later is carried by
   /// what was there; a frame that is lost has the shape of the one before. Throws std::invalid_argument where the model
   /// does not deform, or has no such frame.
@@ -61,11 +70,13 @@ class Model {
 
   /// All that the model knows, as bytes; a model that is loaded from them goes on to the same bits. `note`: bytes of
   /// the caller's to keep with it. Read by every nacre with the same checkpoint_format, on every machine. To replace a
-  /// file safely, write another one, flush it to disk and rename it.
+  /// file safely, write another one, flush it to disk and rename it. Of a model with points_folder, they name files in
+  /// it, of which those stay that the two newest saves name.
   std::string save(const std::string& note = {}) const;
   /// Throws CheckpointError where the bytes are damaged, not all there, or of another format. They may come from
-  /// anybody: sizes are checked before memory is allocated, and no code is run.
-  static Model load(std::string_view bytes, std::string* note = nullptr);
+  /// anybody: sizes are checked before memory is allocated, and no code is run. points_folder: of a model that had one,
+  /// where that is now; std::invalid_argument where it is missing.
+  static Model load(std::string_view bytes, std::string* note = nullptr, const std::string& points_folder = {});
 
  private:
   explicit Model(std::unique_ptr<Pipeline> pipeline);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "base/pose_check.hpp"
 #include "camera/point_projection.hpp"
@@ -51,8 +52,45 @@ void BlockIndex::add_new(const PointModel& model) {
   }
 }
 
+static std::vector<BlockIndex::Gap>::const_iterator next_gap(const std::vector<BlockIndex::Gap>& gaps,
+                                                             std::size_t place) {
+  return std::upper_bound(gaps.begin(), gaps.end(), place,
+                          [](std::size_t before, const BlockIndex::Gap& gap) { return before < gap.place; });
+}
+
+std::size_t BlockIndex::add_gap(Gap gap) {
+  const auto number = next_gap(gaps_, gap.place) - gaps_.cbegin();
+  gaps_.insert(gaps_.begin() + number, gap);
+  return static_cast<std::size_t>(number);
+}
+
+std::size_t BlockIndex::first_gap_behind(std::size_t place) const {
+  const auto next = next_gap(gaps_, place);
+  return next == gaps_.end() ? std::numeric_limits<std::size_t>::max() : next->place;
+}
+
+std::size_t BlockIndex::num_left_before(std::size_t place) const {
+  return std::accumulate(gaps_.cbegin(), next_gap(gaps_, place), std::size_t{0},
+                         [](std::size_t sum, const Gap& gap) { return sum + gap.count; });
+}
+
+std::vector<BlockIndex::Summary> BlockIndex::summaries() const {
+  std::vector<Summary> all;
+  std::size_t first = 0;
+  for (std::size_t k = 0; k < blocks_.size(); ++k) {
+    all.push_back({{k, first, blocks_[k].count}, blocks_[k].box, blocks_[k].newest});
+    first += static_cast<std::size_t>(blocks_[k].count);
+  }
+  return all;
+}
+
 // Neighbours that have become small become one.
 void BlockIndex::keep(const std::vector<std::uint8_t>& flags) {
+  std::size_t place = 0, num_before = 0;
+  for (Gap& gap : gaps_) {
+    for (; place < gap.place; ++place) num_before += static_cast<std::size_t>(flags[place] != 0);
+    gap.place = num_before;
+  }
   std::size_t kept = 0, next = 0;
   for (const Block& block : blocks_) {
     Block left = block;

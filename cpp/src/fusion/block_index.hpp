@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "camera/view_volume.hpp"
@@ -34,6 +35,25 @@ class BlockIndex {
 
   // Those that may have points in a volume, last seen by oldest_frame or later; in the model's order.
   std::vector<PointRange> in_view(const ViewVolume& volume, std::int32_t oldest_frame = 0) const;
+  struct Summary {
+    PointRange range;
+    Box box;
+    std::int32_t newest;  // frame that last observed one of the points
+  };
+  std::vector<Summary> summaries() const;
+
+  // Gaps between points, in order: how many points are before each, and how many have left from it. They stay between
+  // the same points.
+  struct Gap {
+    std::size_t place;
+    std::size_t count;
+  };
+  const std::vector<Gap>& gaps() const { return gaps_; }
+  std::size_t add_gap(Gap gap);  // behind those at the same place; returns its number
+  void set_gaps(std::vector<Gap> gaps) { gaps_ = std::move(gaps); }
+  std::size_t first_gap_behind(std::size_t place) const;
+  std::size_t num_left_before(std::size_t place) const;  // from gaps up to there
+
   // Those from a point on.
   std::vector<PointRange> from(std::size_t first) const;
 
@@ -47,6 +67,7 @@ class BlockIndex {
 
   std::vector<Block> blocks_;
   std::size_t size_ = 0;  // of the model
+  std::vector<Gap> gaps_;
 };
 
 // What a frame can say anything about: points of the model elsewhere are as if they were not there. spacing: of the

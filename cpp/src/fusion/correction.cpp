@@ -34,8 +34,8 @@ void straighten_points(PointModel& model, const std::vector<Pose>& poses, double
   });
 }
 
-void merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
-                  const std::function<double(const Eigen::Vector3f&)>& spacing_of) {
+std::vector<std::uint8_t> merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
+                                       const std::function<double(const Eigen::Vector3f&)>& spacing_of) {
   std::vector<std::size_t> old;
   std::vector<std::uint8_t> flags(model.points.size(), 1);
   for (std::size_t i = 0; i < model.points.size(); ++i) {
@@ -98,6 +98,7 @@ void merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
   }
   for (const std::size_t i : old) model.free_space_violations[i] = 0;
   model.keep(flags);
+  return flags;
 }
 
 }  // namespace nacre

@@ -1,6 +1,7 @@
 // A model whose cameras have turned out to be elsewhere.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -17,7 +18,8 @@ void straighten_points(PointModel& model, const std::vector<Pose>& poses, double
 
 // Where a point that was last observed before oldest_frame and a later one stand for the same surface, about a spacing
 // apart at most, they become one. spacing_of: where a point is, at least the model's spacing and up to eight times it.
-void merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
-                  const std::function<double(const Eigen::Vector3f&)>& spacing_of);
+// Returns which points are left.
+std::vector<std::uint8_t> merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
+                                       const std::function<double(const Eigen::Vector3f&)>& spacing_of);
 
 }  // namespace nacre

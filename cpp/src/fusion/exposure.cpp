@@ -34,8 +34,8 @@ float significant_gain(std::vector<float> ratios) {
 
 }  // namespace
 
-Eigen::Vector3f color_gain(const PointModel& model, const std::vector<PointRange>& in_view, const RegisteredFrame& now,
-                           double spacing) {
+Eigen::Vector3f color_gain(const PointModel& model, const BlockIndex& blocks, const std::vector<PointRange>& in_view,
+                           const RegisteredFrame& now, double spacing) {
   if (!now.observer.has_colors() || model.colors.empty()) return Eigen::Vector3f::Ones();
   const PointProjection view(now.camera, now.world_from_camera);
   std::array<std::vector<float>, 3> ratios;
@@ -43,9 +43,14 @@ Eigen::Vector3f color_gain(const PointModel& model, const std::vector<PointRange
   PointProjection::Block points;
   for (const PointRange& range : in_view) {
     view.project(model.points[range.first].data(), model.normals[range.first].data(), range.count, points);
+    std::size_t num_left = blocks.num_left_before(range.first), next_gap = blocks.first_gap_behind(range.first);
     for (int j = 0; j < range.count; ++j) {
       const std::size_t i = range.first + static_cast<std::size_t>(j);
-      if (i / block_size % fusion_limits::exposure_blocks != 0) continue;
+      if (i == next_gap) {
+        num_left = blocks.num_left_before(i);
+        next_gap = blocks.first_gap_behind(i);
+      }
+      if ((i + num_left) / block_size % fusion_limits::exposure_blocks != 0) continue;
       if (!points.inside[j] || !(points.facing[j] > fusion_limits::least_facing)) continue;
       const std::int32_t pixel = points.pixel[j];
       const float margin = std::max(static_cast<float>(camera_limits::surface_spacings * spacing),
@@ -63,16 +68,19 @@ Eigen::Vector3f color_gain(const PointModel& model, const std::vector<PointRange
   return gain;
 }
 
-Eigen::Vector3f share_exposure(PointModel& model, const std::vector<PointRange>& in_view, const RegisteredFrame& now,
-                               double spacing) {
-  const Eigen::Vector3f gain = color_gain(model, in_view, now, spacing);
-  if (gain == Eigen::Vector3f::Ones()) return Eigen::Vector3f::Ones();
+SharedExposure share_exposure(const PointModel& model, const BlockIndex& blocks, const std::vector<PointRange>& in_view,
+                              const RegisteredFrame& now, double spacing) {
+  const Eigen::Vector3f gain = color_gain(model, blocks, in_view, now, spacing);
+  if (gain == Eigen::Vector3f::Ones()) return {};
   const float share = -1.0F / std::max(1.0F, static_cast<float>(now.index) + 1.0F);
   const Eigen::Vector3f moved = gain.array().pow(share);
+  return {gain.cwiseProduct(moved), moved};
+}
+
+void expose_points(PointModel& model, const Eigen::Vector3f& gain) {
   for (Eigen::Vector3f& color : model.colors) {
-    if (color.allFinite()) color = exposed(color, moved);
+    if (color.allFinite()) color = exposed(color, gain);
   }
-  return gain.cwiseProduct(moved);
 }
 
 }  // namespace nacre

@@ -164,11 +164,14 @@ std::vector<std::uint8_t> remove_violated(PointModel& model, BlockIndex& blocks,
 }
 
 FusionReport fuse_observed(PointModel& model, BlockIndex& blocks, RegisteredFrame now, double spacing,
-                           const FusionOptions& options, int num_threads,
-                           const std::vector<FrameAttribute>& attributes) {
+                           const FusionOptions& options, int num_threads, const std::vector<FrameAttribute>& attributes,
+                           Eigen::Vector3f* model_gain) {
   FusionReport report;
   const std::vector<PointRange> seen = blocks.in_view(observed_volume(now, options, spacing));
-  now.color_gain = share_exposure(model, seen, now, spacing);
+  const SharedExposure exposure = share_exposure(model, blocks, seen, now, spacing);
+  now.color_gain = exposure.frame;
+  if (exposure.model != Eigen::Vector3f::Ones()) expose_points(model, exposure.model);
+  if (model_gain != nullptr) *model_gain = exposure.model;
   const bool with_colors = now.observer.has_colors() || !model.colors.empty();
   if (with_colors) {
     model.colors.resize(model.points.size(), Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN()));

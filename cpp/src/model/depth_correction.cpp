@@ -88,6 +88,7 @@ void Pipeline::straighten(double tilt, FrameReport& report) {
   }
   corrections = interpolated(corrections, depth_view_frames, poses);
   straighten_points(cloud, poses, tilt, options.num_threads);
+  parked.straighten(poses, tilt);
   move_all(corrections, report);
   loops.straighten(tilt, corrections);
   straighten_view(before, camera, tilt, options.num_threads);

@@ -53,8 +53,23 @@ double Model::depth_unit() const { return pipeline_->calibration.unit(); }
 double Model::noise_factor() const { return pipeline_->known_noise_factor(); }
 double Model::spacing() const { return pipeline_->spacing; }
 
+std::int64_t Model::num_points() const { return pipeline_->num_points(); }
+
+void Model::for_each_part(const std::function<void(const PointModel& part)>& visit) const {
+  pipeline_->parked.for_each_part(pipeline_->cloud, pipeline_->blocks, visit);
+}
+
+PointModel Model::whole_cloud() const {
+  if (pipeline_->parked.size() == 0) return pipeline_->cloud;
+  PointModel whole;
+  for_each_part([&](const PointModel& part) { append_range(whole, part, 0, part.points.size()); });
+  return whole;
+}
+
+void Model::recall_all() { pipeline_->parked.recall_all(pipeline_->cloud, pipeline_->blocks); }
+
 PointModel Model::cloud_in_camera() const {
-  PointModel moved = pipeline_->cloud;
+  PointModel moved = whole_cloud();
   if (pipeline_->history.num_registered() == 0) return moved;
   const Eigen::Isometry3f camera_from_world(pipeline_->history.registered_pose(0).inverse().cast<float>());
   for (Eigen::Vector3f& point : moved.points) point = camera_from_world * point;
@@ -78,6 +93,8 @@ ShapeAtFrame Model::shape_at(std::int64_t frame) const {
 }
 
 std::string Model::save(const std::string& note) const { return save_checkpoint(*pipeline_, note); }
-Model Model::load(std::string_view bytes, std::string* note) { return Model(load_checkpoint(bytes, note)); }
+Model Model::load(std::string_view bytes, std::string* note, const std::string& points_folder) {
+  return Model(load_checkpoint(bytes, note, points_folder));
+}
 
 }  // namespace nacre

@@ -71,6 +71,9 @@ void ModelOptions::check() const {
           "0 (automatic) or a positive distance in metres below 1e30", spacing);
   require(!deform || fusion_method == FusionMethod::fuse, "deform", "used with fusion_method fuse", deform);
   require(!deform || registration.method != Metric::paper, "deform", "used with another method than paper", deform);
+  require(points_folder.empty() || !deform, "points_folder", "empty for a model that deforms", points_folder);
+  require(points_folder.empty() || (loop_closure && fusion_method == FusionMethod::fuse), "points_folder",
+          "used with loop_closure and fusion_method fuse", points_folder);
   require(max_points >= 100, "max_points", "at least 100", max_points);
   require(min_score >= 0.0, "min_score", "0 or more", min_score);
   require(num_threads >= 0, "num_threads", "0 (all) or more", num_threads);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 #include <utility>
 
@@ -80,7 +81,11 @@ FrameExtras averaged(const FrameExtras& extras, const PixelBinning& pixels) {
 }  // namespace
 
 Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in, int binning)
-    : given_camera(camera_in), camera(camera_in.binned(binning)), given(options_in), options(options_in) {
+    : given_camera(camera_in),
+      camera(camera_in.binned(binning)),
+      given(options_in),
+      options(options_in),
+      parked(options_in.points_folder) {
   options.check();
   options.binning = binning;
   options.registration.num_threads = options.num_threads;
@@ -94,8 +99,19 @@ Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in, int 
 
 // Pixels are averaged, and their systematic error is taken away, before all else.
 FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras) {
+  require_whole();
   require_camera_size("depth", depth.rows(), depth.cols(), given_camera);
   check_extras(given_camera, extras, cloud);
+  if (parked.is_on()) make_room();
+  try {
+    return add_whole(depth, extras);
+  } catch (const std::filesystem::filesystem_error& error) {
+    torn = error.what();
+    throw;
+  }
+}
+
+FrameReport Pipeline::add_whole(const DepthRef& depth, const FrameExtras& extras) {
   FrameReport report;
   if (options.binning == 1 && options.depth.tilt == 0.0) return add_worked_on(depth, extras, report);
   DepthImage image;
@@ -126,6 +142,7 @@ FrameReport Pipeline::add_worked_on(const DepthRef& depth, const FrameExtras& ex
     keep_region(report);
     observe(extras, report);
     if (shape) deform(extras, report);
+    if (parked.size() > 0) recall_where_camera_may_be(extras);
     TrackingResult tracking = locate(extras, report);
     if (report.status == FrameStatus::lost && shape && shape->follow_at_any_rate(cloud, options.num_threads)) {
       blocks.renew(cloud);
@@ -147,7 +164,7 @@ FrameReport Pipeline::add_worked_on(const DepthRef& depth, const FrameExtras& ex
     const bool is_lost = report.status == FrameStatus::lost && history.num_registered() > 0;
     num_lost = is_lost ? num_lost + 1 : 0;
     num_vain = is_lost ? num_vain + (frame.valid.size() >= base_limits::least_points) : 0;
-    report.num_points = cloud.size();
+    report.num_points = num_points();
     report.spacing = spacing;
   }
   history.add(report);
@@ -336,7 +353,7 @@ std::vector<Pose> Pipeline::guesses(const FrameExtras& extras) const {
 }
 
 // Some of the newest poses from which the camera looked in different directions.
-static std::vector<Pose> key_poses(const FrameHistory& history) {
+std::vector<Pose> Pipeline::key_poses() const {
   std::vector<Pose> chosen;
   for (std::size_t age = 0; age < history.num_registered() && chosen.size() < model_limits::most_key_poses; ++age) {
     const Pose pose = history.registered_pose(age);
@@ -355,7 +372,7 @@ RelocalisationPlaces Pipeline::elsewhere(const RegionReport& region_report, bool
   if (!options.relocalise || !may_search) return places;
   places.views = &views;
   places.view_of_frame = [&] { return view_of_object(region_report); };
-  if (num_vain % model_limits::search_interval == 0) places.key_poses = [this] { return key_poses(history); };
+  if (num_vain % model_limits::search_interval == 0) places.key_poses = [this] { return key_poses(); };
   places.everywhere = places.key_poses && (num_vain < model_limits::patience || num_vain % model_limits::patience == 0);
   return places;
 }
@@ -393,6 +410,7 @@ void Pipeline::move_all(const std::vector<Pose>& corrections, FrameReport& repor
   history.move(corrections);
   move_points(cloud, corrections, options.num_threads);
   blocks.renew(cloud);
+  parked.move(corrections);
   report.world_from_camera = corrections.back() * report.world_from_camera;
   still_scene.move(corrections.back());
   turn_uncertainty(report, corrections.back().linear());
@@ -433,13 +451,16 @@ void Pipeline::close_loops(const TrackingResult& tracking, bool is_given, FrameR
   }
   move_all(loop.corrections, report);
   const double noise = static_cast<double>(median_sigma(frame));
-  merge_layers(cloud, oldest_frame, spacing, [&](const Eigen::Vector3f& point) {
+  if (parked.size() > 0) recall_layers(oldest_frame);
+  const std::vector<std::uint8_t> kept = merge_layers(cloud, oldest_frame, spacing, [&](const Eigen::Vector3f& point) {
     const double distance = (point.cast<double>() - report.world_from_camera.translation()).norm();
     const double farther = camera.model() == Camera::Model::pinhole ? distance / loop.depth : 1.0;
     const double sigma = noise * farther * farther;  // noise grows with the square
     return spacing_at(static_cast<float>(distance), static_cast<float>(sigma), camera, spacing);
   });
+  blocks.keep(kept);
   blocks.renew(cloud);
+  parked.forget_violations();
   for (ObjectView& view : views) {
     view.world_from_camera = loop.corrections[static_cast<std::size_t>(view.frame)] * view.world_from_camera;
   }
@@ -452,25 +473,35 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
     const Stopwatch watch(report.milliseconds.fuse);
     if (!(spacing > 0.0)) spacing = spacing_for(frame, camera);
     if (options.fusion_method == FusionMethod::fuse) {
-      report.fusion = fuse_observed(cloud, blocks, {frame, camera, observer, report.world_from_camera, index}, spacing,
-                                    options.fusion, options.num_threads, extras.attributes);
+      const RegisteredFrame registered{frame, camera, observer, report.world_from_camera, index};
+      if (parked.size() > 0)
+        parked.recall(cloud, blocks, std::vector{observed_volume(registered, options.fusion, spacing)});
+      Eigen::Vector3f gain;
+      report.fusion = fuse_observed(cloud, blocks, registered, spacing, options.fusion, options.num_threads,
+                                    extras.attributes, &gain);
+      parked.expose(gain);
       const std::vector<std::uint8_t> kept = remove_violated(cloud, blocks, options.fusion, report.fusion);
       if (shape && !kept.empty()) shape->keep(kept);
     } else {
       consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
     }
-    while (options.fusion_method == FusionMethod::fuse && cloud.size() > options.max_points) {
-      spacing *= model_limits::coarsening;
-      const std::vector<std::uint8_t> kept = thinned(cloud, spacing);
-      cloud.keep(kept);
-      if (shape) shape->keep(kept);
-      blocks.renew(cloud);
-    }
+    if (options.fusion_method == FusionMethod::fuse && !parked.is_on()) coarsen();
   }
   if (options.fusion_method == FusionMethod::fuse) return;
   const Stopwatch watch(report.milliseconds.normals);
   renew_normals(cloud, options);
   blocks.renew(cloud);
+}
+
+void Pipeline::coarsen() {
+  while (cloud.size() > options.max_points) {
+    spacing *= model_limits::coarsening;
+    const std::vector<std::uint8_t> kept = thinned(cloud, spacing);
+    cloud.keep(kept);
+    if (shape) shape->keep(kept);
+    blocks.keep(kept);
+    blocks.renew(cloud);
+  }
 }
 
 // The shape is as it was, where the camera is lost.

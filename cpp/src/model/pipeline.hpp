@@ -2,12 +2,14 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "deformation/deforming_shape.hpp"
 #include "fusion/observer.hpp"
 #include "loops/loop_closure.hpp"
 #include "model/frame_history.hpp"
+#include "model/parked_points.hpp"
 #include "nacre/depth_calibration.hpp"
 #include "nacre/frame_report.hpp"
 #include "nacre/model_options.hpp"
@@ -39,9 +41,10 @@ struct Pipeline {
   NoiseCalibration calibration{camera};
   std::optional<DepthCalibrator> depth_views;   // where depth is to be calibrated
   std::vector<std::int32_t> depth_view_frames;  // their numbers
-  PointModel cloud;
-  BlockIndex blocks;                    // of the cloud
-  std::optional<DeformingShape> shape;  // of a cloud that deforms
+  PointModel cloud;                             // in memory
+  BlockIndex blocks;                            // of the cloud
+  ParkedPoints parked;                          // the rest of the model
+  std::optional<DeformingShape> shape;          // of a cloud that deforms
   LoopClosure loops{camera, options};
   FrameHistory history;
   StillScene still_scene{camera};
@@ -59,6 +62,7 @@ struct Pipeline {
   double spacing = 0.0;
   std::int64_t num_lost = 0;             // frames in a row, up to the newest
   std::int64_t num_vain = 0;             // of them, those that showed something
+  std::string torn;                      // why the newest frame is part of the model in part alone
   std::vector<StartFrame> start_frames;  // while the model holds one frame: the newest that may begin another
   bool is_trial = false;                 // whether the third frame is to confirm the first two
 
@@ -67,10 +71,13 @@ struct Pipeline {
 
   FrameReport add_frame(const DepthRef& depth, const FrameExtras& extras);
   std::optional<DepthCalibration> depth_calibration() const;
+  std::int64_t num_points() const { return cloud.size() + parked.size(); }
+  void require_whole() const;         // as it was after its newest frame
   double known_noise_factor() const;  // of the frames so far
   NoiseModel noise() const { return options.depth.noise ? *options.depth.noise : calibration.model(); }
 
  private:
+  FrameReport add_whole(const DepthRef& depth, const FrameExtras& extras);
   FrameReport add_worked_on(const DepthRef& depth, const FrameExtras& extras, FrameReport report);
   // The steps of the loop, in their order.
   DepthImage preprocess(const DepthRef& depth, const MaskRef& mask, FrameReport& report);
@@ -87,6 +94,8 @@ struct Pipeline {
   void unbend(FrameReport& report);
   void remember_view(const FrameReport& report);
   void calibrate_depth(FrameReport& report);
+  void make_room();
+  void coarsen();
 
   // What they need.
   bool was_lost() const { return num_lost > 0; }
@@ -94,11 +103,14 @@ struct Pipeline {
   bool keeps_key_frames() const {
     return options.loop_closure && options.fusion_method == FusionMethod::fuse && !shape;
   }
+  void recall_where_camera_may_be(const FrameExtras& extras);
+  void recall_layers(std::int32_t oldest_frame);
   TrackingResult register_frame(const FrameExtras& extras, const RegionReport& region_report);
   bool learns_noise() const;
   void set_noise_factor(double factor);
   TrackingResult track_frame(TrackingPrior prior, bool may_search);
   std::vector<Pose> guesses(const FrameExtras& extras) const;
+  std::vector<Pose> key_poses() const;
   RelocalisationPlaces elsewhere(const RegionReport& region_report, bool may_search) const;
   std::optional<ObjectView> view_of_object(const RegionReport& region_report) const;
   std::vector<Pose> depth_view_poses() const;

@@ -21,7 +21,8 @@ std::vector<RowsOfBlock> rows_in_view(const PointModel& model, const BlockIndex&
   const PointProjection projection(camera, world_from_camera);
   const auto width = static_cast<float>(camera.width()), height = static_cast<float>(camera.height());
   const float margin_u = width / 3.0F, margin_v = height / 3.0F;
-  const ViewVolume volume(camera, world_from_camera, 1.0 / 3.0, 0.0, std::numeric_limits<double>::infinity());
+  const ViewVolume volume(camera, world_from_camera, tracking_limits::view_margin, 0.0,
+                          std::numeric_limits<double>::infinity());
   const std::vector<PointRange> ranges = blocks.in_view(volume, oldest_frame);
   std::vector<RowsOfBlock> found(ranges.size());
   parallel_for(static_cast<std::int64_t>(ranges.size()), 1, num_threads, [&](std::int64_t number) {

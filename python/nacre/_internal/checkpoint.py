@@ -69,13 +69,16 @@ def checkpoint_of(core: _core.Model, depth_scale: float, more: Mapping[str, Any]
     return core.save(json.dumps({"depth_scale": depth_scale, **more}))
 
 
-def read_checkpoint(path: str | os.PathLike[str]) -> tuple[_core.Model, float, dict[str, Any]]:
+def read_checkpoint(
+    path: str | os.PathLike[str], points_folder: str | os.PathLike[str] | None = None
+) -> tuple[_core.Model, float, dict[str, Any]]:
     """Return the model, the scale of its depth images, and the rest of what was written beside it."""
     from nacre.io.raw import read_file
 
     data = read_file(path)
     try:
-        core, note = _core.Model.load(data)
+        folder = "" if points_folder is None else os.path.abspath(points_folder)  # noqa: PTH100
+        core, note = _core.Model.load(data, folder)
     except _core.CheckpointError as error:
         reason, offset = error.args
         raise FileFormatError(path, reason, offset=offset) from None

@@ -78,6 +78,7 @@ def carry_out(
         if all(frame.report is None for frame in job.run.done.frames):
             job.unfinished.remove()
         raise
+    job.run.done.model.recall_points()  # their folder goes
     job.unfinished.remove()
     return report
 

@@ -77,7 +77,9 @@ def begin_run(
         words, num_frames, indices = describe(sequence, chosen), len(chosen), chosen
         if options.realtime:
             indices = feed = real_time_feed(sequence, chosen, stop=stop, controls=controls)
-    done = Reconstruction(sequence, Model(sequence.camera, parameters=parameters))
+    parks_points = parameters.loop_closure and parameters.fusion_method == "fuse" and not parameters.deform
+    folder = unfinished.points_folder if parks_points else None
+    done = Reconstruction(sequence, Model(sequence.camera, parameters=parameters, points_folder=folder))
     writable_folder(out)
     _hold(unfinished)
     remove_leftovers(out)

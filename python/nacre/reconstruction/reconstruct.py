@@ -39,6 +39,7 @@ def reconstruct(
     retry: bool = True,
     workers: int | None = None,
     scheduler: str | None = None,
+    points_folder: str | os.PathLike[str] | None = None,
     **changes: Any,
 ) -> Reconstruction:
     """
@@ -58,7 +59,7 @@ def reconstruct(
     depth_scale : float, optional
         Stored units per metre, in place of what a recording or the camera file says. Arrays of floats are
         metres without it; integers need it.
-    preset, parameters, **changes
+    preset, parameters, points_folder, **changes
         As in :class:`nacre.Model`.
     progress : callable, optional
         Called with each :class:`~nacre.reconstruction.FrameRecord` when it is done. To return False, or to
@@ -96,7 +97,7 @@ def reconstruct(
     >>> done = nacre.reconstruct(depth_images, camera=camera, depth_scale=1000)  # doctest: +SKIP
     """
     frames, of_all, indices = _opened(source, format, camera, depth_scale)
-    model = Model(of_all, preset, parameters=parameters, **changes)
+    model = Model(of_all, preset, parameters=parameters, points_folder=points_folder, **changes)
     run = Run(Reconstruction(frames, model), indices, retry=retry)
     if workers is not None or scheduler is not None:
         if not isinstance(source, str | os.PathLike):

@@ -256,7 +256,11 @@ class Reconstruction(Checkpointed):
 
     @classmethod
     def load(
-        cls, path: str | os.PathLike[str], sequence: collections.abc.Sequence[SequenceFrame]
+        cls,
+        path: str | os.PathLike[str],
+        sequence: collections.abc.Sequence[SequenceFrame],
+        *,
+        points_folder: str | os.PathLike[str] | None = None,
     ) -> Reconstruction:
         """
         Read a run that :meth:`save` wrote; :meth:`complete` then goes on to the same bits.
@@ -267,6 +271,8 @@ class Reconstruction(Checkpointed):
             The file.
         sequence : sequence of SequenceFrame
             The same recording.
+        points_folder : path-like, optional
+            As in :meth:`nacre.Model.load`.
 
         Returns
         -------
@@ -279,13 +285,16 @@ class Reconstruction(Checkpointed):
         OSError
             It cannot be read.
         """
-        return cls._load(path, sequence)[0]
+        return cls._load(path, sequence, points_folder)[0]
 
     @classmethod
     def _load(
-        cls, path: str | os.PathLike[str], sequence: collections.abc.Sequence[SequenceFrame]
+        cls,
+        path: str | os.PathLike[str],
+        sequence: collections.abc.Sequence[SequenceFrame],
+        points_folder: str | os.PathLike[str] | None,
     ) -> tuple[Reconstruction, dict[str, Any]]:
-        model, more = Model._loaded(path)
+        model, more = Model._loaded(path, points_folder)
         done = cls(sequence, model)
         reports = model.frames
         try:

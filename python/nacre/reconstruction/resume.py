@@ -28,7 +28,7 @@ _LEAST_SECONDS = 5.0
 
 class UnfinishedRun:
     """
-    The folder ``OUT/unfinished``: run.json (what was asked for), journal.txt and checkpoint.
+    The folder ``OUT/unfinished``: run.json (what was asked for), journal.txt, checkpoint, points.
 
     Parameters
     ----------
@@ -60,6 +60,11 @@ class UnfinishedRun:
         return self.folder / "checkpoint"
 
     @property
+    def points_folder(self) -> Path:
+        """Where points of the model go that the camera has left behind."""
+        return self.folder / "points"
+
+    @property
     def document_path(self) -> Path:
         """The file that says what was asked for."""
         return self.folder / "run.json"
@@ -78,6 +83,8 @@ class UnfinishedRun:
         """Begin a new run; what was left of another goes."""
         self._clear()
         self.folder.mkdir(exist_ok=True)
+        if run.done.model.parks_points:
+            self.points_folder.mkdir()
         self._run = run
         self._journal = Journal(self.journal_path)
         self.save()
@@ -101,7 +108,8 @@ class UnfinishedRun:
         self, sequence: Sequence[SequenceFrame], indices: Sequence[int], *, compare: bool, retry: bool
     ) -> Run:
         """Return the run as it was at the newest checkpoint; what is done again may be compared."""
-        done, more = Reconstruction._load(self.checkpoint, sequence)
+        folder = self.points_folder if self.points_folder.is_dir() else None
+        done, more = Reconstruction._load(self.checkpoint, sequence, folder)
         try:
             live = more["live"]
             if not (live is None or isinstance(live, dict)):
@@ -166,5 +174,8 @@ class UnfinishedRun:
             *pieces,
         ):  # no run without the first
             path.unlink(missing_ok=True)
-        with suppress(OSError):
-            self.folder.rmdir()
+        for path in self.points_folder.glob("*.points"):
+            path.unlink()
+        for folder in (self.points_folder, self.folder):
+            with suppress(OSError):
+                folder.rmdir()

@@ -49,7 +49,8 @@ Eigen::Vector3f gain_of(const Eigen::Vector3f& gain) {
   const Colors colors = painted(gain);
   observer.look_at(plane(), colors, 1);
   const Pose at = Pose::Identity();
-  return color_gain(model, BlockIndex(model).from(0), {plane(), orthographic, observer, at, 1}, 0.004);
+  const BlockIndex blocks(model);
+  return color_gain(model, blocks, blocks.from(0), {plane(), orthographic, observer, at, 1}, 0.004);
 }
 
 }  // namespace

@@ -3,80 +3,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <sstream>
+#include <limits>
 
-#include "base/random.hpp"
+#include "base/check.hpp"
 #include "depth/limits.hpp"
+#include "model/checkpoint/seal.hpp"
 #include "model/checkpoint/state.hpp"
+#include "model/checkpoint/surface_check.hpp"
 #include "model/limits.hpp"
-#include "nacre/version.hpp"
 
 namespace nacre {
 namespace {
-
-constexpr char magic[] = {'n', 'a', 'c', 'r', 'e', 'm', 'd', 'l'};
-constexpr std::size_t version_at = 12, length_at = 32, checksum_at = 40, header_size = 48;
-
-std::uint64_t checksum_of(std::string_view bytes) {
-  std::uint64_t sum = bytes.size();
-  for (std::size_t i = 0; i < bytes.size(); i += sizeof(std::uint64_t)) {
-    std::uint64_t word = 0;
-    std::memcpy(&word, bytes.data() + i, std::min(sizeof(word), bytes.size() - i));
-    sum = mix64(sum ^ word);
-  }
-  return sum;
-}
-
-template <class Number>
-Number number_at(std::string_view bytes, std::size_t offset) {
-  Number number;
-  std::memcpy(&number, bytes.data() + offset, sizeof(number));
-  return number;
-}
-
-template <class Number>
-void set_number(std::string& bytes, std::size_t offset, Number number) {
-  std::memcpy(bytes.data() + offset, &number, sizeof(number));
-}
-
-std::string sealed(std::string bytes) {
-  std::copy(std::begin(magic), std::end(magic), bytes.begin());
-  set_number(bytes, sizeof(magic), checkpoint_format);
-  const std::string version = NACRE_VERSION;
-  version.copy(bytes.data() + version_at, length_at - version_at - 1);
-  set_number(bytes, length_at, static_cast<std::uint64_t>(bytes.size()));
-  set_number(bytes, checksum_at, checksum_of(std::string_view(bytes).substr(header_size)));
-  return bytes;
-}
-
-void check_seal(std::string_view bytes) {
-  if (bytes.size() < header_size || !std::equal(std::begin(magic), std::end(magic), bytes.begin())) {
-    throw CheckpointError("it is no model that nacre saved", 0);
-  }
-  const auto format = number_at<std::uint32_t>(bytes, sizeof(magic));
-  if (format != checkpoint_format) {
-    std::string writer(bytes.substr(version_at, length_at - version_at));
-    writer = writer.substr(0, writer.find('\0'));
-    writer.erase(std::remove_if(writer.begin(), writer.end(), [](char c) { return c < ' ' || c > '~'; }), writer.end());
-    std::ostringstream reason;
-    reason << "it has checkpoint format " << format << " (nacre " << writer << " wrote it), and nacre " << NACRE_VERSION
-           << " reads format " << checkpoint_format << ": use that version, or run the recording again";
-    throw CheckpointError(reason.str(), sizeof(magic));
-  }
-  const auto length = number_at<std::uint64_t>(bytes, length_at);
-  if (length != bytes.size()) {
-    std::ostringstream reason;
-    if (length > bytes.size()) {
-      reason << "it has " << bytes.size() << " of its " << length << " bytes: it was not written or copied to the end";
-    } else {
-      reason << "it has " << bytes.size() << " bytes and says that they are " << length << ": it is damaged";
-    }
-    throw CheckpointError(reason.str(), static_cast<std::int64_t>(std::min<std::uint64_t>(length, bytes.size())));
-  }
-  if (number_at<std::uint64_t>(bytes, checksum_at) != checksum_of(bytes.substr(header_size))) {
-    throw CheckpointError("it is damaged: its checksum does not fit", checksum_at);
-  }
-}
 
 struct CameraFields {
   Camera::Model model = Camera::Model::pinhole;
@@ -115,6 +52,9 @@ void exchange_state(Archive& archive, Pipeline& state) {
           state.calibration, state.confidence_noise, state.residual_noise, state.usual_consistency, state.cloud,
           state.loops, state.history, state.before, state.still_scene, state.odometry, state.hypothesis, state.views,
           state.spacing, state.num_lost, state.num_vain, state.start_frames);
+  std::vector<BlockIndex::Gap> gaps = state.blocks.gaps();
+  if (state.parked.is_on()) archive(state.parked, gaps);
+  state.blocks.set_gaps(std::move(gaps));
   if (state.depth_views) archive(*state.depth_views);
   if (state.shape) archive(*state.shape);
 }
@@ -124,41 +64,6 @@ std::string filler_of(const CameraFields& camera, const Pipeline& state) {
   constexpr std::size_t bytes_per_pixel = 8;
   const bool is_needed = camera.has_table() && state.before.depth.size() == 0;
   return std::string(is_needed ? bytes_per_pixel * static_cast<std::size_t>(camera.num_pixels()) : 0, '\0');
-}
-
-template <class Number>
-bool is_within(Number number, std::size_t count) {
-  return number >= 0 && static_cast<std::uint64_t>(number) < count;
-}
-
-template <class T, class Test>
-bool are_all(const std::vector<T>& values, Test&& test) {
-  return std::all_of(values.begin(), values.end(), test);
-}
-
-bool is_place(const Eigen::Vector3f& point) {
-  return (point.array().abs() < static_cast<float>(4.0 * farthest_place)).all();  // of a camera, and, turned, from it
-}
-
-bool is_unit(const Eigen::Vector3f& normal) { return std::abs(normal.squaredNorm() - 1.0F) < 0.01F; }
-
-bool is_sound(const PointModel& cloud, std::size_t num_frames) {
-  const std::size_t count = cloud.points.size();
-  if (cloud.normals.size() != count || (!cloud.colors.empty() && cloud.colors.size() != count) ||
-      cloud.confidence.size() != count || cloud.last_seen.size() != count || cloud.observations.size() != count ||
-      cloud.free_space_violations.size() != count) {
-    return false;
-  }
-  for (const PointAttribute& attribute : cloud.attributes) {
-    if (attribute.num_channels < 1 || attribute.values.size() % static_cast<std::size_t>(attribute.num_channels) != 0 ||
-        attribute.values.size() / static_cast<std::size_t>(attribute.num_channels) != count) {
-      return false;
-    }
-  }
-  const auto is_count = [](auto number) { return number >= 0 && std::isfinite(static_cast<float>(number)); };
-  return are_all(cloud.points, is_place) && are_all(cloud.normals, is_unit) && are_all(cloud.confidence, is_count) &&
-         are_all(cloud.observations, is_count) && are_all(cloud.free_space_violations, is_count) &&
-         are_all(cloud.last_seen, [&](std::int32_t frame) { return is_within(frame, num_frames); });
 }
 
 // Whether all numbers are counts, of at most so many.
@@ -216,6 +121,8 @@ bool is_sound(const ObjectView& view, const Camera& camera, std::size_t num_fram
 bool PrivateState::is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options) {
   const std::int64_t num_pixels = static_cast<std::int64_t>(camera.width()) * camera.height();
   const std::size_t num_frames = history.size();
+  const bool is_bounded = options.points_folder.empty();  // of those on disk a report may tell as many as it likes
+  const std::int64_t most_points = is_bounded ? options.max_points : std::numeric_limits<std::int64_t>::max() / 2;
   for (const FrameHistory::Chunk& chunk : history.chunks_) {
     const bool is_last = &chunk == &history.chunks_.back();
     if (chunk.ends.empty() || chunk.ends.size() > FrameHistory::per_chunk ||
@@ -228,7 +135,7 @@ bool PrivateState::is_sound(const FrameHistory& history, const Camera& camera, c
   try {
     for (std::size_t i = 0; i < num_frames; ++i) {
       const FrameReport report = history[i];
-      if (!nacre::is_sound(report, num_pixels, options.max_points)) return false;
+      if (!nacre::is_sound(report, num_pixels, most_points)) return false;
       if (report.status != FrameStatus::lost) registered.push_back(static_cast<std::int32_t>(i));
     }
   } catch (const CheckpointError&) {  // whose place is none in the file
@@ -363,21 +270,62 @@ bool PrivateState::is_sound(const UsualConsistency& usual) {
          std::isfinite(usual.count_);
 }
 
+// A file is none but one of its own folder's.
+static bool is_points_file(const std::string& name) {
+  const std::size_t dash = name.find('-');
+  if (dash != 16 || name.size() < dash + 9 || name.compare(name.size() - 7, 7, ".points") != 0) return false;
+  const std::string token = name.substr(0, dash), number = name.substr(dash + 1, name.size() - 7 - (dash + 1));
+  return token.find_first_not_of("0123456789abcdef") == std::string::npos &&
+         number.find_first_not_of("0123456789") == std::string::npos;
+}
+
+bool PrivateState::is_sound(const ParkedPoints& parked, const BlockIndex& blocks, std::size_t num_points,
+                            std::size_t num_frames) {
+  const std::vector<BlockIndex::Gap>& gaps = blocks.gaps();
+  const auto is_frame = [&](std::int32_t frame) { return is_within(frame, num_frames); };
+  if (gaps.size() != parked.parcels_.size() || parked.num_checkpoints_ < 0) return false;
+  std::size_t place = 0;
+  std::int64_t size = 0;
+  for (std::size_t k = 0; k < gaps.size(); ++k) {
+    const ParkedPoints::Parcel& parcel = parked.parcels_[k];
+    if (gaps[k].place < place || gaps[k].place > num_points || parcel.count <= 0 ||
+        static_cast<std::uint64_t>(parcel.count) != gaps[k].count || parcel.count > (std::int64_t{1} << 32) ||
+        !is_points_file(parcel.file) || !is_place(parcel.lowest) || !is_place(parcel.highest) ||
+        !(parcel.lowest.array() <= parcel.highest.array()).all() || parcel.frames.empty() ||
+        !std::is_sorted(parcel.frames.begin(), parcel.frames.end()) || !are_all(parcel.frames, is_frame) ||
+        !is_within(parcel.first_motion, parked.motions_.size() + 1) ||
+        !is_within(parcel.first_gain, parked.gains_.size() + 1)) {
+      return false;
+    }
+    for (auto i = static_cast<std::size_t>(parcel.first_motion); i < parked.motions_.size(); ++i) {
+      if (!is_within(parcel.frames.back(), parked.motions_[i].size())) return false;
+    }
+    place = gaps[k].place;
+    size += parcel.count;
+  }
+  return size == parked.size_ && are_all(parked.released_, [](const ParkedPoints::Released& released) {
+           return is_points_file(released.file);
+         });
+}
+
 std::string save_checkpoint(Pipeline& pipeline, const std::string& note) {
-  std::string bytes(header_size, '\0'), kept = note;
+  pipeline.require_whole();
+  pipeline.parked.note_checkpoint();
+  std::string bytes(sealed_header_size, '\0'), kept = note;
   StateWriter archive(bytes);
   CameraFields camera = fields_of(pipeline.given_camera);
   exchange(archive, camera);
   std::string filler = filler_of(camera, pipeline);
-  archive(pipeline.given, pipeline.options.binning, filler);
+  bool has_folder = pipeline.parked.is_on();
+  archive(pipeline.given, pipeline.options.binning, has_folder, filler);
   exchange_state(archive, pipeline);
   archive(kept);
   return sealed(std::move(bytes));
 }
 
-std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* note) {
+std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* note, const std::string& points_folder) {
   check_seal(bytes);
-  StateReader archive(bytes, header_size);
+  StateReader archive(bytes, sealed_header_size);
   CameraFields camera;
   ModelOptions given;
   int binning = 1;
@@ -387,7 +335,12 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   archive.require(!camera.has_table() || (camera.width > 0 && camera.height > 0 &&
                                           static_cast<std::size_t>(camera.num_pixels()) <= archive.left() / 8),
                   "the camera is larger than what is left");
-  archive(given, binning, filler);
+  bool has_folder = false;
+  archive(given, binning, has_folder, filler);
+  require(has_folder == !points_folder.empty(), "points_folder",
+          has_folder ? "the folder of the points that left the model's memory" : "empty for a model that had none",
+          points_folder);
+  given.points_folder = points_folder;
   archive.require(binning >= 1 && (given.binning == 0 || binning == given.binning), "pixels are averaged otherwise");
   std::unique_ptr<Pipeline> pipeline;
   try {
@@ -409,11 +362,13 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   const bool is_first = state.cloud.size() == 0 && before.depth.size() == 0;
   archive.require(filler == filler_of(camera, state), "its length does not fit the camera");
   archive.require(state.region.size() == 0 || is_image(state.region, state.camera), "the region has another size");
-  archive.require(is_sound(state.cloud, num_frames), "the points are not all there, or no surface");
+  archive.require(is_surface(state.cloud, num_frames), "the points are not all there, or no surface");
   archive.require(is_first || (is_pixels(before.depth) && is_pixels(before.sigma) && is_pixels(before.measured)),
                   "the newest view has another size than the camera");
   archive.require(is_first || state.history.num_registered() > 0, "the poses are missing");
-  archive.require(num_frames == 0 || state.history.back().num_points == state.cloud.size(),
+  archive.require(PrivateState::is_sound(state.parked, state.blocks, state.cloud.points.size(), num_frames),
+                  "the points that left memory contradict the others");
+  archive.require(num_frames == 0 || state.history.back().num_points == state.num_points() || state.parked.is_on(),
                   "the newest report has another number of points");
   archive.require(is_within(state.num_lost, num_frames + 1), "more frames are lost than there are");
   archive.require(is_within(state.num_vain, static_cast<std::size_t>(state.num_lost) + 1),

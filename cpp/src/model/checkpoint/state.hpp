@@ -78,6 +78,11 @@ void exchange(Archive& archive, WarpField& field) {
   archive(field.node_spacing, field.nodes, field.edges, field.bindings);
 }
 
+template <class Archive>
+void exchange(Archive& archive, BlockIndex::Gap& gap) {
+  archive(gap.place, gap.count);
+}
+
 // Of classes that keep theirs to themselves.
 struct PrivateState {
   template <class Archive>
@@ -184,6 +189,20 @@ struct PrivateState {
     archive(shape.field_, shape.states_);
   }
 
+  template <class Archive>
+  static void exchange(Archive& archive, ParkedPoints::Parcel& parcel) {
+    archive(parcel.file, parcel.count, parcel.lowest, parcel.highest, parcel.frames, parcel.first_motion,
+            parcel.first_gain, parcel.forgets_violations, parcel.is_named);
+  }
+  template <class Archive>
+  static void exchange(Archive& archive, ParkedPoints::Released& released) {
+    archive(released.file, released.checkpoint);
+  }
+  template <class Archive>
+  static void exchange(Archive& archive, ParkedPoints& parked) {
+    archive(parked.size_, parked.num_checkpoints_, parked.parcels_, parked.motions_, parked.gains_, parked.released_);
+  }
+
   // Whether what was read can be gone on with.
   static bool is_sound(const NoiseCalibration& calibration);
   static bool is_sound(const DepthCalibrator& calibrator);
@@ -196,6 +215,8 @@ struct PrivateState {
   static bool is_sound(const FrameOdometry& odometry);
   static bool is_sound(const DeformingShape& shape, std::size_t num_points, std::size_t num_frames);
   static bool is_sound(const StillScene& scene);
+  static bool is_sound(const ParkedPoints& parked, const BlockIndex& blocks, std::size_t num_points,
+                       std::size_t num_frames);
 };
 
 template <class Archive, class T>

@@ -1,0 +1,397 @@
+#include "model/parked_points.hpp"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <limits>
+#include <random>
+#include <system_error>
+#include <utility>
+
+#include "fusion/correction.hpp"
+#include "model/checkpoint/fields.hpp"
+#include "model/checkpoint/seal.hpp"
+#include "model/checkpoint/surface_check.hpp"
+#include "model/limits.hpp"
+#include "nacre/checkpoint.hpp"
+
+#ifdef _WIN32
+#include <io.h>
+#else
+#include <unistd.h>
+#endif
+
+namespace nacre {
+namespace {
+
+namespace fs = std::filesystem;
+
+[[noreturn]] void fail(const char* what, const fs::path& path) {
+  throw fs::filesystem_error(what, path, std::error_code(errno, std::generic_category()));
+}
+
+constexpr const char* parcel_ending = ".points";
+constexpr const char* cannot_write = "points that leave the model cannot be written";
+constexpr const char* cannot_read = "points that left the model cannot be read";
+
+void write_file(const fs::path& path, const std::string& bytes) {
+  errno = 0;
+  std::FILE* const file = std::fopen(path.string().c_str(), "wb");
+  if (file == nullptr) fail(cannot_write, path);
+  bool is_good = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
+  is_good = std::fclose(file) == 0 && is_good;
+  if (is_good) return;
+  const int error = errno;
+  std::remove(path.string().c_str());
+  errno = error;
+  fail(cannot_write, path);
+}
+
+// Until the power may go.
+void flush_to_disk(const fs::path& path) {
+  errno = 0;
+  std::FILE* const file = std::fopen(path.string().c_str(), "rb+");
+  if (file == nullptr) fail(cannot_write, path);
+#ifdef _WIN32
+  const bool is_good = _commit(_fileno(file)) == 0;
+#else
+  const bool is_good = fsync(fileno(file)) == 0;
+#endif
+  const int error = errno;
+  std::fclose(file);
+  errno = error;
+  if (!is_good) fail(cannot_write, path);
+}
+
+std::string read_file(const fs::path& path) {
+  errno = 0;
+  std::ifstream stream(path, std::ios::binary | std::ios::ate);
+  if (!stream) fail(cannot_read, path);
+  std::string bytes(static_cast<std::size_t>(stream.tellg()), '\0');
+  stream.seekg(0);
+  if (!stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) fail(cannot_read, path);
+  return bytes;
+}
+
+void remove_file(const std::string& folder, const std::string& file) {
+  std::error_code ignored;
+  fs::remove(fs::path(folder) / file, ignored);
+}
+
+template <class Value>
+void append_values(std::vector<Value>& to, const std::vector<Value>& from, std::size_t first, std::size_t count) {
+  const auto begin = from.begin() + static_cast<std::ptrdiff_t>(first);
+  to.insert(to.end(), begin, begin + static_cast<std::ptrdiff_t>(count));
+}
+
+// As expose_points one after the other, all at once: as many gains as there were frames would take long.
+void expose_points(PointModel& points, const std::vector<Eigen::Vector3f>& gains, std::size_t first) {
+  constexpr std::size_t group = 16;
+  using Lanes = Eigen::Array<float, 3, group>;
+  for (std::size_t i = 0; i < points.colors.size(); i += group) {
+    const std::size_t count = std::min(group, points.colors.size() - i);
+    Lanes colors = Lanes::Zero();
+    for (std::size_t k = 0; k < count; ++k) colors.col(static_cast<Eigen::Index>(k)) = points.colors[i + k];
+    for (std::size_t g = first; g < gains.size(); ++g) {
+      colors = (colors.colwise() * gains[g].array()).min(255.0F);
+    }
+    for (std::size_t k = 0; k < count; ++k) {
+      Eigen::Vector3f& color = points.colors[i + k];
+      if (color.allFinite()) color = colors.col(static_cast<Eigen::Index>(k));
+    }
+  }
+}
+
+std::string new_token() {
+  std::random_device device;
+  char text[17];
+  std::snprintf(text, sizeof(text), "%08x%08x", static_cast<unsigned>(device()), static_cast<unsigned>(device()));
+  return text;
+}
+
+}  // namespace
+
+void append_range(PointModel& model, const PointModel& more, std::size_t first, std::size_t count) {
+  constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+  const std::size_t before = model.points.size();
+  append_values(model.points, more.points, first, count);
+  append_values(model.normals, more.normals, first, count);
+  append_values(model.confidence, more.confidence, first, count);
+  append_values(model.last_seen, more.last_seen, first, count);
+  append_values(model.observations, more.observations, first, count);
+  append_values(model.free_space_violations, more.free_space_violations, first, count);
+  if (!more.colors.empty()) {
+    model.colors.resize(before, Eigen::Vector3f::Constant(unknown));
+    append_values(model.colors, more.colors, first, count);
+  } else if (!model.colors.empty()) {
+    model.colors.resize(before + count, Eigen::Vector3f::Constant(unknown));
+  }
+  for (const PointAttribute& attribute : more.attributes) {
+    const auto is_same = [&](const PointAttribute& other) { return other.name == attribute.name; };
+    auto known = std::find_if(model.attributes.begin(), model.attributes.end(), is_same);
+    if (known == model.attributes.end()) {
+      model.attributes.push_back({attribute.name, attribute.num_channels, {}});
+      known = std::prev(model.attributes.end());
+    }
+    const auto channels = static_cast<std::size_t>(attribute.num_channels);
+    known->values.resize(before * channels, unknown);
+    append_values(known->values, attribute.values, first * channels, count * channels);
+  }
+  for (PointAttribute& attribute : model.attributes) {
+    attribute.values.resize((before + count) * static_cast<std::size_t>(attribute.num_channels), unknown);
+  }
+}
+
+ParkedPoints::ParkedPoints(const std::string& folder)
+    : folder_(folder.empty() ? folder : fs::absolute(folder).string()), token_(new_token()) {}
+
+// What no checkpoint names nobody will ask for.
+ParkedPoints::~ParkedPoints() {
+  for (const Parcel& parcel : parcels_) {
+    if (!parcel.is_named) remove_file(folder_, parcel.file);
+  }
+}
+
+ParkedPoints::Parcel ParkedPoints::write(PointModel points) {
+  Parcel parcel;
+  parcel.count = points.size();
+  Box box;
+  for (const Eigen::Vector3f& point : points.points) box.extend(point);
+  parcel.lowest = box.min();
+  parcel.highest = box.max();
+  parcel.frames = points.last_seen;
+  std::sort(parcel.frames.begin(), parcel.frames.end());
+  parcel.frames.erase(std::unique(parcel.frames.begin(), parcel.frames.end()), parcel.frames.end());
+  parcel.first_motion = static_cast<std::int64_t>(motions_.size());
+  parcel.first_gain = static_cast<std::int64_t>(gains_.size());
+  parcel.file = token_ + "-" + std::to_string(next_++) + parcel_ending;
+  std::string bytes(sealed_header_size, '\0');
+  StateWriter archive(bytes);
+  archive(points);
+  write_file(fs::path(folder_) / parcel.file, sealed(std::move(bytes)));
+  return parcel;
+}
+
+PointModel ParkedPoints::read(const Parcel& parcel) const {
+  const fs::path path = fs::path(folder_) / parcel.file;
+  const std::string bytes = read_file(path);
+  PointModel points;
+  try {
+    check_seal(bytes);
+    StateReader archive(bytes, sealed_header_size);
+    archive(points);
+    archive.require_end();
+    const auto num_frames = static_cast<std::size_t>(parcel.frames.back()) + 1;
+    archive.require(points.size() == parcel.count && is_surface(points, num_frames),
+                    "the points are not all there, or no surface");
+  } catch (const CheckpointError& error) {
+    throw fs::filesystem_error(std::string(cannot_read) + ": " + error.what(), path,
+                               std::make_error_code(std::errc::io_error));
+  }
+  for (auto i = static_cast<std::size_t>(parcel.first_motion); i < motions_.size(); ++i) {
+    move_points(points, motions_[i], 1);
+  }
+  expose_points(points, gains_, static_cast<std::size_t>(parcel.first_gain));
+  if (parcel.forgets_violations) {
+    std::fill(points.free_space_violations.begin(), points.free_space_violations.end(), std::uint8_t{0});
+  }
+  return points;
+}
+
+void ParkedPoints::release(const Parcel& parcel) {
+  if (parcel.is_named) {
+    released_.push_back({parcel.file, num_checkpoints_});
+  } else {
+    remove_file(folder_, parcel.file);
+  }
+}
+
+void ParkedPoints::note_checkpoint() {
+  for (const Parcel& parcel : parcels_) {
+    if (!parcel.is_named) flush_to_disk(fs::path(folder_) / parcel.file);
+  }
+  ++num_checkpoints_;
+  for (Parcel& parcel : parcels_) parcel.is_named = true;
+  const auto is_old = [&](const Released& released) { return released.checkpoint + 2 <= num_checkpoints_; };
+  for (const Released& released : released_) {
+    if (is_old(released)) remove_file(folder_, released.file);
+  }
+  released_.erase(std::remove_if(released_.begin(), released_.end(), is_old), released_.end());
+}
+
+// Files are written before anything leaves: where one cannot be, all is as it was.
+void ParkedPoints::park(PointModel& model, BlockIndex& blocks, std::int64_t most_points, std::int32_t oldest_frame,
+                        const ViewVolume& view) {
+  if (!is_on() || model.size() <= most_points) return;
+  blocks.renew(model);
+  std::vector<BlockIndex::Summary> candidates = blocks.summaries();
+  candidates.erase(
+      std::remove_if(candidates.begin(), candidates.end(),
+                     [&](const auto& block) { return block.newest >= oldest_frame || view.may_hold(block.box); }),
+      candidates.end());
+  std::stable_sort(candidates.begin(), candidates.end(),
+                   [](const auto& a, const auto& b) { return a.newest < b.newest; });
+  const auto wanted =
+      model.size() - static_cast<std::int64_t>(model_limits::part_in_memory * static_cast<double>(most_points));
+  std::int64_t num_chosen = 0;
+  std::size_t num_blocks = 0;
+  while (num_blocks < candidates.size() && num_chosen < wanted) num_chosen += candidates[num_blocks++].range.count;
+  candidates.resize(num_blocks);
+  if (candidates.empty()) return;
+  std::sort(candidates.begin(), candidates.end(),
+            [](const auto& a, const auto& b) { return a.range.first < b.range.first; });
+
+  fs::create_directories(folder_);
+  std::vector<std::uint8_t> flags(model.points.size(), 1);
+  std::vector<std::pair<std::size_t, Parcel>> leaving;  // with their places
+  try {
+    for (std::size_t k = 0; k < candidates.size();) {
+      const std::size_t first = candidates[k].range.first;
+      std::size_t end = first;
+      for (; k < candidates.size() && candidates[k].range.first == end && end - first < model_limits::parcel_points &&
+             (end == first || blocks.first_gap_behind(first) > end);
+           ++k) {
+        end += static_cast<std::size_t>(candidates[k].range.count);
+        if (blocks.first_gap_behind(first) < end) {  // what has left from between two of its points divides it
+          end = blocks.first_gap_behind(first);
+          ++k;
+          break;
+        }
+      }
+      PointModel points;
+      append_range(points, model, first, end - first);
+      leaving.emplace_back(first, write(std::move(points)));
+      std::fill(flags.begin() + static_cast<std::ptrdiff_t>(first), flags.begin() + static_cast<std::ptrdiff_t>(end),
+                std::uint8_t{0});
+    }
+  } catch (...) {
+    for (const auto& [_, parcel] : leaving) remove_file(folder_, parcel.file);
+    throw;
+  }
+  for (auto& [place, parcel] : leaving) {
+    size_ += parcel.count;
+    const std::size_t k = blocks.add_gap({place, static_cast<std::size_t>(parcel.count)});
+    parcels_.insert(parcels_.begin() + static_cast<std::ptrdiff_t>(k), std::move(parcel));
+  }
+  model.keep(flags);
+  blocks.keep(flags);
+}
+
+void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vector<ViewVolume>& volumes) {
+  std::vector<std::uint8_t> is_wanted;
+  for (const Parcel& parcel : parcels_) {
+    const Box box(parcel.lowest, parcel.highest);
+    is_wanted.push_back(
+        std::any_of(volumes.begin(), volumes.end(), [&](const ViewVolume& volume) { return volume.may_hold(box); }));
+  }
+  recall(model, blocks, is_wanted);
+}
+
+void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vector<Box>& near) {
+  std::vector<std::uint8_t> is_wanted;
+  for (const Parcel& parcel : parcels_) {
+    const Box box(parcel.lowest, parcel.highest);
+    is_wanted.push_back(std::any_of(near.begin(), near.end(), [&](const Box& other) { return box.intersects(other); }));
+  }
+  recall(model, blocks, is_wanted);
+}
+
+// All are read before the model changes.
+void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vector<std::uint8_t>& is_wanted) {
+  if (std::find(is_wanted.begin(), is_wanted.end(), std::uint8_t{1}) == is_wanted.end()) return;
+  PointModel whole;
+  append_range(whole, model, 0, 0);  // its colours and attributes
+  std::vector<BlockIndex::Gap> gaps;
+  std::vector<Parcel> left;
+  std::size_t done = 0;
+  std::int64_t num_back = 0;
+  for (std::size_t k = 0; k < parcels_.size(); ++k) {
+    const auto [place, count] = blocks.gaps()[k];
+    append_range(whole, model, done, place - done);
+    done = place;
+    if (!is_wanted[k]) {
+      gaps.push_back({whole.points.size(), count});
+      continue;
+    }
+    const PointModel back = read(parcels_[k]);
+    append_range(whole, back, 0, back.points.size());
+    num_back += back.size();
+  }
+  append_range(whole, model, done, model.points.size() - done);
+  for (std::size_t k = 0; k < parcels_.size(); ++k) {
+    if (is_wanted[k]) {
+      release(parcels_[k]);
+    } else {
+      left.push_back(std::move(parcels_[k]));
+    }
+  }
+  size_ -= num_back;
+  parcels_ = std::move(left);
+  if (parcels_.empty()) {
+    motions_.clear();
+    gains_.clear();
+  }
+  model = std::move(whole);
+  blocks.renew(model);
+  blocks.set_gaps(std::move(gaps));
+}
+
+// Each point moves with the frame that last observed it: bounds hold those of the box with each of these.
+void ParkedPoints::move(const std::vector<Pose>& corrections) {
+  for (Parcel& parcel : parcels_) {
+    const Box before(parcel.lowest, parcel.highest);
+    Box after;
+    for (const std::int32_t frame : parcel.frames) {
+      const Eigen::Isometry3f motion(corrections[static_cast<std::size_t>(frame)].cast<float>());
+      const Eigen::Vector3f center = motion * before.center();
+      const Eigen::Vector3f half = 0.5F * (motion.linear().cwiseAbs() * before.sizes());
+      after.extend(Box(center - half, center + half));
+    }
+    parcel.lowest = after.min();
+    parcel.highest = after.max();
+  }
+  if (parcels_.empty()) return;
+  motions_.push_back(corrections);
+  std::size_t num_poses = 0;
+  for (const std::vector<Pose>& motion : motions_) num_poses += motion.size();
+  if (num_poses > model_limits::most_kept_motions) settle();
+}
+
+// Bounds are not known before it is done.
+void ParkedPoints::straighten(const std::vector<Pose>& poses, double tilt) {
+  std::vector<Parcel> straight;
+  for (const Parcel& parcel : parcels_) {
+    PointModel points = read(parcel);
+    straighten_points(points, poses, tilt, 1);
+    straight.push_back(write(std::move(points)));
+  }
+  replace_all(std::move(straight));
+}
+
+void ParkedPoints::expose(const Eigen::Vector3f& gain) {
+  if (!parcels_.empty() && gain != Eigen::Vector3f::Ones()) gains_.push_back(gain);
+}
+
+void ParkedPoints::forget_violations() {
+  for (Parcel& parcel : parcels_) parcel.forgets_violations = true;
+}
+
+// So that nothing is left to be done.
+void ParkedPoints::settle() {
+  std::vector<Parcel> settled;
+  for (const Parcel& parcel : parcels_) settled.push_back(write(read(parcel)));
+  replace_all(std::move(settled));
+}
+
+void ParkedPoints::replace_all(std::vector<Parcel> parcels) {
+  for (const Parcel& parcel : parcels_) release(parcel);
+  for (Parcel& parcel : parcels) parcel.first_motion = parcel.first_gain = 0;
+  parcels_ = std::move(parcels);
+  motions_.clear();
+  gains_.clear();
+}
+
+}  // namespace nacre
