@@ -12,7 +12,7 @@ struct Found {
 };
 
 // Neighbours at -offset and +offset. Comparisons with a missing one (NaN) are false.
-NACRE_INLINE void test_direction(const float* pixel, ptrdiff_t offset, F32 bend, F32 step, Found& found) {
+NACRE_INLINE void test_direction(const float* pixel, ptrdiff_t offset, F32 bend, F32 rim_bend, F32 step, Found& found) {
   const F32 own = load(pixel), a = load(pixel - offset), b = load(pixel + offset);
   const F32 from_a = own - a, from_b = own - b;
   const Mask steep_a = abs(from_a) > step, steep_b = abs(from_b) > step;
@@ -22,8 +22,8 @@ NACRE_INLINE void test_direction(const float* pixel, ptrdiff_t offset, F32 bend,
     found.slanted = found.slanted | (steep_a & steep_b);
     return;
   }
-  const Mask bent_a = abs(from_a + (load(pixel - 2 * offset) - a)) > bend;
-  const Mask bent_b = abs(from_b + (load(pixel + 2 * offset) - b)) > bend;
+  const Mask bent_a = abs(from_a + (load(pixel - 2 * offset) - a)) > rim_bend;
+  const Mask bent_b = abs(from_b + (load(pixel + 2 * offset) - b)) > rim_bend;
   found.edge = found.edge | ((!has_a) & bent_b) | ((!has_b) & bent_a);
   found.slanted = found.slanted | ((steep_a | (!has_a)) & (steep_b | (!has_b)) & (steep_a | steep_b));
 }
@@ -39,14 +39,14 @@ NACRE_INLINE Found test(const float* pixel, ptrdiff_t stride, const EdgeLimits& 
   const F32 step_both = sqrt(step_noise * step_noise + step_lateral * step_lateral);
   const F32 straight_bend = sqrt(bend_straight * bend_straight + bend_lateral * bend_lateral);
   const F32 straight_step = step_both + step_slant;
-  test_direction(pixel, 1, straight_bend, straight_step, found);
-  test_direction(pixel, stride, straight_bend, straight_step, found);
+  test_direction(pixel, 1, straight_bend, bend_straight, straight_step, found);
+  test_direction(pixel, stride, straight_bend, bend_straight, straight_step, found);
   const F32 diagonal = broadcast(::sqrtf(2.0F));
   const F32 bend_across = max(bend_noise, bend_crease * diagonal);
   const F32 diagonal_bend = sqrt(bend_across * bend_across + bend_lateral * bend_lateral);
   const F32 diagonal_step = step_both + step_slant * diagonal;
-  test_direction(pixel, stride + 1, diagonal_bend, diagonal_step, found);
-  test_direction(pixel, stride - 1, diagonal_bend, diagonal_step, found);
+  test_direction(pixel, stride + 1, diagonal_bend, bend_across, diagonal_step, found);
+  test_direction(pixel, stride - 1, diagonal_bend, bend_across, diagonal_step, found);
   return found;
 }
 
