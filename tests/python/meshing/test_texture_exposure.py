@@ -20,7 +20,7 @@ def test_gains_of_images_that_overlap_in_a_chain():
 
 
 def seen_through_a_lens(light, seed):
-    """Return colours of places in 20 images, each in an uneven light of its own; where they are; what is seen."""
+    """Return colours of places in 20 images of an uneven light of their own; where they are; what is seen."""
     rng = np.random.default_rng(seed)
     is_visible = rng.uniform(size=(20, 2000)) < 0.3
     radii = np.sqrt(rng.uniform(0, 1, is_visible.shape))
