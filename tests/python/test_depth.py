@@ -249,7 +249,7 @@ def test_mixtures_with_an_unmeasured_background_go():
 
 
 def test_a_slight_mixture_at_the_rim_of_a_slanted_surface_goes():
-    """As far off as if the last pixel looked six pixels aside; at the border of the image it may look aside."""
+    """It is as far off as if the last pixel looked six pixels aside; at the image's border it may do so."""
     slant = np.radians(52)
     exact = plane_depth(PINHOLE, (-np.sin(slant), 0, -np.cos(slant)), (0, 0, 0.6))
     depth = exact + 0.001 * np.random.default_rng(3).standard_normal(exact.shape)
