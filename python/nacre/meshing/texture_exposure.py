@@ -18,6 +18,7 @@ _REWEIGHTINGS = 6
 _TRUST = 0.1  # of the logarithm: residuals of gloss and of wrong places are larger
 _POWERS = (2, 4, 6)  # of the distance from the middle of the image
 _LEAST_IMAGES = 8  # from whose differences the error of what they have in common is estimated
+_RUNS = 50  # of places, which are as independent as the images
 _SURE = 5.0  # standard errors: beyond chance
 _SEEN_RADIUS = 0.99  # quantile of the distances from the middle: farther out little is known
 _FADING = 100  # rounds of smoothing: the correction of a seam reaches some ten triangles
@@ -106,8 +107,9 @@ def light_falloff(colors: Array, radii: Array, is_visible: Bools) -> Falloff:
     Notes
     -----
     One least squares with :func:`image_gains`, of the mean logarithm of the channels. The standard error is
-    of residuals that are independent from image to image, and not within one (Liang and Zeger 1986,
-    "Longitudinal data analysis using generalized linear models").
+    of residuals that are alike within an image, and within runs of successive places, which gloss has in
+    common (Cameron, Gelbach and Miller 2011, "Robust inference with multiway clustering", without the term
+    that takes away what is counted twice).
     """
     usable = _usable(colors, is_visible)
     if usable.any(axis=1).sum() < _LEAST_IMAGES:
@@ -188,10 +190,16 @@ def _fit_exposure(logarithms: Array, usable: Bools, columns: Array) -> tuple[Arr
         gains, coefficients = np.split(inverse @ right, [num_images])
         added = gains[:, None] - (weights * gains[:, None]).sum(axis=0) / totals
         residuals = lacking + added + shared @ coefficients
-        scores = np.einsum("kpm,kp->km", weighted, residuals)
+        scores = weighted * residuals[..., None]
         weights = usable / (1 + (residuals / _TRUST) ** 2)
-    influences = scores @ inverse[num_images:, num_images:]
+    parts = [scores.sum(axis=1), np.add.reduceat(scores.sum(axis=0), _starts(scores.shape[1]), axis=0)]
+    influences = np.concatenate(parts) @ inverse[num_images:, num_images:]
     return gains - gains.mean(), coefficients, influences.T @ influences
+
+
+def _starts(num_places: int) -> npt.NDArray[np.intp]:
+    """Return where runs of places begin: successive ones are near each other, and shine alike."""
+    return np.unique(np.linspace(0, num_places, _RUNS, endpoint=False).astype(np.intp))
 
 
 def seam_corrections(
