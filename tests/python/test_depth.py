@@ -248,6 +248,21 @@ def test_mixtures_with_an_unmeasured_background_go():
     assert np.isnan(clean[ball]).mean() < 0.2  # the rim is steep; the slope cap takes some of it
 
 
+def test_a_slight_mixture_at_the_rim_of_a_slanted_surface_goes():
+    """It is as far off as if the last pixel looked six pixels aside; at the image's border it may do so."""
+    slant = np.radians(52)
+    exact = plane_depth(PINHOLE, (-np.sin(slant), 0, -np.cos(slant)), (0, 0, 0.6))
+    depth = exact + 0.001 * np.random.default_rng(3).standard_normal(exact.shape)
+    rim = slice(10, 60), 60
+    depth[rim] += 6 * np.abs(np.diff(exact, axis=1))[rim]
+    depth[:, 61:] = np.nan
+    clean = nacre.preprocess_depth(depth, PINHOLE)
+    assert np.isfinite(clean[rim]).mean() < 0.1
+    assert np.isfinite(clean[10:60, 50:60]).mean() > 0.95
+    narrow = Camera(width=61, height=HEIGHT, fx=90, fy=92, cx=47.5, cy=35.5)
+    assert np.isfinite(nacre.preprocess_depth(depth[:, :61], narrow)[rim]).mean() > 0.9
+
+
 @pytest.mark.parametrize("camera", [PINHOLE, RADIAL, ORTHOGRAPHIC], ids=["pinhole", "radial", "orthographic"])
 def test_slanted_planes_stay_and_the_gradient_test_loses_them(camera):
     slant = np.radians(75 if camera is ORTHOGRAPHIC else 60)

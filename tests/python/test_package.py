@@ -27,16 +27,19 @@ def test_numpy_is_the_only_requirement() -> None:
 
 
 # They have no wheel for some machines, or are larger than all the rest.
-NOT_FOR_ALL = {"realsense", "record3d", "rerun", "e57", "closed"}
+NOT_FOR_ALL = {"realsense", "record3d", "rerun", "closed"}
 
 
 def test_all_brings_every_extra_but_the_developers() -> None:
     metadata = importlib.metadata.metadata("nacre")
     extras = set(metadata.get_all("Provides-Extra") or [])
-    (everything,) = (
-        r for r in importlib.metadata.requires("nacre") or [] if re.search(r"""extra == ['"]all""", r)
-    )
-    assert set(re.findall(r"\[(.*?)\]", everything)[0].split(",")) == extras - {"all", "test"} - NOT_FOR_ALL
+    everything = {
+        name
+        for requirement in importlib.metadata.requires("nacre") or []
+        if re.search(r"""extra == ['"]all""", requirement)
+        for name in re.findall(r"\[(.*?)\]", requirement)[0].split(",")
+    }
+    assert everything == extras - {"all", "test"} - NOT_FOR_ALL
 
 
 def test_metadata_is_complete() -> None:

@@ -29,15 +29,22 @@ simd::EdgeLimits edge_limits(const PlanarImage& image, const NoiseModel& noise, 
 // since an edge can only make a slope larger. 0 where no window says.
 class SlopeRows {
  public:
-  SlopeRows(const WindowFits& fits, int width)
-      : fits_(fits), around_(static_cast<std::size_t>(fits.cols + 2)), slopes_(padded(width)), width_(width) {}
+  SlopeRows(const WindowFits& fits, int width, int height)
+      : fits_(fits),
+        around_(static_cast<std::size_t>(fits.cols + 2)),
+        slopes_(padded(width)),
+        at_rim_(padded(width)),
+        width_(width),
+        height_(height) {}
 
-  const float* row(int v) {
-    if (fits_.rows == 0 || fits_.cols == 0) return slopes_.data();
+  // Beyond the image, other than beside pixels that miss in it, the surface goes on.
+  simd::SlopeRow row(int v) {
+    if (fits_.rows == 0 || fits_.cols == 0) return {slopes_.data(), slopes_.data()};
     const int row = nearest(v, fits_.rows);
     if (row != current_) fill(row);
     current_ = row;
-    return slopes_.data();
+    const bool is_outermost = v == 0 || v == height_ - 1;
+    return {slopes_.data(), is_outermost ? slopes_.data() : at_rim_.data()};
   }
 
  private:
@@ -61,11 +68,14 @@ class SlopeRows {
       const int begin = c == 0 ? 0 : centre - reach, end = c + 1 == cols ? width_ : centre + reach + 1;
       std::fill(slopes_.begin() + begin, slopes_.begin() + end, value);
     }
+    const auto last = static_cast<std::size_t>(width_ - 1);
+    at_rim_[0] = slopes_[0];
+    at_rim_[last] = slopes_[last];
   }
 
   const WindowFits& fits_;
-  std::vector<float> around_, slopes_;
-  int width_, current_ = -1;
+  std::vector<float> around_, slopes_, at_rim_;
+  int width_, height_, current_ = -1;
 };
 
 ByteImage copy(const ByteImage& image) {
@@ -83,7 +93,7 @@ ByteImage mark_planar_edges(const PlanarImage& image, const WindowFits& fits, co
   const auto mark_edges = simd::mark_edges();
   parallel_blocks(image.height(), rows_per_block(image.width()), num_threads,
                   [&](std::int64_t, std::int64_t begin, std::int64_t end) {
-                    SlopeRows slopes(fits, image.width());
+                    SlopeRows slopes(fits, image.width(), image.height());
                     for (auto v = static_cast<int>(begin); v < end; ++v) {
                       mark_edges(image.planar_row(v), limits, slopes.row(v), marks.row(v));
                     }

@@ -17,10 +17,16 @@ struct EdgeLimits {
   float bend_lateral, step_lateral;
 };
 
+// The surface's change per pixel, by which a pixel errs that looks aside: between others, and beside missing ones,
+// where looking aside is looking past the surface. Readable 15 beyond the row's end.
+struct SlopeRow {
+  const float *inside, *at_rim;
+};
+
 // Marks pixels where a second difference in one of the four directions through the pixel exceeds its limit; at a rim
 // the pixel is held against the plane through its two inner neighbours. And pixels where both first differences do, or
-// the slope of the surface as a whole. `slope`: the surface's change per pixel, readable 15 beyond the row's end.
-using MarkEdges = void(const PlanarRow& row, const EdgeLimits& limits, const float* slope, uint8_t* marks);
+// the slope of the surface as a whole.
+using MarkEdges = void(const PlanarRow& row, const EdgeLimits& limits, const SlopeRow& slope, uint8_t* marks);
 NACRE_DECLARE_KERNEL(MarkEdges, mark_edges)
 
 // Marks pixels where the gradient of the depth, by Sobel's 3 x 3 operator, exceeds a limit (squared, of 8 times the

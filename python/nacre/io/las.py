@@ -29,6 +29,9 @@ _HEADER = struct.Struct("<96xIIBHI116x")  # data offset, number of records, poin
 _RECORD_BYTES = 54  # of a variable length record, at least
 _COMPRESSED = 0x80
 _FINEST_SCALE = 1e-6  # [m]
+_DAY_AND_YEAR = (
+    90  # where the header says when it was written; zeros: not known, and the same cloud the same bytes
+)
 _DEFAULTS = {"return_number": 1, "number_of_returns": 1}
 _PLAIN, _COLORED = 6, 7  # the point formats of LAS 1.4
 
@@ -189,12 +192,14 @@ def write_chunks(
         if copc.is_copc(path):
             arrays_of_records = (record.array for record in records)
             copc.write(stream, header, arrays_of_records, num_points, _bounds(extremes), temporary.parent)
-            return
-        is_compressed = Path(path).suffix.lower() == ".laz"
-        writer = laspy.LasWriter(stream, header, do_compress=is_compressed, closefd=False)
-        for record in records:
-            writer.write_points(record)
-        writer.close()
+        else:
+            is_compressed = Path(path).suffix.lower() == ".laz"
+            writer = laspy.LasWriter(stream, header, do_compress=is_compressed, closefd=False)
+            for record in records:
+                writer.write_points(record)
+            writer.close()
+        stream.seek(_DAY_AND_YEAR)
+        stream.write(bytes(4))
 
 
 def _bounds(points: arrays.FloatArray) -> npt.NDArray[np.float64]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
@@ -14,6 +16,11 @@ _LEAST_CONTRAST = 0.02  # a pixel: that of noise
 _CLIPPED = 0.2  # of its contrast: a white pixel has lost its colour
 _REWEIGHTINGS = 6
 _TRUST = 0.1  # of the logarithm: residuals of gloss and of wrong places are larger
+_POWERS = (2, 4, 6)  # of the distance from the middle of the image
+_LEAST_IMAGES = 8  # from whose differences the error of what they have in common is estimated
+_RUNS = 50  # of places, which are as independent as the images
+_SURE = 5.0  # standard errors: beyond chance
+_SEEN_RADIUS = 0.99  # quantile of the distances from the middle: farther out little is known
 _FADING = 100  # rounds of smoothing: the correction of a seam reaches some ten triangles
 
 
@@ -50,6 +57,72 @@ def colors_at(image: npt.NDArray[np.floating], pixels: Array) -> Array:
     return colors
 
 
+class Falloff(NamedTuple):
+    """
+    How the light of a lens falls off to the corners of its images, in half diagonals from their middle.
+
+    Attributes
+    ----------
+    coefficients : (3,)
+        Of the second, fourth and sixth power of the distance: they add up to the logarithm of the light that
+        is lacking. Zeros: none.
+    radius : float
+        Beyond it the light is that at this distance.
+    """
+
+    coefficients: Array
+    radius: float
+
+    @property
+    def is_seen(self) -> bool:
+        """Whether there is any."""
+        return bool(self.coefficients.any())
+
+    def factors(self, radii: Array) -> Array:
+        """Return by what colours at distances from the middle are to be multiplied."""
+        powers = np.minimum(radii, self.radius)[..., None] ** _POWERS
+        factors: Array = np.exp(powers @ self.coefficients)
+        return factors
+
+
+def light_falloff(colors: Array, radii: Array, is_visible: Bools) -> Falloff:
+    """
+    Return how much light all images lack away from their middle, as far as that is beyond chance.
+
+    Parameters
+    ----------
+    colors : (K, P, 3)
+        Of P places in K images, from 0 to 255.
+    radii : (K, P)
+        Where the images show them, from the middle of the image [half diagonals].
+    is_visible : (K, P) bool
+        Where an image shows a place.
+
+    Returns
+    -------
+    Falloff
+        None with fewer than eight images, nor where what is lacking at the largest distances is less than
+        five times its standard error.
+
+    Notes
+    -----
+    One least squares with :func:`image_gains`, of the mean logarithm of the channels. The standard error is
+    of residuals that are alike within an image, and within runs of successive places, which gloss has in
+    common (Cameron, Gelbach and Miller 2011, "Robust inference with multiway clustering", without the term
+    that takes away what is counted twice).
+    """
+    usable = _usable(colors, is_visible)
+    if usable.any(axis=1).sum() < _LEAST_IMAGES:
+        return Falloff(np.zeros(len(_POWERS)), 1.0)
+    radius = float(np.quantile(radii[usable], _SEEN_RADIUS))
+    # Powers of the part of the largest distance are no larger than 1, as are the gains.
+    powers = (np.where(usable, np.minimum(radii / radius, 1), 0.0)[..., None]) ** _POWERS
+    _, lacking, covariance = _fit_exposure(_logarithms(colors, usable).mean(axis=2), usable, powers)
+    if not lacking.sum() > _SURE * np.sqrt(covariance.sum()):
+        lacking = np.zeros(len(_POWERS))
+    return Falloff(lacking / radius ** np.array(_POWERS), radius)
+
+
 def image_gains(colors: Array, is_visible: Bools) -> Array:
     """
     Return the factors that bring images to one exposure.
@@ -72,29 +145,61 @@ def image_gains(colors: Array, is_visible: Bools) -> Array:
     again by Cauchy's function of the residuals. The unknown colours of the places are eliminated: K equations
     are left.
     """
-    usable = is_visible & (colors > _DARKEST).all(axis=2) & (colors < _BRIGHTEST).all(axis=2)
-    usable &= usable.sum(axis=0) >= 2
-    logarithms = np.log(np.where(usable[..., None], colors, 1.0))
-    gains = np.stack([_log_gains(logarithms[..., i], usable) for i in range(3)], axis=1)
+    usable = _usable(colors, is_visible)
+    logarithms, nothing = _logarithms(colors, usable), np.zeros((*usable.shape, 0))
+    gains = np.stack([_fit_exposure(logarithms[..., i], usable, nothing)[0] for i in range(3)], axis=1)
     return np.exp(gains)
 
 
-def _log_gains(logarithms: Array, usable: Bools) -> Array:
-    gains = np.zeros(len(logarithms))
+def _usable(colors: Array, is_visible: Bools) -> Bools:
+    usable = is_visible & (colors > _DARKEST).all(axis=2) & (colors < _BRIGHTEST).all(axis=2)
+    several: Bools = usable & (usable.sum(axis=0) >= 2)
+    return several
+
+
+def _logarithms(colors: Array, usable: Bools) -> Array:
+    return np.asarray(np.log(np.where(usable[..., None], colors, 1.0)), np.float64)
+
+
+def _fit_exposure(logarithms: Array, usable: Bools, columns: Array) -> tuple[Array, Array, Array]:
+    """
+    Return what is to be added to the (K, P) logarithms of images to make them agree.
+
+    That is (K,) of each image, with the mean 0, and of (K, P, M) columns that they share (M,) coefficients,
+    with their covariance (M, M).
+    """
+    num_images, _, num_columns = columns.shape
     weights = usable.astype(np.float64)
+    values = np.concatenate([logarithms[..., None], columns], axis=2)
     for _ in range(_REWEIGHTINGS):
         totals = np.maximum(weights.sum(axis=0), 1e-12)
-        means = (weights * logarithms).sum(axis=0) / totals
-        matrix = np.diag(weights.sum(axis=1)) - np.einsum("kp,lp->kl", weights / totals, weights)
-        right = (weights * (means - logarithms)).sum(axis=1)
+        # The mean of a place is its own colour's.
+        means = np.einsum("kp,kpm->pm", weights, values) / totals[:, None]
+        differences = values - means
+        lacking, shared = differences[..., 0], differences[..., 1:]
+        weighted = weights[..., None] * shared
+        matrix = np.empty((num_images + num_columns,) * 2)
+        matrix[:num_images, :num_images] = np.diag(weights.sum(axis=1)) - (weights / totals) @ weights.T
+        matrix[:num_images, num_images:] = weighted.sum(axis=1)
+        matrix[num_images:, :num_images] = matrix[:num_images, num_images:].T
+        matrix[num_images:, num_images:] = np.einsum("kpm,kpn->mn", weighted, shared)
+        right = -np.append((weights * lacking).sum(axis=1), np.einsum("kpm,kp->m", weighted, lacking))
         # Images that share no place with others, and the mean, are left as they are.
         damping = 1e-6 * max(1.0, float(np.trace(matrix)) / len(matrix))
-        gains = np.linalg.solve(matrix + damping * np.eye(len(matrix)), right)
-        corrected = logarithms + gains[:, None]
-        residuals = corrected - (weights * corrected).sum(axis=0) / totals
+        inverse = np.linalg.inv(matrix + damping * np.eye(len(matrix)))
+        gains, coefficients = np.split(inverse @ right, [num_images])
+        added = gains[:, None] - (weights * gains[:, None]).sum(axis=0) / totals
+        residuals = lacking + added + shared @ coefficients
+        scores = weighted * residuals[..., None]
         weights = usable / (1 + (residuals / _TRUST) ** 2)
-    centered: Array = gains - gains.mean()
-    return centered
+    parts = [scores.sum(axis=1), np.add.reduceat(scores.sum(axis=0), _starts(scores.shape[1]), axis=0)]
+    influences = np.concatenate(parts) @ inverse[num_images:, num_images:]
+    return gains - gains.mean(), coefficients, influences.T @ influences
+
+
+def _starts(num_places: int) -> npt.NDArray[np.intp]:
+    """Return where runs of places begin: successive ones are near each other, and shine alike."""
+    return np.unique(np.linspace(0, num_places, _RUNS, endpoint=False).astype(np.intp))
 
 
 def seam_corrections(

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre._internal import arrays
+from nacre.camera import Camera
 from nacre.mesh import Mesh
 from nacre.meshing.texture import Texture
 from nacre.meshing.texture_blending import layers_at_seams
-from nacre.meshing.texture_exposure import blurred, colors_at, detail_at, image_gains, seam_corrections
+from nacre.meshing.texture_exposure import (
+    Falloff,
+    blurred,
+    colors_at,
+    detail_at,
+    image_gains,
+    light_falloff,
+    seam_corrections,
+)
 from nacre.meshing.texture_labels import NO_VIEW, choose_labels, neighbors_of
 from nacre.meshing.texture_painting import paint
 from nacre.meshing.texture_patches import Patches
@@ -72,7 +83,7 @@ def texture_mesh(
     is_guess = np.zeros(len(mesh.vertices), np.bool_)
     if is_seen is not None:
         is_guess = arrays.as_values("is_seen", is_seen, len(mesh.vertices), "vertex") == 0
-    labels, gains, is_shown = _choose_views(mesh, checked, is_guess)
+    checked, labels, gains, is_shown = _choose_views(mesh, checked, is_guess)
     patches = Patches.of(mesh, labels, checked)
     node_colors = _node_colors(patches, checked, gains, fallback)
     edges = patches.corners[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
@@ -83,28 +94,70 @@ def texture_mesh(
     return paint(patches, checked, gains, node_colors, corrections, layers)
 
 
-def _choose_views(
-    mesh: Mesh, views: Sequence[TextureView], is_guess: Bools
-) -> tuple[npt.NDArray[np.int32], Array, Bools]:
-    """Return the view of each triangle, the gains of the views' channels, and which view shows which."""
+class _Choice(NamedTuple):
+    """
+    What triangles are painted with.
+
+    Attributes
+    ----------
+    views : list of TextureView
+        As bright at their corners as in the middle.
+    labels : (T,) int32
+        The view of each triangle.
+    gains : (K, 3)
+        Of the views' channels.
+    is_shown : (K, T) bool
+        Which view shows which triangle.
+    """
+
+    views: list[TextureView]
+    labels: npt.NDArray[np.int32]
+    gains: Array
+    is_shown: Bools
+
+
+def _choose_views(mesh: Mesh, views: Sequence[TextureView], is_guess: Bools) -> _Choice:
     tolerance = edge_lengths(mesh)
     places = np.unique(np.linspace(0, len(mesh.vertices) - 1, _PLACES).astype(np.intp))
     scores = np.empty((len(views), len(mesh.triangles)), np.float32)
     is_visible = np.empty((len(views), len(places)), np.bool_)
     colors = np.empty((len(views), len(places), 3))
+    radii = np.empty((len(views), len(places)))
     for k, view in enumerate(views):
         projection = project(mesh, view, tolerance)
         image = blurred(view.color)
         scores[k] = projection.area * detail_at(image, projection.pixels)[mesh.triangles[:, 0]]
         is_visible[k] = projection.is_visible[places]
         colors[k] = colors_at(image, projection.pixels[places])
+        radii[k] = _radii(view.camera, projection.pixels[places])
     scores[:, is_guess[mesh.triangles].any(axis=1)] = 0
     if not scores.any():
         raise ValueError("views show no triangle of the mesh: check that their poses are of its frame")
+    falloff = light_falloff(colors, radii, is_visible)
+    colors *= falloff.factors(radii)[..., None]
     a, b, c = (mesh.vertices[mesh.triangles[:, i]].astype(np.float64) for i in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    labels = choose_labels(scores, areas, neighbors_of(mesh.triangles))
-    return labels, image_gains(colors, is_visible), scores > 0
+    return _Choice(
+        [_evened(view, falloff) for view in views],
+        choose_labels(scores, areas, neighbors_of(mesh.triangles)),
+        image_gains(colors, is_visible),
+        scores > 0,
+    )
+
+
+def _radii(camera: Camera, pixels: npt.NDArray[np.number]) -> Array:
+    """Return how far (..., 2) pixels are from the optical axis, in half diagonals of the image."""
+    offsets = np.nan_to_num(pixels) - (camera.cx, camera.cy)
+    return np.asarray(2 * np.hypot(*np.moveaxis(offsets, -1, 0)) / np.hypot(camera.width, camera.height))
+
+
+def _evened(view: TextureView, falloff: Falloff) -> TextureView:
+    """Return a view that is as bright at its corners as in the middle."""
+    if not falloff.is_seen:
+        return view
+    pixels = np.stack(np.meshgrid(*(np.arange(side) for side in view.color.shape[1::-1])), axis=-1)
+    bright = view.color * falloff.factors(_radii(view.camera, pixels))[..., None]
+    return dataclasses.replace(view, color=np.clip(np.rint(bright), 0, 255).astype(np.uint8))
 
 
 def _node_colors(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -82,6 +83,13 @@ class SavedRun:
         return None
 
     @property
+    def depth_range(self) -> tuple[float, float]:
+        """Outside of which depth was not used [m]; all, where the report does not say."""
+        depth = (self.report.get("parameters") or {}).get("depth") or {}
+        nearest, farthest = depth.get("min_depth"), depth.get("max_depth")
+        return nearest or 0.0, math.inf if farthest is None else farthest
+
+    @property
     def counts(self) -> dict[str, int]:
         """How many frames there are, and how many of each status."""
         counts = {f"num_{status.lower()}": count for status, count in count_statuses(self.frames).items()}
@@ -99,10 +107,16 @@ def _wrong_in_report(report: dict[str, Any]) -> str | None:
         value = (recording or {}).get(name)
         if value is not None and not (isinstance(value, str) and "\0" not in value):
             return f"recording.{name} must be a text, got {shown(value)}"
-    spacing = report.get("spacing")
-    return (
-        None if spacing is None or _is_number(spacing) else f"spacing must be a number, got {shown(spacing)}"
-    )
+    parameters = report.get("parameters") or {}
+    depth = parameters.get("depth") or {} if isinstance(parameters, dict) else None
+    if not isinstance(depth, dict):
+        return f"parameters must be groups of names and values, got {shown(parameters)}"
+    numbers = {f"parameters.depth.{name}": depth.get(name) for name in ("min_depth", "max_depth")}
+    numbers["spacing"] = report.get("spacing")
+    for name, value in numbers.items():
+        if value is not None and not _is_number(value):
+            return f"{name} must be a number, got {shown(value)}"
+    return None
 
 
 def _wrong_in_frame(frame: Any) -> str | None:

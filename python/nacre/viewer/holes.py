@@ -9,11 +9,11 @@ import numpy.typing as npt
 
 from nacre.meshing import boundary_loops
 from nacre.viewer.timeline import Snapshot, Timeline
-from nacre.viewer.views import Array, were_in_image
+from nacre.viewer.views import Array, could_be_measured
 
 _MIN_EDGES = 16  # of a hole: shorter ones are gaps between a few points
 _MIN_RIM = 60  # edges of a rim: shorter ones are those of loose flakes
-_MARGIN = 0.04  # of the image's width and height, at its edges: what is cut there goes on
+_MARGIN = 0.04  # of the image's width and height, and of the limits of depth: what is cut there goes on
 _OUTWARDS = 0.2  # mean cosine: of a hole the surface lies outwards of its middle
 _LIFT = 0.7  # spacings that the lines lie above the surface
 
@@ -41,9 +41,9 @@ def find_holes(cloud: Snapshot, triangles: npt.NDArray[np.int32], timeline: Time
     """
     Find the borders of a surface that are worth another look.
 
-    Where every camera had a border at the edge of its image, if at all, the scene goes on: that part of it is
-    left out, and a loop that is mostly such is no hole. Holes of fewer than 16 edges are left out, too, and
-    rims of fewer than 60.
+    Where every camera had a border at the edge of its image, if at all, or at a limit of depth, the scene
+    goes on: that part of it is left out, and a loop that is mostly such is no hole. Holes of fewer than 16
+    edges are left out, too, and rims of fewer than 60.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def find_holes(cloud: Snapshot, triangles: npt.NDArray[np.int32], timeline: Time
     """
     loops = [loop for loop in boundary_loops(triangles) if len(loop) >= _MIN_EDGES]
     corners = np.concatenate([*loops, np.zeros(0, np.int32)])
-    seen = were_in_image(timeline, place, cloud.points[corners], _MARGIN)
+    seen = could_be_measured(timeline, place, cloud.points[corners], _MARGIN)
     ends = np.cumsum([len(loop) for loop in loops])[:-1]
     segments, is_hole, sizes = [np.zeros((0, 6), np.float32)], [np.zeros(0, np.uint8)], []
     for loop, was_seen in zip(loops, np.split(seen, ends), strict=False):

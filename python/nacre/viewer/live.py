@@ -38,12 +38,14 @@ class LiveView:
         controls: Controls | None = None,
     ) -> None:
         self._done = done
+        depth = done.model.parameters.depth
         self.timeline = Timeline(
-            title, done.model.camera, depth_of=lambda index: self._done.sequence[index].depth
+            title,
+            done.model.camera,
+            depth_of=lambda index: self._done.sequence[index].depth,
+            depth_range=(depth.min_depth, depth.max_depth),
         )
-        self.viewer = Viewer(
-            self.timeline, host=host, port=port, parameters=done.model.parameters.depth, controls=controls
-        )
+        self.viewer = Viewer(self.timeline, host=host, port=port, parameters=depth, controls=controls)
         self._next = 0.0
 
     def add(self, record: FrameRecord) -> None:

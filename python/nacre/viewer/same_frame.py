@@ -63,7 +63,11 @@ def _share_near(cloud: Snapshot, other: Snapshot) -> float:
 def _placed(timeline: Timeline, motion: npt.NDArray[np.float64], words: str) -> Timeline:
     """Return a run in another world frame, and say how it came there."""
     moved = Timeline(
-        timeline.title, timeline.camera, depth_of=timeline.depth_of, is_upright=timeline.is_upright
+        timeline.title,
+        timeline.camera,
+        depth_of=timeline.depth_of,
+        depth_range=timeline.depth_range,
+        is_upright=timeline.is_upright,
     )
     moved.placement = words
     states = dict(timeline.snapshots)

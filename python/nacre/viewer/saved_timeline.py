@@ -42,7 +42,12 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
         timeline.set_snapshot(_cloud(file, None))
         return timeline
     out = SavedRun(path)
-    timeline = Timeline(out.report.get("title") or path.name, out.camera, depth_of=_recorded_depth(out))
+    timeline = Timeline(
+        out.report.get("title") or path.name,
+        out.camera,
+        depth_of=_recorded_depth(out),
+        depth_range=out.depth_range,
+    )
     placed = out.truth_from_world
     world_from_truth = None if placed is None else np.asarray(np.linalg.inv(placed), np.float64)
     for frame in out.frames:

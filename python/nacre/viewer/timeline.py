@@ -99,6 +99,8 @@ class Timeline:
         ``depth_of(index)`` reads the depth image of a frame again: (H, W) float32 [m].
     max_snapshots : int
         So many states of the model are kept, evenly spread over the frames.
+    depth_range : (float, float)
+        Outside of which depth was not used [m].
     is_upright : bool
         Whether y points up and z to who looks, as in files of other programs, and not as in a camera's frame.
     max_points : int
@@ -118,6 +120,7 @@ class Timeline:
         camera: Camera | None,
         *,
         depth_of: Callable[[int], npt.NDArray[np.float32]] | None = None,
+        depth_range: tuple[float, float] = (0.0, np.inf),
         is_upright: bool = False,
         max_snapshots: int = 40,
         max_points: int = 100_000,
@@ -127,6 +130,7 @@ class Timeline:
         self.title = printable(title)
         self.camera = camera
         self.depth_of = depth_of
+        self.depth_range = depth_range
         self.is_upright = is_upright
         self.frames: list[ReportedFrame] = []
         self.placement = ""

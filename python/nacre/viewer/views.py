@@ -77,11 +77,13 @@ def _in_image(
     return np.asarray(inside & (local[:, 2] > 0))
 
 
-def were_in_image(
+def could_be_measured(
     timeline: Timeline, place: int, points: npt.NDArray[np.float32], margin: float
 ) -> npt.NDArray[np.bool_]:
     """
-    Return which points (N, 3) a frame up to one had in its image, hidden or not; all, without a camera.
+    Return which points (N, 3) a frame up to one had well within its image and range of depth, hidden or not.
+
+    Without a camera these are all.
 
     Parameters
     ----------
@@ -90,14 +92,18 @@ def were_in_image(
     points : (N, 3) float32
         In the world frame [m].
     margin : float
-        What does not count at each edge of the image: a part of its width and height.
+        What does not count at each edge of the image: a part of its width and height; and at either end of
+        the range: a part of that depth.
     """
     places = posed_places(timeline, place)
     if timeline.camera is None or not places:
         return np.ones(len(points), bool)
+    nearest, farthest = (1 + margin) * timeline.depth_range[0], (1 - margin) * timeline.depth_range[1]
     seen = np.zeros(len(points), bool)
     for pose in _poses(timeline, places):
-        seen |= _in_image(timeline.camera, (points - pose[:3, 3]) @ pose[:3, :3], margin)
+        local = (points - pose[:3, 3]) @ pose[:3, :3]
+        depth = np.linalg.norm(local, axis=1) if timeline.camera.depth == "radial" else local[:, 2]
+        seen |= _in_image(timeline.camera, local, margin) & (nearest <= depth) & (depth <= farthest)
     return seen
 
 

@@ -23,26 +23,32 @@ TEST_CASE("edges are those of a plain test") {
     const simd::Quadratic sigma = image.sigma({0.002, 0.0, 0.0}), unit_slope = image.unit_slope();
     const simd::EdgeLimits limits = {sigma * 9.8F, unit_slope * 3.0F, sigma * 4.2F, unit_slope * 5.67F, 4.9F, 2.1F};
     std::vector<float> slope(static_cast<std::size_t>(w + PlanarImage::kOverhang));
-    for (std::size_t u = 0; u < slope.size(); ++u) slope[u] = u % 3 == 0 ? 1e-3F : 1e-4F;
+    std::vector<float> at_rim(slope.size(), 0.0F);
+    for (std::size_t u = 0; u < slope.size(); ++u) {
+      slope[u] = u % 3 == 0 ? 1e-3F : 1e-4F;
+      if (u % 2 == 0) at_rim[u] = slope[u];
+    }
     std::vector<std::uint8_t> marks(static_cast<std::size_t>(w + 1), 9);
     for (int v = 0; v < rows; ++v) {
       for (const Kernels& kernels : all_kernels()) {
-        kernels.mark_edges(image.planar_row(v), limits, slope.data(), marks.data());
+        kernels.mark_edges(image.planar_row(v), limits, {slope.data(), at_rim.data()}, marks.data());
         for (int u = 0; u < w; ++u) {
           const auto at = [&](int du, int dv) { return image.row(v + dv)[u + du]; };
           const float own = at(0, 0), lateral = slope[static_cast<std::size_t>(u)];
           bool edge = false, slanted = lateral > evaluate(limits.step_slant, own);
           for (const auto& [du, dv] : {std::pair{1, 0}, {0, 1}, {1, 1}, {-1, 1}}) {
             const float length = du != 0 && dv != 0 ? std::sqrt(2.0F) : 1.0F;
-            const float bend = std::max(evaluate(limits.bend_noise, own), evaluate(limits.bend_crease, own) * length) +
-                               limits.bend_lateral * lateral;
-            const float step = evaluate(limits.step_noise, own) + evaluate(limits.step_slant, own) * length +
-                               limits.step_lateral * lateral;
+            const float straight =
+                std::max(evaluate(limits.bend_noise, own), evaluate(limits.bend_crease, own) * length);
+            const float bend = std::hypot(straight, limits.bend_lateral * lateral);
+            const float rim_bend = std::hypot(straight, limits.bend_lateral * at_rim[static_cast<std::size_t>(u)]);
+            const float step = std::hypot(evaluate(limits.step_noise, own), limits.step_lateral * lateral) +
+                               evaluate(limits.step_slant, own) * length;
             const float a = at(-du, -dv), b = at(du, dv);
             const bool has_a = a == a, has_b = b == b;
             edge |= std::abs((own - a) + (own - b)) > bend;
-            edge |= !has_a && std::abs((own - b) + (at(2 * du, 2 * dv) - b)) > bend;
-            edge |= !has_b && std::abs((own - a) + (at(-2 * du, -2 * dv) - a)) > bend;
+            edge |= !has_a && std::abs((own - b) + (at(2 * du, 2 * dv) - b)) > rim_bend;
+            edge |= !has_b && std::abs((own - a) + (at(-2 * du, -2 * dv) - a)) > rim_bend;
             const bool steep_a = std::abs(own - a) > step, steep_b = std::abs(own - b) > step;
             slanted |= (steep_a || !has_a) && (steep_b || !has_b) && (steep_a || steep_b);
           }

@@ -1,5 +1,7 @@
 """Point files of every format, as they are read again and as other programs see them."""
 
+import datetime
+
 import numpy as np
 import pytest
 
@@ -92,6 +94,25 @@ def test_laspy_sees_a_survey(tmp_path, ending):
     assert (set(las.classification), las.gps_time[7], las.last_seen[7]) == ({6}, 7.0, 7)
     again = nacre.read_points(path).attributes
     assert set(again) == set(attributes)
+
+
+@pytest.mark.parametrize("ending", [".las", ".laz", ".copc.laz"])
+def test_the_same_survey_has_the_same_bytes_on_another_day(tmp_path, monkeypatch, ending):
+    laspy = pytest.importorskip("laspy")
+    today = written(tmp_path / f"today{ending}", GEOREFERENCED, colors=COLORS)
+
+    class Later(datetime.date):
+        @classmethod
+        def today(cls):
+            return cls(2087, 6, 5)
+
+    monkeypatch.setattr("laspy.header.date", Later)
+    later = written(tmp_path / f"later{ending}", GEOREFERENCED, colors=COLORS)
+    assert today.read_bytes() == later.read_bytes()
+    assert laspy.read(later).header.creation_date is None
+    np.testing.assert_allclose(
+        np.sort(laspy.read(later).xyz, axis=0), np.sort(GEOREFERENCED, axis=0), atol=1e-6
+    )
 
 
 def test_a_las_file_of_another_program(tmp_path):

@@ -67,6 +67,20 @@ def test_what_the_images_cut_off_goes_on() -> None:
     assert (ends[..., 0] > 0.0999).all()
 
 
+@pytest.mark.parametrize("depth_range", [(0, 1.01), (0.99, np.inf)], ids=["farthest", "nearest"])
+def test_what_the_limits_of_depth_cut_off_goes_on(depth_range: tuple[float, float]) -> None:
+    """The plane is at 1 m from one camera, well within the limits of another."""
+    timeline = seen_by(CAMERA, 0.0, 0.01)
+    timeline.depth_range = depth_range
+    assert len(holes_of(with_hole(), timeline).segments) == 0
+    closer = timeline.frames[1].world_from_camera
+    assert closer is not None
+    closer[2, 3] = 0.1 if depth_range[0] == 0 else -0.1
+    found = holes_of(with_hole(), timeline)
+    assert found.sizes == pytest.approx([HOLE])
+    assert (found.is_hole == 0).sum() == RIM
+
+
 def test_a_hole_that_is_not_seen_whole_is_none() -> None:
     narrow = nacre.Camera(100, 100, 2000, 2000, 49.5, 49.5)  # sees 5 cm of the plane, all of it in the hole
     assert holes_of(with_hole(), seen_by(narrow, 0.0)).sizes == []
