@@ -39,8 +39,10 @@ NodeEquations::NodeEquations(std::size_t num_nodes, std::vector<std::pair<std::i
 
 void NodeEquations::set_zero() {
   std::fill(blocks_.begin(), blocks_.end(), Matrix6::Zero());
-  std::fill(right_side_.begin(), right_side_.end(), Vector6::Zero());
+  set_right_side_zero();
 }
+
+void NodeEquations::set_right_side_zero() { std::fill(right_side_.begin(), right_side_.end(), Vector6::Zero()); }
 
 std::size_t NodeEquations::block_at(std::int32_t row, std::int32_t column) const {
   const auto begin = columns_.begin() + static_cast<std::ptrdiff_t>(starts_[static_cast<std::size_t>(row)]);

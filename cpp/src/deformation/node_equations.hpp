@@ -17,6 +17,7 @@ class NodeEquations {
 
   std::size_t num_nodes() const { return starts_.size() - 1; }
   void set_zero();
+  void set_right_side_zero();
   // Where the block of two nodes is; they are a pair, or the same.
   std::size_t block_at(std::int32_t row, std::int32_t column) const;
   Matrix6& block(std::size_t place) { return blocks_[place]; }

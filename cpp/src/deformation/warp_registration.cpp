@@ -56,7 +56,11 @@ class WarpRegistration {
     neighbors_.resize(field.nodes.size());
     for (const WarpEdge& edge : field.edges) {
       for (const auto& [a, b] : {std::pair(edge.first, edge.second), std::pair(edge.second, edge.first)}) {
-        neighbors_[static_cast<std::size_t>(a)].push_back({b, equations_.block_at(a, a), equations_.block_at(a, b)});
+        const WarpNode& first = field.nodes[static_cast<std::size_t>(a)];
+        const WarpNode& second = field.nodes[static_cast<std::size_t>(b)];
+        neighbors_[static_cast<std::size_t>(a)].push_back({b, equations_.block_at(a, a), equations_.block_at(a, b),
+                                                           gap_between(first, second).gap,
+                                                           gap_between(second, first).gap});
       }
     }
   }
@@ -73,9 +77,10 @@ class WarpRegistration {
       match(part * widest);
       move(1.0 + part * (deformation_limits::first_stiffness - 1.0));
     }
+    const double by_chance = misfit_by_chance();
     match(0.0);
     found.bent = field_.nodes;
-    found.is_bent = misfit_before - misfit() > misfit_by_chance();
+    found.is_bent = misfit_before - misfit() > by_chance;
     if (!found.is_bent) {
       field_.nodes = before;
       match(0.0);
@@ -95,6 +100,7 @@ class WarpRegistration {
   struct Neighbor {
     std::int32_t node;
     std::size_t own_block, shared_block;
+    Eigen::Vector3d out_before, back_before;
   };
 
   static std::vector<WarpRow> chosen_rows(const WarpField& field, const OrientedPoints& canonical,
@@ -163,13 +169,39 @@ class WarpRegistration {
     return sum;
   }
 
-  // What a bend may explain of noise: so much for each unknown (Akaike's criterion), where rows err on their own. An
-  // error that all rows of a node share counts as often as there are rows.
-  double misfit_by_chance() const {
-    const auto num_used = std::count_if(uses_.begin(), uses_.end(), [](const auto& uses) { return !uses.empty(); });
+  // What a bend may explain without there being one: many times what the last step's equations explain of noise alone,
+  // of one standard deviation and either sign at each row (Hutchinson's estimate of degrees of freedom, which stiffness
+  // makes fewer than the unknowns). An error that neighbours share counts as often as there are rows.
+  double misfit_by_chance() {
+    equations_.set_right_side_zero();
+    const auto noise_of = [&](std::size_t i) {
+      return std::sqrt(rows_[i].weight) * (random_bits(1, i) % 2 == 0 ? 1.0 : -1.0);
+    };
+    for (std::size_t node = 0; node < uses_.size(); ++node) {
+      for (const Use& use : uses_[node]) {
+        if (!(rows_[use.row].weight > 0.0)) continue;
+        equations_.right_side(node) += noise_of(use.row) * rows_[use.row].jacobian[static_cast<std::size_t>(use.k)];
+      }
+    }
+    const std::vector<Vector6> motion = solved();
+    double explained = 0.0;
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      const WarpRow& row = rows_[i];
+      if (!(row.weight > 0.0)) continue;
+      double moved = 0.0;
+      for (int k = 0; k < row.num_nodes; ++k) {
+        const auto j = static_cast<std::size_t>(k);
+        moved += row.jacobian[j].dot(motion[static_cast<std::size_t>(row.binding.nodes[j])]);
+      }
+      explained += moved * (2.0 * noise_of(i) - row.weight * moved);
+    }
     const auto num_rows = static_cast<double>(rows_.size());
-    const double num_unknowns = std::min(6.0 * static_cast<double>(num_used), num_rows);
-    return deformation_limits::misfit_per_unknown * (num_unknowns + shown_.shared_error * (num_rows - num_unknowns));
+    return deformation_limits::misfit_by_noise * explained +
+           deformation_limits::misfit_per_shared * shown_.shared_error * (num_rows - explained);
+  }
+
+  std::vector<Vector6> solved() const {
+    return equations_.solve(deformation_limits::solver_tolerance, deformation_limits::most_solver_steps, num_threads_);
   }
 
   void linearise(WarpRow& row, const Eigen::Vector3f& point, const Eigen::Vector3f& normal, std::uint32_t slot,
@@ -212,8 +244,7 @@ class WarpRegistration {
       add_edges(node, stiffness);
       add_prior(node);
     });
-    const std::vector<Vector6> motion =
-        equations_.solve(deformation_limits::solver_tolerance, deformation_limits::most_solver_steps, num_threads_);
+    const std::vector<Vector6> motion = solved();
     for (std::size_t i = 0; i < field_.nodes.size(); ++i) nacre::move(field_.nodes[i], motion[i]);
   }
 
@@ -236,9 +267,14 @@ class WarpRegistration {
     const WarpNode& a = field_.nodes[i];
     for (const Neighbor& neighbor : neighbors_[i]) {
       const WarpNode& b = field_.nodes[static_cast<std::size_t>(neighbor.node)];
-      const double length = deformation_limits::strain * (b.rest - a.rest).norm();
-      const double weight = length > 0.0 ? stiffness / (length * length) : 0.0;
-      const WarpGap out = gap_between(a, b), back = gap_between(b, a);
+      const double size = (b.rest - a.rest).norm();
+      if (!(size > 0.0)) continue;
+      const double length = deformation_limits::strain * size, held = deformation_limits::change * size;
+      const double by_rest = stiffness / (length * length), by_last = stiffness / (held * held);
+      const double weight = by_rest + by_last;
+      WarpGap out = gap_between(a, b), back = gap_between(b, a);
+      out.gap -= by_last / weight * neighbor.out_before;
+      back.gap -= by_last / weight * neighbor.back_before;
       Matrix6& own = equations_.block(neighbor.own_block);
       own.noalias() += weight * out.by_first.transpose() * out.by_first;
       own.bottomRightCorner<3, 3>().diagonal().array() += weight;
