@@ -249,6 +249,17 @@ def test_any_number_of_threads_corrects_to_the_same_bits(room, wrong, corrected)
     np.testing.assert_array_equal(other.poses, corrected.poses)
 
 
+def test_noise_as_large_as_the_relief_is_no_tilt():
+    """A thing that turns before a stereo camera: a tilt and turns that are too small would fit each other."""
+    camera = nacre.Camera(width=320, height=240, fx=192, fy=192, cx=159.5, cy=119.5)
+    thing = nacre.built_in_object()
+    size = 1.7 / np.ptp(thing.vertices, axis=0).max()
+    thing = nacre.Mesh(size * np.asarray(thing.vertices), thing.triangles)
+    poses = nacre.turntable_poses(thing, 24, distance=2.2)[:12]
+    views = [(thing.simulate_depth(camera, p, sensor="stereo", seed=i), p) for i, p in enumerate(poses)]
+    assert nacre.calibrate_depth(views, camera).num_pairs == 0
+
+
 @pytest.mark.parametrize("before", [3, 7])
 def test_a_saved_model_goes_on_to_the_same_bits(room, wrong, corrected, tmp_path, before):
     """Before the first correction, and after it."""

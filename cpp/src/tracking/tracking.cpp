@@ -91,12 +91,6 @@ TrackingResult held_by_odometry(const FrameRegistration& registration, const Tra
   return fits ? held : open;
 }
 
-// Of a place that is far from all guesses the frame before is asked, too: an object may look alike from another side.
-bool is_led_elsewhere(const FrameOdometry& odometry, const TrackingResult& found) {
-  constexpr double as_far = camera_limits::new_direction / camera_limits::view_turn;  // as a guess may be
-  return !odometry.allows(found.alignment.target_from_source, as_far);
-}
-
 // A place that the model alone says too little of, but to which the frame before leads, too.
 std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& registration,
                                                     const FrameOdometry& odometry, TrackingPrior& prior,
@@ -179,16 +173,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   if (prior.elsewhere.beside && registration.may_be_beside(best, prior.guesses.front())) {
     try_beside(registration, target.model, prior, options, best);
     if (best.is_lost()) {
-      follow();
-      const auto only = only_near(prior, options, target.usual);
-      if (only && !is_led_elsewhere(odometry, *only)) return *only;
-    }
-  }
-  if (best.decision == Decision::accepted && best.expectation == Expectation::beside) {
-    follow();
-    if (is_led_elsewhere(odometry, best)) {
-      best.decision = Decision::rejected;
-      best.reason = "far from all guesses, and the frame before leads elsewhere";
+      if (const auto only = only_near(prior, options, target.usual)) return *only;
     }
   }
   if (best.decision == Decision::accepted) return best;
