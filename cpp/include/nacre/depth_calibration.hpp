@@ -55,8 +55,8 @@ class DepthCalibrator {
   int num_views() const { return static_cast<int>(views_.size()); }
   std::int64_t num_blocks() const;  ///< of pixels, that a view is averaged to
 
-  /// What the views say, num_pairs 0 or 1 and no error where that is nothing, or a tilt that would turn what lies across
-  /// the axis by more than the 0.1 rad by which the views are turned at least.
+  /// What the views say, num_pairs 0 or 1 and no error where that is nothing, or a tilt that would turn what lies
+  /// across the axis by more than the 0.1 rad by which the views are turned at least.
   DepthCalibration fit(int num_threads = 0) const;
   /// The same in parts, for a loop that must not wait: begins anew with the views that are there; each step is one
   /// iteration, the last of which returns what they say.
