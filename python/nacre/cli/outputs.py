@@ -84,6 +84,7 @@ def file_rows(folder: Path, *, page: bool = True) -> list[tuple[str, str]]:
     """Return where the files are."""
     return [
         ("model", str(folder / "model.ply")),
+        *([("as it moved", str(folder / "animation.glb"))] if (folder / "animation.glb").exists() else []),
         ("trajectory", str(folder / "trajectory.txt")),
         ("figures", str(folder / "report.json")),
         *([("report", str(folder / "report.html"))] if page else []),

@@ -128,8 +128,9 @@ def reconstruct(
     Where frames come faster than they can be registered, the oldest are dropped and counted.
 
     OUT gets model.ply (points with normals, in the first camera's frame), trajectory.txt, report.json and
-    report.html. A frame that cannot be read or registered is LOST and changes nothing. Where fewer than
-    --min-tracked of the frames are tracked, all is written, and the exit code is 3.
+    report.html; with --deform, animation.glb, too: how it moved. A frame that cannot be read or registered
+    is LOST and changes nothing. Where fewer than --min-tracked of the frames are tracked, all is written,
+    and the exit code is 3.
     The frames may be far apart and in any order: a lost camera is searched for everywhere.
 
     Ctrl-C (and SIGTERM) saves the run and writes what there is; --resume OUT goes on with it, and with one

@@ -13,6 +13,7 @@ from nacre.io.atomic import atomic_writer
 from nacre.io.json_files import to_json
 from nacre.io.points import write_points
 from nacre.io.trajectories import write_trajectory
+from nacre.reconstruction.animation import write_model_animation
 
 if TYPE_CHECKING:
     from nacre.reconstruction.reconstruction import Reconstruction
@@ -37,17 +38,26 @@ def write_results(
     page: bool = True,
     min_tracked: float = 0.5,
 ) -> dict[str, Any]:
-    """Write the files of a run, the page if wanted, and return what report.json, the last one, holds."""
+    """
+    Write the files of a run, the page if wanted, and return what report.json, the last one, holds.
+
+    What bends is written as a mesh that moves, too, when the run is finished.
+    """
     write_points(
         folder / "model.ply",
         done.cloud,
         comments=[f"nacre {__version__}", "metres; the world is the first camera's frame"],
     )
     write_trajectory(folder / "trajectory.txt", done.trajectory)
+    interrupted = bool(document.get("interrupted"))
+    animation = folder / "animation.glb"
+    if done.model.parameters.deform and not interrupted:
+        write_model_animation(animation, done.model, done.frames)
+    else:
+        animation.unlink(missing_ok=True)  # of an earlier model
     if page:
         from nacre.report import render_page
 
-        interrupted = bool(document.get("interrupted"))
         text = render_page(
             done.report_data(title, source, figures, interrupted=interrupted, min_tracked=min_tracked)
         )

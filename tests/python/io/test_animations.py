@@ -1,13 +1,12 @@
 """Animated GLB files: what they play is what was written, frame by frame."""
 
-import json
-import struct
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from played_animation import played
 
 import nacre
 
@@ -25,27 +24,6 @@ def bending_strip(num_frames: int = 20, num_points: int = 30) -> tuple[Array, Ar
         frames.append(np.stack([0.2 / bend * np.sin(angle), width, 0.2 / bend * (1 - np.cos(angle))], axis=1))
     rows = 2 * np.arange(num_points - 1)[:, None, None]
     return np.array(frames), (rows + SQUARE).reshape(-1, 3)
-
-
-def played(path: Path) -> tuple[Array, Array, dict[str, Any]]:
-    """Return the times and the vertices at each, as a viewer works them out from a file."""
-    data = path.read_bytes()
-    length = struct.unpack_from("<I", data, 12)[0]
-    document, chunk = json.loads(data[20 : 20 + length]), data[28 + length :]
-
-    def read(accessor: int) -> Array:
-        one = document["accessors"][accessor]
-        view = document["bufferViews"][one["bufferView"]]
-        width = {"SCALAR": 1, "VEC3": 3}[one["type"]]
-        values = np.frombuffer(chunk, "<f4", one["count"] * width, view["byteOffset"])
-        return values.reshape(-1, width) if width > 1 else values
-
-    (primitive,) = document["meshes"][0]["primitives"]
-    targets = [read(target["POSITION"]) for target in primitive["targets"]]
-    (sampler,) = document["animations"][0]["samplers"]
-    weights = read(sampler["output"]).reshape(-1, len(targets))
-    base = read(primitive["attributes"]["POSITION"]) + np.array(document["nodes"][0]["translation"])
-    return read(sampler["input"]), base + np.einsum("fr,rni->fni", weights, targets), document
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-5])
