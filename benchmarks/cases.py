@@ -267,6 +267,19 @@ def measure(case: Case, model: Any) -> Figures:
     )
 
 
+def count_far_off(case: Case, model: Any) -> int:
+    """Return how many of the claimed frames are off by more than a tenth of the depth, or 10 degrees."""
+    claimed = [i for i, report in enumerate(model.frames) if report.status in ("TRACKED", "RELOCALISED")]
+    known = [i for i in claimed if case.truths[i] is not None]
+    if not known:
+        return 0
+    poses = np.array([model.frames[i].world_from_camera for i in known])
+    truths = np.array([case.truths[i] for i in known])
+    depth = middle_depth(case.depths)
+    _, shifts, turns = best_fit(poses, truths, RIGHT_SHIFT * depth, RIGHT_TURN)
+    return int(np.sum((shifts > 0.1 * depth) | (turns > 10.0)))
+
+
 def main() -> None:
     """Run the cases that are named, with settings: cases.py d435 robot spacing=0.01."""
     settings = dict(word.split("=") for word in sys.argv[1:] if "=" in word)

@@ -17,7 +17,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 import cases
-import numpy as np
 
 LONGEST = 40
 """Frames of a piece."""
@@ -74,16 +73,7 @@ def run(piece: tuple[str, int, int]) -> Piece:
     figures, model = cases.run(case)
     known = [i for i, truth in enumerate(case.truths) if truth is not None]
     claimed = [i for i in known if model.frames[i].status in ("TRACKED", "RELOCALISED")]
-    far_off = 0
-    if claimed:
-        depth = cases.middle_depth(case.depths)
-        _, shifts, turns = cases.best_fit(
-            np.array([model.frames[i].world_from_camera for i in claimed]),
-            np.array([case.truths[i] for i in claimed]),
-            cases.RIGHT_SHIFT * depth,
-            cases.RIGHT_TURN,
-        )
-        far_off = int(np.sum((shifts > 0.1 * depth) | (turns > 10.0)))
+    far_off = cases.count_far_off(case, model)
     return Piece(name, start, step, len(known), len(claimed), figures.right, far_off, figures.milliseconds)
 
 
