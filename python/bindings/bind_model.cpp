@@ -1,3 +1,5 @@
+#include <pybind11/stl/filesystem.h>
+
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
@@ -106,7 +108,9 @@ void bind_model(py::module_& m) {
       .def_readwrite("deform", &ModelOptions::deform)
       .def_readwrite("spacing", &ModelOptions::spacing)
       .def_readwrite("max_points", &ModelOptions::max_points)
-      .def_readwrite("points_folder", &ModelOptions::points_folder)
+      .def_property(
+          "points_folder", [](const ModelOptions& options) { return std::filesystem::path(options.points_folder); },
+          [](ModelOptions& options, const std::filesystem::path& folder) { options.points_folder = folder.string(); })
       .def_readwrite("predict_motion", &ModelOptions::predict_motion)
       .def_readwrite("relocalise", &ModelOptions::relocalise)
       .def_readwrite("loop_closure", &ModelOptions::loop_closure)
@@ -200,13 +204,13 @@ void bind_model(py::module_& m) {
              return py::bytes(bytes);
            })
       .def_static("load",
-                  [](const py::bytes& bytes, const std::string& points_folder) {
+                  [](const py::bytes& bytes, const std::filesystem::path& points_folder) {
                     std::string note;
                     const auto data = static_cast<std::string_view>(bytes);
                     std::optional<Model> model;
                     {
                       const py::gil_scoped_release unlocked;
-                      model.emplace(Model::load(data, &note, points_folder));
+                      model.emplace(Model::load(data, &note, points_folder.string()));
                     }
                     return std::make_pair(std::move(*model), py::bytes(note));
                   })

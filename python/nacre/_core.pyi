@@ -6,6 +6,8 @@ from __future__ import annotations
 
 import collections.abc
 import enum
+import os
+import pathlib
 import typing
 
 import numpy
@@ -730,7 +732,6 @@ class ModelOptions:
     fusion: FusionOptions
     fusion_method: FusionMethod
     loop_closure: bool
-    points_folder: str
     predict_motion: bool
     region: RegionOptions
     registration: AlignOptions
@@ -756,6 +757,10 @@ class ModelOptions:
     def num_threads(self) -> int: ...
     @num_threads.setter
     def num_threads(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
+    @property
+    def points_folder(self) -> pathlib.Path: ...
+    @points_folder.setter
+    def points_folder(self, arg1: os.PathLike | str | bytes) -> None: ...
     @property
     def spacing(self) -> float: ...
     @spacing.setter
@@ -853,7 +858,7 @@ class CheckpointError(ValueError):
 
 class Model:
     @staticmethod
-    def load(arg0: bytes, arg1: str) -> tuple[Model, bytes]: ...
+    def load(arg0: bytes, arg1: os.PathLike | str | bytes) -> tuple[Model, bytes]: ...
     def __init__(self, arg0: Camera, arg1: ModelOptions) -> None: ...
     def add_frame(
         self,

@@ -28,17 +28,21 @@ from killed_runs import NACRE, command, results  # noqa: E402  they need the com
 
 SILENT = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 NUM_FRAMES = 150  # three pieces, all around
+CAMERA = nacre.Camera(width=80, height=60, fx=65.5, fy=65.5, cx=39.5, cy=29.5)
 
 
 @pytest.fixture(scope="module", name="recording")
 def once_around(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a recording of the built-in object from all sides; the camera comes back to where it began."""
-    folder = tmp_path_factory.mktemp("pieces") / "object"
+    return write_turn(tmp_path_factory.mktemp("pieces") / "object", CAMERA)
+
+
+def write_turn(folder: Path, told: nacre.Camera) -> Path:
+    """Write what CAMERA sees of the built-in object once around, as the recording of another one."""
     mesh = nacre.built_in_object()
-    camera = nacre.Camera(width=80, height=60, fx=65.5, fy=65.5, cx=39.5, cy=29.5)
-    poses = nacre.turntable_poses(mesh, NUM_FRAMES, 2 * np.pi / (NUM_FRAMES - 10), camera=camera)
-    depths = [mesh.simulate_depth(camera, pose, noise=0.0005, seed=k) for k, pose in enumerate(poses)]
-    nacre.write_recording(folder, camera, depths, depth_scale=20000, poses=poses)
+    poses = nacre.turntable_poses(mesh, NUM_FRAMES, 2 * np.pi / (NUM_FRAMES - 10), camera=CAMERA)
+    depths = [mesh.simulate_depth(CAMERA, pose, noise=0.0005, seed=k) for k, pose in enumerate(poses)]
+    nacre.write_recording(folder, told, depths, depth_scale=20000, poses=poses)
     return folder
 
 
@@ -110,8 +114,12 @@ def test_it_is_nearly_as_good_as_in_one_go(recording: Path, in_pieces: Any, tmp_
     assert errors[0] <= 2 * errors[1], errors
 
 
-def test_loops_between_pieces_are_closed(in_pieces: Any) -> None:
-    loops = [frame for frame in in_pieces[2]["frames"] if frame["loop_frame"] is not None]
+def test_loops_between_pieces_are_closed(cluster: Any, tmp_path: Path) -> None:
+    """A focal length that is told wrongly makes the turn not close."""
+    told = nacre.Camera(width=80, height=60, fx=67, fy=67, cx=39.5, cy=29.5)
+    recording = write_turn(tmp_path / "object", told)
+    assert run(recording, tmp_path / "out", "--scheduler", cluster.scheduler_address)[0] == 0
+    loops = [frame for frame in results(tmp_path / "out")[2]["frames"] if frame["loop_frame"] is not None]
     assert any(frame["index"] >= PIECE > frame["loop_frame"] for frame in loops)
 
 
