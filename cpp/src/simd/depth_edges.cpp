@@ -12,7 +12,8 @@ struct Found {
 };
 
 // Neighbours at -offset and +offset. Comparisons with a missing one (NaN) are false.
-NACRE_INLINE void test_direction(const float* pixel, ptrdiff_t offset, F32 bend, F32 rim_bend, F32 step, Found& found) {
+NACRE_INLINE void test_direction(const float* pixel, ptrdiff_t offset, F32 bend, F32 rim_bend, F32 step, F32 away,
+                                 Found& found) {
   const F32 own = load(pixel), a = load(pixel - offset), b = load(pixel + offset);
   const F32 from_a = own - a, from_b = own - b;
   const Mask steep_a = abs(from_a) > step, steep_b = abs(from_b) > step;
@@ -22,13 +23,18 @@ NACRE_INLINE void test_direction(const float* pixel, ptrdiff_t offset, F32 bend,
     found.slanted = found.slanted | (steep_a & steep_b);
     return;
   }
-  const Mask bent_a = abs(from_a + (load(pixel - 2 * offset) - a)) > rim_bend;
-  const Mask bent_b = abs(from_b + (load(pixel + 2 * offset) - b)) > rim_bend;
+  // What lies behind, and is not measured, draws a pixel of the rim away from the camera.
+  const F32 away_a = away * (from_a + (load(pixel - 2 * offset) - a));
+  const F32 away_b = away * (from_b + (load(pixel + 2 * offset) - b));
+  const F32 nearest = broadcast(0.0F) - bend;
+  const Mask bent_a = (away_a > rim_bend) | (nearest > away_a), bent_b = (away_b > rim_bend) | (nearest > away_b);
   found.edge = found.edge | ((!has_a) & bent_b) | ((!has_b) & bent_a);
   found.slanted = found.slanted | ((steep_a | (!has_a)) & (steep_b | (!has_b)) & (steep_a | steep_b));
 }
 
-NACRE_INLINE Found test(const float* pixel, ptrdiff_t stride, const EdgeLimits& limits, F32 slope, F32 rim_slope) {
+NACRE_INLINE Found test(const float* pixel, ptrdiff_t stride, bool is_inverse, const EdgeLimits& limits, F32 slope,
+                        F32 rim_slope) {
+  const F32 away = broadcast(is_inverse ? -1.0F : 1.0F);
   const F32 own = load(pixel);
   const F32 bend_noise = evaluate(limits.bend_noise, own), bend_crease = evaluate(limits.bend_crease, own);
   const F32 step_noise = evaluate(limits.step_noise, own), step_slant = evaluate(limits.step_slant, own);
@@ -41,15 +47,15 @@ NACRE_INLINE Found test(const float* pixel, ptrdiff_t stride, const EdgeLimits& 
   const F32 straight_bend = sqrt(bend_straight * bend_straight + bend_lateral * bend_lateral);
   const F32 straight_rim = sqrt(bend_straight * bend_straight + rim_lateral * rim_lateral);
   const F32 straight_step = step_both + step_slant;
-  test_direction(pixel, 1, straight_bend, straight_rim, straight_step, found);
-  test_direction(pixel, stride, straight_bend, straight_rim, straight_step, found);
+  test_direction(pixel, 1, straight_bend, straight_rim, straight_step, away, found);
+  test_direction(pixel, stride, straight_bend, straight_rim, straight_step, away, found);
   const F32 diagonal = broadcast(::sqrtf(2.0F));
   const F32 bend_across = max(bend_noise, bend_crease * diagonal);
   const F32 diagonal_bend = sqrt(bend_across * bend_across + bend_lateral * bend_lateral);
   const F32 diagonal_rim = sqrt(bend_across * bend_across + rim_lateral * rim_lateral);
   const F32 diagonal_step = step_both + step_slant * diagonal;
-  test_direction(pixel, stride + 1, diagonal_bend, diagonal_rim, diagonal_step, found);
-  test_direction(pixel, stride - 1, diagonal_bend, diagonal_rim, diagonal_step, found);
+  test_direction(pixel, stride + 1, diagonal_bend, diagonal_rim, diagonal_step, away, found);
+  test_direction(pixel, stride - 1, diagonal_bend, diagonal_rim, diagonal_step, away, found);
   return found;
 }
 
@@ -72,8 +78,8 @@ void mark_edges(const PlanarRow& row, const EdgeLimits& limits, const SlopeRow& 
   for (int begin = 0; begin < row.width; begin += chunk) {
     const int count = row.width - begin < chunk ? row.width - begin : chunk;
     for (int i = 0; i < count; i += lanes) {
-      const Found found =
-          test(row.values + begin + i, row.stride, l, load(slope.inside + begin + i), load(slope.at_rim + begin + i));
+      const Found found = test(row.values + begin + i, row.stride, row.is_inverse, l, load(slope.inside + begin + i),
+                               load(slope.at_rim + begin + i));
       const I32 zero = broadcast(0);
       store(found_marks + i, select(found.edge, broadcast(int32_t{edge_mark}), zero) |
                                  select(found.slanted, broadcast(int32_t{slanted_mark}), zero));

@@ -24,8 +24,8 @@ struct SlopeRow {
 };
 
 // Marks pixels where a second difference in one of the four directions through the pixel exceeds its limit; at a rim
-// the pixel is held against the plane through its two inner neighbours. And pixels where both first differences do, or
-// the slope of the surface as a whole.
+// the pixel is held against the plane through its two inner neighbours: where it is farther, to the slope of a rim. And
+// pixels where both first differences do, or the slope of the surface as a whole.
 using MarkEdges = void(const PlanarRow& row, const EdgeLimits& limits, const SlopeRow& slope, uint8_t* marks);
 NACRE_DECLARE_KERNEL(MarkEdges, mark_edges)
 

@@ -47,8 +47,10 @@ TEST_CASE("edges are those of a plain test") {
             const float a = at(-du, -dv), b = at(du, dv);
             const bool has_a = a == a, has_b = b == b;
             edge |= std::abs((own - a) + (own - b)) > bend;
-            edge |= !has_a && std::abs((own - b) + (at(2 * du, 2 * dv) - b)) > rim_bend;
-            edge |= !has_b && std::abs((own - a) + (at(-2 * du, -2 * dv) - a)) > rim_bend;
+            const auto bent = [&](float away) { return away > rim_bend || -away > bend; };
+            const float sign = image.planar_row(v).is_inverse ? -1.0F : 1.0F;
+            edge |= !has_a && bent(sign * ((own - b) + (at(2 * du, 2 * dv) - b)));
+            edge |= !has_b && bent(sign * ((own - a) + (at(-2 * du, -2 * dv) - a)));
             const bool steep_a = std::abs(own - a) > step, steep_b = std::abs(own - b) > step;
             slanted |= (steep_a || !has_a) && (steep_b || !has_b) && (steep_a || steep_b);
           }
