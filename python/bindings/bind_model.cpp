@@ -1,5 +1,3 @@
-#include <pybind11/stl/filesystem.h>
-
 #include <algorithm>
 #include <cstring>
 #include <filesystem>
@@ -108,9 +106,6 @@ void bind_model(py::module_& m) {
       .def_readwrite("deform", &ModelOptions::deform)
       .def_readwrite("spacing", &ModelOptions::spacing)
       .def_readwrite("max_points", &ModelOptions::max_points)
-      .def_property(
-          "points_folder", [](const ModelOptions& options) { return std::filesystem::path(options.points_folder); },
-          [](ModelOptions& options, const std::filesystem::path& folder) { options.points_folder = folder.string(); })
       .def_readwrite("predict_motion", &ModelOptions::predict_motion)
       .def_readwrite("relocalise", &ModelOptions::relocalise)
       .def_readwrite("loop_closure", &ModelOptions::loop_closure)
@@ -192,7 +187,10 @@ void bind_model(py::module_& m) {
   });
 
   py::class_<Model>(m, "Model")
-      .def(py::init<const Camera&, const ModelOptions&>())
+      .def(py::init([](const Camera& camera, ModelOptions options, const py::bytes& points_folder) {
+        options.points_folder = points_folder;
+        return Model(camera, options);
+      }))
       .def("add_frame", &add_frame, ReleaseGil())
       .def("save",
            [](const Model& model, const std::string& note) {
@@ -204,13 +202,14 @@ void bind_model(py::module_& m) {
              return py::bytes(bytes);
            })
       .def_static("load",
-                  [](const py::bytes& bytes, const std::filesystem::path& points_folder) {
+                  [](const py::bytes& bytes, const py::bytes& points_folder) {
+                    const std::string folder = points_folder;
                     std::string note;
                     const auto data = static_cast<std::string_view>(bytes);
                     std::optional<Model> model;
                     {
                       const py::gil_scoped_release unlocked;
-                      model.emplace(Model::load(data, &note, points_folder.string()));
+                      model.emplace(Model::load(data, &note, folder));
                     }
                     return std::make_pair(std::move(*model), py::bytes(note));
                   })

@@ -6,8 +6,6 @@ from __future__ import annotations
 
 import collections.abc
 import enum
-import os
-import pathlib
 import typing
 
 import numpy
@@ -758,10 +756,6 @@ class ModelOptions:
     @num_threads.setter
     def num_threads(self, arg0: typing.SupportsInt | typing.SupportsIndex) -> None: ...
     @property
-    def points_folder(self) -> pathlib.Path: ...
-    @points_folder.setter
-    def points_folder(self, arg1: os.PathLike | str | bytes) -> None: ...
-    @property
     def spacing(self) -> float: ...
     @spacing.setter
     def spacing(self, arg0: typing.SupportsFloat | typing.SupportsIndex) -> None: ...
@@ -858,8 +852,8 @@ class CheckpointError(ValueError):
 
 class Model:
     @staticmethod
-    def load(arg0: bytes, arg1: os.PathLike | str | bytes) -> tuple[Model, bytes]: ...
-    def __init__(self, arg0: Camera, arg1: ModelOptions) -> None: ...
+    def load(arg0: bytes, arg1: bytes) -> tuple[Model, bytes]: ...
+    def __init__(self, arg0: Camera, arg1: ModelOptions, arg2: bytes) -> None: ...
     def add_frame(
         self,
         arg0: typing.Annotated[numpy.typing.NDArray[numpy.float32], "[m, n]", "flags.c_contiguous"],

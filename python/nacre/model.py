@@ -27,7 +27,7 @@ from nacre._internal.arrays import (
     as_pose,
     as_scale,
 )
-from nacre._internal.checkpoint import Checkpointed, checkpoint_of, read_checkpoint
+from nacre._internal.checkpoint import Checkpointed, checkpoint_of, file_name, read_checkpoint
 from nacre._internal.core_options import from_core, mirrored, to_core, updated
 from nacre._internal.guided import guided
 from nacre._internal.point_exchange import ExchangeablePoints
@@ -106,8 +106,7 @@ class Model(ExchangeablePoints, Checkpointed):
         self._camera = given if isinstance(given, Camera) else camera_of(given)
         self._depth_scale = as_scale("depth_scale", depth_scale)
         options = to_core(self.parameters, _core.ModelOptions())
-        options.points_folder = "" if points_folder is None else os.path.abspath(points_folder)  # noqa: PTH100
-        self._core = _core.Model(camera, options)
+        self._core = _core.Model(camera, options, file_name(points_folder))
         self.parks_points = points_folder is not None
         self._whole: _core.PointModel | None = None  # while more than one thing is asked of all points
         self._calibration: tuple[int, DepthCalibration | None] | None = None  # by so many frames

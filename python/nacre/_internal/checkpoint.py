@@ -69,6 +69,11 @@ def checkpoint_of(core: _core.Model, depth_scale: float, more: Mapping[str, Any]
     return core.save(json.dumps({"depth_scale": depth_scale, **more}))
 
 
+def file_name(path: str | os.PathLike[str] | None) -> bytes:
+    """Return the whole name of a file, as the system has it, for C++; nothing for None."""
+    return b"" if path is None else os.fsencode(os.path.abspath(path))  # noqa: PTH100
+
+
 def read_checkpoint(
     path: str | os.PathLike[str], points_folder: str | os.PathLike[str] | None = None
 ) -> tuple[_core.Model, float, dict[str, Any]]:
@@ -77,8 +82,7 @@ def read_checkpoint(
 
     data = read_file(path)
     try:
-        folder = "" if points_folder is None else os.path.abspath(points_folder)  # noqa: PTH100
-        core, note = _core.Model.load(data, folder)
+        core, note = _core.Model.load(data, file_name(points_folder))
     except _core.CheckpointError as error:
         reason, offset = error.args
         raise FileFormatError(path, reason, offset=offset) from None

@@ -116,7 +116,7 @@ def test_it_is_nearly_as_good_as_in_one_go(recording: Path, in_pieces: Any, tmp_
 
 def test_loops_between_pieces_are_closed(cluster: Any, tmp_path: Path) -> None:
     """A focal length that is told wrongly makes the turn not close."""
-    told = nacre.Camera(width=80, height=60, fx=67, fy=67, cx=39.5, cy=29.5)
+    told = nacre.Camera(width=80, height=60, fx=69, fy=69, cx=39.5, cy=29.5)
     recording = write_turn(tmp_path / "object", told)
     assert run(recording, tmp_path / "out", "--scheduler", cluster.scheduler_address)[0] == 0
     loops = [frame for frame in results(tmp_path / "out")[2]["frames"] if frame["loop_frame"] is not None]
