@@ -43,36 +43,52 @@ PixelBinning::PixelBinning(const DepthRef& depth, const Camera& camera, int fact
       binned_(depth.rows() / factor, depth.cols() / factor) {
   parallel_blocks(binned_.rows(), rows_per_block(depth_.cols()), num_threads_,
                   [&](std::int64_t, std::int64_t begin, std::int64_t end) {
-                    std::vector<float> values, sorted;
+                    std::vector<float> values;
                     for (Eigen::Index row = begin; row < end; ++row) {
                       for (Eigen::Index col = 0; col < binned_.cols(); ++col) {
-                        binned_(row, col) = mean_depth(row, col, values, sorted);
+                        binned_(row, col) = mean_depth(row, col, values);
                       }
                     }
                   });
 }
 
-float PixelBinning::mean_depth(Eigen::Index row, Eigen::Index col, std::vector<float>& values,
-                               std::vector<float>& sorted) const {
-  values.clear();
+template <class Visit>
+void PixelBinning::for_each_pixel(Eigen::Index row, Eigen::Index col, Visit&& visit) const {
   for (Eigen::Index v = row * factor_; v < (row + 1) * factor_; ++v) {
-    const float* pixel = depth_.data() + v * depth_.outerStride() + col * factor_;
-    std::copy_if(pixel, pixel + factor_, std::back_inserter(values), is_measurement);
+    const float* const pixels = depth_.data() + v * depth_.outerStride() + col * factor_;
+    for (int u = 0; u < factor_; ++u) visit(pixels[u]);
   }
-  const std::size_t size = static_cast<std::size_t>(factor_) * static_cast<std::size_t>(factor_);
-  if (2 * values.size() < size) return std::numeric_limits<float>::quiet_NaN();
-  const auto [nearest, farthest] = std::minmax_element(values.begin(), values.end());
-  if (*farthest - *nearest > gate_slope_ * *nearest) {
-    sorted = values;
-    std::sort(sorted.begin(), sorted.end());
-    const float median = 0.5F * (sorted[(sorted.size() - 1) / 2] + sorted[sorted.size() / 2]);
-    const auto is_other = [&](float z) { return std::abs(z - median) > gate_slope_ * median; };
-    values.erase(std::remove_if(values.begin(), values.end(), is_other), values.end());
-    if (2 * values.size() < size) return std::numeric_limits<float>::quiet_NaN();
-  }
-  float sum = 0.0F;
-  for (const float z : values) sum += 1.0F / z;
-  return static_cast<float>(values.size()) / sum;
+}
+
+// Where the pixels differ by more than noise, of those around their median.
+float PixelBinning::mean_depth(Eigen::Index row, Eigen::Index col, std::vector<float>& values) const {
+  const int size = factor_ * factor_;
+  float nearest = std::numeric_limits<float>::infinity(), farthest = 0.0F, sum = 0.0F;
+  int count = 0;
+  for_each_pixel(row, col, [&](float z) {
+    if (!is_measurement(z)) return;
+    nearest = std::min(nearest, z);
+    farthest = std::max(farthest, z);
+    sum += 1.0F / z;
+    ++count;
+  });
+  if (2 * count < size) return std::numeric_limits<float>::quiet_NaN();
+  if (!(farthest - nearest > gate_slope_ * nearest)) return static_cast<float>(count) / sum;
+
+  values.clear();
+  for_each_pixel(row, col, [&](float z) {
+    if (is_measurement(z)) values.push_back(z);
+  });
+  std::sort(values.begin(), values.end());
+  const float median = 0.5F * (values[(values.size() - 1) / 2] + values[values.size() / 2]);
+  sum = 0.0F;
+  count = 0;
+  for_each_pixel(row, col, [&](float z) {
+    if (!is_measurement(z) || std::abs(z - median) > gate_slope_ * median) return;
+    sum += 1.0F / z;
+    ++count;
+  });
+  return 2 * count < size ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(count) / sum;
 }
 
 template <class Visit>

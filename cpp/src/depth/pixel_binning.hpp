@@ -28,7 +28,11 @@ class PixelBinning {
   MaskImage majority(const MaskImage& mask) const;
 
  private:
-  float mean_depth(Eigen::Index row, Eigen::Index col, std::vector<float>& values, std::vector<float>& sorted) const;
+  // `values` is room for those of a block.
+  float mean_depth(Eigen::Index row, Eigen::Index col, std::vector<float>& values) const;
+  // visit(depth) for each pixel of a block, row by row.
+  template <class Visit>
+  void for_each_pixel(Eigen::Index row, Eigen::Index col, Visit&& visit) const;
   // visit(v, u) for each pixel of a block whose depth was taken.
   template <class Visit>
   void for_each_taken(Eigen::Index row, Eigen::Index col, Visit&& visit) const;

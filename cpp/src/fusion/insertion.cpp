@@ -90,31 +90,45 @@ std::vector<NewPoint> find_candidates(const RegisteredFrame& now, const PixelSet
 }  // namespace
 
 // One after the other, where neither the model nor a point before stands for the surface. The covered pixels rule most
-// of them out at once, by what was measured; the others are compared as they are, without the noise.
+// of them out at once, by what was measured; the others are compared as they are, without the noise: with the model
+// all at once.
 std::int64_t insert_points(PointModel& model, KnownSurface known, const RegisteredFrame& now, double spacing,
                            bool with_colors, int num_threads) {
-  const std::vector<NewPoint> candidates = find_candidates(now, known.covered, spacing, num_threads);
+  std::vector<NewPoint> candidates = find_candidates(now, known.covered, spacing, num_threads);
   if (candidates.empty()) return 0;
   const Frame& frame = now.frame;
   const Eigen::Isometry3f to_world(now.world_from_camera.cast<float>());
   const std::int64_t num_known = model.size();
   int farthest = 0;
-  for (const NewPoint& candidate : candidates) farthest = std::max(farthest, candidate.reach);
-  PixelIndex points(frame.width, frame.height, std::max(1, farthest / fusion_limits::squares_across));
-  for (const KnownSurface::Point& seen : known.points) points.add(seen.pixel, seen.point);
-  for (const NewPoint& candidate : candidates) {
+  for (NewPoint& candidate : candidates) {
+    candidate.point = to_world * candidate.point;
+    candidate.normal = to_world.linear() * candidate.normal;
+    farthest = std::max(farthest, candidate.reach);
+  }
+  const int side = std::max(1, farthest / fusion_limits::squares_across);
+  const auto is_near = [&](const PixelIndex& points, const NewPoint& candidate) {
+    const float largest_offset = std::max(candidate.spacing, fusion_limits::cover_sigmas * frame.sigma[candidate.row]);
+    return points.any_near(candidate.row, candidate.reach, [&](std::size_t i) {
+      return same_surface(candidate.point, candidate.normal, model.points[i], model.normals[i], candidate.spacing,
+                          largest_offset);
+    });
+  };
+  PixelIndex points_before(frame.width, frame.height, side), points(frame.width, frame.height, side);
+  points_before.reserve(known.points.size());
+  for (const KnownSurface::Point& seen : known.points) points_before.add(seen.pixel, seen.point);
+  std::vector<std::uint8_t> is_known(candidates.size());
+  parallel_for(static_cast<std::int64_t>(candidates.size()), 64, num_threads, [&](std::int64_t i) {
+    const auto k = static_cast<std::size_t>(i);
+    is_known[k] = is_near(points_before, candidates[k]) ? 1 : 0;
+  });
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    const NewPoint& candidate = candidates[k];
     if (known.covered.contains(candidate.row % frame.width, candidate.row / frame.width)) continue;
     known.covered.insert(candidate.cover);
-    const Eigen::Vector3f point = to_world * candidate.point;
-    const Eigen::Vector3f normal = to_world.linear() * candidate.normal;
-    const float largest_offset = std::max(candidate.spacing, fusion_limits::cover_sigmas * frame.sigma[candidate.row]);
-    const bool is_known = points.any_near(candidate.row, candidate.reach, [&](std::size_t i) {
-      return same_surface(point, normal, model.points[i], model.normals[i], candidate.spacing, largest_offset);
-    });
-    if (is_known) continue;
+    if (is_known[k] != 0 || is_near(points, candidate)) continue;
     points.add(candidate.row, model.points.size());
-    model.points.push_back(point);
-    model.normals.push_back(normal);
+    model.points.push_back(candidate.point);
+    model.normals.push_back(candidate.normal);
     if (with_colors) model.colors.push_back(candidate.color);
     model.confidence.push_back(candidate.weight);
     model.last_seen.push_back(now.index);

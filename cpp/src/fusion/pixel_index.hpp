@@ -48,6 +48,8 @@ class PixelIndex {
         rows_((height + side - 1) / side),
         newest_(static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_), nobody) {}
 
+  void reserve(std::size_t num_points) { entries_.reserve(num_points); }
+
   void add(std::int32_t pixel, std::size_t point) {
     std::int32_t& newest = newest_at(pixel % width_ / side_, pixel / width_ / side_);
     entries_.push_back({point, newest});
