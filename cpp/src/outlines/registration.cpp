@@ -20,6 +20,7 @@ class EdgeSearch : public OpenDirectionSearch {
              const AlignOptions& options)
       : target_(target),
         source_(source),
+        few_(source.few()),
         outlines_(outlines),
         options_(options),
         held_(options),
@@ -44,14 +45,18 @@ class EdgeSearch : public OpenDirectionSearch {
     const double narrow = std::min(outlines_limits::first_gate * pixel_, widest_);
     for (const double first : {narrow, widest_}) {
       if (first == gate_) break;
-      const double agreement = agreement_from(geometric, first, nullptr).second;
-      if (agreement > best) gate_ = first;
-      best = std::max(best, agreement);
+      auto [fit, agreement] = agreement_from(geometric, first, nullptr);
+      if (!(agreement > best)) continue;
+      best = agreement;
+      gate_ = first;
+      free_ = std::move(fit);
     }
-    return best >= outlines_limits::least_agreement;
+    free_.agrees = best >= outlines_limits::least_agreement;
+    return free_.agrees;
   }
 
   OpenFit fit(const IcpResult& geometric, const TwistBasis* only) override {
+    if (only == nullptr) return free_;
     auto [fit, agreement] = agreement_from(geometric, gate_, only);
     fit.agrees = agreement >= outlines_limits::least_agreement;
     return fit;
@@ -98,7 +103,8 @@ class EdgeSearch : public OpenDirectionSearch {
         step(pairs, open, result);
         gate = std::max(smallest_gate(), gate * registration_limits::gate_decay);
       }
-      if (!return_to_surface(target_, source_, held_, result)) return start;
+      const bool is_last = round + 1 == outlines_limits::num_rounds;
+      if (!return_to_surface(target_, is_last ? source_ : few_, held_, result)) return start;
     }
     return result;
   }
@@ -146,10 +152,12 @@ class EdgeSearch : public OpenDirectionSearch {
 
   const IcpTarget& target_;
   const IcpSource& source_;
+  const IcpSource few_;
   const OutlinePair& outlines_;
   const AlignOptions& options_;
   AlignOptions held_;                // few steps within the last gate, weak directions held
   std::vector<OutlinePoint> edges_;  // of the target
+  OpenFit free_;                     // along all that geometry leaves open
   double pixel_ = 0.0, widest_ = 0.0, gate_ = 0.0, extent_ = 1.0, noise_ = 1.0;
 };
 
