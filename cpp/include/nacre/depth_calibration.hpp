@@ -59,7 +59,7 @@ class DepthCalibrator {
   /// across the axis by more than the 0.1 rad by which the views are turned at least.
   DepthCalibration fit(int num_threads = 0) const;
   /// The same in parts, for a loop that must not wait: begins anew with the views that are there; each step is one
-  /// iteration, the last of which returns what they say.
+  /// iteration, the last of which returns what they say: the first by which the tilt is not going to be significant.
   void begin_fit();
   bool is_fitting() const { return fit_.has_value(); }
   std::optional<DepthCalibration> step(int num_threads = 0);
@@ -83,10 +83,13 @@ class DepthCalibrator {
   struct Fit {
     std::int32_t iteration = 0;
     double tilt = 0.0, stretch = 1.0;
+    Eigen::Vector2d last_step = Eigen::Vector2d::Zero();  // [sigma] of Gauss and Newton
+    double length = 1.0;                                  // of the step that was taken, of theirs
+    bool is_done = false;
     std::vector<Pair> pairs;
   };
   Fit begun() const;
-  std::optional<DepthCalibration> iterate(Fit& fit, int num_threads) const;
+  DepthCalibration iterate(Fit& fit, int num_threads) const;
   double typical_depth() const;
 
   Camera camera_;

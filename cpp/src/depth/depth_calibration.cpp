@@ -12,6 +12,7 @@
 #include "base/pose_check.hpp"
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
+#include "base/step_length.hpp"
 #include "camera/ray_table.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/limits.hpp"
@@ -44,6 +45,17 @@ struct BlockGrid {
   explicit BlockGrid(const Camera& camera)
       : side(block_side(camera)), columns(camera.width() / side), rows(camera.height() / side) {}
   std::int64_t size() const { return static_cast<std::int64_t>(columns) * rows; }
+
+  // Of the rows and the columns: blocks side by side share their neighbours, and the camera's error.
+  std::vector<Eigen::Index> every_second() const {
+    std::vector<Eigen::Index> blocks;
+    for (int row = 0; row < rows; row += 2) {
+      for (int column = 0; column < columns; column += 2) {
+        blocks.push_back(static_cast<Eigen::Index>(row) * columns + column);
+      }
+    }
+    return blocks;
+  }
 };
 
 // One point for each block of pixels, from the means of their rays and of their inverse depths.
@@ -114,7 +126,7 @@ std::optional<PairFit> linearise(const CorrectedView& target, const CorrectedVie
   const BlockGrid grid(camera);
   std::vector<Row> rows;
   std::vector<double> depths;
-  for (Eigen::Index i = 0; i < source.points.rows(); ++i) {
+  for (const Eigen::Index i : grid.every_second()) {
     if (!source.normals.row(i).allFinite()) continue;
     const Eigen::Vector3d local = source.points.row(i), p = motion * local;
     const Eigen::Vector2d pixel = camera.project(Eigen::Vector3d(p.x() / stretch, p.y() / stretch, p.z()));
@@ -234,16 +246,19 @@ bool DepthCalibrator::add(const DepthRef& depth, const Pose& world_from_camera) 
 DepthCalibration DepthCalibrator::fit(int num_threads) const {
   Fit fit = begun();
   for (;;) {
-    const std::optional<DepthCalibration> found = iterate(fit, num_threads);
-    if (found) return *found;
+    const DepthCalibration found = iterate(fit, num_threads);
+    if (fit.is_done) return found;
   }
 }
 
 void DepthCalibrator::begin_fit() { fit_ = begun(); }
 
+// What a few more steps like the last would leave insignificant need not be known better.
 std::optional<DepthCalibration> DepthCalibrator::step(int num_threads) {
-  std::optional<DepthCalibration> found = iterate(fit_.value(), num_threads);
-  if (found) fit_.reset();
+  const DepthCalibration found = iterate(fit_.value(), num_threads);
+  const double most = std::abs(found.tilt / found.sigma) + base_limits::longest_step * std::abs(fit_->last_step(0));
+  if (!fit_->is_done && is_beyond_doubt(most, found.num_pairs)) return std::nullopt;
+  fit_.reset();
   return found;
 }
 
@@ -271,8 +286,9 @@ double DepthCalibrator::typical_depth() const {
   return depths.empty() ? 0.0 : median_of(depths);
 }
 
-// The views' result where they are at rest, or may not come to it.
-std::optional<DepthCalibration> DepthCalibrator::iterate(Fit& fit, int num_threads) const {
+// What the views say; the fit is done where they are at rest, or may not come to it.
+DepthCalibration DepthCalibrator::iterate(Fit& fit, int num_threads) const {
+  fit.is_done = true;
   const Distortion distortion{fit.tilt, fit.stretch};
   std::vector<CorrectedView> views(views_.size());
   parallel_for(num_views(), 1, num_threads, [&](std::int64_t k) {
@@ -307,7 +323,12 @@ std::optional<DepthCalibration> DepthCalibrator::iterate(Fit& fit, int num_threa
     scatter += left * left.transpose();
   }
   const Eigen::Array2d sigmas = (2.0 * (covariance * scatter * covariance).diagonal().array()).sqrt();
-  step *= std::min(1.0, depth_limits::largest_stretch_step / std::max(std::abs(step(1)), 1e-12));
+  const Eigen::Vector2d in_sigmas = step.array() / sigmas.max(1e-12);
+  const double longest = depth_limits::largest_stretch_step / std::max(std::abs(step(1)), 1e-12);
+  fit.length = std::min(step_length(fit.last_step, fit.length, in_sigmas, Eigen::Matrix2d(Eigen::Matrix2d::Identity())),
+                        longest);
+  fit.last_step = in_sigmas;
+  step *= fit.length;
   fit.tilt += step(0);
   // What lies across the axis looks turned by so much: by more than the views are, and turns and tilt change places.
   if (!(std::abs(fit.tilt) * typical_depth() <= depth_limits::least_turn)) return DepthCalibration{};
@@ -317,11 +338,12 @@ std::optional<DepthCalibration> DepthCalibrator::iterate(Fit& fit, int num_threa
   result.focal_scale = 1.0 / fit.stretch;
   result.focal_sigma = sigmas(1) / (fit.stretch * fit.stretch);
   const bool is_at_rest = (step.array().abs() < depth_limits::at_rest * sigmas).all();
-  if (is_at_rest || ++fit.iteration == depth_limits::most_calibration_steps) return result;
+  fit.is_done = is_at_rest || ++fit.iteration == depth_limits::most_calibration_steps;
+  if (fit.is_done) return result;
   for (std::size_t i = 0; i < fits.size(); ++i) {
-    if (fits[i]) fit.pairs[i].motion = followed(fit.pairs[i].motion, *fits[i], {step(0), step(1), 1.0});
+    if (fits[i]) fit.pairs[i].motion = followed(fit.pairs[i].motion, *fits[i], {step(0), step(1), fit.length});
   }
-  return std::nullopt;
+  return result;
 }
 
 void DepthCalibrator::set_poses(const std::vector<Pose>& world_from_camera) {

@@ -144,13 +144,15 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   Pose pose = initial, best_pose = initial;
   double best_rmse = infinity<double>;
   bool at_rest = false;
+  StepBefore before;  // with the same gate and points
 
   for (int iteration = 0; iteration < options.max_iterations && !at_rest; ++iteration) {
     std::vector<Pair> pairs = target.match(source, schedule.num_samples(), pose, schedule.gate(), nearest);
     if (pairs.size() < least_pairs(schedule.num_samples())) return result;
     const double scale = weight_pairs(pairs, options.method, options.robust, resolution);
     const double weak_threshold = hold_weak ? options.weak_threshold : 0.0;
-    const IcpStep step = solve_step(pairs, options.method, weak_threshold, along, options.num_threads);
+    const IcpStep step = solve_step(pairs, options.method, weak_threshold, along, options.num_threads,
+                                    schedule.gate().is_smallest ? &before : nullptr);
     if (step.rmse < best_rmse) {
       best_rmse = step.rmse;
       best_pose = pose;
@@ -160,7 +162,9 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
     // Of six unknowns.
     const bool is_small =
         step.size < resolution || step.reduction < 6.0 * registration_limits::still_uncertainty * scale * scale;
+    const std::int64_t num_samples = schedule.num_samples();
     at_rest = !schedule.advance(is_small, scale);
+    if (schedule.num_samples() != num_samples) before = {};
   }
 
   schedule.finish();

@@ -7,6 +7,7 @@
 #include "base/linear_algebra.hpp"
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
+#include "base/step_length.hpp"
 #include "registration/limits.hpp"
 #include "registration/normal_equations.hpp"
 
@@ -95,7 +96,7 @@ double normal_information(const std::vector<Pair>& pairs, Metric metric) {
 }
 
 IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, const TwistBasis& along,
-                   int num_threads) {
+                   int num_threads, StepBefore* before) {
   IcpStep step;
   if (pairs.empty()) return step;
   const Eigen::Vector3d origin = pairs.front().q;
@@ -120,14 +121,20 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   const TwistBasis sure = along.cols() > 0 ? along : TwistBasis(eigen.vectors.rightCols(6 - num_weak));
   Matrix6 damped = equations.hessian;
   damped.diagonal().array() += base_limits::damping * sums.weight;
-  const Vector6 solution =
-      sure * solve_symmetric(sure.transpose() * damped * sure, sure.transpose() * equations.gradient);
+  Vector6 solution = sure * solve_symmetric(sure.transpose() * damped * sure, sure.transpose() * equations.gradient);
   step.reduction = solution.dot(equations.hessian * solution);
   Vector6 scale;
   scale << extent, extent, extent, 1.0, 1.0, 1.0;
   step.hessian = scale.asDiagonal() * equations.hessian * scale.asDiagonal();
   const Eigen::Matrix<double, 6, 6> axes = scale.asDiagonal() * eigen.vectors;
   step.shape = axes * Vector6(eigen.values.cwiseMax(0.0)).asDiagonal() * axes.transpose();
+
+  if (before != nullptr) {
+    const Vector6 twist = solution.cwiseQuotient(scale);
+    before->length = step_length(before->twist, before->length, twist, step.hessian);
+    before->twist = twist;
+    solution *= before->length;
+  }
 
   const Eigen::Vector3d rotation_vector = solution.head<3>() / extent, translation = solution.tail<3>();
   if (metric == Metric::point_to_point && is_free) {

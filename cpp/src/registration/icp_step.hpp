@@ -11,6 +11,12 @@ namespace nacre {
 // Twists, rotations in units of an extent, one a column: directions of a pose.
 using TwistBasis = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
 
+// What the next step needs to know of the one before, to be as long as it should be.
+struct StepBefore {
+  Vector6 twist = Vector6::Zero();  // before it was made longer
+  double length = 1.0;              // times which it was taken
+};
+
 struct IcpStep {
   Pose motion = Pose::Identity();  // p <- motion * p
   double size = 0.0;               // how far the motion moves the pairs, root mean square [m]
@@ -29,8 +35,9 @@ double normal_information(const std::vector<Pair>& pairs, Metric metric);
 
 // Directions in which the normals of source and target agree on less information than weak_threshold, per pair that
 // agrees and with rotations in units of the pairs' extent, do not move: what a shape leaves open does not depend on how
-// well its parts are measured. Where `along` has directions, the motion has no others.
+// well its parts are measured. Where `along` has directions, the motion has no others. Where the step before is given,
+// the motion is as much longer as that should have been (base/step_length.hpp), and takes its place.
 IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, const TwistBasis& along,
-                   int num_threads);
+                   int num_threads, StepBefore* before = nullptr);
 
 }  // namespace nacre
