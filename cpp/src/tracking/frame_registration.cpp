@@ -32,19 +32,27 @@ TrackingResult FrameRegistration::from(const Pose& guess, Gate gate, Expectation
 }
 
 TrackingResult FrameRegistration::from(const Pose& start, const Pose& guess, Gate gate, Expectation expectation) const {
-  const PointsInView view = in_view(start);
-  const TrackingResult whole = registered({source_, view, 0.0}, start, guess, gate, expectation);
+  TrackingResult whole = whole_from(start, guess, gate, expectation);
   const bool is_near = expectation == Expectation::expected || expectation == Expectation::near_lost;
-  if (!is_near || gate == Gate::wide) return whole;
-  // Where something moves, what stays is registered, too; the better of both tells whether it does. Scores count what
-  // hides the scene in the whole as new, and what is left out in the rest as untold, which is as much.
+  return is_near && gate == Gate::narrow ? without_moving(whole, start, expectation) : whole;
+}
+
+TrackingResult FrameRegistration::whole_from(const Pose& start, const Pose& guess, Gate gate,
+                                             Expectation expectation) const {
+  return registered({source_, in_view(start), 0.0}, start, guess, gate, expectation);
+}
+
+// Scores count what hides the scene in the whole as new, and what is left out in the rest as untold, which is as much.
+TrackingResult FrameRegistration::without_moving(const TrackingResult& whole, const Pose& guess,
+                                                 Expectation expectation) const {
   const auto fit = [](const TrackingResult& result) { return result.score * result.alignment.overlap; };
+  const PointsInView& view = in_view(guess);
   TrackingResult best = whole;
-  for (const Pose& pose : {start, whole.alignment.target_from_source}) {
+  for (const Pose& pose : {guess, whole.alignment.target_from_source}) {
     const auto still = still_at(pose, view);
     if (!still) continue;
     const TrackingResult found =
-        registered({still->samples, view.part(still->points), still->moving}, pose, guess, gate, expectation);
+        registered({still->samples, view.part(still->points), still->moving}, pose, guess, Gate::narrow, expectation);
     const bool is_better = best.is_lost()
                                ? found.rank() > best.rank()
                                : !found.is_lost() && fit(best) < tracking_limits::clearly_better * fit(found);
@@ -110,9 +118,18 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   return result;
 }
 
-PointsInView FrameRegistration::in_view(const Pose& world_from_camera) const {
-  return points_in_view(target_.model, target_.blocks, now_.camera, world_from_camera, target_.oldest_frame,
-                        options_.num_threads);
+const PointsInView& FrameRegistration::in_view(const Pose& world_from_camera) const {
+  if (!newest_view_ || newest_view_->first.matrix() != world_from_camera.matrix()) {
+    newest_view_.emplace(world_from_camera,
+                         points_in_view(target_.model, target_.blocks, now_.camera, world_from_camera,
+                                        target_.oldest_frame, options_.num_threads));
+  }
+  return newest_view_->second;
+}
+
+void FrameRegistration::include_older_points() {
+  target_.oldest_frame = 0;
+  newest_view_.reset();
 }
 
 // A match may be about as far along the surface as the model's points are apart, and as far across it as noise and the
@@ -185,7 +202,7 @@ const OutlinePair& FrameRegistration::outlines() const {
 }
 
 std::vector<Pose> FrameRegistration::around(const Pose& world_from_camera) const {
-  const PointsInView view = in_view(world_from_camera);
+  const PointsInView& view = in_view(world_from_camera);
   std::vector<Pose> poses = {world_from_camera};
   if (view.points.rows() == 0) return poses;
   const Eigen::Vector3d center = view.points.colwise().mean().transpose().cast<double>();
@@ -207,7 +224,7 @@ bool FrameRegistration::may_be_beside(const TrackingResult& found, const Pose& g
 }
 
 std::vector<Pose> FrameRegistration::beside(const Pose& world_from_camera) const {
-  const PointsInView view = in_view(world_from_camera);
+  const PointsInView& view = in_view(world_from_camera);
   std::vector<Pose> poses;
   if (view.points.rows() == 0) return poses;
   const Eigen::Vector3d seen = view.points.colwise().mean().transpose().cast<double>();

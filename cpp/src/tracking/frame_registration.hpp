@@ -50,10 +50,15 @@ class FrameRegistration {
   // The same from a start beside the guess.
   TrackingResult from(const Pose& start, const Pose& guess, Gate gate, Expectation expectation) const;
 
+  // Of all that frame and model show.
+  TrackingResult whole_from(const Pose& start, const Pose& guess, Gate gate, Expectation expectation) const;
+  // Where something moves, what stays is registered, too: the better of both tells whether it does.
+  TrackingResult without_moving(const TrackingResult& whole, const Pose& guess, Expectation expectation) const;
+
   // A gate that the user has set is neither narrow nor wide.
   bool has_automatic_gate() const { return !(options_.registration.max_distance > 0.0); }
 
-  void include_older_points() { target_.oldest_frame = 0; }
+  void include_older_points();
   const IcpSource& source() const { return source_; }
   double depth() const { return depth_; }
 
@@ -84,7 +89,7 @@ class FrameRegistration {
   std::optional<Still> still_at(const Pose& world_from_camera, const PointsInView& view) const;
   TrackingResult registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
                             Expectation expectation) const;
-  PointsInView in_view(const Pose& world_from_camera) const;
+  const PointsInView& in_view(const Pose& world_from_camera) const;
   IcpSource gated(IcpSource source, const PointsInView& view, const IcpTarget& target) const;
   void determine_open_directions(const PointsInView& view, const IcpTarget& target, const IcpSource& gated,
                                  const AlignOptions& options, IcpResult& result) const;
@@ -95,8 +100,9 @@ class FrameRegistration {
   TrackingTarget target_;
   const TrackingOptions& options_;
   IcpSource source_;
-  Values noise_;                                 // of the sampled points [m]
-  double depth_;                                 // of the sampled points, the median [m]
+  Values noise_;  // of the sampled points [m]
+  double depth_;  // of the sampled points, the median [m]
+  mutable std::optional<std::pair<Pose, PointsInView>> newest_view_;
   mutable std::optional<OutlinePair> outlines_;  // found when they are first asked for
 };
 

@@ -34,18 +34,30 @@ void guess_where_followed(TrackingPrior& prior) {
   prior.is_predicted = prior.followed->is_determined;
 }
 
-// With a narrow gate first, which is safest.
+// With a narrow gate first, which is safest. From the best of the guesses it is asked whether something moves.
 void try_guesses(const FrameRegistration& registration, TrackingPrior& prior, TrackingResult& best) {
   using Gate = FrameRegistration::Gate;
   for (const Gate gate : {Gate::narrow, Gate::wide}) {
     if (gate == Gate::wide && !(best.is_lost() && registration.has_automatic_gate())) return;
+    std::optional<TrackingResult> nearest;
+    const Pose* start = nullptr;
     for (const Pose& guess : prior.guesses) {
-      const TrackingResult result =
-          with_open_directions_held(registration.from(guess, gate, prior.expectation), guess, prior);
-      keep_better(result, best);
-      prior.tried.push_back(result);
-      if (result.is_clear_cut) return;
+      const TrackingResult found =
+          with_open_directions_held(registration.whole_from(guess, guess, gate, prior.expectation), guess, prior);
+      prior.tried.push_back(found);
+      if (nearest && found.rank() < nearest->rank()) continue;
+      nearest = found;
+      start = &guess;
+      if (found.is_clear_cut) break;
     }
+    if (!nearest) return;
+    if (gate == Gate::narrow) {
+      nearest =
+          with_open_directions_held(registration.without_moving(*nearest, *start, prior.expectation), *start, prior);
+      prior.tried.push_back(*nearest);
+    }
+    keep_better(*nearest, best);
+    if (nearest->is_clear_cut) return;
   }
 }
 
@@ -109,16 +121,23 @@ std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& reg
   return best.is_lost() ? std::nullopt : std::optional(best);
 }
 
+// A place that a search has led to. Beside the last pose it is no surprise, however it was found.
+TrackingResult found_at(const Pose& place, const FrameRegistration& registration, const TrackingPrior& prior) {
+  using Gate = FrameRegistration::Gate;
+  return prior.elsewhere.beside ? registration.from(place, prior.guesses.back(), Gate::narrow, Expectation::beside)
+                                : registration.from(place, Gate::narrow, Expectation::unexpected);
+}
+
 // From every place where a camera has been, and around it.
 TrackingResult around_key_poses(const FrameRegistration& registration, const PointModel& model,
-                                const std::vector<Pose>& key_poses, const TrackingOptions& options) {
+                                const TrackingPrior& prior, const TrackingOptions& options) {
   std::vector<Pose> guesses;
-  for (const Pose& key_pose : key_poses) {
+  for (const Pose& key_pose : prior.elsewhere.key_poses()) {
     for (const Pose& guess : registration.around(key_pose)) guesses.push_back(guess);
   }
   TrackingResult best;
   for (const Pose& candidate : most_promising(model, registration.source(), guesses, options.registration)) {
-    keep_better(registration.from(candidate, FrameRegistration::Gate::narrow, Expectation::unexpected), best);
+    keep_better(found_at(candidate, registration, prior), best);
   }
   return best;
 }
@@ -194,13 +213,11 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   }
   const bool goes_on = followed && hypothesis.is_confirmed_by(best);
   if (!goes_on && places.key_poses) {
-    keep_if_possible(around_key_poses(registration, target.model, places.key_poses(), options));
+    keep_if_possible(around_key_poses(registration, target.model, prior, options));
   }
   if (best.is_lost() && !goes_on && places.everywhere) {
     const std::optional<Pose> pose = fit_anywhere(target.model, source, options.registration);
-    if (pose) {
-      keep_if_possible(registration.from(*pose, FrameRegistration::Gate::narrow, Expectation::unexpected));
-    }
+    if (pose) keep_if_possible(found_at(*pose, registration, prior));
   }
   best.is_to_whole_model = true;
   if (best.is_lost() && options.relocalise && options.verify && hypothesis.add(best, prior.depth)) {
