@@ -109,11 +109,13 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   determine_open_directions(view, target, source, align_options, result.alignment);
   const Pose& pose = result.alignment.target_from_source;
   result.consistency = consistency(surfaces, pose);
-  const double starts = expectation == Expectation::beside ? 2.0 : 1.0;  // as far from the guess as from a start again
-  const bool is_far =
-      view_distance(guess, pose, depth_) > starts * camera_limits::new_direction / camera_limits::view_turn;
-  const bool has_jumped = expectation == Expectation::expected && target_.usual;
-  result.expectation = !is_far ? expectation : has_jumped ? Expectation::beside : Expectation::unexpected;
+  const double nearby = camera_limits::new_direction / camera_limits::view_turn;
+  const double distance = view_distance(guess, pose, depth_);
+  const bool has_jumped = expectation == Expectation::expected && target_.usual && distance > nearby;
+  if (has_jumped) expectation = Expectation::beside;
+  // A place beside a guess is as far from it as from a start again.
+  const double farthest = expectation == Expectation::beside ? 2.0 * nearby : nearby;
+  result.expectation = distance > farthest ? Expectation::unexpected : expectation;
   result.test(options_, target_.usual);
   return result;
 }

@@ -147,14 +147,16 @@ TrackingResult around_key_poses(const FrameRegistration& registration, const Poi
 std::optional<TrackingResult> only_near(const TrackingPrior& prior, const TrackingOptions& options,
                                         const std::optional<Consistency>& usual) {
   if (!options.relocalise || !prior.has_moved || !prior.elsewhere.beside) return std::nullopt;
-  std::vector<TrackingResult> places = prior.tried;
+  std::vector<TrackingResult> near, places = prior.tried;
   for (TrackingResult& place : places) {
+    const bool is_near = place.expectation != Expectation::unexpected;
     place.expectation = Expectation::only_near;
     place.test(options, usual);
+    if (is_near) near.push_back(place);
   }
   const auto is_lower = [](const TrackingResult& a, const TrackingResult& b) { return a.score < b.score; };
-  const auto best = std::max_element(places.begin(), places.end(), is_lower);
-  if (best == places.end() || best->decision != Decision::accepted) return std::nullopt;
+  const auto best = std::max_element(near.begin(), near.end(), is_lower);
+  if (best == near.end() || best->decision != Decision::accepted) return std::nullopt;
   if (!PlaceOdds::is_for(best->relocalisation_score)) return std::nullopt;
   const bool has_rival = std::any_of(places.begin(), places.end(), [&](const TrackingResult& other) {
     return other.score > GlobalAlignOptions().max_rivalry * best->score &&

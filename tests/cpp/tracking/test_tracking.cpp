@@ -45,6 +45,13 @@ TEST_CASE("two places that fit about as well are none") {
   CHECK(only(with_tried({found_at(0.28, 0.43), found_at(0.3, 0.45)})).has_value());  // the same twice
 }
 
+TEST_CASE("a place far from the last pose is not the only one near it, but its rival") {
+  TrackingResult far = found_at(1.5, 0.45);
+  far.expectation = Expectation::unexpected;
+  CHECK_FALSE(only(with_tried({far})).has_value());
+  CHECK_FALSE(only(with_tried({far, found_at(0.3, 0.45)})).has_value());
+}
+
 TEST_CASE("what fits too little is not believed, alone or not") {
   CHECK_FALSE(only(with_tried({})).has_value());
   CHECK_FALSE(only(with_tried({found_at(0.3, 0.3)})).has_value());
