@@ -147,11 +147,14 @@ TrackingResult around_key_poses(const FrameRegistration& registration, const Poi
 std::optional<TrackingResult> only_near(const TrackingPrior& prior, const TrackingOptions& options,
                                         const std::optional<Consistency>& usual) {
   if (!options.relocalise || !prior.has_moved || !prior.elsewhere.beside) return std::nullopt;
+  // As far from the last pose as a guess that turned about what it saw, and again as far.
+  const double farthest = 2.0 * camera_limits::new_direction / camera_limits::view_shift;
   std::vector<TrackingResult> near, places = prior.tried;
   for (TrackingResult& place : places) {
-    const bool is_near = place.expectation != Expectation::unexpected;
     place.expectation = Expectation::only_near;
     place.test(options, usual);
+    const bool is_near =
+        view_distance(prior.guesses.back(), place.alignment.target_from_source, prior.depth) <= farthest;
     if (is_near) near.push_back(place);
   }
   const auto is_lower = [](const TrackingResult& a, const TrackingResult& b) { return a.score < b.score; };
