@@ -83,34 +83,44 @@ Points average(const DepthRef& depth, const Camera& camera) {
   return blocks;
 }
 
-// Measured points without the tilt (1 / z less tilt * x / z), and stretched across the axis.
-PointBlocks corrected(const Points& points, const Distortion& distortion) {
-  PointBlocks result = points.cast<double>();
-  for (Eigen::Index i = 0; i < result.rows(); ++i) {
-    result.row(i) /= 1.0 - distortion.tilt * result(i, 0);
-    result.row(i).head<2>() *= distortion.stretch;
-  }
+// A measured point without the tilt (1 / z less tilt * x / z), and stretched across the axis.
+Eigen::Vector3d corrected(const Points& points, Eigen::Index i, const Distortion& distortion) {
+  Eigen::Vector3d result = points.row(i).transpose().cast<double>();
+  result /= 1.0 - distortion.tilt * result.x();
+  result.head<2>() *= distortion.stretch;
   return result;
 }
 
-// Normals from the neighbours to all sides, towards the camera; NaN beside steps.
-PointBlocks normals_of(const PointBlocks& points, const BlockGrid& grid) {
-  PointBlocks normals = PointBlocks::Constant(points.rows(), 3, std::numeric_limits<double>::quiet_NaN());
-  for (int row = 1; row + 1 < grid.rows; ++row) {
-    for (int column = 1; column + 1 < grid.columns; ++column) {
-      const Eigen::Index i = static_cast<Eigen::Index>(row) * grid.columns + column;
-      const Eigen::RowVector3d across = points.row(i + 1) - points.row(i - 1);
-      const Eigen::RowVector3d down = points.row(i + grid.columns) - points.row(i - grid.columns);
-      const double step = std::max(std::abs(across.z()), std::abs(down.z()));
-      if (!(step <= depth_limits::largest_block_step * points(i, 2))) continue;
-      normals.row(i) = down.cross(across).normalized();
+// A view without a distortion. Of the blocks of pixels normals are kept; points, of which a quarter is asked for, are
+// not.
+class CorrectedView {
+ public:
+  CorrectedView() = default;
+  CorrectedView(const Points& blocks, const Distortion& distortion, const BlockGrid& grid)
+      : blocks_(&blocks), distortion_(distortion), normals_(blocks.rows(), 3) {
+    normals_.setConstant(std::numeric_limits<double>::quiet_NaN());
+    PointBlocks points(blocks.rows(), 3);
+    for (Eigen::Index i = 0; i < points.rows(); ++i) points.row(i) = point(i);
+    for (int row = 1; row + 1 < grid.rows; ++row) {
+      for (int column = 1; column + 1 < grid.columns; ++column) {
+        const Eigen::Index i = static_cast<Eigen::Index>(row) * grid.columns + column;
+        const Eigen::RowVector3d across = points.row(i + 1) - points.row(i - 1);
+        const Eigen::RowVector3d down = points.row(i + grid.columns) - points.row(i - grid.columns);
+        const double step = std::max(std::abs(across.z()), std::abs(down.z()));
+        if (!(step <= depth_limits::largest_block_step * points(i, 2))) continue;
+        normals_.row(i) = down.cross(across).normalized();
+      }
     }
   }
-  return normals;
-}
 
-struct CorrectedView {
-  PointBlocks points, normals;
+  Eigen::Vector3d point(Eigen::Index i) const { return corrected(*blocks_, i, distortion_); }
+  // From the neighbours to all sides, towards the camera; NaN beside steps.
+  Eigen::Vector3d normal(Eigen::Index i) const { return normals_.row(i); }
+
+ private:
+  const Points* blocks_ = nullptr;
+  Distortion distortion_;
+  PointBlocks normals_;
 };
 
 // What a pair of views says of tilt and stretch beside their relative pose.
@@ -127,15 +137,16 @@ std::optional<PairFit> linearise(const CorrectedView& target, const CorrectedVie
   std::vector<Row> rows;
   std::vector<double> depths;
   for (const Eigen::Index i : grid.every_second()) {
-    if (!source.normals.row(i).allFinite()) continue;
-    const Eigen::Vector3d local = source.points.row(i), p = motion * local;
+    const Eigen::Vector3d source_normal = source.normal(i);
+    if (!source_normal.allFinite()) continue;
+    const Eigen::Vector3d p = motion * source.point(i);
     const Eigen::Vector2d pixel = camera.project(Eigen::Vector3d(p.x() / stretch, p.y() / stretch, p.z()));
     const double column = std::floor((pixel.x() + 0.5) / grid.side), line = std::floor((pixel.y() + 0.5) / grid.side);
     if (!(column >= 0.0 && column < grid.columns && line >= 0.0 && line < grid.rows)) continue;
     const auto seen = static_cast<Eigen::Index>(line) * grid.columns + static_cast<Eigen::Index>(column);
-    const Eigen::Vector3d q = target.points.row(seen), n = target.normals.row(seen);
+    const Eigen::Vector3d q = target.point(seen), n = target.normal(seen);
     const double residual = (q - p).dot(n);
-    const double facing = (motion.linear() * source.normals.row(i).transpose()).dot(n);
+    const double facing = (motion.linear() * source_normal).dot(n);
     if (!(std::abs(residual) < depth_limits::same_surface * q.z() && facing > depth_limits::same_facing)) continue;
     // Both derivatives at the middle of the two points: at the points themselves, their noise would favour whatever
     // makes the scene smaller.
@@ -293,8 +304,7 @@ DepthCalibration DepthCalibrator::iterate(Fit& fit, int num_threads) const {
   std::vector<CorrectedView> views(views_.size());
   parallel_for(num_views(), 1, num_threads, [&](std::int64_t k) {
     const auto i = static_cast<std::size_t>(k);
-    views[i].points = corrected(views_[i].blocks, distortion);
-    views[i].normals = normals_of(views[i].points, BlockGrid(camera_));
+    views[i] = CorrectedView(views_[i].blocks, distortion, BlockGrid(camera_));
   });
   std::vector<std::optional<PairFit>> fits(fit.pairs.size());
   parallel_for(static_cast<std::int64_t>(fits.size()), 1, num_threads, [&](std::int64_t k) {
@@ -355,9 +365,7 @@ std::vector<Pose> DepthCalibrator::correct(double tilt, int num_threads) {
   std::vector<CorrectedView> views(views_.size());
   parallel_for(num_views(), 1, num_threads, [&](std::int64_t k) {
     const auto i = static_cast<std::size_t>(k);
-    views[i].points = corrected(views_[i].blocks, {tilt, 1.0});
-    views[i].normals = normals_of(views[i].points, BlockGrid(camera_));
-    views_[i].blocks = views[i].points.cast<float>();
+    views[i] = CorrectedView(views_[i].blocks, {tilt, 1.0}, BlockGrid(camera_));
   });
   std::vector<Pose> motions(views_.size(), Pose::Identity());
   parallel_for(num_views() - 1, 1, num_threads, [&](std::int64_t k) {
@@ -366,6 +374,11 @@ std::vector<Pose> DepthCalibrator::correct(double tilt, int num_threads) {
     const std::optional<PairFit> fit = linearise(views[i], views[i + 1], motion, 1.0, camera_);
     motions[i + 1] = fit ? followed(motion, *fit, {0.0, 0.0, 1.0}) : motion;
   });
+  for (View& view : views_) {
+    for (Eigen::Index i = 0; i < view.blocks.rows(); ++i) {
+      view.blocks.row(i) = corrected(view.blocks, i, {tilt, 1.0}).cast<float>();
+    }
+  }
   std::vector<Pose> poses;
   for (std::size_t i = 0; i < views_.size(); ++i) {
     poses.push_back(i == 0 ? views_[0].world_from_camera : orthonormal(poses.back() * motions[i]));
