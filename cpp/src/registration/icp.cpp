@@ -39,6 +39,8 @@ class Schedule {
 
   const Gate& gate() const { return gate_; }
   std::int64_t num_samples() const { return source_.levels[level_]; }
+  // Whether steps tell more than which points are matched: with the last gate, and more than the fewest points.
+  bool is_settled() const { return gate_.is_smallest && num_samples() > source_.levels.front(); }
 
   // After a step that was small, or not: returns false when the pose is at rest with the last gate and all points.
   bool advance(bool at_rest, double residual_scale) {
@@ -152,7 +154,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
     const double scale = weight_pairs(pairs, options.method, options.robust, resolution);
     const double weak_threshold = hold_weak ? options.weak_threshold : 0.0;
     const IcpStep step = solve_step(pairs, options.method, weak_threshold, along, options.num_threads,
-                                    schedule.gate().is_smallest ? &before : nullptr);
+                                    schedule.is_settled() ? &before : nullptr);
     if (step.rmse < best_rmse) {
       best_rmse = step.rmse;
       best_pose = pose;
