@@ -59,7 +59,7 @@ class DepthCalibrator {
   /// across the axis by more than the 0.1 rad by which the views are turned at least.
   DepthCalibration fit(int num_threads = 0) const;
   /// The same in parts, for a loop that must not wait: begins anew with the views that are there; each step is one
-  /// iteration, the last of which returns what they say: the first by which the tilt is not going to be significant.
+  /// iteration, the last of which returns what they say, and which comes early where the tilt will not be significant.
   void begin_fit();
   bool is_fitting() const { return fit_.has_value(); }
   std::optional<DepthCalibration> step(int num_threads = 0);

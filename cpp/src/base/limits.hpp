@@ -7,7 +7,7 @@ namespace nacre::base_limits {
 
 constexpr float noise_sigmas = 4.0F;  // [sigma] derived: what noise does not reach, but for 1 of 16 000; test_frame, test_fusion
 constexpr double damping = 1e-9;  // [1] derived: of the mean information, so that there always is a solution; test_icp
-constexpr double longest_step = 2.0;  // [1] budget: of Gauss and Newton's, where it is made longer; test_icp, test_depth_calibration
+constexpr double longest_step = 2.0;  // [1] budget: of Gauss and Newton's, where it is made longer; test_step_length, test_depth_calibration
 constexpr int least_points = 50;  // [points] tuned: that decide anything; poster60-gray, test_failure
 
 }  // namespace nacre::base_limits

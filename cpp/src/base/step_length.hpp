@@ -7,8 +7,8 @@
 
 namespace nacre {
 
-// How many times its length to make a step, after one that was made `length` times the last: that left a part of itself
-// to do, which shows in the new one (Barzilai and Borwein 1988). As it is where there was none (0).
+// How many times to take a step of Gauss and Newton, after the last was taken `length` times: what that one left to do
+// shows in the new one (Barzilai and Borwein 1988). Once, where there was none (0); at least once.
 template <class Vector, class Matrix>
 double step_length(const Vector& last, double length, const Vector& step, const Matrix& metric) {
   const Vector scaled = metric * last;

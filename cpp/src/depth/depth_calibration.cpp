@@ -335,8 +335,7 @@ DepthCalibration DepthCalibrator::iterate(Fit& fit, int num_threads) const {
   const Eigen::Array2d sigmas = (2.0 * (covariance * scatter * covariance).diagonal().array()).sqrt();
   const Eigen::Vector2d in_sigmas = step.array() / sigmas.max(1e-12);
   const double longest = depth_limits::largest_stretch_step / std::max(std::abs(step(1)), 1e-12);
-  fit.length = std::min(step_length(fit.last_step, fit.length, in_sigmas, Eigen::Matrix2d(Eigen::Matrix2d::Identity())),
-                        longest);
+  fit.length = std::min(step_length(fit.last_step, fit.length, in_sigmas, Eigen::Matrix2d::Identity()), longest);
   fit.last_step = in_sigmas;
   step *= fit.length;
   fit.tilt += step(0);
