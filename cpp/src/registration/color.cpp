@@ -27,7 +27,7 @@ class ColorSearch : public OpenDirectionSearch {
  public:
   ColorSearch(const IcpTarget& target, const IcpSource& source, std::vector<ColorLevel> levels,
               const AlignOptions& options)
-      : target_(target), source_(source), levels_(std::move(levels)), options_(options) {
+      : target_(target), source_(source), few_(source.few()), levels_(std::move(levels)), options_(options) {
     held_ = options;
     held_.max_distance = gate().distance;
     held_.max_iterations = 6;
@@ -95,10 +95,11 @@ class ColorSearch : public OpenDirectionSearch {
         const std::vector<MotionRow> rows = match(level, result.target_from_source, result.center);
         if (rows.size() < base_limits::least_points) break;
         const double size = step(rows, open, result);
-        if (!return_to_surface(target_, source_, held_, result)) return start;
+        if (!return_to_surface(target_, few_, held_, result)) return start;
         if (size < registration_limits::small_color_step * target_.spacing()) break;
       }
     }
+    if (!return_to_surface(target_, source_, held_, result)) return start;
     return result;
   }
 
@@ -142,6 +143,7 @@ class ColorSearch : public OpenDirectionSearch {
 
   const IcpTarget& target_;
   const IcpSource& source_;
+  const IcpSource few_;
   std::vector<ColorLevel> levels_;
   const AlignOptions& options_;
   AlignOptions held_;  // few steps within the last gate, weak directions held

@@ -132,10 +132,12 @@ std::size_t least_pairs(std::int64_t num_samples) {
   return static_cast<std::size_t>(std::max<std::int64_t>(6, num_samples / 100));
 }
 
-// hold_weak: whether directions that the pairs do not determine stay as they are in each step.
+// hold_weak: whether weak directions stay as they are in each step.
 IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
-                  bool hold_weak, const TwistBasis& along = {}) {
+                  bool hold_weak, double least_signal = 0.0, const TwistBasis& along = {}) {
+  const WeakTest test{options.weak_threshold, least_signal};
   IcpResult result;
+  result.least_signal = least_signal;
   result.target_from_source = initial;
   result.rmse = std::numeric_limits<double>::quiet_NaN();
 
@@ -152,8 +154,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
     std::vector<Pair> pairs = target.match(source, schedule.num_samples(), pose, schedule.gate(), nearest);
     if (pairs.size() < least_pairs(schedule.num_samples())) return result;
     const double scale = weight_pairs(pairs, options.method, options.robust, resolution);
-    const double weak_threshold = hold_weak ? options.weak_threshold : 0.0;
-    const IcpStep step = solve_step(pairs, options.method, weak_threshold, along, options.num_threads,
+    const IcpStep step = solve_step(pairs, options.method, hold_weak ? test : WeakTest(), along, options.num_threads,
                                     schedule.is_settled() ? &before : nullptr);
     if (step.rmse < best_rmse) {
       best_rmse = step.rmse;
@@ -179,7 +180,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   result.misfit = misfit_of(pairs, options.method);
   result.residual_sigmas = residual_sigmas_of(pairs, options.method);
   weight_pairs(pairs, options.method, options.robust, resolution);
-  const IcpStep last = solve_step(pairs, options.method, options.weak_threshold, along, options.num_threads);
+  const IcpStep last = solve_step(pairs, options.method, test, along, options.num_threads);
   result.size_difference = size_difference(pairs, options.method);
   result.target_from_source = pose;
   result.status = at_rest ? AlignStatus::converged : AlignStatus::max_iterations;
@@ -194,6 +195,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   result.information = last.hessian / variance;
   result.shape_information = last.shape / variance;
   result.weak_directions = last.weak_directions;
+  result.signal = last.signal;
   return result;
 }
 
@@ -221,14 +223,14 @@ IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose&
   return iterate(target, source, initial, options, true);
 }
 
-IcpResult align_held(const IcpTarget& target, const IcpSource& source, const Pose& initial,
-                     const AlignOptions& options) {
-  return iterate(target, source, initial, options, true);
+IcpResult align_held(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
+                     double least_signal) {
+  return iterate(target, source, initial, options, true, least_signal);
 }
 
 IcpResult align_along(const TwistBasis& directions, const IcpTarget& target, const IcpSource& source,
                       const Pose& initial, const AlignOptions& options) {
-  return iterate(target, source, initial, options, false, directions);
+  return iterate(target, source, initial, options, false, 0.0, directions);
 }
 
 TwistBasis motions_on_plane(const Eigen::Vector3d& normal) {

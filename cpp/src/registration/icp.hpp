@@ -11,6 +11,8 @@ namespace nacre {
 struct IcpResult : AlignResult {
   double residual_ratio = std::numeric_limits<double>::quiet_NaN();  // residuals to the largest they may be, rms
   Matrix6 shape_information = Matrix6::Zero();                       // the part of it on which normals agree
+  double signal = infinity<double>;                                  // see IcpStep
+  double least_signal = 0.0;                                         // below which directions are weak
   double normal_information = 0.0;                                   // see normal_information
   double off_planes = 0.0;                                           // see share_off_planes
   double residual_sigmas =
@@ -21,9 +23,10 @@ struct IcpResult : AlignResult {
 
 // align with a prepared target.
 IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options);
-// The same, where directions that the pairs do not determine stay as they are in every step,
-IcpResult align_held(const IcpTarget& target, const IcpSource& source, const Pose& initial,
-                     const AlignOptions& options);
+// The same, where directions that the pairs do not determine, or with too little signal, stay as they are in every
+// step,
+IcpResult align_held(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
+                     double least_signal = 0.0);
 // or where the source only moves along some directions.
 IcpResult align_along(const TwistBasis& directions, const IcpTarget& target, const IcpSource& source,
                       const Pose& initial, const AlignOptions& options);

@@ -95,7 +95,7 @@ double normal_information(const std::vector<Pair>& pairs, Metric metric) {
   return std::max(0.0, 0.5 * std::log(independent.determinant() / apart.determinant()));
 }
 
-IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, const TwistBasis& along,
+IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, const WeakTest& test, const TwistBasis& along,
                    int num_threads, StepBefore* before) {
   IcpStep step;
   if (pairs.empty()) return step;
@@ -110,12 +110,18 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_th
   const double extent = std::sqrt(std::max(sums.extent / sums.weight - p_offset.squaredNorm(), 1e-24));
 
   const NormalEquations equations = normal_equations(pairs, metric, &Pair::weight, p_mean, q_mean, extent, num_threads);
+  const bool has_test = test.least_information > 0.0;
   const NormalEquations shape =
-      weak_threshold > 0.0 ? normal_equations(pairs, metric, &Pair::agreement, p_mean, q_mean, extent, num_threads)
-                           : equations;
+      has_test ? normal_equations(pairs, metric, &Pair::agreement, p_mean, q_mean, extent, num_threads) : equations;
   const Eigensystem eigen = eigensystem(shape.hessian - shape.chance);
-  const double least = weak_threshold * sums.agreement;
-  const Eigen::Index num_weak = weak_threshold > 0.0 ? (eigen.values.array() < least).count() : 0;
+  const Vector6 feigned = (eigen.vectors.transpose() * shape.chance * eigen.vectors).diagonal();
+  const double least = test.least_information * sums.agreement;
+  const auto is_weak = [&](Eigen::Index i) {
+    return eigen.values[i] < std::max(least, test.least_signal * feigned[i]);
+  };
+  Eigen::Index num_weak = 0;
+  while (has_test && num_weak < 6 && is_weak(num_weak)) ++num_weak;
+  if (has_test) step.signal = eigen.values.cwiseQuotient(feigned.cwiseMax(least)).minCoeff();
   step.weak_directions = eigen.vectors.leftCols(num_weak);
   const bool is_free = num_weak == 0 && along.cols() == 0;
   const TwistBasis sure = along.cols() > 0 ? along : TwistBasis(eigen.vectors.rightCols(6 - num_weak));

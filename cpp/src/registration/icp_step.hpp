@@ -11,6 +11,15 @@ namespace nacre {
 // Twists, rotations in units of an extent, one a column: directions of a pose.
 using TwistBasis = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
 
+// Which directions are weak, and do not move: those of which the normals of source and target agree on less information
+// than this, per pair that agrees and with rotations in units of the pairs' extent, since what a shape leaves open does
+// not depend on how well its parts are measured; and those of which it is less than so many times what noise in them
+// feigns.
+struct WeakTest {
+  double least_information = 0.0;  // 0: none is weak
+  double least_signal = 0.0;
+};
+
 // What the next step needs to know of the one before, to be as long as it should be.
 struct StepBefore {
   Vector6 twist = Vector6::Zero();  // before it was made longer
@@ -26,18 +35,18 @@ struct IcpStep {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   Matrix6 hessian = Matrix6::Zero();  // of half the weighted squares, for a twist (rotation, translation) about center
   Matrix6 shape = Matrix6::Zero();    // what the normals of both sides agree on of the hessian
-  TwistBasis weak_directions;         // about center
+  // The information that normals agree on, by what noise in them feigns, in the direction where that is least.
+  double signal = infinity<double>;
+  TwistBasis weak_directions;  // about center
 };
 
 // What the normals of a source and of the target tell about each other, for each pair: their mutual information, were
 // they Gaussian [nats]. Large where they vary together over the surface; nothing on a plane, however well it fits.
 double normal_information(const std::vector<Pair>& pairs, Metric metric);
 
-// Directions in which the normals of source and target agree on less information than weak_threshold, per pair that
-// agrees and with rotations in units of the pairs' extent, do not move: what a shape leaves open does not depend on how
-// well its parts are measured. Where `along` has directions, the motion has no others. Where the step before is given,
+// Weak directions do not move. Where `along` has directions, the motion has no others. Where the step before is given,
 // the motion is as much longer as that should have been (base/step_length.hpp), and takes its place.
-IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, double weak_threshold, const TwistBasis& along,
+IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, const WeakTest& test, const TwistBasis& along,
                    int num_threads, StepBefore* before = nullptr);
 
 }  // namespace nacre

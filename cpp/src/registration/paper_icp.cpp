@@ -124,7 +124,7 @@ class PaperIcp {
   }
 
   IcpStep step(const std::vector<Pair>& pairs) const {
-    return solve_step(pairs, Metric::point_to_plane, options_.weak_threshold, {}, options_.num_threads);
+    return solve_step(pairs, Metric::point_to_plane, {options_.weak_threshold}, {}, options_.num_threads);
   }
 
   IcpResult result_of(const Iterate& best, const Pose& initial) const {

@@ -9,7 +9,9 @@
 #include "camera/limits.hpp"
 #include "camera/point_spacing.hpp"
 #include "camera/view_distance.hpp"
+#include "outlines/limits.hpp"
 #include "registration/color.hpp"
+#include "registration/limits.hpp"
 #include "tracking/limits.hpp"
 
 namespace nacre {
@@ -102,11 +104,36 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
     align_options.max_distance = tracking_limits::narrow_gate * align_options.final_distance;
   }
 
+  const auto judge = [&](IcpResult alignment, bool with_colors) {
+    determine_open_directions(view, target, source, align_options, with_colors, alignment);
+    return judged(surfaces, std::move(alignment), guess, expectation);
+  };
+  IcpResult by_shape = align_to(target, source, start, align_options);
+  const double least_signal = least_signal_at(by_shape.target_from_source);
+  const bool is_doubtful = by_shape.weak_directions.cols() == 0 && by_shape.signal < least_signal;
+  const TrackingResult result = judge(std::move(by_shape), true);
+  if (!is_doubtful) return result;
+  // Noise may feign what the shapes tell: outlines may know better, or colours, which take long.
+  const bool asks_colors = !result.is_clear_cut && result.alignment.signal < registration_limits::least_signal;
+  const TrackingResult other = judge(align_held(target, source.few(), start, align_options, least_signal), asks_colors);
+  const bool is_told = other.alignment.weak_directions.cols() == 0;
+  return is_told && result.score < tracking_limits::clearly_better * other.score ? other : result;
+}
+
+// Errors that frames share move with the camera: model and frame agree on them where it seems to be at rest.
+double FrameRegistration::least_signal_at(const Pose& pose) const {
+  const Pose& last = target_.last_view.world_from_camera;
+  const double shift = (pose.translation() - last.translation()).norm() / depth_;
+  const bool is_at_rest = now_.camera.fx() * (angle_between(pose, last) + shift) < outlines_limits::last_gate;
+  return is_at_rest ? registration_limits::signal_at_rest : registration_limits::least_signal;
+}
+
+TrackingResult FrameRegistration::judged(const Surfaces& surfaces, IcpResult alignment, const Pose& guess,
+                                         Expectation expectation) const {
   TrackingResult result;
   result.noise_factor = now_.noise_factor;
   result.moving = surfaces.moving;
-  result.alignment = align_to(target, source, start, align_options);
-  determine_open_directions(view, target, source, align_options, result.alignment);
+  result.alignment = std::move(alignment);
   const Pose& pose = result.alignment.target_from_source;
   result.consistency = consistency(surfaces, pose);
   const double nearby = camera_limits::new_direction / camera_limits::view_turn;
@@ -161,9 +188,9 @@ IcpSource FrameRegistration::gated(IcpSource source, const PointsInView& view, c
 // What the shapes leave open, colours or outlines may decide.
 void FrameRegistration::determine_open_directions(const PointsInView& view, const IcpTarget& target,
                                                   const IcpSource& source, const AlignOptions& options,
-                                                  IcpResult& result) const {
+                                                  bool with_colors, IcpResult& result) const {
   const Eigen::Index num_weak = result.weak_directions.cols();
-  if (num_weak > 0 && view.brightness.size() > 0 && now_.observer.has_colors()) {
+  if (num_weak > 0 && with_colors && view.brightness.size() > 0 && now_.observer.has_colors()) {
     result = determine_by_color(target, source, BrightCloud(view.points, view.brightness),
                                 bright_cloud(now_.frame, now_.observer), result, options);
   }

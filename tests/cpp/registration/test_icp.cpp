@@ -103,7 +103,7 @@ TEST_CASE("one step from true pairs: point_to_point is exact, symmetric nearly, 
     const Pose pose = motion(size * Eigen::Vector3d(0.6, -0.64, 0.48), {0.0, 0.0, 0.0});
     const Cloud source = moved(target, pose.inverse());
     const auto error = [&](Metric metric) {
-      return angle_between(solve_step(pairs_of(source, target, metric), metric, 0.0, {}, 1).motion, pose);
+      return angle_between(solve_step(pairs_of(source, target, metric), metric, {}, {}, 1).motion, pose);
     };
     CHECK(error(Metric::point_to_point) < 1e-6);
     CHECK(error(Metric::symmetric) < 0.02 * size * size);
@@ -116,18 +116,49 @@ TEST_CASE("a step is a rigid motion, and says how far it moves the pairs") {
   const Cloud target = pebble(500, 1);
   for (const Metric metric : all_metrics) {
     const Cloud source = moved(target, motion({0, 0, 0}, {0.003, 0, 0}).inverse());
-    const IcpStep step = solve_step(pairs_of(source, target, metric), metric, 0.01, {}, 1);
+    const IcpStep step = solve_step(pairs_of(source, target, metric), metric, {0.01}, {}, 1);
     CHECK((step.motion.linear() * step.motion.linear().transpose() - Eigen::Matrix3d::Identity()).norm() < 1e-12);
     CHECK(step.size == doctest::Approx(0.003).epsilon(0.01));
     CHECK(step.weak_directions.cols() == 0);
   }
-  CHECK(solve_step({}, Metric::symmetric, 0.01, {}, 1).motion.isApprox(Pose::Identity()));
+  CHECK(solve_step({}, Metric::symmetric, {0.01}, {}, 1).motion.isApprox(Pose::Identity()));
+}
+
+TEST_CASE(
+    "of a plane with noisy normals noise feigns what they tell; of another shape, or without noise, it does not") {
+  const auto step_of = [](const Cloud& source, const Cloud& target, double least_signal) {
+    return solve_step(pairs_of(source, target, Metric::symmetric), Metric::symmetric, {0.002, least_signal}, {}, 1);
+  };
+  const auto with_noise = [](Cloud cloud, std::uint64_t seed) {
+    for (Eigen::Index i = 0; i < cloud.points.rows(); ++i) {
+      for (int axis = 0; axis < 3; ++axis) {
+        const auto counter = static_cast<std::uint64_t>(3 * i + axis);
+        cloud.normals(i, axis) += static_cast<float>(0.2 * random_normal(seed, counter));
+      }
+      cloud.normals.row(i).normalize();
+    }
+    return cloud;
+  };
+  Cloud plane = pebble(2000, 1);
+  plane.points.col(2).setConstant(0.4f);
+  plane.normals.rowwise() = Eigen::RowVector3f(0.0f, 0.0f, -1.0f);
+  const Cloud round = pebble(2000, 1);
+
+  const IcpStep noisy = step_of(with_noise(plane, 2), with_noise(plane, 3), 1.0);
+  CHECK(noisy.signal < 0.3);
+  CHECK(noisy.weak_directions.cols() == 3);
+  CHECK(step_of(plane, plane, 1.0).weak_directions.cols() == 3);
+  CHECK(step_of(with_noise(round, 2), with_noise(round, 3), 1.0).weak_directions.cols() == 0);
+  CHECK(step_of(round, round, 3.0).signal > 3.0);
+
+  const Cloud shared = with_noise(plane, 2);  // which nothing tells from shape
+  CHECK(step_of(shared, shared, 1.0).weak_directions.cols() == 0);
 }
 
 TEST_CASE("the hessian is the second derivative of half the squared residuals") {
   const Cloud target = pebble(300, 1);
   const std::vector<Pair> pairs = pairs_of(target, target, Metric::point_to_plane);
-  const IcpStep step = solve_step(pairs, Metric::point_to_plane, 0.01, {}, 1);
+  const IcpStep step = solve_step(pairs, Metric::point_to_plane, {0.01}, {}, 1);
   const auto cost = [&](const Vector6& twist) {
     double sum = 0.0;
     for (const Pair& pair : pairs) {
