@@ -1,4 +1,4 @@
-"""A camera that passes along a wall: who holds what the wall leaves open or noise feigns, and for how long."""
+"""A camera that passes along a wall: who holds what it leaves open, or noise feigns, and for how long."""
 
 from __future__ import annotations
 
@@ -103,8 +103,8 @@ def wall_with_boxes() -> nacre.Mesh:
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_what_sticks_to_a_stereo_camera_does_not_hold_it(seed: int) -> None:
-    # Faces of wall and boxes all look alike, and what neighbouring pixels and successive images err by in common lies
-    # still in the image: registered by shape alone the camera stands still, and is sure of it.
+    # The faces of wall and boxes look one way, and what neighbouring pixels and successive images err by in
+    # common lies still in the image: registered by shape alone the camera stands still, and is sure of it.
     camera, scene = nacre.Camera(640, 480, 615, 615, 319.5, 239.5), wall_with_boxes()
     model, pose = nacre.Model(camera), np.eye(4)
     for number in range(8):
