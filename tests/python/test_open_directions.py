@@ -101,17 +101,17 @@ def wall_with_boxes() -> nacre.Mesh:
     return nacre.Mesh(vertices, np.concatenate(triangles).astype(np.int32))
 
 
-@pytest.mark.parametrize("seed", [1, 2])
-def test_what_sticks_to_a_stereo_camera_does_not_hold_it(seed: int) -> None:
+@pytest.mark.parametrize(
+    ("sensor", "focal_length", "seed"), [("stereo", 615, 1), ("structured_light", 525, 0)]
+)
+def test_what_sticks_to_a_camera_does_not_hold_it(sensor: Any, focal_length: float, seed: int) -> None:
     # The faces of wall and boxes look one way, and what neighbouring pixels and successive images err by in
     # common lies still in the image: registered by shape alone the camera stands still, and is sure of it.
-    camera, scene = nacre.Camera(640, 480, 615, 615, 319.5, 239.5), wall_with_boxes()
+    camera, scene = nacre.Camera(640, 480, focal_length, focal_length, 319.5, 239.5), wall_with_boxes()
     model, pose = nacre.Model(camera), np.eye(4)
     for number in range(8):
         pose[0, 3] = 0.04 * number - 0.5
-        depth = scene.simulate_depth(
-            camera, pose, sensor="stereo", seed=100 * seed + number, sensor_seed=seed
-        )
+        depth = scene.simulate_depth(camera, pose, sensor=sensor, seed=100 * seed + number, sensor_seed=seed)
         model.add_frame(depth)
     come = [report.world_from_camera[0, 3] for report in model.frames if report.tracked]
     assert len(come) == 8

@@ -104,20 +104,25 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
     align_options.max_distance = tracking_limits::narrow_gate * align_options.final_distance;
   }
 
-  const auto judge = [&](IcpResult alignment, bool with_colors) {
+  const auto tested = [&](IcpResult alignment, bool with_colors) {
     determine_open_directions(view, target, source, align_options, with_colors, alignment);
-    return judged(surfaces, std::move(alignment), guess, expectation);
+    return test(std::move(alignment), surfaces, guess, expectation);
   };
   IcpResult by_shape = align_to(target, source, start, align_options);
   const double least_signal = least_signal_at(by_shape.target_from_source);
   const bool is_doubtful = by_shape.weak_directions.cols() == 0 && by_shape.signal < least_signal;
-  const TrackingResult result = judge(std::move(by_shape), true);
+  const TrackingResult result = tested(std::move(by_shape), true);
   if (!is_doubtful) return result;
   // Noise may feign what the shapes tell: outlines may know better, or colours, which take long.
   const bool asks_colors = !result.is_clear_cut && result.alignment.signal < registration_limits::least_signal;
-  const TrackingResult other = judge(align_held(target, source.few(), start, align_options, least_signal), asks_colors);
+  const TrackingResult other =
+      tested(align_held(target, source.few(), start, align_options, least_signal), asks_colors);
   const bool is_told = other.alignment.weak_directions.cols() == 0;
-  return is_told && result.score < tracking_limits::clearly_better * other.score ? other : result;
+  // At rest shared errors match, too, and raise the score: then it is for the shapes to fit clearly better.
+  const bool may_stick = least_signal == registration_limits::signal_at_rest;
+  const bool is_better = may_stick ? other.score > tracking_limits::clearly_better * result.score
+                                   : result.score < tracking_limits::clearly_better * other.score;
+  return is_told && is_better ? other : result;
 }
 
 // Errors that frames share move with the camera: model and frame agree on them where it seems to be at rest.
@@ -128,8 +133,8 @@ double FrameRegistration::least_signal_at(const Pose& pose) const {
   return is_at_rest ? registration_limits::signal_at_rest : registration_limits::least_signal;
 }
 
-TrackingResult FrameRegistration::judged(const Surfaces& surfaces, IcpResult alignment, const Pose& guess,
-                                         Expectation expectation) const {
+TrackingResult FrameRegistration::test(IcpResult alignment, const Surfaces& surfaces, const Pose& guess,
+                                       Expectation expectation) const {
   TrackingResult result;
   result.noise_factor = now_.noise_factor;
   result.moving = surfaces.moving;

@@ -88,10 +88,9 @@ class FrameRegistration {
   std::vector<std::uint8_t> shows(const MaskImage& region, const Points& points) const;
   std::optional<Still> still_at(const Pose& world_from_camera, const PointsInView& view) const;
   double least_signal_at(const Pose& world_from_camera) const;
-  TrackingResult judged(const Surfaces& surfaces, IcpResult alignment, const Pose& guess,
-                        Expectation expectation) const;
   TrackingResult registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
                             Expectation expectation) const;
+  TrackingResult test(IcpResult alignment, const Surfaces& surfaces, const Pose& guess, Expectation expectation) const;
   const PointsInView& in_view(const Pose& world_from_camera) const;
   IcpSource gated(IcpSource source, const PointsInView& view, const IcpTarget& target) const;
   void determine_open_directions(const PointsInView& view, const IcpTarget& target, const IcpSource& gated,
