@@ -3,7 +3,8 @@
 Run simulated cameras of four kinds through scenes and at speeds that nothing in nacre was tuned on.
 
 The errors are those of `nacre.simulate_depth`'s sensors, which `sensors.py` compares with real ones. A flat
-is walked through with the camera in the hand, at so many frames a second; cartons in a corner are walked
+is walked through with the camera in the hand, at so many frames a second; the camera passes a wall with
+boxes on it, all of whose faces look one way, in steps of so many millimetres; cartons in a corner are walked
 around, in steps of so many degrees; a figure as tall as a person, and a cow of 0.8 m, turn before the camera,
 alone.
 
@@ -29,13 +30,15 @@ import nacre
 Array = npt.NDArray[Any]
 
 SENSORS = ("structured_light", "time_of_flight", "stereo", "phone_lidar")
-# Of each scene: frames a second or degrees from frame to frame, and the number of frames.
+# Of each scene: frames a second, or millimetres or degrees from frame to frame, and the number of frames.
 SCENES = {
     "flat": ((30, 60), (10, 60), (5, 60), (3, 60)),
+    "wall": ((10, 60), (40, 30)),
     "cartons": ((5, 60), (10, 36), (20, 17)),
     "homer": ((7, 52), (15, 24)),
     "spot": ((7, 52),),
 }
+UNITS = {"flat": "frames a second", "wall": "mm"}
 HEIGHTS = {"homer": 1.7, "spot": 0.8}  # [m]
 DISTANCES = {"homer": 2.2, "spot": 1.2, "cartons": 2.0}  # [m]
 
@@ -106,6 +109,23 @@ def cartons() -> nacre.Mesh:
     return merged(parts)
 
 
+def wall() -> nacre.Mesh:
+    """Return a wall two metres from the camera's way, with boxes before it."""
+    rng = np.random.default_rng(5)
+    parts = [box([0, 0, 2.05], [9, 6, 0.1], 0)]
+    for x in np.arange(-3, 3, 0.55):
+        place = [x + rng.uniform(-0.1, 0.1), rng.uniform(-0.7, 0.7), 2]
+        parts.append(box(place, rng.uniform([0.3, 0.3, 0.6], [0.5, 0.5, 0.7]), 0))
+    return merged(parts)
+
+
+def passing(step: int, count: int) -> list[Array]:
+    """Return poses that pass the wall, in steps of so many millimetres."""
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, 0, 3] = 0.001 * step * (np.arange(count) - count / 2)
+    return list(poses)
+
+
 def figure(name: str) -> nacre.Mesh:
     """Return a mesh at the size of a person or an animal, its head up, where y points down."""
     mesh = nacre.read_mesh(cases.DATA / "meshes" / f"{name}.obj")
@@ -118,6 +138,8 @@ def make(scene: str, sensor: str, speed: int, count: int) -> cases.Case:
     """Return a recording."""
     if scene == "flat":
         mesh, poses = flat_mesh(), walk(speed, count)
+    elif scene == "wall":
+        mesh, poses = wall(), passing(speed, count)
     elif scene == "cartons":
         mesh, poses = cartons(), around(speed, count, DISTANCES[scene], -0.2, np.array([0, 0.5, 0]))
     else:
@@ -155,8 +177,8 @@ def main() -> None:
         todo = [(scene, sensor, speed, count) for scene, speed, count in rows for sensor in sensors]
         cells = pool.map(run, todo)
         for scene, speed, _ in rows:
-            unit = "frames a second" if scene == "flat" else "degrees"
-            print(f"| {scene}, {speed} {unit} | {' | '.join(next(cells) for _ in sensors)} |", flush=True)
+            name = f"{scene}, {speed} {UNITS.get(scene, 'degrees')}"
+            print(f"| {name} | {' | '.join(next(cells) for _ in sensors)} |", flush=True)
 
 
 if __name__ == "__main__":
