@@ -1,6 +1,6 @@
 #!/usr/bin/env python
 """
-Run simulated cameras of four kinds through scenes and at speeds that nothing in nacre was tuned on.
+Run simulated cameras of four kinds through scenes and at speeds that no number in nacre was fitted to.
 
 The errors are those of `nacre.simulate_depth`'s sensors, which `sensors.py` compares with real ones. A flat
 is walked through with the camera in the hand, at so many frames a second; the camera passes a wall with

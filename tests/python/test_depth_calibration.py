@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from boxes import boxes
 
 import nacre
 
@@ -13,18 +14,6 @@ CAMERA = nacre.Camera(width=320, height=240, fx=260, fy=260, cx=159.5, cy=119.5)
 CAMERA_SHAPE = (CAMERA.height, CAMERA.width)
 SIDE = ((np.arange(320) - 159.5) / 260)[None, :]
 DOWN = ((np.arange(240) - 119.5) / 260)[:, None]
-
-
-def boxes(*corners):
-    """A mesh of axis-aligned boxes."""
-    faces = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
-    vertices, triangles = [], []
-    for low, high in corners:
-        first = len(vertices)
-        vertices += [[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)]
-        for a, b, c, d in faces:
-            triangles += [(first + a, first + b, first + c), (first + a, first + c, first + d)]
-    return nacre.Mesh(np.array(vertices, float), np.array(triangles))
 
 
 def pose(yaw, pitch):

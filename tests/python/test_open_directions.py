@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+from boxes import boxes
 
 import nacre
 
@@ -81,24 +82,15 @@ def test_a_camera_that_turned_back_is_found_where_the_wall_is_rough() -> None:
     assert model.frames[-1].status == "TRACKED"
 
 
-def box(center: Any, size: Any) -> tuple[Array, Array]:
-    """Return the vertices and the triangles of a box."""
-    corners: Array = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    return corners * size + center, np.array([t for a, b, c, d in quads for t in ([a, b, c], [a, c, d])])
-
-
 def wall_with_boxes() -> nacre.Mesh:
     """Return a wall two metres away, with boxes before it that are a third of a metre deep."""
     random = np.random.default_rng(5)
-    parts = [box([0, 0, 2.05], [9, 6, 0.1])]
+    corners = [(np.array([-4.5, -3, 2]), np.array([4.5, 3, 2.1]))]
     for x in np.arange(-3, 3, 0.55):
-        place = [x + random.uniform(-0.1, 0.1), random.uniform(-0.7, 0.7), 2]
-        parts.append(box(place, random.uniform([0.3, 0.3, 0.6], [0.5, 0.5, 0.7])))
-    firsts = np.cumsum([0] + [len(vertices) for vertices, _ in parts])[:-1]
-    triangles = [triangles + first for (_, triangles), first in zip(parts, firsts, strict=True)]
-    vertices = np.concatenate([vertices for vertices, _ in parts])
-    return nacre.Mesh(vertices, np.concatenate(triangles).astype(np.int32))
+        middle = np.array([x + random.uniform(-0.1, 0.1), random.uniform(-0.7, 0.7), 2])
+        size = random.uniform([0.3, 0.3, 0.6], [0.5, 0.5, 0.7])
+        corners.append((middle - size / 2, middle + size / 2))
+    return boxes(*corners)
 
 
 @pytest.mark.parametrize(

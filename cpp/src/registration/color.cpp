@@ -88,6 +88,7 @@ class ColorSearch : public OpenDirectionSearch {
 
   IcpResult run(const IcpResult& start, const TwistBasis* only) {
     IcpResult result = start;
+    bool has_moved = false;
     for (const ColorLevel& level : levels_) {
       for (int i = 0; i < registration_limits::most_steps; ++i) {
         const TwistBasis open = only != nullptr ? *only : TwistBasis(result.weak_directions);
@@ -95,11 +96,12 @@ class ColorSearch : public OpenDirectionSearch {
         const std::vector<MotionRow> rows = match(level, result.target_from_source, result.center);
         if (rows.size() < base_limits::least_points) break;
         const double size = step(rows, open, result);
+        has_moved = true;
         if (!return_to_surface(target_, few_, held_, result)) return start;
         if (size < registration_limits::small_color_step * target_.spacing()) break;
       }
     }
-    if (!return_to_surface(target_, source_, held_, result)) return start;
+    if (has_moved && !return_to_surface(target_, source_, held_, result)) return start;
     return result;
   }
 

@@ -109,7 +109,8 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
     return test(std::move(alignment), surfaces, guess, expectation);
   };
   IcpResult by_shape = align_to(target, source, start, align_options);
-  const double least_signal = least_signal_at(by_shape.target_from_source);
+  const bool may_stick = is_at_rest(by_shape.target_from_source);
+  const double least_signal = may_stick ? registration_limits::signal_at_rest : registration_limits::least_signal;
   const bool is_doubtful = by_shape.weak_directions.cols() == 0 && by_shape.signal < least_signal;
   const TrackingResult result = tested(std::move(by_shape), true);
   if (!is_doubtful) return result;
@@ -119,18 +120,16 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
       tested(align_held(target, source.few(), start, align_options, least_signal), asks_colors);
   const bool is_told = other.alignment.weak_directions.cols() == 0;
   // At rest shared errors match, too, and raise the score: then it is for the shapes to fit clearly better.
-  const bool may_stick = least_signal == registration_limits::signal_at_rest;
   const bool is_better = may_stick ? other.score > tracking_limits::clearly_better * result.score
                                    : result.score < tracking_limits::clearly_better * other.score;
   return is_told && is_better ? other : result;
 }
 
-// Errors that frames share move with the camera: model and frame agree on them where it seems to be at rest.
-double FrameRegistration::least_signal_at(const Pose& pose) const {
+// Since the last view no farther than outlines that match. Errors that images share hold a camera there.
+bool FrameRegistration::is_at_rest(const Pose& pose) const {
   const Pose& last = target_.last_view.world_from_camera;
-  const double shift = (pose.translation() - last.translation()).norm() / depth_;
-  const bool is_at_rest = now_.camera.fx() * (angle_between(pose, last) + shift) < outlines_limits::last_gate;
-  return is_at_rest ? registration_limits::signal_at_rest : registration_limits::least_signal;
+  const double shift = (pose.translation() - last.translation()).norm() + depth_ * angle_between(pose, last);
+  return shift < outlines_limits::last_gate * now_.camera.footprint(depth_);
 }
 
 TrackingResult FrameRegistration::test(IcpResult alignment, const Surfaces& surfaces, const Pose& guess,

@@ -87,7 +87,7 @@ class FrameRegistration {
   };
   std::vector<std::uint8_t> shows(const MaskImage& region, const Points& points) const;
   std::optional<Still> still_at(const Pose& world_from_camera, const PointsInView& view) const;
-  double least_signal_at(const Pose& world_from_camera) const;
+  bool is_at_rest(const Pose& world_from_camera) const;
   TrackingResult registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
                             Expectation expectation) const;
   TrackingResult test(IcpResult alignment, const Surfaces& surfaces, const Pose& guess, Expectation expectation) const;
