@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "base/limits.hpp"
 #include "base/parallel.hpp"
@@ -70,19 +71,27 @@ double median_pixel(const std::vector<OutlinePoint>& outline) {
 
 std::vector<int> nearest_edges(const std::vector<OutlinePoint>& outline, const std::vector<OutlinePoint>& others,
                                double gate, int num_threads) {
+  std::vector<std::pair<double, int>> by_x;
+  by_x.reserve(others.size());
+  for (std::size_t k = 0; k < others.size(); ++k) by_x.emplace_back(others[k].point.x(), static_cast<int>(k));
+  std::sort(by_x.begin(), by_x.end());
   std::vector<int> nearest(outline.size(), -1);
   parallel_for(static_cast<std::int64_t>(outline.size()), 32, num_threads, [&](std::int64_t row) {
     const auto i = static_cast<std::size_t>(row);
     const OutlinePoint& edge = outline[i];
     double least = gate * gate;
-    for (std::size_t k = 0; k < others.size(); ++k) {
-      const double squared = (others[k].point - edge.point).squaredNorm();
-      if (!(squared < least) || others[k].outward.dot(edge.outward) < registration_limits::same_surface_cosine ||
-          others[k].normal.dot(edge.normal) < registration_limits::same_surface_cosine) {
+    const double x = edge.point.x();
+    for (auto at = std::lower_bound(by_x.begin(), by_x.end(), std::pair(x - gate, 0));
+         at != by_x.end() && at->first <= x + gate; ++at) {
+      const OutlinePoint& other = others[static_cast<std::size_t>(at->second)];
+      const double squared = (other.point - edge.point).squaredNorm();
+      const bool is_nearer = squared < least || (squared == least && at->second < nearest[i]);
+      if (!is_nearer || other.outward.dot(edge.outward) < registration_limits::same_surface_cosine ||
+          other.normal.dot(edge.normal) < registration_limits::same_surface_cosine) {
         continue;
       }
       least = squared;
-      nearest[i] = static_cast<int>(k);
+      nearest[i] = at->second;
     }
   });
   return nearest;

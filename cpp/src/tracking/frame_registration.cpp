@@ -92,37 +92,50 @@ std::optional<FrameRegistration::Still> FrameRegistration::still_at(const Pose& 
 
 TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
                                              Expectation expectation) const {
-  const PointsInView& view = surfaces.view;
-  AlignOptions align_options = options_.registration;
-  align_options.max_points = 0;  // the view is thin enough
-  const IcpTarget target(AlignCloud(view.points, view.normals), align_options);
-  const IcpSource source = gated(surfaces.samples, view, target);
-  if (!(align_options.final_distance > 0.0)) {
-    align_options.final_distance = source.reach.size() > 0 ? static_cast<double>(median_of(source.reach)) : 0.0;
-  }
-  if (has_automatic_gate() && gate == Gate::narrow) {
-    align_options.max_distance = tracking_limits::narrow_gate * align_options.final_distance;
-  }
-
-  const auto tested = [&](IcpResult alignment, bool with_colors) {
-    determine_open_directions(view, target, source, align_options, with_colors, alignment);
-    return test(std::move(alignment), surfaces, guess, expectation);
-  };
-  IcpResult by_shape = align_to(target, source, start, align_options);
+  const Pairing pairing = paired(surfaces, gate);
+  IcpResult by_shape = align_to(pairing.target, pairing.source, start, pairing.options);
   const bool may_stick = is_at_rest(by_shape.target_from_source);
   const double least_signal = may_stick ? registration_limits::signal_at_rest : registration_limits::least_signal;
   const bool is_doubtful = by_shape.weak_directions.cols() == 0 && by_shape.signal < least_signal;
-  const TrackingResult result = tested(std::move(by_shape), true);
+  determine_open_directions(surfaces.view, pairing, true, by_shape);
+  const TrackingResult result = test(std::move(by_shape), surfaces, guess, expectation);
   if (!is_doubtful) return result;
-  // Noise may feign what the shapes tell: outlines may know better, or colours, which take long.
-  const bool asks_colors = !result.is_clear_cut && result.alignment.signal < registration_limits::least_signal;
-  const TrackingResult other =
-      tested(align_held(target, source.few(), start, align_options, least_signal), asks_colors);
-  const bool is_told = other.alignment.weak_directions.cols() == 0;
+  std::optional<IcpResult> held = without_doubtful(surfaces.view, pairing, start, result, least_signal);
+  if (!held) return result;
+  const TrackingResult other = test(std::move(*held), surfaces, guess, expectation);
   // At rest shared errors match, too, and raise the score: then it is for the shapes to fit clearly better.
   const bool is_better = may_stick ? other.score > tracking_limits::clearly_better * result.score
                                    : result.score < tracking_limits::clearly_better * other.score;
-  return is_told && is_better ? other : result;
+  return is_better ? other : result;
+}
+
+// Noise may feign what the shapes tell: outlines may know better, or colours, which take long. They are asked where the
+// camera is expected, and where the shapes lead.
+std::optional<IcpResult> FrameRegistration::without_doubtful(const PointsInView& view, const Pairing& pairing,
+                                                             const Pose& start, const TrackingResult& by_shape,
+                                                             double least_signal) const {
+  const bool asks_colors = !by_shape.is_clear_cut && by_shape.alignment.signal < registration_limits::least_signal;
+  const IcpSource few = pairing.source.few();
+  for (const Pose& pose : {start, by_shape.alignment.target_from_source}) {
+    IcpResult held = align_held(pairing.target, few, pose, pairing.options, least_signal);
+    determine_open_directions(view, pairing, asks_colors, held);
+    if (held.weak_directions.cols() == 0) return held;
+  }
+  return std::nullopt;
+}
+
+FrameRegistration::Pairing FrameRegistration::paired(const Surfaces& surfaces, Gate gate) const {
+  AlignOptions options = options_.registration;
+  options.max_points = 0;  // the view is thin enough
+  IcpTarget target(AlignCloud(surfaces.view.points, surfaces.view.normals), options);
+  IcpSource source = gated(surfaces.samples, surfaces.view, target);
+  if (!(options.final_distance > 0.0)) {
+    options.final_distance = source.reach.size() > 0 ? static_cast<double>(median_of(source.reach)) : 0.0;
+  }
+  if (has_automatic_gate() && gate == Gate::narrow) {
+    options.max_distance = tracking_limits::narrow_gate * options.final_distance;
+  }
+  return {std::move(target), std::move(source), std::move(options)};
 }
 
 // Since the last view no farther than outlines that match. Errors that images share hold a camera there.
@@ -190,16 +203,15 @@ IcpSource FrameRegistration::gated(IcpSource source, const PointsInView& view, c
 }
 
 // What the shapes leave open, colours or outlines may decide.
-void FrameRegistration::determine_open_directions(const PointsInView& view, const IcpTarget& target,
-                                                  const IcpSource& source, const AlignOptions& options,
-                                                  bool with_colors, IcpResult& result) const {
+void FrameRegistration::determine_open_directions(const PointsInView& view, const Pairing& pairing, bool with_colors,
+                                                  IcpResult& result) const {
   const Eigen::Index num_weak = result.weak_directions.cols();
   if (num_weak > 0 && with_colors && view.brightness.size() > 0 && now_.observer.has_colors()) {
-    result = determine_by_color(target, source, BrightCloud(view.points, view.brightness),
-                                bright_cloud(now_.frame, now_.observer), result, options);
+    result = determine_by_color(pairing.target, pairing.source, BrightCloud(view.points, view.brightness),
+                                bright_cloud(now_.frame, now_.observer), result, pairing.options);
   }
   if (num_weak > 0 && result.weak_directions.cols() == num_weak) {
-    result = determine_by_outline(target, source, outlines(), result, options);
+    result = determine_by_outline(pairing.target, pairing.source, outlines(), result, pairing.options);
   }
 }
 

@@ -79,6 +79,12 @@ class FrameRegistration {
     const PointsInView& view;
     double moving;  // part that is left out
   };
+  // Both, ready to be matched.
+  struct Pairing {
+    IcpTarget target;
+    IcpSource source;
+    AlignOptions options;
+  };
   // What stays, as seen from a pose; nothing where nothing moves.
   struct Still {
     IcpSource samples;
@@ -90,11 +96,15 @@ class FrameRegistration {
   bool is_at_rest(const Pose& world_from_camera) const;
   TrackingResult registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
                             Expectation expectation) const;
+  // What is found with the directions held that noise may feign; nothing where nothing else decides them.
+  std::optional<IcpResult> without_doubtful(const PointsInView& view, const Pairing& pairing, const Pose& start,
+                                            const TrackingResult& by_shape, double least_signal) const;
+  Pairing paired(const Surfaces& surfaces, Gate gate) const;
   TrackingResult test(IcpResult alignment, const Surfaces& surfaces, const Pose& guess, Expectation expectation) const;
   const PointsInView& in_view(const Pose& world_from_camera) const;
   IcpSource gated(IcpSource source, const PointsInView& view, const IcpTarget& target) const;
-  void determine_open_directions(const PointsInView& view, const IcpTarget& target, const IcpSource& gated,
-                                 const AlignOptions& options, bool with_colors, IcpResult& result) const;
+  void determine_open_directions(const PointsInView& view, const Pairing& pairing, bool with_colors,
+                                 IcpResult& result) const;
   Consistency consistency(const Surfaces& surfaces, const Pose& world_from_camera) const;
   const OutlinePair& outlines() const;
 
