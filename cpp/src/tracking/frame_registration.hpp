@@ -59,6 +59,7 @@ class FrameRegistration {
   bool has_automatic_gate() const { return !(options_.registration.max_distance > 0.0); }
 
   void include_older_points();
+  const PointsInView& in_view(const Pose& world_from_camera) const;  // of the model
   const IcpSource& source() const { return source_; }
   double depth() const { return depth_; }
 
@@ -101,7 +102,6 @@ class FrameRegistration {
                                             const TrackingResult& by_shape, double least_signal) const;
   Pairing paired(const Surfaces& surfaces, Gate gate) const;
   TrackingResult test(IcpResult alignment, const Surfaces& surfaces, const Pose& guess, Expectation expectation) const;
-  const PointsInView& in_view(const Pose& world_from_camera) const;
   IcpSource gated(IcpSource source, const PointsInView& view, const IcpTarget& target) const;
   void determine_open_directions(const PointsInView& view, const Pairing& pairing, bool with_colors,
                                  IcpResult& result) const;

@@ -12,27 +12,36 @@
 
 namespace nacre {
 
-std::vector<Pose> most_promising(const PointModel& model, const IcpSource& source, const std::vector<Pose>& guesses,
+std::vector<Pose> most_promising(const AlignCloud& model, const IcpSource& source, const std::vector<Pose>& guesses,
                                  const AlignOptions& options) {
-  const IcpTarget whole(AlignCloud(as_rows(model.points), as_rows(model.normals)), options);
+  const IcpTarget target(model, options);
   AlignOptions coarse = options;
-  coarse.max_samples = coarse.coarse_samples = tracking_limits::coarse_turn_samples;
   coarse.num_threads = 1;
   coarse.max_iterations = tracking_limits::most_coarse_turn_steps;
-  const IcpSource few(AlignCloud(source.cloud.points, source.cloud.normals, source.cloud.sigma), coarse);
 
-  std::vector<std::pair<double, Pose>> candidates(guesses.size());
-  parallel_for(static_cast<std::int64_t>(guesses.size()), 1, options.num_threads, [&](std::int64_t i) {
-    const auto k = static_cast<std::size_t>(i);
-    const AlignResult result = align_to(whole, few, guesses[k], coarse);
-    candidates[k] = {result.overlap, result.target_from_source};
-  });
-  std::stable_sort(candidates.begin(), candidates.end(),
-                   [](const auto& a, const auto& b) { return a.first > b.first; });
+  struct Candidate {
+    Pose guess, found;
+    double overlap;
+  };
+  std::vector<Candidate> candidates;
+  for (const Pose& guess : guesses) candidates.push_back({guess, guess, 0.0});
+  const auto keep_best = [&](std::size_t most, int num_samples) {
+    coarse.max_samples = coarse.coarse_samples = num_samples;
+    const IcpSource few(AlignCloud(source.cloud.points, source.cloud.normals, source.cloud.sigma), coarse);
+    parallel_for(static_cast<std::int64_t>(candidates.size()), 1, options.num_threads, [&](std::int64_t i) {
+      Candidate& candidate = candidates[static_cast<std::size_t>(i)];
+      const AlignResult result = align_to(target, few, candidate.guess, coarse);
+      candidate.found = result.target_from_source;
+      candidate.overlap = result.overlap;
+    });
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.overlap > b.overlap; });
+    if (candidates.size() > most) candidates.resize(most);
+  };
+  keep_best(tracking_limits::num_semifinalists, tracking_limits::first_samples);
+  keep_best(tracking_limits::num_finalists, tracking_limits::coarse_turn_samples);
   std::vector<Pose> best;
-  for (const auto& [overlap, pose] : candidates) {
-    if (best.size() < tracking_limits::num_finalists) best.push_back(pose);
-  }
+  for (const Candidate& candidate : candidates) best.push_back(candidate.found);
   return best;
 }
 

@@ -10,8 +10,8 @@
 namespace nacre {
 
 // The guesses (world_from_camera) on which most agrees after a short registration of a few points of the frame to the
-// whole model, best first: few enough to be registered in full.
-std::vector<Pose> most_promising(const PointModel& model, const IcpSource& source, const std::vector<Pose>& guesses,
+// model, best first: few enough to be registered in full. Of all of them fewer points show which to try with more.
+std::vector<Pose> most_promising(const AlignCloud& model, const IcpSource& source, const std::vector<Pose>& guesses,
                                  const AlignOptions& options);
 
 // Where a frame fits the model, wherever the camera is: none where it fits nowhere, or in several places about as well.

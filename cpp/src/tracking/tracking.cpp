@@ -79,15 +79,16 @@ std::optional<TrackingResult> turned_on_plane(const TrackingTarget& target, cons
 }
 
 // Beside the last pose, as where the camera turned fast. Directions that stay open could be those of any candidate.
-void try_beside(const FrameRegistration& registration, const PointModel& model, TrackingPrior& prior,
-                const TrackingOptions& options, TrackingResult& best) {
+void try_beside(const FrameRegistration& registration, TrackingPrior& prior, const TrackingOptions& options,
+                TrackingResult& best) {
   const Pose& last = prior.guesses.back();
   if (!prior.beside) {
-    prior.beside = most_promising(model, registration.source(), registration.beside(last), options.registration);
+    const PointsInView& view = registration.in_view(last);
+    prior.beside = most_promising(AlignCloud(view.points, view.normals), registration.source(),
+                                  registration.beside(last), options.registration);
   }
-  for (const Pose& candidate : *prior.beside) {
-    const TrackingResult found =
-        registration.from(candidate, last, FrameRegistration::Gate::narrow, Expectation::beside);
+  for (const Pose& start : *prior.beside) {
+    const TrackingResult found = registration.from(start, last, FrameRegistration::Gate::narrow, Expectation::beside);
     if (found.decision == Decision::accepted) keep_better(found, best);
     prior.tried.push_back(found);
   }
@@ -136,7 +137,8 @@ TrackingResult around_key_poses(const FrameRegistration& registration, const Poi
     for (const Pose& guess : registration.around(key_pose)) guesses.push_back(guess);
   }
   TrackingResult best;
-  for (const Pose& candidate : most_promising(model, registration.source(), guesses, options.registration)) {
+  for (const Pose& candidate : most_promising(AlignCloud(as_rows(model.points), as_rows(model.normals)),
+                                              registration.source(), guesses, options.registration)) {
     keep_better(found_at(candidate, registration, prior), best);
   }
   return best;
@@ -195,7 +197,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     best.is_to_whole_model = true;
   }
   if (prior.elsewhere.beside && registration.may_be_beside(best, prior.guesses.front())) {
-    try_beside(registration, target.model, prior, options, best);
+    try_beside(registration, prior, options, best);
     if (best.is_lost()) {
       if (const auto only = only_near(prior, options, target.usual)) return *only;
     }
