@@ -78,16 +78,29 @@ std::optional<TrackingResult> turned_on_plane(const TrackingTarget& target, cons
   return result;
 }
 
+// The place that fits best of those that were found with less noise.
+std::optional<Pose> best_with_less_noise(const TrackingPrior& prior, double noise_factor) {
+  const TrackingResult* best = nullptr;
+  for (const TrackingResult& place : prior.tried) {
+    if (place.noise_factor < noise_factor && (best == nullptr || place.score > best->score)) best = &place;
+  }
+  if (best == nullptr) return std::nullopt;
+  return best->alignment.target_from_source;
+}
+
 // Beside the last pose, as where the camera turned fast. Directions that stay open could be those of any candidate.
-void try_beside(const FrameRegistration& registration, TrackingPrior& prior, const TrackingOptions& options,
-                TrackingResult& best) {
+// More noise makes wider gates, which may lead away from a place that narrower ones have found.
+void try_beside(const FrameRegistration& registration, double noise_factor, TrackingPrior& prior,
+                const TrackingOptions& options, TrackingResult& best) {
   const Pose& last = prior.guesses.back();
   if (!prior.beside) {
     const PointsInView& view = registration.in_view(last);
     prior.beside = most_promising(AlignCloud(view.points, view.normals), registration.source(),
                                   registration.beside(last), options.registration);
   }
-  for (const Pose& start : *prior.beside) {
+  std::vector<Pose> starts = *prior.beside;
+  if (const auto found = best_with_less_noise(prior, noise_factor)) starts.push_back(*found);
+  for (const Pose& start : starts) {
     const TrackingResult found = registration.from(start, last, FrameRegistration::Gate::narrow, Expectation::beside);
     if (found.decision == Decision::accepted) keep_better(found, best);
     prior.tried.push_back(found);
@@ -197,7 +210,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     best.is_to_whole_model = true;
   }
   if (prior.elsewhere.beside && registration.may_be_beside(best, prior.guesses.front())) {
-    try_beside(registration, prior, options, best);
+    try_beside(registration, now.noise_factor, prior, options, best);
     if (best.is_lost()) {
       if (const auto only = only_near(prior, options, target.usual)) return *only;
     }
