@@ -24,6 +24,12 @@ def box(center, size, turn):
     return corners @ np.array([[cos, 0, sin], [0, 1, 0], [-sin, 0, cos]]).T + center, np.array(triangles)
 
 
+def merged(parts):
+    sizes = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
+    vertices = np.concatenate([vertices for vertices, _ in parts])
+    return nacre.Mesh(vertices, np.concatenate([t + n for (_, t), n in zip(parts, sizes[:-1], strict=True)]))
+
+
 def furnished_room():
     """Return a room of 4 m x 2.6 m x 4 m with boxes along its walls."""
     random = np.random.default_rng(3)
@@ -33,9 +39,7 @@ def furnished_room():
         way = np.array([math.sin(angle), 0, math.cos(angle)])
         place = (1.9 / abs(way).max() - 0.4 * random.random()) * way + [0, random.uniform(-1.1, 1.1), 0]
         parts.append(box(place, random.uniform(0.1, [0.5, 0.7, 0.5]), random.uniform(0, math.pi)))
-    sizes = np.cumsum([0] + [len(vertices) for vertices, _ in parts])
-    vertices = np.concatenate([vertices for vertices, _ in parts])
-    return nacre.Mesh(vertices, np.concatenate([t + n for (_, t), n in zip(parts, sizes[:-1], strict=True)]))
+    return merged(parts)
 
 
 def pose(k):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+import test_loop_closure as loops
 
 import nacre
 
@@ -126,3 +127,46 @@ def test_the_same_bits_on_any_threads_and_after_a_rest(passed: nacre.Model, tmp_
         model.add_frame(depth)
     assert [r.num_moving for r in model.frames] == [r.num_moving for r in passed.frames]
     assert np.array_equal(model.points, passed.points)
+
+
+def office() -> nacre.Mesh:
+    """Return a room four metres deep, with a desk, things on it, shelves, and boxes at its end."""
+    random = np.random.default_rng(21)
+    boxes = [
+        ([0, 1.05, 2], [8, 0.1, 8], 0.0),
+        ([0, -0.3, 4.5], [8, 3.4, 0.1], 0.0),
+        ([2.1, -0.3, 2], [0.1, 3.4, 8], 0.05),
+        ([-2.3, 0.2, 3], [0.5, 1.9, 1], 0.0),
+        ([1.75, 0.2, 3.4], [0.5, 1.6, 0.8], 0.0),
+        ([0, 0.4, 2.6], [1.6, 0.05, 0.8], 0.0),
+    ]
+    for _ in range(8):
+        place = [random.uniform(-0.7, 0.7), 0.4 - random.uniform(0.05, 0.2), 2.6 + random.uniform(-0.3, 0.3)]
+        boxes.append((place, random.uniform(0.08, 0.35, 3), random.uniform(0, 3)))
+    for _ in range(5):
+        place = [random.uniform(-2, 1.5), 0.6, 4.1]
+        boxes.append((place, random.uniform(0.3, 0.9, 3), random.uniform(-0.5, 0.5)))
+    return loops.merged([loops.box(*box) for box in boxes])
+
+
+def test_who_stood_before_the_camera_and_walks_away_does_not_pull_it_along() -> None:
+    camera = nacre.Camera(320, 240, 285, 285, 159.5, 119.5)
+    still = office().simulate_depth(camera, np.eye(4))
+    slope = (np.arange(camera.width) - camera.cx) / camera.fx
+
+    def person(x: float, distance: float) -> Array:
+        a, b, c = slope**2 + 1, slope * x + distance, x**2 + distance**2 - 0.2**2
+        inside = b**2 - a * c
+        return np.where(inside > 0, (b - np.sqrt(np.maximum(inside, 0))) / a, np.inf)
+
+    model = nacre.Model(camera)
+    for i in range(24):
+        way = 0.03 * max(0, i - 9)
+        depth = np.fmin(still, np.fmin(person(way - 0.25, 1.7), person(0.35 - way, 2.0))[None])
+        noise = 0.001 * np.random.default_rng(i).normal(size=depth.shape)
+        model.add_frame((depth + noise * depth**2).astype(np.float32))
+    assert {report.status for report in model.frames} == {"TRACKED"}
+    assert max(np.linalg.norm(report.world_from_camera[:3, 3]) for report in model.frames) < 0.005
+    moving = [report.num_moving for report in model.frames]
+    assert moving[:10] == [0] * 10
+    assert min(moving[10:16]) > 10000

@@ -420,8 +420,9 @@ void Pipeline::move_all(const std::vector<Pose>& corrections, FrameReport& repor
 void Pipeline::leave_out_moving(const TrackingResult& tracking, const ColorsRef& colors, FrameReport& report) {
   const Stopwatch watch(report.milliseconds.registration);
   const double margin = camera_limits::surface_spacings * spacing;
-  const MaskImage still =
-      tracking.moving > 0.0 ? still_scene.still_region(cells, report.world_from_camera, margin) : MaskImage();
+  const MaskImage still = tracking.still.size() > 0 ? tracking.still
+                          : tracking.moving > 0.0   ? still_scene.still_region(cells, report.world_from_camera, margin)
+                                                    : MaskImage();
   still_scene.add(cells, still, report.world_from_camera, margin);
   if (still.size() == 0) return;
   const auto num_inside = static_cast<std::int64_t>(frame.valid.size());

@@ -64,6 +64,82 @@ TrackingResult FrameRegistration::without_moving(const TrackingResult& whole, co
   return best;
 }
 
+// Whoever moves by less than he is wide hides and uncovers strips beside him. Where most of what tells the camera's
+// motion is on him, he is followed, and all the rest conflicts with the last view: more than from where it was
+// expected.
+TrackingResult FrameRegistration::without_pulling(const TrackingResult& found, const Pose& guess,
+                                                  Expectation expectation) const {
+  if (found.is_clear_cut) return found;
+  const PointsInView& view = in_view(guess);
+  // How many conflicts fewer than in the other of two places are no chance.
+  const auto chance = [](Eigen::Index a, Eigen::Index b) {
+    return tracking_limits::fewer_conflicts * std::sqrt(static_cast<double>(a + b));
+  };
+  const Eigen::Index num_found = conflicts_at(found.alignment.target_from_source, view).rows();
+  Points conflicts = conflicts_at(guess, view);
+  if (static_cast<double>(conflicts.rows() - num_found) > chance(num_found, conflicts.rows())) return found;
+  TrackingResult other;
+  for (int round = 0; round < 2; ++round) {
+    const Pose& pose = round == 0 ? guess : other.alignment.target_from_source;
+    const ConflictZones zones(conflicts, pose.translation());
+    const auto still = zones.empty() ? std::nullopt : far_from(zones, pose, view);
+    if (!still) return found;
+    other =
+        registered({still->samples, view.part(still->points), still->moving}, guess, guess, Gate::narrow, expectation);
+    conflicts = conflicts_at(other.alignment.target_from_source, view);
+  }
+  if (other.is_lost() || other.expectation != expectation) return found;
+  const auto fewer = static_cast<double>(num_found - conflicts.rows());
+  const double by_chance = chance(num_found, conflicts.rows());
+  const bool is_better = found.is_lost() ? other.is_clear_cut && fewer > -by_chance : fewer > by_chance;
+  if (!is_better) return found;
+  const Pose& pose = other.alignment.target_from_source;
+  other.still = pixels_far_from(ConflictZones(conflicts, pose.translation()), pose);
+  return other;
+}
+
+// Of this frame as seen from a pose, and what the camera saw before.
+Points FrameRegistration::conflicts_at(const Pose& pose, const PointsInView& view) const {
+  DepthView now = now_.view;
+  now.world_from_camera = pose;
+  const double margin = camera_limits::surface_spacings * target_.spacing;
+  const Points in_front = seen_through(now, target_.last_view, now_.camera, margin);
+  const Points gone = seen_through(view.points, view.normals, Values(), now, now_.camera, margin);
+  Points all(in_front.rows() + gone.rows(), 3);
+  all << in_front, gone;
+  return all;
+}
+
+MaskImage FrameRegistration::pixels_far_from(const ConflictZones& zones, const Pose& pose) const {
+  MaskImage far = MaskImage::Ones(now_.camera.height(), now_.camera.width());
+  for (int v = 0; v < far.rows(); ++v) {
+    for (int u = 0; u < far.cols(); ++u) {
+      const Cell& cell = now_.cells[v / now_.cells.step * now_.cells.width + u / now_.cells.step];
+      far(v, u) = !(cell.has_point() && zones.include((pose * cell.point.cast<double>()).cast<float>()));
+    }
+  }
+  return far;
+}
+
+std::optional<FrameRegistration::Still> FrameRegistration::far_from(const ConflictZones& zones, const Pose& pose,
+                                                                    const PointsInView& view) const {
+  const Points& samples = source_.cloud.points;
+  std::vector<std::uint8_t> stays(static_cast<std::size_t>(samples.rows()));
+  for (Eigen::Index i = 0; i < samples.rows(); ++i) {
+    stays[static_cast<std::size_t>(i)] =
+        !zones.include((pose * samples.row(i).transpose().cast<double>()).cast<float>());
+  }
+  std::vector<std::int32_t> points;
+  for (Eigen::Index i = 0; i < view.points.rows(); ++i) {
+    if (!zones.include(view.points.row(i).transpose())) points.push_back(static_cast<std::int32_t>(i));
+  }
+  auto still = still_of(source_.part(stays), std::move(points), view);
+  if (still)
+    still->moving =
+        1.0 - static_cast<double>(still->samples.cloud.rows.size()) / static_cast<double>(source_.cloud.rows.size());
+  return still;
+}
+
 // For each point of the camera's frame, whether a region of its image shows it: an empty one is all of it.
 std::vector<std::uint8_t> FrameRegistration::shows(const MaskImage& region, const Points& points) const {
   std::vector<std::uint8_t> found(static_cast<std::size_t>(points.rows()), 1);
@@ -80,7 +156,12 @@ std::optional<FrameRegistration::Still> FrameRegistration::still_at(const Pose& 
   const MaskImage still = target_.still_scene.still_region(now_.cells, pose, margin);
   std::vector<std::int32_t> points = still_points(view.points, view.normals, now_.view, pose, now_.camera, margin);
   if (still.size() == 0 && static_cast<Eigen::Index>(points.size()) == view.points.rows()) return std::nullopt;
-  IcpSource samples = source_.part(shows(still, source_.cloud.points));
+  return still_of(source_.part(shows(still, source_.cloud.points)), std::move(points), view);
+}
+
+// None where too little is left.
+std::optional<FrameRegistration::Still> FrameRegistration::still_of(IcpSource samples, std::vector<std::int32_t> points,
+                                                                    const PointsInView& view) const {
   if (std::min(samples.cloud.rows.size(), points.size()) < base_limits::least_points) return std::nullopt;
   const auto part = [](std::size_t left, std::size_t all) {
     return static_cast<double>(left) / static_cast<double>(all);

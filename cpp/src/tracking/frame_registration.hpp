@@ -8,6 +8,7 @@
 #include "nacre/fusion.hpp"
 #include "outlines/registration.hpp"
 #include "region/coarse_frame.hpp"
+#include "tracking/conflicts.hpp"
 #include "tracking/frame_samples.hpp"
 #include "tracking/points_in_view.hpp"
 #include "tracking/still_scene.hpp"
@@ -55,6 +56,9 @@ class FrameRegistration {
   // Where something moves, what stays is registered, too: the better of both tells whether it does.
   TrackingResult without_moving(const TrackingResult& whole, const Pose& guess, Expectation expectation) const;
 
+  // Where something that moves a little pulls the camera along, what is far from it is registered.
+  TrackingResult without_pulling(const TrackingResult& found, const Pose& guess, Expectation expectation) const;
+
   // A gate that the user has set is neither narrow nor wide.
   bool has_automatic_gate() const { return !(options_.registration.max_distance > 0.0); }
 
@@ -93,7 +97,12 @@ class FrameRegistration {
     double moving;                     // part that does not
   };
   std::vector<std::uint8_t> shows(const MaskImage& region, const Points& points) const;
+  std::optional<Still> still_of(IcpSource samples, std::vector<std::int32_t> points, const PointsInView& view) const;
   std::optional<Still> still_at(const Pose& world_from_camera, const PointsInView& view) const;
+  Points conflicts_at(const Pose& world_from_camera, const PointsInView& view) const;
+  MaskImage pixels_far_from(const ConflictZones& zones, const Pose& world_from_camera) const;
+  std::optional<Still> far_from(const ConflictZones& zones, const Pose& world_from_camera,
+                                const PointsInView& view) const;
   bool is_at_rest(const Pose& world_from_camera) const;
   TrackingResult registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
                             Expectation expectation) const;

@@ -52,6 +52,10 @@ constexpr double clearly_better = 0.93;  // [1] tuned: score by that of another 
 constexpr double least_step = 0.05;  // [depth] tuned: between a thing that moves and what is behind; test_moving_things
 constexpr int least_around = 5;  // [cells] tuned: of nine, a cell and those around it, that are judged; test_moving_things
 constexpr double least_core = 0.01;  // [1] tuned: part of the image where a thing, and around it, was seen through; test_moving_things
+constexpr double most_asked_pixels = 20000.0;  // [pixels] budget: of a view, whether another one conflicts with it; benchmarks/run.py
+constexpr double conflict_reach = 0.15;  // [depth] tuned: of the surroundings of conflicts, which what moves may fill; test_moving_things
+constexpr int least_conflicts = 6;  // [points] tuned: in a cell of half that size, that crowd; test_moving_things
+constexpr double fewer_conflicts = 2.0;  // [sigma] derived: of the difference of two counts, that is no chance; test_moving_things
 constexpr int squares_across = 40;  // [1] tuned: of an image, three of which a thing is large, that has moved away; test_moving_things
 
 constexpr double noise_per_residual = 1.376;  // [1] derived: standard deviation by median absolute value, of Laplace's distribution; test_residual_noise

@@ -55,6 +55,8 @@ void try_guesses(const FrameRegistration& registration, TrackingPrior& prior, Tr
       nearest =
           with_open_directions_held(registration.without_moving(*nearest, *start, prior.expectation), *start, prior);
       prior.tried.push_back(*nearest);
+      nearest =
+          with_open_directions_held(registration.without_pulling(*nearest, *start, prior.expectation), *start, prior);
     }
     keep_better(*nearest, best);
     if (nearest->is_clear_cut) return;

@@ -15,6 +15,7 @@ struct TrackingResult : Acceptance {
   Expectation expectation = Expectation::expected;  // of where it ended
   double noise_factor = 1.0;                        // of the frame's noise, with which it was found
   double moving = 0.0;                              // part of the frame that moves before the scene, and is left out
+  MaskImage still;                                  // which pixels show what stays (1), where that was registered alone
   bool is_to_whole_model = false;                   // older points included
   bool is_on_plane = false;                         // found by the search on the plane
 
