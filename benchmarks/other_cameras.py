@@ -6,7 +6,7 @@ The errors are those of `nacre.simulate_depth`'s sensors, which `sensors.py` com
 is walked through with the camera in the hand, at so many frames a second; the camera passes a wall with
 boxes on it, all of whose faces look one way, in steps of so many millimetres; cartons in a corner are walked
 around, in steps of so many degrees; a figure as tall as a person, and a cow of 0.8 m, turn before the camera,
-alone.
+alone; two people stand before a desk for two seconds, and then walk about, while somebody holds the camera.
 
     python benchmarks/other_cameras.py
     python benchmarks/other_cameras.py cartons stereo
@@ -37,8 +37,9 @@ SCENES = {
     "cartons": ((5, 60), (10, 36), (20, 17)),
     "homer": ((7, 52), (15, 24)),
     "spot": ((7, 52),),
+    "people": ((30, 108), (10, 36)),
 }
-UNITS = {"flat": "frames a second", "wall": "mm"}
+UNITS = {"flat": "frames a second", "wall": "mm", "people": "frames a second"}
 HEIGHTS = {"homer": 1.7, "spot": 0.8}  # [m]
 DISTANCES = {"homer": 2.2, "spot": 1.2, "cartons": 2.0}  # [m]
 
@@ -134,20 +135,70 @@ def figure(name: str) -> nacre.Mesh:
     return nacre.Mesh(vertices * HEIGHTS[name] / np.ptp(vertices, axis=0).max(), mesh.triangles)
 
 
+def office() -> list[tuple[Array, Array]]:
+    """Return the parts of a room four metres deep: a desk, things on it, shelves, and boxes at its end."""
+    rng = np.random.default_rng(21)
+    parts = [
+        box([0, 1.05, 2], [8, 0.1, 8], 0),
+        box([0, -0.3, 4.5], [8, 3.4, 0.1], 0),
+        box([2.1, -0.3, 2], [0.1, 3.4, 8], 0.05),
+        box([-2.3, 0.2, 3], [0.5, 1.9, 1], 0),
+        box([1.75, 0.2, 3.4], [0.5, 1.6, 0.8], 0),
+        box([0, 0.4, 2.6], [1.6, 0.05, 0.8], 0),
+    ]
+    for _ in range(8):
+        place = [rng.uniform(-0.7, 0.7), 0.4 - rng.uniform(0.05, 0.2), 2.6 + rng.uniform(-0.3, 0.3)]
+        parts.append(box(place, rng.uniform(0.08, 0.35, 3), rng.uniform(0, 3)))
+    for _ in range(5):
+        place = [rng.uniform(-2.5, 2.8), 0.6, 4.2]
+        parts.append(box(place, rng.uniform(0.3, 0.9, 3), rng.uniform(-0.2, 0.2)))
+    return parts
+
+
+def people(rate: int, count: int) -> tuple[list[nacre.Mesh], list[Array]]:
+    """Return an office with two people at so many frames a second, and poses of a camera in the hand."""
+    person = figure("homer")
+    body: Array = np.asarray(person.vertices, float) * [0.7, 1, 0.8]
+    total = count * 30 // rate
+    rng = np.random.default_rng(5)
+    shakes, wobbles = trembling(rng, total, 0.006), trembling(rng, total, math.radians(0.4))
+    parts, meshes, poses = office(), [], []
+    for k in range(0, total, 30 // rate):
+        t = max(0.0, k / 30 - 2)
+        both = []
+        for x, z, turn in (
+            (-0.5 + math.sin(0.9 * t), 1.9 - 0.3 * math.sin(0.5 * t), 0.5 * t),
+            (0.65 - 1.3 * math.sin(0.7 * t), 2.1 + 0.2 * math.sin(t), -0.4 * t),
+        ):
+            cos, sin = math.cos(turn), math.sin(turn)
+            turned = body @ np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]])
+            both.append((turned + np.array([x, 0.15, z]), np.asarray(person.triangles)))
+        meshes.append(merged(parts + both))
+        ahead = np.array([math.sin(wobbles[k, 1]), 0.08 + wobbles[k, 0], 1])
+        poses.append(looking(shakes[k], ahead, wobbles[k, 2]))
+    return meshes, poses
+
+
 def make(scene: str, sensor: str, speed: int, count: int) -> cases.Case:
     """Return a recording."""
-    if scene == "flat":
-        mesh, poses = flat_mesh(), walk(speed, count)
+    if scene == "people":
+        meshes, poses = people(speed, count)
+    elif scene == "flat":
+        meshes, poses = [flat_mesh()] * count, walk(speed, count)
     elif scene == "wall":
-        mesh, poses = wall(), passing(speed, count)
+        meshes, poses = [wall()] * count, passing(speed, count)
     elif scene == "cartons":
-        mesh, poses = cartons(), around(speed, count, DISTANCES[scene], -0.2, np.array([0, 0.5, 0]))
+        meshes, poses = (
+            [cartons()] * count,
+            around(speed, count, DISTANCES[scene], -0.2, np.array([0, 0.5, 0])),
+        )
     else:
-        mesh, poses = figure(scene), around(speed, count, DISTANCES[scene], 0.0, np.zeros(3))
+        meshes, poses = [figure(scene)] * count, around(speed, count, DISTANCES[scene], 0.0, np.zeros(3))
     camera = cases.SENSORS[sensor]
     kind: Any = sensor
     depths = [
-        mesh.simulate_depth(camera, pose, sensor=kind, seed=k, num_threads=1) for k, pose in enumerate(poses)
+        mesh.simulate_depth(camera, pose, sensor=kind, seed=k, num_threads=1)
+        for k, (mesh, pose) in enumerate(zip(meshes, poses, strict=True))
     ]
     return cases.Case(f"{scene} {sensor} {speed}", camera, depths, [None] * count, list(poses))
 

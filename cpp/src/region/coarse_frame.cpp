@@ -33,6 +33,17 @@ std::vector<Offset> pixels_of_cell(int side) {
 
 }  // namespace
 
+MaskImage pixels_without(const std::vector<std::uint8_t>& is_left_out, const CoarseFrame& cells, int width,
+                         int height) {
+  MaskImage pixels(height, width);
+  for (int v = 0; v < height; ++v) {
+    for (int u = 0; u < width; ++u) {
+      pixels(v, u) = is_left_out[static_cast<std::size_t>(v / cells.step * cells.width + u / cells.step)] ? 0 : 1;
+    }
+  }
+  return pixels;
+}
+
 Camera coarse_camera(const Camera& camera, const CellBudget& budget) {
   const int side = side_of_cells(camera.width(), camera.height(), budget);
   const int width = (camera.width() + side - 1) / side, height = (camera.height() + side - 1) / side;

@@ -54,6 +54,9 @@ struct CoarseFrame {
   }
 };
 
+// Of an image, the pixels (1) without those (0) of cells that are left out.
+MaskImage pixels_without(const std::vector<std::uint8_t>& is_left_out, const CoarseFrame& cells, int width, int height);
+
 // A camera of whose pixels each sees a cell of a frame.
 Camera coarse_camera(const Camera& camera, const CellBudget& budget);
 

@@ -111,14 +111,11 @@ Points FrameRegistration::conflicts_at(const Pose& pose, const PointsInView& vie
 }
 
 MaskImage FrameRegistration::pixels_far_from(const ConflictZones& zones, const Pose& pose) const {
-  MaskImage far = MaskImage::Ones(now_.camera.height(), now_.camera.width());
-  for (int v = 0; v < far.rows(); ++v) {
-    for (int u = 0; u < far.cols(); ++u) {
-      const Cell& cell = now_.cells[v / now_.cells.step * now_.cells.width + u / now_.cells.step];
-      far(v, u) = !(cell.has_point() && zones.include((pose * cell.point.cast<double>()).cast<float>()));
-    }
+  std::vector<std::uint8_t> is_near;
+  for (const Cell& cell : now_.cells.cells) {
+    is_near.push_back(cell.has_point() && zones.include((pose * cell.point.cast<double>()).cast<float>()));
   }
-  return far;
+  return pixels_without(is_near, now_.cells, now_.camera.width(), now_.camera.height());
 }
 
 std::optional<FrameRegistration::Still> FrameRegistration::far_from(const ConflictZones& zones, const Pose& pose,

@@ -139,13 +139,7 @@ MaskImage StillScene::still_region(const CoarseFrame& cells, const Pose& world_f
     num_moving += cells.cells[i].has_point() && is_moving[i] != 0;
   }
   if (num_moving == 0 || num_moving > tracking_limits::most_moving * num_points) return {};
-  MaskImage still(height_, width_);
-  for (int v = 0; v < height_; ++v) {
-    for (int u = 0; u < width_; ++u) {
-      still(v, u) = is_moving[static_cast<std::size_t>(v / cells.step * cells.width + u / cells.step)] ? 0 : 1;
-    }
-  }
-  return still;
+  return pixels_without(is_moving, cells, width_, height_);
 }
 
 void StillScene::add(const CoarseFrame& cells, const MaskImage& still, const Pose& world_from_camera, double margin) {
