@@ -77,7 +77,9 @@ TrackingResult FrameRegistration::without_pulling(const TrackingResult& found, c
   };
   const Eigen::Index num_found = conflicts_at(found.alignment.target_from_source, view).rows();
   Points conflicts = conflicts_at(guess, view);
-  if (static_cast<double>(conflicts.rows() - num_found) > chance(num_found, conflicts.rows())) return found;
+  const auto fewer_at_guess = static_cast<double>(num_found - conflicts.rows());
+  const double by_chance = chance(num_found, conflicts.rows());
+  if (found.is_lost() ? fewer_at_guess < -by_chance : fewer_at_guess <= by_chance) return found;
   TrackingResult other;
   for (int round = 0; round < 2; ++round) {
     const Pose& pose = round == 0 ? guess : other.alignment.target_from_source;
@@ -90,8 +92,8 @@ TrackingResult FrameRegistration::without_pulling(const TrackingResult& found, c
   }
   if (other.is_lost() || other.expectation != expectation) return found;
   const auto fewer = static_cast<double>(num_found - conflicts.rows());
-  const double by_chance = chance(num_found, conflicts.rows());
-  const bool is_better = found.is_lost() ? other.is_clear_cut && fewer > -by_chance : fewer > by_chance;
+  const double least = chance(num_found, conflicts.rows());
+  const bool is_better = found.is_lost() ? other.is_clear_cut && fewer > -least : fewer > least;
   if (!is_better) return found;
   const Pose& pose = other.alignment.target_from_source;
   other.still = pixels_far_from(ConflictZones(conflicts, pose.translation()), pose);
