@@ -18,6 +18,15 @@ struct DepthView {
   Values measured = {};  // the depth before it was cleaned, 0 or NaN for none; empty: the same
 };
 
+// What a view shows, in its camera's frame: a row for each pixel, or each `step`-th across and down; NaN where it shows
+// nothing.
+struct SeenPoints {
+  Points points;
+  Values sigma;  // [m]
+
+  SeenPoints(const DepthView& view, const Camera& camera, int step = 1);
+};
+
 // What a camera says of a point that it looks at.
 enum class Visibility {
   agrees,

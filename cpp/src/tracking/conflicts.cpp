@@ -8,37 +8,6 @@
 #include "tracking/limits.hpp"
 
 namespace nacre {
-namespace {
-
-// Some of the pixels of a view, on a grid.
-struct SomePixels {
-  Points points;  // of the camera's frame
-  Values sigma;   // [m]
-
-  SomePixels(const DepthView& view, const Camera& camera) {
-    const double pixels = static_cast<double>(view.depth.size());
-    const int step = std::max(1, static_cast<int>(std::lround(std::sqrt(pixels / tracking_limits::most_asked_pixels))));
-    const int across = camera.width() / step, down = camera.height() / step;
-    points.resize(static_cast<Eigen::Index>(across) * down, 3);
-    sigma.resize(points.rows());
-    Eigen::Index count = 0;
-    for (int v = step / 2; v < step * down; v += step) {
-      for (int u = step / 2; u < step * across; u += step) {
-        const Eigen::Index pixel = static_cast<Eigen::Index>(v) * camera.width() + u;
-        const float z = view.depth[pixel];
-        if (!(z > 0.0F)) continue;
-        const Ray ray = camera.ray(u, v);
-        const float along = z / ray.direction_z;
-        points.row(count) << ray.origin_x + along * ray.direction_x, ray.origin_y + along * ray.direction_y, z;
-        sigma[count++] = view.sigma[pixel];
-      }
-    }
-    points.conservativeResize(count, 3);
-    sigma.conservativeResize(count);
-  }
-};
-
-}  // namespace
 
 Points seen_through(const PointsRef& points, const PointsRef& normals, const Values& sigma, const DepthView& sight,
                     const Camera& camera, double margin) {
@@ -57,12 +26,13 @@ Points seen_through(const PointsRef& points, const PointsRef& normals, const Val
 }
 
 Points seen_through(const DepthView& view, const DepthView& sight, const Camera& camera, double margin) {
-  const SomePixels some(view, camera);
+  const double pixels = static_cast<double>(view.depth.size());
+  const int step = std::max(1, static_cast<int>(std::lround(std::sqrt(pixels / tracking_limits::most_asked_pixels))));
   const Eigen::Matrix3f turn = view.world_from_camera.linear().cast<float>();
-  const Points points =
-      (some.points * turn.transpose()).rowwise() + view.world_from_camera.translation().transpose().cast<float>();
-  const Points towards_camera = -(some.points * turn.transpose()).rowwise().normalized();
-  return seen_through(points, towards_camera, some.sigma, sight, camera, margin);
+  const SeenPoints seen(view, camera, step);
+  const Points rays = seen.points * turn.transpose(), towards_camera = -rays.rowwise().normalized();
+  const Points points = rays.rowwise() + view.world_from_camera.translation().transpose().cast<float>();
+  return seen_through(points, towards_camera, seen.sigma, sight, camera, margin);
 }
 
 ConflictZones::ConflictZones(const Points& conflicts, const Eigen::Vector3d& from) {

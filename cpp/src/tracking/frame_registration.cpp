@@ -71,15 +71,15 @@ TrackingResult FrameRegistration::without_pulling(const TrackingResult& found, c
                                                   Expectation expectation) const {
   if (found.is_clear_cut) return found;
   const PointsInView& view = in_view(guess);
-  // How many conflicts fewer than in the other of two places are no chance.
-  const auto chance = [](Eigen::Index a, Eigen::Index b) {
-    return tracking_limits::fewer_conflicts * std::sqrt(static_cast<double>(a + b));
+  // By how many standard deviations fewer conflicts are counted at one place than at another.
+  const auto fewer = [](Eigen::Index at_one, Eigen::Index at_other) {
+    return static_cast<double>(at_other - at_one) / std::sqrt(std::max(1.0, static_cast<double>(at_one + at_other)));
   };
+  const double least = tracking_limits::fewer_conflicts;
   const Eigen::Index num_found = conflicts_at(found.alignment.target_from_source, view).rows();
   Points conflicts = conflicts_at(guess, view);
-  const auto fewer_at_guess = static_cast<double>(num_found - conflicts.rows());
-  const double by_chance = chance(num_found, conflicts.rows());
-  if (found.is_lost() ? fewer_at_guess < -by_chance : fewer_at_guess <= by_chance) return found;
+  const double at_guess = fewer(conflicts.rows(), num_found);
+  if (found.is_lost() ? at_guess < -least : at_guess <= least) return found;
   TrackingResult other;
   for (int round = 0; round < 2; ++round) {
     const Pose& pose = round == 0 ? guess : other.alignment.target_from_source;
@@ -91,9 +91,8 @@ TrackingResult FrameRegistration::without_pulling(const TrackingResult& found, c
     conflicts = conflicts_at(other.alignment.target_from_source, view);
   }
   if (other.is_lost() || other.expectation != expectation) return found;
-  const auto fewer = static_cast<double>(num_found - conflicts.rows());
-  const double least = chance(num_found, conflicts.rows());
-  const bool is_better = found.is_lost() ? other.is_clear_cut && fewer > -least : fewer > least;
+  const double at_other = fewer(conflicts.rows(), num_found);
+  const bool is_better = found.is_lost() ? other.is_clear_cut && at_other > -least : at_other > least;
   if (!is_better) return found;
   const Pose& pose = other.alignment.target_from_source;
   other.still = pixels_far_from(ConflictZones(conflicts, pose.translation()), pose);
@@ -133,9 +132,9 @@ std::optional<FrameRegistration::Still> FrameRegistration::far_from(const Confli
     if (!zones.include(view.points.row(i).transpose())) points.push_back(static_cast<std::int32_t>(i));
   }
   auto still = still_of(source_.part(stays), std::move(points), view);
+  // What is near conflicts of the model is no part of the frame: that may show all of the rest.
   if (still)
-    still->moving =
-        1.0 - static_cast<double>(still->samples.cloud.rows.size()) / static_cast<double>(source_.cloud.rows.size());
+    still->moving = 1.0 - static_cast<double>(still->samples.cloud.rows.size()) / static_cast<double>(samples.rows());
   return still;
 }
 

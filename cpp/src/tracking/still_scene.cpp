@@ -46,22 +46,11 @@ std::vector<Visibility> judge(const CoarseFrame& cells, const Pose& world_from_c
   return judged;
 }
 
-// The points that a view shows, a row for each pixel.
-Points points_of(const DepthView& view, const Camera& camera) {
-  Points points(view.depth.size(), 3);
-  for (Eigen::Index i = 0; i < points.rows(); ++i) {
-    const Ray ray = camera.ray(static_cast<int>(i % camera.width()), static_cast<int>(i / camera.width()));
-    const float z = view.depth[i], along = z / ray.direction_z;
-    points.row(i) << ray.origin_x + along * ray.direction_x, ray.origin_y + along * ray.direction_y, z;
-  }
-  return points;
-}
-
 // Shows in a view, at some of its pixels, what another one shows there.
 template <class IsChosen>
 void show_from(const DepthView& other, const Camera& camera, IsChosen&& is_chosen, DepthView& view) {
   const PointProjection projection(camera, other.world_from_camera.inverse() * view.world_from_camera);
-  const Points points = points_of(other, camera);
+  const Points points = SeenPoints(other, camera).points;
   visit_points_in_view(points, points, 0, points.rows(), projection, [&](Eigen::Index i, const auto& block, int k) {
     const std::int32_t pixel = block.pixel[k];
     if (!is_chosen(pixel) || view.depth[pixel] < block.z[k]) return;
@@ -186,7 +175,7 @@ void StillScene::move(const Pose& motion) {
 }
 
 void StillScene::forget_what_left(const DepthView& now, double margin) {
-  const Points points = points_of(scene_, camera_), towards_camera = -points.rowwise().normalized();
+  const Points points = SeenPoints(scene_, camera_).points, towards_camera = -points.rowwise().normalized();
   std::vector<std::uint8_t> has_left(static_cast<std::size_t>(points.rows()), 0);
   const PointProjection projection(camera_, scene_.world_from_camera.inverse() * now.world_from_camera);
   const auto look = [&](Eigen::Index i, const PointProjection::Block& block, int k) {

@@ -1,0 +1,162 @@
+// Where the camera is: what the pipeline asks of tracking for each frame.
+#include <algorithm>
+#include <limits>
+#include <string>
+#include <utility>
+
+#include "base/limits.hpp"
+#include "base/se3.hpp"
+#include "camera/limits.hpp"
+#include "model/limits.hpp"
+#include "model/paper_loop.hpp"
+#include "model/pipeline.hpp"
+#include "model/stopwatch.hpp"
+#include "outlines/refinement.hpp"
+#include "tracking/limits.hpp"
+
+namespace nacre {
+
+// Where the camera is. A lost one is reported where it was last.
+TrackingResult Pipeline::locate(const FrameExtras& extras, FrameReport& report) {
+  const Stopwatch watch(report.milliseconds.registration);
+  TrackingResult tracking = register_frame(extras, report.region);
+  static_cast<TrackingReport&>(report) = tracking.report();
+  if (report.status == FrameStatus::lost) {
+    report.world_from_camera = history.num_registered() == 0 ? Pose::Identity() : history.registered_pose(0);
+  } else {
+    hypothesis.forget();
+  }
+  return tracking;
+}
+
+TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionReport& region_report) {
+  TrackingResult result;
+  result.alignment.rmse = std::numeric_limits<double>::quiet_NaN();
+  outline.clear();
+  if (frame.valid.size() < base_limits::least_points) {
+    const std::string count = "only " + std::to_string(frame.valid.size()) + " pixels of the frame are usable";
+    result.reason = region_report.reason.empty() ? count : region_report.reason;
+    return result;
+  }
+  if (keeps_key_frames()) outline = find_outline(now, camera, model_limits::most_outline_points, options.num_threads);
+  if (cloud.size() == 0 || extras.keep_guess) {
+    result.decision = Decision::accepted;
+    result.alignment.target_from_source = extras.guess.value_or(Pose::Identity());
+    result.alignment.rmse = 0.0;
+    result.alignment.overlap = 1.0;
+    result.consistency = {};
+    return result;
+  }
+  if (options.registration.method == Metric::paper) {
+    return PaperLoop{options, static_cast<std::int32_t>(history.size())}.register_frame(
+        {frame, cells, camera, observer, now, noise_factor},
+        {cloud, blocks, spacing, before, still_scene, 0, usual_consistency.mean()}, guesses(extras).front());
+  }
+  const Expectation expectation = was_lost() || jumped() ? Expectation::near_lost : Expectation::expected;
+  const bool is_predicted = !was_lost() || extras.guess.has_value();
+  const bool has_moved = history.num_registered() > 1 || is_trial;
+  if (!extras.search) hypothesis.forget();
+  result = track_frame(
+      {guesses(extras), expectation, is_predicted, has_moved, was_lost(), elsewhere(region_report, extras.search)},
+      extras.search);
+  const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
+  if (is_determined && !result.is_on_plane) {
+    refine_by_outlines(result.alignment, outline, loops.outlines_near(result.alignment.target_from_source),
+                       options.num_threads);
+  }
+  return result;
+}
+
+// Until frames have told how noisy the camera is, a frame that is lost may be noisier where it is expected; elsewhere
+// it is looked for with the noise that is known. Before the second frame none has told: its residuals must show the
+// noise that was tried.
+TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
+  const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
+  const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
+  const TrackingTarget target{cloud, blocks, spacing, before, still_scene, oldest_frame, usual_consistency.mean()};
+  TrackingResult result;
+  TrackingOptions nearby = options;
+  nearby.relocalise = false;
+  if (learns_noise() && !residual_noise.is_known()) {
+    const auto is_as_noisy = [&](const TrackingResult& found) {
+      return found.noise_factor == known_noise_factor() || history.num_registered() > 1 ||
+             found.alignment.residual_sigmas >= tracking_limits::least_residual_sigmas;
+    };
+    const auto is_found = [&] {
+      if (result.is_lost()) return false;
+      if (noise_factor == known_noise_factor()) return true;
+      return is_as_noisy(result) && result.expectation != Expectation::unexpected;
+    };
+    RelocalisationPlaces elsewhere = std::exchange(prior.elsewhere, {});
+    prior.elsewhere.beside = elsewhere.beside;
+    for (double factor = noise_factor; factor <= tracking_limits::largest_noise_factor && !is_found(); factor *= 2.0) {
+      set_noise_factor(factor);
+      result = track(current, target, prior, odometry, hypothesis, nearby);
+    }
+    prior.elsewhere = std::move(elsewhere);
+    if (!is_found()) {
+      const auto is_too_quiet = [&](const TrackingResult& place) { return !is_as_noisy(place); };
+      prior.tried.erase(std::remove_if(prior.tried.begin(), prior.tried.end(), is_too_quiet), prior.tried.end());
+      result = only_near(prior, options, usual_consistency.mean()).value_or(TrackingResult());
+      set_noise_factor(result.is_lost() ? known_noise_factor() : result.noise_factor);
+    }
+  }
+  if (result.is_lost()) result = track(current, target, prior, odometry, hypothesis, may_search ? options : nearby);
+  if (result.decision == Decision::accepted && result.expectation == Expectation::expected) {
+    usual_consistency.add(result.consistency);
+  }
+  if (learns_noise() && result.decision == Decision::accepted && !result.is_on_plane && !(shape && shape->is_bent())) {
+    residual_noise.add(noise_factor * result.alignment.residual_sigmas);
+    set_noise_factor(residual_noise.factor());
+  }
+  return result;
+}
+
+// Whether the camera's last motion was none that goes on: views far apart, in any order.
+bool Pipeline::jumped() const {
+  if (history.num_registered() < 2) return false;
+  return angle_between(history.registered_pose(1), history.registered_pose(0)) > options.registration.max_angle;
+}
+
+std::vector<Pose> Pipeline::guesses(const FrameExtras& extras) const {
+  if (extras.guess) return {*extras.guess};
+  const Pose last = history.registered_pose(0);
+  const bool goes_on = options.registration.method == Metric::paper || !jumped();  // the paper's is a turntable
+  if (!options.predict_motion || history.num_registered() < 2 || was_lost() || !goes_on) return {last};
+  const Pose predicted = last * (history.registered_pose(1).inverse() * last);
+  return {orthonormal(predicted), last};
+}
+
+// Some of the newest poses from which the camera looked in different directions.
+std::vector<Pose> Pipeline::key_poses() const {
+  std::vector<Pose> chosen;
+  for (std::size_t age = 0; age < history.num_registered() && chosen.size() < model_limits::most_key_poses; ++age) {
+    const Pose pose = history.registered_pose(age);
+    const bool is_new = std::all_of(chosen.begin(), chosen.end(), [&](const Pose& other) {
+      return angle_between(other, pose) > camera_limits::new_direction;
+    });
+    if (is_new) chosen.push_back(pose);
+  }
+  return chosen;
+}
+
+// Around some poses, and everywhere: but not at every frame where that has been to no avail.
+RelocalisationPlaces Pipeline::elsewhere(const RegionReport& region_report, bool may_search) const {
+  RelocalisationPlaces places;
+  places.beside = options.relocalise && (!may_search || (!was_lost() && !jumped()));
+  if (!options.relocalise || !may_search) return places;
+  places.views = &views;
+  places.view_of_frame = [&] { return view_of_object(region_report); };
+  if (num_vain % model_limits::search_interval == 0) places.key_poses = [this] { return key_poses(); };
+  places.everywhere = places.key_poses && (num_vain < model_limits::patience || num_vain % model_limits::patience == 0);
+  return places;
+}
+
+// Of the newest frame, where it shows an object that stands on a plane.
+std::optional<ObjectView> Pipeline::view_of_object(const RegionReport& report) const {
+  if (report.support < 0) return std::nullopt;
+  return object_view(frame, region, report.planes[static_cast<std::size_t>(report.support)],
+                     sample_frame(frame, observer, options), options.registration.seed);
+}
+
+}  // namespace nacre
