@@ -103,7 +103,12 @@ CONSTANTS = [
         "camera/limits.hpp",
         "new_direction = 0.35",
     ),
-    ("tracking", "more than ICP's largest angle", "model/localisation.cpp", "> options.registration.max_angle"),
+    (
+        "tracking",
+        "more than ICP's largest angle",
+        "model/localisation.cpp",
+        "> options.registration.max_angle",
+    ),
     ("tracking", "at every eighth", "model/limits.hpp", "patience = 8"),
     ("tracking", r"$\mathcal R - 0.3$", "registration/limits.hpp", "chance_relocalisation = 0.3;"),
     ("tracking", "0.45 from at least two views", "registration/limits.hpp", "enough_together = 0.45"),
