@@ -60,25 +60,33 @@ class ColorSearch : public OpenDirectionSearch {
   }
 
   // Pairs about a centre, their residuals after the best gain and offset, and robust weights.
-  std::vector<MotionRow> match(const ColorLevel& level, const Pose& pose, const Eigen::Vector3d& center) {
+  std::vector<MotionRow> match(ColorLevel& level, const Pose& pose, const Eigen::Vector3d& center) {
     std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source_.cloud.points.rows()), no_slot);
     const std::int64_t count = source_.levels.back();
     target_.match(source_, count, pose, gate(), nearest);
-    std::vector<MotionRow> rows;
-    std::vector<Brightness> values;
+    std::vector<std::uint32_t> matched_targets, matched_sources;
     for (Eigen::Index i = 0; i < count; ++i) {
       const std::uint32_t slot = nearest[static_cast<std::size_t>(i)];
       if (slot == no_slot) continue;
-      const auto k = static_cast<Eigen::Index>(slot);
+      matched_targets.push_back(slot);
+      matched_sources.push_back(static_cast<std::uint32_t>(i));
+    }
+    level.target.fit(matched_targets);
+    level.source.fit(matched_sources);
+    std::vector<MotionRow> rows;
+    std::vector<Brightness> values;
+    for (std::size_t match = 0; match < matched_sources.size(); ++match) {
+      const auto i = static_cast<Eigen::Index>(matched_sources[match]);
+      const auto k = static_cast<Eigen::Index>(matched_targets[match]);
       MotionRow pair;
-      pair.target_gradient = level.target.gradient.row(k).transpose().cast<double>();
-      pair.source_gradient = pose.linear() * level.source.gradient.row(i).transpose().cast<double>();
+      pair.target_gradient = level.target.gradient(k);
+      pair.source_gradient = pose.linear() * level.source.gradient(i);
       const Eigen::Vector3d p = pose * source_.cloud.points.row(i).transpose().cast<double>();
       const Eigen::Vector3d q = target_.cloud().points.row(k).transpose().cast<double>();
       pair.lever = p - center;
       // Park, Zhou and Koltun 2017, eq. 11: the target's brightness where the source point falls on its tangent plane.
-      const Brightness value{level.target.brightness[k] + pair.target_gradient.dot(p - q), level.source.brightness[i]};
-      if (!std::isfinite(value.target + value.source) || !pair.source_gradient.allFinite()) continue;
+      const Brightness value{level.target.brightness(k) + pair.target_gradient.dot(p - q), level.source.brightness(i)};
+      if (!std::isfinite(value.target + value.source)) continue;
       rows.push_back(pair);
       values.push_back(value);
     }
@@ -89,7 +97,7 @@ class ColorSearch : public OpenDirectionSearch {
   IcpResult run(const IcpResult& start, const TwistBasis* only) {
     IcpResult result = start;
     bool has_moved = false;
-    for (const ColorLevel& level : levels_) {
+    for (ColorLevel& level : levels_) {
       for (int i = 0; i < registration_limits::most_steps; ++i) {
         const TwistBasis open = only != nullptr ? *only : TwistBasis(result.weak_directions);
         if (open.cols() == 0) break;
@@ -158,15 +166,16 @@ IcpResult determine_by_color(const IcpTarget& target, const IcpSource& source, c
                              const BrightCloud& source_colors, const IcpResult& geometric,
                              const AlignOptions& options) {
   if (!target.cloud().has_normals() || !source.cloud.has_normals()) return geometric;
+  // As dense as the target: a gradient is that of the surroundings of a point.
+  const std::int64_t denser = source_colors.points.rows() / std::max<std::int64_t>(1, target_colors.points.rows());
   std::vector<ColorLevel> levels;
   for (const std::int64_t step : {std::int64_t{9}, std::int64_t{1}}) {
-    const auto field = [&](const BrightCloud& cloud, const IcpCloud& at) {
+    const auto field = [&](const BrightCloud& cloud, std::int64_t thinning, const IcpCloud& at) {
       const double reach = 4.0 * std::sqrt(static_cast<double>(step)) * target.spacing();
-      return step == 1 ? fit_color_field(cloud, at.points, at.normals, reach, options.num_threads)
-                       : fit_color_field(cloud.thinned(step, options.seed), at.points, at.normals, reach,
-                                         options.num_threads);
+      return ColorField(cloud.thinned(thinning, options.seed), at.points, at.normals, reach, options.num_threads);
     };
-    levels.push_back({field(target_colors, target.cloud()), field(source_colors, source.cloud)});
+    levels.push_back({field(target_colors, step, target.cloud()),
+                      field(source_colors, step * std::max<std::int64_t>(1, denser), source.cloud)});
   }
 
   ColorSearch search(target, source, std::move(levels), options);

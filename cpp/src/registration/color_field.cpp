@@ -1,8 +1,10 @@
 #include "registration/color_field.hpp"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "base/parallel.hpp"
 #include "base/point_rows.hpp"
@@ -29,37 +31,56 @@ BrightCloud BrightCloud::thinned(std::int64_t step, std::uint64_t seed) const {
   return BrightCloud(take_rows<Points>(points, rows), take_rows<Values>(brightness, rows));
 }
 
-ColorField fit_color_field(const BrightCloud& cloud, const Points& points, const Points& normals, double max_distance,
-                           int num_threads) {
-  constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
-  ColorField field{Values::Constant(points.rows(), unknown), Points::Constant(points.rows(), 3, unknown)};
-  const KdTree tree(cloud.points, num_threads);
-  parallel_for(points.rows(), 64, num_threads, [&](std::int64_t i) {
-    const Eigen::Vector3d point = points.row(i).transpose().cast<double>();
-    const Eigen::Vector3d normal = normals.row(i).transpose().cast<double>();
-    if (!point.allFinite() || !normal.allFinite()) return;
-    std::int64_t neighbours[registration_limits::color_neighbors];
-    double squared[registration_limits::color_neighbors];
-    const int count = tree.nearest(point, registration_limits::color_neighbors, max_distance, neighbours, squared);
-    if (count < registration_limits::least_color_neighbors) return;
-    const Eigen::Vector3d across = normal.unitOrthogonal(), along = normal.cross(across);
-    const double radius = std::sqrt(squared[count - 1]);
-    // Unknowns: the value, and the slopes along two directions in units of the radius.
-    Eigen::Matrix3d equations = 1e-3 * Eigen::Vector3d(0.0, 1.0, 1.0).asDiagonal().toDenseMatrix();
-    Eigen::Vector3d right = Eigen::Vector3d::Zero();
-    for (int k = 0; k < count; ++k) {
-      const Eigen::Vector3d d =
-          (cloud.points.row(neighbours[k]).transpose().cast<double>() - point) / std::max(radius, 1e-12);
-      const double falloff = 1.0 - 0.9 * squared[k] / std::max(radius * radius, 1e-24);
-      const Eigen::Vector3d row(1.0, d.dot(across), d.dot(along));
-      equations += falloff * row * row.transpose();
-      right += falloff * static_cast<double>(cloud.brightness[neighbours[k]]) * row;
-    }
-    const Eigen::Vector3d fit = equations.ldlt().solve(right);
-    field.brightness[i] = static_cast<float>(fit[0]);
-    field.gradient.row(i) = ((fit[1] * across + fit[2] * along) / std::max(radius, 1e-12)).transpose().cast<float>();
+ColorField::ColorField(const BrightCloud& cloud, const Points& points, const Points& normals, double max_distance,
+                       int num_threads)
+    : tree_(cloud.points, num_threads),
+      cloud_(cloud),
+      points_(points),
+      normals_(normals),
+      max_distance_(max_distance),
+      num_threads_(num_threads),
+      is_fitted_(static_cast<std::size_t>(points.rows())),
+      brightness_(Values::Constant(points.rows(), std::numeric_limits<float>::quiet_NaN())),
+      gradient_(Points::Zero(points.rows(), 3)) {}
+
+void ColorField::fit(const std::vector<std::uint32_t>& rows) {
+  constexpr int k = registration_limits::color_neighbors;
+  std::vector<std::uint32_t> missing;
+  for (const std::uint32_t row : rows) {
+    if (std::exchange(is_fitted_[row], std::uint8_t{1}) == 0) missing.push_back(row);
+  }
+  const Points queries = take_rows<Points>(points_, missing);
+  std::vector<std::int64_t> neighbors(k * missing.size());
+  std::vector<float> distances(k * missing.size());
+  tree_.query_into(queries, k, max_distance_, num_threads_, neighbors.data(), distances.data());
+  parallel_for(queries.rows(), 64, num_threads_,
+               [&](std::int64_t i) { fit_one(missing[static_cast<std::size_t>(i)], neighbors.data() + k * i); });
+}
+
+void ColorField::fit_one(std::uint32_t row, const std::int64_t* neighbors) {
+  const Eigen::Vector3d point = points_.row(row).transpose().cast<double>();
+  const Eigen::Vector3d normal = normals_.row(row).transpose().cast<double>();
+  const std::int64_t* end =
+      std::find(neighbors, neighbors + registration_limits::color_neighbors, cloud_.points.rows());
+  if (end - neighbors < registration_limits::least_color_neighbors || !normal.allFinite()) return;
+  const auto offset = [&](std::int64_t neighbor) {
+    return Eigen::Vector3d(cloud_.points.row(neighbor).transpose().cast<double>() - point);
+  };
+  const Eigen::Vector3d across = normal.unitOrthogonal(), along = normal.cross(across);
+  const double radius = std::max(offset(*(end - 1)).norm(), 1e-12);
+  // Unknowns: the value, and the slopes along two directions in units of the radius.
+  Eigen::Matrix3d equations = 1e-3 * Eigen::Vector3d(0.0, 1.0, 1.0).asDiagonal().toDenseMatrix();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  std::for_each(neighbors, end, [&](std::int64_t neighbor) {
+    const Eigen::Vector3d d = offset(neighbor) / radius;
+    const double falloff = 1.0 - 0.9 * d.squaredNorm();
+    const Eigen::Vector3d terms(1.0, d.dot(across), d.dot(along));
+    equations += falloff * terms * terms.transpose();
+    right += falloff * static_cast<double>(cloud_.brightness[neighbor]) * terms;
   });
-  return field;
+  const Eigen::Vector3d found = equations.ldlt().solve(right);
+  brightness_[row] = static_cast<float>(found[0]);
+  gradient_.row(row) = ((found[1] * across + found[2] * along) / radius).transpose().cast<float>();
 }
 
 }  // namespace nacre
