@@ -7,15 +7,20 @@ is walked through with the camera in the hand, at so many frames a second; the c
 boxes on it, all of whose faces look one way, in steps of so many millimetres; cartons in a corner are walked
 around, in steps of so many degrees; a figure as tall as a person, and a cow of 0.8 m, turn before the camera,
 alone; two people stand before a desk for two seconds, and then walk about, while somebody holds the camera.
+Things on a table are walked around, and a head, in steps of so many degrees; a camera before a shelf of books
+twists by so many degrees a frame; one turns about itself in a room; somebody walks along a corridor.
+With `--colors` walls and things are printed with a soft pattern, and the camera takes colour images, too.
 
     python benchmarks/other_cameras.py
     python benchmarks/other_cameras.py cartons stereo
+    python benchmarks/other_cameras.py wall corridor room --colors
 """
 
 from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from typing import Any
 
@@ -38,8 +43,13 @@ SCENES = {
     "homer": ((7, 52), (15, 24)),
     "spot": ((7, 52),),
     "people": ((30, 108), (10, 36)),
+    "table": ((2, 60), (8, 45)),
+    "bust": ((4, 90),),
+    "shelf": ((1, 60), (3, 60)),
+    "room": ((2, 60), (6, 60)),
+    "corridor": ((30, 60), (10, 40)),
 }
-UNITS = {"flat": "frames a second", "wall": "mm", "people": "frames a second"}
+UNITS = dict.fromkeys(("flat", "people", "corridor"), "frames a second") | {"wall": "mm"}
 HEIGHTS = {"homer": 1.7, "spot": 0.8}  # [m]
 DISTANCES = {"homer": 2.2, "spot": 1.2, "cartons": 2.0}  # [m]
 
@@ -179,9 +189,170 @@ def people(rate: int, count: int) -> tuple[list[nacre.Mesh], list[Array]]:
     return meshes, poses
 
 
-def make(scene: str, sensor: str, speed: int, count: int) -> cases.Case:
+def standing(name: str, height: float, turn: float, place: list[float]) -> tuple[Array, Array]:
+    """Return a mesh of a height, turned about the vertical, that stands at a place."""
+    mesh = cases.object_mesh(name)
+    vertices = np.asarray(mesh.vertices, float) * [1, -1, -1]
+    vertices -= (vertices.max(axis=0) + vertices.min(axis=0)) / 2
+    vertices *= height / np.ptp(vertices, axis=0).max()
+    cos, sin = math.cos(turn), math.sin(turn)
+    vertices = vertices @ np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]]).T
+    vertices[:, 1] -= vertices[:, 1].max()
+    return vertices + np.array(place), np.asarray(mesh.triangles)
+
+
+def table() -> nacre.Mesh:
+    """Return a table with three figures and three boxes on it, in a corner of a room."""
+    return merged(
+        [
+            box([0, 0.025, 0], [1.4, 0.05, 0.9], 0),
+            box([0, 0.75, 0], [8, 0.1, 8], 0),
+            box([0, -0.5, 3], [8, 3, 0.1], 0.1),
+            box([-3, -0.5, 0], [0.1, 3, 8], 0),
+            standing("homer", 0.25, 0.4, [-0.2, 0, 0.05]),
+            standing("spot", 0.2, 2, [0.15, 0, 0.1]),
+            standing("fandisk", 0.12, 1, [0.05, 0, -0.15]),
+            box([0.3, -0.06, -0.1], [0.1, 0.12, 0.06], 0.5),
+            box([-0.35, -0.04, -0.15], [0.18, 0.08, 0.1], 0.9),
+            box([-0.05, -0.1, 0.25], [0.08, 0.2, 0.08], 0.2),
+        ]
+    )
+
+
+def bust() -> nacre.Mesh:
+    """Return the upper part of a figure 0.6 m high, whose head is the middle."""
+    mesh = figure("homer")
+    vertices: Array = 0.35 * np.asarray(mesh.vertices, float)
+    return nacre.Mesh(vertices - [0, vertices[:, 1].min() + 0.13, 0], mesh.triangles)
+
+
+def corridor() -> nacre.Mesh:
+    """Return a corridor two metres wide, with door frames on either side and three cupboards."""
+    rng = np.random.default_rng(9)
+    parts = [
+        box([0, 1.2, 6], [2.2, 0.1, 20], 0),
+        box([0, -1.4, 6], [2.2, 0.1, 20], 0),
+        box([-1.05, 0, 6], [0.1, 3, 20], 0),
+        box([1.05, 0, 6], [0.1, 3, 20], 0),
+        box([0, 0, 15], [3, 3, 0.1], 0),
+    ]
+    for z in np.arange(1, 15, 1.7):
+        side = rng.choice([-1, 1])
+        parts.append(box([side, 0.1, z + rng.uniform(-0.3, 0.3)], [0.1, 2.1, 0.1], 0))
+        parts.append(box([side, 0.1, z + 0.9], [0.1, 2.1, 0.1], 0))
+        parts.append(box([side, -0.95, z + 0.45], [0.1, 0.1, 1.0], 0))
+    return merged(parts + [box([-0.8, 0.8, z], [0.35, 0.8, 0.5], 0) for z in (3.1, 8.2, 11)])
+
+
+def shelf() -> nacre.Mesh:
+    """Return a shelf of books before a wall."""
+    rng = np.random.default_rng(13)
+    parts = [box([0, 0, 1.35], [4, 3, 0.1], 0)]
+    parts += [box([0, y, 1.2], [2.4, 0.02, 0.3], 0) for y in np.arange(-0.9, 1.0, 0.35)]
+    for y in np.arange(-0.9, 0.9, 0.35):
+        x = -1.2
+        while x < 1.15:
+            width, height, depth = rng.uniform(0.015, 0.06), rng.uniform(0.18, 0.3), rng.uniform(0.12, 0.24)
+            if rng.random() < 0.85:
+                place = [x + width / 2, y + 0.34 - height / 2, 1.34 - depth / 2]
+                parts.append(box(place, [width, height, depth], 0))
+            x += width + 0.002
+    return merged(parts)
+
+
+def room() -> nacre.Mesh:
+    """Return the office, with walls and things on all sides."""
+    parts = [
+        box([0, -0.3, -2.5], [8, 3.4, 0.1], 0),
+        box([-3.5, -0.3, 1], [0.1, 3.4, 8], 0),
+        box([-1.5, 0.6, -2], [1, 0.9, 0.6], 0.1),
+        box([1.2, 0.5, -2.1], [0.6, 1.1, 0.5], 0),
+        box([-3.1, 0.2, 0.5], [0.5, 1.6, 1.2], 0),
+        box([1.7, 0.7, 0], [0.6, 0.6, 0.6], 0.5),
+    ]
+    return merged(office() + parts)
+
+
+def in_hand(step: float, count: int, distance: float, height: float, middle: list[float]) -> list[Array]:
+    """Return poses of a camera that is carried around something, in steps of so many degrees."""
+    rng = np.random.default_rng(3)
+    shakes, wobbles = trembling(rng, count, 0.01), trembling(rng, count, 0.015)
+    poses = []
+    for k in range(count):
+        angle = math.radians(step * k)
+        offset = np.array([distance * math.sin(angle), -height, -distance * math.cos(angle)])
+        place = np.array(middle) + offset + shakes[k]
+        poses.append(looking(place, np.array(middle) + wobbles[k] - place))
+    return poses
+
+
+def twisting(step: float, count: int) -> list[Array]:
+    """Return poses of a camera in the hand that turns about its axis by up to so many degrees a frame."""
+    shakes = trembling(np.random.default_rng(2), count, 0.01)
+    poses = []
+    for k in range(count):
+        ahead = np.array([0.25 * math.sin(k / 23), 0.15 * math.sin(k / 17), 1])
+        place = shakes[k] + np.array([0.3 * math.sin(k / 40), 0.1 * math.sin(k / 31), 0])
+        poses.append(looking(place, ahead, math.radians(30 * step) * math.sin(k / 30)))
+    return poses
+
+
+def turning(step: float, count: int) -> list[Array]:
+    """Return poses of a camera that turns about itself, in steps of so many degrees."""
+    rng = np.random.default_rng(6)
+    shakes, wobbles = trembling(rng, count, 0.004), trembling(rng, count, math.radians(0.4))
+    poses = []
+    for k in range(count):
+        angle = math.radians(step * k)
+        ahead = np.array([math.sin(angle), 0.1 + wobbles[k, 0], math.cos(angle)])
+        poses.append(looking(shakes[k] + np.array([0, 0, 0.6]), ahead, wobbles[k, 2]))
+    return poses
+
+
+def along(rate: int, count: int) -> list[Array]:
+    """Return poses of a walk of 1 m/s along the corridor."""
+    rng = np.random.default_rng(8)
+    total = count * 30 // rate
+    shakes, wobbles = trembling(rng, total, 0.015), trembling(rng, total, math.radians(1))
+    poses = []
+    for k in range(0, total, 30 // rate):
+        place = np.array([0.2 * math.sin(k / 25), 0.03 * math.sin(k / 5), k / 30]) + shakes[k]
+        ahead = np.array([0.3 * math.sin(k / 20) + wobbles[k, 1], 0.05 + wobbles[k, 0], 1])
+        poses.append(looking(place, ahead, wobbles[k, 2]))
+    return poses[:count]
+
+
+def colors_of(mesh: nacre.Mesh, camera: nacre.Camera, poses: list[Array]) -> list[Array | None]:
+    """Return images of a soft pattern on all surfaces, with the camera's noise and exposure."""
+    rng = np.random.default_rng(77)
+    waves = rng.normal(size=(30, 3))
+    waves *= (rng.uniform(10, 60, 30) / np.linalg.norm(waves, axis=1))[:, None]  # details of 5 to 30 cm
+    phases = rng.uniform(0, 2 * math.pi, 30)
+    v, u = np.mgrid[0 : camera.height, 0 : camera.width]
+    rays = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(u.shape)], axis=-1)
+    images: list[Array | None] = []
+    for k, pose in enumerate(poses):
+        points = (mesh.simulate_depth(camera, pose)[..., None] * rays) @ pose[:3, :3].T + pose[:3, 3]
+        shade = sum(np.sin(points @ w + p) for w, p in zip(waves, phases, strict=True))
+        value = (1 + 0.1 * math.sin(k / 5)) * (120 + 10 * shade) + rng.normal(0, 3, shade.shape)
+        gray = np.clip(np.nan_to_num(value), 0, 255).astype(np.uint8)
+        images.append(np.repeat(gray[..., None], 3, axis=-1))
+    return images
+
+
+def make(scene: str, sensor: str, speed: int, count: int, colored: bool = False) -> cases.Case:
     """Return a recording."""
-    if scene == "people":
+    still: dict[str, tuple[Callable[[], nacre.Mesh], Callable[[], list[Array]]]] = {
+        "table": (table, lambda: in_hand(speed, count, 0.6, 0.35, [0, -0.05, 0])),
+        "bust": (bust, lambda: in_hand(speed, count, 0.5, 0.05, [0, 0.05, 0])),
+        "shelf": (shelf, lambda: twisting(speed, count)),
+        "room": (room, lambda: turning(speed, count)),
+        "corridor": (corridor, lambda: along(speed, count)),
+    }
+    if scene in still:
+        mesh_of, poses_of = still[scene]
+        meshes, poses = [mesh_of()] * count, poses_of()
+    elif scene == "people":
         meshes, poses = people(speed, count)
     elif scene == "flat":
         meshes, poses = [flat_mesh()] * count, walk(speed, count)
@@ -200,10 +371,11 @@ def make(scene: str, sensor: str, speed: int, count: int) -> cases.Case:
         mesh.simulate_depth(camera, pose, sensor=kind, seed=k, num_threads=1)
         for k, (mesh, pose) in enumerate(zip(meshes, poses, strict=True))
     ]
-    return cases.Case(f"{scene} {sensor} {speed}", camera, depths, [None] * count, list(poses))
+    colors: list[Array | None] = colors_of(meshes[0], camera, poses) if colored else [None] * count
+    return cases.Case(f"{scene} {sensor} {speed}", camera, depths, colors, list(poses))
 
 
-def run(recording: tuple[str, str, int, int]) -> str:
+def run(recording: tuple[str, str, int, int, bool]) -> str:
     """Run a recording, and return its cell: right / claimed / far off of all, and the trajectory's error."""
     case = make(*recording)
     figures, model = cases.run(case)
@@ -217,6 +389,7 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("names", nargs="*", choices=[[], *SCENES, *SENSORS], default=[], metavar="NAME")
+    parser.add_argument("--colors", action="store_true", help="of scenes that keep still")
     parser.add_argument("--processes", type=int, default=2)
     arguments = parser.parse_args()
     scenes = [name for name in SCENES if name in arguments.names] or list(SCENES)
@@ -225,7 +398,11 @@ def main() -> None:
     print(f"| scene | {' | '.join(sensors)} |")
     print(f"| --- | {' | '.join('---' for _ in sensors)} |")
     with ProcessPoolExecutor(arguments.processes) as pool:
-        todo = [(scene, sensor, speed, count) for scene, speed, count in rows for sensor in sensors]
+        todo = [
+            (scene, sensor, speed, count, arguments.colors)
+            for scene, speed, count in rows
+            for sensor in sensors
+        ]
         cells = pool.map(run, todo)
         for scene, speed, _ in rows:
             name = f"{scene}, {speed} {UNITS.get(scene, 'degrees')}"

@@ -108,3 +108,33 @@ def test_what_sticks_to_a_camera_does_not_hold_it(sensor: Any, focal_length: flo
     come = [report.world_from_camera[0, 3] for report in model.frames if report.tracked]
     assert len(come) == 8
     np.testing.assert_allclose(come, 0.04 * np.arange(8), atol=0.02)
+
+
+def printed(points: Array, number: int) -> Array:
+    """Return the brightness of a pattern with details of 5 to 30 cm, with the noise of an image."""
+    random = np.random.default_rng(1)
+    waves = random.normal(size=(20, 3))
+    waves *= (random.uniform(10, 60, 20) / np.linalg.norm(waves, axis=1))[:, None]
+    phases = random.uniform(0, 2 * np.pi, 20)
+    pattern = sum(np.sin(points @ wave + phase) for wave, phase in zip(waves, phases, strict=True))
+    noise = np.random.default_rng(number).normal(0, 3, points.shape[:2])
+    return np.clip(np.nan_to_num(128 + 12 * pattern + noise), 0, 255).astype(np.uint8)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_colours_tell_that_a_camera_moves_where_shared_errors_hold_it(seed: int) -> None:
+    # By shape alone it stands still from the first frame on, and is sure of it.
+    camera, scene = nacre.Camera(640, 480, 615, 615, 319.5, 239.5), wall_with_boxes()
+    v, u = np.mgrid[0:480, 0:640]
+    rays = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(u.shape)], axis=-1)
+    model, pose = nacre.Model(camera), np.eye(4)
+    for number in range(6):
+        pose[0, 3] = 0.08 * number - 0.9
+        depth = scene.simulate_depth(
+            camera, pose, sensor="stereo", seed=100 * seed + number, sensor_seed=seed
+        )
+        points = scene.simulate_depth(camera, pose)[..., None] * rays + pose[:3, 3]
+        model.add_frame(depth, color=np.repeat(printed(points, number)[..., None], 3, axis=-1))
+    come = [report.world_from_camera[0, 3] for report in model.frames if report.tracked]
+    assert len(come) == 6
+    np.testing.assert_allclose(come, 0.08 * np.arange(6), atol=0.02)

@@ -55,8 +55,9 @@ AlignResult align(const AlignCloud& source, const AlignCloud& target, const Pose
   IcpResult result = align_to(prepared_target, prepared_source, initial, options);
   const bool has_colors = source.brightness.size() > 0 && target.brightness.size() > 0;
   if (result.weak_directions.cols() == 0 || !has_colors) return result;
-  return determine_by_color(prepared_target, prepared_source, BrightCloud(target.points, target.brightness),
-                            BrightCloud(source.points, source.brightness), result, options);
+  return ColorRegistration(prepared_target, prepared_source, BrightCloud(target.points, target.brightness),
+                           BrightCloud(source.points, source.brightness), options)
+      .determine(result);
 }
 
 }  // namespace nacre

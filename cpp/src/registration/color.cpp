@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <utility>
 
 #include "base/limits.hpp"
 #include "base/parallel.hpp"
@@ -23,11 +25,18 @@ struct ColorLevel {
   ColorField target, source;
 };
 
-class ColorSearch : public OpenDirectionSearch {
+}  // namespace
+
+class ColorRegistration::Search : public OpenDirectionSearch {
  public:
-  ColorSearch(const IcpTarget& target, const IcpSource& source, std::vector<ColorLevel> levels,
-              const AlignOptions& options)
-      : target_(target), source_(source), few_(source.few()), levels_(std::move(levels)), options_(options) {
+  Search(const IcpTarget& target, IcpSource source, BrightCloud target_colors, BrightCloud source_colors,
+         const AlignOptions& options)
+      : target_(target),
+        source_(std::move(source)),
+        few_(source_.few()),
+        target_colors_(std::move(target_colors)),
+        source_colors_(std::move(source_colors)),
+        options_(options) {
     held_ = options;
     held_.max_distance = gate().distance;
     held_.max_iterations = 6;
@@ -36,34 +45,79 @@ class ColorSearch : public OpenDirectionSearch {
   OpenFit fit(const IcpResult& geometric, const TwistBasis* only) override {
     OpenFit fit;
     fit.result = run(geometric, only);
-    fit.rows = match(levels_.back(), fit.result.target_from_source, fit.result.center);
+    fit.rows = match(level(fine_, 1), source_, fit.result.target_from_source, fit.result.center);
     fit.extent = extent_of(fit.rows);
     fit.noise = noise_;
-    distance_noise_ = std::max(geometric.rmse, 0.1 * target_.spacing());
+    distance_noise_ = distance_noise(geometric);
     fit.agrees = fit.rows.size() >= base_limits::least_points;
     return fit;
   }
 
   // Information as if it were of distances, per pair.
   Directions determined(const OpenFit& fit, const TwistBasis& open) const override {
-    double weight = 0.0;
-    for (const MotionRow& row : fit.rows) weight += row.weight;
-    const Eigen::MatrixXd information = agreed_information(fit.rows, open, fit.extent, distance_noise_ / noise_);
-    return split_directions(information / std::max(weight, 1e-12), options_.weak_threshold);
+    return split_directions(information_per_pair(fit.rows, open, fit.extent, distance_noise_), options_.weak_threshold);
+  }
+
+  Pose one_step(const IcpResult& geometric) {
+    IcpResult moved = geometric;
+    if (moved.weak_directions.cols() == 0) return moved.target_from_source;
+    const std::vector<MotionRow> rows = match(level(coarse_, registration_limits::coarse_color_step), few_,
+                                              geometric.target_from_source, geometric.center);
+    if (rows.size() >= base_limits::least_points) step(rows, geometric.weak_directions, moved);
+    return moved.target_from_source;
+  }
+
+  // For a twist, its rotation in radians. Per pair of the registration's, as far as either side's are independent.
+  Matrix6 information(const IcpResult& geometric) {
+    const std::vector<MotionRow> rows = match(level(fine_, 1), source_, geometric.target_from_source, geometric.center);
+    if (rows.size() < base_limits::least_points) return Matrix6::Zero();
+    std::vector<double> whitened;
+    for (const MotionRow& row : rows) whitened.push_back(row.residual * std::sqrt(row.weight));
+    const double num_independent = static_cast<double>(rows.size()) / design_effect(whitened);
+    const double extent = extent_of(rows);
+    Vector6 scale;
+    scale << extent, extent, extent, 1.0, 1.0, 1.0;
+    return num_independent / geometric.num_independent * scale.asDiagonal() *
+           information_per_pair(rows, TwistBasis::Identity(6, 6), extent, distance_noise(geometric)) *
+           scale.asDiagonal();
   }
 
  private:
+  double distance_noise(const IcpResult& geometric) const { return std::max(geometric.rmse, 0.1 * target_.spacing()); }
+
+  Eigen::MatrixXd information_per_pair(const std::vector<MotionRow>& rows, const TwistBasis& basis, double extent,
+                                       double distance_noise) const {
+    double weight = 0.0;
+    for (const MotionRow& row : rows) weight += row.weight;
+    return agreed_information(rows, basis, extent, distance_noise / noise_) / std::max(weight, 1e-12);
+  }
+
+  // One of so many points of the model's density, when it is first asked for.
+  ColorLevel& level(std::optional<ColorLevel>& kept, std::int64_t thinning) {
+    if (kept) return *kept;
+    // As dense as the target: a gradient is that of the surroundings of a point.
+    const std::int64_t denser = source_colors_.points.rows() / std::max<std::int64_t>(1, target_colors_.points.rows());
+    const auto field = [&](const BrightCloud& cloud, std::int64_t step, const IcpCloud& at) {
+      const double reach = 4.0 * std::sqrt(static_cast<double>(thinning)) * target_.spacing();
+      return ColorField(cloud.thinned(step, options_.seed), at.points, at.normals, reach, options_.num_threads);
+    };
+    return kept.emplace(ColorLevel{field(target_colors_, thinning, target_.cloud()),
+                                   field(source_colors_, thinning * std::max<std::int64_t>(1, denser), source_.cloud)});
+  }
+
   Gate gate() const {
     const double reach =
         options_.final_distance > 0.0 ? options_.final_distance : camera_limits::surface_spacings * target_.spacing();
     return {reach, std::cos(std::min(options_.max_angle, 3.14)), true};
   }
 
-  // Pairs about a centre, their residuals after the best gain and offset, and robust weights.
-  std::vector<MotionRow> match(ColorLevel& level, const Pose& pose, const Eigen::Vector3d& center) {
-    std::vector<std::uint32_t> nearest(static_cast<std::size_t>(source_.cloud.points.rows()), no_slot);
-    const std::int64_t count = source_.levels.back();
-    target_.match(source_, count, pose, gate(), nearest);
+  // Pairs about a centre, their residuals after the best gain and offset, and robust weights. The samples are the
+  // source's, or its first.
+  std::vector<MotionRow> match(ColorLevel& level, const IcpSource& samples, const Pose& pose,
+                               const Eigen::Vector3d& center) {
+    std::vector<std::uint32_t> nearest(static_cast<std::size_t>(samples.cloud.points.rows()), no_slot);
+    const std::int64_t count = samples.levels.back();
+    target_.match(samples, count, pose, gate(), nearest);
     std::vector<std::uint32_t> matched_targets, matched_sources;
     for (Eigen::Index i = 0; i < count; ++i) {
       const std::uint32_t slot = nearest[static_cast<std::size_t>(i)];
@@ -97,11 +151,12 @@ class ColorSearch : public OpenDirectionSearch {
   IcpResult run(const IcpResult& start, const TwistBasis* only) {
     IcpResult result = start;
     bool has_moved = false;
-    for (ColorLevel& level : levels_) {
+    for (const bool is_coarse : {true, false}) {
+      ColorLevel& colors = is_coarse ? level(coarse_, registration_limits::coarse_color_step) : level(fine_, 1);
       for (int i = 0; i < registration_limits::most_steps; ++i) {
         const TwistBasis open = only != nullptr ? *only : TwistBasis(result.weak_directions);
         if (open.cols() == 0) break;
-        const std::vector<MotionRow> rows = match(level, result.target_from_source, result.center);
+        const std::vector<MotionRow> rows = match(colors, source_, result.target_from_source, result.center);
         if (rows.size() < base_limits::least_points) break;
         const double size = step(rows, open, result);
         has_moved = true;
@@ -152,34 +207,35 @@ class ColorSearch : public OpenDirectionSearch {
   }
 
   const IcpTarget& target_;
-  const IcpSource& source_;
-  const IcpSource few_;
-  std::vector<ColorLevel> levels_;
+  const IcpSource source_, few_;
+  const BrightCloud target_colors_, source_colors_;
+  std::optional<ColorLevel> coarse_, fine_;
   const AlignOptions& options_;
   AlignOptions held_;  // few steps within the last gate, weak directions held
   double noise_ = 1.0, distance_noise_ = 1.0;
 };
 
-}  // namespace
+ColorRegistration::ColorRegistration(const IcpTarget& target, IcpSource source, BrightCloud target_colors,
+                                     BrightCloud source_colors, const AlignOptions& options) {
+  if (!target.cloud().has_normals() || !source.cloud.has_normals()) return;
+  search_ =
+      std::make_unique<Search>(target, std::move(source), std::move(target_colors), std::move(source_colors), options);
+}
 
-IcpResult determine_by_color(const IcpTarget& target, const IcpSource& source, const BrightCloud& target_colors,
-                             const BrightCloud& source_colors, const IcpResult& geometric,
-                             const AlignOptions& options) {
-  if (!target.cloud().has_normals() || !source.cloud.has_normals()) return geometric;
-  // As dense as the target: a gradient is that of the surroundings of a point.
-  const std::int64_t denser = source_colors.points.rows() / std::max<std::int64_t>(1, target_colors.points.rows());
-  std::vector<ColorLevel> levels;
-  for (const std::int64_t step : {std::int64_t{9}, std::int64_t{1}}) {
-    const auto field = [&](const BrightCloud& cloud, std::int64_t thinning, const IcpCloud& at) {
-      const double reach = 4.0 * std::sqrt(static_cast<double>(step)) * target.spacing();
-      return ColorField(cloud.thinned(thinning, options.seed), at.points, at.normals, reach, options.num_threads);
-    };
-    levels.push_back({field(target_colors, step, target.cloud()),
-                      field(source_colors, step * std::max<std::int64_t>(1, denser), source.cloud)});
-  }
+ColorRegistration::~ColorRegistration() = default;
+ColorRegistration::ColorRegistration(ColorRegistration&&) noexcept = default;
+ColorRegistration& ColorRegistration::operator=(ColorRegistration&&) noexcept = default;
 
-  ColorSearch search(target, source, std::move(levels), options);
-  return determine_open_directions(geometric, search);
+Matrix6 ColorRegistration::information(const IcpResult& geometric) const {
+  return search_ ? search_->information(geometric) : Matrix6::Zero();
+}
+
+Pose ColorRegistration::one_step(const IcpResult& geometric) const {
+  return search_ ? search_->one_step(geometric) : geometric.target_from_source;
+}
+
+IcpResult ColorRegistration::determine(const IcpResult& geometric) const {
+  return search_ ? determine_open_directions(geometric, *search_) : geometric;
 }
 
 }  // namespace nacre

@@ -123,12 +123,12 @@ IcpSource::IcpSource(const AlignCloud& cloud_in, const AlignOptions& options) : 
   cloud.keep(rows);
 }
 
-IcpSource IcpSource::few() const {
+IcpSource IcpSource::few(std::size_t level) const {
   IcpSource source = *this;
-  std::vector<std::int32_t> rows(static_cast<std::size_t>(levels.front()));
+  std::vector<std::int32_t> rows(static_cast<std::size_t>(levels[level]));
   std::iota(rows.begin(), rows.end(), 0);
   source.cloud.keep(rows);
-  source.levels.fill(levels.front());
+  std::fill(source.levels.begin() + static_cast<std::ptrdiff_t>(level), source.levels.end(), levels[level]);
   return source;
 }
 

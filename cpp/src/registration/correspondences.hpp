@@ -33,7 +33,7 @@ struct IcpSource {
   Values noise;  // standard deviation of each sample along its residual [m], or empty
 
   IcpSource(const AlignCloud& cloud, const AlignOptions& options);
-  IcpSource few() const;                                         // those of the first level alone
+  IcpSource few(std::size_t level = 0) const;                    // those of the first level alone
   IcpSource part(const std::vector<std::uint8_t>& is_in) const;  // a flag for each sample
 };
 

@@ -52,7 +52,7 @@ void add_information(const std::vector<MotionRow>& rows, const TwistBasis& basis
 }
 
 bool return_to_surface(const IcpTarget& target, const IcpSource& source, const AlignOptions& held, IcpResult& result) {
-  const IcpResult back = align_held(target, source, result.target_from_source, held, result.least_signal);
+  const IcpResult back = align_held(target, source, result.target_from_source, held, result.weak_test);
   if (back.status == AlignStatus::too_few_pairs) return false;
   const int iterations = result.iterations + back.iterations;
   const AlignStatus status = result.status;

@@ -128,16 +128,22 @@ double misfit_of(const std::vector<Pair>& pairs, Metric metric) {
   return count > 0.0 ? std::sqrt(sum / count) : 0.0;
 }
 
+// How many pairs there would be, were their residuals independent.
+double num_independent(const std::vector<Pair>& pairs, Metric metric) {
+  std::vector<double> whitened;
+  for (const Pair& pair : pairs) whitened.push_back(residual(pair, metric) * std::sqrt(pair.weight));
+  return static_cast<double>(pairs.size()) / design_effect(whitened);
+}
+
 std::size_t least_pairs(std::int64_t num_samples) {
   return static_cast<std::size_t>(std::max<std::int64_t>(6, num_samples / 100));
 }
 
 // hold_weak: whether weak directions stay as they are in each step.
 IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
-                  bool hold_weak, double least_signal = 0.0, const TwistBasis& along = {}) {
-  const WeakTest test{options.weak_threshold, least_signal};
+                  bool hold_weak, const WeakTest& test, const TwistBasis& along = {}) {
   IcpResult result;
-  result.least_signal = least_signal;
+  result.weak_test = test;
   result.target_from_source = initial;
   result.rmse = std::numeric_limits<double>::quiet_NaN();
 
@@ -178,6 +184,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   }
   if (pairs.size() < least_pairs(schedule.num_samples())) return result;
   result.misfit = misfit_of(pairs, options.method);
+  result.num_independent = num_independent(pairs, options.method);
   result.residual_sigmas = residual_sigmas_of(pairs, options.method);
   weight_pairs(pairs, options.method, options.robust, resolution);
   const IcpStep last = solve_step(pairs, options.method, test, along, options.num_threads);
@@ -201,6 +208,20 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
 
 }  // namespace
 
+double design_effect(const std::vector<double>& residuals) {
+  double of_sums = 0.0, of_all = 0.0;
+  for (std::size_t first = 0; first + registration_limits::cell_pairs <= residuals.size();
+       first += registration_limits::cell_pairs) {
+    double sum = 0.0;
+    for (std::size_t i = first; i < first + registration_limits::cell_pairs; ++i) {
+      sum += residuals[i];
+      of_all += residuals[i] * residuals[i];
+    }
+    of_sums += sum * sum;
+  }
+  return of_all > 0.0 ? std::max(1.0, of_sums / of_all) : 1.0;
+}
+
 double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double floor) {
   const double median_weight = median_over(pairs, [](const Pair& pair) { return pair.weight; });
   for (Pair& pair : pairs) pair.weight /= median_weight;
@@ -218,19 +239,20 @@ double weight_pairs(std::vector<Pair>& pairs, Metric metric, bool robust, double
 
 IcpResult align_to(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options) {
   // What pairs know of a direction shows at the end only: while source and target are apart their normals disagree.
-  IcpResult free = iterate(target, source, initial, options, false);
+  const WeakTest test{options.weak_threshold};
+  IcpResult free = iterate(target, source, initial, options, false, test);
   if (free.status != AlignStatus::too_few_pairs && free.weak_directions.cols() == 0) return free;
-  return iterate(target, source, initial, options, true);
+  return iterate(target, source, initial, options, true, test);
 }
 
 IcpResult align_held(const IcpTarget& target, const IcpSource& source, const Pose& initial, const AlignOptions& options,
-                     double least_signal) {
-  return iterate(target, source, initial, options, true, least_signal);
+                     const WeakTest& weak_test) {
+  return iterate(target, source, initial, options, true, weak_test);
 }
 
 IcpResult align_along(const TwistBasis& directions, const IcpTarget& target, const IcpSource& source,
                       const Pose& initial, const AlignOptions& options) {
-  return iterate(target, source, initial, options, false, 0.0, directions);
+  return iterate(target, source, initial, options, false, {options.weak_threshold}, directions);
 }
 
 TwistBasis motions_on_plane(const Eigen::Vector3d& normal) {

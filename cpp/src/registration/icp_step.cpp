@@ -70,6 +70,11 @@ Eigen::Matrix3d closest_rotation(const Eigen::Matrix3d& covariance) {
   return svd.matrixU() * sign * svd.matrixV().transpose();
 }
 
+void append_column(TwistBasis& basis, const Vector6& column) {
+  basis.conservativeResize(6, basis.cols() + 1);
+  basis.rightCols<1>() = column;
+}
+
 }  // namespace
 
 double normal_information(const std::vector<Pair>& pairs, Metric metric) {
@@ -116,21 +121,24 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, const WeakTest
   const Eigensystem eigen = eigensystem(shape.hessian - shape.chance);
   const Vector6 feigned = (eigen.vectors.transpose() * shape.chance * eigen.vectors).diagonal();
   const double least = test.least_information * sums.agreement;
-  const auto is_weak = [&](Eigen::Index i) {
-    return eigen.values[i] < std::max(least, test.least_signal * feigned[i]);
-  };
-  Eigen::Index num_weak = 0;
-  while (has_test && num_weak < 6 && is_weak(num_weak)) ++num_weak;
+  Vector6 scale;
+  scale << extent, extent, extent, 1.0, 1.0, 1.0;
+  const Matrix6 by_scale = scale.cwiseInverse().asDiagonal();
+  const Matrix6 otherwise = sums.agreement * (by_scale * test.told_otherwise * by_scale);
+  const Vector6 told_otherwise = (eigen.vectors.transpose() * otherwise * eigen.vectors).diagonal();
+  const Vector6 needed = told_otherwise.cwiseMax(test.least_signal * feigned).cwiseMax(least);
+  TwistBasis sure(6, 0);
+  step.weak_directions.resize(6, 0);
+  for (Eigen::Index i = 0; i < 6; ++i) {
+    append_column(has_test && eigen.values[i] < needed[i] ? step.weak_directions : sure, eigen.vectors.col(i));
+  }
   if (has_test) step.signal = eigen.values.cwiseQuotient(feigned.cwiseMax(least)).minCoeff();
-  step.weak_directions = eigen.vectors.leftCols(num_weak);
-  const bool is_free = num_weak == 0 && along.cols() == 0;
-  const TwistBasis sure = along.cols() > 0 ? along : TwistBasis(eigen.vectors.rightCols(6 - num_weak));
+  const bool is_free = sure.cols() == 6 && along.cols() == 0;
+  if (along.cols() > 0) sure = along;
   Matrix6 damped = equations.hessian;
   damped.diagonal().array() += base_limits::damping * sums.weight;
   Vector6 solution = sure * solve_symmetric(sure.transpose() * damped * sure, sure.transpose() * equations.gradient);
   step.reduction = solution.dot(equations.hessian * solution);
-  Vector6 scale;
-  scale << extent, extent, extent, 1.0, 1.0, 1.0;
   step.hessian = scale.asDiagonal() * equations.hessian * scale.asDiagonal();
   const Eigen::Matrix<double, 6, 6> axes = scale.asDiagonal() * eigen.vectors;
   step.shape = axes * Vector6(eigen.values.cwiseMax(0.0)).asDiagonal() * axes.transpose();

@@ -13,11 +13,13 @@ using TwistBasis = Eigen::Matrix<double, 6, Eigen::Dynamic, 0, 6, 6>;
 
 // Which directions are weak, and do not move: those of which the normals of source and target agree on less information
 // than this, per pair that agrees and with rotations in units of the pairs' extent, since what a shape leaves open does
-// not depend on how well its parts are measured; and those of which it is less than so many times what noise in them
-// feigns.
+// not depend on how well its parts are measured; those of which it is less than so many times what noise in them
+// feigns; and those of which something else tells more: information as if of residuals of these pairs, per pair, for a
+// twist (rotation [rad], translation [m]) about their center.
 struct WeakTest {
   double least_information = 0.0;  // 0: none is weak
   double least_signal = 0.0;
+  Matrix6 told_otherwise = Matrix6::Zero();
 };
 
 // What the next step needs to know of the one before, to be as long as it should be.

@@ -29,6 +29,7 @@ constexpr std::int64_t spacing_probes = 500;  // [points] budget: that tell a cl
 constexpr std::size_t least_scale_rows = 16;  // [rows] derived: for seven unknowns; test_scale_check
 constexpr double least_brightness_noise = 1.0;  // [1/255] derived: of the brightness: a step of its scale; test_color_registration
 constexpr double small_color_step = 0.01;  // [spacing] budget: of a search by color that has converged; test_color_registration
+constexpr std::int64_t coarse_color_step = 9;  // [points] budget: one of so many is enough at first, three times as far apart; test_color_registration
 constexpr int color_neighbors = 16;  // [points] budget: around a point, that show how brightness changes; test_color_registration
 constexpr int least_color_neighbors = 6;  // [points] derived: for three unknowns with some to spare; test_color_registration
 constexpr int mean_neighbors = 24;  // [points] tuned: that a noisy point is averaged with; test_global_registration

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "base/limits.hpp"
 #include "base/se3.hpp"
@@ -9,8 +10,8 @@
 #include "camera/limits.hpp"
 #include "camera/point_spacing.hpp"
 #include "camera/view_distance.hpp"
+#include "nacre/global_registration.hpp"
 #include "outlines/limits.hpp"
-#include "registration/color.hpp"
 #include "registration/limits.hpp"
 #include "tracking/limits.hpp"
 
@@ -173,31 +174,69 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
                                              Expectation expectation) const {
   const Pairing pairing = paired(surfaces, gate);
   IcpResult by_shape = align_to(pairing.target, pairing.source, start, pairing.options);
-  const bool may_stick = is_at_rest(by_shape.target_from_source);
-  const double least_signal = may_stick ? registration_limits::signal_at_rest : registration_limits::least_signal;
-  const bool is_doubtful = by_shape.weak_directions.cols() == 0 && by_shape.signal < least_signal;
-  determine_open_directions(surfaces.view, pairing, true, by_shape);
+  if (by_shape.weak_directions.cols() > 0) {
+    determine_open_directions(pairing, colors_of(surfaces.view, pairing, pairing.source), by_shape);
+    return test(std::move(by_shape), surfaces, guess, expectation);
+  }
   const TrackingResult result = test(std::move(by_shape), surfaces, guess, expectation);
-  if (!is_doubtful) return result;
-  std::optional<IcpResult> held = without_doubtful(surfaces.view, pairing, start, result, least_signal);
-  if (!held) return result;
-  const TrackingResult other = test(std::move(*held), surfaces, guess, expectation);
+  const Pose& pose = result.alignment.target_from_source;
+  const bool may_stick = is_at_rest(pose);
+  const WeakTest noisy{pairing.options.weak_threshold,
+                       may_stick ? registration_limits::signal_at_rest : registration_limits::least_signal};
+  const bool is_doubtful = result.alignment.signal < noisy.least_signal;
+  const bool is_unclear = !result.is_clear_cut && result.alignment.signal < registration_limits::least_signal;
+  const bool is_surprise = result.expectation == Expectation::expected && !are_close(pose, guess);
+  const bool may_slide = is_surprise || (are_close(pose, target_.last_view.world_from_camera) &&
+                                         result.alignment.signal < registration_limits::signal_at_rest);
+  WeakTest doubt = noisy;
+  std::optional<ColorRegistration> colors;
+  if (may_slide || is_unclear) colors = colors_of(surfaces.view, pairing, pairing.source.few(1));
+  if (colors && may_slide) doubt.least_signal = registration_limits::signal_at_rest;
+  if (colors && is_surprise) doubt.told_otherwise = colors->information(result.alignment);
+  if (colors && !is_unclear && !contradict(*colors, pairing, pose, doubt)) {
+    colors.reset();
+    doubt = noisy;
+  }
+  if (!colors && !is_doubtful) return result;
+  std::optional<IcpResult> other_alignment = without_doubtful(pairing, colors, start, pose, doubt);
+  if (!other_alignment) return result;
+  const TrackingResult other = test(std::move(*other_alignment), surfaces, guess, expectation);
+  if (colors && may_slide) {
+    // Where colours agree with the shapes, those are more exact; where shapes fit in both places, colours decide.
+    const bool is_rival = other.score > GlobalAlignOptions().max_rivalry * result.score;
+    return is_rival && !are_close(pose, other.alignment.target_from_source) ? other : result;
+  }
   // At rest shared errors match, too, and raise the score: then it is for the shapes to fit clearly better.
   const bool is_better = may_stick ? other.score > tracking_limits::clearly_better * result.score
                                    : result.score < tracking_limits::clearly_better * other.score;
   return is_better ? other : result;
 }
 
-// Noise may feign what the shapes tell: outlines may know better, or colours, which take long. They are asked where the
-// camera is expected, and where the shapes lead.
-std::optional<IcpResult> FrameRegistration::without_doubtful(const PointsInView& view, const Pairing& pairing,
-                                                             const Pose& start, const TrackingResult& by_shape,
-                                                             double least_signal) const {
-  const bool asks_colors = !by_shape.is_clear_cut && by_shape.alignment.signal < registration_limits::least_signal;
+// Whether they would move the camera by a pixel or more at once.
+bool FrameRegistration::contradict(const ColorRegistration& colors, const Pairing& pairing, const Pose& pose,
+                                   const WeakTest& doubt) const {
+  const IcpResult held = align_held(pairing.target, pairing.source.few(), pose, pairing.options, doubt);
+  return shift_ahead(pose, colors.one_step(held)) >= now_.camera.footprint(depth_);
+}
+
+std::optional<ColorRegistration> FrameRegistration::colors_of(const PointsInView& view, const Pairing& pairing,
+                                                              IcpSource samples) const {
+  if (view.brightness.size() == 0 || !now_.observer.has_colors()) return std::nullopt;
+  return ColorRegistration(pairing.target, std::move(samples), BrightCloud(view.points, view.brightness),
+                           bright_cloud(now_.frame, now_.observer), pairing.options);
+}
+
+// Noise may feign what the shapes tell: outlines or colours may know better. They are asked where the camera is
+// expected, and where the shapes lead.
+std::optional<IcpResult> FrameRegistration::without_doubtful(const Pairing& pairing,
+                                                             const std::optional<ColorRegistration>& colors,
+                                                             const Pose& start, const Pose& by_shape,
+                                                             const WeakTest& doubt) const {
   const IcpSource few = pairing.source.few();
-  for (const Pose& pose : {start, by_shape.alignment.target_from_source}) {
-    IcpResult held = align_held(pairing.target, few, pose, pairing.options, least_signal);
-    determine_open_directions(view, pairing, asks_colors, held);
+  for (const Pose& pose : {start, by_shape}) {
+    IcpResult held = align_held(pairing.target, few, pose, pairing.options, doubt);
+    if (held.weak_directions.cols() == 0) continue;
+    determine_open_directions(pairing, colors, held);
     if (held.weak_directions.cols() == 0) return held;
   }
   return std::nullopt;
@@ -217,7 +256,18 @@ FrameRegistration::Pairing FrameRegistration::paired(const Surfaces& surfaces, G
   return {std::move(target), std::move(source), std::move(options)};
 }
 
-// Since the last view no farther than outlines that match. Errors that images share hold a camera there.
+// By how much what is ahead moves between two poses [m].
+double FrameRegistration::shift_ahead(const Pose& a, const Pose& b) const {
+  const Eigen::Vector3d ahead(0.0, 0.0, depth_);
+  return (a * ahead - b * ahead).norm();
+}
+
+// No farther apart than outlines that match. Errors that images share hold what is ahead where it is in the image.
+bool FrameRegistration::are_close(const Pose& a, const Pose& b) const {
+  return shift_ahead(a, b) < outlines_limits::last_gate * now_.camera.footprint(depth_);
+}
+
+// The camera itself, since the last view.
 bool FrameRegistration::is_at_rest(const Pose& pose) const {
   const Pose& last = target_.last_view.world_from_camera;
   const double shift = (pose.translation() - last.translation()).norm() + depth_ * angle_between(pose, last);
@@ -282,13 +332,11 @@ IcpSource FrameRegistration::gated(IcpSource source, const PointsInView& view, c
 }
 
 // What the shapes leave open, colours or outlines may decide.
-void FrameRegistration::determine_open_directions(const PointsInView& view, const Pairing& pairing, bool with_colors,
+void FrameRegistration::determine_open_directions(const Pairing& pairing,
+                                                  const std::optional<ColorRegistration>& colors,
                                                   IcpResult& result) const {
   const Eigen::Index num_weak = result.weak_directions.cols();
-  if (num_weak > 0 && with_colors && view.brightness.size() > 0 && now_.observer.has_colors()) {
-    result = determine_by_color(pairing.target, pairing.source, BrightCloud(view.points, view.brightness),
-                                bright_cloud(now_.frame, now_.observer), result, pairing.options);
-  }
+  if (num_weak > 0 && colors) result = colors->determine(result);
   if (num_weak > 0 && result.weak_directions.cols() == num_weak) {
     result = determine_by_outline(pairing.target, pairing.source, outlines(), result, pairing.options);
   }

@@ -2,12 +2,14 @@
 #pragma once
 
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "fusion/observer.hpp"
 #include "nacre/fusion.hpp"
 #include "outlines/registration.hpp"
 #include "region/coarse_frame.hpp"
+#include "registration/color.hpp"
 #include "tracking/conflicts.hpp"
 #include "tracking/frame_samples.hpp"
 #include "tracking/points_in_view.hpp"
@@ -103,16 +105,23 @@ class FrameRegistration {
   MaskImage pixels_far_from(const ConflictZones& zones, const Pose& world_from_camera) const;
   std::optional<Still> far_from(const ConflictZones& zones, const Pose& world_from_camera,
                                 const PointsInView& view) const;
+  double shift_ahead(const Pose& a, const Pose& b) const;
+  bool are_close(const Pose& a, const Pose& b) const;
   bool is_at_rest(const Pose& world_from_camera) const;
   TrackingResult registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
                             Expectation expectation) const;
-  // What is found with the directions held that noise may feign; nothing where nothing else decides them.
-  std::optional<IcpResult> without_doubtful(const PointsInView& view, const Pairing& pairing, const Pose& start,
-                                            const TrackingResult& by_shape, double least_signal) const;
+  // Nothing where one side has no colours. The pairing outlives it.
+  std::optional<ColorRegistration> colors_of(const PointsInView& view, const Pairing& pairing, IcpSource samples) const;
+  bool contradict(const ColorRegistration& colors, const Pairing& pairing, const Pose& pose,
+                  const WeakTest& doubt) const;
+  // What is found with the directions held that noise may feign, or of which colours tell more; nothing where nothing
+  // else decides them.
+  std::optional<IcpResult> without_doubtful(const Pairing& pairing, const std::optional<ColorRegistration>& colors,
+                                            const Pose& start, const Pose& by_shape, const WeakTest& doubt) const;
   Pairing paired(const Surfaces& surfaces, Gate gate) const;
   TrackingResult test(IcpResult alignment, const Surfaces& surfaces, const Pose& guess, Expectation expectation) const;
   IcpSource gated(IcpSource source, const PointsInView& view, const IcpTarget& target) const;
-  void determine_open_directions(const PointsInView& view, const Pairing& pairing, bool with_colors,
+  void determine_open_directions(const Pairing& pairing, const std::optional<ColorRegistration>& colors,
                                  IcpResult& result) const;
   Consistency consistency(const Surfaces& surfaces, const Pose& world_from_camera) const;
   const OutlinePair& outlines() const;

@@ -7,7 +7,9 @@
 #include "doctest/doctest.h"
 #include "nacre/registration.hpp"
 #include "registration/correspondences.hpp"
+#include "registration/icp.hpp"
 #include "registration/icp_step.hpp"
+#include "registration/limits.hpp"
 
 using namespace nacre;
 
@@ -153,6 +155,33 @@ TEST_CASE(
 
   const Cloud shared = with_noise(plane, 2);  // which nothing tells from shape
   CHECK(step_of(shared, shared, 1.0).weak_directions.cols() == 0);
+}
+
+TEST_CASE("a direction of which something else tells more is weak, and held") {
+  const Cloud target = pebble(2000, 1);
+  const Cloud source = moved(target, motion({0, 0, 0}, {0.003, 0.002, 0}).inverse());
+  WeakTest test{0.002};
+  test.told_otherwise(4, 4) = 100.0;  // of a shift along y
+  const IcpStep step =
+      solve_step(pairs_of(source, target, Metric::point_to_plane), Metric::point_to_plane, test, {}, 1);
+  REQUIRE(step.weak_directions.cols() > 0);
+  const Vector6 along_y = Vector6::Unit(4);
+  CHECK((step.weak_directions.transpose() * along_y).norm() > 0.9);
+  test.told_otherwise(4, 4) = 1e-6;
+  CHECK(solve_step(pairs_of(source, target, Metric::point_to_plane), Metric::point_to_plane, test, {}, 1)
+            .weak_directions.cols() == 0);
+}
+
+TEST_CASE("independent residuals count as one each, shared ones as one together") {
+  const std::size_t cells = 500, cell = registration_limits::cell_pairs;
+  std::vector<double> independent, shared;
+  for (std::size_t i = 0; i < cells * cell; ++i) {
+    independent.push_back(random_normal(1, i));
+    shared.push_back(random_normal(2, i / cell));
+  }
+  CHECK(design_effect(independent) == doctest::Approx(1.0).epsilon(0.15));
+  CHECK(design_effect(shared) == doctest::Approx(static_cast<double>(cell)));
+  CHECK(design_effect({}) == 1.0);
 }
 
 TEST_CASE("the hessian is the second derivative of half the squared residuals") {
