@@ -44,14 +44,14 @@ ColorField::ColorField(const BrightCloud& cloud, const Points& points, const Poi
       gradient_(Points::Zero(points.rows(), 3)) {}
 
 void ColorField::fit(const std::vector<std::uint32_t>& rows) {
-  constexpr int k = registration_limits::color_neighbors;
+  const int k = registration_limits::color_neighbors;
   std::vector<std::uint32_t> missing;
   for (const std::uint32_t row : rows) {
     if (std::exchange(is_fitted_[row], std::uint8_t{1}) == 0) missing.push_back(row);
   }
   const Points queries = take_rows<Points>(points_, missing);
-  std::vector<std::int64_t> neighbors(k * missing.size());
-  std::vector<float> distances(k * missing.size());
+  std::vector<std::int64_t> neighbors(missing.size() * static_cast<std::size_t>(k));
+  std::vector<float> distances(neighbors.size());
   tree_.query_into(queries, k, max_distance_, num_threads_, neighbors.data(), distances.data());
   parallel_for(queries.rows(), 64, num_threads_,
                [&](std::int64_t i) { fit_one(missing[static_cast<std::size_t>(i)], neighbors.data() + k * i); });
