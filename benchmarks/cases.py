@@ -116,13 +116,33 @@ def turntable(name: str, mesh: nacre.Mesh, views: int, *, sensor: str, seed: int
     return Case(name, camera, depths, [None] * views, list(poses), mesh)
 
 
+def photograph(
+    mesh: nacre.Mesh,
+    camera: nacre.Camera,
+    pose: Array,
+    waves: Array,
+    phases: Array,
+    exposure: float,
+    rng: np.random.Generator,
+) -> Array:
+    """Return a colour image of surfaces that are printed with waves [rad/m], with a camera's noise."""
+    v, u = np.mgrid[0 : camera.height, 0 : camera.width]
+    rays = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(u.shape)], axis=-1)
+    points = (mesh.simulate_depth(camera, pose)[..., None] * rays) @ pose[:3, :3].T + pose[:3, 3]
+    shade = sum(np.sin(points @ w + p) for w, p in zip(waves, phases, strict=True))
+    value = exposure * (120 + 10 * shade) + rng.normal(0, 3, u.shape)
+    gray = np.clip(np.nan_to_num(value), 0, 255).astype(np.uint8)
+    return np.repeat(gray[..., None], 3, axis=-1)
+
+
 def poster(views: int, *, colored: bool, seed: int) -> Case:
     """Return a camera that moves along a printed wall, which leaves three directions to its colours."""
     rng = np.random.default_rng(seed)
     camera = nacre.Camera(320, 240, 262.5, 262.5, 159.5, 119.5)
     corners = np.array([[-4, -3, 0], [4, -3, 0], [4, 3, 0], [-4, 3, 0]], float)
     wall = nacre.Mesh(corners, np.array([[0, 2, 1], [0, 3, 2]]))
-    waves = rng.normal(size=(30, 2)) * rng.uniform(10, 60, (30, 1))  # details of 5 to 30 cm
+    waves = np.zeros((30, 3))
+    waves[:, :2] = rng.normal(size=(30, 2)) * rng.uniform(10, 60, (30, 1))  # details of 5 to 30 cm
     phases = rng.uniform(0, 2 * math.pi, 30)
     depths: list[Array] = []
     colors: list[Array | None] = []
@@ -134,16 +154,9 @@ def poster(views: int, *, colored: bool, seed: int) -> Case:
         yaw = np.array([[math.cos(b), 0, math.sin(b)], [0, 1, 0], [-math.sin(b), 0, math.cos(b)]])
         pose[:3, :3] = yaw @ roll
         pose[:3, 3] = (0.012 * i, 0.1 * math.sin(i / 11), -1.0 + 0.1 * math.sin(i / 13))
-        exact = wall.simulate_depth(camera, pose)
-        v, u = np.mgrid[0:240, 0:320]
-        rays = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(u.shape)], axis=-1)
-        points = (exact[..., None] * rays) @ pose[:3, :3].T + pose[:3, 3]
-        shade = sum(np.sin(points[..., :2] @ w + p) for w, p in zip(waves, phases, strict=True))
-        gain = 1 + 0.1 * math.sin(i / 5)  # the camera's exposure
-        value = gain * (120 + 10 * shade) + rng.normal(0, 3, shade.shape)
-        gray = np.clip(np.nan_to_num(value), 0, 255).astype(np.uint8)
+        image = photograph(wall, camera, pose, waves, phases, 1 + 0.1 * math.sin(i / 5), rng)
         depths.append(wall.simulate_depth(camera, pose, noise="kinect", seed=1000 * seed + i))
-        colors.append(np.repeat(gray[..., None], 3, axis=-1) if colored else None)
+        colors.append(image if colored else None)
         truths.append(pose)
     return Case("poster", camera, depths, colors, truths, wall)
 

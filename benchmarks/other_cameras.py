@@ -137,12 +137,17 @@ def passing(step: int, count: int) -> list[Array]:
     return list(poses)
 
 
-def figure(name: str) -> nacre.Mesh:
-    """Return a mesh at the size of a person or an animal, its head up, where y points down."""
-    mesh = nacre.read_mesh(cases.DATA / "meshes" / f"{name}.obj")
+def upright(name: str, size: float) -> nacre.Mesh:
+    """Return a mesh of a size about the origin, its head up, where y points down."""
+    mesh = cases.object_mesh(name)
     vertices = np.asarray(mesh.vertices, float) * [1, -1, -1]
     vertices -= (vertices.max(axis=0) + vertices.min(axis=0)) / 2
-    return nacre.Mesh(vertices * HEIGHTS[name] / np.ptp(vertices, axis=0).max(), mesh.triangles)
+    return nacre.Mesh(vertices * size / np.ptp(vertices, axis=0).max(), mesh.triangles)
+
+
+def figure(name: str) -> nacre.Mesh:
+    """Return a mesh at the size of a person or an animal."""
+    return upright(name, HEIGHTS[name])
 
 
 def office() -> list[tuple[Array, Array]]:
@@ -189,12 +194,10 @@ def people(rate: int, count: int) -> tuple[list[nacre.Mesh], list[Array]]:
     return meshes, poses
 
 
-def standing(name: str, height: float, turn: float, place: list[float]) -> tuple[Array, Array]:
-    """Return a mesh of a height, turned about the vertical, that stands at a place."""
-    mesh = cases.object_mesh(name)
-    vertices = np.asarray(mesh.vertices, float) * [1, -1, -1]
-    vertices -= (vertices.max(axis=0) + vertices.min(axis=0)) / 2
-    vertices *= height / np.ptp(vertices, axis=0).max()
+def standing(name: str, size: float, turn: float, place: list[float]) -> tuple[Array, Array]:
+    """Return a mesh of a size, turned about the vertical, that stands at a place."""
+    mesh = upright(name, size)
+    vertices: Array = np.asarray(mesh.vertices, float)
     cos, sin = math.cos(turn), math.sin(turn)
     vertices = vertices @ np.array([[cos, 0, -sin], [0, 1, 0], [sin, 0, cos]]).T
     vertices[:, 1] -= vertices[:, 1].max()
@@ -328,16 +331,10 @@ def colors_of(mesh: nacre.Mesh, camera: nacre.Camera, poses: list[Array]) -> lis
     waves = rng.normal(size=(30, 3))
     waves *= (rng.uniform(10, 60, 30) / np.linalg.norm(waves, axis=1))[:, None]  # details of 5 to 30 cm
     phases = rng.uniform(0, 2 * math.pi, 30)
-    v, u = np.mgrid[0 : camera.height, 0 : camera.width]
-    rays = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(u.shape)], axis=-1)
-    images: list[Array | None] = []
-    for k, pose in enumerate(poses):
-        points = (mesh.simulate_depth(camera, pose)[..., None] * rays) @ pose[:3, :3].T + pose[:3, 3]
-        shade = sum(np.sin(points @ w + p) for w, p in zip(waves, phases, strict=True))
-        value = (1 + 0.1 * math.sin(k / 5)) * (120 + 10 * shade) + rng.normal(0, 3, shade.shape)
-        gray = np.clip(np.nan_to_num(value), 0, 255).astype(np.uint8)
-        images.append(np.repeat(gray[..., None], 3, axis=-1))
-    return images
+    return [
+        cases.photograph(mesh, camera, pose, waves, phases, 1 + 0.1 * math.sin(k / 5), rng)
+        for k, pose in enumerate(poses)
+    ]
 
 
 def make(scene: str, sensor: str, speed: int, count: int, colored: bool = False) -> cases.Case:

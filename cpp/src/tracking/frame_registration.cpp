@@ -181,21 +181,21 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   const TrackingResult result = test(std::move(by_shape), surfaces, guess, expectation);
   const Pose& pose = result.alignment.target_from_source;
   const bool may_stick = is_at_rest(pose);
-  const WeakTest noisy{pairing.options.weak_threshold,
-                       may_stick ? registration_limits::signal_at_rest : registration_limits::least_signal};
-  const bool is_doubtful = result.alignment.signal < noisy.least_signal;
+  const WeakTest by_noise{pairing.options.weak_threshold,
+                          may_stick ? registration_limits::signal_at_rest : registration_limits::least_signal};
+  const bool is_doubtful = result.alignment.signal < by_noise.least_signal;
   const bool is_unclear = !result.is_clear_cut && result.alignment.signal < registration_limits::least_signal;
   const bool is_surprise = result.expectation == Expectation::expected && !are_close(pose, guess);
   const bool may_slide = is_surprise || (are_close(pose, target_.last_view.world_from_camera) &&
                                          result.alignment.signal < registration_limits::signal_at_rest);
-  WeakTest doubt = noisy;
+  WeakTest doubt = by_noise;
   std::optional<ColorRegistration> colors;
   if (may_slide || is_unclear) colors = colors_of(surfaces.view, pairing, pairing.source.few(1));
   if (colors && may_slide) doubt.least_signal = registration_limits::signal_at_rest;
   if (colors && is_surprise) doubt.told_otherwise = colors->information(result.alignment);
   if (colors && !is_unclear && !contradict(*colors, pairing, pose, doubt)) {
     colors.reset();
-    doubt = noisy;
+    doubt = by_noise;
   }
   if (!colors && !is_doubtful) return result;
   std::optional<IcpResult> other_alignment = without_doubtful(pairing, colors, start, pose, doubt);
