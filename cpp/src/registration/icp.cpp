@@ -203,6 +203,8 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   result.shape_information = last.shape / variance;
   result.weak_directions = last.weak_directions;
   result.signal = last.signal;
+  result.weakest = last.weakest;
+  result.weakest_part = last.weakest_part;
   return result;
 }
 

@@ -12,6 +12,8 @@ struct IcpResult : AlignResult {
   double residual_ratio = std::numeric_limits<double>::quiet_NaN();  // residuals to the largest they may be, rms
   Matrix6 shape_information = Matrix6::Zero();                       // the part of it on which normals agree
   double signal = infinity<double>;                                  // see IcpStep
+  Vector6 weakest = Vector6::Zero();                                 // see IcpStep
+  double weakest_part = infinity<double>;                            // see IcpStep
   WeakTest weak_test;                                                // by which directions are weak
   double normal_information = 0.0;                                   // see normal_information
   double off_planes = 0.0;                                           // see share_off_planes

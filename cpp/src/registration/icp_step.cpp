@@ -132,7 +132,11 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, const WeakTest
   for (Eigen::Index i = 0; i < 6; ++i) {
     append_column(has_test && eigen.values[i] < needed[i] ? step.weak_directions : sure, eigen.vectors.col(i));
   }
-  if (has_test) step.signal = eigen.values.cwiseQuotient(feigned.cwiseMax(least)).minCoeff();
+  if (has_test) {
+    step.signal = eigen.values.cwiseQuotient(feigned.cwiseMax(least)).minCoeff();
+    step.weakest = eigen.vectors.col(0).cwiseQuotient(scale);
+    step.weakest_part = eigen.values[0] / sums.agreement;
+  }
   const bool is_free = sure.cols() == 6 && along.cols() == 0;
   if (along.cols() > 0) sure = along;
   Matrix6 damped = equations.hessian;

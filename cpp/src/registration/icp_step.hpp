@@ -39,7 +39,10 @@ struct IcpStep {
   Matrix6 shape = Matrix6::Zero();    // what the normals of both sides agree on of the hessian
   // The information that normals agree on, by what noise in them feigns, in the direction where that is least.
   double signal = infinity<double>;
-  TwistBasis weak_directions;  // about center
+  // That direction: a twist (rotation [rad], translation [m]) about center, that moves the pairs by some 1 m;
+  Vector6 weakest = Vector6::Zero();
+  double weakest_part = infinity<double>;  // and the information along it, per pair that agrees
+  TwistBasis weak_directions;              // about center
 };
 
 // What the normals of a source and of the target tell about each other, for each pair: their mutual information, were

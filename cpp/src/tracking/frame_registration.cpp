@@ -178,7 +178,10 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
     determine_open_directions(pairing, colors_of(surfaces.view, pairing, pairing.source), by_shape);
     return test(std::move(by_shape), surfaces, guess, expectation);
   }
-  const TrackingResult result = test(std::move(by_shape), surfaces, guess, expectation);
+  TrackingResult result = test(std::move(by_shape), surfaces, guess, expectation);
+  if (expectation == Expectation::expected && gate == Gate::narrow) {
+    result = best_along_weakest(std::move(result), surfaces, pairing, guess, expectation);
+  }
   const Pose& pose = result.alignment.target_from_source;
   const bool may_stick = is_at_rest(pose);
   const WeakTest by_noise{pairing.options.weak_threshold,
@@ -210,6 +213,35 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   const bool is_better = may_stick ? other.score > tracking_limits::clearly_better * result.score
                                    : result.score < tracking_limits::clearly_better * other.score;
   return is_better ? other : result;
+}
+
+// Where few matches tell of a direction, a registration may come to rest beside the right place, at the next door frame
+// of a corridor: the rest fits there, too, and what does not counts as new. Then frame and model contradict each other
+// more than usual, and other places along that direction are tried.
+TrackingResult FrameRegistration::best_along_weakest(TrackingResult found, const Surfaces& surfaces,
+                                                     const Pairing& pairing, const Pose& guess,
+                                                     Expectation expectation) const {
+  for (int round = 0; round < tracking_limits::most_slides; ++round) {
+    const bool contradicts = !target_.usual || GlobalAlignOptions().max_rivalry * found.consistency.contradiction() >=
+                                                   target_.usual->contradiction();
+    const bool may_slide = found.alignment.weakest_part < 1.0 - tracking_limits::clearly_better;
+    if (found.is_lost() || !contradicts || !may_slide) break;
+    const IcpSource few = pairing.source.few();
+    const TrackingResult before = found;
+    const Pose& pose = before.alignment.target_from_source;
+    for (const double gates : {-2.0, -1.0, 1.0, 2.0}) {
+      const Vector6 slide = gates * pairing.options.max_distance * before.alignment.weakest;
+      const Pose start = motion_about(before.alignment.center, slide) * pose;
+      if (are_close(align_to(pairing.target, few, start, pairing.options).target_from_source, pose)) continue;
+      IcpResult alignment = align_to(pairing.target, pairing.source, start, pairing.options);
+      if (alignment.weak_directions.cols() > 0) continue;
+      const TrackingResult other = test(std::move(alignment), surfaces, guess, expectation);
+      const bool is_better = before.score < tracking_limits::clearly_better * other.score && found.score < other.score;
+      if (!other.is_lost() && is_better) found = other;
+    }
+    if (!(found.score > before.score)) break;
+  }
+  return found;
 }
 
 // Whether they would move the camera by a pixel or more at once.

@@ -110,6 +110,8 @@ class FrameRegistration {
   bool is_at_rest(const Pose& world_from_camera) const;
   TrackingResult registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
                             Expectation expectation) const;
+  TrackingResult best_along_weakest(TrackingResult found, const Surfaces& surfaces, const Pairing& pairing,
+                                    const Pose& guess, Expectation expectation) const;
   // Nothing where one side has no colours. The pairing outlives it.
   std::optional<ColorRegistration> colors_of(const PointsInView& view, const Pairing& pairing, IcpSource samples) const;
   bool contradict(const ColorRegistration& colors, const Pairing& pairing, const Pose& pose,

@@ -12,6 +12,7 @@ namespace nacre::tracking_limits {
 
 constexpr std::size_t most_target_points = 30000;  // [points] budget: that a frame is registered to; benchmarks/run.py
 constexpr double view_margin = 1.0 / 3.0;  // [image] tuned: on each side of it, that points to register a frame to may be in; teddy
+constexpr int most_slides = 3;  // [1] budget: of a registration, along the direction of which the shapes tell least; test_open_directions
 constexpr double largest_reach = 0.03;  // [size] tuned: of matches, in diameters of the smaller surface; bunny12
 constexpr double reach_spacings = 1.5;  // [spacing] tuned: of matches along the surface; scans
 constexpr double narrow_gate = 4.0;  // [reach] tuned: of matches at first, from a guess that is about right; teddy
