@@ -92,7 +92,7 @@ class FrameRegistration {
     IcpSource source;
     AlignOptions options;
   };
-  // What stays, as seen from a pose; nothing where nothing moves.
+  // What stays, as seen from a pose; nothing where nothing moves: moving_things.cpp.
   struct Still {
     IcpSource samples;
     std::vector<std::int32_t> points;  // of the view
@@ -110,6 +110,7 @@ class FrameRegistration {
   bool is_at_rest(const Pose& world_from_camera) const;
   TrackingResult registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
                             Expectation expectation) const;
+  // The best of what is found from places beside it, in the direction of which the shapes tell least.
   TrackingResult best_along_weakest(TrackingResult found, const Surfaces& surfaces, const Pairing& pairing,
                                     const Pose& guess, Expectation expectation) const;
   // Nothing where one side has no colours. The pairing outlives it.
