@@ -128,6 +128,14 @@ def test_a_wrong_frame_is_lost_and_changes_no_byte(case: str) -> None:
     goes_on(model)
 
 
+def test_of_a_camera_that_is_lost_a_few_points_say_whether_it_still_is() -> None:
+    model = grown()
+    first, second = (model.add_frame(WRONG["another scene"]()) for _ in range(2))
+    assert [first.status, second.status] == ["LOST", "LOST"]
+    assert first.num_inliers / first.overlap > 601
+    assert second.num_inliers / second.overlap == pytest.approx(600)
+
+
 @pytest.mark.parametrize("factor", [1000, 0.001, 0.1, 200])
 def test_millimetres_for_metres_are_refused(factor: float) -> None:
     model = grown()

@@ -74,6 +74,7 @@ Acceptance accept(const IcpResult& alignment, const Consistency& consistency, Ex
   reason.precision(3);
   if (alignment.status == AlignStatus::too_few_pairs) {
     acceptance.reason = "too few points of the frame match the model";
+    acceptance.is_hopeless = true;
     return acceptance;
   }
   const Demands demands = demands_on(expectation);
@@ -104,6 +105,9 @@ Acceptance accept(const IcpResult& alignment, const Consistency& consistency, Ex
            << " of the largest that match";
     if (bent > 1.0) reason << ", bent " << bent << " times as much as true matches may be";
     if (beyond_planes < 1.0) reason << ", all but " << alignment.off_planes << " on three planes";
+    const double near = GlobalAlignOptions().max_rivalry;
+    acceptance.is_hopeless = acceptance.score < near * only_near_score * options.min_score &&
+                             acceptance.relocalisation_score < near * registration_limits::chance_relocalisation;
   } else if (options.verify && !is_determined) {
     // Where the camera was says nothing of a far place, and cannot stand in for what is open there.
     if (expectation != Expectation::unexpected) acceptance.decision = Decision::undetermined;

@@ -53,6 +53,8 @@ struct Acceptance {
   double relocalisation_score = 0.0;
   // Most of the source matches, closely, and nothing contradicts: no other guess needs to be tried.
   bool is_clear_cut = false;
+  // Neither score comes near what is asked of any place: where a few points say so, all need not be asked.
+  bool is_hopeless = false;
 };
 
 // The registration score is what the matches tell against chance: for each a residual that is small among those that

@@ -47,6 +47,13 @@ TrackingResult FrameRegistration::whole_from(const Pose& start, const Pose& gues
 TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
                                              Expectation expectation) const {
   const Pairing pairing = paired(surfaces, gate);
+  if (asks_few_first_) {
+    AlignOptions coarse = pairing.options;
+    coarse.max_iterations = std::min(coarse.max_iterations, tracking_limits::most_coarse_turn_steps);
+    IcpResult few = align_to(pairing.target, pairing.source.few(), start, coarse);
+    const TrackingResult of_few = test(std::move(few), surfaces, guess, expectation);
+    if (of_few.is_hopeless) return of_few;
+  }
   IcpResult by_shape = align_to(pairing.target, pairing.source, start, pairing.options);
   if (by_shape.weak_directions.cols() > 0) {
     determine_open_directions(pairing, colors_of(surfaces.view, pairing, pairing.source), by_shape);
@@ -106,7 +113,10 @@ TrackingResult FrameRegistration::best_along_weakest(TrackingResult found, const
     for (const double gates : {-2.0, -1.0, 1.0, 2.0}) {
       const Vector6 slide = gates * pairing.options.max_distance * before.alignment.weakest;
       const Pose start = motion_about(before.alignment.center, slide) * pose;
-      if (are_close(align_to(pairing.target, few, start, pairing.options).target_from_source, pose)) continue;
+      IcpResult by_few = align_to(pairing.target, few, start, pairing.options);
+      if (are_close(by_few.target_from_source, pose)) continue;
+      const TrackingResult of_few = test(std::move(by_few), surfaces, guess, expectation);
+      if (of_few.score < GlobalAlignOptions().max_rivalry * before.score) continue;
       IcpResult alignment = align_to(pairing.target, pairing.source, start, pairing.options);
       if (alignment.weak_directions.cols() > 0) continue;
       const TrackingResult other = test(std::move(alignment), surfaces, guess, expectation);

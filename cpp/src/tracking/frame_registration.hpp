@@ -65,6 +65,8 @@ class FrameRegistration {
   bool has_automatic_gate() const { return !(options_.registration.max_distance > 0.0); }
 
   void include_older_points();
+  // From now on a few points tell whether it is worth while to ask all.
+  void ask_few_points_first() { asks_few_first_ = true; }
   const PointsInView& in_view(const Pose& world_from_camera) const;  // of the model
   const IcpSource& source() const { return source_; }
   double depth() const { return depth_; }
@@ -132,6 +134,7 @@ class FrameRegistration {
   CurrentFrame now_;
   TrackingTarget target_;
   const TrackingOptions& options_;
+  bool asks_few_first_ = false;
   IcpSource source_;
   Values noise_;  // of the sampled points [m]
   double depth_;  // of the sampled points, the median [m]

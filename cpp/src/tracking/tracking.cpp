@@ -34,7 +34,8 @@ void guess_where_followed(TrackingPrior& prior) {
   prior.is_predicted = prior.followed->is_determined;
 }
 
-// With a narrow gate first, which is safest. From the best of the guesses it is asked whether something moves.
+// With a narrow gate first, which is safest. From the best of the guesses it is asked whether something moves. Of a
+// camera that is lost already, only the most trusted guess is tried with a wide one.
 void try_guesses(const FrameRegistration& registration, TrackingPrior& prior, TrackingResult& best) {
   using Gate = FrameRegistration::Gate;
   for (const Gate gate : {Gate::narrow, Gate::wide}) {
@@ -48,7 +49,7 @@ void try_guesses(const FrameRegistration& registration, TrackingPrior& prior, Tr
       if (nearest && found.rank() < nearest->rank()) continue;
       nearest = found;
       start = &guess;
-      if (found.is_clear_cut) break;
+      if (found.is_clear_cut || (gate == Gate::wide && prior.was_lost)) break;
     }
     if (!nearest) return;
     if (gate == Gate::narrow) {
@@ -126,7 +127,9 @@ std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& reg
                                                     const std::optional<Consistency>& usual) {
   if (!prior.has_moved || !prior.followed || !prior.followed->is_determined) return std::nullopt;
   const Pose& followed = prior.followed->world_from_camera;
-  prior.tried.push_back(registration.from(followed, FrameRegistration::Gate::narrow, prior.expectation));
+  if (!prior.guesses_followed) {
+    prior.tried.push_back(registration.from(followed, FrameRegistration::Gate::narrow, prior.expectation));
+  }
   TrackingResult best;
   for (TrackingResult place : prior.tried) {
     if (!odometry.allows(place.alignment.target_from_source, tracking_limits::least_new_view)) continue;
@@ -199,6 +202,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   odometry.look_at(source);
   prior.depth = registration.depth();
   if (prior.was_lost) {
+    registration.ask_few_points_first();
     follow();
     guess_where_followed(prior);
   }

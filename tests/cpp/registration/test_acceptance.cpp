@@ -65,6 +65,34 @@ TEST_CASE("the more speaks for a place, the less is asked of the frame") {
   CHECK(tested(faint, Expectation::near_lost).decision == Decision::rejected);
 }
 
+TEST_CASE("what is hopeless anywhere is believed nowhere") {
+  const Expectation all[] = {Expectation::expected,  Expectation::near_lost, Expectation::beside,
+                             Expectation::only_near, Expectation::confirmed, Expectation::unexpected};
+  int num_hopeless = 0;
+  for (double overlap = 0.05; overlap < 1.0; overlap += 0.05) {
+    const auto covered = [&](Registration& result) { result.alignment.overlap = overlap; };
+    for (const Expectation here : all) {
+      if (!tested(covered, here).is_hopeless) continue;
+      ++num_hopeless;
+      for (const Expectation there : all) CHECK(tested(covered, there).decision == Decision::rejected);
+    }
+  }
+  CHECK(num_hopeless > 0);
+  CHECK_FALSE(tested([](Registration& result) { result.alignment.overlap = 0.05; }, Expectation::expected,
+                     {0.3, false, std::nullopt})
+                  .is_hopeless);
+}
+
+TEST_CASE("too few pairs are hopeless") {
+  CHECK(tested([](Registration& result) { result.alignment.status = AlignStatus::too_few_pairs; }).is_hopeless);
+}
+
+TEST_CASE("what may be another view of a place that others speak for is not hopeless") {
+  const auto partial = [](Registration& result) { result.alignment.overlap = 0.2; };  // matches closely, where it does
+  CHECK(tested(partial).decision == Decision::rejected);
+  CHECK_FALSE(tested(partial).is_hopeless);
+}
+
 TEST_CASE("what the frame before confirms needs less, but not nothing") {
   const auto faint = [](Registration& result) { result.alignment.overlap = 0.35; };
   const auto too_faint = [](Registration& result) { result.alignment.overlap = 0.25; };
