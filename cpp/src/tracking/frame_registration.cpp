@@ -60,7 +60,9 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
     return test(std::move(by_shape), surfaces, guess, expectation);
   }
   TrackingResult result = test(std::move(by_shape), surfaces, guess, expectation);
-  if (expectation == Expectation::expected && gate == Gate::narrow) {
+  // What moves before the scene contradicts it wherever the camera is, unless it is left out.
+  const bool is_still = surfaces.moving > 0.0 || !target_.still_scene.is_passed();
+  if (expectation == Expectation::expected && gate == Gate::narrow && is_still) {
     result = best_along_weakest(std::move(result), surfaces, pairing, guess, expectation);
   }
   const Pose& pose = result.alignment.target_from_source;

@@ -22,6 +22,8 @@ class StillScene {
 
   // The newest registered frame, of which `still` shows the scene (empty: all of it).
   void add(const CoarseFrame& cells, const MaskImage& still, const Pose& world_from_camera, double margin);
+  // Whether something moved before it in the newest registered frame.
+  bool is_passed() const { return !moved_.empty(); }
   // The world has moved.
   void move(const Pose& motion);
 
