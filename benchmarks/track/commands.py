@@ -43,8 +43,8 @@ def program(command: list[str], *arguments: str | Path | float) -> tuple[str, fl
 
 
 def reconstruct(recording: Path, out: Path, *settings: str) -> float:
-    """Run ``nacre reconstruct``; return the processor time [s]."""
-    return program(NACRE, "reconstruct", recording, "-o", out, "--quiet", *settings)[1]
+    """Run ``nacre reconstruct``, however few frames it tracks; return the processor time [s]."""
+    return program(NACRE, "reconstruct", recording, "-o", out, "--quiet", "--min-tracked", "0", *settings)[1]
 
 
 def run_peer(name: str, recording: Path, out: Path, voxel: float | None) -> float:
