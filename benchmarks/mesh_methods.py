@@ -36,11 +36,11 @@ def nacre_closed(scene: Scene) -> Laid:
 
 
 def open3d_poisson(scene: Scene) -> Laid:
-    """Screened Poisson, cells of half the spacing, as `close_surface` has them."""
+    """Screened Poisson, cells of about half the spacing, as `close_surface` has them."""
     from open3d.geometry import TriangleMesh
 
     extent = float(np.ptp(scene.cloud.points, axis=0).max())
-    depth = int(np.ceil(np.log2(1.1 * extent / scene.spacing))) + 1
+    depth = round(np.log2(1.1 * extent / scene.spacing)) + 1
     return _of_open3d(scene, TriangleMesh.create_from_point_cloud_poisson(_cloud(scene), depth=depth)[0])
 
 

@@ -141,14 +141,26 @@ def photograph(browser, page, size, loaded="true"):
     return np.asarray(picture.resize((width, width * size[1] // size[0]), Image.Resampling.LANCZOS))
 
 
+def thickness(points):
+    """Return how thick a surface of points is, from each with its 16 nearest: mean, and for 95 % [mm]."""
+    neighbors = points[nacre.KdTree(points).query(points, 17)[1]].astype(float)
+    away = neighbors - neighbors.mean(axis=1, keepdims=True)
+    least = np.linalg.eigvalsh(np.einsum("nki,nkj->nij", away, away) / 17)[:, 0]
+    thick = 1000 * np.sqrt(np.maximum(least, 0))
+    return f"{thick.mean():.2f}, {np.quantile(thick, 0.95):.1f}"
+
+
 def surfaces():
-    """Draw models with all their points and as they are written, side by side."""
+    """Draw models with all their points and as they are written, side by side; print how thick they are."""
     panels = []
     with tempfile.TemporaryDirectory() as scratch, Browser(Path(scratch) / "profile") as browser:
         for name in RECORDINGS:
             out = reconstructed(name, Path(scratch) / name, "--all-points", "--no-report")
             cloud = nacre.read_points(out / "model.ply")
             written = cloud[on_surface(cloud.points, cloud.normals, cloud.attributes["confidence"])]
+            part = 1 - len(written) / len(cloud)
+            thick = f"{thickness(cloud.points)} | {thickness(written.points)}"
+            print(f"| {name} | {part:.1%} | {thick} |", flush=True)
             for title, points in (("all points", cloud), ("as written", written)):
                 nacre.write_points(out / "model.ply", points)
                 export_html(read_timeline(out), out / "page.html")

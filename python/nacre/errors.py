@@ -66,6 +66,10 @@ class RunError(Exception):
         self.code = code
 
 
+class CannotResumeError(RunError):
+    """A run that cannot go on with what an earlier one left: the message says why."""
+
+
 _repr = reprlib.Repr()
 _repr.maxlist = _repr.maxdict = 10
 _repr.maxstring = _repr.maxother = 60

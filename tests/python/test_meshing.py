@@ -197,6 +197,25 @@ class TestCloseSurface:
         radii = np.linalg.norm(surface.vertices, axis=1)
         assert np.sqrt(np.mean((radii - 0.1) ** 2)) < 0.37 * noise
 
+    @pytest.mark.parametrize("scale", [0.7, 1.0, 1.4])
+    def test_its_cells_are_half_as_large_as_points_are_apart(self, scale: float) -> None:
+        points, normals = sphere(6000)
+        points, normals = scale * points[points[:, 2] < 0.05], normals[points[:, 2] < 0.05]
+        apart = np.median(nacre.KdTree(points).query(points, 7)[0][:, 1:].mean(axis=1))
+        vertices = close_surface(points, normals).vertices
+        # Marching cubes cut the edges of cells: two coordinates of each vertex are multiples of their size.
+        values, counts = np.unique(np.round(vertices[:, 0], 7), return_counts=True)
+        cell = np.median(np.diff(values[counts > 8]))
+        assert 0.35 < cell / apart < 0.71
+
+    def test_a_bubble_through_a_few_stray_points_goes(self) -> None:
+        points, normals = sphere(4000)
+        few, outwards = sphere(20)
+        stray = 0.08 * few + [0.3, 0, 0]
+        surface = close_surface(np.concatenate([points, stray]), np.concatenate([normals, outwards]))
+        assert surface.vertices[:, 0].max() < 0.11
+        assert largest_part(surface.triangles).shape == surface.triangles.shape
+
     def test_a_sphere_without_its_cap_is_closed_and_the_cap_is_a_guess(self) -> None:
         points, normals = sphere(4000)
         low = points[:, 2] < 0.08

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from nacre.cli.terminal import CommandError
-from nacre.errors import FileFormatError, RunError, UnknownRecordingError
+from nacre.errors import CannotResumeError, FileFormatError, RunError, UnknownRecordingError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -76,6 +76,8 @@ def in_option_words() -> Iterator[None]:
     except FileFormatError as error:
         code = 2 if isinstance(error, UnknownRecordingError) else 1
         raise CommandError(option_words(str(error)), code) from error
+    except CannotResumeError as error:
+        raise CommandError(f"{error}; run it again without --resume", error.code) from error
     except RunError as error:
         raise CommandError(option_words(str(error)), error.code) from error
 
@@ -88,6 +90,8 @@ def option_words(reason: str) -> str:
         text += f" Known formats: {names}; see nacre reconstruct --help."
     text = text.replace("camera and depth_scale not known", "--camera and --depth-scale are needed")
     text = text.replace("check depth_scale,", "give --depth-scale,")
+    text = text.replace("attribute needs", "--attribute needs")
+    text = text.replace("overwrite begins", "--overwrite begins")
     text = text.replace("Give camera= and depth_scale=", "Give --camera FILE.json and --depth-scale")
     for name in ("camera", "depth_scale"):
         option = name.replace("_", "-")

@@ -5,19 +5,23 @@ from __future__ import annotations
 import dataclasses
 import math
 import warnings
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from nacre import _core
 from nacre._internal import arrays
 from nacre._internal.value_equality import Value
 from nacre.kdtree import KdTree
-from nacre.meshing.triangulation import triangulate
+from nacre.meshing.triangulation import triangulate, used_rows
 
 _MISSING = 'closed surfaces need gpytoolbox: pip install "nacre[closed]"'
-_MOST_HALVINGS = 12  # of the box, budget: more than 4096 cells a side would take hours
-_BOX = 1.1  # of the points' extent: Kazhdan's
-_SCREENING = 5.0  # tuned (benchmarks/meshing.py): more follows stray points, less rounds edges off
+_MOST_HALVINGS = 12  # of the box: no more are taken by it
+_BOX = 3.2  # of the points' extent: gpytoolbox's, measured (test_closed_surface)
+_SCREENED_NOISE = 0.17  # of the distance between points, tuned: with so much, points and normals weigh alike
+_LEAST_PART = 30  # points: as of a surface, cpp/src/mesh/limits.hpp; parts through fewer are bubbles
+_MOST_SCREENING = 10.0  # tuned (benchmarks/meshing.py, as the former): more follows stray points
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -30,7 +34,8 @@ class ClosedSurface(Value):
     vertices : (V, 3) float64
         [m].
     triangles : (T, 3) int32
-        Vertex indices, counter-clockwise seen from outside; each edge has two.
+        Vertex indices, counter-clockwise seen from outside; each edge has two, but where a guess ends at the
+        box of three times the points' extent.
     normals : (V, 3) float64
         Unit vectors that point outwards.
     is_seen : (V,) bool
@@ -68,7 +73,10 @@ def close_surface(points: npt.ArrayLike, normals: npt.ArrayLike) -> ClosedSurfac
     -----
     M. Kazhdan and H. Hoppe, "Screened Poisson Surface Reconstruction", 2013, by the authors' program, through
     the points and the middles of the triangles of :func:`triangulate`, so that it does not sag in between.
-    Its finest cells are half as large as the distance between points, but no finer than 1/4096 of the extent.
+    How much points weigh against their normals (their screening) follows from how far they lie from their
+    neighbours' middle: exact points are kept, noisy ones averaged.
+    Its finest cells are about half as large as the distance between points (0.35 to 0.71, as a box is
+    halved), but no finer than 1/1280 of the extent.
     """
     positions = arrays.as_points("points", points)
     directions = arrays.as_unit_rows("normals", normals, "points", len(positions))
@@ -83,25 +91,54 @@ def close_surface(points: npt.ArrayLike, normals: npt.ArrayLike) -> ClosedSurfac
         raise ImportError(_MISSING, name="gpytoolbox") from error
     local, origin = arrays.localize(positions[usable])
     tree = KdTree(local)
-    spacings = tree.query(local, 7)[0][:, 1:].mean(axis=1)
+    apart, neighbors = tree.query(local, 7)
+    spacings = apart[:, 1:].mean(axis=1)
     spacing, extent = float(np.median(spacings)), float(np.ptp(local, axis=0).max())
     if not 0 < spacing < extent:
         raise ValueError("points must be spread over a surface, but most of them are in one place")
-    halvings = min(math.ceil(math.log2(_BOX * extent / spacing)) + 1, _MOST_HALVINGS)
+    halvings = min(round(math.log2(_BOX * extent / spacing)) + 1, _MOST_HALVINGS)
     vertices, triangles = point_cloud_to_mesh(
         *_with_middles(local.astype(np.float64), directions[usable].astype(np.float64)),
         psr_depth=halvings,
-        psr_screening_weight=_SCREENING,
+        psr_screening_weight=_screening(local, directions[usable], neighbors[:, 1:], spacings),
     )
+    triangles = np.ascontiguousarray(triangles, np.int32)
     if not len(triangles):
         raise ValueError("points and normals make no surface")
     distances, nearest = tree.query(vertices, 1)
+    is_seen = distances <= 2 * np.maximum(spacings[nearest], spacing)
+    rows, triangles = used_rows(_without_bubbles(triangles, np.where(is_seen, nearest, -1)))
     return ClosedSurface(
-        vertices + origin,
-        np.ascontiguousarray(triangles, np.int32),
-        _vertex_normals(vertices, triangles),
-        distances <= 2 * np.maximum(spacings[nearest], spacing),
+        vertices[rows] + origin,
+        triangles,
+        _vertex_normals(vertices[rows], triangles),
+        is_seen[rows],
     )
+
+
+def _without_bubbles(
+    triangles: npt.NDArray[np.int32], nearest: npt.NDArray[np.integer[Any]]
+) -> npt.NDArray[np.int32]:
+    """Leave parts out that go through few points; each vertex has the row of its nearest one, or -1."""
+    parts = _core.connected_parts(triangles, len(nearest))
+    through = np.unique(np.stack([parts, nearest])[:, nearest >= 0], axis=1)[0]
+    num_points = np.bincount(through, minlength=int(parts.max()) + 1)
+    is_part = num_points >= min(_LEAST_PART, num_points.max())
+    kept: npt.NDArray[np.int32] = triangles[is_part[parts[triangles[:, 0]]]]
+    return kept
+
+
+def _screening(
+    points: npt.NDArray[np.float32],
+    normals: npt.NDArray[np.floating[Any]],
+    neighbors: npt.NDArray[np.integer[Any]],
+    spacings: npt.NDArray[np.float32],
+) -> float:
+    """Return how much points weigh against their normals: by the square of how exact they show to be."""
+    offsets = np.einsum("ij,ij->i", points[neighbors].mean(axis=1) - points, normals)
+    noise = 1.4826 * np.median(np.abs(offsets) / np.maximum(spacings, np.finfo(np.float32).tiny))
+    noise /= math.sqrt(1 + 1 / neighbors.shape[1])  # the neighbours' mean errs, too
+    return float(min((_SCREENED_NOISE / max(noise, 1e-6)) ** 2, _MOST_SCREENING))
 
 
 def _with_middles(

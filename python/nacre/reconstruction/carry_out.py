@@ -9,7 +9,7 @@ from contextlib import closing, suppress
 from typing import Any
 
 from nacre._internal.signals import Interruption, Stopped
-from nacre.errors import RunError
+from nacre.errors import CannotResumeError, RunError
 from nacre.reconstruction.description import describe_recording
 from nacre.reconstruction.job import Job
 from nacre.reconstruction.journal import ChangedRunError
@@ -65,7 +65,7 @@ def carry_out(
         try:
             _run(job, stop, listeners)
         except ChangedRunError as error:
-            raise RunError(f"{error}; run it again without --resume") from error
+            raise CannotResumeError(str(error)) from error
         if job.feed is not None and not (job.run.done.frames or stop.wanted):
             raise RunError(f"{job.feed.error or 'stopped before the first frame'}: nothing was recorded")
         if not stop.wanted:

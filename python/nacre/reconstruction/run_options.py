@@ -13,7 +13,7 @@ from nacre import __version__
 from nacre._internal.arrays import as_count, as_flag, as_number, as_scale
 from nacre._internal.core_options import leaves
 from nacre.datasets import open_sequence
-from nacre.errors import FileFormatError, RunError, shown
+from nacre.errors import CannotResumeError, FileFormatError, RunError, shown
 from nacre.evaluation.result import plain
 from nacre.parameters import ModelParameters
 
@@ -70,7 +70,7 @@ class RunOptions:
         for text in self.attribute:
             name, equals, images = text.partition("=")
             if not (name and equals and images):
-                raise RunError(f"--attribute needs NAME=FOLDER, got {text!r}", 2)
+                raise RunError(f"attribute needs NAME=FOLDER, got {text!r}", 2)
             sequence = sequence.with_attribute(name, path(images))
         return sequence if self.color else sequence.without_color()
 
@@ -118,7 +118,7 @@ def read_document(unfinished: UnfinishedRun) -> dict[str, Any]:
         if (out / "report.json").exists():
             raise RunError(f"{out} holds a run that is finished: there is nothing to resume", 2) from None
         what = f"{out} holds no unfinished run" if out.is_dir() else f"there is no folder {out}"
-        raise RunError(f"{what}; give the folder that nacre reconstruct wrote to (its -o)", 2) from None
+        raise RunError(f"{what}; give the folder that nacre reconstruct wrote to", 2) from None
 
 
 def checked(options: RunOptions) -> RunOptions:
@@ -145,15 +145,15 @@ def checked(options: RunOptions) -> RunOptions:
 
 
 def check_recording(document: Mapping[str, Any], sequence: Sequence) -> None:
-    """Compare a recording with what it was; a RunError says that it is another one."""
+    """Compare a recording with what it was; a CannotResumeError says that it is another one."""
     if document.get("nacre") != __version__:
         _log.warning("the run began with nacre %s; this is nacre %s", document.get("nacre"), __version__)
     before, now = document.get("recording"), sequence.digests()
     if before is None or before == now:
         return
     if before.get("files") != now["files"]:
-        raise RunError(
+        raise CannotResumeError(
             f"{sequence.path} is not the recording that it was: files were added, removed or have another "
-            "size; run it again without --resume",
+            "size"
         )
     _log.warning("%s: files were written again since the run began", sequence.path)

@@ -185,7 +185,9 @@ class TestRefused:
 
     def test_another_recording(self, killed: tuple[Path, Path]) -> None:
         (killed[0] / "depth" / "000006.png").unlink()
-        assert "not the recording that it was" in self.fails(1, "--resume", killed[1])
+        told = self.fails(1, "--resume", killed[1])
+        assert "not the recording that it was" in told
+        assert told.rstrip().endswith("run it again without --resume")
 
     def test_a_frame_that_changed_before_the_kill(self, killed: tuple[Path, Path]) -> None:
         image = killed[0] / "depth" / "000004.png"

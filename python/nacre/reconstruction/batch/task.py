@@ -135,8 +135,7 @@ def _reconstruct(task: Task, unfinished: UnfinishedRun) -> BatchResult:
         outcome = _go_on(task, unfinished)
     except (FileFormatError, RunError) as error:
         if not task.overwrite:
-            reason = str(error).removesuffix("; run it again without --resume")
-            raise RunError(f"{reason}; --overwrite begins it again") from error
+            raise RunError(f"{error}; overwrite begins it again") from error
         outcome = None
     if outcome is None:
         carry_out(begin_run(task.options, unfinished, task.parameters))

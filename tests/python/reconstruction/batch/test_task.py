@@ -105,9 +105,7 @@ def test_other_options_are_said_and_not_skipped(task_for: MakeTask, tmp_path: Pa
     before = results(tmp_path / "cup")
     result = reconstruct_recording(task_for(every=2))
     assert result.outcome == "failed"
-    assert result.message == (
-        "it was done with other options: every was 1, is 2; --overwrite begins it again"
-    )
+    assert result.message == "it was done with other options: every was 1, is 2; overwrite begins it again"
     assert results(tmp_path / "cup") == before
     assert reconstruct_recording(task_for(every=2, overwrite=True)).num_frames == 4
 
@@ -132,7 +130,7 @@ def test_damaged_files_are_told_and_replaced_if_wanted(task_for: MakeTask, tmp_p
     result = reconstruct_recording(task_for())
     assert result.outcome == "failed"
     assert file in result.message
-    assert result.message.endswith("--overwrite begins it again")
+    assert result.message.endswith("overwrite begins it again")
     assert path.read_text() == '{"cut short'
     assert reconstruct_recording(task_for(overwrite=True)).outcome == "reconstructed"
 
@@ -146,7 +144,7 @@ def test_what_cannot_go_on_is_told_and_begun_again_if_wanted(
     result = reconstruct_recording(task_for())
     assert result.outcome == "failed"
     assert "unfinished/checkpoint" in result.message
-    assert result.message.endswith("; --overwrite begins it again")
+    assert result.message.endswith("; overwrite begins it again")
     assert reconstruct_recording(task_for(overwrite=True)).outcome == "reconstructed"
     assert results(tmp_path / "cup") == alone["cup"]
 
