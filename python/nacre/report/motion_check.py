@@ -17,7 +17,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Jump:
-    """A step between two successive tracked frames that is out of line."""
+    """A step between two successive frames that were registered in all directions, which is out of line."""
 
     first: int  #: index of the frame before
     last: int  #: and of the one after
@@ -38,7 +38,7 @@ def find_jumps(frames: Sequence[ReportedFrame], distance_seen: float = 0.0) -> l
     A step counts per time, or per frame where the recording has no time stamps, and is held against the
     median of the steps around it, and against the upper quartile of all: a camera may begin to move, and
     views in any order are all far apart. Only steps count that move what is seen by a notable part of its
-    distance.
+    distance. A WEAK frame says itself that its pose is open in some directions: it is left out.
 
     Parameters
     ----------
@@ -51,7 +51,8 @@ def find_jumps(frames: Sequence[ReportedFrame], distance_seen: float = 0.0) -> l
     -------
     list of Jump
     """
-    tracked = [frame for frame in frames if frame.is_tracked and frame.world_from_camera is not None]
+    known = [frame for frame in frames if frame.is_tracked and frame.status != "WEAK"]
+    tracked = [frame for frame in known if frame.world_from_camera is not None]
     if len(tracked) <= MIN_STEPS:
         return []
     poses = np.array([frame.world_from_camera for frame in tracked], np.float64)

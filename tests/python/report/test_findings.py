@@ -91,6 +91,14 @@ class TestMotion:
             in sentence
         )
 
+    def test_where_directions_were_open_nothing_jumps(self) -> None:
+        frames = moved(walk(), range(8, 12), turned(0, x=0.5))
+        assert [jump.last for jump in find_jumps(frames)] == [8, 12]
+        weak = [with_figures(f, status="WEAK") if 8 <= i < 12 else f for i, f in enumerate(frames)]
+        assert not find_jumps(weak)
+        verdict = verdict_on(weak)
+        assert [finding.kind for finding in verdict.findings] == ["weak"]
+
     def test_a_camera_that_begins_to_move_does_not_jump(self) -> None:
         frames = [
             ReportedFrame(i, "TRACKED", world_from_camera=turned(0.5 * max(i - 10, 0) ** 2))
