@@ -255,6 +255,24 @@ class TestSimplify:
         radius = np.linalg.norm(vertices - [1e6, 0, 0], axis=1)
         assert np.abs(radius - 0.1).max() < 0.0005  # of edges of 16 mm, whose middle is 0.3 mm deep
 
+    def test_parts_that_touch_in_a_corner_do_not_grow_together(self) -> None:
+        points, normals = sphere(500)
+        triangles = triangulate(points, normals)
+        second = triangles + len(points)
+        second[second == len(points)] = 0  # the second sphere, beside the first, has its first corner
+        beside = points + 2 * points[0]
+        vertices, left = simplify(np.concatenate([points, beside]), np.concatenate([triangles, second]), 600)
+        assert 590 < len(left) <= 600
+        assert (edges(nacre.Mesh(vertices, left)) == 2).all()
+        assert 200 < len(largest_part(left)) < 400
+
+    def test_open_borders_stay_where_they_are(self) -> None:
+        x, y = (a.ravel() / 60 for a in np.mgrid[0:61, 0:61])
+        plane = np.stack([x, y, 0 * x], axis=1)
+        vertices, left = simplify(plane, triangulate(plane, np.tile([0, 0, 1.0], (len(plane), 1))), 100)
+        a, b, c = (vertices[left[:, i]] for i in range(3))
+        assert np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2 == pytest.approx(1, abs=0.01)
+
     def test_few_triangles_stay_as_they_are(self) -> None:
         points, normals = sphere(100)
         triangles = triangulate(points, normals)
@@ -267,7 +285,7 @@ class TestSimplify:
             simplify(np.eye(3), [[0, 1, 2]], 0)
 
     def test_without_the_library(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setitem(sys.modules, "fast_simplification", None)
+        monkeypatch.setitem(sys.modules, "gpytoolbox", None)
         with pytest.raises(ImportError, match=r'pip install "nacre\[simplify\]"'):
             simplify(np.eye(3), [[0, 1, 2], [2, 1, 0]], 1)
 

@@ -27,7 +27,7 @@ def test_numpy_is_the_only_requirement() -> None:
 
 
 # They have no wheel for some machines, or are larger than all the rest.
-NOT_FOR_ALL = {"realsense", "record3d", "rerun", "closed"}
+NOT_FOR_ALL = {"realsense", "record3d", "rerun"}
 
 
 def test_all_brings_every_extra_but_the_developers() -> None:

@@ -76,22 +76,31 @@ def mesh(
     terminal = Terminal(json, quiet, verbose)
     from nacre import read_points, write_mesh
     from nacre.io.meshes import require_mesh_suffix
-    from nacre.meshing import largest_part
+    from nacre.meshing import largest_part, part_sizes
 
+    if not source.exists():
+        raise CommandError(
+            f"there is no {source}: give the folder that nacre reconstruct wrote to, or points", 2
+        )
     path = written_file(source, "model.ply") if source.is_dir() else source
     target = writable_file(out or path.with_name("mesh.glb" if texture else "mesh.ply"))
     require_mesh_suffix(target, textured=texture)
     views = _views(source) if texture else []
     cloud = read_points(path)
     if cloud.normals is None:
-        raise CommandError(f"{path} has no normals: give a model of nacre reconstruct")
+        raise CommandError(f"{path} has no normals: nacre normals {path} OUT.ply estimates them")
     mesh = _closed(cloud) if closed else _open(cloud)
     if not len(mesh.triangles):
         raise CommandError(f"{path} has too few points for a surface, or normals that contradict it")
-    if keep is Keep.largest:
+    left_out = part_sizes(mesh.triangles)[1:] if keep is Keep.largest else []
+    if len(left_out):
         mesh = _used(dataclasses.replace(mesh, triangles=largest_part(mesh.triangles)))
     if num_triangles is not None:
         mesh = _simplified(mesh, num_triangles)
+        if len(mesh.triangles) > num_triangles:
+            terminal.say(
+                f"{len(mesh.triangles)} triangles are left: parts and holes do not vanish (--keep largest, --closed)"
+            )
     if texture:
         mesh = _textured(mesh, views)
     write_mesh(
@@ -111,15 +120,25 @@ def mesh(
     if mesh.texture is not None:
         figures["images"] = len(views)
         figures["texture"] = list(mesh.texture.image.shape[1::-1])
+    if len(left_out):
+        figures["left_out"] = left_out.tolist()
     if "seen" in mesh.attributes:
         figures["seen"] = float(mesh.attributes["seen"].mean())
     if not quiet:
-        terminal.answer(figures, [(name, _words(name, value)) for name, value in figures.items()])
+        terminal.answer(
+            figures, [(name.replace("_", " "), _words(name, value)) for name, value in figures.items()]
+        )
 
 
 def _words(name: str, value: Any) -> str:
     if name == "seen":
         return f"{value:.1%} of the corners; the others are a guess"
+    if name == "left_out":
+        return (
+            f"{len(value)} parts, of {value[0]} triangles at most"
+            if len(value) > 1
+            else f"a part of {value[0]}"
+        )
     return " x ".join(map(str, value)) if name == "texture" else str(value)
 
 

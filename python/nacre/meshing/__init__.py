@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from nacre.meshing.boundary import boundary_loops
 from nacre.meshing.closed_surface import ClosedSurface, close_surface
-from nacre.meshing.parts import largest_part
+from nacre.meshing.parts import largest_part, part_sizes
 from nacre.meshing.simplification import simplify
 from nacre.meshing.surface_points import on_surface
 from nacre.meshing.texture import Texture
@@ -21,6 +21,7 @@ __all__ = [
     "largest_part",
     "mesh_points",
     "on_surface",
+    "part_sizes",
     "simplify",
     "texture_mesh",
     "texture_views",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import warnings
 from typing import Any
 
 import numpy as np
@@ -12,11 +11,11 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal import arrays
+from nacre._internal.mesh_library import gpytoolbox
 from nacre._internal.value_equality import Value
 from nacre.kdtree import KdTree
 from nacre.meshing.triangulation import triangulate, used_rows
 
-_MISSING = 'closed surfaces need gpytoolbox: pip install "nacre[closed]"'
 _MOST_HALVINGS = 12  # of the box: no more are taken by it
 _BOX = 3.2  # of the points' extent: gpytoolbox's, measured (test_closed_surface)
 _SCREENED_NOISE = 0.17  # of the distance between points, tuned: with so much, points and normals weigh alike
@@ -83,12 +82,7 @@ def close_surface(points: npt.ArrayLike, normals: npt.ArrayLike) -> ClosedSurfac
     usable = np.isfinite(positions).all(axis=1) & np.isfinite(directions).all(axis=1)
     if np.count_nonzero(usable) < 10:
         raise ValueError(f"points must be 10 or more for a surface, got {np.count_nonzero(usable)}")
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # its own
-            from gpytoolbox import point_cloud_to_mesh
-    except ImportError as error:
-        raise ImportError(_MISSING, name="gpytoolbox") from error
+    library = gpytoolbox("closed surfaces", "closed")
     local, origin = arrays.localize(positions[usable])
     tree = KdTree(local)
     apart, neighbors = tree.query(local, 7)
@@ -97,7 +91,7 @@ def close_surface(points: npt.ArrayLike, normals: npt.ArrayLike) -> ClosedSurfac
     if not 0 < spacing < extent:
         raise ValueError("points must be spread over a surface, but most of them are in one place")
     halvings = min(round(math.log2(_BOX * extent / spacing)) + 1, _MOST_HALVINGS)
-    vertices, triangles = point_cloud_to_mesh(
+    vertices, triangles = library.point_cloud_to_mesh(
         *_with_middles(local.astype(np.float64), directions[usable].astype(np.float64)),
         psr_depth=halvings,
         psr_screening_weight=_screening(local, directions[usable], neighbors[:, 1:], spacings),

@@ -28,11 +28,37 @@ def largest_part(triangles: npt.ArrayLike) -> npt.NDArray[np.int32]:
     TypeError, ValueError
         Not triangles, or indices below 0.
     """
+    corners, parts = _labelled(triangles)
+    largest: npt.NDArray[np.int32] = corners[parts == np.bincount(parts, minlength=1).argmax()]
+    return largest
+
+
+def part_sizes(triangles: npt.ArrayLike) -> npt.NDArray[np.int64]:
+    """
+    Return of how many triangles each part consists, the largest first.
+
+    Parameters
+    ----------
+    triangles : (T, 3) array_like of integers
+        Vertex indices. Triangles with a common vertex are in one part.
+
+    Returns
+    -------
+    (P,) int64
+
+    Raises
+    ------
+    TypeError, ValueError
+        Not triangles, or indices below 0.
+    """
+    return np.sort(np.unique(_labelled(triangles)[1], return_counts=True)[1])[::-1].astype(np.int64)
+
+
+def _labelled(triangles: npt.ArrayLike) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.integer]]:
+    """Return triangles as an array, and the number of the part of each."""
     given = arrays.as_array("triangles", triangles)
     if given.shape == (0, 3):
-        return given.astype(np.int32)
+        return given.astype(np.int32), np.zeros(0, np.int32)
     num_vertices = int(given.max(initial=-1)) + 1 if given.dtype.kind in "iu" else 0
     corners = arrays.as_triangles("triangles", given, num_vertices)
-    parts = _core.connected_parts(corners, num_vertices)[corners[:, 0]]
-    largest: npt.NDArray[np.int32] = corners[parts == np.bincount(parts).argmax()]
-    return largest
+    return corners, _core.connected_parts(corners, num_vertices)[corners[:, 0]]

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from nacre import _core
 from nacre._internal import arrays
-
-_MISSING = 'fewer triangles need fast-simplification: pip install "nacre[simplify]"'
-
-_EDGE = 10.0  # of the triangles, in the library's units: its thresholds begin well below one and grow slowly
+from nacre._internal.mesh_library import gpytoolbox
 
 
 def simplify(
@@ -25,21 +23,22 @@ def simplify(
     triangles : (T, 3) array_like of integers
         Vertex indices.
     num_triangles : int
-        At least 1. Where there are no more, vertices and triangles come back as they are. A few more may be
-        left where no edge can go without folding the surface.
+        At least 1. Where there are no more, vertices and triangles come back as they are. More are left
+        where no edge can go: parts and holes do not vanish.
 
     Returns
     -------
     vertices : (N, 3) float32 or float64
-        [m], in the type of those given.
+        [m], in the type of those given. Where parts touch in a vertex, each has its own.
     triangles : (M, 3) int32
+        No edge has more than two, if each side of an edge had at most one.
 
     Raises
     ------
     TypeError, ValueError
         Arguments of the wrong type or shape.
     ImportError
-        When fast-simplification is missing, with the command that installs it.
+        When gpytoolbox is missing, with the command that installs it.
 
     Notes
     -----
@@ -50,12 +49,26 @@ def simplify(
     wanted = arrays.as_count("num_triangles", num_triangles, minimum=1)
     if len(corners) <= wanted:
         return points, corners
-    try:
-        import fast_simplification
-    except ImportError as error:
-        raise ImportError(_MISSING, name="fast_simplification") from error
+    library = gpytoolbox("fewer triangles", "simplify")
     local, origin = arrays.localize(points)
-    edges = np.linalg.norm(local[corners[:, 0]] - local[corners[:, 1]], axis=1)
-    unit = float(np.median(edges)) / _EDGE or 1.0
-    fewer, left = fast_simplification.simplify(local / np.float32(unit), corners, target_count=wanted)
-    return (unit * fewer + origin).astype(points.dtype), np.ascontiguousarray(left, np.int32)
+    rows, manifold = _split_where_parts_touch(corners)
+    fewer, left, *_ = library.decimate(local[rows], manifold, num_faces=wanted, method="qslim")
+    return (fewer + origin).astype(points.dtype), np.ascontiguousarray(left, np.int32)
+
+
+def _split_where_parts_touch(
+    triangles: npt.NDArray[np.int32],
+) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
+    """Give each fan of triangles around a vertex a vertex of its own; return their rows, and the triangles."""
+    begins, ends = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+    corners = np.arange(triangles.size, dtype=np.int32)
+    next_corners = corners.reshape(-1, 3)[:, [1, 2, 0]].ravel()
+    # Two triangles that have an edge, one in each direction, have its ends in common.
+    size = np.int64(triangles.max()) + 1
+    _, there, back = np.intersect1d(begins * size + ends, ends * size + begins, return_indices=True)
+    same = np.concatenate(
+        [[there, next_corners[back], next_corners[back]], [next_corners[there], back, back]], axis=1
+    )
+    fans = _core.connected_parts(np.ascontiguousarray(same.T, np.int32), triangles.size)
+    _, first, labels = np.unique(fans, return_index=True, return_inverse=True)
+    return begins[first], labels.reshape(-1, 3).astype(np.int32)

@@ -1,0 +1,18 @@
+"""The library that closes surfaces and simplifies them."""
+
+from __future__ import annotations
+
+import warnings
+from types import ModuleType
+
+
+def gpytoolbox(purpose: str, extra: str) -> ModuleType:
+    """Return gpytoolbox, or say what needs it, and which extra of nacre installs it."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", DeprecationWarning)  # its own
+            import gpytoolbox as library
+    except ImportError as error:
+        message = f'{purpose} need gpytoolbox: pip install "nacre[{extra}]"'
+        raise ImportError(message, name="gpytoolbox") from error
+    return library
