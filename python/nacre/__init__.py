@@ -177,7 +177,16 @@ def __getattr__(name: str) -> Any:
     from nacre._internal.guided import no_such_name
     from nacre._internal.names_elsewhere import OF_PACKAGE
 
-    raise no_such_name("nacre", name, __all__, OF_PACKAGE)
+    raise no_such_name("nacre", name, __all__, _names_of_packages() | OF_PACKAGE)
+
+
+def _names_of_packages() -> dict[str, str]:
+    """Return where those public names are that a package of nacre has, and nacre itself has not."""
+    return {
+        name: f"it is nacre.{package}.{name}"
+        for package in ("evaluation", *_PACKAGES)
+        for name in getattr(importlib.import_module(f"nacre.{package}"), "__all__", ())
+    }
 
 
 def __dir__() -> list[str]:

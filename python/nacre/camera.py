@@ -4,20 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal.arrays import as_count, as_number, as_real
-from nacre._internal.guided import GuidedNames, guided
+from nacre._internal.guided import GuidedNames, guided, no_such_member
 
 _NO_DISTORTION = (0.0, 0.0, 0.0, 0.0, 0.0)
 _FROM_FOV = "Camera.from_fov(width, height, horizontal_degrees) makes one of a field of view"
 _FROM_MATRIX = "Camera.from_matrix(width, height, K) of a 3x3 matrix"
 
 
-class Camera(GuidedNames, _core.Camera):
+class _GuidedClass(type(_core.Camera)):  # type: ignore[misc]
+    """The type of a class whose missing constructors are answered by what takes their place."""
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(cls, name: str) -> Any:
+            raise no_such_member(cls, name, cls)
+
+
+class Camera(GuidedNames, _core.Camera, metaclass=_GuidedClass):
     """
     An immutable camera model. Pixel centres are integers; axes are OpenCV's (x right, y down, z forward).
 
@@ -108,6 +118,7 @@ class Camera(GuidedNames, _core.Camera):
         return cls(columns, rows, fx, fy, (columns - 1) / 2, (rows - 1) / 2, depth=depth)
 
     @classmethod
+    @guided(f"it is {_FROM_MATRIX}", K="matrix", dist="distortion", coeffs="distortion")
     def from_matrix(
         cls,
         width: int,
@@ -140,7 +151,7 @@ class Camera(GuidedNames, _core.Camera):
         """
         given = as_real("matrix", matrix).astype(np.float64)
         if given.shape != (3, 3):
-            raise ValueError(f"matrix must have shape (3, 3), got {given.shape}")
+            raise ValueError(f"matrix must have shape (3, 3), got {given.shape}: it is {_FROM_MATRIX}")
         (fx, skew, cx), (lower, fy, cy), last = given.tolist()
         if not np.isfinite(given).all():
             raise ValueError(f"matrix must be finite, got {given.tolist()}")

@@ -170,6 +170,10 @@ class KdTree(GuidedNames):
         As in SciPy, the last axis is dropped for ``k = 1``.
         """
         array = _as_queries("queries", queries)
+        if isinstance(k, Sequence) or (isinstance(k, np.ndarray) and k.ndim):
+            raise TypeError(
+                f"k must be an integer, got {k!r}; query(queries, max(k)) has a column for each neighbour"
+            )
         k = as_count("k", k, minimum=1)
         if k > max(len(self), _LARGEST_ROW):
             raise ValueError(

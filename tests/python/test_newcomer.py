@@ -1,14 +1,16 @@
-"""What a newcomer does wrong, and what the command line then says to do."""
+"""What a newcomer does wrong, on the command line and in Python, and what is then said to do."""
 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import io
 import json
 import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -207,6 +209,114 @@ def test_parameters_and_choices_are_suggested_in_python_too() -> None:
         nacre.Model(camera, spacng=0.01)
     with pytest.raises(ValueError, match=r"got 'wolp' \(did you mean 'wlop'\?\)"):
         nacre.consolidate(np.zeros((3, 3)), method="wolp")
+
+
+@pytest.fixture(scope="module")
+def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Return what names stand for in guesses."""
+    folder = tmp_path_factory.mktemp("guesses")
+    recording = camera_folder(folder / "recording")
+    done = nacre.reconstruct(recording)
+    cloud = done.model.cloud(all_points=True)
+    return {
+        "np": np, "nacre": nacre, "dataclasses": dataclasses, "recording": recording, "done": done,
+        "model": done.model, "cloud": cloud, "points": cloud.points, "mesh": nacre.built_in_object(),
+        "camera": done.model.camera, "K": done.model.camera.matrix, "tree": nacre.KdTree(cloud.points),
+        "result": nacre.align(cloud, cloud), "stl": folder / "m.stl", "txt": folder / "t.txt",
+    }  # fmt: skip
+
+
+EVERY_25TH = "nacre.open_sequence(path)[::25]"
+
+GUESSES = {
+    # Some of a recording's frames.
+    "nacre.reconstruct(recording, every=25)": ["no argument 'every'", EVERY_25TH],
+    "nacre.reconstruct(recording, first=1)": ["no argument 'first'", EVERY_25TH],
+    "nacre.reconstruct(recording, spacing=0.01, last=2)": ["no argument 'last'", "[-100:]"],
+    "nacre.open_sequence(recording, every=10)": ["no argument 'every'", EVERY_25TH],
+    "nacre.open_sequence(recording, last=3)": ["no argument 'last'", "[-100:]"],
+    "nacre.open_sequence(recording, 'tum')": ["the rest by name: format"],
+    "nacre.reconstruct(spacing=0.01)": ["reconstruct needs source"],
+    # Meshes.
+    "model.to_mesh(closed=True)": ["to_mesh has no argument 'closed'", "nacre.meshing.close_surface"],
+    "model.to_mesh(simplify=10)": ["to_mesh has no argument 'simplify'", "nacre.meshing.simplify"],
+    "nacre.write_mesh(stl, model)": ["triangles must be", "got None", "give model.to_mesh()"],
+    "nacre.write_mesh(stl, done)": ["give its .model.to_mesh()"],
+    "nacre.write_mesh(stl, cloud)": ["nacre.meshing.mesh_points(cloud.points, cloud.normals)"],
+    "nacre.write_mesh(stl, points)": ["nacre.meshing.mesh_points(cloud.points, cloud.normals)"],
+    "nacre.write_mesh(stl, nacre.meshing.ClosedSurface(points, None, None, None))": [
+        "give its .vertices and its .triangles"
+    ],
+    "nacre.simplify(mesh, 10)": ["nacre.meshing.simplify(mesh.vertices, mesh.triangles, num_triangles)"],
+    "mesh.simplify(10)": ["nacre.meshing.simplify(mesh.vertices, mesh.triangles, num_triangles)"],
+    "mesh.vertex_colors": ["nacre.write_mesh(path, mesh, colors=...)"],
+    "mesh.colors": ["nacre.write_mesh(path, mesh, colors=...)"],
+    # Clouds.
+    "cloud.to_mesh()": ["nacre.meshing.mesh_points(cloud.points, cloud.normals)"],
+    "cloud.voxel_downsample(0.1)": ["nacre.voxel_downsample(cloud, voxel_size)"],
+    "cloud.write('a.ply')": ["nacre.write_points(path, cloud)"],
+    "cloud.confidence": ["it is attributes['confidence']"],
+    "cloud['confidence']": ["rows must be", "got 'confidence'", "cloud.attributes"],
+    "cloud.paint_uniform_color([1, 0, 0])": ["dataclasses.replace(cloud, colors=numpy.full("],
+    # Cameras.
+    "nacre.Camera.from_matrix(K, 64, 48)": ["matrix must have shape (3, 3)", "from_matrix(width, height, K)"],
+    "nacre.Camera.from_matrix(K)": ["needs height and matrix too", "from_matrix(width, height, K)"],
+    "nacre.Camera.from_matrix(64, 48, K=K)": ["it is matrix"],
+    "nacre.Camera.from_json('camera.json')": ["a Camera has no", "nacre.read_camera(path).camera"],
+    "nacre.Camera.load('camera.json')": ["nacre.read_camera(path).camera"],
+    "nacre.Camera.from_intrinsics(K)": ["Camera.from_matrix(width, height, K)"],
+    "nacre.Camera.from_fv(64, 48, 60)": ["did you mean 'from_fov'?"],
+    "camera.from_json('camera.json')": ["nacre.read_camera(path).camera"],
+    # Trajectories.
+    "nacre.write_trajectory(txt, done)": ["timestamps be a", "got Reconstruction", "give its .trajectory"],
+    "nacre.write_trajectory(txt, model.poses)": ["got ndarray", "the times first, then the poses"],
+    # Names of the package.
+    "nacre.draw(cloud)": ["nacre view"],
+    "nacre.visualize(cloud)": ["nacre view"],
+    "nacre.save('a.ply', cloud)": ["nacre.write_points", "nacre.write_mesh", "model.save"],
+    "nacre.open(recording)": ["nacre.open_sequence", "nacre.read_points", "nacre.read_mesh"],
+    "nacre.convert('a.pcd', 'b.ply')": ["nacre.write_points(path, nacre.read_points(other))"],
+    "nacre.RealSense()": ["nacre.datasets.RealSense"],
+    "nacre.close_surface(points, points)": ["nacre.meshing.close_surface"],
+    "nacre.f_score(points, mesh)": ["nacre.evaluation.f_score"],
+    "nacre.remove_outliers(points)": ["nacre.KdTree(points).query", "nacre.out_of_core.remove_outliers"],
+    "nacre.statistical_outlier_removal(points)": ["nacre.KdTree(points).query"],
+    "nacre.depth_to_points(np.ones((48, 64)), camera)": ["nacre.back_project(depth, camera,"],
+    "nacre.read_depth('a.png')": ["nacre.io.images.read_depth(path)"],
+    "nacre.io.read_depth('a.png')": ["nacre.io.images.read_depth(path)"],
+    "nacre.evaluate(cloud, mesh)": ["nacre.evaluation.surface_accuracy(points, mesh)"],
+    # Others.
+    "tree.query(points, k=[1, 3])": ["k must be an integer, got [1, 3]", "a column for each neighbour"],
+    "tree.query(points, k=np.array([1, 3]))": ["k must be an integer", "a column for each neighbour"],
+    "result.foo": ["an AlignResult has no attribute 'foo'"],
+}
+
+
+@pytest.mark.parametrize("guess", GUESSES)
+def test_a_guess_in_python_is_answered_by_what_to_do(guess: str, known: dict[str, Any]) -> None:
+    with pytest.raises((TypeError, ValueError, AttributeError)) as told:
+        eval(guess, dict(known))
+    for word in GUESSES[guess]:
+        assert word in str(told.value)
+
+
+# What the answers say to do, and what is then true of its value, which is called `it`.
+ANSWERS = {
+    "nacre.reconstruct(nacre.open_sequence(recording)[::25])": "len(it.frames) == 1",
+    "nacre.write_mesh(stl, model.to_mesh())": "len(nacre.read_mesh(stl).triangles) > 100",
+    "nacre.meshing.mesh_points(cloud.points, cloud.normals)": "len(it.triangles) > 100",
+    "cloud.attributes['confidence']": "it.shape == (len(cloud),)",
+    "dataclasses.replace(cloud, colors=np.full(cloud.points.shape, (9, 0, 0), np.uint8))": "it.colors.any()",
+    "nacre.write_trajectory(txt, done.trajectory)": "len(nacre.read_trajectory(txt)) == 1",
+    "nacre.write_trajectory(txt, [0.0], model.poses)": "len(nacre.read_trajectory(txt)) == 1",
+    "tree.query(points, 3)[1][:, [0, 2]]": "(it[:, 0] == np.arange(len(points))).all()",
+}
+
+
+@pytest.mark.parametrize("call", ANSWERS)
+def test_what_an_answer_says_works(call: str, known: dict[str, Any]) -> None:
+    it = eval(call, dict(known))
+    assert eval(ANSWERS[call], {**known, "it": it}), it
 
 
 # What needs a package that is not there, and the command that brings it.

@@ -9,6 +9,7 @@
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
+#include "base/step_length.hpp"
 #include "camera/limits.hpp"
 #include "registration/limits.hpp"
 #include "registration/open_directions.hpp"
@@ -63,7 +64,10 @@ class ColorRegistration::Search : public OpenDirectionSearch {
     if (moved.weak_directions.cols() == 0) return moved.target_from_source;
     const std::vector<MotionRow> rows = match(level(coarse_, registration_limits::coarse_color_step), few_,
                                               geometric.target_from_source, geometric.center);
-    if (rows.size() >= base_limits::least_points) step(rows, geometric.weak_directions, moved);
+    if (rows.size() >= base_limits::least_points) {
+      const double extent = extent_of(rows);
+      take(gauss_newton_step(rows, geometric.weak_directions, extent, base_limits::damping), extent, moved);
+    }
     return moved.target_from_source;
   }
 
@@ -153,15 +157,22 @@ class ColorRegistration::Search : public OpenDirectionSearch {
     bool has_moved = false;
     for (const bool is_coarse : {true, false}) {
       ColorLevel& colors = is_coarse ? level(coarse_, registration_limits::coarse_color_step) : level(fine_, 1);
+      Vector6 before = Vector6::Zero();
+      double length = 0.0;
       for (int i = 0; i < registration_limits::most_steps; ++i) {
         const TwistBasis open = only != nullptr ? *only : TwistBasis(result.weak_directions);
         if (open.cols() == 0) break;
         const std::vector<MotionRow> rows = match(colors, source_, result.target_from_source, result.center);
         if (rows.size() < base_limits::least_points) break;
-        const double size = step(rows, open, result);
+        const double extent = extent_of(rows);
+        const Vector6 step = gauss_newton_step(rows, open, extent, base_limits::damping);
+        length = step_length(before, length, step, Matrix6::Identity());
+        take(length * step, extent, result);
         has_moved = true;
         if (!return_to_surface(target_, few_, held_, result)) return start;
-        if (size < registration_limits::small_color_step * target_.spacing()) break;
+        // Where a step turns back, which points are matched decides more than their colours.
+        if (step.dot(std::exchange(before, step)) < 0.0) break;
+        if (step.norm() < registration_limits::small_color_step * target_.spacing()) break;
       }
     }
     if (has_moved && !return_to_surface(target_, source_, held_, result)) return start;
@@ -196,14 +207,10 @@ class ColorRegistration::Search : public OpenDirectionSearch {
     for (MotionRow& row : rows) row.weight = robust_weight(row.residual, noise_);
   }
 
-  // Moves the pose along the open directions; returns how far, root mean square over the pairs [m].
-  double step(const std::vector<MotionRow>& rows, const TwistBasis& open, IcpResult& result) const {
-    const double extent = extent_of(rows);
-    Vector6 twist = gauss_newton_step(rows, open, extent, base_limits::damping);
-    const double size = twist.norm();
-    twist.head<3>() /= extent;
-    result.target_from_source = motion_about(result.center, twist) * result.target_from_source;
-    return size;
+  // Moves the pose by a step of lengths, root mean square over the pairs [m].
+  static void take(Vector6 step, double extent, IcpResult& result) {
+    step.head<3>() /= extent;
+    result.target_from_source = motion_about(result.center, step) * result.target_from_source;
   }
 
   const IcpTarget& target_;

@@ -65,6 +65,7 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   if (expectation == Expectation::expected && gate == Gate::narrow && is_still) {
     result = best_along_weakest(std::move(result), surfaces, pairing, guess, expectation);
   }
+  if (result.is_hopeless) return result;
   const Pose& pose = result.alignment.target_from_source;
   const bool may_stick = is_at_rest(pose);
   const WeakTest by_noise{pairing.options.weak_threshold,

@@ -32,20 +32,25 @@ def guided(
 
         @functools.wraps(function)
         def call(*given: Arguments.args, **named: Arguments.kwargs) -> Result:
-            try:
-                return function(*given, **named)
-            except TypeError:
+            if elsewhere.keys().isdisjoint(named):
                 try:
-                    signature.bind(*given, **named)
+                    return function(*given, **named)
                 except TypeError:
-                    message = _how_to_call(function, signature, given, named, hint, elsewhere)
-                else:
-                    raise
-            raise TypeError(message)
+                    if _fits(signature, given, named):
+                        raise
+            raise TypeError(_how_to_call(function, signature, given, named, hint, elsewhere))
 
         return call
 
     return decorate
+
+
+def _fits(signature: inspect.Signature, given: tuple[Any, ...], named: Mapping[str, Any]) -> bool:
+    try:
+        signature.bind(*given, **named)
+    except TypeError:
+        return False
+    return True
 
 
 def _how_to_call(
@@ -59,9 +64,10 @@ def _how_to_call(
     name = function.__qualname__.removesuffix(".__init__").rpartition(".")[2]
     parameters = [p for p in signature.parameters.values() if p.name not in ("self", "cls")]
     own_object = len(signature.parameters) - len(parameters)
+    takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters)
     parameters = [p for p in parameters if p.kind not in (p.VAR_POSITIONAL, p.VAR_KEYWORD)]
     own = {p.name for p in parameters}
-    unknown = [word for word in named if word not in own]
+    unknown = [word for word in named if word in elsewhere or not (takes_any or word in own)]
     if unknown:
         word = unknown[0]
         advice = elsewhere.get(word)
@@ -92,6 +98,17 @@ def no_such_name(owner: str, name: str, known: Iterable[str], elsewhere: Mapping
     return AttributeError(f"{owner} has no attribute {name!r}{meant(name, known)}")
 
 
+def no_such_member(kind: type, name: str, owner: Any) -> AttributeError:
+    """Return the error for a name that a class, or an object of it, does not have."""
+    if name.startswith("_"):
+        return AttributeError(f"{kind.__name__!r} object has no attribute {name!r}")
+    from nacre._internal.names_elsewhere import OF_CLASS
+
+    article = "an" if kind.__name__.startswith(("A", "E", "I", "O", "FS")) else "a"
+    known = (word for word in dir(owner) if not word.startswith("_"))
+    return no_such_name(f"{article} {kind.__name__}", name, known, OF_CLASS.get(kind.__name__, {}))
+
+
 class GuidedNames:
     """Base of classes whose missing attributes are answered by what takes their place."""
 
@@ -103,9 +120,4 @@ class GuidedNames:
             kind = type(self)
             if name in dir(kind):  # a property that raised
                 return object.__getattribute__(self, name)
-            if name.startswith("_"):
-                raise AttributeError(f"{kind.__name__!r} object has no attribute {name!r}")
-            from nacre._internal.names_elsewhere import OF_CLASS
-
-            known = (word for word in dir(self) if not word.startswith("_"))
-            raise no_such_name(f"a {kind.__name__}", name, known, OF_CLASS.get(kind.__name__, {}))
+            raise no_such_member(kind, name, self)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import warnings
-from types import ModuleType
+from typing import Any
 
 
-def gpytoolbox(purpose: str, extra: str) -> ModuleType:
+def gpytoolbox(purpose: str, extra: str) -> Any:
     """Return gpytoolbox, or say what needs it, and which extra of nacre installs it."""
     try:
         with warnings.catch_warnings():

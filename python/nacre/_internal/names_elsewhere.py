@@ -9,10 +9,20 @@ _FUSION = "nacre.Model(camera).add_frame(depth, color) fuses images, and finds t
 _TREE = "it is nacre.KdTree(points)"
 _VOXELS = "it is nacre.voxel_downsample(points, voxel_size)"
 _MODULES = "functions on points and images are in nacre itself: nacre.align, nacre.KdTree, nacre.read_points"
+_OUTLIERS = (
+    "nacre.KdTree(points).query(points, k) has the distances to threshold; "
+    "nacre.consolidate(points) denoises; nacre.out_of_core.remove_outliers(source, output) is for files"
+)
+_SIMPLIFY = "it is nacre.meshing.simplify(mesh.vertices, mesh.triangles, num_triangles)"
+_READ_IMAGE = "nacre.open_sequence(folder) reads recordings, nacre.io.images.read_depth(path) a depth image"
 _BACK_PROJECT = "it is nacre.back_project(depth, camera, depth_scale=...)"
 _MOVE = "it is an array of rows: points @ pose[:3, :3].T + pose[:3, 3]"
 _MESH_NORMALS = "mesh.closest(points).normals has those of its triangles"
 _VIEW = "nacre reconstruct --view and nacre view show runs in the browser; notebooks show models and clouds"
+_MESH_COLORS = "it has vertices and triangles; nacre.write_mesh(path, mesh, colors=...) writes colours, too"
+_WRITE_CLOUD = "it is nacre.write_points(path, cloud)"
+_DOWNSAMPLE_CLOUD = "it is nacre.voxel_downsample(cloud, voxel_size)"
+_CAMERA_FILE = "it is nacre.read_camera(path).camera"
 _POSE = "it is target_from_source"
 
 OF_PACKAGE = {
@@ -26,8 +36,11 @@ OF_PACKAGE = {
     "ml": _MODULES,
     "visualization": _VIEW,
     "draw_geometries": _VIEW,
+    "draw": _VIEW,
+    "plot": _VIEW,
     "show": _VIEW,
     "view": _VIEW,
+    "visualize": _VIEW,
     "icp": _ALIGN,
     "ICP": _ALIGN,
     "gicp": _ALIGN,
@@ -45,7 +58,11 @@ OF_PACKAGE = {
     "write_triangle_mesh": "it is nacre.write_mesh(path, mesh)",
     "load_mesh": "it is nacre.read_mesh(path)",
     "load": "it is nacre.read_mesh(path), nacre.read_points(path) or nacre.Model.load(path)",
-    "read_image": "nacre.open_sequence(folder) reads recordings; single images are arrays of any library",
+    "open": "it is nacre.open_sequence(path) of recordings, nacre.read_points(path) or nacre.read_mesh(path)",
+    "save": "it is nacre.write_points(path, points), nacre.write_mesh(path, mesh) or model.save(path)",
+    "convert": "nacre.write_points(path, nacre.read_points(other)) does, and the command nacre convert",
+    "read_image": _READ_IMAGE,
+    "read_depth": _READ_IMAGE,
     "KDTree": _TREE,
     "cKDTree": _TREE,
     "KDTreeFlann": _TREE,
@@ -55,8 +72,10 @@ OF_PACKAGE = {
     "downsample": _VOXELS,
     "NormalEstimation": "it is nacre.estimate_normals(points, k=...)",
     "estimate_covariances": "it is nacre.estimate_normals(points, k=...)",
-    "remove_statistical_outlier": "nacre.KdTree(points).query(points, k) has the distances to threshold; "
-    "nacre.consolidate(points) denoises",
+    "remove_statistical_outlier": _OUTLIERS,
+    "remove_outliers": _OUTLIERS,
+    "statistical_outlier_removal": _OUTLIERS,
+    "StatisticalOutlierRemoval": _OUTLIERS,
     "PinholeCameraIntrinsic": "it is nacre.Camera(width, height, fx, fy, cx, cy)",
     "RGBDImage": "depth and colour are arrays: nacre.Model(camera).add_frame(depth, color)",
     "ScalableTSDFVolume": _FUSION,
@@ -66,9 +85,13 @@ OF_PACKAGE = {
     "create_from_depth_image": _BACK_PROJECT,
     "create_from_rgbd_image": _BACK_PROJECT,
     "depthTo3d": _BACK_PROJECT,
+    "depth_to_points": _BACK_PROJECT,
+    "simplify": _SIMPLIFY,
     "poisson": "it is nacre.meshing.close_surface(points, normals)",
     "ball_pivoting": "it is nacre.meshing.mesh_points(points, normals)",
     "wlop_simplify_and_regularize_point_set": "it is nacre.consolidate(points, method='cgal')",
+    "evaluate": "nacre.evaluation.surface_accuracy(points, mesh) and nacre.evaluation.f_score(points, mesh) "
+    "measure points, nacre.evaluation.absolute_trajectory_error(poses, truths) poses",
 }
 
 OF_CLASS = {
@@ -93,6 +116,12 @@ OF_CLASS = {
         "K": "it is matrix",
         "intrinsic_matrix": "it is matrix",
         "intrinsics": "it is matrix",
+        "from_intrinsics": "it is Camera.from_matrix(width, height, K)",
+        "from_json": _CAMERA_FILE,
+        "from_file": _CAMERA_FILE,
+        "load": _CAMERA_FILE,
+        "read": _CAMERA_FILE,
+        "save": "it is nacre.write_camera(path, camera)",
         "ppx": "it is cx",
         "ppy": "it is cy",
         "coeffs": "it is distortion",
@@ -109,15 +138,22 @@ OF_CLASS = {
         "estimate_normals": "it is nacre.estimate_normals(cloud), which returns them",
         "has_normals": "ask cloud.normals is not None",
         "has_colors": "ask cloud.colors is not None",
-        "voxel_down_sample": "it is nacre.voxel_downsample(cloud, voxel_size)",
-        "remove_statistical_outlier": OF_PACKAGE["remove_statistical_outlier"],
+        "voxel_down_sample": _DOWNSAMPLE_CLOUD,
+        "voxel_downsample": _DOWNSAMPLE_CLOUD,
+        "remove_statistical_outlier": _OUTLIERS,
+        "confidence": "it is attributes['confidence'], where the file has it",
+        "intensity": "it is attributes['intensity'], where the file has it",
+        "paint_uniform_color": "dataclasses.replace(cloud, colors=numpy.full(cloud.points.shape, (r, g, b), "
+        "numpy.uint8)) makes one with that colour",
         "transform": _MOVE,
         "rotate": _MOVE,
         "translate": _MOVE,
         "crop": "it is cloud[mask], with a mask of its points",
         "select_by_index": "it is cloud[indices]",
-        "save": "it is nacre.write_points(path, cloud)",
+        "save": _WRITE_CLOUD,
+        "write": _WRITE_CLOUD,
         "show": _VIEW,
+        "to_mesh": "it is nacre.meshing.mesh_points(cloud.points, cloud.normals)",
         "to_open3d": "open3d.geometry.PointCloud(open3d.utility.Vector3dVector(cloud.points)) makes one",
         "to_trimesh": "trimesh.PointCloud(cloud.points, colors=cloud.colors) makes one",
     },
@@ -138,7 +174,10 @@ OF_CLASS = {
     "Mesh": {
         "faces": "it is triangles",
         "area": "sum the cross products of its edges: numpy.cross",
-        "simplify_quadric_decimation": "it is nacre.meshing.simplify",
+        "simplify": _SIMPLIFY,
+        "simplify_quadric_decimation": _SIMPLIFY,
+        "colors": _MESH_COLORS,
+        "vertex_colors": _MESH_COLORS,
         "compute_vertex_normals": _MESH_NORMALS,
         "normals": _MESH_NORMALS,
         "vertex_normals": _MESH_NORMALS,
@@ -176,6 +215,13 @@ OF_CLASS = {
         "save": "it is nacre.write_trajectory(path, trajectory)",
     },
 }
+
+SOME_FRAMES = dict.fromkeys(
+    ("every", "step", "stride", "first", "last", "start", "stop", "end", "max_frames"),
+    "a slice has some of the frames: nacre.open_sequence(path)[::25] every 25th, [:100] the first, [-100:] "
+    "the last",
+)
+"""Arguments of what reads recordings elsewhere."""
 
 PARAMETERS = {
     "voxel_size": "spacing",

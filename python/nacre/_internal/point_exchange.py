@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre._internal.guided import GuidedNames
+from nacre._internal.guided import GuidedNames, guided
 
 if TYPE_CHECKING:
     from nacre.io.cloud import Cloud
     from nacre.mesh import Mesh
+
+
+_CLOSED = "nacre.meshing.close_surface(cloud.points, cloud.normals) does, of cloud = model.cloud()"
+_FEWER = "nacre.meshing.simplify(mesh.vertices, mesh.triangles, num_triangles) does, of a mesh"
 
 
 class ArrayOfPoints(GuidedNames):
@@ -51,6 +55,7 @@ class ExchangeablePoints(ArrayOfPoints, ABC):
     def cloud(self, *, all_points: bool = False) -> Cloud:
         """Return the points that are a surface."""
 
+    @guided(closed=_CLOSED, watertight=_CLOSED, simplify=_FEWER, num_triangles=_FEWER)
     def to_mesh(self, *, num_threads: int = 0) -> Mesh:
         """
         Return triangles that join the points of :meth:`cloud`; see :func:`nacre.meshing.triangulate`.
@@ -94,7 +99,8 @@ class ExchangeablePoints(ArrayOfPoints, ABC):
         """
         Return the points as a ``trimesh.PointCloud``, with colours where there are any.
 
-        It has no place for normals: they are in its ``metadata["normals"]``.
+        It has no place for normals: they are in its ``metadata["normals"]``. With triangles it is
+        ``trimesh.Trimesh(mesh.vertices, mesh.triangles)``, of the mesh of :meth:`to_mesh`.
 
         Raises
         ------

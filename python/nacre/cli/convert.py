@@ -101,6 +101,8 @@ def _kind_wanted(given: str, out: Path, to: Target | None) -> str:
     """Return what is to be written: points, mesh, trajectory or images."""
     from nacre.io.meshes import WRITE_SUFFIXES
 
+    if to is not None and out.suffix.lower() in (*point_suffixes(), *WRITE_SUFFIXES):
+        raise CommandError(f"{out}: --to {to.value} writes no points or triangles, as the ending says", 2)
     if to is not None:
         return "images" if to in (Target.colmap, Target.nerfstudio) else "trajectory"
     suffix = out.suffix.lower()

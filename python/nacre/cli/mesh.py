@@ -92,14 +92,15 @@ def mesh(
     mesh = _closed(cloud) if closed else _open(cloud)
     if not len(mesh.triangles):
         raise CommandError(f"{path} has too few points for a surface, or normals that contradict it")
-    left_out = part_sizes(mesh.triangles)[1:] if keep is Keep.largest else []
+    left_out = part_sizes(mesh.triangles)[1:].tolist() if keep is Keep.largest else []
     if len(left_out):
         mesh = _used(dataclasses.replace(mesh, triangles=largest_part(mesh.triangles)))
     if num_triangles is not None:
         mesh = _simplified(mesh, num_triangles)
         if len(mesh.triangles) > num_triangles:
             terminal.say(
-                f"{len(mesh.triangles)} triangles are left: parts and holes do not vanish (--keep largest, --closed)"
+                f"{len(mesh.triangles)} triangles are left, since parts and holes do not vanish "
+                "(--keep largest, --closed)"
             )
     if texture:
         mesh = _textured(mesh, views)
@@ -121,7 +122,7 @@ def mesh(
         figures["images"] = len(views)
         figures["texture"] = list(mesh.texture.image.shape[1::-1])
     if len(left_out):
-        figures["left_out"] = left_out.tolist()
+        figures["left_out"] = left_out
     if "seen" in mesh.attributes:
         figures["seen"] = float(mesh.attributes["seen"].mean())
     if not quiet:

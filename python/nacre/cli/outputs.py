@@ -30,7 +30,8 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
         rows.append(("loops closed", f"{len(done.loops)}, the last at frame {last.index}"))
     ate: Any = done.evaluation.get("absolute_trajectory_error")
     if ate is not None:
-        rows.append(("trajectory error", " ".join(told_trajectory_error(ate)) + " (ATE)"))
+        error, of = told_trajectory_error(ate)
+        rows.append(("trajectory error", f"{error}: {of}" if error == "not known" else f"{error} {of} (ATE)"))
     rpe: Any = done.evaluation.get("relative_pose_error")
     if rpe is not None and rpe.num_pairs:
         text = f"{quantity(rpe.translation_rmse, 'm')}, {quantity(rpe.rotation_rmse, 'rad')}"

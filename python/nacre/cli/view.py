@@ -40,8 +40,8 @@ def view(
     """
     Look at a reconstruction in the browser.
 
-    The page shows the model as points or as a mesh, coloured as seen or by shading, normal, confidence or
-    age, measures distances, crops and saves points, hides those of low confidence, and plays how the model
+    The page shows the model as points or as a mesh, coloured as seen or by shading, normal, uncertainty or
+    age, measures distances, crops and saves points, hides those of large uncertainty, and plays how the model
     grew; with --compare also how far two runs are apart, after the other is brought into the frame of
     the first where frames differ. --rrd needs the extra "rerun".
     """

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from nacre import Camera
+from nacre._internal.guided import guided
+from nacre._internal.names_elsewhere import SOME_FRAMES
 from nacre.datasets import (
     azure_kinect,
     icl_nuim,
@@ -51,6 +53,7 @@ _OF_FILES = [module.FORMAT for module in (stanford, rosbag, record3d, azure_kine
 FILE_SUFFIXES = (*rosbag.SUFFIXES, *record3d.SUFFIXES, *azure_kinect.SUFFIXES)
 
 
+@guided("a recording, or depth images with camera= and depth_scale=", **SOME_FRAMES)
 def open_sequence(
     path: str | os.PathLike[str] | Iterable[Any],
     *,

@@ -73,9 +73,7 @@ def read_camera(path: str | os.PathLike[str]) -> CameraFile:
 def camera_of(path: str | os.PathLike[str], document: Any) -> CameraFile:
     """Return the camera that a JSON object of a file describes; see :func:`read_camera`."""
     if not isinstance(document, dict):
-        raise FileFormatError(
-            path, f"a camera file must hold a JSON object, this holds a {type(document).__name__}"
-        )
+        raise FileFormatError(path, f"a camera file must hold a JSON object, got {shown(document)}")
     fields = _Fields(path, document)
     scale = fields.number("depth_scale") if "depth_scale" in document else None
     if scale is not None and scale <= 0:

@@ -58,7 +58,8 @@ class Cloud(ArrayOfPoints, Value):
             picked = arrays.as_array("rows", rows)
             if picked.ndim != 1 or (picked.size and picked.dtype.kind not in "bui"):
                 raise TypeError(
-                    f"rows must be a slice, a mask or indices, got {rows!r}; one is cloud.points[0]"
+                    f"rows must be a slice, a mask or indices, got {rows!r}; one is cloud.points[0], and "
+                    "fields are in cloud.attributes, by their names"
                 )
             rows = picked if picked.size else np.zeros(0, np.int64)
         return Cloud(

@@ -130,13 +130,25 @@ def write_mesh(
             raise ValueError("triangles must not be given with a Mesh, which has its own")
         triangles, vertices = vertices.triangles, vertices.vertices
     if triangles is None:
-        raise TypeError("triangles must be an array of indices, got None")
+        raise TypeError(f"triangles must be an array of indices, got None: {_way_to_triangles(vertices)}")
     points = arrays.as_points("vertices", vertices)
     corners = arrays.as_triangles("triangles", triangles, len(points))
     checked = check_cloud(points, normals, colors, attributes)
     painted = None if texture is None else check_texture(texture, len(corners))
     mesh = MeshArrays(checked.points, corners, checked.normals, checked.colors, checked.attributes, painted)
     _WRITERS[Path(path).suffix.lower()].write_mesh(path, mesh, comments=comments, binary=binary)
+
+
+def _way_to_triangles(value: object) -> str:
+    """Say how to write as a mesh what was given without triangles."""
+    if hasattr(value, "to_mesh"):
+        return "give model.to_mesh()"
+    if hasattr(value, "model"):
+        return "give its .model.to_mesh()"
+    for name in ("faces", "triangles"):
+        if hasattr(value, "vertices") and hasattr(value, name):
+            return f"give its .vertices and its .{name}"
+    return "nacre.meshing.mesh_points(cloud.points, cloud.normals) makes a mesh of points"
 
 
 def require_mesh_suffix(path: str | os.PathLike[str], *, textured: bool = False) -> None:

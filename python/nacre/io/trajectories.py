@@ -122,10 +122,15 @@ def write_trajectory(
     name = ending if format is None else format
     if name not in _WRITERS:
         raise ValueError(f"format must be one of {', '.join(_WRITERS)}, got {format!r}")
-    if not isinstance(timestamps, Trajectory):
+    if isinstance(timestamps, Trajectory):
+        if poses is not None:
+            raise ValueError("poses must not be given with a Trajectory, which has its own; got both")
+    elif poses is None:
+        got = type(timestamps).__name__
+        way = "its .trajectory" if hasattr(timestamps, "trajectory") else "the times first, then the poses"
+        raise TypeError(f"poses must be given, or timestamps be a nacre.Trajectory, got {got}; give {way}")
+    else:
         timestamps = Trajectory(timestamps, poses)  # type: ignore[arg-type]
-    elif poses is not None:
-        raise ValueError("poses must not be given with a Trajectory, which has its own; got both")
     trajectory = timestamps
     if not np.isfinite(trajectory.poses).all():
         raise ValueError("poses must be finite, got NaN or infinity")

@@ -59,16 +59,15 @@ def simplify(
 def _split_where_parts_touch(
     triangles: npt.NDArray[np.int32],
 ) -> tuple[npt.NDArray[np.int32], npt.NDArray[np.int32]]:
-    """Give each fan of triangles around a vertex a vertex of its own; return their rows, and the triangles."""
+    """Give each fan of triangles around a vertex its own; return their rows, and the triangles."""
     begins, ends = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
     corners = np.arange(triangles.size, dtype=np.int32)
     next_corners = corners.reshape(-1, 3)[:, [1, 2, 0]].ravel()
     # Two triangles that have an edge, one in each direction, have its ends in common.
     size = np.int64(triangles.max()) + 1
     _, there, back = np.intersect1d(begins * size + ends, ends * size + begins, return_indices=True)
-    same = np.concatenate(
-        [[there, next_corners[back], next_corners[back]], [next_corners[there], back, back]], axis=1
-    )
+    begin, end = next_corners[back], next_corners[there]
+    same = np.concatenate([[there, begin, begin], [end, back, back]], axis=1)
     fans = _core.connected_parts(np.ascontiguousarray(same.T, np.int32), triangles.size)
     _, first, labels = np.unique(fans, return_index=True, return_inverse=True)
     return begins[first], labels.reshape(-1, 3).astype(np.int32)

@@ -110,6 +110,7 @@ def _write(job: Job, stop: Interruption) -> dict[str, Any]:
     """Write the results; of a run that is stopped without the page, whose pictures take long."""
     done = job.run.done
     done.all_points = job.options.all_points
+    done.num_dropped = int((job.unfinished.live or {}).get("num_dropped") or 0)
     done.evaluate_trajectory()
     feed, calibration = job.feed, done.depth_calibration
     advice = done.advice

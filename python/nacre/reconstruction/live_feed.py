@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from nacre.viewer import Controls
 
 
+# Frames: a second of most cameras, which the first frames may take while nobody knows how noisy they are.
+_MOST_WAITING = 30
+
+
 class LiveFeed:
     """
     The indices of frames, each when the frame is there; those that were too many are counted.
@@ -164,7 +168,11 @@ def camera_feed(
                 controls.see(frame)
             yield frame
 
-    queue = LiveQueue(seen(), timeout=2 * camera.timeout)  # the camera itself knows better what is wrong
+    queue = LiveQueue(
+        seen(),
+        size=_MOST_WAITING,
+        timeout=2 * camera.timeout,  # the camera itself knows better what is wrong
+    )
 
     def close() -> None:
         camera.close()
@@ -186,4 +194,4 @@ def real_time_feed(
                     controls.see(sequence[index])
             yield index
 
-    return LiveFeed(sequence, LiveQueue(seen()), int, stop=stop, controls=controls)
+    return LiveFeed(sequence, LiveQueue(seen(), size=_MOST_WAITING), int, stop=stop, controls=controls)

@@ -12,6 +12,7 @@ import numpy as np
 from nacre import Camera
 from nacre._internal.arrays import as_count
 from nacre._internal.guided import guided
+from nacre._internal.names_elsewhere import SOME_FRAMES
 from nacre.datasets import Sequence as Recording
 from nacre.datasets import SequenceFrame, open_sequence
 from nacre.datasets.held_frames import HeldFrames, first_of
@@ -26,7 +27,7 @@ from nacre.reconstruction.run_options import RunOptions
 from nacre.reconstruction.runner import Run
 
 
-@guided("a recording, or a list of depth images with camera=")
+@guided("a recording, or a list of depth images with camera=", **SOME_FRAMES)
 def reconstruct(
     source: str | os.PathLike[str] | Iterable[Any],
     *,

@@ -101,15 +101,17 @@ class Reconstruction(Checkpointed):
         self.evaluation: dict[str, Result] = {}
         self.cancelled = False
         self.all_points = False
+        self.num_dropped = 0  # of frames that came faster than they could be registered
         self._retry: _Retry | None = None
         self._cloud: tuple[tuple[int, bool], Cloud] | None = None  # of so many frames
         self._doubled: tuple[int, DoubledSurfaces] | None = None  # after so many of the model's frames
 
     def __repr__(self) -> str:
         ended = ", cancelled" * self.cancelled
+        statuses = ", ".join(f"{number} {name}" for name, number in self.counts.items() if number)
         return (
-            f"Reconstruction({len(self.frames)} of {len(self.sequence)} frames done, "
-            f"{self.num_tracked} tracked, {len(self.model)} points{ended})"
+            f"Reconstruction({len(self.frames)} of {len(self.sequence)} frames done"
+            f"{f' ({statuses})' * bool(statuses)}, {len(self.model)} points{ended})"
         )
 
     def complete(

@@ -12,7 +12,7 @@ from typing import Any
 
 from nacre._internal.arrays import as_count
 from nacre.datasets.sequence import SequenceFrame
-from nacre.errors import CannotResumeError, FileFormatError
+from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer, remove_leftovers
 from nacre.io.folder_lock import lock_folder
 from nacre.io.json_files import read_json
@@ -97,7 +97,9 @@ class UnfinishedRun:
         path = self.document_path
         found = read_json(path)
         if not isinstance(found, dict) or found.get("format") != _FORMAT:
-            raise CannotResumeError(f"{path}: it was written by another version of nacre")
+            raise FileFormatError(
+                path, "it was written by another version of nacre: the run must begin again"
+            )
         if not isinstance(found.get("options"), dict):
             raise FileFormatError(path, "options must be an object: it is no run of nacre reconstruct")
         return found

@@ -28,6 +28,10 @@ _ADVICE = {
     "together in time. More overlap, and coming back to the start, keep drift small.",
     "doubled": "Frames disagree there, by their poses or by systematic errors of their depth: look at it in "
     "the viewer; record it more slowly, come back to it so that a loop closes, or calibrate the camera.",
+    "camera": "Give the camera as it was calibrated (--camera FILE.json), for images of this size; where "
+    "depth comes in steps, record it in finer units.",
+    "dropped": "Move more slowly, or give less to register: --max-depth, --object, --set spacing=0.005, "
+    "--set binning=4. What was kept of a camera (OUT/recording) can be gone over again.",
     "doubtful": "Look at these frames in the viewer: does what they see lie on the model?",
     "interrupted": "nacre reconstruct --resume goes on with it.",
     "single": "Points are confirmed where three frames saw them: record more views.",
@@ -38,7 +42,7 @@ _ADVICE = {
 class Finding:
     """One thing that speaks against a run."""
 
-    kind: str  #: "untracked", "flip", "jump", "trajectory", "doubled", "doubtful", "lost", "weak", ...
+    kind: str  #: "untracked", "flip", "jump", "trajectory", "doubled", "camera", "dropped", "lost", ...
     level: Level  #: "lost": do not trust it; "weak": look at it
     word: str  #: the verdict where this is the worst
     statement: str  #: what was found
@@ -52,12 +56,18 @@ def find_problems(data: ReportData, trajectory: AbsoluteTrajectoryError | None) 
     weak = [frame for frame in data.frames if frame.status == "WEAK"]
     is_failed = _is_failed(data, len(data.frames) - len(lost))
     if is_failed:
-        yield _failure(lost, len(data.frames))
+        yield _failure(data, lost)
     distance = _distance_seen(data)
     yield from _jumps(data.frames, distance)
     yield from _pose_errors(data.frames, trajectory, distance)
     yield from _doubled(data)
+    for doubt in data.camera_doubts:
+        yield Finding("camera", "weak", "Inaccurate", doubt, _ADVICE["camera"])
     yield from _doubtful(data.frames)
+    if lost and data.num_dropped:
+        came = count(data.num_dropped + len(data.frames))
+        statement = f"{count(data.num_dropped)} of {came} frames were dropped: they came too fast"
+        yield Finding("dropped", "weak", "Incomplete", statement, _ADVICE["dropped"])
     if lost and not is_failed:
         reason = most_common_reason(frame.reason for frame in lost)
         statement = f"{count(len(lost))} of {_were(len(data.frames))} lost" + f": {reason}" * bool(reason)
@@ -82,8 +92,9 @@ def _is_failed(data: ReportData, num_tracked: int) -> bool:
     return not num_tracked or num_tracked < data.min_tracked * len(data.frames)
 
 
-def _failure(lost: Sequence[ReportedFrame], total: int) -> Finding:
-    num_tracked, reason = total - len(lost), most_common_reason(frame.reason for frame in lost)
+def _failure(data: ReportData, lost: Sequence[ReportedFrame]) -> Finding:
+    total, reason = len(data.frames), most_common_reason(frame.reason for frame in lost)
+    num_tracked = total - len(lost)
     statement = "the only frame could not be used"
     if num_tracked:
         part = quantity(num_tracked / total, "fraction")
@@ -91,7 +102,8 @@ def _failure(lost: Sequence[ReportedFrame], total: int) -> Finding:
     elif total > 1:
         statement = f"none of the {count(total)} frames could be registered"
     statement += f": {reason}" * bool(reason)
-    return Finding("untracked", "lost", "Failed", statement, advice_on(lost), _indices(lost))
+    next_step = _ADVICE["dropped"] if data.num_dropped > len(lost) else advice_on(lost)
+    return Finding("untracked", "lost", "Failed", statement, next_step, _indices(lost))
 
 
 def _jumps(frames: Sequence[ReportedFrame], distance_seen: float) -> Iterator[Finding]:

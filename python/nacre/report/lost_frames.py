@@ -61,7 +61,7 @@ def most_common_reason(reasons: Iterable[str]) -> str:
 def plain_reason(reason: str) -> str:
     """Return a frame's reason without the figures that differ from frame to frame."""
     if reason.startswith("registration score "):
-        return "the registration score is too low"
+        return "it does not fit the model well enough"
     if re.match(r"only 0 pixels", reason):
         return "no usable pixel"
     if re.match(r"only \d+ pixels", reason):

@@ -93,6 +93,8 @@ def run_report(
         parameters=run.parameters,
         interrupted=interrupted,
         doubled=None if interrupted else run.doubled_surfaces,  # who stops a run waits for it
+        num_dropped=run.num_dropped,
+        camera_doubts=run.advice,
         min_tracked=min_tracked,
     )
 

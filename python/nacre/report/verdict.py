@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from nacre.evaluation import AbsoluteTrajectoryError
+from nacre.evaluation.trajectory import MIN_ALIGNED
 from nacre.report.data import ReportData
 from nacre.report.findings import Finding, Level, find_problems
-from nacre.report.text import count
+from nacre.report.text import count, quantity
 
 
 @dataclass(frozen=True)
@@ -20,14 +21,22 @@ class Verdict:
     findings: tuple[Finding, ...]  #: what speaks against the run, the worst first
 
 
+def _known(trajectory: AbsoluteTrajectoryError | None) -> str:
+    """Say what holds the frames to be right: each other, or a truth that is near."""
+    if trajectory is None or trajectory.num_compared < MIN_ALIGNED:
+        return "and nothing contradicts them"
+    return f"{quantity(trajectory.rmse, 'm')} from the true path (root mean square)"
+
+
 def judge(data: ReportData, trajectory: AbsoluteTrajectoryError | None) -> Verdict | None:
     """Return the verdict on a run; None where nothing was run."""
     if not data.frames:
         return None
     findings = tuple(find_problems(data, trajectory))
     if not findings:
-        number = count(len(data.frames))
-        return Verdict("ok", f"Good: all {number} frames were tracked, and nothing contradicts them.", "", ())
+        return Verdict(
+            "ok", f"Good: all {count(len(data.frames))} frames were tracked, {_known(trajectory)}.", "", ()
+        )
     worst = findings[0]
     level: Level = "lost" if any(finding.level == "lost" for finding in findings) else "weak"
     return Verdict(level, f"{worst.word}: {worst.statement}.", worst.next_step, findings)

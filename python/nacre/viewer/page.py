@@ -74,8 +74,8 @@ def export_html(
 
     Notes
     -----
-    Positions are rounded to 1 / 65535 of the model's longest side, confidence to 0.02 %, and of more than a
-    million points every second, third, ... is kept.
+    Positions are rounded to 1 / 65535 of the model's longest side, confidence and standard deviations to
+    0.02 %, and of more than a million points every second, third, ... is kept.
     """
     if not timeline.has_points:
         raise ValueError("timeline must hold a state of the model to export, got none")

@@ -15,6 +15,7 @@ from nacre.meshing import triangulate
 from nacre.parameters import DepthParameters
 from nacre.report.colormap import viridis
 from nacre.report.image_files import encode_png
+from nacre.report.lost_frames import plain_reason
 from nacre.viewer.colors import STATUS_COLORS
 from nacre.viewer.depth_picture import depth_legend, depth_picture
 from nacre.viewer.disks import deviation, disk_radii
@@ -37,6 +38,11 @@ class State(NamedTuple):
     def name(self) -> str:
         """Of the state; another one has another name."""
         return f"{self.run}/{self.place}/{len(self.cloud.points)}"
+
+    @property
+    def is_mesh(self) -> bool:
+        """Whether its triangles came with the points."""
+        return self.cloud.triangles is not None
 
 
 class PageData:
@@ -86,9 +92,10 @@ class PageData:
 
     @property
     def surface_names(self) -> list[str]:
-        """Of the triangles of the newest state of each run, and of the holes in them."""
-        newest = {state.run: state.name for state in self._states}
-        return [f"{kind}/{name}" for name in newest.values() for kind in ("triangles", "holes")]
+        """Of the triangles of the newest state of each run, and of the holes in those that are no mesh."""
+        newest = {state.run: state for state in self._states}.values()
+        triangles = [f"triangles/{state.name}" for state in newest]
+        return triangles + [f"holes/{state.name}" for state in newest if not state.is_mesh]
 
     def read(self, name: str) -> bytes:
         """
@@ -107,6 +114,8 @@ class PageData:
         if kind not in ("points", "triangles", "holes"):
             raise KeyError(name)
         state = {state.name: state for state in self._states}[rest]
+        if kind == "holes" and state.is_mesh:
+            raise KeyError(name)
         if kind == "triangles":
             return pack({}, {"triangles": _sorted_triangles(self._triangulated(state))})
         return self._holes(state) if kind == "holes" else self._points(state)
@@ -133,7 +142,8 @@ class PageData:
             {
                 "index": frame.index,
                 "status": frame.status,
-                "reason": frame.reason,
+                "reason": plain_reason(frame.reason),
+                "details": frame.reason,
                 "figures": words(frame),
                 "pose": _rounded_pose(frame.world_from_camera),
                 "truth": _rounded_pose(frame.truth),
@@ -144,6 +154,7 @@ class PageData:
         return {
             "title": timeline.title,
             "placement": timeline.placement,
+            "isMesh": any(s.is_mesh for s in self._states if s.run == run),
             "hasDepth": timeline.depth_of is not None and timeline.camera is not None,
             "frustum": frustum_corners(timeline.camera).tolist(),
             "frames": frames,
@@ -167,7 +178,9 @@ class PageData:
         if last is not None and last[0] is state:
             return last[1]
         cloud = self._prepared(state)
-        triangles = triangulate(cloud.points, cloud.normals, num_threads=1 if self._is_live else 0)
+        triangles = cloud.triangles
+        if triangles is None:
+            triangles = triangulate(cloud.points, cloud.normals, num_threads=1 if self._is_live else 0)
         self._last_triangles = state, triangles
         return triangles
 
@@ -188,6 +201,8 @@ class PageData:
             columns["colors"] = cloud.colors
         if cloud.confidence is not None:
             columns["confidence"] = rounded(np.maximum(np.nan_to_num(cloud.confidence), 0))
+        if cloud.sigma is not None and np.isfinite(cloud.sigma).any():
+            columns["sigma"] = rounded(_known_sigma(cloud.sigma))
         if cloud.last_seen is not None:
             columns["lastSeen"] = np.maximum(cloud.last_seen, 0).astype(np.uint32)
         if len(timeline.snapshots) == 1:
@@ -222,6 +237,12 @@ def frustum_corners(camera: Camera | None) -> npt.NDArray[np.float64]:
 def _logarithms(factors: npt.NDArray[np.float32]) -> npt.NDArray[np.uint8]:
     """Return factors from 1/4 to 4000, true to 2 %, as 18 times their binary logarithms above that of 1/4."""
     return np.asarray(np.rint(np.clip(18 * (np.log2(factors) + 2), 0, 255)), np.uint8)
+
+
+def _known_sigma(sigma: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return standard deviations of a micrometre at least; those that are not known as the largest."""
+    known = np.isfinite(sigma)
+    return np.maximum(np.where(known, sigma, sigma[known].max()), 1e-6)
 
 
 def _rounded_pose(pose: npt.NDArray[np.float64] | None) -> list[list[float]] | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -84,11 +85,8 @@ def _placed(timeline: Timeline, motion: npt.NDArray[np.float64], words: str) -> 
 
 def _moved(cloud: Snapshot, motion: npt.NDArray[np.float64]) -> Snapshot:
     rotation = motion[:3, :3].T
-    return Snapshot(
-        (cloud.points @ rotation + motion[:3, 3]).astype(np.float32),
-        (cloud.normals @ rotation).astype(np.float32),
-        cloud.spacing,
-        cloud.colors,
-        cloud.confidence,
-        cloud.last_seen,
+    return replace(
+        cloud,
+        points=(cloud.points @ rotation + motion[:3, 3]).astype(np.float32),
+        normals=(cloud.normals @ rotation).astype(np.float32),
     )

@@ -12,14 +12,17 @@ import numpy.typing as npt
 from nacre import KdTree, estimate_normals
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Cloud
+from nacre.io.meshes import read_mesh_arrays
+from nacre.io.ply_header import read_header
 from nacre.io.points import read_points
+from nacre.io.raw import read_head
 from nacre.report.saved_run import SavedRun
 from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline
 
 
 def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     """
-    Read what a reconstruction wrote, or the points of a file.
+    Read what a reconstruction wrote, or the points or the mesh of a file.
 
     Depth images are shown where the recording is still in its place.
 
@@ -27,7 +30,7 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     ----------
     path : path-like
         ``OUT``, which holds ``model.ply`` and ``report.json``; or a point file. Where it has no normals, they
-        are estimated; y is up unless a comment says that it is nacre's.
+        come from the triangles, or else are estimated; y is up unless a comment says that it is nacre's.
 
     Raises
     ------
@@ -39,7 +42,7 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
         file = read_points(path)
         is_upright = not any(CAMERA_FRAME in comment for comment in file.comments)
         timeline = Timeline(path.name, None, is_upright=is_upright)
-        timeline.set_snapshot(_cloud(file, None))
+        timeline.set_snapshot(_cloud(file, None, _triangles(path)))
         return timeline
     out = SavedRun(path)
     timeline = Timeline(
@@ -61,19 +64,48 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     return timeline
 
 
-def _cloud(file: Cloud, spacing: float | None) -> Snapshot:
-    """Return the points of a file that are finite."""
+def _cloud(file: Cloud, spacing: float | None, triangles: npt.NDArray[np.int32] | None = None) -> Snapshot:
+    """Return the points of a file that are finite, and the triangles between them."""
     kept = np.flatnonzero(np.isfinite(file.points).all(axis=1))
-    points = np.asarray(file.points[kept], np.float32)
-    normals = _estimated_normals(points) if file.normals is None else file.normals[kept]
+    points = np.asarray(file.points, np.float32)
+    spacing = max(float(spacing or _usual_spacing(points[kept])), 1e-6)
+    if file.normals is not None:
+        normals = file.normals
+    elif triangles is not None:
+        normals = _vertex_normals(points, triangles)
+    else:
+        normals = np.full(points.shape, np.nan)
+        normals[kept] = _estimated_normals(points[kept])
     known = np.isfinite(normals).all(axis=1, keepdims=True)
-    columns = (file.colors, file.attributes.get("confidence"), file.attributes.get("last_seen"))
-    return Snapshot(
-        points,
-        np.where(known, normals, (0, 0, -1)).astype(np.float32),
-        max(float(spacing or _usual_spacing(points)), 1e-6),
-        *(None if column is None else column[kept] for column in columns),
-    )
+    normals = np.where(known, normals, (0, 0, -1)).astype(np.float32)
+    known_of = file.attributes.get
+    columns = (known_of("confidence"), known_of("last_seen"), known_of("sigma"))
+    return Snapshot(points, normals, spacing, file.colors, *columns, triangles).rows(kept, spacing)
+
+
+def _triangles(path: Path) -> npt.NDArray[np.int32] | None:
+    """Return the triangles of a file of points, where it has any that can be used."""
+    if path.suffix.lower() != ".ply":
+        return None
+    elements = read_header(path, read_head(path, b"end_header")).elements
+    if not any(element.name == "face" and element.num_rows for element in elements):
+        return None
+    try:
+        return read_mesh_arrays(path).triangles
+    except FileFormatError:
+        return None
+
+
+def _vertex_normals(
+    points: npt.NDArray[np.float32], triangles: npt.NDArray[np.int32]
+) -> npt.NDArray[np.float64]:
+    """Return the mean direction of the triangles about each point, by area; NaN where there are none."""
+    a, b, c = points.astype(np.float64)[triangles].transpose(1, 0, 2)
+    with np.errstate(invalid="ignore"):
+        areas = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+        sums = [np.bincount(triangles.ravel(), areas[:, axis], len(points)) for axis in range(3)]
+        normals = np.stack(sums, axis=1)
+        return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
 def _estimated_normals(points: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

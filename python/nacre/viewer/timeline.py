@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,10 @@ class Snapshot:
         Frontal observations that each point stands for.
     last_seen : (N,) integer, optional
         Of the registered frames, the last that observed the point.
+    sigma : (N,) float, optional
+        The expected standard deviation of each point across the surface [m]; NaN where not known.
+    triangles : (T, 3) integer, optional
+        Rows of the points, of a mesh; otherwise the viewer joins the points itself.
     """
 
     points: npt.NDArray[np.float32]
@@ -44,34 +48,61 @@ class Snapshot:
     colors: npt.NDArray[np.uint8] | None = None
     confidence: npt.NDArray[Any] | None = None
     last_seen: npt.NDArray[Any] | None = None
+    sigma: npt.NDArray[Any] | None = None
+    triangles: npt.NDArray[np.int32] | None = None
 
     @classmethod
     def of(cls, model: Model) -> Snapshot:
         """Copy the points of a model as it is now."""
         return cls(
-            model.points, model.normals, model.spacing, model.colors, model.confidence, model.last_seen
+            model.points,
+            model.normals,
+            model.spacing,
+            model.colors,
+            model.confidence,
+            model.last_seen,
+            model.point_sigma.astype(np.float32),
         )
 
     def rows(self, chosen: slice | npt.NDArray[np.int64], spacing: float) -> Snapshot:
-        """Return some of the points, which are so far apart."""
-        rest = (
-            None if column is None else column[chosen].copy()
-            for column in (self.colors, self.confidence, self.last_seen)
+        """Return some of the points, which are so far apart, and the triangles between them."""
+
+        def chosen_of(column: Any) -> Any:
+            return None if column is None else column[chosen].copy()
+
+        return Snapshot(
+            chosen_of(self.points),
+            chosen_of(self.normals),
+            spacing,
+            chosen_of(self.colors),
+            chosen_of(self.confidence),
+            chosen_of(self.last_seen),
+            chosen_of(self.sigma),
+            self._triangles_between(chosen),
         )
-        return Snapshot(self.points[chosen].copy(), self.normals[chosen].copy(), spacing, *rest)
+
+    def _triangles_between(self, chosen: slice | npt.NDArray[np.int64]) -> npt.NDArray[np.int32] | None:
+        if self.triangles is None:
+            return None
+        row_of = np.full(len(self.points), -1, np.int32)
+        row_of[chosen] = np.arange(len(row_of[chosen]))
+        triangles = row_of[self.triangles]
+        return triangles[(triangles >= 0).all(axis=1)]
 
     def thinned(self, max_points: int) -> Snapshot:
-        """Return the same with every second, third, ... point, ``max_points`` at most."""
+        """Return every second, third, ... point, ``max_points`` at most; fewer than all without triangles."""
         step = max(-(-len(self.points) // max_points), 1)
-        return self if step == 1 else self.rows(slice(None, None, step), self.spacing * step**0.5)
+        if step == 1:
+            return self
+        return replace(self, triangles=None).rows(slice(None, None, step), self.spacing * step**0.5)
 
 
 _FIGURES: dict[str, tuple[str, Callable[[Any], str]]] = {
     "overlap": ("overlap", lambda value: quantity(value, "fraction")),
     "consistency": ("consistency", lambda value: quantity(value, "fraction")),
     "score": ("registration score", lambda value: f"{value:.2f}"),
-    "rmse": ("residual", lambda value: quantity(value, "m")),
-    "num_inliers": ("pairs", count),
+    "rmse": ("RMS distance of matched points", lambda value: quantity(value, "m")),
+    "num_inliers": ("matched points", count),
     "num_points": ("model points", count),
     "milliseconds": ("time", lambda value: quantity(value, "ms")),
 }

@@ -238,7 +238,7 @@ def test_too_few_tracked_frames_exit_with_3_and_all_is_written(mostly_blank, tmp
     report = strict_json(tmp_path / "o" / "report.json")
     assert report["num_tracked"] == 1
     assert (report["verdict"]["level"] == "lost") == (code == 3)
-    assert "not known 1 of 4 frames have a pose and a true one" in result.out
+    assert "not known: 1 of 4 frames have a pose and a true one" in result.out
     assert (tmp_path / "o" / "report.html").exists()
     assert len(nacre.read_points(tmp_path / "o" / "model.ply")) == report["num_points"] > 0
     assert (code == 3) == ("only 1 of 4 frames were tracked, less than 0.5 of them" in result.err)

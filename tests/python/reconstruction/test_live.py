@@ -226,7 +226,7 @@ class TestRealTime:
             return add(self, *arguments, **options)
 
         monkeypatch.setattr(Reconstruction, "_add", slowly)
-        write_wave(tmp_path / "r", 40, 0.001)
+        write_wave(tmp_path / "r", 80, 0.001)
         with pytest.raises(SystemExit) as end:
             main(
                 ["reconstruct", str(tmp_path / "r"), "-o", str(tmp_path / "out"), "--realtime", "--no-retry"]
@@ -234,13 +234,13 @@ class TestRealTime:
         assert not end.value.code
         report = json.loads((tmp_path / "out" / "report.json").read_text())
         live = report["live"]
-        assert (live["camera"], live["num_received"]) == (False, 40)
+        assert (live["camera"], live["num_received"]) == (False, 80)
         assert live["num_dropped"] > 20
-        assert report["num_frames"] == 40 - live["num_dropped"]
+        assert report["num_frames"] == 80 - live["num_dropped"]
         indices = [entry["index"] for entry in report["frames"]]
         assert indices == sorted(indices)
-        assert indices[-1] == 39
-        told = f"{live['num_dropped']} of 40: they came faster than they could be registered"
+        assert indices[-1] == 79
+        told = f"{live['num_dropped']} of 80: they came faster than they could be registered"
         assert told in capsys.readouterr().out
-        assert report["source"].endswith(f"{live['num_dropped']} of 40 frames dropped")
+        assert report["source"].endswith(f"{live['num_dropped']} of 80 frames dropped")
         assert told in (tmp_path / "out" / "report.html").read_text()

@@ -33,7 +33,7 @@ def test_one_call_makes_a_model_of_a_list_of_frames(frames: list[nacre.SequenceF
     assert done.num_tracked == 5
     assert done.model.parameters.spacing == 0.003
     assert done.evaluation["absolute_trajectory_error"].rmse < 0.001
-    assert repr(done).startswith("Reconstruction(5 of 5 frames done, 5 tracked, ")
+    assert repr(done).startswith("Reconstruction(5 of 5 frames done (5 TRACKED), ")
 
 
 def test_a_path_is_opened(frames: list[nacre.SequenceFrame], tmp_path: Path) -> None:

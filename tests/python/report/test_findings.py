@@ -58,6 +58,28 @@ def verdict_on(frames: list[ReportedFrame], **more: Any) -> Verdict:
     return verdict
 
 
+def test_a_truth_that_is_near_is_told() -> None:
+    assert verdict_on(walk(truth=True)).sentence == (
+        "Good: all 20 frames were tracked, 0 mm from the true path (root mean square)."
+    )
+
+
+def test_a_camera_whose_numbers_are_doubted_is_not_good() -> None:
+    verdict = verdict_on(walk(), camera_doubts=["its focal length is wrong"])
+    assert (verdict.level, verdict.sentence) == ("weak", "Inaccurate: its focal length is wrong.")
+    assert "--camera" in verdict.next_step
+
+
+def test_frames_that_came_too_fast_are_what_is_told_where_others_were_lost() -> None:
+    assert verdict_on(walk(), num_dropped=9).level == "ok"
+    frames = [
+        with_figures(f, status="LOST", world_from_camera=None) if i > 5 else f for i, f in enumerate(walk())
+    ]
+    verdict = verdict_on(frames, num_dropped=40)
+    assert [finding.kind for finding in verdict.findings] == ["untracked", "dropped"]
+    assert "--max-depth" in verdict.next_step
+
+
 class TestMotion:
     def test_a_steady_hand_is_good(self) -> None:
         assert verdict_on(walk()).level == "ok"

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import io
 import json
+import math
+import re
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +17,7 @@ import pytest
 
 import nacre
 from nacre.report import ReportedFrame
-from nacre.viewer import Timeline, Viewer, export_html
+from nacre.viewer import Controls, Timeline, Viewer, export_html, read_timeline
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from browser import CHROMIUM, Browser
@@ -69,6 +72,15 @@ def color_at(browser: Browser, x: float, y: float) -> np.ndarray:
 
 def num_shown(browser: Browser) -> int:
     return int(browser.evaluate("page.clouds[0].numShown"))
+
+
+def saved_points(browser: Browser, folder: Path) -> nacre.Cloud:
+    """Save the points of the plane that are shown, and read them."""
+    browser.press_button("save")
+    end = time.monotonic() + 10
+    while not (folder / "plane.ply").exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    return nacre.read_points(folder / "plane.ply")
 
 
 def test_it_begins_with_the_colored_model_in_the_middle(exported: Browser) -> None:
@@ -137,11 +149,7 @@ def test_a_box_keeps_what_is_in_it_and_saves_it(exported: Browser, tmp_path: Pat
     assert 0 < expected < 441
     assert num_shown(exported) == expected
     assert f"{expected} of 441 points" in exported.text()
-    exported.press_button("save")
-    end = time.monotonic() + 10
-    while not (tmp_path / "plane.ply").exists() and time.monotonic() < end:
-        time.sleep(0.05)
-    saved = nacre.read_points(tmp_path / "plane.ply")
+    saved = saved_points(exported, tmp_path)
     assert len(saved.points) == expected
     assert np.min(saved.points @ axis) >= limit - 1e-5
     np.testing.assert_allclose(saved.normals, plane().normals[:expected], atol=0.01)
@@ -152,15 +160,28 @@ def test_a_box_keeps_what_is_in_it_and_saves_it(exported: Browser, tmp_path: Pat
     np.testing.assert_allclose(saved.attributes["confidence"], 1 + rows[:, 0] + 21 * rows[:, 1])
 
 
-def test_points_of_low_confidence_are_hidden(exported: Browser) -> None:
-    confidence = plane().confidence
-    assert confidence is not None
-    for level in (30, 60, 90):
-        exported.choose("confidence", level)
-        told = exported.evaluate("document.getElementById('confidence-value').textContent")
-        assert 0 < num_shown(exported) == int((confidence >= float(told)).sum()) < 441
-    exported.choose("confidence", 0)
-    assert num_shown(exported) == 441
+def test_points_of_large_uncertainty_are_hidden(browser: Browser, tmp_path: Path) -> None:
+    sigma = np.arange(1, 442) / 10_000
+    export_html(two_looks(replace(plane(), sigma=sigma)), tmp_path / "view.html")
+    browser.open((tmp_path / "view.html").as_uri())
+    browser.wait_for(LOADED)
+    for share, told in ((5, "2.30 mm"), (30, "13.3 mm"), (90, "39.7 mm")):
+        browser.choose("uncertainty", share)
+        assert num_shown(browser) == 1 + 440 * share // 100
+        assert browser.evaluate("document.getElementById('uncertainty-value').textContent") == told
+    browser.download_to(tmp_path)
+    np.testing.assert_allclose(
+        np.sort(saved_points(browser, tmp_path).attributes["sigma"]), sigma[:397], rtol=3e-4
+    )
+    browser.choose("uncertainty", 100)
+    assert num_shown(browser) == 441
+    browser.choose("kind", "uncertainty")
+    assert re.search(r"standard deviation .*\s+0\.98\d mm\s+43\.\d mm", browser.text())
+
+
+def test_without_uncertainties_there_is_no_such_tool(exported: Browser) -> None:
+    assert exported.evaluate("document.getElementById('uncertainty-row').hidden")
+    assert not exported.evaluate("page.clouds[0].kinds.includes('uncertainty')")
 
 
 def test_the_mesh_closes_the_gaps_between_points(exported: Browser) -> None:
@@ -226,6 +247,45 @@ def test_two_runs_2_mm_apart(browser: Browser, tmp_path: Path, has_frames: bool)
     assert browser.evaluate("page.activeRun") == 1
 
 
+def test_runs_that_are_nearly_equal_do_not_deviate(browser: Browser, tmp_path: Path) -> None:
+    first, second = two_looks(plane(), "first"), two_looks(plane(1 + 2e-7), "second")
+    export_html(first, tmp_path / "view.html", other=second)
+    browser.open((tmp_path / "view.html").as_uri())
+    browser.wait_for(LOADED)
+    assert browser.evaluate("document.getElementById('scale-value').textContent") == "1.00 mm"
+    assert "first: median 0.000 mm, 95 % below 0.000 mm" in browser.text()
+    counts = browser.evaluate("page.deviation.figures(page.clouds[0]).counts")
+    assert counts[0] == sum(counts) == 441
+
+
+def test_halves_show_all_that_the_whole_shows(browser: Browser, tmp_path: Path) -> None:
+    export_html(two_looks(plane(), "first"), tmp_path / "view.html", other=two_looks(plane(), "second"))
+    browser.open((tmp_path / "view.html").as_uri())
+    browser.wait_for(LOADED)
+    half = browser.evaluate("page.orbit.distance")
+    aspect = browser.evaluate("page.canvas.clientWidth / page.canvas.clientHeight / 2")
+    radius = browser.evaluate("page.document.view.radius")
+    assert half * math.sin(math.atan(aspect * math.tan(0.35))) == pytest.approx(radius)
+    browser.choose("layout", "0")
+    assert browser.evaluate("page.orbit.distance") < half
+    browser.evaluate("page.orbit.turn(20, 0)")
+    turned = browser.evaluate("page.orbit.distance")
+    browser.choose("layout", "both")
+    assert browser.evaluate("page.orbit.distance") == turned  # where a hand has put it
+
+
+def test_no_word_of_holes_while_they_are_off(browser: Browser, tmp_path: Path) -> None:
+    export_html(two_looks(plane(), "first"), tmp_path / "view.html", other=two_looks(plane(), "second"))
+    browser.open((tmp_path / "view.html").as_uri())
+    browser.wait_for(LOADED)
+    words = "document.getElementById('holes-count').textContent"
+    assert browser.evaluate(words) == ""
+    browser.press_button("holes")
+    browser.wait_for(f"{words} === 'no holes and no holes'")
+    browser.choose("layout", "0")
+    browser.wait_for(f"{words} === 'no holes'")
+
+
 def test_points_are_where_they_were_to_half_a_step(exported: Browser) -> None:
     found = np.array(exported.evaluate("Array.from({length: 441}, (_, i) => page.clouds[0].position(i))"))
     expected = plane().points
@@ -255,6 +315,100 @@ def test_a_served_page_follows_the_run(browser: Browser) -> None:
         viewer.refresh()
         time.sleep(1.2)
         assert browser.evaluate("page.player.place") == 1  # where a hand has put it
+    finally:
+        viewer.close()
+
+
+def test_a_lost_frame_is_told_plainly(browser: Browser, tmp_path: Path) -> None:
+    timeline = two_looks(plane())
+    reason = "registration score 0.03 is below 0.36: overlap 0.5, consistency 0.7 and 0.9"
+    timeline.add(ReportedFrame(2, "LOST", reason=reason))
+    export_html(timeline, tmp_path / "view.html")
+    browser.open((tmp_path / "view.html").as_uri())
+    browser.wait_for(LOADED)
+    told = [
+        browser.evaluate(f"document.getElementById('frame-{x}').textContent") for x in ("status", "details")
+    ]
+    assert told == ["frame 2, LOST: it does not fit the model well enough", reason]
+    browser.choose("frame", 1)
+    assert browser.evaluate("document.getElementById('frame-details').textContent") == ""
+
+
+def test_a_mesh_file_is_shown_as_its_mesh(browser: Browser, tmp_path: Path) -> None:
+    cloud, triangles = plane(), np.array([[0, 440, 20], [0, 420, 440]])  # two, over all of the plane
+    nacre.write_mesh(tmp_path / "mesh.ply", cloud.points, triangles)
+    export_html(read_timeline(tmp_path / "mesh.ply"), tmp_path / "view.html")
+    browser.open((tmp_path / "view.html").as_uri())
+    browser.wait_for(LOADED)
+    assert browser.evaluate("document.getElementById('surface').value") == "mesh"
+    corners = browser.evaluate("Array.from(page.clouds[0].triangles, (i) => page.clouds[0].position(i))")
+    assert len(corners) == 6
+    assert np.abs(np.array(corners)[:, :2]) == pytest.approx(0.1, abs=1e-5)
+    assert browser.evaluate("document.getElementById('holes-row').hidden")
+
+
+@pytest.fixture
+def phone(browser: Browser) -> Iterator[Browser]:
+    size = {"width": 412, "height": 800, "deviceScaleFactor": 1, "mobile": True}
+    browser.send("Emulation.setDeviceMetricsOverride", **size)
+    yield browser
+    browser.send("Emulation.clearDeviceMetricsOverride")
+
+
+def test_on_a_phone_the_panel_is_folded_away(phone: Browser, tmp_path: Path) -> None:
+    export_html(two_looks(plane()), tmp_path / "view.html")
+    phone.open((tmp_path / "view.html").as_uri())
+    phone.wait_for(LOADED)
+    assert phone.evaluate("page.canvas.clientWidth") == 412
+    assert "Colour by" not in phone.text()
+    phone.press_button("fold")
+    assert "Colour by" in phone.text()
+    assert phone.evaluate("page.canvas.clientWidth") == 412
+    assert phone.evaluate("page.canvas.clientHeight") == pytest.approx(0.55 * 800, abs=1)
+    phone.press_button("fold")
+    assert phone.evaluate("page.canvas.clientHeight") == 800
+
+
+def test_on_a_wide_page_the_panel_can_be_folded_away(exported: Browser) -> None:
+    before = exported.evaluate("page.canvas.clientWidth")
+    assert "Colour by" in exported.text()
+    exported.press_button("fold")
+    assert exported.evaluate("page.canvas.clientWidth") == before + 300
+    assert exported.evaluate("document.getElementById('fold').ariaExpanded") == "false"
+
+
+@pytest.fixture
+def without_webgl(browser: Browser) -> Iterator[Browser]:
+    script = """const get = HTMLCanvasElement.prototype.getContext;
+        HTMLCanvasElement.prototype.getContext = function (kind) {
+            return kind === "2d" ? get.call(this, kind) : null;
+        };"""
+    added = browser.send("Page.addScriptToEvaluateOnNewDocument", source=script)
+    yield browser
+    browser.send("Page.removeScriptToEvaluateOnNewDocument", identifier=added["identifier"])
+
+
+def test_without_webgl_a_camera_s_buttons_work(without_webgl: Browser) -> None:
+    viewer = Viewer(two_looks(plane()), port=0, controls=Controls())
+    try:
+        without_webgl.open(viewer.url)
+        without_webgl.wait_for("document.body.innerText.includes('cannot draw the model')")
+        without_webgl.wait_for("!document.getElementById('start').disabled")
+        without_webgl.press_button("start")
+        without_webgl.wait_for("page.live.now.state === 'recording'")
+        assert without_webgl.evaluate("document.getElementById('stop').getBoundingClientRect().width") > 20
+        without_webgl.wait_for("document.body.innerText.includes('441 points')")
+        assert "cannot draw the model" in without_webgl.text()
+    finally:
+        viewer.close()
+
+
+def test_on_a_phone_a_camera_s_buttons_are_in_sight(phone: Browser) -> None:
+    viewer = Viewer(two_looks(plane()), port=0, controls=Controls())
+    try:
+        phone.open(viewer.url)
+        phone.wait_for("!document.getElementById('start').disabled")
+        assert phone.evaluate("document.getElementById('start').getBoundingClientRect().bottom") < 800
     finally:
         viewer.close()
 

@@ -9,6 +9,7 @@ import math
 import re
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,8 @@ import nacre
 from nacre.cli import main
 from nacre.reconstruction import Reconstruction
 from nacre.report import ReportedFrame
+from nacre.report.lost_frames import plain_reason
+from nacre.viewer.page_data import PageData
 from nacre.viewer.timeline import words
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -87,8 +90,24 @@ class TestTimeline:
         assert last.world_from_camera is not None
         assert np.allclose(first.truth, np.eye(4))
         assert np.abs(last.truth - last.world_from_camera).max() < 0.01
+        (cloud,) = (cloud for _, cloud in timeline.snapshots)
+        assert cloud.sigma is not None
+        assert 0 < np.min(cloud.sigma) < np.max(cloud.sigma) < 0.01
         assert timeline.depth_of is not None
         assert timeline.depth_of(2).shape == (120, 160)
+
+
+@pytest.mark.parametrize(
+    ("reason", "told"),
+    [
+        ("registration score 0.03 is below 0.36: overlap 0.5", "it does not fit the model well enough"),
+        ("1 direction(s) of the pose are not determined", "the shape leaves directions of the pose open"),
+        ("no overlap", "no overlap"),
+        ("", ""),
+    ],
+)
+def test_reasons_are_told_plainly(reason: str, told: str) -> None:
+    assert plain_reason(reason) == told
 
 
 def test_removed_pixels_are_marked() -> None:
@@ -192,6 +211,47 @@ def test_a_point_file_is_shown_too(tmp_path: Path) -> None:
     assert timeline.is_upright
     assert run("view", tmp_path / "scan.ply", "--html", tmp_path / "view.html", "--quiet") == 0
     assert b'"frames": []' in embedded(tmp_path / "view.html")
+
+
+def test_a_mesh_file_keeps_its_triangles(tmp_path: Path) -> None:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [9, 9, 9]], float)
+    nacre.write_mesh(tmp_path / "mesh.ply", vertices, [[0, 1, 2]])
+    ((_, read),) = viewer.read_timeline(tmp_path / "mesh.ply").snapshots
+    assert read.triangles is not None
+    assert read.triangles.tolist() == [[0, 1, 2]]
+    np.testing.assert_allclose(read.normals[:3], np.broadcast_to((0, 0, 1), (3, 3)))
+    turned = read.rows(np.array([2, 3, 0, 1]), 1.0)
+    assert turned.triangles is not None
+    assert turned.triangles.tolist() == [[2, 3, 0]]
+    less = read.rows(np.array([0, 1, 3]), 1.0)
+    assert less.triangles is not None
+    assert len(less.triangles) == 0
+    assert read.thinned(2).triangles is None
+    data = PageData([viewer.read_timeline(tmp_path / "mesh.ply")])
+    assert data.surface_names == ["triangles/0/-1/4"]
+    with pytest.raises(KeyError):
+        data.read("holes/0/-1/4")
+
+
+def test_faces_that_are_no_triangles_leave_the_points(tmp_path: Path) -> None:
+    lines = ["ply", "format ascii 1.0", "element vertex 3", *(f"property float {axis}" for axis in "xyz")]
+    lines += ["element face 1", "property list uchar int vertex_indices", "end_header"]
+    lines += ["0 0 0", "1 0 0", "0 1 0", "2 0 1"]
+    (tmp_path / "edge.ply").write_text("\n".join(lines) + "\n")
+    ((_, read),) = viewer.read_timeline(tmp_path / "edge.ply").snapshots
+    assert len(read.points) == 3
+    assert read.triangles is None
+
+
+def test_uncertainties_that_are_not_known_are_the_largest() -> None:
+    def column(*sigma: float) -> bytes:
+        timeline = viewer.Timeline("x", None)
+        timeline.set_snapshot(replace(snapshot(4), sigma=np.array(sigma)))
+        return PageData([timeline]).read("points/0/-1/4")
+
+    assert column(0.01, 0.02, np.nan, 0.03) == column(0.01, 0.02, 0.03, 0.03)
+    assert b'"sigma"' in column(0.01, 0.02, np.nan, 0.03)
+    assert b'"sigma"' not in column(np.nan, np.nan, np.nan, np.nan)
 
 
 def test_a_file_of_no_points_is_an_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -35,18 +35,18 @@ class Cloud {
 
   /** What the points can be colored by. */
   get kinds() {
-    const known = { colour: this.colors, shading: true, normal: true, confidence: this.confidence };
+    const known = { colour: this.colors, shading: true, normal: true, uncertainty: this.sigma };
     Object.assign(known, { age: this.lastSeen, deviation: this.deviation });
     return Object.keys(known).filter((kind) => known[kind]);
   }
 
-  /** Show what is confident enough, in the box, and seen by a frame up to a place. */
-  select(minConfidence, box, place) {
+  /** Show what has a standard deviation up to one, is in the box, and was seen by a frame up to a place. */
+  select(maxSigma, box, place) {
     const isInside = box ? box.test(this) : () => true;
     this.numShown = 0;
     for (let i = 0; i < this.size; i++) {
       const shown =
-        !(this.confidence && this.confidence[i] < minConfidence) &&
+        !(this.sigma && this.sigma[i] > maxSigma) &&
         !(this.firstSeen && this.firstSeen[i] > place) &&
         isInside(i);
       this.paint[4 * i + 3] = shown ? 255 : 0;
@@ -57,7 +57,7 @@ class Cloud {
 
   /** Give the points the colors of a kind; deviations end at a length. */
   color(kind, colormap, deviationEnd) {
-    if (kind === "confidence") this.#map(this.confidence, colormap, this.range(kind), Math.log);
+    if (kind === "uncertainty") this.#map(this.sigma, colormap, this.range(kind), Math.log);
     else if (kind === "age") this.#map(this.lastSeen, colormap, this.range(kind));
     else if (kind === "deviation") this.#map(this.deviation, colormap, [0, deviationEnd]);
     else {
@@ -75,9 +75,8 @@ class Cloud {
 
   /** The values at the ends of the color scale of a kind. */
   range(kind) {
-    const values = { confidence: this.confidence, age: this.lastSeen }[kind];
-    const [low, high] = [quantile(values, LOWEST), quantile(values, HIGHEST)];
-    return kind === "confidence" ? [Math.max(low, 1e-3), Math.max(high, 1e-3)] : [low, high];
+    const values = { uncertainty: this.sigma, age: this.lastSeen }[kind];
+    return [quantile(values, LOWEST), quantile(values, HIGHEST)];
   }
 
   #map(values, colormap, [low, high], measure = (value) => value) {

@@ -90,13 +90,14 @@ class Crop {
 
 /** The shown points of a cloud as a binary PLY file. */
 function plyBytes(cloud, comment) {
+  const attributes = ["confidence", "sigma"].filter((name) => cloud[name]);
   const floats = ["x", "y", "z", "nx", "ny", "nz"], colors = cloud.colors ? ["red", "green", "blue"] : [];
   const header = [
     "ply", "format binary_little_endian 1.0", `comment ${comment}`, `element vertex ${cloud.numShown}`,
     ...floats.map((name) => `property float ${name}`), ...colors.map((name) => `property uchar ${name}`),
-    ...(cloud.confidence ? ["property float confidence"] : []), "end_header\n",
+    ...attributes.map((name) => `property float ${name}`), "end_header\n",
   ].join("\n");
-  const rowSize = 24 + colors.length + (cloud.confidence ? 4 : 0);
+  const rowSize = 24 + colors.length + 4 * attributes.length;
   const start = new TextEncoder().encode(header);
   const bytes = new Uint8Array(start.length + rowSize * cloud.numShown);
   bytes.set(start);
@@ -107,7 +108,7 @@ function plyBytes(cloud, comment) {
     const normal = unit([0, 1, 2].map((k) => cloud.normals[4 * i + k]));
     [...cloud.position(i), ...normal].forEach((value, k) => view.setFloat32(at + 4 * k, value, true));
     colors.forEach((_, k) => view.setUint8(at + 24 + k, cloud.colors[3 * i + k]));
-    if (cloud.confidence) view.setFloat32(at + rowSize - 4, cloud.confidence[i], true);
+    attributes.forEach((name, k) => view.setFloat32(at + 24 + colors.length + 4 * k, cloud[name][i], true));
     at += rowSize;
   }
   return bytes;

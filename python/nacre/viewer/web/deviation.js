@@ -1,6 +1,7 @@
 // How far the points of each run are from the surface of the other: figures, and a histogram in their colors.
 
 const BINS = 40;
+const LEAST_END = 0.1; // spacings: where the color scale ends by itself; runs that are nearly equal differ by rounding
 
 class Deviation {
   constructor(app) {
@@ -11,10 +12,11 @@ class Deviation {
 
   /** The length at which the color scale ends [m]: from 0.1 to 10 of its usual one, by the slider. */
   get end() {
-    const usual = this.app.clouds.map(({ deviation }) => {
-      return Math.min(1.25 * quantile(deviation, 0.95), 10 * quantile(deviation, 0.5)); // parts that one lacks are far
+    const usual = this.app.clouds.flatMap(({ deviation, spacing }) => {
+      const most = 1.25 * quantile(deviation, 0.95), ofOverlap = 10 * quantile(deviation, 0.5);
+      return [Math.min(most, ofOverlap), LEAST_END * spacing]; // parts that one run lacks are far
     });
-    return Math.max(...usual, 1e-6) * 100 ** (this.input.value / 100 - 0.5);
+    return Math.max(...usual) * 100 ** (this.input.value / 100 - 0.5);
   }
 
   /** Of the points of a run that are shown: the median, what 95 % are below, and how many are in each bin. */
@@ -44,7 +46,8 @@ class Deviation {
     counts.forEach((count, i) => {
       const color = mapped(this.app.document.colormap, (i + 0.5) / BINS).map(Math.round);
       context.fillStyle = `rgb(${color})`;
-      context.fillRect(4 * i, 60 - (58 * count) / highest, 3, 60);
+      const height = count && Math.max((58 * count) / highest, 2); // a few points are seen, too
+      context.fillRect(4 * i, 60 - height, 3, height);
     });
     return canvas;
   }

@@ -14,8 +14,8 @@ class Holes {
 
   /** Find the holes of what is shown, unless that is being done, or was done a moment ago. */
   async load() {
-    const { clouds, source } = this.app;
-    document.getElementById("holes-row").hidden = !clouds.some(({ name }) => source.has(`holes/${name}`));
+    const { clouds } = this.app;
+    document.getElementById("holes-row").hidden = !clouds.some(({ name }, run) => this.#canFind(name, run));
     if (!this.input.checked || this.isBusy || performance.now() < this.next) return this.#showCount();
     this.isBusy = true;
     const start = performance.now();
@@ -40,17 +40,21 @@ class Holes {
     setTimeout(() => this.app.clouds.some(({ name }, run) => name !== this.runs[run]?.name) && this.load(), rest + 1);
   }
 
+  /** A mesh of a file is as it is: holes are those of points that were joined here. */
+  #canFind(name, run) {
+    return !this.app.document.runs[run].isMesh && this.app.source.has(`holes/${name}`);
+  }
+
   async #read(name, run) {
-    if (this.runs[run]?.name === name) return;
+    if (this.runs[run]?.name === name || !this.#canFind(name, run)) return;
     const { header, columns } = unpack(await this.app.source.read(`holes/${name}`));
     const colors = [...columns.isHole].flatMap((isHole) => [...(isHole ? HOLE : RIM), ...(isHole ? HOLE : RIM)]);
     this.runs[run] = { name, positions: columns.segments, colors, sizes: header.sizes };
   }
 
   #showCount() {
-    const texts = this.app.parts.map(({ run }) => {
-      const sizes = this.lines(run)?.sizes;
-      if (!sizes) return "";
+    const known = this.app.parts.map(({ run }) => this.lines(run)?.sizes).filter((sizes) => sizes);
+    const texts = known.map((sizes) => {
       if (!sizes.length) return "no holes";
       return `${sizes.length} hole${sizes.length > 1 ? "s" : ""}, the largest ${lengthText(sizes[0])}`;
     });

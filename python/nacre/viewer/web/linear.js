@@ -58,5 +58,6 @@ function quantile(values, part) {
 /** A length in the unit that suits it. */
 function lengthText(metres) {
   if (metres >= 1) return `${metres.toFixed(3)} m`;
+  if (metres < 1e-5) return `${(1000 * metres).toFixed(3)} mm`; // less than a micrometre is rounding
   return `${(1000 * metres).toPrecision(metres >= 0.1 ? 4 : 3)} mm`;
 }

@@ -1,11 +1,16 @@
 // The page: what is chosen, what is loaded for it, and the picture of it.
 
 const POLL = 1000; // [ms]
+const IS_NARROW = matchMedia("(max-width: 600px)"); // as in style.css: the panel lies below the model
 
 class App {
   constructor() {
     this.canvas = document.getElementById("scene");
-    this.renderer = new Renderer(this.canvas);
+    try {
+      this.renderer = new Renderer(this.canvas);
+    } catch (error) {
+      this.cannotDraw = error.message; // the rest goes on: a camera's buttons, figures, files
+    }
     this.orbit = new Orbit(
       this.canvas, () => this.redraw(), (x, y) => this.#click(x, y), (x, y) => this.#turnAbout(x, y),
     );
@@ -48,12 +53,15 @@ class App {
     const isFirst = !this.document;
     this.document = JSON.parse(new TextDecoder().decode(bytes));
     showDocument(this.document);
-    const { isLive } = this.document;
-    if (isFirst && isLive) document.getElementById("holes").checked = true;
-    if (isFirst && !isLive && !this.document.runs[0].frames.length) document.getElementById("reverse").checked = true;
+    const { isLive, view, runs } = this.document;
+    if (isFirst) {
+      this.#fold(IS_NARROW.matches && !isLive); // a camera's buttons stay in sight
+      document.getElementById("holes").checked = isLive;
+      document.getElementById("reverse").checked = !isLive && !runs[0].frames.length;
+      if (runs[0].isMesh) document.getElementById("surface").value = "mesh";
+    }
     this.player.update();
     this.#forget();
-    const { view, runs } = this.document;
     if (view && !this.orbit.touched && runs[0].frames.length >= 2 * this.framesAtReset) this.reset();
     await this.load();
   }
@@ -84,7 +92,7 @@ class App {
     this.clouds = clouds;
     this.#say("");
     if (isOther) {
-      this.renderer.keepOnly(clouds);
+      this.renderer?.keepOnly(clouds);
       showKinds(this);
       await this.#loadTriangles();
       this.color();
@@ -121,13 +129,13 @@ class App {
   /** Which run is drawn; of two the first. */
   get activeRun() {
     const layout = document.getElementById("layout").value;
-    return this.clouds.length > 1 && layout !== "both" ? +layout : 0;
+    return this.document.runs.length > 1 && layout !== "both" ? +layout : 0;
   }
 
   /** Which run is drawn where, as parts of the canvas. */
   get parts() {
     const layout = document.getElementById("layout").value;
-    if (this.clouds.length < 2 || layout !== "both") return [{ run: this.activeRun, left: 0, width: 1 }];
+    if (this.document.runs.length < 2 || layout !== "both") return [{ run: this.activeRun, left: 0, width: 1 }];
     return [{ run: 0, left: 0, width: 0.5 }, { run: 1, left: 0.5, width: 0.5 }];
   }
 
@@ -137,11 +145,22 @@ class App {
     this.orbit.look(this.document.view, this.#aspect(this.parts[0]));
   }
 
+  /** Fit an untouched first view to what there is room for now. */
+  #refit() {
+    if (this.document?.view && !this.orbit.touched) this.reset();
+    else this.redraw();
+  }
+
+  #fold(isFolded) {
+    document.body.classList.toggle("is-folded", isFolded);
+    document.getElementById("fold").setAttribute("aria-expanded", String(!isFolded));
+  }
+
   /** Show the points that the tools leave. */
   select() {
-    const least = showConfidence(this);
+    const maxSigma = showUncertainty(this);
     this.clouds.forEach((cloud, run) => {
-      cloud.select(least, this.crop.active, run === 0 ? this.player.place : Infinity);
+      cloud.select(maxSigma, this.crop.active, run === 0 ? this.player.place : Infinity);
     });
     showCount(this);
     if (this.clouds.length === 2) this.deviation.show();
@@ -165,6 +184,7 @@ class App {
   }
 
   draw() {
+    if (!this.renderer) return;
     this.renderer.resize();
     this.renderer.clear();
     const overlay = this.clouds.length ? this.parts.flatMap((part) => this.#drawPart(part)) : [];
@@ -233,27 +253,24 @@ class App {
     on("kind", "change", () => this.color());
     on("surface", "change", () => this.#loadTriangles().then(() => this.redraw()));
     on("size", "input", () => this.redraw());
-    on("confidence", "input", () => this.select());
+    on("uncertainty", "input", () => this.select());
     for (const id of ["reverse", "path", "cameras"]) on(id, "change", () => this.redraw());
     on("reset", "click", () => this.reset());
-    on("layout", "change", () => this.select());
-    new ResizeObserver(() => this.redraw()).observe(this.canvas);
+    on("layout", "change", () => {
+      this.#refit();
+      this.select();
+      this.holes.load();
+    });
+    on("fold", "click", () => this.#fold(!document.body.classList.contains("is-folded")));
+    new ResizeObserver(() => this.#refit()).observe(this.canvas);
   }
 
   #say(words) {
-    document.getElementById("message").textContent = words;
+    document.getElementById("message").textContent = this.cannotDraw ?? words;
   }
 }
 
 const isChecked = (id) => document.getElementById(id).checked;
 
-try {
-  window.page = new App();
-  window.page.start().catch(fail);
-} catch (error) {
-  fail(error);
-}
-
-function fail(error) {
-  document.getElementById("message").textContent = String(error);
-}
+window.page = new App();
+window.page.start().catch((error) => (document.getElementById("message").textContent = String(error)));

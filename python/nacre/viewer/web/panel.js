@@ -4,8 +4,12 @@ const LEGENDS = {
   colour: "as the camera saw it",
   shading: "by how the surface lies to the light",
   normal: "red: to the right, green: up, blue: towards the first camera",
+  uncertainty: "expected standard deviation of each point across the surface",
+  age: "the last frame that saw each point",
+  deviation: "distance to the surface of the other run",
 };
-const LEVELS = 100; // of the confidence slider
+/** What stands at the ends of a color scale. */
+const SCALES = { uncertainty: (sigma) => lengthText(sigma), age: (frame) => `frame ${Math.round(frame)}` };
 
 /** Show what belongs to the whole of a document. */
 function showDocument({ title, runs, depthLegend }) {
@@ -29,33 +33,28 @@ function showKinds({ clouds }) {
   select.replaceChildren(...kinds.map((value) => element("option", { value }, value)));
   const first = kinds.includes("deviation") ? "deviation" : kinds[0];
   select.value = kinds.includes(before) ? before : first;
-  document.getElementById("confidence-row").hidden = !clouds[0].confidence;
+  document.getElementById("uncertainty-row").hidden = !clouds[0].sigma;
 }
 
 function showLegend({ kind, clouds, document: { colormap } }) {
   const legend = document.getElementById("legend");
   const gradient = `linear-gradient(90deg, ${colormap.map((color) => `rgb(${color})`)})`;
-  if (kind === "confidence" || kind === "age") {
-    const [low, high] = clouds[0].range(kind).map((value) => Number(value.toPrecision(2)).toLocaleString("en"));
-    const [before, after] = kind === "age" ? ["last seen in frame ", ""] : ["", " observations"];
+  legend.textContent = LEGENDS[kind];
+  if (SCALES[kind]) {
+    const [low, high] = clouds[0].range(kind).map(SCALES[kind]);
     const bar = element("div", { class: "bar" });
-    bar.append(element("span", {}, before + low), element("i", {}), element("span", {}, high + after));
-    legend.replaceChildren(bar);
-  } else legend.textContent = LEGENDS[kind] ?? "distance to the surface of the other run";
+    bar.append(element("span", {}, low), element("i", {}), element("span", {}, high));
+    legend.append(bar);
+  }
   document.querySelectorAll(".bar i").forEach((bar) => (bar.style.background = gradient));
 }
 
-/** The confidence that points must have, by the slider: none at its start, then evenly in the logarithm. */
-function showConfidence({ clouds }) {
-  const level = +document.getElementById("confidence").value, cloud = clouds[0];
-  const output = document.getElementById("confidence-value");
-  output.textContent = "any";
-  if (!cloud?.confidence || level === 0) return -Infinity;
-  cloud.confidenceRange ??= [quantile(cloud.confidence, 0.001), quantile(cloud.confidence, 0.999)];
-  const [low, high] = cloud.confidenceRange.map((value) => Math.log(Math.max(value, 1e-3)));
-  const least = Math.exp(low + ((high - low) * level) / LEVELS);
-  output.textContent = Number(least.toPrecision(3)).toLocaleString("en");
-  return least;
+/** The standard deviation that points may have, by the slider: that which its share of the points is within. */
+function showUncertainty({ clouds: [cloud] }) {
+  const share = document.getElementById("uncertainty").value / 100;
+  const most = cloud?.sigma && share < 1 ? quantile(cloud.sigma, share) : Infinity;
+  document.getElementById("uncertainty-value").textContent = most < Infinity ? lengthText(most) : "any";
+  return most;
 }
 
 function showCount({ clouds, parts }) {

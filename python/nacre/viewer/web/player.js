@@ -60,6 +60,8 @@ class Player {
     if (!frame) return;
     const reason = frame.reason ? `: ${frame.reason}` : "";
     document.getElementById("frame-status").textContent = `frame ${frame.index}, ${frame.status}${reason}`;
+    const details = document.getElementById("frame-details");
+    details.textContent = frame.details === frame.reason ? "" : frame.details;
     const rows = Object.entries(frame.figures).map(([name, value]) => {
       const row = element("tr", {});
       row.append(element("td", {}, name), element("td", {}, value));

@@ -75,7 +75,7 @@ const CLOUD_INPUTS = ["point", "normal", "color", "size"];
 class Renderer {
   constructor(canvas) {
     const gl = canvas.getContext("webgl2", { antialias: true, alpha: true });
-    if (!gl) throw new Error("This browser has no WebGL 2.");
+    if (!gl) throw new Error("This browser cannot draw the model: it has no WebGL 2.");
     this.canvas = canvas;
     this.gl = gl;
     this.clouds = new Map(); // of each cloud its buffers
