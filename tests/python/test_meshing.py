@@ -12,6 +12,7 @@ import pytest
 import nacre
 from nacre.cli import main
 from nacre.meshing import close_surface, largest_part, mesh_points, on_surface, simplify, triangulate
+from nacre.meshing.surface_points import on_main_parts
 
 
 def sphere(n: int, radius: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
@@ -186,6 +187,17 @@ class TestOnSurface:
         points, normals = sphere(50)
         with pytest.raises(ValueError, match=r"confidence must have one entry per point \(50\)"):
             on_surface(points, normals, np.ones(49))
+
+
+def test_scraps_beside_an_object_are_told_from_it() -> None:
+    points, normals = sphere(4000)
+    few, up = sphere(39)
+    both = np.concatenate([points, 0.1 * few + [0.2, 0, 0]]).astype(np.float32)
+    facing = np.concatenate([normals, up]).astype(np.float32)
+    assert on_main_parts(both, facing).tolist() == [True] * 4000 + [False] * 39
+    larger = slice(1000, None)  # of fewer points a part of 39 is more than a hundredth
+    assert on_main_parts(both[larger], facing[larger])[-39:].all()
+    assert not len(on_main_parts(both[:0], facing[:0]))
 
 
 class TestCloseSurface:

@@ -30,7 +30,7 @@ def info(
     quiet: Quiet = False,
     verbose: Verbose = 0,
 ) -> None:
-    """Tell what is in a recording, a point file or a mesh, or what a camera is (realsense and others)."""
+    """Tell what is in a recording, a point file, a mesh or a run, or what a camera is (realsense, ...)."""
     terminal = Terminal(json, quiet, verbose)
     if is_camera(source):
         terminal.answer(*_camera(source))
@@ -39,6 +39,9 @@ def info(
         raise CommandError(f"no such file or folder: {source}", 2)
     if (source / "unfinished" / "run.json").is_file():
         terminal.answer(*describe_unfinished(source))
+        return
+    if (source / "report.json").is_file():
+        terminal.answer(*_finished(source))
         return
     from nacre.datasets.detect import FILE_SUFFIXES
 
@@ -181,6 +184,25 @@ def _geometry(points: Any) -> tuple[dict[str, Any], Rows]:
     if len(finite) < len(points):
         rows.append(("not finite", f"{len(points) - len(finite):,} points"))
     return figures, rows
+
+
+def _finished(out: Path) -> tuple[dict[str, Any], Rows]:
+    """Return what there is to tell of a finished run."""
+    from nacre.cli.outputs import file_rows, verdict_rows
+    from nacre.report.saved_run import SavedRun
+    from nacre.report.text import count
+
+    report = {"verdict": None, "point_sigma": None, **SavedRun(out).report}
+    counts = {name: report.get(name) for name in ("num_frames", "num_tracked", "num_points")}
+    source = (report.get("recording") or {}).get("path", "a recording")
+    return {"kind": "run", "path": str(out), "verdict": report["verdict"], **counts}, [
+        ("run", f"nacre reconstruct of {source}"),
+        ("frames tracked", f"{counts['num_tracked']} of {counts['num_frames']}"),
+        ("model", f"{count(counts['num_points'] or 0)} points"),
+        *verdict_rows(report),
+        *file_rows(out, page=(out / "report.html").is_file()),
+        ("look at it", f"nacre view {out}"),
+    ]
 
 
 def describe_unfinished(out: Path) -> tuple[dict[str, Any], list[tuple[str, str]]]:

@@ -7,6 +7,9 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal import arrays
+from nacre.meshing.triangulation import triangulate
+
+_LEAST_OF_OBJECT = 0.01  # of the points of its largest part, tuned: smaller ones lie beside it
 
 
 def on_surface(
@@ -46,3 +49,27 @@ def on_surface(
         arrays.localize(positions)[0], directions, sure, arrays.as_count("num_threads", num_threads)
     )
     return flags.astype(bool)
+
+
+def on_main_parts(
+    points: npt.NDArray[np.float32], normals: npt.NDArray[np.float32], *, num_threads: int = 0
+) -> npt.NDArray[np.bool_]:
+    """
+    Tell the points of an object from small parts that no triangle joins to it.
+
+    Parameters
+    ----------
+    points, normals : (N, 3) float32
+        [m], and unit vectors.
+    num_threads : int
+        0 uses all. The result does not depend on it.
+
+    Returns
+    -------
+    (N,) bool
+    """
+    if not len(points):
+        return np.zeros(0, bool)
+    parts = _core.connected_parts(triangulate(points, normals, num_threads=num_threads), len(points))
+    sizes = np.bincount(parts)
+    return np.asarray(sizes[parts] >= _LEAST_OF_OBJECT * sizes.max())

@@ -18,7 +18,9 @@ _MOST_VERTICES = 20_000_000  # of all frames together: half a GB
 _TOLERANCE = 0.1  # [spacing] that a vertex may be off
 
 
-def write_model_animation(path: Path, model: Model, frames: Sequence[FrameRecord]) -> None:
+def write_model_animation(
+    path: Path, model: Model, frames: Sequence[FrameRecord], *, all_points: bool = False
+) -> None:
     """
     Write a model that deforms as a mesh that moves.
 
@@ -30,9 +32,11 @@ def write_model_animation(path: Path, model: Model, frames: Sequence[FrameRecord
         With ``deform=True``.
     frames : sequence of FrameRecord
         In their order. Those that are tracked are shown, of many every second, third or so.
+    all_points : bool
+        Whether to join all points, not those alone that are a surface.
     """
     shown = [frame for frame in frames if frame.world_from_camera is not None]
-    rows, triangles = _surface(model)
+    rows, triangles = _surface(model, all_points)
     if not (shown and len(triangles)):
         path.unlink(missing_ok=True)
         return
@@ -51,12 +55,14 @@ def write_model_animation(path: Path, model: Model, frames: Sequence[FrameRecord
     )
 
 
-def _surface(model: Model) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32]]:
-    """Return the points of the canonical shape that are a surface, and triangles between them."""
+def _surface(model: Model, all_points: bool) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32]]:
+    """Return the points of the canonical shape that are shown, and triangles between them."""
     points, normals = model.points, model.normals
     if not len(points):
         return np.zeros(0, np.int64), np.zeros((0, 3), np.int32)
-    surface = np.flatnonzero(on_surface(points, normals, model.confidence))
+    surface = np.arange(len(points))
+    if not all_points:
+        surface = np.flatnonzero(on_surface(points, normals, model.confidence))
     rows, triangles = used_rows(triangulate(points[surface], normals[surface]))
     return surface[rows], triangles
 

@@ -372,14 +372,19 @@ class Reconstruction(Checkpointed):
     @property
     def advice(self) -> list[str]:
         """What the frames say is wrong with the camera as it was given, or with its depth; sentences."""
-        calibration, unit = self.depth_calibration, self.model.depth_unit
-        told = [] if calibration is None else [calibration.focal_length_advice(self.model.camera)]
+        told, unit = [self.camera_doubt], self.model.depth_unit
         if unit > self.model.spacing > 0.0:
             told.append(
                 f"depth comes in steps of {1e3 * unit:.3g} mm, coarser than its noise and than the model's "
                 "points are apart: poses and surfaces may be off by as much"
             )
         return [sentence for sentence in told if sentence]
+
+    @property
+    def camera_doubt(self) -> str:
+        """What the frames say is wrong with the camera as it was given; empty where nothing is."""
+        calibration = self.depth_calibration
+        return "" if calibration is None else calibration.focal_length_advice(self.model.camera)
 
     @property
     def doubled_surfaces(self) -> DoubledSurfaces | None:

@@ -52,7 +52,7 @@ def write_results(
     interrupted = bool(document.get("interrupted"))
     animation = folder / "animation.glb"
     if done.model.parameters.deform and not interrupted:
-        write_model_animation(animation, done.model, done.frames)
+        write_model_animation(animation, done.model, done.frames, all_points=done.all_points)
     else:
         animation.unlink(missing_ok=True)  # of an earlier model
     if page:

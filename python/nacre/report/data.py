@@ -54,5 +54,5 @@ class ReportData:
     interrupted: bool = False  #: whether it was stopped before the last frame
     doubled: DoubledSurfaces | None = None  #: of the model; None where nobody looked
     num_dropped: int = 0  #: frames that came faster than they could be registered
-    camera_doubts: Sequence[str] = ()  #: what the frames say is wrong with the camera as it was given
+    camera_doubt: str = ""  #: what the frames say is wrong with the camera as it was given
     min_tracked: float = MIN_TRACKED  #: part of the frames; with less the run has failed

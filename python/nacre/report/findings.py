@@ -28,8 +28,7 @@ _ADVICE = {
     "together in time. More overlap, and coming back to the start, keep drift small.",
     "doubled": "Frames disagree there, by their poses or by systematic errors of their depth: look at it in "
     "the viewer; record it more slowly, come back to it so that a loop closes, or calibrate the camera.",
-    "camera": "Give the camera as it was calibrated (--camera FILE.json), for images of this size; where "
-    "depth comes in steps, record it in finer units.",
+    "camera": "Give the camera as it was calibrated (--camera FILE.json), for images of this size.",
     "dropped": "Move more slowly, or give less to register: --max-depth, --object, --set spacing=0.005, "
     "--set binning=4. What was kept of a camera (OUT/recording) can be gone over again.",
     "doubtful": "Look at these frames in the viewer: does what they see lie on the model?",
@@ -61,8 +60,8 @@ def find_problems(data: ReportData, trajectory: AbsoluteTrajectoryError | None) 
     yield from _jumps(data.frames, distance)
     yield from _pose_errors(data.frames, trajectory, distance)
     yield from _doubled(data)
-    for doubt in data.camera_doubts:
-        yield Finding("camera", "weak", "Inaccurate", doubt, _ADVICE["camera"])
+    if data.camera_doubt:
+        yield Finding("camera", "weak", "Inaccurate", data.camera_doubt, _ADVICE["camera"])
     yield from _doubtful(data.frames)
     if lost and data.num_dropped:
         came = count(data.num_dropped + len(data.frames))

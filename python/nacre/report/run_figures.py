@@ -94,7 +94,7 @@ def run_report(
         interrupted=interrupted,
         doubled=None if interrupted else run.doubled_surfaces,  # who stops a run waits for it
         num_dropped=run.num_dropped,
-        camera_doubts=run.advice,
+        camera_doubt=run.camera_doubt,
         min_tracked=min_tracked,
     )
 

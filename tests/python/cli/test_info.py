@@ -32,6 +32,15 @@ def test_points_mesh_and_model(reconstructed, tmp_path):
     np.testing.assert_allclose([figures["lower"], figures["upper"]], mesh.bounds, atol=1e-6)
 
 
+def test_a_finished_run_tells_its_verdict(reconstructed):
+    out = reconstructed[0]
+    figures = run("info", out, "--json").json
+    assert (figures["kind"], figures["num_frames"]) == ("run", 4)
+    text = run("info", out).out
+    assert figures["verdict"]["sentence"] in text
+    assert f"nacre view {out}" in text
+
+
 def test_empty_and_nan_points(tmp_path):
     nacre.write_points(tmp_path / "n.ply", np.full((4, 3), np.nan))
     assert run("info", tmp_path / "n.ply", "--json").json["spacing"] is None

@@ -65,7 +65,7 @@ def test_a_truth_that_is_near_is_told() -> None:
 
 
 def test_a_camera_whose_numbers_are_doubted_is_not_good() -> None:
-    verdict = verdict_on(walk(), camera_doubts=["its focal length is wrong"])
+    verdict = verdict_on(walk(), camera_doubt="its focal length is wrong")
     assert (verdict.level, verdict.sentence) == ("weak", "Inaccurate: its focal length is wrong.")
     assert "--camera" in verdict.next_step
 
