@@ -7,7 +7,7 @@ import dataclasses
 import hashlib
 import logging
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -258,9 +258,7 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         FileFormatError
             None of the folder's images belongs to a depth image.
         """
-        masks = pair([source.depth for source in self._sources], files(Path(folder), COLOR_SUFFIXES))
-        if not any(masks):
-            raise FileFormatError(Path(folder), "no image here is named as a depth image of the recording is")
+        masks = self._paired(Path(folder), COLOR_SUFFIXES)
         return self._with_sources(
             [dataclasses.replace(s, mask=mask) for s, mask in zip(self._sources, masks, strict=True)]
         )
@@ -288,15 +286,21 @@ class Sequence(collections.abc.Sequence[SequenceFrame]):
         FileFormatError
             None of the folder's images belongs to a depth image.
         """
-        images = pair([source.depth for source in self._sources], files(Path(folder), ATTRIBUTE_SUFFIXES))
-        if not any(images):
-            raise FileFormatError(Path(folder), "no image here is named as a depth image of the recording is")
+        images = self._paired(Path(folder), ATTRIBUTE_SUFFIXES)
         return self._with_sources(
             [
                 s if image is None else dataclasses.replace(s, attributes={**s.attributes, name: image})
                 for s, image in zip(self._sources, images, strict=True)
             ]
         )
+
+    def _paired(self, folder: Path, suffixes: Iterable[str]) -> list[Path | None]:
+        """Return the image of a folder that belongs to each depth image."""
+        found = pair([source.depth for source in self._sources], files(folder, suffixes))
+        if not any(found):
+            here = "no image here is named as a depth image of the recording is"
+            raise FileFormatError(folder, here if folder.is_dir() else "there is no such folder")
+        return found
 
     def _with_sources(self, sources: collections.abc.Sequence[FrameSource]) -> Sequence:
         return Sequence(

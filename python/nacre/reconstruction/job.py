@@ -83,6 +83,8 @@ def begin_run(
     writable_folder(out)
     _hold(unfinished)
     remove_leftovers(out)
+    for mesh in sorted(out.glob("mesh.*")):
+        _log.warning("%s is of an earlier model: nacre mesh %s makes it anew", mesh, out)
     if unfinished.checkpoint.exists():
         _log.warning("%s held an unfinished run, which could have gone on: it is begun again", out)
     run = Run(done, indices, retry=options.retry)

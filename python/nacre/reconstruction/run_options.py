@@ -78,7 +78,9 @@ class RunOptions:
         """Return which frames to run."""
         indices = range(len(sequence))[slice(*self.pick)]
         if not indices:
-            raise RunError(f"no frames are left of {len(sequence)} (0 to {len(sequence) - 1})", 2)
+            first, last, every = self.first, self.last, self.every
+            picked = f"first {first}, last {last}, every {every}" if last is not None else f"first {first}"
+            raise RunError(f"{picked} leaves none of {len(sequence)} frames (0 to {len(sequence) - 1})", 2)
         return indices
 
     def document(self, sequence: Sequence) -> dict[str, Any]:

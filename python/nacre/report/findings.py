@@ -69,7 +69,9 @@ def find_problems(data: ReportData, trajectory: AbsoluteTrajectoryError | None) 
         yield Finding("dropped", "weak", "Incomplete", statement, _ADVICE["dropped"])
     if lost and not is_failed:
         reason = most_common_reason(frame.reason for frame in lost)
-        statement = f"{count(len(lost))} of {_were(len(data.frames))} lost" + f": {reason}" * bool(reason)
+        were = "were" if len(lost) > 1 else "was"
+        statement = f"{count(len(lost))} of {count(len(data.frames))} frames {were} lost"
+        statement += f": {reason}" * bool(reason)
         advice = advice_on(lost, some_are_tracked=True)
         yield _of_frames("lost", "weak", "Incomplete", statement, lost, advice)
     if weak:

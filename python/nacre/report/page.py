@@ -82,7 +82,7 @@ def _sections(
 ) -> list[Section]:
     """Return the folded parts that have something to show."""
     frames = data.frames
-    views = "six sides, point spacing, confidence" + ", colours" * bool(model and model.colors)
+    views = "six sides, point spacing, confidence" + ", shape" * bool(model and model.shape)
     path = trajectory_charts(frames, trajectory)
     registration = registration_charts(frames, data.parameters)
     depth = {

@@ -74,7 +74,7 @@ class ModelPictures:
     sides: tuple[Picture, ...]
     spacing: Attribute  #: distance of each point to its nearest neighbour [m]
     confidence: Attribute | None
-    colors: tuple[Picture, ...]
+    shape: tuple[Picture, ...]  #: without colours, where there are some
     scale_bar: tuple[str, float]  #: its length in words, and as a part of a side picture's width
 
 
@@ -102,8 +102,8 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
         caption: str,
         view: View,
         kind: str,
-        colors: npt.NDArray[np.uint8] | None = None,
-        by: str = "shaded grey",
+        colors: npt.NDArray[np.uint8] | None = model.colors,
+        by: str = "shaded grey" if model.colors is None else "in its colours",
     ) -> Picture:
         hidden = reverse(view).inside_out
         image = render_points(
@@ -144,11 +144,10 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
     if model.confidence is not None:
         known = np.nan_to_num(np.asarray(model.confidence, dtype=np.float64).reshape(-1))
         confidence = attribute("Confidence", known)
-    colors: tuple[Picture, ...] = ()
+    shape: tuple[Picture, ...] = ()
     if model.colors is not None:
-        colors = tuple(
-            picture(f"Colour, {where}", view, "attribute", model.colors, "in its colours")
-            for where, view in few
+        shape = tuple(
+            picture(f"Shape, {where}", view, "attribute", None, "shaded grey") for where, view in few
         )
     return ModelPictures(
         main=picture("The model", main, "main"),
@@ -156,7 +155,7 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
         sides=tuple(picture(side.capitalize(), view, "side") for side, view in sides.items()),
         spacing=attribute("Spacing", spacing),
         confidence=confidence,
-        colors=colors,
+        shape=shape,
         scale_bar=_scale_bar(scale * _SIZE[0]),
     )
 

@@ -32,7 +32,8 @@ def _environment() -> jinja2.Environment:
     try:
         import jinja2
     except ImportError as error:
-        raise ImportError('the report needs jinja2: pip install "nacre[report]"', name="jinja2") from error
+        message = 'the report needs jinja2: pip install "nacre[report]", or leave it out (--no-report)'
+        raise ImportError(message, name="jinja2") from error
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).with_name("templates")),
         autoescape=True,

@@ -25,7 +25,7 @@ def _known(trajectory: AbsoluteTrajectoryError | None) -> str:
     """Say what holds the frames to be right: each other, or a truth that is near."""
     if trajectory is None or trajectory.num_compared < MIN_ALIGNED:
         return "and nothing contradicts them"
-    return f"{quantity(trajectory.rmse, 'm')} from the true path (root mean square)"
+    return f"with a trajectory error of {quantity(trajectory.rmse, 'm')}"
 
 
 def judge(data: ReportData, trajectory: AbsoluteTrajectoryError | None) -> Verdict | None:

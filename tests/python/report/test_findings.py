@@ -60,7 +60,7 @@ def verdict_on(frames: list[ReportedFrame], **more: Any) -> Verdict:
 
 def test_a_truth_that_is_near_is_told() -> None:
     assert verdict_on(walk(truth=True)).sentence == (
-        "Good: all 20 frames were tracked, 0 mm from the true path (root mean square)."
+        "Good: all 20 frames were tracked, with a trajectory error of 0 mm."
     )
 
 

@@ -308,7 +308,7 @@ class TestPage:
     def test_it_says_the_main_figures_first(self, page: str) -> None:
         text = PageCheck(page).text
         verdict, shown = text[: text.index("Frames tracked")], text[: text.index("Frames not fused")]
-        assert "Incomplete: 1 of 12 frames were lost: <overlap> (frame 7)." in verdict
+        assert "Incomplete: 1 of 12 frames was lost: <overlap> (frame 7)." in verdict
         for figure in ("11 / 12", f"3{SPACE}000", "0.120 mm", "RMSE over 11 of 12 frames", "13.0 ms"):
             assert figure in shown
         assert "75.0 %" in text

@@ -109,7 +109,7 @@ def test_the_page_and_the_written_figures_agree(runs: dict[str, Run], name: str)
 def test_a_good_run_is_called_good(runs: dict[str, Run]) -> None:
     run = runs["whole"]
     error = quantity(run.figures["absolute_trajectory_error"]["rmse"], "m")
-    sentence = f"Good: all 6 frames were tracked, {error} from the true path (root mean square)."
+    sentence = f"Good: all 6 frames were tracked, with a trajectory error of {error}."
     assert run.verdict == ("ok", sentence)
     assert run.figures["verdict"] == {
         "level": "ok", "sentence": run.verdict[1], "next_step": "", "findings": [],
