@@ -10,10 +10,12 @@ alone; two people stand before a desk for two seconds, and then walk about, whil
 Things on a table are walked around, and a head, in steps of so many degrees; a camera before a shelf of books
 twists by so many degrees a frame; one turns about itself in a room; somebody walks along a corridor.
 With `--colors` walls and things are printed with a soft pattern, and the camera takes colour images, too.
+With `--cameras` four of the scenes are seen by cameras of other sizes and lenses.
 
     python benchmarks/other_cameras.py
     python benchmarks/other_cameras.py cartons stereo
     python benchmarks/other_cameras.py wall corridor room --colors
+    python benchmarks/other_cameras.py --cameras
 """
 
 from __future__ import annotations
@@ -49,6 +51,19 @@ SCENES = {
     "room": ((2, 60), (6, 60)),
     "corridor": ((30, 60), (10, 40)),
 }
+# Other sizes and lenses: the kind of sensor, width and height, and the focal length [pixels].
+CAMERAS = {
+    "160 x 120, 58 degrees": ("time_of_flight", 160, 120, 145),
+    "224 x 172, 56 degrees": ("time_of_flight", 224, 172, 210),
+    "512 x 512, 91 degrees": ("time_of_flight", 512, 512, 252),
+    "424 x 240, 90 degrees": ("stereo", 424, 240, 212),
+    "848 x 480, 90 degrees": ("stereo", 848, 480, 425),
+    "1280 x 720, 101 degrees": ("stereo", 1280, 720, 530),
+    "320 x 240, 59 degrees": ("structured_light", 320, 240, 285),
+    "640 x 480, 68 degrees": ("structured_light", 640, 480, 475),
+    "640 x 480, 67 degrees": ("phone_lidar", 640, 480, 480),
+}
+SEEN_BY_THEM = (("flat", 10, 40), ("table", 8, 30), ("cartons", 10, 24), ("shelf", 3, 30))
 UNITS = dict.fromkeys(("flat", "people", "corridor"), "frames a second") | {"wall": "mm"}
 HEIGHTS = {"homer": 1.7, "spot": 0.8}  # [m]
 DISTANCES = {"homer": 2.2, "spot": 1.2, "cartons": 2.0}  # [m]
@@ -337,8 +352,15 @@ def colors_of(mesh: nacre.Mesh, camera: nacre.Camera, poses: list[Array]) -> lis
     ]
 
 
-def make(scene: str, sensor: str, speed: int, count: int, colored: bool = False) -> cases.Case:
-    """Return a recording."""
+def make(
+    scene: str,
+    sensor: str,
+    speed: int,
+    count: int,
+    colored: bool = False,
+    camera: nacre.Camera | None = None,
+) -> cases.Case:
+    """Return a recording, by a camera of another size where one is given."""
     still: dict[str, tuple[Callable[[], nacre.Mesh], Callable[[], list[Array]]]] = {
         "table": (table, lambda: in_hand(speed, count, 0.6, 0.35, [0, -0.05, 0])),
         "bust": (bust, lambda: in_hand(speed, count, 0.5, 0.05, [0, 0.05, 0])),
@@ -362,7 +384,7 @@ def make(scene: str, sensor: str, speed: int, count: int, colored: bool = False)
         )
     else:
         meshes, poses = [figure(scene)] * count, around(speed, count, DISTANCES[scene], 0.0, np.zeros(3))
-    camera = cases.SENSORS[sensor]
+    camera = camera or cases.SENSORS[sensor]
     kind: Any = sensor
     depths = [
         mesh.simulate_depth(camera, pose, sensor=kind, seed=k, num_threads=1)
@@ -374,10 +396,33 @@ def make(scene: str, sensor: str, speed: int, count: int, colored: bool = False)
 
 def run(recording: tuple[str, str, int, int, bool]) -> str:
     """Run a recording, and return its cell: right / claimed / far off of all, and the trajectory's error."""
-    case = make(*recording)
+    return cell(make(*recording))
+
+
+def run_camera(recording: tuple[str, str, int, int]) -> str:
+    """Run a scene before one of CAMERAS, and return its cell."""
+    name, scene, speed, count = recording
+    sensor, width, height, focal = CAMERAS[name]
+    camera = nacre.Camera(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2)
+    return cell(make(scene, sensor, speed, count, camera=camera))
+
+
+def cell(case: cases.Case) -> str:
+    """Return right / claimed / far off of all frames, and the trajectory's error."""
     figures, model = cases.run(case)
     far_off = cases.count_far_off(case, model)
     return f"{figures.right} / {figures.claimed} / {far_off} of {figures.frames}, {figures.ate:.0f} mm"
+
+
+def print_cameras(processes: int) -> None:
+    """Print the table of CAMERAS."""
+    titles = [f"{scene}, {speed} {UNITS.get(scene, 'degrees')}" for scene, speed, _ in SEEN_BY_THEM]
+    print(f"| kind | size, width of the view | {' | '.join(titles)} |")
+    print(f"| --- | --- | {' | '.join('---' for _ in titles)} |")
+    with ProcessPoolExecutor(processes) as pool:
+        cells = pool.map(run_camera, [(name, *scene) for name in CAMERAS for scene in SEEN_BY_THEM])
+        for name, (sensor, *_) in CAMERAS.items():
+            print(f"| {sensor} | {name} | {' | '.join(next(cells) for _ in titles)} |", flush=True)
 
 
 def main() -> None:
@@ -387,8 +432,12 @@ def main() -> None:
     )
     parser.add_argument("names", nargs="*", choices=[[], *SCENES, *SENSORS], default=[], metavar="NAME")
     parser.add_argument("--colors", action="store_true", help="of scenes that keep still")
+    parser.add_argument("--cameras", action="store_true", help="other sizes and lenses, four scenes")
     parser.add_argument("--processes", type=int, default=2)
     arguments = parser.parse_args()
+    if arguments.cameras:
+        print_cameras(arguments.processes)
+        return
     scenes = [name for name in SCENES if name in arguments.names] or list(SCENES)
     sensors = [name for name in SENSORS if name in arguments.names] or list(SENSORS)
     rows = [(scene, *speed) for scene in scenes for speed in SCENES[scene]]

@@ -112,6 +112,7 @@ def mesh(
         colors=mesh.colors,
         attributes=mesh.attributes,
         texture=mesh.texture,
+        comments=[] if target.suffix.lower() == ".stl" else cloud.comments,
     )
     figures: dict[str, Any] = {
         "mesh": str(target),

@@ -17,7 +17,11 @@ PortOption = Annotated[
 def view(
     folder: Annotated[
         Path,
-        typer.Argument(metavar="OUT", help="What nacre reconstruct wrote, or points.", show_default=False),
+        typer.Argument(
+            metavar="OUT",
+            help="What nacre reconstruct wrote, or a file of points or a mesh.",
+            show_default=False,
+        ),
     ],
     compare: Annotated[
         Path | None,

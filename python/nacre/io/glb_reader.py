@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import struct
 from collections.abc import Iterator
@@ -47,7 +48,15 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
     pieces = [piece for piece in pieces if len(piece.triangles)]
     if not pieces:
         raise FileFormatError(path, "not a mesh: there is no triangle in its scene", offset=20)
-    return _joined(pieces)
+    return dataclasses.replace(_joined(pieces), comments=_comments(document))
+
+
+def _comments(document: dict[str, Any]) -> tuple[str, ...]:
+    """Return the comments that nacre writes; other programs may have anything in their place."""
+    found: Any = document
+    for name in ("asset", "extras", "comments"):
+        found = found.get(name) if isinstance(found, dict) else None
+    return tuple(line for line in found if isinstance(line, str)) if isinstance(found, list) else ()
 
 
 def _read_chunks(path: str | os.PathLike[str], data: bytes) -> tuple[dict[str, Any], bytes]:

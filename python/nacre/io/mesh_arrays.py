@@ -35,6 +35,8 @@ class MeshArrays:
         More of the vertices; not read.
     texture : Texture or None
         What is painted on the triangles; not read.
+    comments : tuple of str
+        Read from GLB files.
     """
 
     vertices: arrays.FloatArray
@@ -43,6 +45,7 @@ class MeshArrays:
     colors: npt.NDArray[np.uint8] | None = None
     attributes: Columns = field(default_factory=dict)
     texture: Texture | None = None
+    comments: tuple[str, ...] = ()
 
 
 def fan(

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from nacre import KdTree, estimate_normals
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Cloud
-from nacre.io.meshes import read_mesh_arrays
+from nacre.io.meshes import READ_SUFFIXES, read_mesh_arrays
 from nacre.io.ply_header import read_header
 from nacre.io.points import read_points
 from nacre.io.raw import read_head
@@ -29,8 +29,9 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     Parameters
     ----------
     path : path-like
-        ``OUT``, which holds ``model.ply`` and ``report.json``; or a point file. Where it has no normals, they
-        come from the triangles, or else are estimated; y is up unless a comment says that it is nacre's.
+        ``OUT``, which holds ``model.ply`` and ``report.json``; or a file of points or of a mesh. Where it has
+        no normals, they come from the triangles, or else are estimated; y is up unless a comment says that it
+        is nacre's.
 
     Raises
     ------
@@ -39,10 +40,10 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     """
     path = Path(path)
     if path.is_file():
-        file = read_points(path)
+        file, triangles = _read(path)
         is_upright = not any(CAMERA_FRAME in comment for comment in file.comments)
         timeline = Timeline(path.name, None, is_upright=is_upright)
-        timeline.set_snapshot(_cloud(file, None, _triangles(path)))
+        timeline.set_snapshot(_cloud(file, None, triangles))
         return timeline
     out = SavedRun(path)
     timeline = Timeline(
@@ -81,6 +82,15 @@ def _cloud(file: Cloud, spacing: float | None, triangles: npt.NDArray[np.int32] 
     known_of = file.attributes.get
     columns = (known_of("confidence"), known_of("last_seen"), known_of("sigma"))
     return Snapshot(points, normals, spacing, file.colors, *columns, triangles).rows(kept, spacing)
+
+
+def _read(path: Path) -> tuple[Cloud, npt.NDArray[np.int32] | None]:
+    """Return the points of a file, or the vertices of a mesh, and its triangles."""
+    if path.suffix.lower() in set(READ_SUFFIXES) - {".ply"}:
+        mesh = read_mesh_arrays(path)
+        cloud = Cloud(mesh.vertices, mesh.normals, mesh.colors, comments=mesh.comments)
+        return cloud, mesh.triangles
+    return read_points(path), _triangles(path)
 
 
 def _triangles(path: Path) -> npt.NDArray[np.int32] | None:

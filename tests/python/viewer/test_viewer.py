@@ -233,6 +233,23 @@ def test_a_mesh_file_keeps_its_triangles(tmp_path: Path) -> None:
         data.read("holes/0/-1/4")
 
 
+@pytest.mark.parametrize("ending", ["glb", "obj", "stl"])
+def test_meshes_of_other_formats_are_shown(tmp_path: Path, ending: str) -> None:
+    path = tmp_path / f"mesh.{ending}"
+    nacre.write_mesh(path, [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    ((_, read),) = viewer.read_timeline(path).snapshots
+    assert read.triangles is not None
+    assert read.points[read.triangles[0]].tolist() == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
+    np.testing.assert_allclose(read.normals, np.broadcast_to((0, 0, 1), (3, 3)))
+
+
+def test_a_glb_file_of_nacre_stands_upright(tmp_path: Path) -> None:
+    corners, triangles = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]
+    for comments in ([], ["metres; the world is the first camera's frame"]):
+        nacre.write_mesh(tmp_path / "a.glb", corners, triangles, comments=comments)
+        assert viewer.read_timeline(tmp_path / "a.glb").is_upright == (not comments)
+
+
 def test_faces_that_are_no_triangles_leave_the_points(tmp_path: Path) -> None:
     lines = ["ply", "format ascii 1.0", "element vertex 3", *(f"property float {axis}" for axis in "xyz")]
     lines += ["element face 1", "property list uchar int vertex_indices", "end_header"]
