@@ -32,7 +32,7 @@ def _environment() -> jinja2.Environment:
     try:
         import jinja2
     except ImportError as error:
-        message = 'the report needs jinja2: pip install "nacre[report]", or leave it out (--no-report)'
+        message = 'the report (--no-report leaves it out) needs jinja2: pip install "nacre[report]"'
         raise ImportError(message, name="jinja2") from error
     environment = jinja2.Environment(
         loader=jinja2.FileSystemLoader(Path(__file__).with_name("templates")),
