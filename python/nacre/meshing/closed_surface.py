@@ -17,7 +17,7 @@ from nacre.kdtree import KdTree
 from nacre.meshing.triangulation import triangulate, used_rows
 
 _MOST_HALVINGS = 12  # of the box: no more are taken by it
-_BOX = 3.2  # of the points' extent: gpytoolbox's, measured (test_closed_surface)
+_BOX = 3.2  # of the points' extent: gpytoolbox's, measured (test_meshing)
 _SCREENED_NOISE = 0.17  # of the distance between points, tuned: with so much, points and normals weigh alike
 _LEAST_PART = 30  # points: as of a surface, cpp/src/mesh/limits.hpp; parts through fewer are bubbles
 _MOST_SCREENING = 10.0  # tuned (benchmarks/meshing.py, as the former): more follows stray points
