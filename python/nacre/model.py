@@ -34,7 +34,7 @@ from nacre._internal.point_exchange import ExchangeablePoints
 from nacre.camera import Camera, camera_of
 from nacre.depth_calibration import DepthCalibration
 from nacre.frame_report import FrameReport, FrameReports, report_from
-from nacre.meshing.surface_points import on_main_parts, on_surface
+from nacre.meshing.surface_points import surface_rows
 from nacre.noise import NoiseModel
 from nacre.parameters import (
     ModelParameters,
@@ -467,22 +467,17 @@ class Model(ExchangeablePoints, Checkpointed):
                 }
             finally:
                 self._whole = None
-        rows = slice(None) if all_points else self._surface_rows(points, normals, more["confidence"])
+        rows = (
+            slice(None)
+            if all_points
+            else surface_rows(points, normals, more["confidence"], is_object=self.parameters.region.object)
+        )
         return Cloud(
             points[rows],
             normals[rows],
             None if colors is None else colors[rows],
             {name: values[rows] for name, values in more.items()},
         )
-
-    def _surface_rows(
-        self, points: npt.NDArray[np.float32], normals: npt.NDArray[np.float32], confidence: npt.ArrayLike
-    ) -> npt.NDArray[np.int64]:
-        """Return which points are a surface; of an object on a plane, without what lies beside it."""
-        rows = np.flatnonzero(on_surface(points, normals, confidence))
-        if not self.parameters.region.object:
-            return rows
-        return rows[on_main_parts(points[rows], normals[rows])]
 
     def points_at(self, frame: int) -> npt.NDArray[np.float32]:
         """

@@ -73,3 +73,15 @@ def on_main_parts(
     parts = _core.connected_parts(triangulate(points, normals, num_threads=num_threads), len(points))
     sizes = np.bincount(parts)
     return np.asarray(sizes[parts] >= _LEAST_OF_OBJECT * sizes.max())
+
+
+def surface_rows(
+    points: npt.NDArray[np.float32],
+    normals: npt.NDArray[np.float32],
+    confidence: npt.ArrayLike,
+    *,
+    is_object: bool,
+) -> npt.NDArray[np.int64]:
+    """Return which points of a model are written: those on a surface, of an object without small parts."""
+    rows = np.flatnonzero(on_surface(points, normals, confidence))
+    return rows[on_main_parts(points[rows], normals[rows])] if is_object else rows

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.io.animations import write_animation
-from nacre.meshing.surface_points import on_surface
+from nacre.meshing.surface_points import surface_rows
 from nacre.meshing.triangulation import triangulate, used_rows
 from nacre.model import Model
 from nacre.reconstruction.frame_record import FrameRecord
@@ -62,7 +62,8 @@ def _surface(model: Model, all_points: bool) -> tuple[npt.NDArray[np.int64], npt
         return np.zeros(0, np.int64), np.zeros((0, 3), np.int32)
     surface = np.arange(len(points))
     if not all_points:
-        surface = np.flatnonzero(on_surface(points, normals, model.confidence))
+        is_object = model.parameters.region.object
+        surface = surface_rows(points, normals, model.confidence, is_object=is_object)
     rows, triangles = used_rows(triangulate(points[surface], normals[surface]))
     return surface[rows], triangles
 
