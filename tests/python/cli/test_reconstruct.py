@@ -30,7 +30,9 @@ def test_writes_every_file(reconstructed):
 
 
 def test_all_points_may_be_written(recording, tmp_path, monkeypatch):
-    monkeypatch.setattr("nacre.model.on_surface", lambda points, *_: points[:, 0] > points[:, 0].mean())
+    monkeypatch.setattr(
+        "nacre.meshing.surface_points.on_surface", lambda points, *_: points[:, 0] > points[:, 0].mean()
+    )
     run("reconstruct", recording, "-o", tmp_path / "surface", "--last", "1")
     run("reconstruct", recording, "-o", tmp_path / "all", "--last", "1", "--all-points")
     surface, everything = (nacre.read_points(tmp_path / name / "model.ply") for name in ("surface", "all"))
