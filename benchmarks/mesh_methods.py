@@ -14,6 +14,7 @@ from nacre import meshing
 
 Array = npt.NDArray[Any]
 MOST_VOXELS, MOST_OF_CGAL = 200_000_000, 20_000  # budgets
+BLOCK = 16  # [voxels] a side
 
 
 class OverBudgetError(Exception):
@@ -145,7 +146,7 @@ def _grid(scene: Scene) -> Any:
     names = ("tsdf", "weight", "color") if scene.has_color else ("tsdf", "weight")
     channels = ((1,), (1,), (3,))[: len(names)]
     types = (core.float32, core.float32, core.float32)[: len(names)]
-    grid = o3d.t.geometry.VoxelBlockGrid(names, types, channels, scene.spacing, 16, 20_000)
+    grid = o3d.t.geometry.VoxelBlockGrid(names, types, channels, scene.spacing, BLOCK, 20_000)
     intrinsic = core.Tensor(
         [[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]], core.float64
     )
@@ -153,13 +154,19 @@ def _grid(scene: Scene) -> Any:
     def image(pixels: Array) -> Any:
         return o3d.t.geometry.Image(core.Tensor(np.ascontiguousarray(pixels, np.float32)))
 
-    for depth, color, pose in zip(scene.depths, scene.colors, scene.poses, strict=True):
-        if np.isfinite(pose).all():
-            images = [image(np.nan_to_num(depth))]
-            extrinsic = core.Tensor(np.linalg.inv(pose), core.float64)
-            blocks = grid.compute_unique_block_coordinates(images[0], intrinsic, extrinsic, 1.0, 10.0)
-            if color is not None:
-                images.append(image(color / 255))
-            cameras = (intrinsic, intrinsic)[: len(images)]
-            grid.integrate(blocks, *images, *cameras, extrinsic, 1.0, 10.0)
+    known = [i for i, pose in enumerate(scene.poses) if np.isfinite(pose).all()]
+    depths = [image(np.nan_to_num(scene.depths[i])) for i in known]
+    extrinsics = [core.Tensor(np.linalg.inv(scene.poses[i]), core.float64) for i in known]
+    blocks = [
+        grid.compute_unique_block_coordinates(depth, intrinsic, extrinsic, 1.0, 10.0)
+        for depth, extrinsic in zip(depths, extrinsics, strict=True)
+    ]
+    voxels = BLOCK**3 * len(np.unique(np.concatenate([rows.numpy() for rows in blocks]), axis=0))
+    if voxels > MOST_VOXELS:
+        raise OverBudgetError(f"not run: {voxels} voxels")
+    for i, rows, depth, extrinsic in zip(known, blocks, depths, extrinsics, strict=True):
+        color = scene.colors[i]
+        images = [depth] if color is None else [depth, image(color / 255)]
+        cameras = (intrinsic, intrinsic)[: len(images)]
+        grid.integrate(rows, *images, *cameras, extrinsic, 1.0, 10.0)
     return grid

@@ -49,10 +49,13 @@ class Laid:
 
 @dataclass(frozen=True)
 class Figures:
-    """How a mesh fits the truth: RMS and the median of its errors [mm], parts of 1, grey values."""
+    """
+    How a mesh fits the truth.
 
-    rms: float
-    median: float
+    Errors [mm], NaN where the mesh does not reach what was measured; parts of 1; grey values.
+    """
+
+    errors: Array
     complete: float
     made_up: float
     color: float | None
@@ -101,13 +104,7 @@ class Painted(Scene):
         if moved.colors is not None:
             shown = moved.colors_at(found)[is_complete]
             color = float(np.mean(np.abs(shown - self.paint.colors_at(self.seen[is_complete]))))
-        return Figures(
-            float(np.sqrt(np.mean(errors**2))),
-            float(np.median(errors)),
-            float(is_complete.mean()),
-            float(1 - near.mean()),
-            color,
-        )
+        return Figures(errors, float(is_complete.mean()), float(1 - near.mean()), color)
 
     def _to_truth(self, points: Array) -> Array:
         moved: Array = points @ self.truth_from_model[:3, :3].T + self.truth_from_model[:3, 3]
@@ -193,8 +190,7 @@ class Recorded(Scene):
         distances = np.concatenate(errors)
         is_near = distances <= np.concatenate(tolerances)
         return Figures(
-            float(1000 * np.sqrt(np.mean(distances[is_near] ** 2))),
-            float(1000 * np.median(distances[is_near])),
+            np.where(is_near, 1000 * distances, np.nan),
             float(is_near.mean()),
             float(np.concatenate(before).mean()),
             float(np.concatenate(differences).mean()) if differences else None,

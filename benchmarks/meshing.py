@@ -20,6 +20,7 @@ import contextlib
 import importlib
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,11 +28,13 @@ import cases
 import numpy as np
 import numpy.typing as npt
 from mesh_methods import METHODS, OverBudgetError
-from mesh_scenes import Laid, Painted, Recorded, Scene
+from mesh_scenes import Figures, Laid, Painted, Recorded, Scene
 from suite.worker import give_back_memory, memory, reset_peak
 
+Array = npt.NDArray[Any]
+
 OBJECTS = ["bunny-kinect36", "spot-kinect36", "homer-kinect36", "fandisk-kinect36"]
-RECORDINGS = ["icl", "d435"]
+RECORDINGS = ["icl", "d435", "teddy", "boxcan"]
 HEADS = ["", "CPU [s]", "memory [MB]", "triangles", "parts", "holes", "RMS [mm]", "median [mm]"]
 HEADS += ["complete", "made up", "colour"]
 MARKS = "<!-- made by benchmarks/meshing.py -->", "<!-- end -->"
@@ -63,31 +66,61 @@ def timed(scene: Scene, method: Callable[[Scene], Laid]) -> tuple[float, float, 
     return time.process_time() - begin, (memory("VmHWM") - before) / 1e6, laid
 
 
-def row(name: str, scene: Painted | Recorded, method: Callable[[Scene], Laid]) -> str:
-    """Measure a method; one line of a table."""
-    seconds, megabytes, laid = timed(scene, method)
+@dataclass(frozen=True)
+class Result:
+    """What a method took and gave."""
+
+    seconds: float
+    megabytes: float
+    triangles: npt.NDArray[np.int32]
+    figures: Figures
+
+    def row(self, reached: Array | None) -> list[str]:
+        """Return what the table says of it; `reached`: what every method reaches."""
+        parts, holes = parts_and_holes(self.triangles)
+        figures = self.figures
+        cells = [
+            f"{self.seconds:.2f}",
+            f"{self.megabytes:.0f}",
+            str(len(self.triangles)),
+            str(parts),
+            str(holes),
+        ]
+        cells += [f"{rms(figures.errors):.3f}", f"{np.nanmedian(figures.errors):.3f}"]
+        cells += [] if reached is None else [f"{rms(figures.errors[reached]):.3f}"]
+        color = "-" if figures.color is None else f"{figures.color:.1f}"
+        return [*cells, f"{figures.complete:.1%}", f"{figures.made_up:.1%}", color]
+
+
+def rms(errors: Array) -> float:
+    """Root mean square of what is known."""
+    return float(np.sqrt(np.nanmean(errors**2)))
+
+
+def result_of(scene: Painted | Recorded, method: Callable[[Scene], Laid]) -> Result | Exception:
+    """Measure a method, or say why it was not run."""
+    try:
+        seconds, megabytes, laid = timed(scene, method)
+    except (ImportError, OverBudgetError) as error:
+        return error
     laid.vertices = np.asarray(laid.vertices, np.float64)
-    parts, holes = parts_and_holes(laid.triangles)
-    figures = scene.measure(laid)
-    color = "-" if figures.color is None else f"{figures.color:.1f}"
-    return (
-        f"| {name} | {seconds:.2f} | {megabytes:.0f} | {len(laid.triangles)} | {parts} | {holes} "
-        f"| {figures.rms:.3f} | {figures.median:.3f} "
-        f"| {figures.complete:.1%} | {figures.made_up:.1%} | {color} |"
-    )
+    return Result(seconds, megabytes, laid.triangles, scene.measure(laid))
 
 
 def table(name: str) -> Iterator[str]:
     """Run a case; the lines of its table."""
     scene: Painted | Recorded = Recorded(name) if name in cases.REAL else Painted(name)
+    results = {title: result_of(scene, method) for title, method in METHODS.items()}
+    # The same pixels of the same images, for every method.
+    errors = [result.figures.errors for result in results.values() if isinstance(result, Result)]
+    reached = np.isfinite(errors).all(axis=0) if isinstance(scene, Recorded) else None
+    heads = HEADS if reached is None else [*HEADS[:8], f"RMS of common {reached.mean():.0%} [mm]", *HEADS[8:]]
     yield f"{name}: {len(scene.cloud)} points, {1000 * scene.spacing:.1f} mm apart\n"
-    yield f"| {' | '.join(HEADS)} |"
-    yield f"|{' --- |' * len(HEADS)}"
-    for title, method in METHODS.items():
-        try:
-            yield row(title, scene, method)
-        except (ImportError, OverBudgetError) as error:
-            yield f"| {title} | {error} |{' - |' * (len(HEADS) - 2)}"
+    yield f"| {' | '.join(heads)} |"
+    yield f"|{' --- |' * len(heads)}"
+    for title, result in results.items():
+        missing = [str(result)] + ["-"] * (len(heads) - 2)
+        yield f"| {' | '.join([title, *(result.row(reached) if isinstance(result, Result) else missing)])} |"
     yield ""
 
 

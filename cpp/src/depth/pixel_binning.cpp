@@ -101,18 +101,24 @@ void PixelBinning::for_each_taken(Eigen::Index row, Eigen::Index col, Visit&& vi
   }
 }
 
+// Where no depth was taken, it may yet be filled in: there, of all pixels.
 Colors PixelBinning::mean(const Colors& colors) const {
   Colors result = Colors::Zero(binned_.size(), 3);
   parallel_for(binned_.rows(), rows_per_block(depth_.cols()), num_threads_, [&](Eigen::Index row) {
     for (Eigen::Index col = 0; col < binned_.cols(); ++col) {
       std::array<int, 3> sum{};
       int count = 0;
-      for_each_taken(row, col, [&](Eigen::Index v, Eigen::Index u) {
+      const auto add = [&](Eigen::Index v, Eigen::Index u) {
         const std::uint8_t* color = colors.data() + 3 * (v * depth_.cols() + u);
         for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += color[k];
         ++count;
-      });
-      if (count == 0) continue;
+      };
+      for_each_taken(row, col, add);
+      if (count == 0) {
+        for (int pixel = 0; pixel < factor_ * factor_; ++pixel) {
+          add(row * factor_ + pixel / factor_, col * factor_ + pixel % factor_);
+        }
+      }
       for (int k = 0; k < 3; ++k) {
         result(row * binned_.cols() + col, k) =
             static_cast<std::uint8_t>((sum[static_cast<std::size_t>(k)] + count / 2) / count);

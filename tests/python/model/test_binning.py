@@ -116,6 +116,15 @@ def test_what_comes_with_pixels_is_averaged_too() -> None:
     assert expected.min() > 38
 
 
+def test_what_is_filled_in_between_lines_that_were_measured_has_colours() -> None:
+    depth = views()[1][0].copy()
+    depth.reshape(240, 2, 640)[::2] = np.nan  # each other pair of lines, as structured light leaves them out
+    model = nacre.Model(CAMERA)
+    model.add_frame(depth, color=np.full((480, 640, 3), 200, np.uint8))
+    assert model.binning == 2
+    assert (np.asarray(model.colors) == 200).all()
+
+
 def test_it_goes_on_to_the_same_bits(tmp_path: Path) -> None:
     depths = views()[1]
     model = nacre.Model(CAMERA)
