@@ -107,6 +107,24 @@ class TestMeasuring:
         assert error < 0.5 * np.abs(np.log(one_scale.sigma(z) / truth.sigma(z))).max()
         assert error < np.log(1.35)
 
+    @pytest.mark.parametrize("near", [0.07, 0.2, 0.5])
+    def test_calibration_finds_noise_that_grows_from_the_camera_on(self, near):
+        truth = NoiseModel.stereo(300.0, baseline=0.018, disparity_sigma=0.05 * 0.07 / near)
+        rng = np.random.default_rng(8)
+        wall = slanted_wall(PINHOLE, near, 7 * near)
+        images = [wall + truth.sigma(wall) * rng.standard_normal(wall.shape) for _ in range(4)]
+        found = nacre.calibrate_noise(images, PINHOLE)
+        z = np.linspace(1.5 * near, 6 * near, 7)
+        assert found.offset == 0
+        assert np.abs(np.log(found.sigma(z) / truth.sigma(z))).max() < np.log(1.35)
+
+    def test_calibration_finds_the_kinects_law(self):
+        truth = NoiseModel.kinect()
+        rng = np.random.default_rng(9)
+        wall = slanted_wall(PINHOLE, 0.8, 4.0)
+        images = [wall + truth.sigma(wall) * rng.standard_normal(wall.shape) for _ in range(4)]
+        assert nacre.calibrate_noise(images, PINHOLE).offset == truth.offset
+
     def test_calibration_of_nothing_is_the_prior(self):
         assert nacre.calibrate_noise([], PINHOLE) == NoiseModel.kinect()
         assert nacre.calibrate_noise([], ORTHOGRAPHIC).constant == pytest.approx(0.0001)

@@ -119,12 +119,13 @@ class NoiseCalibration {
   struct Mean {
     double value = 0.0, count = 0.0;
   };
-  static constexpr std::size_t num_bins = 18;  // of depth, a third of an octave each
+  static constexpr std::size_t num_bins = 36;  // of depth, a third of an octave each
 
   Camera camera_;
-  float unit_ = 0.0F;                  // that depth was rounded to [m]
-  Mean local_, total_, fitted_;        // logarithms of factors of the sensor's prior
-  std::array<Mean, num_bins> bins_{};  // likewise, of what surface fits leave over
+  float unit_ = 0.0F;                     // that depth was rounded to [m]
+  Mean local_, total_, fitted_;           // logarithms of factors of the sensor's prior
+  std::array<Mean, num_bins> bins_{};     // likewise, of what surface fits leave over
+  std::array<Mean, num_bins> windows_{};  // of an image, that tell it
 };
 
 /// A copy of a depth image in which noise is NaN. Throws std::invalid_argument when depth and camera or mask differ in

@@ -12,7 +12,12 @@
 namespace nacre {
 namespace {
 
-// c and q, not negative, of c + q s_i = 1 in the sense of weighted least squares, drawn to (c0, q0).
+// The noise at some depth [m], by so many windows.
+struct MeasuredNoise {
+  double z, sigma, weight;
+};
+
+// c and q, not negative, of c + q s_i = 1 in the sense of weighted least squares.
 struct CurveFit {
   double cc = 0.0, cq = 0.0, qq = 0.0, c = 0.0, q = 0.0, weight = 0.0;
 
@@ -32,7 +37,42 @@ struct CurveFit {
     if (quadratic < 0.0) return {c / cc, 0.0};
     return {constant, quadratic};
   }
+  // The weighted sum of the squared residuals.
+  double misfit(double constant, double quadratic) const {
+    return weight - 2.0 * (constant * c + quadratic * q) + constant * constant * cc + 2.0 * constant * quadratic * cq +
+           quadratic * quadratic * qq;
+  }
 };
+
+struct NoiseCurve {
+  NoiseModel model;
+  double misfit;
+};
+
+// Of the offset of another, to whose shape it is drawn: one depth tells nothing of that.
+NoiseCurve curve_through(const std::vector<MeasuredNoise>& measured, const NoiseModel& expected) {
+  CurveFit fit;
+  for (const auto& [z, sigma, weight] : measured) {
+    const double beyond = z - expected.offset;
+    fit.add(1.0 / sigma, beyond * beyond / sigma, weight);
+  }
+  CurveFit drawn = fit;
+  drawn.add(1.0 / expected.constant, 0.0, depth_limits::prior_weight * fit.weight);
+  drawn.add(0.0, 1.0 / expected.quadratic, depth_limits::prior_weight * fit.weight);
+  const auto [constant, quadratic] = drawn.solve();
+  return {{constant, quadratic, expected.offset, 0.0}, fit.misfit(constant, quadratic)};
+}
+
+// What triangulation is expected to come to: noise that begins at the camera, half of it there at the middle depth.
+NoiseModel triangulation(const std::vector<MeasuredNoise>& measured, const NoiseModel& prior) {
+  double weights = 0.0, logarithms = 0.0;
+  for (const auto& [z, sigma, weight] : measured) {
+    weights += weight;
+    logarithms += weight * std::log(z);
+  }
+  const double depth = std::exp(logarithms / weights), half = 0.5 * prior.sigma(depth);
+  return {half, half / (depth * depth), 0.0, 0.0};
+}
 
 }  // namespace
 
@@ -72,7 +112,9 @@ void NoiseCalibration::add(const PlanarImage& image, const WindowFits& fits, int
   for (std::size_t bin = 0; bin < num_bins; ++bin) {
     if (static_cast<std::int64_t>(residuals[bin].size()) < depth_limits::least_windows) continue;
     const double typical = quantile(residuals[bin], depth_limits::noise_quantile);
-    if (typical > 0.0) pool(bins_[bin], std::log(typical));
+    if (!(typical > 0.0)) continue;
+    pool(bins_[bin], std::log(typical));
+    pool(windows_[bin], static_cast<double>(residuals[bin].size()));
   }
   pool(fitted_, std::log(std::max(quantile(fits.residual, depth_limits::noise_quantile), 1e-6)));
 }
@@ -84,22 +126,22 @@ NoiseModel NoiseCalibration::model() const {
 
   // The curve's shape, where the recording shows several depths: relative to what the fits leave over on the whole.
   const NoiseModel prior = sensor_prior(camera_);
-  CurveFit fit;
+  std::vector<MeasuredNoise> measured;
   for (std::size_t bin = 0; bin < num_bins; ++bin) {
     if (bins_[bin].count == 0.0) continue;
     const double z =
         depth_limits::nearest_bin * std::exp2((static_cast<double>(bin) + 0.5) / depth_limits::bins_per_octave);
     const double sigma = prior.sigma(z) * std::exp(bins_[bin].value - fitted_.value);
-    fit.add(1.0 / sigma, (z - prior.offset) * (z - prior.offset) / sigma, bins_[bin].count);
+    measured.push_back({z, sigma, windows_[bin].count * windows_[bin].value});
   }
-  if (fit.weight == 0.0) return with_unit(model, unit_);
-  const double weight = depth_limits::prior_weight * fit.weight;
-  fit.add(1.0 / prior.constant, 0.0, weight);
-  fit.add(0.0, 1.0 / prior.quadratic, weight);
-  const auto [constant, quadratic] = fit.solve();
+  if (measured.empty()) return with_unit(model, unit_);
+  const NoiseCurve as_prior = curve_through(measured, prior);
+  const NoiseCurve triangulated = curve_through(measured, triangulation(measured, prior));
+  const NoiseModel& curve = triangulated.misfit < as_prior.misfit ? triangulated.model : as_prior.model;
   const double scale = std::exp(total_.value);
-  model.constant = scale * constant;
-  model.quadratic = scale * quadratic;
+  model.constant = scale * curve.constant;
+  model.quadratic = scale * curve.quadratic;
+  model.offset = curve.offset;
   return with_unit(model, unit_);
 }
 

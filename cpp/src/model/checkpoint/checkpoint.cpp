@@ -235,7 +235,8 @@ bool PrivateState::is_sound(const NoiseCalibration& calibration) {
   };
   return calibration.unit_ >= 0.0F && std::isfinite(calibration.unit_) && is_mean(calibration.local_) &&
          is_mean(calibration.total_) && is_mean(calibration.fitted_) &&
-         std::all_of(calibration.bins_.begin(), calibration.bins_.end(), is_mean);
+         std::all_of(calibration.bins_.begin(), calibration.bins_.end(), is_mean) &&
+         std::all_of(calibration.windows_.begin(), calibration.windows_.end(), is_mean);
 }
 
 bool PrivateState::is_sound(const DepthCalibrator& calibrator) {

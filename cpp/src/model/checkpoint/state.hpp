@@ -96,6 +96,7 @@ struct PrivateState {
       exchange(archive, *mean);
     }
     for (NoiseCalibration::Mean& bin : calibration.bins_) exchange(archive, bin);
+    for (NoiseCalibration::Mean& windows : calibration.windows_) exchange(archive, windows);
   }
 
   template <class Archive>
