@@ -11,6 +11,7 @@ peers (see `track/peers/`; `grid=0.01` [m], or twice a pixel) where they are ins
 
 from __future__ import annotations
 
+import math
 import re
 import sys
 import time
@@ -140,6 +141,25 @@ def passed_by(part: float) -> Callable[[Case], Case]:
     return change
 
 
+def holding(part: float) -> Callable[[Case], Case]:
+    """Put a rough gripper before the camera, 0.25 m away, over so much of the image."""
+
+    def change(case: Case) -> Case:
+        width, height = case.camera.width, case.camera.height
+        rng = np.random.default_rng(3)
+        v, u = np.mgrid[:height, :width]
+        surface = 0.25 + 0.04 * np.sin(8 * math.pi * u / width) * np.cos(8 * math.pi * v / height)
+        tall, wide = 1.2 * math.sqrt(part) * height, math.sqrt(part) / 1.2 * width
+        inside = (v > height - tall) & (u > 0.55 * width) & (u < 0.55 * width + wide)
+
+        def add(depth: Depth) -> Depth:
+            return np.where(inside, surface + rng.normal(0, 0.0008, depth.shape), depth).astype(np.float32)
+
+        return each(case, add)
+
+    return change
+
+
 def each(case: Case, change: Callable[[Depth], Depth]) -> Case:
     """Change each image."""
     return replace(case, depths=[change(np.asarray(depth, np.float32)) for depth in case.depths])
@@ -154,6 +174,7 @@ DAMAGES: dict[str, Callable[[Case], Case]] = {
     "every fourth pixel": every_pixel(4),
     "pixels doubled": enlarged(2),
     **{f"somebody passing, {100 * part:.0f} % wide": passed_by(part) for part in (0.15, 0.3, 0.45)},
+    **{f"a gripper over {100 * part:.0f} % of the image": holding(part) for part in (0.1, 0.2, 0.35)},
     **{f"focal length {factor:+.0%}": wrong_focal_length(1 + factor) for factor in (-0.03, 0.03)},
 }
 

@@ -85,7 +85,8 @@ class FrameReport(Value):
     region : RegionReport
         What was left out of the rest.
     num_moving : int
-        Pixels that were left out after that, since what they show moved before the scene.
+        Pixels that were left out after that, since what they show moved before the scene, or came along with
+        the camera.
     num_updated, num_inserted, num_removed : int
         Points of the model that the frame moved, added and removed.
     deformation : DeformationReport

@@ -52,7 +52,7 @@ struct FrameReport : TrackingReport {
   bool corrects_earlier = false;           ///< whether it changed reports of earlier frames
   DepthReport depth;
   RegionReport region;
-  std::int64_t num_moving = 0;  ///< pixels that were left out, since what they show moved before the scene
+  std::int64_t num_moving = 0;  ///< pixels left out: what moved before the scene, or with the camera
   FusionReport fusion;
   DeformationReport deformation;
   std::int64_t num_points = 0;  ///< of the model, after the frame

@@ -153,7 +153,8 @@ DepthImage preprocess_depth(const DepthRef& depth, const Camera& camera, const D
 }
 
 DepthImage clean_depth(const DepthRef& measured, const Camera& camera, const DepthOptions& options, const MaskRef& mask,
-                       NoiseCalibration* calibration, DepthReport* report, MaskImage* labels, int num_threads) {
+                       NoiseCalibration* calibration, DepthReport* report, MaskImage* labels, int num_threads,
+                       const MaskRef& scene) {
   options.check();
   require_camera_size("depth", measured.rows(), measured.cols(), camera);
   if (mask.size() > 0) require_camera_size("mask", mask.rows(), mask.cols(), camera);
@@ -164,7 +165,9 @@ DepthImage clean_depth(const DepthRef& measured, const Camera& camera, const Dep
   // The tests see every measurement, so that range and mask do not make edges where there are none.
   const PlanarImage image(depth, camera, num_threads);
   const WindowFits fits = fit_windows(image, camera, restored.unit(), num_threads);
-  if (calibration != nullptr && !options.noise) calibration->add(image, fits, num_threads);
+  if (calibration != nullptr && !options.noise) {
+    calibration->add(image, scene.size() > 0 ? fits_of(scene, fits) : fits, num_threads);
+  }
   const NoiseModel noise = options.noise            ? *options.noise
                            : calibration != nullptr ? calibration->model()
                                                     : estimate_noise(fits, camera, num_threads);

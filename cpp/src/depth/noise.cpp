@@ -111,6 +111,19 @@ WindowFits fit_windows(const PlanarImage& image, const Camera& camera, float uni
   return fits;
 }
 
+WindowFits fits_of(const MaskRef& part, WindowFits fits) {
+  for (int row = 0; row < fits.rows; ++row) {
+    for (int column = 0; column < fits.cols; ++column) {
+      if (part(WindowFits::centre(row), WindowFits::centre(column)) != 0) continue;
+      const auto i = static_cast<std::size_t>(row * fits.cols + column);
+      for (std::vector<float>* const values : {&fits.residual, &fits.roughness, &fits.pixel, &fits.step, &fits.slope}) {
+        (*values)[i] = std::numeric_limits<float>::quiet_NaN();
+      }
+    }
+  }
+  return fits;
+}
+
 void NoiseModel::check() const {
   require(std::isfinite(constant) && constant >= 0.0, "noise.constant", "a finite number of metres, at least 0",
           constant);

@@ -25,6 +25,9 @@ struct WindowFits {
 // Residuals, roughness, pixels and steps are in units of the noise of `sensor_prior`.
 WindowFits fit_windows(const PlanarImage& image, const Camera& camera, float unit, int num_threads);
 
+// Without the windows whose centres a part of the image (1) leaves out.
+WindowFits fits_of(const MaskRef& part, WindowFits fits);
+
 // The Kinect's curve; for an orthographic camera a constant.
 NoiseModel sensor_prior(const Camera& camera);
 

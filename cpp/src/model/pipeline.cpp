@@ -155,7 +155,8 @@ FrameReport Pipeline::add_worked_on(const DepthRef& depth, const FrameExtras& ex
 // Without what is noise at depth edges. The noise is measured from all images so far.
 DepthImage Pipeline::preprocess(const DepthRef& depth, const MaskRef& mask, FrameReport& report) {
   const Stopwatch watch(report.milliseconds.preprocess);
-  return clean_depth(depth, camera, options.depth, mask, &calibration, &report.depth, nullptr, options.num_threads);
+  return clean_depth(depth, camera, options.depth, mask, &calibration, &report.depth, nullptr, options.num_threads,
+                     carried.scene());
 }
 
 // Points and normals.
@@ -175,11 +176,57 @@ void Pipeline::keep_region(FrameReport& report) {
   if (report.region.num_inside > 0) region = std::move(found);
 }
 
+// What the camera carries is no part of the scene.
+void Pipeline::leave_out_carried(FrameReport& report) {
+  if (shape || options.registration.method == Metric::paper) return;
+  carried.look_at(cells, camera, report.index);
+  forget_carried();
+  if (carried.scene().size() == 0) return;
+  const auto num_inside = static_cast<std::int64_t>(frame.valid.size());
+  nacre::keep_region(carried.scene(), frame);
+  for (Eigen::Index i = 0; i < carried.scene().size(); ++i) {
+    if (carried.scene().data()[i] == 0) now.measured[i] = std::numeric_limits<float>::quiet_NaN();
+  }
+  report.num_moving = num_inside - static_cast<std::int64_t>(frame.valid.size());
+  cells = StillScene::cells_of(frame, camera);
+}
+
+// Until it was found, what the camera carries was taken for a part of the scene.
+void Pipeline::forget_carried() {
+  const Values& depth = carried.found();
+  if (depth.size() == 0) return;
+  const auto is_carried = [&](Eigen::Index cell, float z) {
+    return z < static_cast<float>(1.0 + tracking_limits::least_step) * depth[cell];
+  };
+  const Camera coarse = StillScene::camera_of_cells(camera);
+  std::vector<std::uint8_t> stays(cloud.points.size(), 1);
+  for (auto i = static_cast<std::size_t>(carried.since()); i < history.size(); ++i) {
+    if (history[i].status == FrameStatus::lost) continue;
+    const auto look = [&](Eigen::Index point, const PointProjection::Block& block, int k) {
+      if (is_carried(block.pixel[k], block.z[k])) stays[static_cast<std::size_t>(point)] = 0;
+    };
+    visit_points_in_view(as_rows(cloud.points), as_rows(cloud.normals), 0, cloud.size(),
+                         PointProjection(coarse, history.pose(i)), look);
+  }
+  if (std::find(stays.begin(), stays.end(), 0) != stays.end()) {
+    cloud.keep(stays);
+    blocks.keep(stays);
+    blocks.renew(cloud);
+  }
+  for (Eigen::Index pixel = 0; pixel < before.depth.size(); ++pixel) {
+    const Eigen::Index u = pixel % camera.width() / cells.step, v = pixel / camera.width() / cells.step;
+    if (u >= cells.width || v >= cells.height || !is_carried(v * cells.width + u, before.depth[pixel])) continue;
+    before.depth[pixel] = before.measured[pixel] = std::numeric_limits<float>::quiet_NaN();
+  }
+  still_scene = StillScene(camera);
+}
+
 // Makes the frame ready to be asked about points.
 void Pipeline::observe(const FrameExtras& extras, FrameReport& report) {
   const Stopwatch watch(report.milliseconds.back_project);
   confidence_noise.scale(extras.confidence, frame);
   cells = StillScene::cells_of(frame, camera);
+  leave_out_carried(report);
   if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
   observer.look_at(frame, extras.colors, options.num_threads);
   now.depth = frame.points.col(2);
@@ -266,7 +313,7 @@ void Pipeline::leave_out_moving(const TrackingResult& tracking, const ColorsRef&
   if (still.size() == 0) return;
   const auto num_inside = static_cast<std::int64_t>(frame.valid.size());
   nacre::keep_region(still, frame);
-  report.num_moving = num_inside - static_cast<std::int64_t>(frame.valid.size());
+  report.num_moving += num_inside - static_cast<std::int64_t>(frame.valid.size());
   for (Eigen::Index i = 0; i < still.size(); ++i) {
     if (still.data()[i] == 0) now.depth[i] = now.measured[i] = std::numeric_limits<float>::quiet_NaN();
   }

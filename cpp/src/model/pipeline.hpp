@@ -13,6 +13,7 @@
 #include "nacre/depth_calibration.hpp"
 #include "nacre/frame_report.hpp"
 #include "nacre/model_options.hpp"
+#include "tracking/carried_things.hpp"
 #include "tracking/confidence_noise.hpp"
 #include "tracking/object_view.hpp"
 #include "tracking/relocalisation_filter.hpp"
@@ -48,6 +49,7 @@ struct Pipeline {
   LoopClosure loops{camera, options};
   FrameHistory history;
   StillScene still_scene{camera};
+  CarriedThings carried;
   CoarseFrame cells;                   // of the newest frame
   DepthView now;                       // of the newest, from the origin: where the camera is, is to be found
   std::vector<OutlinePoint> outline;   // of the newest
@@ -84,6 +86,8 @@ struct Pipeline {
   void organise(const DepthRef& depth, const DepthImage& clean, FrameReport& report);
   void keep_region(FrameReport& report);
   void observe(const FrameExtras& extras, FrameReport& report);
+  void leave_out_carried(FrameReport& report);
+  void forget_carried();
   void deform(const FrameExtras& extras, FrameReport& report);
   TrackingResult locate(const FrameExtras& extras, FrameReport& report);
   void leave_out_moving(const TrackingResult& tracking, const ColorsRef& colors, FrameReport& report);

@@ -80,7 +80,9 @@ struct Thing {
 }  // namespace
 
 StillScene::StillScene(const Camera& camera)
-    : width_(camera.width()), height_(camera.height()), camera_(coarse_camera(camera, cell_budget)) {}
+    : width_(camera.width()), height_(camera.height()), camera_(camera_of_cells(camera)) {}
+
+Camera StillScene::camera_of_cells(const Camera& camera) { return coarse_camera(camera, cell_budget); }
 
 CoarseFrame StillScene::cells_of(const Frame& frame, const Camera& camera) {
   return CoarseFrame(frame, camera, MaskImage(), cell_budget);
@@ -148,7 +150,7 @@ void StillScene::add(const CoarseFrame& cells, const MaskImage& still, const Pos
     return;
   }
   const DepthView all = now;
-  if (!moved_.empty()) {
+  if (!moved_.empty() && all_.depth.size() > 0) {
     // What has not moved since the camera came to the last place has become part of the scene.
     std::vector<std::uint8_t> is_hidden = moved_;
     const std::vector<Visibility> then = judge(cells, world_from_camera, all_, camera_, margin);

@@ -14,6 +14,7 @@ class StillScene {
  public:
   explicit StillScene(const Camera& camera);
   static CoarseFrame cells_of(const Frame& frame, const Camera& camera);
+  static Camera camera_of_cells(const Camera& camera);
 
   // The pixels of a frame that show the scene (1), without those (0) of things that have moved in. A thing holds
   // together, is not where the scene was seen, and is large: errors at edges and of poses are narrow. Empty where

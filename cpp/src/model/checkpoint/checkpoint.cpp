@@ -50,8 +50,8 @@ template <class Archive>
 void exchange_state(Archive& archive, Pipeline& state) {
   archive(state.options.fusion.reference_sigma, state.options.depth.tilt, state.depth_view_frames, state.region,
           state.calibration, state.confidence_noise, state.residual_noise, state.usual_consistency, state.cloud,
-          state.loops, state.history, state.before, state.still_scene, state.odometry, state.hypothesis, state.views,
-          state.spacing, state.num_lost, state.num_vain, state.start_frames);
+          state.loops, state.history, state.before, state.still_scene, state.carried, state.odometry, state.hypothesis,
+          state.views, state.spacing, state.num_lost, state.num_vain, state.start_frames);
   std::vector<BlockIndex::Gap> gaps = state.blocks.gaps();
   if (state.parked.is_on()) archive(state.parked, gaps);
   state.blocks.set_gaps(std::move(gaps));
@@ -187,6 +187,13 @@ bool PrivateState::is_sound(const StillScene& scene) {
   if (scene.scene_.depth.size() == 0) return scene.all_.depth.size() == 0 && scene.moved_.empty();
   return is_sound(scene.scene_) && is_sound(scene.all_) &&
          (scene.moved_.empty() || static_cast<Eigen::Index>(scene.moved_.size()) == num_cells);
+}
+
+bool PrivateState::is_sound(const CarriedThings& things, const StillScene& scene) {
+  const Eigen::Index num_cells = static_cast<Eigen::Index>(scene.camera_.width()) * scene.camera_.height();
+  const bool has_size = things.scene_.rows() == scene.height_ && things.scene_.cols() == scene.width_;
+  return things.changed_ >= 0 && static_cast<Eigen::Index>(things.is_carried_.size()) == things.depth_.size() &&
+         (things.depth_.size() == 0 || things.depth_.size() == num_cells) && (things.scene_.size() == 0 || has_size);
 }
 
 bool PrivateState::is_sound(const FrameOdometry& odometry) {
@@ -395,7 +402,8 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
                       std::is_sorted(state.depth_view_frames.begin(), state.depth_view_frames.end()) &&
                       (!state.depth_views || PrivateState::is_sound(*state.depth_views)),
                   "the views that calibrate depth contradict the camera");
-  archive.require(PrivateState::is_sound(state.still_scene), "the still scene has another size than the camera");
+  archive.require(PrivateState::is_sound(state.still_scene) && PrivateState::is_sound(state.carried, state.still_scene),
+                  "the still scene has another size than the camera");
   archive.require(!state.shape || PrivateState::is_sound(*state.shape, state.cloud.points.size(), num_frames),
                   "the shape contradicts the points or itself");
   archive.require(PrivateState::is_sound(state.odometry), "the frame before contradicts itself");

@@ -7,6 +7,7 @@
 #include "model/checkpoint/fields.hpp"
 #include "model/frame_history.hpp"
 #include "model/pipeline.hpp"
+#include "tracking/carried_things.hpp"
 #include "tracking/object_view.hpp"
 #include "tracking/relocalisation_filter.hpp"
 #include "tracking/still_scene.hpp"
@@ -186,6 +187,11 @@ struct PrivateState {
   }
 
   template <class Archive>
+  static void exchange(Archive& archive, CarriedThings& things) {
+    archive(things.depth_, things.is_carried_, things.scene_, things.changed_);
+  }
+
+  template <class Archive>
   static void exchange(Archive& archive, DeformingShape& shape) {
     archive(shape.field_, shape.states_);
   }
@@ -216,6 +222,7 @@ struct PrivateState {
   static bool is_sound(const FrameOdometry& odometry);
   static bool is_sound(const DeformingShape& shape, std::size_t num_points, std::size_t num_frames);
   static bool is_sound(const StillScene& scene);
+  static bool is_sound(const CarriedThings& things, const StillScene& scene);
   static bool is_sound(const ParkedPoints& parked, const BlockIndex& blocks, std::size_t num_points,
                        std::size_t num_frames);
 };
