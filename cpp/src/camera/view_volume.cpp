@@ -6,6 +6,14 @@
 
 namespace nacre {
 
+Box moved(const Box& box, const Pose& motion) {
+  if (box.isEmpty()) return box;
+  const Eigen::Isometry3f by(motion.cast<float>());
+  const Eigen::Vector3f center = by * box.center();
+  const Eigen::Vector3f half = 0.5F * (by.linear().cwiseAbs() * box.sizes());
+  return {center - half, center + half};
+}
+
 ViewVolume::ViewVolume(const Camera& camera, const Pose& world_from_camera, double margin, double slack,
                        double farthest)
     : slack_(slack) {

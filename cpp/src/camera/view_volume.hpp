@@ -10,6 +10,9 @@ namespace nacre {
 
 using Box = Eigen::AlignedBox3f;
 
+// Holds what a box holds, moved.
+Box moved(const Box& box, const Pose& motion);
+
 // What is before a camera and in its image: bounded by planes. Lens distortion bends those at the sides: such a
 // camera's volume is all that is before it.
 class ViewVolume {

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <limits>
 #include <random>
@@ -103,6 +104,66 @@ void expose_points(PointModel& points, const std::vector<Eigen::Vector3f>& gains
       if (color.allFinite()) color = colors.col(static_cast<Eigen::Index>(k));
     }
   }
+}
+
+// Points, and how many of a model's are before them.
+struct PlacedPoints {
+  std::size_t place;
+  PointModel points;
+};
+
+// So many values a point. In memory that is there as far as it goes: what is behind moves back, the last first.
+template <class Value, class ValuesOf>
+void insert_values(std::vector<Value>& values, const std::vector<PlacedPoints>& parts, const ValuesOf& values_of,
+                   const Value& unknown, std::size_t channels = 1) {
+  std::size_t end = values.size(), shift = 0;
+  for (const PlacedPoints& part : parts) shift += channels * part.points.points.size();
+  values.resize(end + shift, unknown);
+  const auto at = [&](std::size_t i) { return values.begin() + static_cast<std::ptrdiff_t>(i); };
+  for (auto part = parts.rbegin(); part != parts.rend(); ++part) {
+    const std::size_t place = channels * part->place, count = channels * part->points.points.size();
+    std::move_backward(at(place), at(end), at(end + shift));
+    end = place;
+    shift -= count;
+    const std::vector<Value>& added = std::invoke(values_of, part->points);
+    if (added.empty()) {
+      std::fill_n(at(place + shift), count, unknown);
+    } else {
+      std::copy(added.begin(), added.end(), at(place + shift));
+    }
+  }
+}
+
+const std::vector<float>& values_of_attribute(const PointModel& points, const std::string& name) {
+  static const std::vector<float> none;
+  for (const PointAttribute& attribute : points.attributes) {
+    if (attribute.name == name) return attribute.values;
+  }
+  return none;
+}
+
+// Colours and attributes that some lack are not known. In the order of their places.
+void insert_points(PointModel& model, const std::vector<PlacedPoints>& parts) {
+  constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+  bool with_colors = !model.colors.empty();
+  for (const PlacedPoints& part : parts) {
+    with_colors = with_colors || !part.points.colors.empty();
+    append_range(model, part.points, 0, 0);  // its attributes
+  }
+  for (PointAttribute& attribute : model.attributes) {
+    const auto values_of = [&](const PointModel& points) -> const auto& {
+      return values_of_attribute(points, attribute.name);
+    };
+    insert_values(attribute.values, parts, values_of, unknown, static_cast<std::size_t>(attribute.num_channels));
+  }
+  const Eigen::Vector3f unknown_vector = Eigen::Vector3f::Constant(unknown);
+  if (with_colors) insert_values(model.colors, parts, &PointModel::colors, unknown_vector);
+  insert_values(model.points, parts, &PointModel::points, unknown_vector);
+  insert_values(model.normals, parts, &PointModel::normals, unknown_vector);
+  insert_values(model.confidence, parts, &PointModel::confidence, unknown);
+  insert_values(model.last_seen, parts, &PointModel::last_seen, std::int32_t{0});
+  insert_values(model.observations, parts, &PointModel::observations, std::uint8_t{0});
+  insert_values(model.free_space_violations, parts, &PointModel::free_space_violations, std::uint8_t{0});
 }
 
 std::string new_token() {
@@ -302,25 +363,20 @@ void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vect
 // All are read before the model changes.
 void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vector<std::uint8_t>& is_wanted) {
   if (std::find(is_wanted.begin(), is_wanted.end(), std::uint8_t{1}) == is_wanted.end()) return;
-  PointModel whole;
-  append_range(whole, model, 0, 0);  // its colours and attributes
+  std::vector<PlacedPoints> back;
   std::vector<BlockIndex::Gap> gaps;
   std::vector<Parcel> left;
-  std::size_t done = 0;
-  std::int64_t num_back = 0;
+  std::size_t num_back = 0;
   for (std::size_t k = 0; k < parcels_.size(); ++k) {
     const auto [place, count] = blocks.gaps()[k];
-    append_range(whole, model, done, place - done);
-    done = place;
-    if (!is_wanted[k]) {
-      gaps.push_back({whole.points.size(), count});
-      continue;
+    if (is_wanted[k]) {
+      back.push_back({place, read(parcels_[k])});
+      num_back += count;
+    } else {
+      gaps.push_back({place + num_back, count});
     }
-    const PointModel back = read(parcels_[k]);
-    append_range(whole, back, 0, back.points.size());
-    num_back += back.size();
   }
-  append_range(whole, model, done, model.points.size() - done);
+  insert_points(model, back);
   for (std::size_t k = 0; k < parcels_.size(); ++k) {
     if (is_wanted[k]) {
       release(parcels_[k]);
@@ -328,13 +384,12 @@ void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vect
       left.push_back(std::move(parcels_[k]));
     }
   }
-  size_ -= num_back;
+  size_ -= static_cast<std::int64_t>(num_back);
   parcels_ = std::move(left);
   if (parcels_.empty()) {
     motions_.clear();
     gains_.clear();
   }
-  model = std::move(whole);
   blocks.renew(model);
   blocks.set_gaps(std::move(gaps));
 }
@@ -345,10 +400,7 @@ void ParkedPoints::move(const std::vector<Pose>& corrections) {
     const Box before(parcel.lowest, parcel.highest);
     Box after;
     for (const std::int32_t frame : parcel.frames) {
-      const Eigen::Isometry3f motion(corrections[static_cast<std::size_t>(frame)].cast<float>());
-      const Eigen::Vector3f center = motion * before.center();
-      const Eigen::Vector3f half = 0.5F * (motion.linear().cwiseAbs() * before.sizes());
-      after.extend(Box(center - half, center + half));
+      after.extend(moved(before, corrections[static_cast<std::size_t>(frame)]));
     }
     parcel.lowest = after.min();
     parcel.highest = after.max();
