@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "camera/view_distance.hpp"
+#include "camera/view_volume.hpp"
 #include "depth/depth_view.hpp"
 #include "outlines/occluding_edges.hpp"
 #include "tracking/frame_samples.hpp"
@@ -18,12 +19,18 @@ FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, con
 struct KeyFrame {
   std::int32_t frame;  // its number
   FrameCloud cloud;
+  Box bounds;                         // of the cloud
   std::vector<OutlinePoint> outline;  // camera frame
   int last_verified;                  // the last node of the trajectory from which its surface was seen to lie right
 };
 
+Box bounds_of(const Points& points);
+
 // What a camera says of a cloud of another one's: of so much of the depth as margin it counts as the same place.
 VisibilityCounts compare(const FrameCloud& cloud, const Pose& camera_from_cloud, const DepthView& view,
                          const Camera& camera, double margin);
+
+// Where points of a cloud are that may agree then.
+ViewVolume agreeing_volume(const DepthView& view, const Pose& world_from_camera, const Camera& camera, double margin);
 
 }  // namespace nacre

@@ -15,6 +15,7 @@ constexpr std::size_t most_key_frames = 500;  // [views] budget: about 80 kB eac
 constexpr std::size_t most_candidates = 4;  // [views] budget: that a frame is registered to at once; test_loop_closure
 constexpr int verified_nodes = 12;  // [nodes] tuned: of the trajectory: what was seen since is taken to be in place; test_loop_closure, teddy
 constexpr double least_overlap = 0.3;  // [1] tuned: of a frame and a key frame; test_loop_closure
+constexpr float least_facing = 0.2F;  // [cosine] tuned: at which a key frame's surface should be seen; test_loop_closure
 constexpr double search_radius = 0.12;  // [depth] tuned: drift that is looked for; test_loop_closure
 constexpr double drift = 0.005;  // [rad, depth] tuned: standard deviation of a step between nodes; test_loop_closure
 constexpr double loop_error = 0.25 * drift;  // [rad, depth] tuned: standard deviation of a registration that closes a loop; test_loop_closure

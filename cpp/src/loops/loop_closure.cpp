@@ -69,7 +69,9 @@ std::vector<std::vector<OutlinePoint>> LoopClosure::outlines_near(const Pose& po
 
 LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
   if (!is_next_node(frame)) return {};
-  KeyFrame view{frame.index, sample_cloud(frame.frame, frame.observer, options_), frame.outline, time()};
+  FrameCloud cloud = sample_cloud(frame.frame, frame.observer, options_);
+  const Box bounds = bounds_of(cloud.points);
+  KeyFrame view{frame.index, std::move(cloud), bounds, frame.outline, time()};
   auto [seen, in_question] = select(frame);
   std::optional<Match> loop = match(frame, view.cloud, in_question);
   const bool is_apart = loop && loop->distance > tolerance_of(frame);
@@ -115,7 +117,10 @@ double LoopClosure::part_in_view(int key_frame, const LoopFrame& frame) const {
 LoopClosure::SeenKeyFrames LoopClosure::select(const LoopFrame& frame) const {
   SeenKeyFrames seen;
   std::vector<SeenKeyFrame> in_question;
+  const ViewVolume volume =
+      agreeing_volume(frame.view, frame.alignment.target_from_source, camera_, loops_limits::search_radius);
   for (int k = 0; k < num_key_frames(); ++k) {
+    if (!volume.may_hold(moved(key_frames_[static_cast<std::size_t>(k)].bounds, pose_of(k)))) continue;
     const double part = part_in_view(k, frame);
     if (part < loops_limits::least_overlap) continue;
     const bool is_sure = is_verified(k) || frame.to_whole_model || frame.is_given;
@@ -189,6 +194,7 @@ void LoopClosure::straighten(double tilt, const std::vector<Pose>& motions) {
       points.row(i) = straight.point;
       normals.row(i) = straight.normal;
     }
+    key_frame.bounds = bounds_of(points);
     for (OutlinePoint& outline : key_frame.outline) {
       const SurfacePoint straight = without_tilt({outline.point.cast<float>(), outline.normal.cast<float>()}, tilt);
       outline.point = straight.point.cast<double>();

@@ -352,6 +352,35 @@ TEST_CASE("the distance of two views counts turns and, by depth, ways") {
   CHECK(view_distance(Pose::Identity(), moved_view, 4.0) == doctest::Approx(0.5));
 }
 
+TEST_CASE("a cloud that agrees with a view has points in the volume of that, from wherever it is seen") {
+  const Camera camera = Room::camera();
+  const Frame frame = make_frame(DepthImage::Constant(156, 208, 1.0F), camera);
+  const FusionOptions options;
+  SurfaceObserver observer(camera, options);
+  observer.look_at(frame, Colors(), 0);
+  const FrameCloud cloud = sample_cloud(frame, observer, {});
+  const DepthView view{frame.points.col(2), frame.sigma};
+  const Box bounds = bounds_of(cloud.points);
+  int num_agreeing = 0, num_outside = 0;
+  for (std::uint64_t i = 0; i < 2000; ++i) {
+    Pose camera_from_cloud = Pose::Identity();
+    for (std::uint64_t axis = 0; axis < 3; ++axis) {
+      const auto part = [&](std::uint64_t which) {
+        return static_cast<double>(random_bits(which, 3 * i + axis) % 2001) / 1000.0 - 1.0;
+      };
+      camera_from_cloud.rotate(Eigen::AngleAxisd(part(1), Eigen::Vector3d::Unit(static_cast<Eigen::Index>(axis))));
+      camera_from_cloud.translation()[static_cast<Eigen::Index>(axis)] = 2.0 * part(2);
+    }
+    const bool may_agree = agreeing_volume(view, camera_from_cloud.inverse(), camera, 0.12).may_hold(bounds);
+    const bool agrees = compare(cloud, camera_from_cloud, view, camera, 0.12).agreeing > 0;
+    num_agreeing += agrees ? 1 : 0;
+    num_outside += may_agree ? 0 : 1;
+    if (agrees) CHECK(may_agree);
+  }
+  CHECK(num_agreeing > 50);
+  CHECK(num_outside > 500);
+}
+
 TEST_CASE("a cloud is found in its own view, not behind the camera, and seen through where nothing is") {
   const Camera camera = Room::camera();
   const Frame frame = make_frame(DepthImage::Constant(156, 208, 1.0F), camera);

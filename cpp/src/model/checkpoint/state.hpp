@@ -40,6 +40,7 @@ void exchange(Archive& archive, OutlinePoint& point) {
 template <class Archive>
 void exchange(Archive& archive, KeyFrame& key_frame) {
   archive(key_frame.frame, key_frame.cloud, key_frame.outline, key_frame.last_verified);
+  key_frame.bounds = bounds_of(key_frame.cloud.points);
 }
 
 template <class Archive>
