@@ -58,12 +58,6 @@ static std::vector<BlockIndex::Gap>::const_iterator next_gap(const std::vector<B
                           [](std::size_t before, const BlockIndex::Gap& gap) { return before < gap.place; });
 }
 
-std::size_t BlockIndex::add_gap(Gap gap) {
-  const auto number = next_gap(gaps_, gap.place) - gaps_.cbegin();
-  gaps_.insert(gaps_.begin() + number, gap);
-  return static_cast<std::size_t>(number);
-}
-
 std::size_t BlockIndex::first_gap_behind(std::size_t place) const {
   const auto next = next_gap(gaps_, place);
   return next == gaps_.end() ? std::numeric_limits<std::size_t>::max() : next->place;

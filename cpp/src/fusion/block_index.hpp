@@ -49,7 +49,6 @@ class BlockIndex {
     std::size_t count;
   };
   const std::vector<Gap>& gaps() const { return gaps_; }
-  std::size_t add_gap(Gap gap);  // behind those at the same place; returns its number
   void set_gaps(std::vector<Gap> gaps) { gaps_ = std::move(gaps); }
   std::size_t first_gap_behind(std::size_t place) const;
   std::size_t num_left_before(std::size_t place) const;  // from gaps up to there

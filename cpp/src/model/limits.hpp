@@ -18,7 +18,7 @@ constexpr std::size_t start_frames = 3;  // [frames] derived: that begin a model
 constexpr int calibration_interval = 6;  // [views] budget: in new directions, from one calibration of depth to the next; test_depth_calibration
 constexpr std::size_t most_object_views = 24;  // [views] budget: of an object that turns on a plane; dog
 constexpr double part_in_memory = 0.9;  // [1] budget: of the most points, that are left when points leave; test_parked_points
-constexpr std::size_t parcel_points = 16384;  // [points] budget: of a file, of those that leave; test_parked_points
+constexpr std::size_t parcel_points = 8192;  // [points] budget: of a file, of those that leave; test_parked_points
 constexpr std::size_t most_kept_motions = 100000;  // [poses] budget: of what happened to points that left, until they are written anew; test_parked_points
 
 }  // namespace nacre::model_limits

@@ -283,6 +283,59 @@ void ParkedPoints::note_checkpoint() {
   released_.erase(std::remove_if(released_.begin(), released_.end(), is_old), released_.end());
 }
 
+// Points that leave become one file with what left from between and beside them before: small files would become ever
+// more.
+std::vector<ParkedPoints::Leaving> ParkedPoints::divided(const std::vector<BlockIndex::Summary>& blocks,
+                                                         const std::vector<BlockIndex::Gap>& gaps) {
+  std::vector<Leaving> all;
+  std::size_t parcel = 0;
+  for (std::size_t k = 0; k < blocks.size();) {
+    const std::size_t first = blocks[k].range.first;
+    std::size_t end = first;
+    for (; k < blocks.size() && blocks[k].range.first == end; ++k)
+      end += static_cast<std::size_t>(blocks[k].range.count);
+    while (parcel < gaps.size() && gaps[parcel].place < first) ++parcel;
+    Leaving now{first, first, parcel, parcel};
+    std::size_t count = 0;
+    const auto begin_next = [&] {
+      if (now.end > now.first || now.end_parcel > now.first_parcel + 1) all.push_back(now);
+      now = {now.end, now.end, parcel, parcel};
+      count = 0;
+    };
+    while (true) {
+      const std::size_t next_gap = parcel < gaps.size() ? gaps[parcel].place : std::numeric_limits<std::size_t>::max();
+      if (next_gap == now.end) {
+        if (count + gaps[parcel].count > model_limits::parcel_points) begin_next();
+        count += gaps[parcel].count;
+        now.end_parcel = ++parcel;
+      } else if (now.end < end) {
+        if (count >= model_limits::parcel_points) begin_next();
+        const std::size_t last = std::min({end, next_gap, now.end + model_limits::parcel_points - count});
+        count += last - now.end;
+        now.end = last;
+      } else {
+        break;
+      }
+    }
+    begin_next();
+  }
+  return all;
+}
+
+PointModel ParkedPoints::gathered(const PointModel& model, const BlockIndex& blocks, const Leaving& leaving) const {
+  PointModel points;
+  std::size_t done = leaving.first;
+  for (std::size_t k = leaving.first_parcel; k < leaving.end_parcel; ++k) {
+    const std::size_t place = blocks.gaps()[k].place;
+    append_range(points, model, done, place - done);
+    done = place;
+    const PointModel before = read(parcels_[k]);
+    append_range(points, before, 0, before.points.size());
+  }
+  append_range(points, model, done, leaving.end - done);
+  return points;
+}
+
 // Files are written before anything leaves: where one cannot be, all is as it was.
 void ParkedPoints::park(PointModel& model, BlockIndex& blocks, std::int64_t most_points, std::int32_t oldest_frame,
                         const ViewVolume& view) {
@@ -306,37 +359,42 @@ void ParkedPoints::park(PointModel& model, BlockIndex& blocks, std::int64_t most
             [](const auto& a, const auto& b) { return a.range.first < b.range.first; });
 
   fs::create_directories(folder_);
-  std::vector<std::uint8_t> flags(model.points.size(), 1);
-  std::vector<std::pair<std::size_t, Parcel>> leaving;  // with their places
+  const std::vector<Leaving> leaving = divided(candidates, blocks.gaps());
+  std::vector<Parcel> written;
   try {
-    for (std::size_t k = 0; k < candidates.size();) {
-      const std::size_t first = candidates[k].range.first;
-      std::size_t end = first;
-      for (; k < candidates.size() && candidates[k].range.first == end && end - first < model_limits::parcel_points &&
-             (end == first || blocks.first_gap_behind(first) > end);
-           ++k) {
-        end += static_cast<std::size_t>(candidates[k].range.count);
-        if (blocks.first_gap_behind(first) < end) {  // what has left from between two of its points divides it
-          end = blocks.first_gap_behind(first);
-          ++k;
-          break;
-        }
-      }
-      PointModel points;
-      append_range(points, model, first, end - first);
-      leaving.emplace_back(first, write(std::move(points)));
-      std::fill(flags.begin() + static_cast<std::ptrdiff_t>(first), flags.begin() + static_cast<std::ptrdiff_t>(end),
-                std::uint8_t{0});
-    }
+    for (const Leaving& part : leaving) written.push_back(write(gathered(model, blocks, part)));
   } catch (...) {
-    for (const auto& [_, parcel] : leaving) remove_file(folder_, parcel.file);
+    for (const Parcel& parcel : written) remove_file(folder_, parcel.file);
     throw;
   }
-  for (auto& [place, parcel] : leaving) {
-    size_ += parcel.count;
-    const std::size_t k = blocks.add_gap({place, static_cast<std::size_t>(parcel.count)});
-    parcels_.insert(parcels_.begin() + static_cast<std::ptrdiff_t>(k), std::move(parcel));
+  take_out(model, blocks, leaving, std::move(written));
+}
+
+void ParkedPoints::take_out(PointModel& model, BlockIndex& blocks, const std::vector<Leaving>& leaving,
+                            std::vector<Parcel> written) {
+  std::vector<std::uint8_t> flags(model.points.size(), 1);
+  std::vector<Parcel> parcels;
+  std::vector<BlockIndex::Gap> gaps;
+  std::size_t k = 0;
+  const auto keep_until = [&](std::size_t end) {
+    for (; k < end; ++k) {
+      gaps.push_back(blocks.gaps()[k]);
+      parcels.push_back(std::move(parcels_[k]));
+    }
+  };
+  for (std::size_t i = 0; i < leaving.size(); ++i) {
+    const Leaving& part = leaving[i];
+    keep_until(part.first_parcel);
+    for (; k < part.end_parcel; ++k) release(parcels_[k]);
+    gaps.push_back({part.first, static_cast<std::size_t>(written[i].count)});
+    parcels.push_back(std::move(written[i]));
+    std::fill(flags.begin() + static_cast<std::ptrdiff_t>(part.first),
+              flags.begin() + static_cast<std::ptrdiff_t>(part.end), std::uint8_t{0});
+    size_ += static_cast<std::int64_t>(part.end - part.first);
   }
+  keep_until(parcels_.size());
+  parcels_ = std::move(parcels);
+  blocks.set_gaps(std::move(gaps));
   model.keep(flags);
   blocks.keep(flags);
 }

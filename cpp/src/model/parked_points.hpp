@@ -64,6 +64,17 @@ class ParkedPoints {
     std::int64_t checkpoint;  // the last that names it
   };
 
+  // Points of the model and parcels, one after the other in its order, that are to be one parcel.
+  struct Leaving {
+    std::size_t first, end;                // points
+    std::size_t first_parcel, end_parcel;  // from between and beside them
+  };
+
+  static std::vector<Leaving> divided(const std::vector<BlockIndex::Summary>& blocks,
+                                      const std::vector<BlockIndex::Gap>& gaps);
+  PointModel gathered(const PointModel& model, const BlockIndex& blocks, const Leaving& leaving) const;
+  void take_out(PointModel& model, BlockIndex& blocks, const std::vector<Leaving>& leaving,
+                std::vector<Parcel> written);
   PointModel read(const Parcel& parcel) const;
   Parcel write(PointModel points);
   void settle();

@@ -9,6 +9,7 @@
 #include "fusion/correction.hpp"
 #include "fusion/exposure.hpp"
 #include "model/checkpoint/fields.hpp"
+#include "model/limits.hpp"
 #include "model/parked_points.hpp"
 
 using namespace nacre;
@@ -126,6 +127,22 @@ TEST_CASE("what happens to a model happens to the points that have left it, to t
   CHECK(bytes_of(all) == bytes_of(stayed));
   there.recall_all();
   CHECK(bytes_of(there.model) == bytes_of(stayed));
+}
+
+TEST_CASE("points that leave little by little, from between others that have left, are in few files") {
+  Folder folder;
+  PointModel model = wall();
+  BlockIndex blocks(model);
+  ParkedPoints parked(folder.path.string());
+  for (std::int64_t most = num_points; most >= num_points / 4; most -= num_points / 20) {
+    const double x = most > num_points / 2 ? 5.0 : 19.0;  // first a part stays of the middle of what is to leave
+    parked.park(model, blocks, most, num_frames, view_at(x));
+  }
+  const auto per_file = static_cast<std::int64_t>(model_limits::parcel_points);
+  CHECK(parked.size() > 2 * num_points / 3);
+  CHECK(static_cast<std::int64_t>(folder.files().size()) <= 1 + (parked.size() + per_file - 1) / per_file);
+  parked.recall_all(model, blocks);
+  CHECK(bytes_of(model) == bytes_of(wall()));
 }
 
 TEST_CASE("a file that is damaged or missing is named, and the model stays as it is") {
