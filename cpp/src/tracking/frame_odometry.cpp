@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "base/se3.hpp"
 #include "camera/limits.hpp"
 #include "camera/view_distance.hpp"
 #include "registration/acceptance.hpp"
@@ -98,7 +99,7 @@ void FrameOdometry::end_frame(FrameStatus status, const Pose& world_from_camera,
   is_tracked_ = status != FrameStatus::weak;
   path_ = Path{world_from_camera, {}};
   if (!last || status == FrameStatus::relocalised) return;
-  motion_ = last->world_from_camera.inverse() * world_from_camera;
+  motion_ = orthonormal(last->world_from_camera.inverse() * world_from_camera);
   // Where no step tells what is open, the pose goes on as before, and is wrong by what that changes.
   if (!is_tracked_) {
     const bool is_followed = step && step->weak_directions.cols() == 0;

@@ -151,3 +151,17 @@ TEST_CASE("after a frame that shows nothing, or something else, it may be anywhe
   CHECK_FALSE(other.odometry.place().has_value());
   CHECK_FALSE(other.odometry.motion().has_value());
 }
+
+TEST_CASE("rounding does not grow where frame after frame is placed by the one before") {
+  Camcorder camera;
+  Pose pose = camera_at(0);
+  pose.linear() *= 1.0 + 1e-12;
+  for (int step = 0; step < 20; ++step) {
+    camera.see(camera_at(0), wall);
+    const auto place = camera.odometry.place();
+    if (step > 1) REQUIRE(place.has_value());
+    if (place) pose = place->world_from_camera;
+    camera.odometry.end_frame(FrameStatus::weak, pose, Eigen::Matrix<double, 6, 3>::Identity());
+  }
+  CHECK((pose.linear() * pose.linear().transpose()).isIdentity(1e-10));
+}
