@@ -39,7 +39,7 @@ def way_from_middle(rooms: int) -> float:
     return RADIUS + (rooms - 2) * ROOM / 2
 
 
-def flat_mesh(rooms: int) -> nacre.Mesh:
+def flat_mesh(rooms: int = 2) -> nacre.Mesh:
     """Return a flat of rooms in a square: walls that cross, doors in the outer rooms, furniture around."""
     half, way = rooms * ROOM / 2, way_from_middle(rooms)
     parts = box(np.array([-half, CEILING, -half]), np.array([half, FLOOR, half]))

@@ -113,8 +113,11 @@ def table(name: str) -> Iterator[str]:
     results = {title: result_of(scene, method) for title, method in METHODS.items()}
     # The same pixels of the same images, for every method.
     errors = [result.figures.errors for result in results.values() if isinstance(result, Result)]
-    reached = np.isfinite(errors).all(axis=0) if isinstance(scene, Recorded) else None
-    heads = HEADS if reached is None else [*HEADS[:8], f"RMS of common {reached.mean():.0%} [mm]", *HEADS[8:]]
+    reached: Array | None = None
+    heads = HEADS
+    if isinstance(scene, Recorded):
+        reached = np.asarray(np.isfinite(errors).all(axis=0))
+        heads = [*HEADS[:8], f"RMS of common {reached.mean():.0%} [mm]", *HEADS[8:]]
     yield f"{name}: {len(scene.cloud)} points, {1000 * scene.spacing:.1f} mm apart\n"
     yield f"| {' | '.join(heads)} |"
     yield f"|{' --- |' * len(heads)}"

@@ -115,10 +115,10 @@ struct PlacedPoints {
 // So many values a point. In memory that is there as far as it goes: what is behind moves back, the last first.
 template <class Value, class ValuesOf>
 void insert_values(std::vector<Value>& values, const std::vector<PlacedPoints>& parts, const ValuesOf& values_of,
-                   const Value& unknown, std::size_t channels = 1) {
+                   const Value& missing, std::size_t channels = 1) {
   std::size_t end = values.size(), shift = 0;
   for (const PlacedPoints& part : parts) shift += channels * part.points.points.size();
-  values.resize(end + shift, unknown);
+  values.resize(end + shift, missing);
   const auto at = [&](std::size_t i) { return values.begin() + static_cast<std::ptrdiff_t>(i); };
   for (auto part = parts.rbegin(); part != parts.rend(); ++part) {
     const std::size_t place = channels * part->place, count = channels * part->points.points.size();
@@ -127,7 +127,7 @@ void insert_values(std::vector<Value>& values, const std::vector<PlacedPoints>& 
     shift -= count;
     const std::vector<Value>& added = std::invoke(values_of, part->points);
     if (added.empty()) {
-      std::fill_n(at(place + shift), count, unknown);
+      std::fill_n(at(place + shift), count, missing);
     } else {
       std::copy(added.begin(), added.end(), at(place + shift));
     }
@@ -144,7 +144,7 @@ const std::vector<float>& values_of_attribute(const PointModel& points, const st
 
 // Colours and attributes that some lack are not known. In the order of their places.
 void insert_points(PointModel& model, const std::vector<PlacedPoints>& parts) {
-  constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+  constexpr float not_known = std::numeric_limits<float>::quiet_NaN();
   bool with_colors = !model.colors.empty();
   for (const PlacedPoints& part : parts) {
     with_colors = with_colors || !part.points.colors.empty();
@@ -154,9 +154,9 @@ void insert_points(PointModel& model, const std::vector<PlacedPoints>& parts) {
     const auto values_of = [&](const PointModel& points) -> const auto& {
       return values_of_attribute(points, attribute.name);
     };
-    insert_values(attribute.values, parts, values_of, unknown, static_cast<std::size_t>(attribute.num_channels));
+    insert_values(attribute.values, parts, values_of, not_known, static_cast<std::size_t>(attribute.num_channels));
   }
-  const Eigen::Vector3f unknown_vector = Eigen::Vector3f::Constant(unknown);
+  const Eigen::Vector3f unknown_vector = Eigen::Vector3f::Constant(not_known);
   if (with_colors) insert_values(model.colors, parts, &PointModel::colors, unknown_vector);
   insert_values(model.points, parts, &PointModel::points, unknown_vector);
   insert_values(model.normals, parts, &PointModel::normals, unknown_vector);
