@@ -144,7 +144,7 @@ const std::vector<float>& values_of_attribute(const PointModel& points, const st
 
 // Colours and attributes that some lack are not known. In the order of their places.
 void insert_points(PointModel& model, const std::vector<PlacedPoints>& parts) {
-  constexpr float not_known = std::numeric_limits<float>::quiet_NaN();
+  const float not_known = std::numeric_limits<float>::quiet_NaN();
   bool with_colors = !model.colors.empty();
   for (const PlacedPoints& part : parts) {
     with_colors = with_colors || !part.points.colors.empty();
