@@ -50,6 +50,16 @@ def test_a_gripper_does_not_hold_the_camera_back() -> None:
     assert model.points[:, 2].min() > 0.8  # nothing of it is left
 
 
+def test_a_model_that_begins_without_it_says_so_of_the_frames_before() -> None:
+    model = nacre.Model(CAMERA)
+    reports = [model.add_frame(image) for image in holding(4)]
+    begun = next(report for report in reports if report.num_moving)
+    assert begun.corrects_earlier
+    for frame in model.frames[: begun.index]:
+        assert frame.status == "LOST"
+        assert frame.reason == "the camera carries a part of what it sees: the model begins later"
+
+
 def test_without_one_nothing_is_left_out() -> None:
     model = run([view(i, None) for i in range(6)])
     assert [frame.num_moving for frame in model.frames] == [0] * 6

@@ -39,6 +39,11 @@ def plain(source: object, *, distance: float = 0.0) -> None:
     """Take two arguments."""
 
 
+@guided()
+def by_name(*, distance: float = 0.0) -> None:
+    """Take one argument, by name."""
+
+
 def test_a_call_that_fits_is_not_changed() -> None:
     assert measure("a", "b", distance=2.0, extra=1) == "a b 2.0 {'extra': 1}"
     assert list(inspect.signature(measure).parameters) == ["source", "target", "distance", "more"]
@@ -56,6 +61,7 @@ def test_the_errors_of_the_function_itself_come_out() -> None:
         (lambda: measure("a"), "measure needs target too: ask somebody"),
         (lambda: measure(), "measure needs source and target: ask somebody"),
         (lambda: plain(1, 2), "plain takes source by place and the rest by name: distance"),
+        (lambda: by_name(1), "by_name takes nothing by place; by name: distance"),
         (lambda: plain(1, source=2), "plain got source twice, by place and by name"),
         (lambda: plain(1, distanse=2), r"plain has no argument 'distanse' \(did you mean 'distance'\?\)"),
     ],

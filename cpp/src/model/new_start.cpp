@@ -53,6 +53,7 @@ std::unique_ptr<Pipeline> begun_without_carried(const Pipeline& model, const Dep
     begun->history.add(without_model(history[i], "the camera carries a part of what it sees: the model begins later"));
     if (begun->shape) begun->shape->end_frame();
   }
+  begun->forgets_earlier = true;
   begun->add_frame(depth, extras);
   begun->start_frames.push_back({depth, extras, begun->history.back().index});
   return begun;

@@ -115,7 +115,8 @@ FrameReport Pipeline::add_whole(const DepthRef& depth, const FrameExtras& extras
 FrameReport Pipeline::add_worked_on(const DepthRef& depth, const FrameExtras& extras, FrameReport report) {
   report.index = static_cast<std::int64_t>(history.size());
   report.timestamp = extras.timestamp;
-  report.corrects_earlier = is_trial && history.num_registered() == 2;  // see begin_anew: it confirms both
+  // See begin_anew: it confirms both, or begins without those before.
+  report.corrects_earlier = (is_trial && history.num_registered() == 2) || std::exchange(forgets_earlier, false);
   {
     const Stopwatch total(report.milliseconds.total);
     const DepthImage clean = preprocess(depth, extras.mask, report);

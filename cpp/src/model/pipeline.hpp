@@ -67,6 +67,7 @@ struct Pipeline {
   std::string torn;                      // why the newest frame is part of the model in part alone
   std::vector<StartFrame> start_frames;  // while the model holds one frame: the newest that may begin another
   bool is_trial = false;                 // whether the third frame is to confirm the first two
+  bool forgets_earlier = false;          // whether the next frame begins the model without those before
 
   // binning: what the first frame decided, 1 before.
   Pipeline(const Camera& camera_in, const ModelOptions& options_in, int binning);

@@ -77,6 +77,8 @@ def _how_to_call(
     by_place = [p.name for p in parameters if p.kind is p.POSITIONAL_OR_KEYWORD]
     if len(given) - own_object > len(by_place):
         others = ", ".join(p.name for p in parameters if p.kind is p.KEYWORD_ONLY)
+        if not by_place:
+            return f"{name} takes nothing by place" + f"; by name: {others}" * bool(others)
         return f"{name} takes {listing(by_place)} by place and the rest by name: {others}"
     taken = set(by_place[: len(given) - own_object])
     missing = [p.name for p in parameters if p.default is p.empty and p.name not in taken | set(named)]

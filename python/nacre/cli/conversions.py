@@ -99,14 +99,24 @@ def _mesh(job: Job) -> Figures:
     import numpy as np
 
     import nacre
-    from nacre.io.meshes import read_mesh_arrays
+    from nacre.io.meshes import lost_in, read_mesh_arrays
 
     mesh = read_mesh_arrays(job.source)
     if not len(mesh.triangles) or not np.isfinite(mesh.vertices).all():
         what = "vertices that are not finite" if len(mesh.triangles) else "no triangle"
         raise CommandError(f"{job.source} has {what}")
-    nacre.write_mesh(job.out, mesh.vertices, mesh.triangles, normals=mesh.normals, colors=mesh.colors)
-    return {"num_vertices": len(mesh.vertices), "num_triangles": len(mesh.triangles)}
+    nacre.write_mesh(
+        job.out,
+        mesh.vertices,
+        mesh.triangles,
+        normals=mesh.normals,
+        colors=mesh.colors,
+        attributes=mesh.attributes,
+    )
+    figures: Figures = {"num_vertices": len(mesh.vertices), "num_triangles": len(mesh.triangles)}
+    if lost := lost_in(job.out, mesh):
+        figures["fields_left_out"] = lost
+    return figures
 
 
 def _trajectory(job: Job) -> Figures:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from nacre.cli.source import reopen
+from nacre.cli.surfaces import has_faces, mesh_suffixes
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose, writable_file, written_file
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ def mesh(
         Path,
         typer.Argument(
             metavar="OUT",
-            help="What nacre reconstruct wrote, or points with normals.",
+            help="What nacre reconstruct wrote, points with normals, or a mesh to simplify.",
             show_default=False,
         ),
     ],
@@ -75,7 +76,8 @@ def mesh(
     """
     terminal = Terminal(json, quiet, verbose)
     from nacre import read_points, write_mesh
-    from nacre.io.meshes import require_mesh_suffix
+    from nacre._internal.guided import listing
+    from nacre.io.meshes import lost_in, read_mesh_arrays, require_mesh_suffix
     from nacre.meshing import largest_part, part_sizes
 
     if not source.exists():
@@ -86,10 +88,14 @@ def mesh(
     target = writable_file(out or path.with_name("mesh.glb" if texture else "mesh.ply"))
     require_mesh_suffix(target, textured=texture)
     views = _views(source) if texture else []
-    cloud = read_points(path)
-    if cloud.normals is None:
-        raise CommandError(f"{path} has no normals: nacre normals {path} OUT.ply estimates them")
-    mesh = _closed(cloud) if closed else _open(cloud)
+    comments: tuple[str, ...] = ()
+    if not closed and path.suffix.lower() in mesh_suffixes() and has_faces(path):
+        mesh = read_mesh_arrays(path)
+    else:
+        cloud = read_points(path)
+        if cloud.normals is None:
+            raise CommandError(f"{path} has no normals: nacre normals {path} OUT.ply estimates them")
+        mesh, comments = _closed(cloud) if closed else _open(cloud), cloud.comments
     if not len(mesh.triangles):
         raise CommandError(f"{path} has too few points for a surface, or normals that contradict it")
     left_out = part_sizes(mesh.triangles)[1:].tolist() if keep is Keep.largest else []
@@ -112,8 +118,11 @@ def mesh(
         colors=mesh.colors,
         attributes=mesh.attributes,
         texture=mesh.texture,
-        comments=[] if target.suffix.lower() == ".stl" else cloud.comments,
+        comments=[] if target.suffix.lower() == ".stl" else comments,
     )
+    lost = lost_in(target, mesh)
+    if lost:
+        terminal.say(f"{target.suffix} has no place for {listing(lost)}")
     figures: dict[str, Any] = {
         "mesh": str(target),
         "vertices": len(mesh.vertices),
@@ -125,7 +134,7 @@ def mesh(
     if len(left_out):
         figures["left_out"] = left_out
     if "seen" in mesh.attributes:
-        figures["seen"] = float(mesh.attributes["seen"].mean())
+        figures["seen"] = _seen_area(mesh)
     if not quiet:
         terminal.answer(
             figures, [(name.replace("_", " "), _words(name, value)) for name, value in figures.items()]
@@ -134,7 +143,7 @@ def mesh(
 
 def _words(name: str, value: Any) -> str:
     if name == "seen":
-        return f"{value:.1%} of the corners; the others are a guess"
+        return f"{value:.1%} of the area; the rest is a guess"
     if name == "left_out":
         return (
             f"{len(value)} parts, of {value[0]} triangles at most"
@@ -142,6 +151,16 @@ def _words(name: str, value: Any) -> str:
             else f"a part of {value[0]}"
         )
     return " x ".join(map(str, value)) if name == "texture" else str(value)
+
+
+def _seen_area(mesh: MeshArrays) -> float:
+    """Return the part of the surface whose corners were seen."""
+    import numpy as np
+
+    a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    seen = mesh.attributes["seen"][mesh.triangles].mean(axis=1)
+    return float(np.average(seen, weights=areas)) if areas.any() else 0.0
 
 
 def _views(source: Path) -> list[TextureView]:

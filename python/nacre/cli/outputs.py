@@ -35,7 +35,12 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
     rpe: Any = done.evaluation.get("relative_pose_error")
     if rpe is not None and rpe.num_pairs:
         text = f"{quantity(rpe.translation_rmse, 'm')}, {quantity(rpe.rotation_rmse, 'rad')}"
-        rows.append(("drift per frame", f"{text} RMSE over {count(rpe.num_pairs)} pairs (RPE)"))
+        rows.append(
+            (
+                "drift per frame",
+                f"{text} RMSE over {count(rpe.num_pairs)} pair{'s' * (rpe.num_pairs > 1)} (RPE)",
+            )
+        )
     times = done.milliseconds
     if len(times):
         slow = quantity(float(np.percentile(times, 99)), "ms")

@@ -32,7 +32,7 @@ class MeshArrays:
     colors : (N, 3) uint8, or None
         Red, green, blue of the vertices.
     attributes : dict of str to (N,) or (N, K) array
-        More of the vertices; not read.
+        More of the vertices; read from PLY files.
     texture : Texture or None
         What is painted on the triangles; not read.
     comments : tuple of str

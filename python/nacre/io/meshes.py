@@ -151,6 +151,15 @@ def _way_to_triangles(value: object) -> str:
     return "nacre.meshing.mesh_points(cloud.points, cloud.normals) makes a mesh of points"
 
 
+def lost_in(path: str | os.PathLike[str], mesh: MeshArrays) -> list[str]:
+    """Return what a mesh has that files which end so have no place for."""
+    suffix = Path(path).suffix.lower()
+    lost = [] if suffix == ".ply" else list(mesh.attributes)
+    if suffix == ".stl":
+        lost += [name for name in ("normals", "colors") if getattr(mesh, name) is not None]
+    return lost
+
+
 def require_mesh_suffix(path: str | os.PathLike[str], *, textured: bool = False) -> None:
     """Raise where no mesh, or none with a texture, is written to files that end so."""
     suffixes, what = (TEXTURE_SUFFIXES, "textured meshes") if textured else (WRITE_SUFFIXES, "meshes")

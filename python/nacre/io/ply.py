@@ -133,7 +133,8 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
     if not isinstance(faces, Ragged) or faces.values.dtype.kind == "f":
         raise FileFormatError(path, "not a mesh: there is no element face with lists vertex_indices")
     triangles = fan(path, faces.values.astype(np.int64), faces.counts.astype(np.int64), len(cloud))
-    return MeshArrays(cloud.points, triangles, cloud.normals, cloud.colors)
+    attributes = {name: values for name, values in cloud.attributes.items() if values.dtype.kind in "buif"}
+    return MeshArrays(cloud.points, triangles, cloud.normals, cloud.colors, attributes)
 
 
 def _vertices(file: PlyFile) -> Cloud:

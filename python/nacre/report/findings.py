@@ -8,6 +8,7 @@ from typing import Literal
 
 import numpy as np
 
+from nacre._internal.rotations import rotation_angles
 from nacre.evaluation import AbsoluteTrajectoryError
 from nacre.evaluation.trajectory import MIN_ALIGNED
 from nacre.report.data import ReportData
@@ -138,6 +139,7 @@ def _pose_errors(
 ) -> Iterator[Finding]:
     """Hold the trajectory against the truth, as far as it is known."""
     if error is None or error.num_compared < MIN_ALIGNED or len(error.errors) != len(frames):
+        yield from _pair_error(frames, distance_seen)
         return
     places = np.array([frame.truth[:3, 3] for frame in frames if frame.truth is not None]).reshape(-1, 3)
     extent = float(np.linalg.norm(np.ptp(places, axis=0))) if len(places) else 0.0
@@ -155,6 +157,24 @@ def _pose_errors(
     word = "Wrong" if is_wrong else "Wrong in part"
     advice = _ADVICE["flip" if error.rotation_max > FLIP_ANGLE else "trajectory"]
     yield _of_frames("trajectory", level, word, statement, off, advice)
+
+
+def _pair_error(frames: Sequence[ReportedFrame], distance_seen: float) -> Iterator[Finding]:
+    """Hold the motion between two poses against the truth: too few to align, which a motion needs not."""
+    known = [frame for frame in frames if frame.world_from_camera is not None and frame.truth is not None]
+    if len(known) != 2:
+        return
+    first, last = known
+    found = np.linalg.inv(first.world_from_camera) @ last.world_from_camera
+    truth = np.linalg.inv(first.truth) @ last.truth
+    error = np.linalg.inv(truth) @ found
+    most = MAX_POSE_ERROR * max(float(np.linalg.norm(truth[:3, 3])), distance_seen)
+    shift, turn = float(np.linalg.norm(error[:3, 3])), float(rotation_angles(error[None, :3, :3])[0])
+    if shift > most or turn > MAX_POSE_ERROR:
+        statement = f"the motion between the two known poses departs from the truth by {quantity(shift, 'm')}"
+        statement += f" and {quantity(turn, 'rad')}"
+        advice = _ADVICE["flip" if turn > FLIP_ANGLE else "trajectory"]
+        yield _of_frames("trajectory", "lost", "Wrong", statement, known, advice)
 
 
 def _distance_seen(data: ReportData) -> float:

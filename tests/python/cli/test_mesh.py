@@ -32,3 +32,19 @@ def test_an_ending_that_no_mesh_has(sheet, tmp_path):
     message = fails(2, "mesh", sheet, "-o", tmp_path / "a.usd")
     assert "meshes are written to .ply, .glb, .obj, .stl, got" in message
     assert not list(tmp_path.iterdir())
+
+
+def test_a_mesh_is_simplified_as_it_is(sheet, tmp_path):
+    run("mesh", sheet, "-o", tmp_path / "a.ply")
+    told = run("mesh", tmp_path / "a.ply", "--simplify", 100, "-o", tmp_path / "b.ply", "--json").json
+    assert told["triangles"] == 100
+    assert set(map(tuple, read_mesh_arrays(tmp_path / "b.ply").colors)) <= set(
+        map(tuple, nacre.read_points(sheet).colors)
+    )
+
+
+def test_what_a_format_has_no_place_for_is_told(sheet, tmp_path):
+    assert ".stl has no place for normals and colors" in run("mesh", sheet, "-o", tmp_path / "a.stl").out
+    run("mesh", sheet, "-o", tmp_path / "a.ply")
+    told = run("convert", tmp_path / "a.ply", tmp_path / "b.stl", "--json").json
+    assert told["fields_left_out"] == ["normals", "colors"]

@@ -160,6 +160,15 @@ class TestTruth:
         assert verdict.findings[0].kind == "trajectory"
         assert "of 20 poses depart from the truth, by up to" in verdict.sentence
 
+    @pytest.mark.parametrize("degrees", [0.0, 50.0])
+    def test_two_poses_are_too_few_to_align_but_have_a_motion(self, degrees: float) -> None:
+        frames = walk(2, truth=True)
+        frames[1] = with_figures(frames[1], world_from_camera=turned(degrees) @ frames[1].world_from_camera)
+        verdict = verdict_on(frames)
+        assert (verdict.level == "lost") == (degrees > 0)
+        if degrees:
+            assert "the motion between the two known poses departs from the truth by" in verdict.sentence
+
     def test_what_looks_the_same_from_two_sides_is_said_to(self) -> None:
         bent = [
             with_figures(f, world_from_camera=turned(9 * f.index) @ f.world_from_camera)
