@@ -160,7 +160,7 @@ void insert_points(PointModel& model, const std::vector<PlacedPoints>& parts) {
   if (with_colors) insert_values(model.colors, parts, &PointModel::colors, unknown_vector);
   insert_values(model.points, parts, &PointModel::points, unknown_vector);
   insert_values(model.normals, parts, &PointModel::normals, unknown_vector);
-  insert_values(model.confidence, parts, &PointModel::confidence, unknown);
+  insert_values(model.confidence, parts, &PointModel::confidence, not_known);
   insert_values(model.last_seen, parts, &PointModel::last_seen, std::int32_t{0});
   insert_values(model.observations, parts, &PointModel::observations, std::uint8_t{0});
   insert_values(model.free_space_violations, parts, &PointModel::free_space_violations, std::uint8_t{0});
