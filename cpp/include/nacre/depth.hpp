@@ -119,7 +119,7 @@ class NoiseCalibration {
   struct Mean {
     double value = 0.0, count = 0.0;
   };
-  static constexpr std::size_t num_bins = 36;  // of depth, a third of an octave each
+  static constexpr std::size_t num_bins = 36;  // of depth, a third of an octave each: from 1/64 m to 64 m
 
   Camera camera_;
   float unit_ = 0.0F;                     // that depth was rounded to [m]

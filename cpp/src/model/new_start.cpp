@@ -51,7 +51,6 @@ std::unique_ptr<Pipeline> begun_without_carried(const Pipeline& model, const Dep
   begun->carried = model.carried;
   for (std::size_t i = 0; i + 1 < history.size(); ++i) {
     begun->history.add(without_model(history[i], "the camera carries a part of what it sees: the model begins later"));
-    if (begun->shape) begun->shape->end_frame();
   }
   begun->forgets_earlier = true;
   begun->add_frame(depth, extras);
