@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from pathlib import Path
 from statistics import median
@@ -128,21 +129,36 @@ def workload(run: dict[str, Any], name: str) -> str:
 
 
 def growth(run: dict[str, Any]) -> str:
-    """Return nacre's time per item of the workloads that come in several sizes."""
+    """Return nacre's time per item of the workloads that come in several sizes, and per pixel of the loop."""
     families: dict[str, dict[int, str]] = {}
+    pixels: list[list[str]] = []
     for name, about in run["workloads"].items():
         ours, _ = leaders(run, name, run["threads"][-1])
+        if not ours:
+            continue
+        each = median(ours["seconds"]) / about["items"] * 1e9
         size = f"{about['items'] // 1000}k"
-        if ours and size in name and about["items"] >= 10_000:
-            nanoseconds = median(ours["seconds"]) / about["items"] * 1e9
-            families.setdefault(name.replace(f"-{size}", ""), {})[about["items"]] = f"{nanoseconds:,.0f}"
+        if size in name and about["items"] >= 10_000:
+            families.setdefault(name.replace(f"-{size}", ""), {})[about["items"]] = f"{each:,.0f}"
+        if image := re.search(r"-(\d+)x(\d+)$", name):
+            milliseconds = time_of(median(ours["seconds"]), about)
+            pixels.append([" x ".join(image.groups()), milliseconds, f"{each / about['steps']:.0f}"])
     families = {name: times for name, times in families.items() if len(times) > 1}
     sizes = sorted({size for times in families.values() for size in times})
     rows = [[name, *(times.get(size, "-") for size in sizes)] for name, times in families.items()]
-    if not rows:
+    parts = []
+    if rows:
+        parts.append(table(["nanoseconds a point", *(f"{size:,}" for size in sizes)], rows))
+    if pixels:
+        heads = ["the loop in a room, pixels", "a frame [ms]", "nanoseconds a pixel"]
+        parts.append(table(heads, pixels))
+    if not parts:
         return ""
-    heads = ["nanoseconds a point", *(f"{size:,}" for size in sizes)]
-    return f"## How nacre's cost grows\n\n{plural(run['threads'][-1])}.\n\n{table(heads, rows)}"
+    text = (
+        f"{plural(run['threads'][-1])}. With points that are out of view a frame's time hardly grows: "
+        "[a model of five million](scaling.md#long-recordings)."
+    )
+    return "\n".join([f"## How nacre's cost grows\n\n{text}\n", *parts])
 
 
 def bounds(run: dict[str, Any]) -> str:

@@ -46,7 +46,7 @@ def parse() -> argparse.Namespace:
     add("--repeats", type=int, default=5, help="turns of each contender (default: 5)")
     add("--output", type=Path, default=HERE / "results", help="folder of results.json and results.md")
     add("--env", type=Path, default=HERE / ".env", help="folder of the environment (kept for the next run)")
-    add("--data", type=Path, help="folder of real recordings, tum-fr1-rpy and tum-fr3-teddy among them")
+    add("--data", type=Path, help="folder of real recordings, for the loop")
     add("--no-setup", action="store_true", help="take the environment as it is")
     options = parser.parse_args()
     default = [most] if options.quick else sorted({1, most})

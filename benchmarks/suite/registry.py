@@ -126,7 +126,15 @@ class Workload:
 
 def all_workloads() -> dict[str, Workload]:
     """Return every workload by name, in the order of the report."""
-    from suite.workloads import consolidation, depth, loop, neighbors, normals, registration
+    from suite.workloads import (
+        consolidation,
+        depth,
+        loop,
+        neighbors,
+        normals,
+        recordings,
+        registration,
+    )
 
-    modules = (neighbors, normals, registration, consolidation, depth, loop)
+    modules = (neighbors, normals, registration, consolidation, depth, loop, recordings)
     return {workload.name: workload for module in modules for workload in module.WORKLOADS}

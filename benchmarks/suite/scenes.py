@@ -10,8 +10,20 @@ import numpy as np
 from nacre import Camera, Mesh, NoiseModel
 from suite.clouds import Array, bumpy_surface, rotation
 
-CAMERA = Camera(width=640, height=480, fx=525, fy=525, cx=319.5, cy=239.5)
-INTRINSICS = np.array([[525, 0, 319.5], [0, 525, 239.5], [0, 0, 1.0]])
+
+def camera(width: int, height: int) -> Camera:
+    """Return a pinhole camera that sees as much from left to right whatever its pixels."""
+    focal = 525 * width / 640
+    return Camera(width, height, fx=focal, fy=focal, cx=(width - 1) / 2, cy=(height - 1) / 2)
+
+
+def matrix(camera: Camera) -> Array:
+    """Return the intrinsics."""
+    return np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]])
+
+
+CAMERA = camera(640, 480)
+INTRINSICS = matrix(CAMERA)
 PIXELS = np.stack([*np.meshgrid(np.arange(640.0), np.arange(480.0)), np.ones((480, 640))], axis=-1)
 RAYS = PIXELS.reshape(-1, 3) @ np.linalg.inv(INTRINSICS).T
 QUAD = np.array([[0, 1, 2], [0, 2, 3]])
@@ -106,7 +118,7 @@ def room_pose(angle: float) -> Array:
 
 
 @cache
-def recording(scene: str, num_given: int, num_frames: int) -> Recording:
+def recording(scene: str, num_given: int, num_frames: int, camera: Camera = CAMERA) -> Recording:
     """
     Return views 12 degrees apart, the middle one last, and frames of a camera that sways about it.
 
@@ -120,7 +132,7 @@ def recording(scene: str, num_given: int, num_frames: int) -> Recording:
         poses = np.array([pose_at(angle) for angle in angles])
         noise = NoiseModel(0.0005) if scene == "object" else NoiseModel.kinect()
         depths = [
-            mesh().simulate_depth(CAMERA, pose, noise=noise, edge_mixing=1, seed=seed + i)
+            mesh().simulate_depth(camera, pose, noise=noise, edge_mixing=1, seed=seed + i)
             for i, pose in enumerate(poses)
         ]
         return np.array(depths), poses

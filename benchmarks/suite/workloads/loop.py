@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
-import os
 from functools import cache, partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,24 +10,27 @@ import numpy as np
 from suite.clouds import degrees_between
 from suite.registry import Arrays, Contender, Lap, Run, Workload
 
-FRAMES, MOST_FRAMES, FAR = 12, 60, 4.0
+FRAMES, FAR = 12, 4.0
 STAGES = ("preprocess", "back_project", "registration", "fuse", "normals")
-DATA = "NACRE_BENCHMARK_DATA"
-"""The environment variable that names the folder of real recordings."""
+IMAGES = ((160, 120), (320, 240), (640, 480), (1280, 720), (1920, 1080))
+"""Sizes of images [pixels]."""
 
 
 @cache
-def simulated(scene: str, num_given: int, spacing: float, voxel: float) -> dict[str, Any]:
+def simulated(
+    scene: str, num_given: int, spacing: float, voxel: float, size: tuple[int, int] = (640, 480)
+) -> dict[str, Any]:
     """Return a simulated recording; spacing 0 is nacre's own choice."""
     from suite import scenes
 
-    recording = scenes.recording(scene, num_given, FRAMES)
+    camera = scenes.camera(*size)
+    recording = scenes.recording(scene, num_given, FRAMES, camera)
     return {
         "given": recording.given,
         "given poses": recording.given_poses,
         "frames": recording.frames,
         "poses": recording.poses,
-        "intrinsics": scenes.INTRINSICS,
+        "intrinsics": scenes.matrix(camera),
         "spacing": np.array(spacing),
         "voxel": np.array(voxel),
         "vertices": recording.mesh.vertices,
@@ -38,39 +38,23 @@ def simulated(scene: str, num_given: int, spacing: float, voxel: float) -> dict[
     }
 
 
-@cache
-def recorded(name: str, voxel: float) -> dict[str, Any]:
-    """Return a real recording; the first frame is given."""
-    import nacre
-
-    known = (frame for frame in nacre.open_sequence(Path(os.environ[DATA]) / name) if frame.truth is not None)
-    sequence = list(itertools.islice(known, MOST_FRAMES + 1))
-    camera = sequence[0].camera
-    frames = np.array([np.asarray(frame.depth, np.float32) for frame in sequence])
-    poses = np.array([frame.truth for frame in sequence])
-    return {
-        "given": frames[:1],
-        "given poses": poses[:1],
-        "frames": frames[1:],
-        "poses": poses[1:],
-        "intrinsics": np.array([[camera.fx, 0, camera.cx], [0, camera.fy, camera.cy], [0, 0, 1]]),
-        "spacing": np.array(0.0),
-        "voxel": np.array(voxel),
-    }
-
-
 def nacre(arrays: Arrays, threads: int) -> Run:
     """Take the default preset; grow the model first, with the true poses of the given views."""
     from nacre import Camera, Model
 
-    matrix = arrays["intrinsics"]
-    camera = Camera(640, 480, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2])
+    matrix, frames = arrays["intrinsics"], arrays["frames"]
+    height, width = frames.shape[1:]
+    camera = Camera(width, height, matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2])
     model = Model(camera, num_threads=threads, spacing=float(arrays["spacing"]))
-    for depth, pose in zip(arrays["given"], arrays["given poses"], strict=True):
-        model.add_frame(depth, guess=pose, keep_guess=True)
+    given = arrays["given"]
+    for depth, color, pose in zip(
+        given, arrays.get("given colors", [None] * len(given)), arrays["given poses"], strict=True
+    ):
+        model.add_frame(depth, color, guess=pose, keep_guess=True)
+    colors = arrays.get("colors", [None] * len(frames))
 
     def run(lap: Lap) -> Arrays:
-        reports = [model.add_frame(depth) for depth in arrays["frames"]]
+        reports = [model.add_frame(*images) for images in zip(frames, colors, strict=True)]
         for stage in STAGES:
             lap(stage, 1e-3 * sum(report.milliseconds[stage] for report in reports))
         lap("rest")
@@ -94,7 +78,8 @@ def open3d(arrays: Arrays, threads: int, image_normals: bool) -> Run:
     metric = registration.TransformationEstimationPointToPlane()
     criteria = registration.ICPConvergenceCriteria(1e-6, 1e-6, 30)
     matrix, voxel = arrays["intrinsics"], float(arrays["voxel"])
-    intrinsic, tensor = camera.PinholeCameraIntrinsic(640, 480, matrix), core.Tensor(matrix)
+    height, width = arrays["frames"].shape[1:]
+    intrinsic, tensor = camera.PinholeCameraIntrinsic(width, height, matrix), core.Tensor(matrix)
     scale: dict[str, Any] = {"depth_scale": 1.0}
 
     def cloud_of(depth: Any) -> Any:
@@ -154,23 +139,24 @@ def check(arrays: Arrays, answer: Arrays) -> dict[str, float]:
     return errors
 
 
-def workload(name: str, title: str, data: Any, items: int, frames: int, **rest: Any) -> Workload:
-    """Return the workload of a recording."""
+COMPOSED = [
+    Contender("nacre", nacre),
+    Contender("Open3D", partial(open3d, image_normals=False), "normals of neighbours"),
+    Contender("Open3D", partial(open3d, image_normals=True), "normals of the image"),
+]
+
+
+def workload(name: str, title: str, data: Any, items: int, **rest: Any) -> Workload:
+    """Return the workload of a simulated recording."""
     return Workload(
         name=name,
-        title=f"The loop at 640 x 480, {title}: a frame",
+        title=f"The loop at {title}: a frame",
         items=items,
         data=data,
-        contenders=[
-            Contender("nacre", nacre),
-            Contender("Open3D", partial(open3d, image_normals=False), "normals of neighbours"),
-            Contender("Open3D", partial(open3d, image_normals=True), "normals of the image"),
-        ],
         check=check,
         limits={},
-        goal=10,
-        steps=frames,
-        **rest,
+        steps=FRAMES,
+        **{"contenders": COMPOSED, "goal": 10, **rest},
     )
 
 
@@ -178,19 +164,17 @@ SWAY = "A camera sways by 5 degrees, up to 1.5 degrees a frame; the model is gro
 WORKLOADS = [
     workload(
         "loop-object-50k",
-        "an object that fills the frame, model of about 50,000 points",
+        "640 x 480, an object that fills the frame, model of about 50,000 points",
         partial(simulated, "object", 1, 0.0014, 0.0019),
         50_000,
-        FRAMES,
         milliseconds=1000 / 60,
         note=f"{SWAY} sigma 0.5 mm, mixed pixels at edges.",
     ),
     workload(
         "loop-object-500k",
-        "an object that fills the frame, model of about 500,000 points",
+        "640 x 480, an object that fills the frame, model of about 500,000 points",
         partial(simulated, "object", 21, 0.0, 0.0016),
         500_000,
-        FRAMES,
         milliseconds=1000 / 30,
         quick=False,
         most_threads_only=True,
@@ -198,36 +182,35 @@ WORKLOADS = [
     ),
     workload(
         "loop-room-50k",
-        "a room, model of about 50,000 points",
+        "640 x 480, a room, model of about 50,000 points",
         partial(simulated, "room", 1, 0.006, 0.010),
         50_000,
-        FRAMES,
         milliseconds=1000 / 60,
         quick=False,
         note=f"{SWAY} The noise of structured light, mixed pixels at edges.",
     ),
     workload(
         "loop-room-500k",
-        "a room, model of about 500,000 points",
+        "640 x 480, a room, model of about 500,000 points",
         partial(simulated, "room", 25, 0.0, 0.006),
         500_000,
-        FRAMES,
         milliseconds=1000 / 30,
         quick=False,
         most_threads_only=True,
         note=f"{SWAY} The noise of structured light, mixed pixels at edges.",
     ),
 ]
-for _name, _voxel in {"tum-fr1-rpy": 0.008, "tum-fr3-teddy": 0.01, "d435-t265-shelf": 0.01}.items():
-    if DATA in os.environ and (Path(os.environ[DATA]) / _name).is_dir():
-        _work = workload(
-            f"loop-{_name}",
-            f"the recording {_name}",
-            partial(recorded, _name, _voxel),
-            50_000,
-            MOST_FRAMES,
-            quick=False,
-            most_threads_only=True,
-            note=f"Its first {MOST_FRAMES + 1} frames; the truth is that of the motion capture.",
-        )
-        WORKLOADS.append(_work)
+WORKLOADS += [
+    workload(
+        f"loop-room-{width}x{height}",
+        f"{width} x {height}, a room, model of the first image",
+        partial(simulated, "room", 1, 0.0, 0.006 * 640 / width, (width, height)),
+        width * height,
+        contenders=COMPOSED[:1],
+        goal=None,
+        quick=False,
+        most_threads_only=True,
+        note=f"{SWAY} The noise of structured light, mixed pixels at edges.",
+    )
+    for width, height in IMAGES
+]
