@@ -17,13 +17,17 @@ NACRE_FUZZ_TARGET(bytes) {
   DepthReport report;
   const DepthImage clean = preprocess_depth(depth, camera, options, mask, &report, threads);
   NACRE_HOLDS(clean.rows() == depth.rows() && clean.cols() == depth.cols());
-  const float rounding = 0.56F * coarse_unit(depth);
+  const DepthUnit unit = coarse_unit(depth);
+  const auto is_within_step = [&](float clean_depth, float measured) {
+    const float apart = unit.is_of_inverse ? 1.0F / clean_depth - 1.0F / measured : clean_depth - measured;
+    return std::abs(apart) <= 0.56F * unit.step;
+  };
   std::int64_t num_kept = 0;
   for (Eigen::Index i = 0; i < clean.size(); ++i) {
     if (std::isnan(clean.data()[i])) continue;
     const float measured = depth.data()[i];
     const bool may_be_filled = !(measured > 0.0F && std::isfinite(measured));
-    NACRE_HOLDS(clean.data()[i] > 0.0F && (std::abs(clean.data()[i] - measured) <= rounding || may_be_filled));
+    NACRE_HOLDS(clean.data()[i] > 0.0F && (is_within_step(clean.data()[i], measured) || may_be_filled));
     ++num_kept;
   }
   NACRE_HOLDS(num_kept == report.num_kept && report.num_pixels == clean.size());

@@ -96,6 +96,15 @@ NoiseModel estimate_noise(const DepthRef& depth, const Camera& camera, int num_t
 class PlanarImage;
 struct WindowFits;
 
+/// The steps that depth comes in: of depth [m], or of its inverse [1/m], as whole pixels of disparity give.
+struct DepthUnit {
+  float step = 0.0F;  ///< 0 where noise hides it
+  bool is_of_inverse = false;
+
+  /// [m]
+  double at(double depth) const { return static_cast<double>(step) * (is_of_inverse ? depth * depth : 1.0); }
+};
+
 /// The noise of a sensor, measured from the images of a recording: what estimate_noise finds in each, pooled, and for a
 /// pinhole camera the curve over depth, where the images show several depths. The order of the images matters little,
 /// the number of threads not at all.
@@ -111,8 +120,8 @@ class NoiseCalibration {
 
   /// Before anything was added, what estimate_noise says of an empty image.
   NoiseModel model() const;
-  /// That depth comes in [m]; 0 where noise hides it.
-  double unit() const { return static_cast<double>(unit_); }
+  /// The step that depth comes in, at the middle of what the images show [m]; 0 where noise hides it.
+  double unit() const;
 
  private:
   friend struct PrivateState;
@@ -122,7 +131,7 @@ class NoiseCalibration {
   static constexpr std::size_t num_bins = 36;  // of depth, a third of an octave each: from 1/64 m to 64 m
 
   Camera camera_;
-  float unit_ = 0.0F;                     // that depth was rounded to [m]
+  DepthUnit unit_;                        // that depth was rounded to
   Mean local_, total_, fitted_;           // logarithms of factors of the sensor's prior
   std::array<Mean, num_bins> bins_{};     // likewise, of what surface fits leave over
   std::array<Mean, num_bins> windows_{};  // of an image, that tell it

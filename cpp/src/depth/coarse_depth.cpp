@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
+#include <utility>
 #include <vector>
 
 #include "base/parallel.hpp"
@@ -44,38 +46,40 @@ void for_each_on_plateau(const Line& line, float unit, Visit&& visit) {
   }
 }
 
-}  // namespace
+// Values of pixels beside each other, and by how much those differ that do.
+struct Steps {
+  std::vector<float> sizes, levels;
+};
 
-float coarse_unit(const DepthRef& depth) {
-  std::size_t num_equal = 0;
-  std::vector<float> steps, levels;
-  for (Eigen::Index v = 0; v < depth.rows(); v += depth_limits::probed_rows) {
-    for (Eigen::Index u = 0; u + 1 < depth.cols(); ++u) {
-      const float z = depth(v, u), step = std::abs(z - depth(v, u + 1));
-      if (!is_measurement(z) || !is_measurement(depth(v, u + 1))) continue;
-      if (step == 0.0F) {
-        ++num_equal;
-      } else {
-        steps.push_back(step);
-        levels.push_back(z);
-      }
-    }
-  }
-  if (steps.empty() || num_equal <= steps.size()) return 0.0F;
-  // Steep and far surfaces step by several units at once, but seldom everywhere.
-  const auto unit = static_cast<float>(quantile(steps, depth_limits::unit_quantile));
-  const auto is_multiple = [&](float step) {
-    const float units = step / unit;
+// Steep and far surfaces step by several units at once, but seldom everywhere.
+float smallest_step(const Steps& steps) {
+  return static_cast<float>(quantile(steps.sizes, depth_limits::unit_quantile));
+}
+
+// The same of steps that the storage of depth has rounded, too.
+float smallest_rounded_step(const Steps& steps) {
+  const float least = smallest_step(steps);
+  std::vector<float> single;
+  std::copy_if(steps.sizes.begin(), steps.sizes.end(), std::back_inserter(single),
+               [&](float size) { return 0.5F * least < size && size < 1.5F * least; });
+  return static_cast<float>(quantile(single, 0.5));
+}
+
+// The unit, if nearly all steps are multiples of it; otherwise 0.
+float confirmed(float unit, Steps steps) {
+  const auto is_multiple = [&](float size) {
+    const float units = size / unit;
     return std::abs(units - std::round(units)) < depth_limits::unit_tolerance;
   };
-  const auto num_multiples = static_cast<double>(std::count_if(steps.begin(), steps.end(), is_multiple));
-  if (num_multiples < depth_limits::least_multiples * static_cast<double>(steps.size())) return 0.0F;
-  std::sort(levels.begin(), levels.end());
-  const auto num_levels = std::unique(levels.begin(), levels.end()) - levels.begin();
+  const auto num_multiples = static_cast<double>(std::count_if(steps.sizes.begin(), steps.sizes.end(), is_multiple));
+  if (num_multiples < depth_limits::least_multiples * static_cast<double>(steps.sizes.size())) return 0.0F;
+  std::sort(steps.levels.begin(), steps.levels.end());
+  const auto num_levels = std::unique(steps.levels.begin(), steps.levels.end()) - steps.levels.begin();
   return num_levels < depth_limits::least_levels ? 0.0F : unit;
 }
 
-DepthImage interpolate_plateaus(const DepthRef& depth, float unit, int num_threads) {
+// Between the plateaus of an image whose steps are of this size.
+DepthImage interpolate(const DepthRef& depth, float step, int num_threads) {
   DepthImage sum = depth, weight = DepthImage::Zero(depth.rows(), depth.cols());
   // A plateau that is twice as long tells its slope half as well.
   const auto add = [&](Eigen::Index v, Eigen::Index u, float value, float length) {
@@ -84,19 +88,60 @@ DepthImage interpolate_plateaus(const DepthRef& depth, float unit, int num_threa
     weight(v, u) += added;
   };
   parallel_for(depth.rows(), rows_per_block(depth.cols()), num_threads, [&](std::int64_t v) {
-    for_each_on_plateau({&depth.coeffRef(v, 0), 1, depth.cols()}, unit,
+    for_each_on_plateau({&depth.coeffRef(v, 0), 1, depth.cols()}, step,
                         [&](Eigen::Index u, float value, float length) { add(v, u, value, length); });
   });
   parallel_for(depth.cols(), rows_per_block(depth.rows()), num_threads, [&](std::int64_t u) {
-    for_each_on_plateau({&depth.coeffRef(0, u), depth.outerStride(), depth.rows()}, unit,
+    for_each_on_plateau({&depth.coeffRef(0, u), depth.outerStride(), depth.rows()}, step,
                         [&](Eigen::Index v, float value, float length) { add(v, u, value, length); });
   });
   return (weight > 0.0F).select(sum / weight, depth);
 }
 
-NoiseModel with_unit(const NoiseModel& noise, float unit) {
+}  // namespace
+
+DepthUnit coarse_unit(const DepthRef& depth) {
+  std::size_t num_equal = 0;
+  Steps steps, inverse_steps;
+  for (Eigen::Index v = 0; v < depth.rows(); v += depth_limits::probed_rows) {
+    for (Eigen::Index u = 0; u + 1 < depth.cols(); ++u) {
+      const float z = depth(v, u), next = depth(v, u + 1);
+      if (!is_measurement(z) || !is_measurement(next)) continue;
+      if (z == next) {
+        ++num_equal;
+      } else {
+        steps.sizes.push_back(std::abs(z - next));
+        steps.levels.push_back(z);
+        inverse_steps.sizes.push_back(std::abs(1.0F / z - 1.0F / next));
+      }
+    }
+  }
+  if (steps.sizes.empty() || num_equal <= steps.sizes.size()) return {};
+  inverse_steps.levels = steps.levels;
+  const float least = smallest_step(steps), least_of_inverse = smallest_rounded_step(inverse_steps);
+  if (const float unit = confirmed(least, std::move(steps)); unit > 0.0F) return {unit, false};
+  const float unit = confirmed(least_of_inverse, std::move(inverse_steps));
+  return {unit, unit > 0.0F};
+}
+
+DepthImage interpolate_plateaus(const DepthRef& depth, const DepthUnit& unit, int num_threads) {
+  if (!unit.is_of_inverse) return interpolate(depth, unit.step, num_threads);
+  const DepthImage inverse = depth.unaryExpr([](float z) { return is_measurement(z) ? 1.0F / z : z; });
+  return interpolate(inverse, unit.step, num_threads).unaryExpr([](float value) {
+    return is_measurement(value) ? 1.0F / value : value;
+  });
+}
+
+NoiseModel with_unit(const NoiseModel& noise, const DepthUnit& unit) {
+  if (!(unit.step > 0.0F)) return noise;
   NoiseModel rounded = noise;
-  rounded.constant = std::hypot(noise.constant, static_cast<double>(unit) / std::sqrt(12.0));
+  const double sigma = static_cast<double>(unit.step) / std::sqrt(12.0);
+  if (unit.is_of_inverse) {
+    rounded.offset = 0.0;  // depth is triangulated
+    rounded.quadratic = std::hypot(noise.quadratic, sigma);
+  } else {
+    rounded.constant = std::hypot(noise.constant, sigma);
+  }
   return rounded;
 }
 

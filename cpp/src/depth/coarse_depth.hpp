@@ -5,13 +5,12 @@
 
 namespace nacre {
 
-// The unit [m]; 0 where noise hides it.
-float coarse_unit(const DepthRef& depth);
+DepthUnit coarse_unit(const DepthRef& depth);
 
 // A copy without plateaus, no farther from the depth than half a step between two of them.
-DepthImage interpolate_plateaus(const DepthRef& depth, float unit, int num_threads);
+DepthImage interpolate_plateaus(const DepthRef& depth, const DepthUnit& unit, int num_threads);
 
 // The noise of depth that was rounded to a unit.
-NoiseModel with_unit(const NoiseModel& noise, float unit);
+NoiseModel with_unit(const NoiseModel& noise, const DepthUnit& unit);
 
 }  // namespace nacre

@@ -38,7 +38,7 @@ void compact(const std::vector<int>& counts, std::size_t width, std::vector<std:
 
 NoiseModel noise_of(const std::optional<NoiseModel>& given, const PlanarImage& image, const Camera& camera,
                     int num_threads) {
-  if (!given) return estimate_noise(fit_windows(image, camera, 0.0F, num_threads), camera, num_threads);
+  if (!given) return estimate_noise(fit_windows(image, camera, {}, num_threads), camera, num_threads);
   given->check();
   return *given;
 }

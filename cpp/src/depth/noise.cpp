@@ -85,7 +85,7 @@ NoiseModel sensor_prior(const Camera& camera) {
   return camera.model() == Camera::Model::pinhole ? NoiseModel::kinect() : NoiseModel{1.0, 0.0, 0.0, 0.0};
 }
 
-WindowFits fit_windows(const PlanarImage& image, const Camera& camera, float unit, int num_threads) {
+WindowFits fit_windows(const PlanarImage& image, const Camera& camera, const DepthUnit& unit, int num_threads) {
   const auto count = [](int size) { return std::max(0, (size - 2 * WindowFits::kRadius - 1) / WindowFits::kStep + 1); };
   WindowFits fits;
   fits.unit = unit;

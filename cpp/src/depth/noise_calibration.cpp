@@ -63,6 +63,11 @@ NoiseCurve curve_through(const std::vector<MeasuredNoise>& measured, const Noise
   return {{constant, quadratic, expected.offset, 0.0}, fit.misfit(constant, quadratic)};
 }
 
+// Of a bin of depth.
+double middle_of(std::size_t bin) {
+  return depth_limits::nearest_bin * std::exp2((static_cast<double>(bin) + 0.5) / depth_limits::bins_per_octave);
+}
+
 // What triangulation is expected to come to: noise that begins at the camera, half of it there at the middle depth.
 NoiseModel triangulation(const std::vector<MeasuredNoise>& measured, const NoiseModel& prior) {
   double weights = 0.0, logarithms = 0.0;
@@ -86,7 +91,7 @@ void NoiseCalibration::add(const DepthRef& depth, int num_threads) {
 }
 
 void NoiseCalibration::add(const PlanarImage& image, const WindowFits& fits, int num_threads) {
-  unit_ = std::max(unit_, fits.unit);
+  if (fits.unit.at(1.0) > unit_.at(1.0)) unit_ = fits.unit;
   const std::optional<NoiseScale> scale = measure_noise(fits, num_threads);
   if (!scale) return;
   const auto pool = [](Mean& mean, double value) {
@@ -119,6 +124,16 @@ void NoiseCalibration::add(const PlanarImage& image, const WindowFits& fits, int
   pool(fitted_, std::log(std::max(quantile(fits.residual, depth_limits::noise_quantile), 1e-6)));
 }
 
+double NoiseCalibration::unit() const {
+  double logarithms = 0.0, weights = 0.0;
+  for (std::size_t bin = 0; bin < num_bins; ++bin) {
+    const double weight = windows_[bin].count * windows_[bin].value;
+    logarithms += weight * std::log(middle_of(bin));
+    weights += weight;
+  }
+  return unit_.at(weights > 0.0 ? std::exp(logarithms / weights) : 1.0);
+}
+
 NoiseModel NoiseCalibration::model() const {
   if (local_.count == 0.0) return estimate_noise(WindowFits{}, camera_, 1);
   NoiseModel model = scaled_prior(camera_, {std::exp(local_.value), std::exp(total_.value)});
@@ -129,8 +144,7 @@ NoiseModel NoiseCalibration::model() const {
   std::vector<MeasuredNoise> measured;
   for (std::size_t bin = 0; bin < num_bins; ++bin) {
     if (bins_[bin].count == 0.0) continue;
-    const double z =
-        depth_limits::nearest_bin * std::exp2((static_cast<double>(bin) + 0.5) / depth_limits::bins_per_octave);
+    const double z = middle_of(bin);
     const double sigma = prior.sigma(z) * std::exp(bins_[bin].value - fitted_.value);
     measured.push_back({z, sigma, windows_[bin].count * windows_[bin].value});
   }

@@ -32,7 +32,8 @@ int binning_for(const DepthRef& depth, const MaskRef& mask, const Camera& camera
   if (factor == 1 || measured.empty()) return factor;
   const auto middle = measured.begin() + static_cast<std::ptrdiff_t>(measured.size() / 2);
   std::nth_element(measured.begin(), middle, measured.end());
-  return static_cast<double>(coarse_unit(depth)) > factor * camera.footprint(*middle) ? 1 : factor;
+  const double depth_of_middle = static_cast<double>(*middle);
+  return coarse_unit(depth).at(depth_of_middle) > factor * camera.footprint(depth_of_middle) ? 1 : factor;
 }
 
 PixelBinning::PixelBinning(const DepthRef& depth, const Camera& camera, int factor, int num_threads)

@@ -6,10 +6,11 @@
 namespace nacre {
 namespace {
 
-DepthImage restore(const DepthRef& measured, const Camera& camera, float unit, int num_threads) {
+DepthImage restore(const DepthRef& measured, const Camera& camera, const DepthUnit& unit, int num_threads) {
   DepthImage restored;
-  if (unit > 0.0F) restored = interpolate_plateaus(measured, unit, num_threads);
-  if (has_gaps(measured, camera)) restored = fill_gaps(unit > 0.0F ? DepthRef(restored) : measured, camera);
+  const bool is_coarse = unit.step > 0.0F;
+  if (is_coarse) restored = interpolate_plateaus(measured, unit, num_threads);
+  if (has_gaps(measured, camera)) restored = fill_gaps(is_coarse ? DepthRef(restored) : measured, camera);
   return restored;
 }
 

@@ -13,11 +13,11 @@ class RestoredDepth {
   RestoredDepth& operator=(const RestoredDepth&) = delete;
 
   const DepthRef& image() const { return image_; }
-  // That depth was rounded to, where it shows [m]; otherwise 0.
-  float unit() const { return unit_; }
+  // That depth was rounded to, where it shows.
+  const DepthUnit& unit() const { return unit_; }
 
  private:
-  float unit_;
+  DepthUnit unit_;
   DepthImage own_;
   DepthRef image_;
 };

@@ -14,7 +14,7 @@ struct WindowFits {
   static constexpr int kRadius = simd::fit_radius, kStep = simd::fit_step;
 
   int cols = 0, rows = 0;
-  float unit = 0.0F;  // that depth was rounded to, where it shows [m]
+  DepthUnit unit;  // that depth was rounded to, where it shows
   // Of each window, row by row: see simd::WindowRow.
   std::vector<float> residual, roughness, pixel, step, slope;
 
@@ -23,7 +23,7 @@ struct WindowFits {
 };
 
 // Residuals, roughness, pixels and steps are in units of the noise of `sensor_prior`.
-WindowFits fit_windows(const PlanarImage& image, const Camera& camera, float unit, int num_threads);
+WindowFits fit_windows(const PlanarImage& image, const Camera& camera, const DepthUnit& unit, int num_threads);
 
 // Without the windows whose centres a part of the image (1) leaves out.
 WindowFits fits_of(const MaskRef& part, WindowFits fits);

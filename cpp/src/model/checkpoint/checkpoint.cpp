@@ -240,7 +240,7 @@ bool PrivateState::is_sound(const NoiseCalibration& calibration) {
   const auto is_mean = [](const NoiseCalibration::Mean& mean) {
     return std::isfinite(mean.value) && std::isfinite(mean.count) && mean.count >= 0.0;
   };
-  return calibration.unit_ >= 0.0F && std::isfinite(calibration.unit_) && is_mean(calibration.local_) &&
+  return calibration.unit_.step >= 0.0F && std::isfinite(calibration.unit_.step) && is_mean(calibration.local_) &&
          is_mean(calibration.total_) && is_mean(calibration.fitted_) &&
          std::all_of(calibration.bins_.begin(), calibration.bins_.end(), is_mean) &&
          std::all_of(calibration.windows_.begin(), calibration.windows_.end(), is_mean);

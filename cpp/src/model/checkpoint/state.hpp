@@ -93,7 +93,7 @@ struct PrivateState {
   }
   template <class Archive>
   static void exchange(Archive& archive, NoiseCalibration& calibration) {
-    archive(calibration.unit_);
+    archive(calibration.unit_.step, calibration.unit_.is_of_inverse);
     for (NoiseCalibration::Mean* mean : {&calibration.local_, &calibration.total_, &calibration.fitted_}) {
       exchange(archive, *mean);
     }
