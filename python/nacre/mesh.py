@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
+from collections.abc import Callable
 from typing import Literal, NoReturn
 
 import numpy as np
@@ -73,27 +75,49 @@ class Mesh(GuidedNames):
         [m]. float64 coordinates far from 0 keep their digits: the tree is made about a nearby origin.
     triangles : (T, 3) array_like of integers
         Vertex indices.
+    normals : (V, 3) array_like of real numbers, optional
+        Of the vertices.
+    colors : (V, 3) array_like of integers from 0 to 255, or of floats from 0 to 1, optional
+        Red, green, blue of the vertices.
 
     Raises
     ------
     TypeError, ValueError
-        For vertices that are not finite, indices out of range, or no triangle.
+        For vertices that are not finite, indices out of range, or no triangle; for normals or colours of
+        another number than there are vertices.
     """
 
-    def __init__(self, vertices: npt.ArrayLike, triangles: npt.ArrayLike) -> None:
+    def __init__(
+        self,
+        vertices: npt.ArrayLike,
+        triangles: npt.ArrayLike,
+        *,
+        normals: npt.ArrayLike | None = None,
+        colors: npt.ArrayLike | None = None,
+    ) -> None:
         self._vertices = arrays.as_points("vertices", vertices).copy()
-        self._triangles = arrays.as_triangles("triangles", triangles, len(self._vertices)).copy()
-        self._vertices.flags.writeable = False
-        self._triangles.flags.writeable = False
+        size = len(self._vertices)
+        self._triangles = arrays.as_triangles("triangles", triangles, size).copy()
+        self._normals, self._colors = None, None
+        if normals is not None:
+            self._normals = arrays.as_matching_points("normals", normals, "vertices", size).copy()
+        if colors is not None:
+            self._colors = arrays.as_colors("colors", colors, (size, 3)).copy()
+        for array in (self._vertices, self._triangles, self._normals, self._colors):
+            if array is not None:
+                array.flags.writeable = False
         local, self._origin = arrays.localize(self._vertices)
         self._tree = _core.MeshTree(local, self._triangles)
 
     def __repr__(self) -> str:
         size = " x ".join(f"{side:.4g}" for side in self.bounds[1] - self.bounds[0])
-        return f"Mesh({len(self.vertices)} vertices, {len(self.triangles)} triangles, {size} m)"
+        parts = [f"{len(self.vertices)} vertices", f"{len(self.triangles)} triangles", f"{size} m"]
+        parts += [name for name in ("normals", "colors") if getattr(self, name) is not None]
+        return f"Mesh({', '.join(parts)})"
 
-    def __reduce__(self) -> tuple[type[Mesh], tuple[arrays.FloatArray, npt.NDArray[np.int32]]]:
-        return Mesh, (self.vertices, self.triangles)
+    def __reduce__(self) -> tuple[Callable[..., Mesh], tuple[arrays.FloatArray, npt.NDArray[np.int32]]]:
+        make = functools.partial(Mesh, normals=self.normals, colors=self.colors)
+        return make, (self.vertices, self.triangles)
 
     def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> NoReturn:
         raise TypeError("a Mesh is two arrays: give its vertices or its triangles")
@@ -107,6 +131,16 @@ class Mesh(GuidedNames):
     def triangles(self) -> npt.NDArray[np.int32]:
         """(T, 3) int32, read-only: vertex indices."""
         return self._triangles
+
+    @property
+    def normals(self) -> arrays.FloatArray | None:
+        """(V, 3) float32 or float64, read-only: of the vertices, as they were given; or None."""
+        return self._normals
+
+    @property
+    def colors(self) -> npt.NDArray[np.uint8] | None:
+        """(V, 3) uint8, read-only: red, green, blue of the vertices; or None."""
+        return self._colors
 
     @property
     def bounds(self) -> npt.NDArray[np.float64]:

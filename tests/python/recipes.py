@@ -352,7 +352,11 @@ RECIPES: dict[str, Recipe] = {
     "nacre.trajectory.Trajectory.at": Recipe(
         nacre.Trajectory(np.arange(3.0), POSES).at, {"timestamps": np.arange(4.0), "max_difference": 0.1}
     ),
-    "nacre.mesh.Mesh": Recipe(nacre.Mesh, {"vertices": VERTICES, "triangles": TRIANGLES}),
+    "nacre.mesh.Mesh": Recipe(
+        nacre.Mesh,
+        {"vertices": VERTICES, "triangles": TRIANGLES, "normals": unit(4), "colors": COLOR[0, :4]},
+        lists=("colors",),
+    ),
     "nacre.mesh.Mesh.cast": Recipe(
         mesh().cast, {"origins": bumpy(), "directions": unit(), "num_threads": 1}, _hits
     ),

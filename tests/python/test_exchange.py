@@ -39,9 +39,15 @@ def test_its_memory_is_not_shared(model: nacre.Model) -> None:
 def test_triangles_join_the_points(model: nacre.Model, tmp_path: Path) -> None:
     mesh = model.to_mesh(num_threads=1)
     assert 1.5 * len(model) < len(mesh.triangles) < 2 * len(model)
-    assert np.isin(mesh.vertices, model.points).all()
+    cloud = model.cloud()
+    rows = nacre.KdTree(cloud.points).query(mesh.vertices, 1)[1]
+    assert np.array_equal(mesh.vertices, cloud.points[rows])
+    assert np.array_equal(mesh.normals, cloud.normals[rows])
+    assert np.array_equal(mesh.colors, cloud.colors[rows])
     nacre.write_mesh(tmp_path / "mesh.ply", mesh)
-    assert np.array_equal(nacre.read_mesh(tmp_path / "mesh.ply").triangles, mesh.triangles)
+    again = nacre.read_mesh(tmp_path / "mesh.ply")
+    for name in ("vertices", "triangles", "normals", "colors"):
+        assert np.array_equal(getattr(again, name), getattr(mesh, name))
     with pytest.raises(ValueError, match="triangles must not be given with a Mesh"):
         nacre.write_mesh(tmp_path / "mesh.ply", mesh, mesh.triangles)
     with pytest.raises(TypeError, match="triangles must be an array of indices, got None"):

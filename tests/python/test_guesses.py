@@ -183,7 +183,7 @@ TOLD = {
     "nacre.simulate_depth(mesh, camera, np.eye(4))": ["mesh.simulate_depth(camera, world_from_camera)"],
     "nacre.meshing.mesh_points(cloud)": ["needs normals", "cloud.normals"],
     "nacre.Sequence(folder)": ["nacre.open_sequence(path)"],
-    "mesh.vertex_normals": ["mesh.closest(points).normals"],
+    "mesh.vertex_normals": ["it is normals", "mesh.closest(points).normals"],
     "nacre.reconstruct(42)": ["source must be"],
     "nacre.reconstruct(depths[0], camera=camera)": ["a list of depth images", "[depth]"],
     "nacre.back_project(millimetres[0], camera)": ["depth_scale", "1000 for millimetres"],

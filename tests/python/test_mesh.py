@@ -126,6 +126,23 @@ def test_a_mesh_is_a_copy_that_cannot_change():
     again = pickle.loads(pickle.dumps(mesh))
     np.testing.assert_array_equal(again.vertices, mesh.vertices)
     np.testing.assert_array_equal(again.triangles, mesh.triangles)
+    assert (again.normals, again.colors) == (None, None)
+
+
+def test_normals_and_colours_go_with_the_vertices():
+    colors = np.arange(12, dtype=np.uint8).reshape(4, 3)
+    mesh = nacre.Mesh(SQUARE, SQUARE_TRIANGLES, normals=[[0, 0, 1.0]] * 4, colors=colors)
+    assert repr(mesh) == "Mesh(4 vertices, 2 triangles, 1 x 1 x 0 m, normals, colors)"
+    again = pickle.loads(pickle.dumps(mesh))
+    for found in (mesh, again):
+        np.testing.assert_array_equal(found.normals, [[0, 0, 1]] * 4)
+        np.testing.assert_array_equal(found.colors, colors)
+    with pytest.raises(ValueError, match="read-only"):
+        mesh.colors[0] = 1
+    with pytest.raises(ValueError, match=r"normals must have one row per point of vertices \(4\), got 2"):
+        nacre.Mesh(SQUARE, SQUARE_TRIANGLES, normals=np.eye(3)[:2])
+    with pytest.raises(ValueError, match=r"colors must have shape \(4, 3\)"):
+        nacre.Mesh(SQUARE, SQUARE_TRIANGLES, colors=colors[:2])
 
 
 @pytest.mark.parametrize(

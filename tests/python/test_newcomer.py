@@ -249,8 +249,7 @@ GUESSES = {
     ],
     "nacre.simplify(mesh, 10)": ["nacre.meshing.simplify(mesh.vertices, mesh.triangles, num_triangles)"],
     "mesh.simplify(10)": ["nacre.meshing.simplify(mesh.vertices, mesh.triangles, num_triangles)"],
-    "mesh.vertex_colors": ["nacre.write_mesh(path, mesh, colors=...)"],
-    "mesh.colors": ["nacre.write_mesh(path, mesh, colors=...)"],
+    "mesh.vertex_colors": ["it is colors"],
     # Clouds.
     "cloud.to_mesh()": ["nacre.meshing.mesh_points(cloud.points, cloud.normals)"],
     "cloud.voxel_downsample(0.1)": ["nacre.voxel_downsample(cloud, voxel_size)"],

@@ -17,9 +17,8 @@ _SIMPLIFY = "it is nacre.meshing.simplify(mesh.vertices, mesh.triangles, num_tri
 _READ_IMAGE = "nacre.open_sequence(folder) reads recordings, nacre.io.images.read_depth(path) a depth image"
 _BACK_PROJECT = "it is nacre.back_project(depth, camera, depth_scale=...)"
 _MOVE = "it is an array of rows: points @ pose[:3, :3].T + pose[:3, 3]"
-_MESH_NORMALS = "mesh.closest(points).normals has those of its triangles"
+_MESH_NORMALS = "it is normals, where there are some; mesh.closest(points).normals has those of triangles"
 _VIEW = "nacre reconstruct --view and nacre view show runs in the browser; notebooks show models and clouds"
-_MESH_COLORS = "it has vertices and triangles; nacre.write_mesh(path, mesh, colors=...) writes colours, too"
 _WRITE_CLOUD = "it is nacre.write_points(path, cloud)"
 _DOWNSAMPLE_CLOUD = "it is nacre.voxel_downsample(cloud, voxel_size)"
 _CAMERA_FILE = "it is nacre.read_camera(path).camera"
@@ -176,16 +175,14 @@ OF_CLASS = {
         "area": "sum the cross products of its edges: numpy.cross",
         "simplify": _SIMPLIFY,
         "simplify_quadric_decimation": _SIMPLIFY,
-        "colors": _MESH_COLORS,
-        "vertex_colors": _MESH_COLORS,
+        "vertex_colors": "it is colors",
         "compute_vertex_normals": _MESH_NORMALS,
-        "normals": _MESH_NORMALS,
         "vertex_normals": _MESH_NORMALS,
         "sample_points_uniformly": "it is nacre.evaluation.sample_surface(mesh.vertices, mesh.triangles, n)",
         "save": "it is nacre.write_mesh(path, mesh)",
         "export": "it is nacre.write_mesh(path, mesh)",
         "show": _VIEW,
-        "to_trimesh": "trimesh.Trimesh(mesh.vertices, mesh.triangles) makes one",
+        "to_trimesh": "trimesh.Trimesh(mesh.vertices, mesh.triangles, vertex_colors=mesh.colors) makes one",
     },
     "Model": {
         "integrate": "it is add_frame(depth, color), which finds the pose, or takes guess=world_from_camera",

@@ -60,6 +60,8 @@ class ExchangeablePoints(ArrayOfPoints, ABC):
         """
         Return triangles that join the points of :meth:`cloud`; see :func:`nacre.meshing.triangulate`.
 
+        Its vertices are points of the model, with their normals, and their colours where there are any.
+
         Parameters
         ----------
         num_threads : int
@@ -74,7 +76,7 @@ class ExchangeablePoints(ArrayOfPoints, ABC):
 
         cloud = self.cloud()
         assert cloud.normals is not None
-        return mesh_points(cloud.points, cloud.normals, num_threads=num_threads)
+        return mesh_points(cloud.points, cloud.normals, colors=cloud.colors, num_threads=num_threads)
 
     def to_open3d(self) -> Any:
         """
@@ -100,7 +102,8 @@ class ExchangeablePoints(ArrayOfPoints, ABC):
         Return the points as a ``trimesh.PointCloud``, with colours where there are any.
 
         It has no place for normals: they are in its ``metadata["normals"]``. With triangles it is
-        ``trimesh.Trimesh(mesh.vertices, mesh.triangles)``, of the mesh of :meth:`to_mesh`.
+        ``trimesh.Trimesh(mesh.vertices, mesh.triangles, vertex_colors=mesh.colors)``, of the mesh of
+        :meth:`to_mesh`.
 
         Raises
         ------

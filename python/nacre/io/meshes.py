@@ -36,12 +36,14 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     ----------
     path : path-like
         A ``.ply``, ``.glb``, ``.obj``, ``.off`` or ``.stl`` file. Polygons become fans of triangles, the
-        equal corners of an STL file one vertex, the meshes of a GLB file's scene one mesh. Colours, normals
-        and texture coordinates are left out.
+        equal corners of an STL file one vertex, the meshes of a GLB file's scene one mesh. Textures are left
+        out.
 
     Returns
     -------
     Mesh
+        With the normals and colours that PLY, GLB and OBJ files have of their vertices; of OBJ files normals
+        where a vertex has the same one in all its faces.
 
     Raises
     ------
@@ -57,7 +59,7 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
 
     stored = read_mesh_arrays(path)
     try:
-        return Mesh(stored.vertices, stored.triangles)
+        return Mesh(stored.vertices, stored.triangles, normals=stored.normals, colors=stored.colors)
     except ValueError as error:
         raise FileFormatError(path, str(error)) from error
 
@@ -95,7 +97,8 @@ def write_mesh(
         - ``.obj``: everything; colours as three numbers from 0 to 1 after the coordinates.
         - ``.stl``: triangles alone, as float32; each has the normal that its corners give.
     vertices : Mesh, or (N, 3) array
-        PLY stores float32 as float, everything else as double.
+        PLY stores float32 as float, everything else as double. The normals and colours of a Mesh are written
+        with it, where no others are given.
     triangles : (M, 3) array of integers
         Indices of the corners, counted from 0; not with a Mesh, which has its own.
     normals : (N, 3) array, optional
@@ -128,6 +131,8 @@ def write_mesh(
     if isinstance(vertices, Mesh):
         if triangles is not None:
             raise ValueError("triangles must not be given with a Mesh, which has its own")
+        normals = vertices.normals if normals is None else normals
+        colors = vertices.colors if colors is None else colors
         triangles, vertices = vertices.triangles, vertices.vertices
     if triangles is None:
         raise TypeError(f"triangles must be an array of indices, got None: {_way_to_triangles(vertices)}")

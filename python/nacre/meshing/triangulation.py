@@ -51,7 +51,13 @@ def triangulate(
 
 
 @guided("a Cloud has cloud.normals, and nacre.estimate_normals(points) finds them")
-def mesh_points(points: npt.ArrayLike, normals: npt.ArrayLike, *, num_threads: int = 0) -> Mesh:
+def mesh_points(
+    points: npt.ArrayLike,
+    normals: npt.ArrayLike,
+    *,
+    colors: npt.ArrayLike | None = None,
+    num_threads: int = 0,
+) -> Mesh:
     """
     Lay triangles over points with normals: those of :func:`triangulate`, with the points that they use.
 
@@ -59,21 +65,31 @@ def mesh_points(points: npt.ArrayLike, normals: npt.ArrayLike, *, num_threads: i
     ----------
     points, normals, num_threads
         As there.
+    colors : (N, 3) array_like of integers from 0 to 255, or of floats from 0 to 1, optional
+        Red, green, blue of the points.
 
     Returns
     -------
     Mesh
+        With the normals and the colours of its vertices.
 
     Raises
     ------
     TypeError, ValueError
         Arrays of the wrong type or shape; and where the points are too few, or too uneven, for a triangle.
     """
-    triangles = triangulate(points, normals, num_threads=num_threads)
+    positions = arrays.as_points("points", points)
+    painted = None if colors is None else arrays.as_colors("colors", colors, positions.shape)
+    triangles = triangulate(positions, normals, num_threads=num_threads)
     if not len(triangles):
         raise ValueError("points are too few for a surface, or their normals contradict it: no triangle")
     rows, corners = used_rows(triangles)
-    return Mesh(arrays.as_points("points", points)[rows], corners)
+    return Mesh(
+        positions[rows],
+        corners,
+        normals=arrays.as_points("normals", normals)[rows],
+        colors=None if painted is None else painted[rows],
+    )
 
 
 def used_rows(triangles: npt.NDArray[np.int32]) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32]]:

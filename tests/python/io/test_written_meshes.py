@@ -71,6 +71,17 @@ def test_what_is_written_is_read_again(tmp_path, suffix, dtype):
     assert (bare.normals, bare.colors) == (None, None)
 
 
+@pytest.mark.parametrize("suffix", COLORED)
+def test_a_mesh_keeps_its_normals_and_colours(tmp_path, suffix):
+    mesh = nacre.Mesh(TETRAHEDRON, TRIANGLES, normals=NORMALS, colors=COLORS)
+    nacre.write_mesh(tmp_path / f"a{suffix}", mesh)
+    found = nacre.read_mesh(tmp_path / f"a{suffix}")
+    np.testing.assert_allclose(found.normals, NORMALS, atol=1e-7)
+    np.testing.assert_array_equal(found.colors, COLORS)
+    nacre.write_mesh(tmp_path / f"b{suffix}", mesh, colors=COLORS[::-1])
+    np.testing.assert_array_equal(nacre.read_mesh(tmp_path / f"b{suffix}").colors, COLORS[::-1])
+
+
 @pytest.mark.parametrize("binary", [True, False])
 def test_facets_of_stl_have_the_normals_of_their_corners(tmp_path, binary):
     path = write(tmp_path / "a.stl", normals=NORMALS, binary=binary)
