@@ -222,7 +222,8 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
         "np": np, "nacre": nacre, "dataclasses": dataclasses, "recording": recording, "done": done,
         "model": done.model, "cloud": cloud, "points": cloud.points, "mesh": nacre.built_in_object(),
         "camera": done.model.camera, "K": done.model.camera.matrix, "tree": nacre.KdTree(cloud.points),
-        "result": nacre.align(cloud, cloud), "stl": folder / "m.stl", "txt": folder / "t.txt",
+        "result": nacre.align(cloud, cloud), "stl": folder / "m.stl", "glb": folder / "m.glb",
+        "txt": folder / "t.txt",
     }  # fmt: skip
 
 
@@ -302,7 +303,7 @@ def test_a_guess_in_python_is_answered_by_what_to_do(guess: str, known: dict[str
 # What the answers say to do, and what is then true of its value, which is called `it`.
 ANSWERS = {
     "nacre.reconstruct(nacre.open_sequence(recording)[::25])": "len(it.frames) == 1",
-    "nacre.write_mesh(stl, model.to_mesh())": "len(nacre.read_mesh(stl).triangles) > 100",
+    "nacre.write_mesh(glb, model.to_mesh())": "len(nacre.read_mesh(glb).triangles) > 100",
     "nacre.meshing.mesh_points(cloud.points, cloud.normals)": "len(it.triangles) > 100",
     "cloud.attributes['confidence']": "it.shape == (len(cloud),)",
     "dataclasses.replace(cloud, colors=np.full(cloud.points.shape, (9, 0, 0), np.uint8))": "it.colors.any()",

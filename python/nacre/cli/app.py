@@ -28,7 +28,7 @@ from nacre.cli.outliers import outliers
 from nacre.cli.reconstruct import reconstruct
 from nacre.cli.record import record
 from nacre.cli.simulate import simulate
-from nacre.cli.terminal import set_verbosity
+from nacre.cli.terminal import set_verbosity, warnings_in_log
 from nacre.cli.view import view
 from nacre.errors import explain, meant
 
@@ -108,7 +108,8 @@ def run(arguments: Sequence[str] | None = None) -> int:
     command = next((word for word in words if not word.startswith("-")), "")
     try:
         wanted = app if "_NACRE_COMPLETE" in os.environ else make_app(only=command)
-        return wanted(arguments, prog_name="nacre", standalone_mode=False) or 0
+        with warnings_in_log():
+            return wanted(arguments, prog_name="nacre", standalone_mode=False) or 0
     except Stopped as stopped:
         print("error: stopped", file=sys.stderr)
         return 128 + stopped.number

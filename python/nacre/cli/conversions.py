@@ -113,10 +113,13 @@ def _mesh(job: Job) -> Figures:
         colors=mesh.colors,
         attributes=mesh.attributes,
     )
-    figures: Figures = {"num_vertices": len(mesh.vertices), "num_triangles": len(mesh.triangles)}
-    if lost := lost_in(job.out, mesh):
-        figures["fields_left_out"] = lost
-    return figures
+    lost = lost_in(job.out, mesh)
+    fields = {"normals": mesh.normals, "colors": mesh.colors, **mesh.attributes}
+    return {
+        "num_vertices": len(mesh.vertices),
+        "num_triangles": len(mesh.triangles),
+        "fields": [name for name, array in fields.items() if array is not None and name not in lost],
+    }
 
 
 def _trajectory(job: Job) -> Figures:

@@ -76,8 +76,7 @@ def mesh(
     """
     terminal = Terminal(json, quiet, verbose)
     from nacre import read_points, write_mesh
-    from nacre._internal.guided import listing
-    from nacre.io.meshes import lost_in, read_mesh_arrays, require_mesh_suffix
+    from nacre.io.meshes import read_mesh_arrays, require_mesh_suffix
     from nacre.meshing import largest_part, part_sizes
 
     if not source.exists():
@@ -120,9 +119,6 @@ def mesh(
         texture=mesh.texture,
         comments=[] if target.suffix.lower() == ".stl" else comments,
     )
-    lost = lost_in(target, mesh)
-    if lost:
-        terminal.say(f"{target.suffix} has no place for {listing(lost)}")
     figures: dict[str, Any] = {
         "mesh": str(target),
         "vertices": len(mesh.vertices),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import sys
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -42,6 +43,19 @@ def set_verbosity(level: int | None) -> None:
     logger.addHandler(handler)
     levels = (logging.ERROR, logging.WARNING, logging.INFO, logging.DEBUG)
     logger.setLevel(levels[max(-1, min(level, 2)) + 1])
+
+
+@contextmanager
+def warnings_in_log() -> Iterator[None]:
+    """Tell in the log what nacre and others warn of, in a line of its own."""
+
+    def tell(message: Warning | str, *_: Any, **__: Any) -> None:
+        logging.getLogger("nacre").warning("%s", message)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", UserWarning)
+        warnings.showwarning = tell
+        yield
 
 
 class Terminal:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 import math
 import os
 from contextlib import suppress
@@ -13,12 +12,11 @@ from typing import Any
 from nacre import Camera
 from nacre._internal.arrays import as_camera, as_scale
 from nacre._internal.guided import GuidedNames
+from nacre._internal.warned import warn
 from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
 from nacre.io.image_limits import MAX_PIXELS
 from nacre.io.json_files import read_json
-
-_log = logging.getLogger(__name__)
 
 _MOST_BYTES = 1 << 15
 # Lenses that are none: what lies beyond makes points that are not finite.
@@ -175,9 +173,7 @@ def _plain(fields: _Fields) -> Camera:
         raise FileFormatError(fields.path, f"model must be 'pinhole' or 'orthographic', got {shown(model)}")
     unknown = sorted(set(fields.document) - _KEYS[model])
     if unknown:
-        _log.warning(
-            "%s: ignored keys that a %s camera does not have: %s", fields.path, model, ", ".join(unknown)
-        )
+        warn(f"{fields.path}: ignored keys that a {model} camera does not have: {', '.join(unknown)}")
     width, height = fields.size()
     if model == "orthographic":
         return Camera.orthographic(width=width, height=height, pixel_size=fields.number("pixel_size"))

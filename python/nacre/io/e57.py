@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import logging
 import os
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,13 +12,12 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import localize
+from nacre._internal.warned import warn_of_loss
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_path
 from nacre.io.cloud import Cloud
 from nacre.io.e57_scan import AXES, COLORS, NORMALS, read_normals, write_scan
 from nacre.io.raw import require_regular
-
-_log = logging.getLogger(__name__)
 
 _MISSING = 'E57 files need pye57: pip install "nacre[e57]"'
 FIELDS = ("normals", "colors", "intensity")
@@ -98,8 +96,7 @@ def write_cloud(
             columns[name] = values.astype(np.float32)
         else:
             left_out.append(name)
-    if left_out:
-        _log.warning("%s: an E57 file has no place for %s", path, ", ".join(left_out))
+    warn_of_loss(path, left_out)
     with atomic_path(path) as temporary:
         try:
             with pye57.E57(os.fspath(temporary), mode="w") as file:

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from nacre._internal import arrays
 from nacre._internal.arrays import as_flag
+from nacre._internal.warned import warn_of_loss
 from nacre.errors import FileFormatError
 from nacre.io import glb, glb_reader, obj, off, ply, stl
 from nacre.io.cloud import check_cloud
@@ -88,6 +89,8 @@ def write_mesh(
     """
     Write a triangle mesh, whole or not at all.
 
+    What the format has no place for is left out, with a warning.
+
     Parameters
     ----------
     path : path-like
@@ -141,6 +144,7 @@ def write_mesh(
     checked = check_cloud(points, normals, colors, attributes)
     painted = None if texture is None else check_texture(texture, len(corners))
     mesh = MeshArrays(checked.points, corners, checked.normals, checked.colors, checked.attributes, painted)
+    warn_of_loss(path, lost_in(path, mesh))
     _WRITERS[Path(path).suffix.lower()].write_mesh(path, mesh, comments=comments, binary=binary)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal import arrays
+from nacre._internal.warned import warn
 from nacre.errors import FileFormatError
 from nacre.io.cloud import (
     Cloud,
@@ -28,8 +28,6 @@ from nacre.io.ply_header import BYTE_ORDERS, TYPES, Header, read_header
 from nacre.io.ply_tables import Ragged, Table, check_table_size, read_binary_table, read_text_table
 from nacre.io.raw import TextTable, check_padding, file_writer, read_file, read_head, read_records
 from nacre.io.rows import encode_rows
-
-_log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
@@ -80,7 +78,7 @@ def read_ply(path: str | os.PathLike[str]) -> PlyFile:
     check_padding(path, data, position)
     if header.stray_lines:
         where = ", ".join(map(str, header.stray_lines[:5])) + ", ..." * (len(header.stray_lines) > 5)
-        _log.warning("%s: passed over lines of the header that are none of PLY's: %s", path, where)
+        warn(f"{os.fspath(path)}: passed over lines of the header that are none of PLY's: {where}")
     return PlyFile(Path(path), header, tables)
 
 

@@ -39,7 +39,7 @@ def read_points(path: str | os.PathLike[str]) -> Cloud:
     ----------
     path : path-like
         - ``.ply``: ascii, binary little or big endian; elements other than ``vertex`` are checked and left
-          out. Lines of the header that are none of PLY's become comments, with a warning in the log.
+          out. Lines of the header that are none of PLY's become comments, with a warning.
         - ``.pcd``: ascii, binary, binary_compressed.
         - ``.las``, ``.laz`` (extra ``las``): any version; colours as 8 bits, all else as attributes.
           What the header says of the coordinate system is left out.
@@ -103,7 +103,7 @@ def write_points(
           ``classification``, ``gps_time``, ...), and all else, the normals too, as extra bytes.
         - ``.e57`` (extra ``e57``): one scan, coordinates in float32 about an origin in float64; normals
           (libE57's extension ``nor``), colours and ``intensity``. What else there is has no place, which a
-          warning in the log tells.
+          warning tells.
         - ``.xyz``: text with a first line of names.
         - ``.npz``: each field an array, exactly.
     points : (N, 3) array, or Cloud, Model, Reconstruction or Consolidated

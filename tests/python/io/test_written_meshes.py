@@ -4,6 +4,7 @@ import dataclasses
 import json
 import struct
 import sys
+import warnings
 
 import numpy as np
 import pytest
@@ -36,8 +37,8 @@ def seen_by_trimesh(path):
 
 @pytest.mark.parametrize("suffix", WRITE_SUFFIXES)
 def test_another_program_sees_the_same_surface(tmp_path, suffix):
-    path = write(tmp_path / f"a{suffix}", normals=NORMALS, colors=COLORS)
-    seen = seen_by_trimesh(path)
+    fields = {} if suffix == ".stl" else {"normals": NORMALS, "colors": COLORS}
+    seen = seen_by_trimesh(write(tmp_path / f"a{suffix}", **fields))
     assert seen.area == pytest.approx(np.linalg.norm(_doubled_normals(), axis=1).sum() / 2)
     np.testing.assert_allclose(seen.triangles, TETRAHEDRON[TRIANGLES], rtol=1e-6)
 
@@ -82,9 +83,22 @@ def test_a_mesh_keeps_its_normals_and_colours(tmp_path, suffix):
     np.testing.assert_array_equal(nacre.read_mesh(tmp_path / f"b{suffix}").colors, COLORS[::-1])
 
 
+@pytest.mark.parametrize(
+    ("suffix", "lost"),
+    [(".ply", None), (".glb", "heat"), (".obj", "heat"), (".stl", "heat, normals and colors")],
+)
+def test_what_a_format_has_no_place_for_is_warned_of(tmp_path, suffix, lost):
+    mesh = nacre.Mesh(TETRAHEDRON, TRIANGLES, normals=NORMALS, colors=COLORS)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        nacre.write_mesh(tmp_path / f"a{suffix}", mesh, attributes={"heat": np.arange(4.0)})
+    assert [warning.filename for warning in told] == [__file__] * (lost is not None)
+    assert all(f"{suffix} files have no place for {lost}" in str(warning.message) for warning in told)
+
+
 @pytest.mark.parametrize("binary", [True, False])
 def test_facets_of_stl_have_the_normals_of_their_corners(tmp_path, binary):
-    path = write(tmp_path / "a.stl", normals=NORMALS, binary=binary)
+    path = write(tmp_path / "a.stl", binary=binary)
     expected = _doubled_normals() / np.linalg.norm(_doubled_normals(), axis=1, keepdims=True)
     np.testing.assert_allclose(seen_by_trimesh(path).face_normals, expected, atol=1e-6)
     again = read_mesh_arrays(path)
