@@ -79,6 +79,7 @@ class Camera(GuidedNames, _core.Camera, metaclass=_GuidedClass):
         super().__init__(width, height, fx, fy, cx, cy, distortion=distortion, depth=depth)
 
     @classmethod
+    @guided(f"it is {_FROM_FOV}", **dict.fromkeys(("fov", "hfov", "fov_x"), "horizontal_degrees"))
     def from_fov(
         cls,
         width: int,
@@ -97,7 +98,8 @@ class Camera(GuidedNames, _core.Camera, metaclass=_GuidedClass):
             Size of the image [pixels].
         horizontal_degrees : float
             From the left edge of the first column to the right edge of the last, as data sheets have it
-            [degrees]: fx = width / (2 tan(horizontal / 2)).
+            [degrees]: fx = width / (2 tan(horizontal / 2)). Angles up to pi are taken for radians, and
+            refused.
         vertical_degrees : float, optional
             From the upper to the lower edge [degrees]. Pixels are square without it.
         depth : "z" or "radial"
@@ -210,6 +212,11 @@ def camera_of(core: _core.Camera) -> Camera:
 
 def _focal_length(name: str, degrees: float, size: int) -> float:
     angle = as_number(name, degrees)
+    if 0 < angle <= math.pi:
+        raise ValueError(
+            f"{name} must be degrees, got {angle:g}: numpy.degrees makes them of radians, and "
+            "Camera(width, height, fx, fy, cx, cy) a camera with so narrow a view"
+        )
     if not 0 < angle < 180:
         raise ValueError(f"{name} must be more than 0 and less than 180, got {angle:g}")
     return size / (2 * math.tan(math.radians(angle) / 2))

@@ -9,9 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre._internal.guided import guided
 from nacre._internal.quaternions import quaternion_from_matrix
 from nacre.datasets.posed_images import (
     PIXEL_CENTER,
+    POSES_OF_RUN,
     PosedImage,
     colored_points,
     pinhole_of,
@@ -26,6 +28,7 @@ from nacre.io.rows import encode_lines
 _UNKNOWN_ERROR = -1  # as COLMAP has it for points that it did not triangulate itself
 
 
+@guided(POSES_OF_RUN)
 def write_colmap(
     folder: str | os.PathLike[str],
     sequence: Sequence,

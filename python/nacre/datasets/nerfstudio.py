@@ -11,8 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre._internal.guided import guided
 from nacre.datasets.posed_images import (
     PIXEL_CENTER,
+    POSES_OF_RUN,
     PosedImage,
     colored_points,
     pinhole_of,
@@ -30,6 +32,7 @@ _LARGEST_STORED = 65535
 _OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])  # y up, looking along -z
 
 
+@guided(POSES_OF_RUN)
 def write_nerfstudio(
     folder: str | os.PathLike[str],
     sequence: Sequence,

@@ -17,6 +17,7 @@ from nacre.io.cloud import Cloud
 from nacre.io.images import write_color_png
 
 # Those programs have the origin in the corner of the first pixel, which in nacre is at its centre.
+POSES_OF_RUN = "of a Reconstruction give done.sequence, done.poses and cloud=done.cloud"
 PIXEL_CENTER = 0.5
 _GRAY = 128
 

@@ -16,6 +16,7 @@ from nacre.errors import FileFormatError
 from nacre.io import glb, glb_reader, obj, off, ply, stl
 from nacre.io.cloud import check_cloud
 from nacre.io.mesh_arrays import MeshArrays
+from nacre.io.raw import require_path
 from nacre.meshing.texture import Texture, check_texture
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ _WRITERS = {".ply": ply, ".glb": glb, ".obj": obj, ".stl": stl}
 READ_SUFFIXES = tuple(_READERS)
 WRITE_SUFFIXES = tuple(_WRITERS)
 TEXTURE_SUFFIXES = (".glb", ".obj")
+
+_CALLS = "write_mesh(path, mesh) and read_mesh(path)"
 
 
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
@@ -67,6 +70,7 @@ def read_mesh(path: str | os.PathLike[str]) -> Mesh:
 
 def read_mesh_arrays(path: str | os.PathLike[str]) -> MeshArrays:
     """Read a triangle mesh as it is stored; :func:`read_mesh` has the formats and the errors."""
+    require_path(path, _CALLS)
     suffix = Path(path).suffix.lower()
     if suffix not in _READERS:
         raise ValueError(f"mesh files end in {', '.join(_READERS)}, got {os.fspath(path)!r}")
@@ -171,6 +175,7 @@ def lost_in(path: str | os.PathLike[str], mesh: MeshArrays) -> list[str]:
 
 def require_mesh_suffix(path: str | os.PathLike[str], *, textured: bool = False) -> None:
     """Raise where no mesh, or none with a texture, is written to files that end so."""
+    require_path(path, _CALLS)
     suffixes, what = (TEXTURE_SUFFIXES, "textured meshes") if textured else (WRITE_SUFFIXES, "meshes")
     if Path(path).suffix.lower() not in suffixes:
         raise ValueError(f"{what} are written to {', '.join(suffixes)}, got {os.fspath(path)!r}")

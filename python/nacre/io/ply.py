@@ -129,7 +129,8 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
     table = file.tables.get("face", {})
     faces = table.get("vertex_indices", table.get("vertex_index"))
     if not isinstance(faces, Ragged) or faces.values.dtype.kind == "f":
-        raise FileFormatError(path, "not a mesh: there is no element face with lists vertex_indices")
+        reason = "not a mesh: there is no element face with lists vertex_indices"
+        raise FileFormatError(path, f"{reason}; nacre.read_points(path) reads points")
     triangles = fan(path, faces.values.astype(np.int64), faces.counts.astype(np.int64), len(cloud))
     attributes = {name: values for name, values in cloud.attributes.items() if values.dtype.kind in "buif"}
     return MeshArrays(cloud.points, triangles, cloud.normals, cloud.colors, attributes)

@@ -13,6 +13,7 @@ from nacre._internal.arrays import as_flag
 from nacre._internal.guided import guided
 from nacre.io import e57, las, npz, pcd, ply, xyz
 from nacre.io.cloud import Cloud, check_cloud, cloud_of
+from nacre.io.raw import require_path
 
 _FORMATS: dict[str, Any] = {
     ".ply": ply,
@@ -212,10 +213,6 @@ def holds(path: str | os.PathLike[str], field: str) -> bool:
 
 def require_point_suffix(path: str | os.PathLike[str]) -> None:
     """Raise where point files do not end so."""
-    if not isinstance(path, str | os.PathLike):
-        raise TypeError(
-            "path must be a path, as in write_points(path, points) and read_points(path), "
-            f"got {type(path).__name__}"
-        )
+    require_path(path, "write_points(path, points) and read_points(path)")
     if Path(path).suffix.lower() not in _FORMATS:
         raise ValueError(f"point files end in {', '.join(_FORMATS)}, got {os.fspath(path)!r}")

@@ -28,6 +28,12 @@ _IS_SPACE = np.zeros(256, dtype=bool)
 _IS_SPACE[list(b" \t\n\r\v\f")] = True
 
 
+def require_path(path: object, calls: str) -> None:
+    """Raise where a path is none; the calls that show where it stands."""
+    if not isinstance(path, str | os.PathLike):
+        raise TypeError(f"path must be a path, as in {calls}, got {type(path).__name__}")
+
+
 def read_file(path: str | os.PathLike[str], most: int | None = None) -> bytes:
     """Return the bytes of a regular file, ``most`` at most; a pipe or a device is refused."""
     size = require_regular(path).stat().st_size

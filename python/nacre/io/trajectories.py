@@ -18,7 +18,7 @@ from nacre._internal.arrays import FARTHEST
 from nacre._internal.quaternions import matrix_from_quaternion, quaternion_from_matrix
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
-from nacre.io.raw import excerpt, number_of, read_file, text_of
+from nacre.io.raw import excerpt, number_of, read_file, require_path, text_of
 from nacre.trajectory import Trajectory
 
 Float64 = npt.NDArray[np.float64]
@@ -118,6 +118,7 @@ def write_trajectory(
     OSError
         When the file cannot be written.
     """
+    require_path(path, "write_trajectory(path, trajectory)")
     ending = "redwood" if Path(path).suffix.lower() == ".log" else "tum"
     name = ending if format is None else format
     if name not in _WRITERS:

@@ -11,10 +11,11 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal import arrays
+from nacre._internal.guided import guided
 from nacre._internal.mesh_library import gpytoolbox
 from nacre._internal.value_equality import Value
 from nacre.kdtree import KdTree
-from nacre.meshing.triangulation import triangulate, used_rows
+from nacre.meshing.triangulation import NORMALS_OF_CLOUD, triangulate, used_rows
 
 _MOST_HALVINGS = 12  # of the box: no more are taken by it
 _BOX = 3.2  # of the points' extent: gpytoolbox's, measured (test_meshing)
@@ -47,6 +48,7 @@ class ClosedSurface(Value):
     is_seen: npt.NDArray[np.bool_]
 
 
+@guided(NORMALS_OF_CLOUD)
 def close_surface(points: npt.ArrayLike, normals: npt.ArrayLike) -> ClosedSurface:
     """
     Lay a closed surface through points with normals; where there are no points it is a smooth guess.

@@ -7,9 +7,11 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal import arrays
+from nacre._internal.guided import guided
 from nacre._internal.mesh_library import gpytoolbox
 
 
+@guided("it is simplify(mesh.vertices, mesh.triangles, num_triangles)")
 def simplify(
     vertices: npt.ArrayLike, triangles: npt.ArrayLike, num_triangles: int
 ) -> tuple[arrays.FloatArray, npt.NDArray[np.int32]]:

@@ -10,7 +10,10 @@ from nacre._internal import arrays
 from nacre._internal.guided import guided
 from nacre.mesh import Mesh
 
+NORMALS_OF_CLOUD = "a Cloud has cloud.normals, and nacre.estimate_normals(points) finds them"
 
+
+@guided(NORMALS_OF_CLOUD)
 def triangulate(
     points: npt.ArrayLike, normals: npt.ArrayLike, *, num_threads: int = 0
 ) -> npt.NDArray[np.int32]:
@@ -50,7 +53,7 @@ def triangulate(
     return triangles
 
 
-@guided("a Cloud has cloud.normals, and nacre.estimate_normals(points) finds them")
+@guided(NORMALS_OF_CLOUD)
 def mesh_points(
     points: npt.ArrayLike,
     normals: npt.ArrayLike,

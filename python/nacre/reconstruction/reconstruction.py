@@ -11,7 +11,7 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 import numpy.typing as npt
@@ -113,6 +113,9 @@ class Reconstruction(Checkpointed):
             f"Reconstruction({len(self.frames)} of {len(self.sequence)} frames done"
             f"{f' ({statuses})' * bool(statuses)}, {len(self.model)} points{ended})"
         )
+
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> NoReturn:
+        raise TypeError("a Reconstruction is no array: give its cloud.points, its poses or its model")
 
     def complete(
         self,
