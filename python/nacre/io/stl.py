@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from io import BytesIO
 
 import numpy as np
@@ -16,6 +16,7 @@ from nacre.io.rows import encode_lines, encode_rows
 
 _FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _HEADER_BYTES = 84
+_FACETS_AT_ONCE = 1 << 16
 _TEXT_FACET = """facet normal {} {} {}
   outer loop
     vertex {} {} {}
@@ -69,25 +70,33 @@ def write_mesh(
     path: str | os.PathLike[str], mesh: MeshArrays, *, comments: Sequence[str] = (), binary: bool = True
 ) -> None:
     """Write an STL file, of which each facet has its own normal; :func:`nacre.write_mesh` says the rest."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        corners = mesh.vertices[mesh.triangles].astype(np.float32)
-    if not np.isfinite(corners).all():
-        raise ValueError("vertices must be finite, and fit float32 in an STL file, got some that do not")
-    normals = _facet_normals(mesh)
     with file_writer(path) as stream:
         if binary:
-            stream.write(b"binary STL".ljust(80) + np.uint32(len(corners)).astype("<u4").tobytes())
-            attribute = np.zeros(len(corners), np.uint16)
-            stream.writelines(encode_rows([normals, corners.reshape(-1, 9), attribute], binary=True))
+            stream.write(b"binary STL".ljust(80) + np.uint32(len(mesh.triangles)).astype("<u4").tobytes())
+            for facets in _facets(mesh):
+                attribute = np.zeros(len(facets[0]), np.uint16)
+                stream.writelines(encode_rows([*facets, attribute], binary=True))
         else:
             stream.write(b"solid nacre\n")
-            stream.writelines(encode_lines(_TEXT_FACET, [normals, corners.reshape(-1, 9)]))
+            for facets in _facets(mesh):
+                stream.writelines(encode_lines(_TEXT_FACET, facets))
             stream.write(b"endsolid nacre\n")
 
 
-def _facet_normals(mesh: MeshArrays) -> npt.NDArray[np.float32]:
+def _facets(mesh: MeshArrays) -> Iterator[list[npt.NDArray[np.float32]]]:
+    """Yield the normals (N, 3) and the corners (N, 9) of some triangles after the other."""
+    for start in range(0, len(mesh.triangles), _FACETS_AT_ONCE):
+        corners = mesh.vertices[mesh.triangles[start : start + _FACETS_AT_ONCE]]
+        with np.errstate(over="ignore", invalid="ignore"):
+            stored = corners.astype(np.float32)
+        if not np.isfinite(stored).all():
+            raise ValueError("vertices must be finite, and fit float32 in an STL file, got some that do not")
+        yield [_facet_normals(corners), stored.reshape(-1, 9)]
+
+
+def _facet_normals(corners: npt.NDArray[np.floating]) -> npt.NDArray[np.float32]:
     """Return unit vectors by the right-hand rule; 0 where a triangle has no area."""
-    a, b, c = (mesh.vertices[mesh.triangles[:, i]].astype(np.float64) for i in range(3))
+    a, b, c = (corners[:, i].astype(np.float64) for i in range(3))
     normals = np.cross(b - a, c - a)
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     unit = np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0)

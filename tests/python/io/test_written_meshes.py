@@ -106,6 +106,13 @@ def test_facets_of_stl_have_the_normals_of_their_corners(tmp_path, binary):
     assert (b"facet normal" in path.read_bytes()) != binary
 
 
+@pytest.mark.parametrize("binary", [True, False])
+def test_stl_is_written_in_blocks_of_facets(tmp_path, monkeypatch, binary):
+    whole = write(tmp_path / "a.stl", binary=binary).read_bytes()
+    monkeypatch.setattr("nacre.io.stl._FACETS_AT_ONCE", 3)
+    assert write(tmp_path / "a.stl", binary=binary).read_bytes() == whole
+
+
 def test_a_facet_without_area_has_no_normal(tmp_path):
     nacre.write_mesh(tmp_path / "a.stl", TETRAHEDRON, [[0, 1, 1]])
     assert np.frombuffer((tmp_path / "a.stl").read_bytes(), "<f4", 3, 84).tolist() == [0, 0, 0]
