@@ -243,6 +243,17 @@ class TestCloseSurface:
         outward = np.einsum("ij,ij->i", surface.normals, away / radius[:, None])
         assert outward[lower].min() > 0.95
 
+    def test_a_surface_that_cannot_close_is_told(self) -> None:
+        """The corner of a room, seen from inside."""
+        y, x = np.mgrid[0:1:20j, 0:1:20j].reshape(2, -1)
+        flat = np.stack([x, y, np.zeros(400)], axis=1)
+        points = np.concatenate([np.roll(flat, i, axis=1) for i in range(3)])
+        normals = np.repeat(np.eye(3)[[2, 0, 1]], 400, axis=0)
+        with pytest.warns(UserWarning, match="the surface is open where its guess ends") as told:
+            surface = close_surface(points, normals)
+        assert [warning.filename for warning in told] == [__file__]
+        assert (edges(nacre.Mesh(surface.vertices, surface.triangles)) == 1).any()
+
     def test_misuse(self) -> None:
         points, normals = sphere(50)
         with pytest.raises(ValueError, match="points must be 10 or more for a surface, got 9"):

@@ -14,6 +14,7 @@ from nacre._internal import arrays
 from nacre._internal.guided import guided
 from nacre._internal.mesh_library import gpytoolbox
 from nacre._internal.value_equality import Value
+from nacre._internal.warned import warn
 from nacre.kdtree import KdTree
 from nacre.meshing.triangulation import NORMALS_OF_CLOUD, triangulate, used_rows
 
@@ -52,6 +53,8 @@ class ClosedSurface(Value):
 def close_surface(points: npt.ArrayLike, normals: npt.ArrayLike) -> ClosedSurface:
     """
     Lay a closed surface through points with normals; where there are no points it is a smooth guess.
+
+    A guess that goes on to the box of three times the points' extent ends there, with a warning.
 
     Parameters
     ----------
@@ -104,12 +107,21 @@ def close_surface(points: npt.ArrayLike, normals: npt.ArrayLike) -> ClosedSurfac
     distances, nearest = tree.query(vertices, 1)
     is_seen = distances <= 2 * np.maximum(spacings[nearest], spacing)
     rows, triangles = used_rows(_without_bubbles(triangles, np.where(is_seen, nearest, -1)))
+    if _is_open(triangles):
+        warn("the surface is open where its guess ends, at the box of three times the points' extent")
     return ClosedSurface(
         vertices[rows] + origin,
         triangles,
         _vertex_normals(vertices[rows], triangles),
         is_seen[rows],
     )
+
+
+def _is_open(triangles: npt.NDArray[np.int32]) -> bool:
+    """Tell whether an edge has one triangle alone."""
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    numbers = edges @ np.array([edges.max() + 1, 1], np.int64)
+    return bool((np.unique(numbers, return_counts=True)[1] == 1).any())
 
 
 def _without_bubbles(

@@ -420,7 +420,7 @@ class Reconstruction(Checkpointed):
 
     @property
     def num_tracked(self) -> int:
-        """How many frames have a pose."""
+        """How many frames have a pose, WEAK ones, which are not fused, among them."""
         return sum(frame.world_from_camera is not None for frame in self.frames)
 
     @property
