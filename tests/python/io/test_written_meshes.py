@@ -57,6 +57,9 @@ def test_colours_of_glb_are_linear_light(tmp_path):
     np.testing.assert_allclose(seen.visual.vertex_attributes["color"], 0.5, atol=0.003)
     np.testing.assert_allclose(seen.vertex_normals, NORMALS, atol=1e-6)
     assert seen.visual.material.doubleSided
+    trimesh = pytest.importorskip("trimesh")
+    bare = trimesh.load(path, process=False, skip_materials=True).to_geometry()
+    np.testing.assert_array_equal(bare.visual.vertex_colors, [[128, 128, 128, 255]] * 4)
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
