@@ -69,6 +69,19 @@ def rounded(unit: float) -> Callable[[Case], Case]:
     return lambda case: each(case, lambda depth: np.round(depth / np.float32(unit)) * np.float32(unit))
 
 
+def in_disparity(unit: float) -> Callable[[Case], Case]:
+    """Round inverse depth to multiples of a unit [1/m], as stereo cameras do, and store whole millimetres."""
+
+    def change(depth: Depth) -> Depth:
+        steps = np.round(1 / (depth * np.float32(unit)))
+        with np.errstate(divide="ignore"):
+            return np.where(steps > 0, np.round(1000 / (steps * np.float32(unit))) / 1000, np.nan).astype(
+                np.float32
+            )
+
+    return lambda case: each(case, change)
+
+
 def every_pixel(step: int) -> Callable[[Case], Case]:
     """Keep one pixel of so many, each way."""
 
@@ -170,6 +183,7 @@ DAMAGES: dict[str, Callable[[Case], Case]] = {
     **{f"{times} times its noise added": noisier(times) for times in (1, 2, 4, 8)},
     **{f"{100 * part:.0f} % of the pixels missing": missing(part) for part in (0.1, 0.3, 0.5)},
     **{f"rounded to {1000 * unit:.0f} mm": rounded(unit) for unit in (0.005, 0.01, 0.02, 0.05, 0.1)},
+    **{f"disparity in steps of {unit} / m": in_disparity(unit) for unit in (0.0075, 0.015, 0.03)},
     "every second pixel": every_pixel(2),
     "every fourth pixel": every_pixel(4),
     "pixels doubled": enlarged(2),
