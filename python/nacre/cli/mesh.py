@@ -75,8 +75,8 @@ def mesh(
     Their corners are its points, with normals and colours. The mesh is open where the model has no points.
     """
     terminal = Terminal(json, quiet, verbose)
-    from nacre import read_points, write_mesh
-    from nacre.io.meshes import read_mesh_arrays, require_mesh_suffix
+    from nacre import write_mesh
+    from nacre.io.meshes import require_mesh_suffix
     from nacre.meshing import largest_part, part_sizes
 
     if not source.exists():
@@ -87,6 +87,61 @@ def mesh(
     target = writable_file(out or path.with_name("mesh.glb" if texture else "mesh.ply"))
     require_mesh_suffix(target, textured=texture)
     views = _views(source) if texture else []
+    steps = 2 + (keep is Keep.largest) + (num_triangles is not None) + texture
+    left_out: list[int] = []
+    with terminal.progress("steps", steps) as begin:
+        begin("laying triangles")
+        mesh, comments = _surface(path, closed)
+        if keep is Keep.largest:
+            begin("choosing parts")
+            left_out = part_sizes(mesh.triangles)[1:].tolist()
+        if left_out:
+            mesh = _used(dataclasses.replace(mesh, triangles=largest_part(mesh.triangles)))
+        if num_triangles is not None:
+            begin("simplifying")
+            mesh = _simplified(mesh, num_triangles)
+            if len(mesh.triangles) > num_triangles:
+                terminal.say(
+                    f"{len(mesh.triangles)} triangles are left, since parts and holes do not vanish "
+                    "(--keep largest, --closed)"
+                )
+        if texture:
+            begin("painting")
+            mesh = _textured(mesh, views)
+        begin("writing")
+        write_mesh(
+            target,
+            mesh.vertices,
+            mesh.triangles,
+            normals=mesh.normals,
+            colors=mesh.colors,
+            attributes=mesh.attributes,
+            texture=mesh.texture,
+            comments=[] if target.suffix.lower() == ".stl" else comments,
+        )
+    figures: dict[str, Any] = {
+        "mesh": str(target),
+        "vertices": len(mesh.vertices),
+        "triangles": len(mesh.triangles),
+    }
+    if mesh.texture is not None:
+        figures["images"] = len(views)
+        figures["texture"] = list(mesh.texture.image.shape[1::-1])
+    if left_out:
+        figures["left_out"] = left_out
+    if "seen" in mesh.attributes:
+        figures["seen"] = _seen_area(mesh)
+    if not quiet:
+        terminal.answer(
+            figures, [(name.replace("_", " "), _words(name, value)) for name, value in figures.items()]
+        )
+
+
+def _surface(path: Path, closed: bool) -> tuple[MeshArrays, tuple[str, ...]]:
+    """Return the mesh that a file has, or that its points make, and its comments."""
+    from nacre import read_points
+    from nacre.io.meshes import read_mesh_arrays
+
     comments: tuple[str, ...] = ()
     if not closed and path.suffix.lower() in mesh_suffixes() and has_faces(path):
         mesh = read_mesh_arrays(path)
@@ -97,44 +152,7 @@ def mesh(
         mesh, comments = _closed(cloud) if closed else _open(cloud), cloud.comments
     if not len(mesh.triangles):
         raise CommandError(f"{path} has too few points for a surface, or normals that contradict it")
-    left_out = part_sizes(mesh.triangles)[1:].tolist() if keep is Keep.largest else []
-    if len(left_out):
-        mesh = _used(dataclasses.replace(mesh, triangles=largest_part(mesh.triangles)))
-    if num_triangles is not None:
-        mesh = _simplified(mesh, num_triangles)
-        if len(mesh.triangles) > num_triangles:
-            terminal.say(
-                f"{len(mesh.triangles)} triangles are left, since parts and holes do not vanish "
-                "(--keep largest, --closed)"
-            )
-    if texture:
-        mesh = _textured(mesh, views)
-    write_mesh(
-        target,
-        mesh.vertices,
-        mesh.triangles,
-        normals=mesh.normals,
-        colors=mesh.colors,
-        attributes=mesh.attributes,
-        texture=mesh.texture,
-        comments=[] if target.suffix.lower() == ".stl" else comments,
-    )
-    figures: dict[str, Any] = {
-        "mesh": str(target),
-        "vertices": len(mesh.vertices),
-        "triangles": len(mesh.triangles),
-    }
-    if mesh.texture is not None:
-        figures["images"] = len(views)
-        figures["texture"] = list(mesh.texture.image.shape[1::-1])
-    if len(left_out):
-        figures["left_out"] = left_out
-    if "seen" in mesh.attributes:
-        figures["seen"] = _seen_area(mesh)
-    if not quiet:
-        terminal.answer(
-            figures, [(name.replace("_", " "), _words(name, value)) for name, value in figures.items()]
-        )
+    return mesh, comments
 
 
 def _words(name: str, value: Any) -> str:

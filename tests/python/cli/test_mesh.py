@@ -1,10 +1,13 @@
 """``nacre mesh``: the ending of the file chooses the format."""
 
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 from command_line import fails, run
 
 import nacre
+from nacre.cli.terminal import Terminal
 from nacre.io.meshes import WRITE_SUFFIXES, read_mesh_arrays
 
 
@@ -52,3 +55,16 @@ def test_what_a_format_has_no_place_for_is_told(sheet, tmp_path):
         told = run("convert", tmp_path / "a.ply", tmp_path / f"b{suffix}", "--json")
         assert told.json["fields"] == kept
         assert ("no place for normals and colors" in told.err) == (not kept)
+
+
+def test_its_steps_are_told(sheet, tmp_path, monkeypatch):
+    told = []
+
+    @contextmanager
+    def progress(self, description, total):
+        told.append(total)
+        yield told.append
+
+    monkeypatch.setattr(Terminal, "progress", progress)
+    run("mesh", sheet, "-o", tmp_path / "a.ply", "--keep", "largest", "--simplify", "50")
+    assert told == [4, "laying triangles", "choosing parts", "simplifying", "writing"]
