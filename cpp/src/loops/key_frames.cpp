@@ -23,7 +23,7 @@ FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, con
   return cloud;
 }
 
-VisibilityCounts compare(const FrameCloud& cloud, const Pose& camera_from_cloud, const DepthView& view,
+VisibilityCounts compare(const KeyFrameView& cloud, const Pose& camera_from_cloud, const DepthView& view,
                          const Camera& camera, double margin) {
   return compare(cloud.points, cloud.normals, view, camera_from_cloud.inverse(), camera,
                  {0.0, margin, false, loops_limits::least_facing}, 1);

@@ -6,7 +6,7 @@
 #include "camera/view_distance.hpp"
 #include "camera/view_volume.hpp"
 #include "depth/depth_view.hpp"
-#include "outlines/occluding_edges.hpp"
+#include "loops/key_frame_views.hpp"
 #include "tracking/frame_samples.hpp"
 
 namespace nacre {
@@ -16,18 +16,18 @@ struct FrameCloud : FrameSamples {
 };
 FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, const TrackingOptions& options);
 
+// What is kept in memory of each.
 struct KeyFrame {
   std::int32_t frame;  // its number
-  FrameCloud cloud;
-  Box bounds;                         // of the cloud
-  std::vector<OutlinePoint> outline;  // camera frame
-  int last_verified;                  // the last node of the trajectory from which its surface was seen to lie right
+  double depth;        // the median [m]
+  Box bounds;          // of the points of its view
+  int last_verified;   // the last node of the trajectory from which its surface was seen to lie right
 };
 
 Box bounds_of(const Points& points);
 
-// What a camera says of a cloud of another one's: of so much of the depth as margin it counts as the same place.
-VisibilityCounts compare(const FrameCloud& cloud, const Pose& camera_from_cloud, const DepthView& view,
+// What a camera says of another one's points: of so much of the depth as margin it counts as the same place.
+VisibilityCounts compare(const KeyFrameView& cloud, const Pose& camera_from_cloud, const DepthView& view,
                          const Camera& camera, double margin);
 
 // Where points of a cloud are that may agree then.

@@ -36,8 +36,8 @@ double rms_extent(const Points& points) {
   return std::sqrt((points.cast<double>().rowwise() - middle).rowwise().squaredNorm().mean());
 }
 
-double part_of(std::int64_t count, const FrameCloud& cloud) {
-  return static_cast<double>(count) / static_cast<double>(std::max<Eigen::Index>(1, cloud.points.rows()));
+double part_of(std::int64_t count, const KeyFrameView& view) {
+  return static_cast<double>(count) / static_cast<double>(std::max<Eigen::Index>(1, view.points.rows()));
 }
 
 // To which surfaces lie on each other.
@@ -61,19 +61,18 @@ std::vector<std::vector<OutlinePoint>> LoopClosure::outlines_near(const Pose& po
   std::vector<std::vector<OutlinePoint>> outlines;
   for (int k = 0; k < num_key_frames() && outlines.size() < loops_limits::most_near_views; ++k) {
     const KeyFrame& other = key_frames_[static_cast<std::size_t>(k)];
-    if (!is_verified(k) || view_distance(pose_of(k), pose, other.cloud.depth) > loops_limits::near_view) continue;
-    if (!other.outline.empty()) outlines.push_back(moved(other.outline, pose_of(k)));
+    if (!is_verified(k) || view_distance(pose_of(k), pose, other.depth) > loops_limits::near_view) continue;
+    const auto view = views_[k];
+    if (!view->outline.empty()) outlines.push_back(moved(view->outline, pose_of(k)));
   }
   return outlines;
 }
 
 LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
   if (!is_next_node(frame)) return {};
-  FrameCloud cloud = sample_cloud(frame.frame, frame.observer, options_);
-  const Box bounds = bounds_of(cloud.points);
-  KeyFrame view{frame.index, std::move(cloud), bounds, frame.outline, time()};
+  const FrameCloud cloud = sample_cloud(frame.frame, frame.observer, options_);
   auto [seen, in_question] = select(frame);
-  std::optional<Match> loop = match(frame, view.cloud, in_question);
+  std::optional<Match> loop = match(frame, cloud, in_question);
   const bool is_apart = loop && loop->distance > tolerance_of(frame);
   if (loop && !is_apart) {
     for (const int k : in_question) seen.push_back({k, part_in_view(k, frame)});
@@ -82,7 +81,7 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
   for (const SeenKeyFrame& other : seen) {
     key_frames_[static_cast<std::size_t>(other.key_frame)].last_verified = time();
   }
-  if (!insert(frame, std::move(view), seen, is_apart)) return {};
+  if (!insert(frame, cloud, seen, is_apart)) return {};
 
   const int newest = num_key_frames() - 1;
   const bool is_around = comes_around(seen);
@@ -93,7 +92,7 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
   }
   if (loop) {
     if (is_apart) return close(frame, *loop, in_question);
-    const double depth = key_frames_.back().cloud.depth;
+    const double depth = key_frames_.back().depth;
     graph_.add_edge(edge(loop->key_frame, newest, loop->alignment.target_from_source, loop->alignment, depth, true));
   }
   return is_around ? adjust_loop_of_views(frame, seen) : LoopReport{};
@@ -102,15 +101,15 @@ LoopReport LoopClosure::add_frame(const LoopFrame& frame) {
 bool LoopClosure::is_next_node(const LoopFrame& frame) const {
   if (trajectory_.empty() || frame.to_whole_model) return true;
   const TrajectoryNode& last = trajectory_.back();
-  const double depth = key_frames_[static_cast<std::size_t>(last.key_frame)].cloud.depth;
+  const double depth = key_frames_[static_cast<std::size_t>(last.key_frame)].depth;
   return !(view_distance(last.pose, frame.alignment.target_from_source, depth) < 1.0);
 }
 
 // The part of a key frame's points that is about where the camera measures something.
 double LoopClosure::part_in_view(int key_frame, const LoopFrame& frame) const {
-  const FrameCloud& cloud = key_frames_[static_cast<std::size_t>(key_frame)].cloud;
-  const Pose camera_from_cloud = frame.alignment.target_from_source.inverse() * pose_of(key_frame);
-  return part_of(compare(cloud, camera_from_cloud, frame.view, camera_, loops_limits::search_radius).agreeing, cloud);
+  const auto view = views_[key_frame];
+  const Pose camera_from_view = frame.alignment.target_from_source.inverse() * pose_of(key_frame);
+  return part_of(compare(*view, camera_from_view, frame.view, camera_, loops_limits::search_radius).agreeing, *view);
 }
 
 // The key frames whose surfaces are in view.
@@ -140,13 +139,13 @@ void LoopClosure::doubt_all(std::int32_t frame) {
 }
 
 // Adds the frame to the trajectory; as a key frame, where none stands for it. Returns whether it became one.
-bool LoopClosure::insert(const LoopFrame& frame, KeyFrame&& view, const std::vector<SeenKeyFrame>& seen,
+bool LoopClosure::insert(const LoopFrame& frame, const FrameCloud& cloud, const std::vector<SeenKeyFrame>& seen,
                          bool is_apart) {
   const Pose& pose = frame.alignment.target_from_source;
   int nearest = -1, most_seen = -1;
   double least_distance = 1.0, largest_part = 0.0;
   for (const SeenKeyFrame& other : seen) {
-    const double distance = view_distance(pose_of(other.key_frame), pose, view.cloud.depth);
+    const double distance = view_distance(pose_of(other.key_frame), pose, cloud.depth);
     if (distance < least_distance) {
       least_distance = distance;
       nearest = other.key_frame;
@@ -159,8 +158,9 @@ bool LoopClosure::insert(const LoopFrame& frame, KeyFrame&& view, const std::vec
   int node = is_apart ? -1 : nearest;
   const bool is_key_frame = node < 0 && key_frames_.size() < loops_limits::most_key_frames;
   if (is_key_frame) {
-    const double depth = view.cloud.depth;
-    key_frames_.push_back(std::move(view));
+    const double depth = cloud.depth;
+    key_frames_.push_back({frame.index, depth, bounds_of(cloud.points), time()});
+    views_.add({cloud.points, cloud.normals, frame.outline});
     node = graph_.add_node(pose, frame.is_given);
     if (!trajectory_.empty()) {
       const int from = frame.to_whole_model && most_seen >= 0 ? most_seen : trajectory_.back().key_frame;
@@ -177,7 +177,7 @@ bool LoopClosure::insert(const LoopFrame& frame, KeyFrame&& view, const std::vec
 LoopReport LoopClosure::close(const LoopFrame& frame, const Match& loop, const std::vector<int>& in_question) {
   LoopReport report;
   if (!PlaceOdds().is_enough(loop.relocalisation_score, Expectation::expected)) return report;
-  report.depth = key_frames_.back().cloud.depth;
+  report.depth = key_frames_.back().depth;
   report.corrections = optimise(loop, report.depth, frame.index);
   if (report.corrections.empty()) return report;
   report.frame = key_frames_[static_cast<std::size_t>(loop.key_frame)].frame;
@@ -187,20 +187,22 @@ LoopReport LoopClosure::close(const LoopFrame& frame, const Match& loop, const s
 }
 
 void LoopClosure::straighten(double tilt, const std::vector<Pose>& motions) {
-  for (KeyFrame& key_frame : key_frames_) {
-    Points &points = key_frame.cloud.points, &normals = key_frame.cloud.normals;
+  for (int k = 0; k < num_key_frames(); ++k) {
+    KeyFrameView view = *views_[k];
+    Points &points = view.points, &normals = view.normals;
     for (Eigen::Index i = 0; i < points.rows(); ++i) {
       const SurfacePoint straight = without_tilt({points.row(i), normals.row(i)}, tilt);
       points.row(i) = straight.point;
       normals.row(i) = straight.normal;
     }
-    key_frame.bounds = bounds_of(points);
-    for (OutlinePoint& outline : key_frame.outline) {
+    key_frames_[static_cast<std::size_t>(k)].bounds = bounds_of(points);
+    for (OutlinePoint& outline : view.outline) {
       const SurfacePoint straight = without_tilt({outline.point.cast<float>(), outline.normal.cast<float>()}, tilt);
       outline.point = straight.point.cast<double>();
       outline.normal = straight.normal.cast<double>();
       outline.outward = (outline.outward - outline.outward.dot(outline.normal) * outline.normal).normalized();
     }
+    views_.replace(k, std::move(view));
   }
   move(motions);
   graph_.measure_edges();
@@ -217,13 +219,17 @@ void LoopClosure::move(const std::vector<Pose>& motions) {
 
 // The clouds of key frames as one.
 IcpTarget LoopClosure::target_of(const std::vector<int>& key_frames, const AlignOptions& options) const {
+  std::vector<std::shared_ptr<const KeyFrameView>> views;
   Eigen::Index rows = 0;
-  for (const int k : key_frames) rows += key_frames_[static_cast<std::size_t>(k)].cloud.points.rows();
+  for (const int k : key_frames) {
+    views.push_back(views_[k]);
+    rows += views.back()->points.rows();
+  }
   Points points(rows, 3), normals(rows, 3);
   rows = 0;
-  for (const int k : key_frames) {
-    const FrameCloud& other = key_frames_[static_cast<std::size_t>(k)].cloud;
-    const Eigen::Isometry3f pose(pose_of(k).cast<float>());
+  for (std::size_t k = 0; k < views.size(); ++k) {
+    const KeyFrameView& other = *views[k];
+    const Eigen::Isometry3f pose(pose_of(key_frames[k]).cast<float>());
     for (Eigen::Index i = 0; i < other.points.rows(); ++i, ++rows) {
       points.row(rows) = (pose * other.points.row(i).transpose()).transpose();
       normals.row(rows) = (pose.linear() * other.normals.row(i).transpose()).transpose();
@@ -260,11 +266,11 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
   const Pose& pose = found.alignment.target_from_source;
   double seen = 0.0, through = 0.0;
   for (const int k : in_question) {
-    const FrameCloud& other = key_frames_[static_cast<std::size_t>(k)].cloud;
-    const VisibilityCounts counts = compare(other, pose.inverse() * pose_of(k), frame.view, camera_,
+    const auto other = views_[k];
+    const VisibilityCounts counts = compare(*other, pose.inverse() * pose_of(k), frame.view, camera_,
                                             camera_limits::surface_spacings * frame.spacing / cloud.depth);
-    seen += part_of(counts.agreeing, other);
-    through += part_of(counts.seen_through, other);
+    seen += part_of(counts.agreeing, *other);
+    through += part_of(counts.seen_through, *other);
   }
   const double consistency = seen > 0.0 ? seen / (seen + through) : 0.0;
   found.relocalisation_score =
@@ -348,13 +354,14 @@ LoopReport LoopClosure::adjust_loop_of_views(const LoopFrame& frame, const std::
   LoopReport report;
   const bool is_weak = frame.alignment.weak_directions.cols() > 0;  // the views need not determine them either
   if (is_weak || key_frames_.size() > loops_limits::most_loop_views || graph_.has_fixed()) return report;
+  std::vector<std::shared_ptr<const KeyFrameView>> kept;
   std::vector<AdjustableView> views;
   for (int k = 0; k < num_key_frames(); ++k) {
-    const FrameCloud& cloud = key_frames_[static_cast<std::size_t>(k)].cloud;
-    views.push_back({pose_of(k), cloud.points, cloud.normals});
+    kept.push_back(views_[k]);
+    views.push_back({pose_of(k), kept.back()->points, kept.back()->normals});
   }
   const std::vector<Pose> before = graph_.poses();
-  const double extent = rms_extent(key_frames_.back().cloud.points);
+  const double extent = rms_extent(kept.back()->points);
   const std::vector<Pose> adjusted = adjust_views(views, MotionBasis::all(frame.alignment.center, extent),
                                                   loops_limits::loop_tolerance * frame.spacing,
                                                   options_.registration.weak_threshold, options_.num_threads);
@@ -370,8 +377,8 @@ LoopReport LoopClosure::adjust_loop_of_views(const LoopFrame& frame, const std::
   }
   report.frame = key_frames_[static_cast<std::size_t>(seen.front().key_frame)].frame;
   const Pose& pose = frame.alignment.target_from_source;
-  report.distance = rms_distance(key_frames_.back().cloud.points, report.corrections.back() * pose, pose);
-  report.depth = key_frames_.back().cloud.depth;
+  report.distance = rms_distance(kept.back()->points, report.corrections.back() * pose, pose);
+  report.depth = key_frames_.back().depth;
   return report;
 }
 
@@ -392,7 +399,7 @@ std::vector<Pose> LoopClosure::corrections(const std::vector<Pose>& before, std:
                             ? std::max(0.0, static_cast<double>(i - a.frame) / static_cast<double>(b.frame - a.frame))
                             : 0.0;
     const Eigen::Vector3d pivot =
-        a.pose * (key_frames_[static_cast<std::size_t>(a.key_frame)].cloud.depth * Eigen::Vector3d::UnitZ());
+        a.pose * (key_frames_[static_cast<std::size_t>(a.key_frame)].depth * Eigen::Vector3d::UnitZ());
     motions.push_back(blend(correction_at(a), correction_at(b), part, pivot));
   }
   return motions;

@@ -33,9 +33,12 @@ struct LoopReport {
 
 class LoopClosure {
  public:
-  LoopClosure(const Camera& camera, const TrackingOptions& options) : camera_(camera), options_(options) {}
+  // files: where what older key frames saw leaves memory.
+  LoopClosure(const Camera& camera, const TrackingOptions& options, ParkedFiles& files)
+      : camera_(camera), options_(options), views_(files) {}
 
   LoopReport add_frame(const LoopFrame& now);
+  void park() { views_.park(); }
   // The frames have moved, each by its motion.
   void move(const std::vector<Pose>& motions);
   // A tilt of the inverse depth is taken away from all that was seen; the frames move, each by its motion.
@@ -84,7 +87,7 @@ class LoopClosure {
   std::optional<Match> match(const LoopFrame& frame, const FrameCloud& cloud,
                              const std::vector<int>& in_question) const;
   void doubt_all(std::int32_t frame);
-  bool insert(const LoopFrame& frame, KeyFrame&& view, const std::vector<SeenKeyFrame>& seen, bool is_apart);
+  bool insert(const LoopFrame& frame, const FrameCloud& cloud, const std::vector<SeenKeyFrame>& seen, bool is_apart);
   bool comes_around(const std::vector<SeenKeyFrame>& seen) const;
   LoopReport close(const LoopFrame& frame, const Match& loop, const std::vector<int>& in_question);
   LoopReport adjust_loop_of_views(const LoopFrame& frame, const std::vector<SeenKeyFrame>& seen);
@@ -98,6 +101,7 @@ class LoopClosure {
   const Camera& camera_;
   const TrackingOptions& options_;
   std::vector<KeyFrame> key_frames_;         // nodes of the graph
+  KeyFrameViews views_;                      // what each saw
   std::vector<std::vector<int>> seen_with_;  // the earlier key frames in view when one was made, and the later ones
   PoseGraph graph_;
   std::vector<TrajectoryNode> trajectory_;

@@ -20,6 +20,7 @@ void Pipeline::require_whole() const {
 
 // Before a frame changes anything: where the disk is full, all is as it was.
 void Pipeline::make_room() {
+  loops.park();
   if (cloud.size() <= options.max_points) return;
   float farthest = 0.0F;
   for (const float z : before.depth) farthest = std::isfinite(z) ? std::max(farthest, z) : farthest;

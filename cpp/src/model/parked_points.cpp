@@ -1,86 +1,18 @@
 #include "model/parked_points.hpp"
 
 #include <algorithm>
-#include <cerrno>
-#include <cstdio>
-#include <filesystem>
-#include <fstream>
 #include <functional>
 #include <iterator>
 #include <limits>
-#include <random>
-#include <system_error>
 #include <utility>
 
 #include "fusion/correction.hpp"
 #include "model/checkpoint/fields.hpp"
-#include "model/checkpoint/seal.hpp"
 #include "model/checkpoint/surface_check.hpp"
 #include "model/limits.hpp"
-#include "nacre/checkpoint.hpp"
-
-#ifdef _WIN32
-#include <io.h>
-#else
-#include <unistd.h>
-#endif
 
 namespace nacre {
 namespace {
-
-namespace fs = std::filesystem;
-
-[[noreturn]] void fail(const char* what, const fs::path& path) {
-  throw fs::filesystem_error(what, path, std::error_code(errno, std::generic_category()));
-}
-
-constexpr const char* parcel_ending = ".points";
-constexpr const char* cannot_write = "points that leave the model cannot be written";
-constexpr const char* cannot_read = "points that left the model cannot be read";
-
-void write_file(const fs::path& path, const std::string& bytes) {
-  errno = 0;
-  std::FILE* const file = std::fopen(path.string().c_str(), "wb");
-  if (file == nullptr) fail(cannot_write, path);
-  bool is_good = std::fwrite(bytes.data(), 1, bytes.size(), file) == bytes.size();
-  is_good = std::fclose(file) == 0 && is_good;
-  if (is_good) return;
-  const int error = errno;
-  std::remove(path.string().c_str());
-  errno = error;
-  fail(cannot_write, path);
-}
-
-// Until the power may go.
-void flush_to_disk(const fs::path& path) {
-  errno = 0;
-  std::FILE* const file = std::fopen(path.string().c_str(), "rb+");
-  if (file == nullptr) fail(cannot_write, path);
-#ifdef _WIN32
-  const bool is_good = _commit(_fileno(file)) == 0;
-#else
-  const bool is_good = fsync(fileno(file)) == 0;
-#endif
-  const int error = errno;
-  std::fclose(file);
-  errno = error;
-  if (!is_good) fail(cannot_write, path);
-}
-
-std::string read_file(const fs::path& path) {
-  errno = 0;
-  std::ifstream stream(path, std::ios::binary | std::ios::ate);
-  if (!stream) fail(cannot_read, path);
-  std::string bytes(static_cast<std::size_t>(stream.tellg()), '\0');
-  stream.seekg(0);
-  if (!stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()))) fail(cannot_read, path);
-  return bytes;
-}
-
-void remove_file(const std::string& folder, const std::string& file) {
-  std::error_code ignored;
-  fs::remove(fs::path(folder) / file, ignored);
-}
 
 template <class Value>
 void append_values(std::vector<Value>& to, const std::vector<Value>& from, std::size_t first, std::size_t count) {
@@ -166,13 +98,6 @@ void insert_points(PointModel& model, const std::vector<PlacedPoints>& parts) {
   insert_values(model.free_space_violations, parts, &PointModel::free_space_violations, std::uint8_t{0});
 }
 
-std::string new_token() {
-  std::random_device device;
-  char text[17];
-  std::snprintf(text, sizeof(text), "%08x%08x", static_cast<unsigned>(device()), static_cast<unsigned>(device()));
-  return text;
-}
-
 }  // namespace
 
 void append_range(PointModel& model, const PointModel& more, std::size_t first, std::size_t count) {
@@ -206,16 +131,6 @@ void append_range(PointModel& model, const PointModel& more, std::size_t first, 
   }
 }
 
-ParkedPoints::ParkedPoints(const std::string& folder)
-    : folder_(folder.empty() ? folder : fs::absolute(folder).string()), token_(new_token()) {}
-
-// What no checkpoint names nobody will ask for.
-ParkedPoints::~ParkedPoints() {
-  for (const Parcel& parcel : parcels_) {
-    if (!parcel.is_named) remove_file(folder_, parcel.file);
-  }
-}
-
 ParkedPoints::Parcel ParkedPoints::write(PointModel points) {
   Parcel parcel;
   parcel.count = points.size();
@@ -228,30 +143,17 @@ ParkedPoints::Parcel ParkedPoints::write(PointModel points) {
   parcel.frames.erase(std::unique(parcel.frames.begin(), parcel.frames.end()), parcel.frames.end());
   parcel.first_motion = static_cast<std::int64_t>(motions_.size());
   parcel.first_gain = static_cast<std::int64_t>(gains_.size());
-  parcel.file = token_ + "-" + std::to_string(next_++) + parcel_ending;
-  std::string bytes(sealed_header_size, '\0');
-  StateWriter archive(bytes);
-  archive(points);
-  write_file(fs::path(folder_) / parcel.file, sealed(std::move(bytes)));
+  parcel.file = files_.write(points);
   return parcel;
 }
 
 PointModel ParkedPoints::read(const Parcel& parcel) const {
-  const fs::path path = fs::path(folder_) / parcel.file;
-  const std::string bytes = read_file(path);
-  PointModel points;
-  try {
-    check_seal(bytes);
-    StateReader archive(bytes, sealed_header_size);
-    archive(points);
-    archive.require_end();
+  const auto check = [&](const StateReader& archive, const PointModel& points) {
     const auto num_frames = static_cast<std::size_t>(parcel.frames.back()) + 1;
     archive.require(points.size() == parcel.count && is_surface(points, num_frames),
                     "the points are not all there, or no surface");
-  } catch (const CheckpointError& error) {
-    throw fs::filesystem_error(std::string(cannot_read) + ": " + error.what(), path,
-                               std::make_error_code(std::errc::io_error));
-  }
+  };
+  auto points = files_.read<PointModel>(parcel.file, check);
   for (auto i = static_cast<std::size_t>(parcel.first_motion); i < motions_.size(); ++i) {
     move_points(points, motions_[i], 1);
   }
@@ -260,27 +162,6 @@ PointModel ParkedPoints::read(const Parcel& parcel) const {
     std::fill(points.free_space_violations.begin(), points.free_space_violations.end(), std::uint8_t{0});
   }
   return points;
-}
-
-void ParkedPoints::release(const Parcel& parcel) {
-  if (parcel.is_named) {
-    released_.push_back({parcel.file, num_checkpoints_});
-  } else {
-    remove_file(folder_, parcel.file);
-  }
-}
-
-void ParkedPoints::note_checkpoint() {
-  for (const Parcel& parcel : parcels_) {
-    if (!parcel.is_named) flush_to_disk(fs::path(folder_) / parcel.file);
-  }
-  ++num_checkpoints_;
-  for (Parcel& parcel : parcels_) parcel.is_named = true;
-  const auto is_old = [&](const Released& released) { return released.checkpoint + 2 <= num_checkpoints_; };
-  for (const Released& released : released_) {
-    if (is_old(released)) remove_file(folder_, released.file);
-  }
-  released_.erase(std::remove_if(released_.begin(), released_.end(), is_old), released_.end());
 }
 
 // Points that leave become one file with what left from between and beside them before: small files would become ever
@@ -339,7 +220,7 @@ PointModel ParkedPoints::gathered(const PointModel& model, const BlockIndex& blo
 // Files are written before anything leaves: where one cannot be, all is as it was.
 void ParkedPoints::park(PointModel& model, BlockIndex& blocks, std::int64_t most_points, std::int32_t oldest_frame,
                         const ViewVolume& view) {
-  if (!is_on() || model.size() <= most_points) return;
+  if (!files_.is_on() || model.size() <= most_points) return;
   blocks.renew(model);
   std::vector<BlockIndex::Summary> candidates = blocks.summaries();
   candidates.erase(
@@ -358,13 +239,12 @@ void ParkedPoints::park(PointModel& model, BlockIndex& blocks, std::int64_t most
   std::sort(candidates.begin(), candidates.end(),
             [](const auto& a, const auto& b) { return a.range.first < b.range.first; });
 
-  fs::create_directories(folder_);
   const std::vector<Leaving> leaving = divided(candidates, blocks.gaps());
   std::vector<Parcel> written;
   try {
     for (const Leaving& part : leaving) written.push_back(write(gathered(model, blocks, part)));
   } catch (...) {
-    for (const Parcel& parcel : written) remove_file(folder_, parcel.file);
+    for (const Parcel& parcel : written) files_.release(parcel.file);
     throw;
   }
   take_out(model, blocks, leaving, std::move(written));
@@ -385,7 +265,7 @@ void ParkedPoints::take_out(PointModel& model, BlockIndex& blocks, const std::ve
   for (std::size_t i = 0; i < leaving.size(); ++i) {
     const Leaving& part = leaving[i];
     keep_until(part.first_parcel);
-    for (; k < part.end_parcel; ++k) release(parcels_[k]);
+    for (; k < part.end_parcel; ++k) files_.release(parcels_[k].file);
     gaps.push_back({part.first, static_cast<std::size_t>(written[i].count)});
     parcels.push_back(std::move(written[i]));
     std::fill(flags.begin() + static_cast<std::ptrdiff_t>(part.first),
@@ -437,7 +317,7 @@ void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vect
   insert_points(model, back);
   for (std::size_t k = 0; k < parcels_.size(); ++k) {
     if (is_wanted[k]) {
-      release(parcels_[k]);
+      files_.release(parcels_[k].file);
     } else {
       left.push_back(std::move(parcels_[k]));
     }
@@ -497,7 +377,7 @@ void ParkedPoints::settle() {
 }
 
 void ParkedPoints::replace_all(std::vector<Parcel> parcels) {
-  for (const Parcel& parcel : parcels_) release(parcel);
+  for (const Parcel& parcel : parcels_) files_.release(parcel.file);
   for (Parcel& parcel : parcels) parcel.first_motion = parcel.first_gain = 0;
   parcels_ = std::move(parcels);
   motions_.clear();

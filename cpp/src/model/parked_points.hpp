@@ -5,22 +5,18 @@
 #include <string>
 #include <vector>
 
+#include "base/parked_files.hpp"
 #include "fusion/block_index.hpp"
 
 namespace nacre {
 
 // Points that leave a model, each parcel a file, and come back to their place among the others when a camera looks at
 // them: the model goes on as if they had stayed. What happens to the model meanwhile happens to them when they come
-// back. A file is complete before anything names it, is checked when it is read, and is never changed: one that a
-// checkpoint names stays until two later ones do without it.
+// back.
 class ParkedPoints {
  public:
-  explicit ParkedPoints(const std::string& folder);  // "": none leave
-  ~ParkedPoints();
-  ParkedPoints(const ParkedPoints&) = delete;
-  ParkedPoints& operator=(const ParkedPoints&) = delete;
+  explicit ParkedPoints(ParkedFiles& files) : files_(files) {}
 
-  bool is_on() const { return !folder_.empty(); }
   std::int64_t size() const { return size_; }  // points
 
   // Points beyond so many leave that no later frame than oldest_frame has seen, and that are out of view: those first
@@ -44,9 +40,6 @@ class ParkedPoints {
   template <class Visit>
   void for_each_part(const PointModel& model, const BlockIndex& blocks, Visit&& visit) const;
 
-  // A checkpoint is about to name the files that there are: they are flushed to disk.
-  void note_checkpoint();
-
  private:
   friend struct PrivateState;
   struct Parcel {
@@ -57,11 +50,6 @@ class ParkedPoints {
     std::int64_t first_motion = 0;     // of those since it left
     std::int64_t first_gain = 0;       // likewise
     bool forgets_violations = false;
-    bool is_named = false;  // by a checkpoint
-  };
-  struct Released {
-    std::string file;
-    std::int64_t checkpoint;  // the last that names it
   };
 
   // Points of the model and parcels, one after the other in its order, that are to be one parcel.
@@ -79,18 +67,13 @@ class ParkedPoints {
   Parcel write(PointModel points);
   void settle();
   void replace_all(std::vector<Parcel> parcels);
-  void release(const Parcel& parcel);
   void recall(PointModel& model, BlockIndex& blocks, const std::vector<std::uint8_t>& is_wanted);
 
-  std::string folder_;
-  std::string token_;  // in the names of the files of this model's
-  std::int64_t next_ = 0;
+  ParkedFiles& files_;
   std::int64_t size_ = 0;
-  std::int64_t num_checkpoints_ = 0;
   std::vector<Parcel> parcels_;             // in the model's order; their places are the index's gaps
   std::vector<std::vector<Pose>> motions_;  // corrections, by frame
   std::vector<Eigen::Vector3f> gains_;
-  std::vector<Released> released_;
 };
 
 // Some of a model's points, behind another's. Colours and attributes that either lacks are not known.

@@ -66,7 +66,7 @@ Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in, int 
       camera(camera_in.binned(binning)),
       given(options_in),
       options(options_in),
-      parked(options_in.points_folder) {
+      files(options_in.points_folder) {
   options.check();
   options.binning = binning;
   options.registration.num_threads = options.num_threads;
@@ -83,7 +83,7 @@ FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras
   require_whole();
   require_camera_size("depth", depth.rows(), depth.cols(), given_camera);
   check_extras(given_camera, extras, cloud);
-  if (parked.is_on()) make_room();
+  if (files.is_on()) make_room();
   try {
     return add_whole(depth, extras);
   } catch (const std::filesystem::filesystem_error& error) {
@@ -373,7 +373,7 @@ void Pipeline::fuse_frame(const FrameExtras& extras, FrameReport& report) {
     } else {
       consolidate_frame(cloud, frame, report.world_from_camera, options, spacing, index);
     }
-    if (options.fusion_method == FusionMethod::fuse && !parked.is_on()) coarsen();
+    if (options.fusion_method == FusionMethod::fuse && !files.is_on()) coarsen();
   }
   if (options.fusion_method == FusionMethod::fuse) return;
   const Stopwatch watch(report.milliseconds.normals);

@@ -44,9 +44,10 @@ struct Pipeline {
   std::vector<std::int32_t> depth_view_frames;  // their numbers
   PointModel cloud;                             // in memory
   BlockIndex blocks;                            // of the cloud
-  ParkedPoints parked;                          // the rest of the model
+  ParkedFiles files;                            // of what leaves memory
+  ParkedPoints parked{files};                   // the rest of the model
   std::optional<DeformingShape> shape;          // of a cloud that deforms
-  LoopClosure loops{camera, options};
+  LoopClosure loops{camera, options, files};
   FrameHistory history;
   StillScene still_scene{camera};
   CarriedThings carried;

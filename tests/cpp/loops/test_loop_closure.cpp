@@ -317,7 +317,8 @@ TEST_CASE("a ring is not closed by a view that leaves directions open") {
   ModelOptions options;
   for (const bool is_weak : {false, true}) {
     CAPTURE(is_weak);
-    LoopClosure loops(camera, options);
+    ParkedFiles nowhere("");
+    LoopClosure loops(camera, options, nowhere);
     int num_closed = 0;
     for (int k = 0; k < Turntable::num_views; ++k) {
       const Frame frame = make_frame(Turntable::clean(camera)[static_cast<std::size_t>(k)], camera);
@@ -358,7 +359,8 @@ TEST_CASE("a cloud that agrees with a view has points in the volume of that, fro
   const FusionOptions options;
   SurfaceObserver observer(camera, options);
   observer.look_at(frame, Colors(), 0);
-  const FrameCloud cloud = sample_cloud(frame, observer, {});
+  const FrameCloud samples = sample_cloud(frame, observer, {});
+  const KeyFrameView cloud{samples.points, samples.normals, {}};
   const DepthView view{frame.points.col(2), frame.sigma};
   const Box bounds = bounds_of(cloud.points);
   int num_agreeing = 0, num_outside = 0;
@@ -387,9 +389,10 @@ TEST_CASE("a cloud is found in its own view, not behind the camera, and seen thr
   const FusionOptions options;
   SurfaceObserver observer(camera, options);
   observer.look_at(frame, Colors(), 0);
-  const FrameCloud cloud = sample_cloud(frame, observer, {});
+  const FrameCloud samples = sample_cloud(frame, observer, {});
+  const KeyFrameView cloud{samples.points, samples.normals, {}};
   CHECK(cloud.points.rows() == 3000);
-  CHECK(cloud.depth == doctest::Approx(1.0).epsilon(0.001));
+  CHECK(samples.depth == doctest::Approx(1.0).epsilon(0.001));
   const DepthView view{frame.points.col(2), frame.sigma};
   CHECK(compare(cloud, Pose::Identity(), view, camera, 0.02).agreeing == 3000);
   Pose behind = Pose::Identity(), nearer = Pose::Identity(), farther = Pose::Identity();

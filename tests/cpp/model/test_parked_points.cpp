@@ -81,7 +81,8 @@ struct Parked {
   Folder folder;
   PointModel model = wall();
   BlockIndex blocks{model};
-  ParkedPoints parked{folder.path.string()};
+  ParkedFiles files{folder.path.string()};
+  ParkedPoints parked{files};
   Parked() { parked.park(model, blocks, num_points / 2, num_frames, view_at(19.0)); }
   void recall_all() {
     parked.recall(model, blocks, std::vector{Box(Eigen::Vector3f::Constant(-99.0F), Eigen::Vector3f::Constant(99.0F))});
@@ -133,7 +134,8 @@ TEST_CASE("points that leave little by little, from between others that have lef
   Folder folder;
   PointModel model = wall();
   BlockIndex blocks(model);
-  ParkedPoints parked(folder.path.string());
+  ParkedFiles files(folder.path.string());
+  ParkedPoints parked(files);
   for (std::int64_t most = num_points; most >= num_points / 4; most -= num_points / 20) {
     const double x = most > num_points / 2 ? 5.0 : 19.0;  // first a part stays of the middle of what is to leave
     parked.park(model, blocks, most, num_frames, view_at(x));
@@ -167,7 +169,8 @@ TEST_CASE("where points cannot be written, they stay") {
   std::ofstream(folder.path) << "no folder";
   PointModel model = wall();
   BlockIndex blocks(model);
-  ParkedPoints parked(folder.path.string());
+  ParkedFiles files(folder.path.string());
+  ParkedPoints parked(files);
   CHECK_THROWS_AS(parked.park(model, blocks, num_points / 2, num_frames, view_at(19.0)), fs::filesystem_error);
   CHECK(bytes_of(model) == bytes_of(wall()));
   CHECK(parked.size() == 0);

@@ -198,7 +198,7 @@ def test_a_file_that_is_damaged_or_missing_is_named_and_what_was_saved_goes_on(
         for path, data in files.items():
             path.write_bytes(data)
         if error is not None:
-            assert "points that left the model cannot be read" in str(error)
+            assert "what left the model's memory cannot be read" in str(error)
             assert Path(str(error.filename)) in files
         return error is not None
 

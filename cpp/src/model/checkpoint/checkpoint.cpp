@@ -6,8 +6,8 @@
 #include <limits>
 
 #include "base/check.hpp"
+#include "base/seal.hpp"
 #include "depth/limits.hpp"
-#include "model/checkpoint/seal.hpp"
 #include "model/checkpoint/state.hpp"
 #include "model/checkpoint/surface_check.hpp"
 #include "model/limits.hpp"
@@ -53,7 +53,7 @@ void exchange_state(Archive& archive, Pipeline& state) {
           state.loops, state.history, state.before, state.still_scene, state.carried, state.odometry, state.hypothesis,
           state.views, state.spacing, state.num_lost, state.num_vain, state.start_frames);
   std::vector<BlockIndex::Gap> gaps = state.blocks.gaps();
-  if (state.parked.is_on()) archive(state.parked, gaps);
+  if (state.files.is_on()) archive(state.files, state.parked, gaps);
   state.blocks.set_gaps(std::move(gaps));
   if (state.depth_views) archive(*state.depth_views);
   if (state.shape) archive(*state.shape);
@@ -157,17 +157,21 @@ bool PrivateState::is_sound(const PoseGraph& graph) {
                      [&](const PoseEdge& edge) { return is_within(edge.from, count) && is_within(edge.to, count); });
 }
 
+bool PrivateState::is_sound(const KeyFrameViews& views) {
+  for (std::size_t k = 0; k < views.places_.size(); ++k) {
+    if (views.places_[k].file.empty() != (k >= views.num_written_)) return false;
+  }
+  return views.num_written_ <= views.places_.size();
+}
+
 bool PrivateState::is_sound(const LoopClosure& loops, std::size_t num_frames) {
   const std::size_t count = loops.key_frames_.size();
-  if (!is_sound(loops.graph_) || loops.graph_.poses_.size() != count || loops.seen_with_.size() != count) return false;
-  for (const KeyFrame& key_frame : loops.key_frames_) {
-    const FrameCloud& cloud = key_frame.cloud;
-    const Eigen::Index rows = cloud.points.rows();
-    if (!is_within(key_frame.frame, num_frames) || cloud.normals.rows() != rows || cloud.noise.rows() != rows ||
-        cloud.sigma.rows() != rows) {
-      return false;
-    }
+  if (!is_sound(loops.graph_) || loops.graph_.poses_.size() != count || loops.seen_with_.size() != count ||
+      !is_sound(loops.views_) || loops.views_.places_.size() != count) {
+    return false;
   }
+  const auto is_key_frame = [&](const KeyFrame& key_frame) { return is_within(key_frame.frame, num_frames); };
+  if (!are_all(loops.key_frames_, is_key_frame)) return false;
   for (const std::vector<int>& others : loops.seen_with_) {
     if (!std::all_of(others.begin(), others.end(), [&](int other) { return is_within(other, count); })) return false;
   }
@@ -291,14 +295,14 @@ bool PrivateState::is_sound(const ParkedPoints& parked, const BlockIndex& blocks
                             std::size_t num_frames) {
   const std::vector<BlockIndex::Gap>& gaps = blocks.gaps();
   const auto is_frame = [&](std::int32_t frame) { return is_within(frame, num_frames); };
-  if (gaps.size() != parked.parcels_.size() || parked.num_checkpoints_ < 0) return false;
+  if (gaps.size() != parked.parcels_.size()) return false;
   std::size_t place = 0;
   std::int64_t size = 0;
   for (std::size_t k = 0; k < gaps.size(); ++k) {
     const ParkedPoints::Parcel& parcel = parked.parcels_[k];
     if (gaps[k].place < place || gaps[k].place > num_points || parcel.count <= 0 ||
         static_cast<std::uint64_t>(parcel.count) != gaps[k].count || parcel.count > (std::int64_t{1} << 32) ||
-        !is_points_file(parcel.file) || !is_place(parcel.lowest) || !is_place(parcel.highest) ||
+        !is_place(parcel.lowest) || !is_place(parcel.highest) ||
         !(parcel.lowest.array() <= parcel.highest.array()).all() || parcel.frames.empty() ||
         !std::is_sorted(parcel.frames.begin(), parcel.frames.end()) || !are_all(parcel.frames, is_frame) ||
         !is_within(parcel.first_motion, parked.motions_.size() + 1) ||
@@ -311,20 +315,31 @@ bool PrivateState::is_sound(const ParkedPoints& parked, const BlockIndex& blocks
     place = gaps[k].place;
     size += parcel.count;
   }
-  return size == parked.size_ && are_all(parked.released_, [](const ParkedPoints::Released& released) {
-           return is_points_file(released.file);
-         });
+  return size == parked.size_;
+}
+
+bool PrivateState::is_sound(const ParkedFiles& files, const ParkedPoints& parked, const LoopClosure& loops) {
+  std::vector<std::string> needed, known;
+  for (const ParkedPoints::Parcel& parcel : parked.parcels_) needed.push_back(parcel.file);
+  for (const KeyFrameViews::Place& place : loops.views_.places_) {
+    if (!place.file.empty()) needed.push_back(place.file);
+  }
+  std::sort(needed.begin(), needed.end());
+  for (const auto& [file, is_named] : files.is_named_) known.push_back(file);
+  const auto is_named = [](const ParkedFiles::Released& released) { return is_points_file(released.file); };
+  return needed == known && are_all(known, is_points_file) && are_all(files.released_, is_named) &&
+         files.num_checkpoints_ >= 0;
 }
 
 std::string save_checkpoint(Pipeline& pipeline, const std::string& note) {
   pipeline.require_whole();
-  pipeline.parked.note_checkpoint();
+  pipeline.files.note_checkpoint();
   std::string bytes(sealed_header_size, '\0'), kept = note;
   StateWriter archive(bytes);
   CameraFields camera = fields_of(pipeline.given_camera);
   exchange(archive, camera);
   std::string filler = filler_of(camera, pipeline);
-  bool has_folder = pipeline.parked.is_on();
+  bool has_folder = pipeline.files.is_on();
   archive(pipeline.given, pipeline.options.binning, has_folder, filler);
   exchange_state(archive, pipeline);
   archive(kept);
@@ -376,7 +391,7 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   archive.require(is_first || state.history.num_registered() > 0, "the poses are missing");
   archive.require(PrivateState::is_sound(state.parked, state.blocks, state.cloud.points.size(), num_frames),
                   "the points that left memory contradict the others");
-  archive.require(num_frames == 0 || state.history.back().num_points == state.num_points() || state.parked.is_on(),
+  archive.require(num_frames == 0 || state.history.back().num_points == state.num_points() || state.files.is_on(),
                   "the newest report has another number of points");
   archive.require(is_within(state.num_lost, num_frames + 1), "more frames are lost than there are");
   archive.require(is_within(state.num_vain, static_cast<std::size_t>(state.num_lost) + 1),
@@ -395,6 +410,8 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
     last_start = frame.index;
   }
   archive.require(PrivateState::is_sound(state.loops, num_frames), "the key frames contradict each other");
+  archive.require(PrivateState::is_sound(state.files, state.parked, state.loops),
+                  "the files are not those of what left memory");
   const std::size_t num_views = state.depth_views ? static_cast<std::size_t>(state.depth_views->num_views()) : 0;
   const bool is_tilted = state.depth_views.has_value() || state.options.depth.tilt == given.depth.tilt;
   archive.require(is_tilted && std::isfinite(state.options.depth.tilt) && state.depth_view_frames.size() == num_views &&

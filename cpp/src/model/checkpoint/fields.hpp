@@ -1,11 +1,11 @@
-// What options, points and reports hold, field by field; see model/checkpoint/archive.hpp. Whoever adds a field to one
-// of these structs adds it here, and raises the format's version in model/checkpoint/checkpoint.cpp.
+// What options, points and reports hold, field by field; see base/archive.hpp. Whoever adds a field to one of these
+// structs adds it here, and raises the format's version in model/checkpoint/checkpoint.cpp.
 #pragma once
 
 #include <cmath>
 
+#include "base/archive.hpp"
 #include "base/pose_check.hpp"
-#include "model/checkpoint/archive.hpp"
 #include "nacre/frame_report.hpp"
 #include "nacre/model_options.hpp"
 

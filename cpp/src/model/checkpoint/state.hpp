@@ -1,8 +1,9 @@
-// What the parts of a model's state hold, field by field; see model/checkpoint/archive.hpp. Whoever adds a field to one
-// of these structs adds it here, and raises the format's version in model/checkpoint/checkpoint.cpp.
+// What the parts of a model's state hold, field by field; see base/archive.hpp. Whoever adds a field to one of
+// these structs adds it here, and raises the format's version in model/checkpoint/checkpoint.cpp.
 #pragma once
 
 #include "deformation/deforming_shape.hpp"
+#include "loops/key_frame_views.hpp"
 #include "loops/loop_closure.hpp"
 #include "model/checkpoint/fields.hpp"
 #include "model/frame_history.hpp"
@@ -26,21 +27,8 @@ void exchange(Archive& archive, ObjectView& view) {
 }
 
 template <class Archive>
-void exchange(Archive& archive, FrameCloud& cloud) {
-  archive(cloud.points, cloud.normals, cloud.noise, cloud.sigma, cloud.depth);
-}
-
-template <class Archive>
-void exchange(Archive& archive, OutlinePoint& point) {
-  archive(point.point, point.normal, point.outward, point.pixel);
-  const bool is_finite = point.point.allFinite() && point.normal.allFinite() && point.outward.allFinite();
-  archive.require(is_finite, "an outline is not finite");
-}
-
-template <class Archive>
 void exchange(Archive& archive, KeyFrame& key_frame) {
-  archive(key_frame.frame, key_frame.cloud, key_frame.outline, key_frame.last_verified);
-  key_frame.bounds = bounds_of(key_frame.cloud.points);
+  archive(key_frame.frame, key_frame.depth, key_frame.bounds.min(), key_frame.bounds.max(), key_frame.last_verified);
 }
 
 template <class Archive>
@@ -148,12 +136,23 @@ struct PrivateState {
   }
 
   template <class Archive>
+  static void exchange(Archive& archive, KeyFrameViews::Place& place) {
+    archive(place.file);
+    if (!place.file.empty()) return;
+    if (!place.view) place.view = std::make_shared<KeyFrameView>();
+    archive(*place.view);
+  }
+  template <class Archive>
+  static void exchange(Archive& archive, KeyFrameViews& views) {
+    archive(views.places_, views.num_written_);
+  }
+  template <class Archive>
   static void exchange(Archive& archive, LoopClosure::TrajectoryNode& node) {
     archive(node.frame, node.key_frame, node.pose);
   }
   template <class Archive>
   static void exchange(Archive& archive, LoopClosure& loops) {
-    archive(loops.key_frames_, loops.seen_with_, loops.graph_, loops.trajectory_, loops.first_verified_);
+    archive(loops.key_frames_, loops.views_, loops.seen_with_, loops.graph_, loops.trajectory_, loops.first_verified_);
   }
 
   template <class Archive>
@@ -200,15 +199,24 @@ struct PrivateState {
   template <class Archive>
   static void exchange(Archive& archive, ParkedPoints::Parcel& parcel) {
     archive(parcel.file, parcel.count, parcel.lowest, parcel.highest, parcel.frames, parcel.first_motion,
-            parcel.first_gain, parcel.forgets_violations, parcel.is_named);
-  }
-  template <class Archive>
-  static void exchange(Archive& archive, ParkedPoints::Released& released) {
-    archive(released.file, released.checkpoint);
+            parcel.first_gain, parcel.forgets_violations);
   }
   template <class Archive>
   static void exchange(Archive& archive, ParkedPoints& parked) {
-    archive(parked.size_, parked.num_checkpoints_, parked.parcels_, parked.motions_, parked.gains_, parked.released_);
+    archive(parked.size_, parked.parcels_, parked.motions_, parked.gains_);
+  }
+
+  template <class Archive>
+  static void exchange(Archive& archive, ParkedFiles::Released& released) {
+    archive(released.file, released.checkpoint);
+  }
+  // A checkpoint names all files that are needed.
+  template <class Archive>
+  static void exchange(Archive& archive, ParkedFiles& files) {
+    std::vector<std::string> names;
+    for (const auto& [file, is_named] : files.is_named_) names.push_back(file);
+    archive(names, files.num_checkpoints_, files.released_);
+    for (const std::string& file : names) files.is_named_[file] = true;
   }
 
   // Whether what was read can be gone on with.
@@ -219,6 +227,7 @@ struct PrivateState {
   static bool is_sound(const UsualConsistency& usual);
   static bool is_sound(const FrameHistory& history, const Camera& camera, const ModelOptions& options);
   static bool is_sound(const PoseGraph& graph);
+  static bool is_sound(const KeyFrameViews& views);
   static bool is_sound(const LoopClosure& loops, std::size_t num_frames);
   static bool is_sound(const FrameOdometry& odometry);
   static bool is_sound(const DeformingShape& shape, std::size_t num_points, std::size_t num_frames);
@@ -226,6 +235,7 @@ struct PrivateState {
   static bool is_sound(const CarriedThings& things, const StillScene& scene);
   static bool is_sound(const ParkedPoints& parked, const BlockIndex& blocks, std::size_t num_points,
                        std::size_t num_frames);
+  static bool is_sound(const ParkedFiles& files, const ParkedPoints& parked, const LoopClosure& loops);
 };
 
 template <class Archive, class T>

@@ -1,4 +1,4 @@
-#include "model/checkpoint/seal.hpp"
+#include "base/seal.hpp"
 
 #include <algorithm>
 #include <cstdint>
