@@ -69,6 +69,7 @@ class Model(ExchangeablePoints, Checkpointed):
         for TUM.
     points_folder : path-like, optional
         Where points go, beyond ``max_points``, that the camera has left behind; they come back when it does.
+        What older key frames saw goes there, too, and is read where a loop may close.
         Without it the spacing is widened at ``max_points``. The folder is made where it is needed, and the
         model's files in it go when they are needed no more. Used with ``loop_closure``, where
         ``fusion_method`` is "fuse" and without ``deform``.
@@ -180,7 +181,7 @@ class Model(ExchangeablePoints, Checkpointed):
             Arrays of the wrong type or shape; a median depth outside 0.05-50 m (the depth scale cannot be
             right). Nothing is changed.
         OSError
-            Where there is a ``points_folder``: points cannot be written there, and nothing is changed; or
+            Where there is a ``points_folder``: nothing can be written there, and nothing is changed; or
             what was written cannot be read, or is damaged. Then the model takes no more frames, and
             :meth:`load` goes on from what was saved before.
         """

@@ -54,8 +54,8 @@ struct ModelOptions : TrackingOptions {
   double spacing = 0.0;
   bool deform = false;      ///< the object bends: grow its canonical shape, and follow how it is at each frame
   int max_points = 500000;  ///< that the model keeps in memory; beyond them its spacing is widened, or points leave
-  /// Where points go, beyond max_points, that are far from the camera: they come back when it does. Used with
-  /// loop_closure, where fusion_method is fuse and the object does not bend. Empty: none leave.
+  /// Where points go, beyond max_points, that are far from the camera: they come back when it does; and what older key
+  /// frames saw. Used with loop_closure, where fusion_method is fuse and the object does not bend. Empty: none leave.
   std::string points_folder;
 
   /// "default" (what measures best) or "paper" (the 2010 paper's algorithm and numbers, alone);
