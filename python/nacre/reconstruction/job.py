@@ -23,7 +23,13 @@ from nacre.reconstruction.pieces.motions import PieceMotions
 from nacre.reconstruction.pieces.workers import Cluster
 from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.resume import UnfinishedRun
-from nacre.reconstruction.run_options import RunOptions, check_recording, options_before, read_document
+from nacre.reconstruction.run_options import (
+    RunOptions,
+    check_recording,
+    may_park,
+    options_before,
+    read_document,
+)
 from nacre.reconstruction.runner import Run
 
 if TYPE_CHECKING:
@@ -77,8 +83,7 @@ def begin_run(
         words, num_frames, indices = describe(sequence, chosen), len(chosen), chosen
         if options.realtime:
             indices = feed = real_time_feed(sequence, chosen, stop=stop, controls=controls)
-    parks_points = parameters.loop_closure and parameters.fusion_method == "fuse" and not parameters.deform
-    folder = unfinished.points_folder if parks_points else None
+    folder = unfinished.points_folder if may_park(parameters) else None
     done = Reconstruction(sequence, Model(sequence.camera, parameters=parameters, points_folder=folder))
     writable_folder(out)
     _hold(unfinished)

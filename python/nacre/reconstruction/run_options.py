@@ -93,6 +93,11 @@ class RunOptions:
         }
 
 
+def may_park(parameters: ModelParameters) -> bool:
+    """Return whether points of a model may leave memory."""
+    return parameters.loop_closure and parameters.fusion_method == "fuse" and not parameters.deform
+
+
 def changed_parameters(parameters: ModelParameters) -> dict[str, Any]:
     """Return the parameters that differ from the defaults, by their dotted names, as JSON has them."""
     defaults = dict(leaves(plain(dataclasses.asdict(ModelParameters()))))

@@ -6,6 +6,7 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from nacre.io.json_files import read_json
 from nacre.model import Model
 from nacre.parameters import ModelParameters
 from nacre.reconstruction.reconstruction import Reconstruction
-from nacre.reconstruction.run_options import RunOptions
+from nacre.reconstruction.run_options import RunOptions, may_park
 from nacre.reconstruction.saved_state import pose_from
 
 Poses = dict[int, npt.NDArray[np.float64]]
@@ -41,14 +42,21 @@ class Piece:
 
 
 def track(piece: Piece) -> Poses:
-    """Return the poses of a piece's tracked frames by their indices; the world is the piece's own."""
+    """
+    Return the poses of a piece's tracked frames by their indices; the world is the piece's own.
+
+    What leaves the model's memory goes to a temporary folder.
+    """
     if piece.version != __version__:
         raise RunError(f"a worker has nacre {__version__}, and is asked by {piece.version}")
     sequence = piece.options.open(piece.folder)
-    done = Reconstruction(sequence, Model(sequence.camera, parameters=piece.parameters))
-    for _ in done.run(piece.indices):
-        pass
-    return done.fused_poses
+    with TemporaryDirectory(prefix="nacre-piece-") as parked:
+        folder = parked if may_park(piece.parameters) else None
+        model = Model(sequence.camera, parameters=piece.parameters, points_folder=folder)
+        done = Reconstruction(sequence, model)
+        for _ in done.run(piece.indices):
+            pass
+        return done.fused_poses
 
 
 def write_poses(path: Path, poses: Poses) -> None:

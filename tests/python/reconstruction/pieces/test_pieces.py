@@ -8,6 +8,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -20,7 +21,8 @@ import nacre
 from nacre._internal import cluster as clusters
 from nacre.reconstruction.pieces.cut import PIECE, SHARED, cut
 from nacre.reconstruction.pieces.joint import joint
-from nacre.reconstruction.pieces.track import read_poses, write_poses
+from nacre.reconstruction.pieces.track import Piece, read_poses, track, write_poses
+from nacre.reconstruction.run_options import RunOptions
 
 pytest.importorskip("typer")
 distributed = pytest.importorskip("distributed")
@@ -102,6 +104,34 @@ def test_poses_are_kept_to_the_bit_and_damage_is_told(tmp_path: Path) -> None:
     (tmp_path / "piece.json").write_text('{"1": [0]}')
     with pytest.raises(nacre.FileFormatError, match="does not hold the poses of a piece"):
         read_poses(tmp_path / "piece.json")
+
+
+def test_points_of_a_piece_leave_memory_for_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A camera goes along a wall; without leaving, points would be fewer where they may not be as many."""
+    x, y = np.meshgrid(np.linspace(-1, 9, 301), np.linspace(-1.2, 1.2, 73))
+    z = 1.5 + 0.1 * np.sin(3 * x + np.sin(5 * y)) + 0.08 * np.cos(4 * y + x * x)
+    corners = np.arange(x.size).reshape(x.shape)
+    a, b, c, d = (
+        part.ravel() for part in (corners[:-1, :-1], corners[:-1, 1:], corners[1:, :-1], corners[1:, 1:])
+    )
+    triangles = np.concatenate([np.stack([a, b, c], axis=1), np.stack([b, d, c], axis=1)])
+    mesh = nacre.Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), triangles)
+    poses = np.tile(np.eye(4), (PIECE, 1, 1))
+    poses[:, 0, 3] = np.linspace(0, 8, PIECE)
+    depths = [mesh.simulate_depth(CAMERA, pose, noise=0.001, seed=k) for k, pose in enumerate(poses)]
+    nacre.write_recording(tmp_path / "wall", CAMERA, depths, depth_scale=10000)
+    (tmp_path / "parked").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "parked"))
+
+    def found(max_points: int) -> dict[int, bytes]:
+        parameters = nacre.ModelParameters(max_points=max_points)
+        piece = Piece(RunOptions("wall"), tmp_path, parameters, range(PIECE))
+        return {index: pose.tobytes() for index, pose in track(piece).items()}
+
+    poses_of_all = found(500_000)
+    assert len(poses_of_all) == PIECE
+    assert found(4_000) == poses_of_all
+    assert list((tmp_path / "parked").iterdir()) == []
 
 
 def test_it_is_nearly_as_good_as_in_one_go(recording: Path, in_pieces: Any, tmp_path: Path) -> None:
