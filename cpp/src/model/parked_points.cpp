@@ -141,6 +141,7 @@ ParkedPoints::Parcel ParkedPoints::write(PointModel points) {
   parcel.frames = points.last_seen;
   std::sort(parcel.frames.begin(), parcel.frames.end());
   parcel.frames.erase(std::unique(parcel.frames.begin(), parcel.frames.end()), parcel.frames.end());
+  parcel.frames.shrink_to_fit();  // there was one for each point
   parcel.first_motion = static_cast<std::int64_t>(motions_.size());
   parcel.first_gain = static_cast<std::int64_t>(gains_.size());
   parcel.file = files_.write(points);
