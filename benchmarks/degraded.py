@@ -82,6 +82,21 @@ def in_disparity(unit: float) -> Callable[[Case], Case]:
     return lambda case: each(case, change)
 
 
+def repeated(every: int) -> Callable[[Case], Case]:
+    """Give every so many-th image twice, as recordings do that wait for no new depth."""
+
+    def change(case: Case) -> Case:
+        order = [i for i in range(len(case.depths)) for _ in range(2 if i % every == 0 else 1)]
+        return replace(
+            case,
+            depths=[case.depths[i] for i in order],
+            colors=[case.colors[i] for i in order],
+            truths=[case.truths[i] for i in order],
+        )
+
+    return change
+
+
 def every_pixel(step: int) -> Callable[[Case], Case]:
     """Keep one pixel of so many, each way."""
 
@@ -184,6 +199,7 @@ DAMAGES: dict[str, Callable[[Case], Case]] = {
     **{f"{100 * part:.0f} % of the pixels missing": missing(part) for part in (0.1, 0.3, 0.5)},
     **{f"rounded to {1000 * unit:.0f} mm": rounded(unit) for unit in (0.005, 0.01, 0.02, 0.05, 0.1)},
     **{f"disparity in steps of {unit} / m": in_disparity(unit) for unit in (0.0075, 0.015, 0.03)},
+    "every third image twice": repeated(3),
     "every second pixel": every_pixel(2),
     "every fourth pixel": every_pixel(4),
     "pixels doubled": enlarged(2),

@@ -98,3 +98,17 @@ def test_what_was_learned_is_kept(exact: list[tuple[Array, Array]], tmp_path: Pa
     track(model, exact, 0.004)
     model.save(tmp_path / "model")
     assert nacre.Model.load(tmp_path / "model").noise_factor == model.noise_factor > 1.0
+
+
+def test_an_image_that_comes_twice_tells_no_noise(exact: list[tuple[Array, Array]]) -> None:
+    random = np.random.default_rng(7)
+    size = (CAMERA.height, CAMERA.width)
+    errors = [0.004 * smooth_field(random, 24) + 0.001 * random.normal(size=size) for _ in exact]
+    images = [depth + error * depth**2 for (depth, _), error in zip(exact, errors, strict=True)]
+    once, twice = nacre.Model(CAMERA), nacre.Model(CAMERA)
+    for image in images:
+        once.add_frame(image)
+        reports = [twice.add_frame(image) for _ in range(2)]
+        assert [report.status for report in reports] == ["TRACKED", "TRACKED"]
+    assert once.noise_factor > 1.5
+    assert twice.noise_factor == pytest.approx(once.noise_factor, rel=0.2)

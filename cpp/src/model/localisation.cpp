@@ -102,6 +102,7 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
     }
   }
   if (result.is_lost()) result = track(current, target, prior, odometry, hypothesis, may_search ? options : nearby);
+  if (is_repeated) return result;  // it tells nothing of the next one
   if (result.decision == Decision::accepted && result.expectation == Expectation::expected) {
     usual_consistency.add(result.consistency);
   }

@@ -13,6 +13,7 @@
 #include "camera/point_spacing.hpp"
 #include "deformation/shown_surface.hpp"
 #include "depth/cleaning.hpp"
+#include "depth/image_digest.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/pixel_binning.hpp"
 #include "fusion/attribute_fusion.hpp"
@@ -94,6 +95,8 @@ FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras
 
 FrameReport Pipeline::add_whole(const DepthRef& depth, const FrameExtras& extras) {
   FrameReport report;
+  const std::uint64_t last = std::exchange(digest, image_digest(depth));
+  is_repeated = digest == last;
   if (options.binning == 1 && options.depth.tilt == 0.0) return add_worked_on(depth, extras, report);
   DepthImage image;
   std::optional<FrameExtras> others;

@@ -62,6 +62,8 @@ struct Pipeline {
   FrameOdometry odometry;              // up to the newest
   PlaceHypothesis hypothesis;          // while the camera is lost
   std::vector<ObjectView> views;       // of an object that stands on a plane, from different directions
+  std::uint64_t digest = 0;            // of the newest image
+  bool is_repeated = false;            // whether the newest is the image before once more
   double spacing = 0.0;
   std::int64_t num_lost = 0;             // frames in a row, up to the newest
   std::int64_t num_vain = 0;             // of them, those that showed something
