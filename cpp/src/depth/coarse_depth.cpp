@@ -62,11 +62,12 @@ float smallest_rounded_step(const Steps& steps) {
   std::vector<float> single;
   std::copy_if(steps.sizes.begin(), steps.sizes.end(), std::back_inserter(single),
                [&](float size) { return 0.5F * least < size && size < 1.5F * least; });
-  return static_cast<float>(quantile(single, 0.5));
+  return single.empty() ? 0.0F : static_cast<float>(quantile(single, 0.5));
 }
 
 // The unit, if nearly all steps are multiples of it; otherwise 0.
 float confirmed(float unit, Steps steps) {
+  if (!(unit > 0.0F)) return 0.0F;
   const auto is_multiple = [&](float size) {
     const float units = size / unit;
     return std::abs(units - std::round(units)) < depth_limits::unit_tolerance;
@@ -112,7 +113,8 @@ DepthUnit coarse_unit(const DepthRef& depth) {
       } else {
         steps.sizes.push_back(std::abs(z - next));
         steps.levels.push_back(z);
-        inverse_steps.sizes.push_back(std::abs(1.0F / z - 1.0F / next));
+        const float inverse_step = std::abs(1.0F / z - 1.0F / next);
+        inverse_steps.sizes.push_back(std::isfinite(inverse_step) ? inverse_step : 0.0F);
       }
     }
   }
