@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <iterator>
-#include <utility>
 #include <vector>
 
 #include "base/parallel.hpp"
@@ -46,37 +45,32 @@ void for_each_on_plateau(const Line& line, float unit, Visit&& visit) {
   }
 }
 
-// Values of pixels beside each other, and by how much those differ that do.
-struct Steps {
-  std::vector<float> sizes, levels;
-};
-
 // Steep and far surfaces step by several units at once, but seldom everywhere.
-float smallest_step(const Steps& steps) {
-  return static_cast<float>(quantile(steps.sizes, depth_limits::unit_quantile));
+float smallest_step(const std::vector<float>& steps) {
+  return static_cast<float>(quantile(steps, depth_limits::unit_quantile));
 }
 
 // The same of steps that the storage of depth has rounded, too.
-float smallest_rounded_step(const Steps& steps) {
+float smallest_rounded_step(const std::vector<float>& steps) {
   const float least = smallest_step(steps);
   std::vector<float> single;
-  std::copy_if(steps.sizes.begin(), steps.sizes.end(), std::back_inserter(single),
-               [&](float size) { return 0.5F * least < size && size < 1.5F * least; });
+  std::copy_if(steps.begin(), steps.end(), std::back_inserter(single),
+               [&](float step) { return 0.5F * least < step && step < 1.5F * least; });
   return single.empty() ? 0.0F : static_cast<float>(quantile(single, 0.5));
 }
 
-// The unit, if nearly all steps are multiples of it; otherwise 0.
-float confirmed(float unit, Steps steps) {
-  if (!(unit > 0.0F)) return 0.0F;
-  const auto is_multiple = [&](float size) {
-    const float units = size / unit;
+// Whether nearly all steps between so many levels are multiples of a unit.
+bool is_unit(float unit, const std::vector<float>& steps, const std::vector<float>& levels) {
+  if (!(unit > 0.0F)) return false;
+  const auto is_multiple = [&](float step) {
+    const float units = step / unit;
     return std::abs(units - std::round(units)) < depth_limits::unit_tolerance;
   };
-  const auto num_multiples = static_cast<double>(std::count_if(steps.sizes.begin(), steps.sizes.end(), is_multiple));
-  if (num_multiples < depth_limits::least_multiples * static_cast<double>(steps.sizes.size())) return 0.0F;
-  std::sort(steps.levels.begin(), steps.levels.end());
-  const auto num_levels = std::unique(steps.levels.begin(), steps.levels.end()) - steps.levels.begin();
-  return num_levels < depth_limits::least_levels ? 0.0F : unit;
+  const auto num_multiples = static_cast<double>(std::count_if(steps.begin(), steps.end(), is_multiple));
+  if (num_multiples < depth_limits::least_multiples * static_cast<double>(steps.size())) return false;
+  std::vector<float> sorted = levels;
+  std::sort(sorted.begin(), sorted.end());
+  return std::unique(sorted.begin(), sorted.end()) - sorted.begin() >= depth_limits::least_levels;
 }
 
 // Between the plateaus of an image whose steps are of this size.
@@ -103,7 +97,7 @@ DepthImage interpolate(const DepthRef& depth, float step, int num_threads) {
 
 DepthUnit coarse_unit(const DepthRef& depth) {
   std::size_t num_equal = 0;
-  Steps steps, inverse_steps;
+  std::vector<float> steps, levels, nexts;
   for (Eigen::Index v = 0; v < depth.rows(); v += depth_limits::probed_rows) {
     for (Eigen::Index u = 0; u + 1 < depth.cols(); ++u) {
       const float z = depth(v, u), next = depth(v, u + 1);
@@ -111,19 +105,20 @@ DepthUnit coarse_unit(const DepthRef& depth) {
       if (z == next) {
         ++num_equal;
       } else {
-        steps.sizes.push_back(std::abs(z - next));
-        steps.levels.push_back(z);
-        const float inverse_step = std::abs(1.0F / z - 1.0F / next);
-        inverse_steps.sizes.push_back(std::isfinite(inverse_step) ? inverse_step : 0.0F);
+        steps.push_back(std::abs(z - next));
+        levels.push_back(z);
+        nexts.push_back(next);
       }
     }
   }
-  if (steps.sizes.empty() || num_equal <= steps.sizes.size()) return {};
-  inverse_steps.levels = steps.levels;
-  const float least = smallest_step(steps), least_of_inverse = smallest_rounded_step(inverse_steps);
-  if (const float unit = confirmed(least, std::move(steps)); unit > 0.0F) return {unit, false};
-  const float unit = confirmed(least_of_inverse, std::move(inverse_steps));
-  return {unit, unit > 0.0F};
+  if (steps.empty() || num_equal <= steps.size()) return {};
+  if (const float unit = smallest_step(steps); is_unit(unit, steps, levels)) return {unit, false};
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const float step = std::abs(1.0F / levels[i] - 1.0F / nexts[i]);
+    steps[i] = std::isfinite(step) ? step : 0.0F;
+  }
+  if (const float unit = smallest_rounded_step(steps); is_unit(unit, steps, levels)) return {unit, true};
+  return {};
 }
 
 DepthImage interpolate_plateaus(const DepthRef& depth, const DepthUnit& unit, int num_threads) {

@@ -85,8 +85,12 @@ FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras
   require_camera_size("depth", depth.rows(), depth.cols(), given_camera);
   check_extras(given_camera, extras, cloud);
   if (files.is_on()) make_room();
+  const std::uint64_t image = image_digest(depth);
+  is_repeated = image == digest;
   try {
-    return add_whole(depth, extras);
+    FrameReport report = add_whole(depth, extras);
+    digest = image;
+    return report;
   } catch (const std::filesystem::filesystem_error& error) {
     torn = error.what();
     throw;
@@ -95,8 +99,6 @@ FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras
 
 FrameReport Pipeline::add_whole(const DepthRef& depth, const FrameExtras& extras) {
   FrameReport report;
-  const std::uint64_t last = std::exchange(digest, image_digest(depth));
-  is_repeated = digest == last;
   if (options.binning == 1 && options.depth.tilt == 0.0) return add_worked_on(depth, extras, report);
   DepthImage image;
   std::optional<FrameExtras> others;
