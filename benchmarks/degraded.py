@@ -97,6 +97,21 @@ def repeated(every: int) -> Callable[[Case], Case]:
     return change
 
 
+def rested(count: int) -> Callable[[Case], Case]:
+    """Give the first image so many times, with noise of its own each time: a camera that rests before it moves."""
+
+    def change(case: Case) -> Case:
+        still = replace(case, depths=[case.depths[0]] * count)
+        return replace(
+            case,
+            depths=[*noisier(1)(still).depths, *case.depths[1:]],
+            colors=[case.colors[0]] * count + list(case.colors[1:]),
+            truths=[case.truths[0]] * count + list(case.truths[1:]),
+        )
+
+    return change
+
+
 def every_pixel(step: int) -> Callable[[Case], Case]:
     """Keep one pixel of so many, each way."""
 
@@ -200,6 +215,7 @@ DAMAGES: dict[str, Callable[[Case], Case]] = {
     **{f"rounded to {1000 * unit:.0f} mm": rounded(unit) for unit in (0.005, 0.01, 0.02, 0.05, 0.1)},
     **{f"disparity in steps of {unit} / m": in_disparity(unit) for unit in (0.0075, 0.015, 0.03)},
     "every third image twice": repeated(3),
+    "at rest for 30 frames first": rested(30),
     "every second pixel": every_pixel(2),
     "every fourth pixel": every_pixel(4),
     "pixels doubled": enlarged(2),

@@ -100,6 +100,20 @@ def test_what_was_learned_is_kept(exact: list[tuple[Array, Array]], tmp_path: Pa
     assert nacre.Model.load(tmp_path / "model").noise_factor == model.noise_factor > 1.0
 
 
+def test_a_camera_at_rest_tells_no_noise_that_stays_in_its_image(exact: list[tuple[Array, Array]]) -> None:
+    random = np.random.default_rng(7)
+    size = (CAMERA.height, CAMERA.width)
+    errors = [0.004 * smooth_field(random, 24) for _ in exact]
+    images = [depth + error * depth**2 for (depth, _), error in zip(exact, errors, strict=True)]
+    moving, rested = nacre.Model(CAMERA), nacre.Model(CAMERA)
+    for model, still in ((moving, 1), (rested, 12)):
+        for image in still * images[:1] + images[1:]:
+            noisy = image + 0.001 * random.normal(size=size) * image**2
+            assert model.add_frame(noisy).status == "TRACKED"
+    assert moving.noise_factor > 1.5
+    assert rested.noise_factor == pytest.approx(moving.noise_factor, rel=0.2)
+
+
 def test_an_image_that_comes_twice_tells_no_noise(exact: list[tuple[Array, Array]]) -> None:
     random = np.random.default_rng(7)
     size = (CAMERA.height, CAMERA.width)

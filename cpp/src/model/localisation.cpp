@@ -79,7 +79,7 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
   nearby.relocalise = false;
   if (learns_noise() && !residual_noise.is_known()) {
     const auto is_as_noisy = [&](const TrackingResult& found) {
-      return found.noise_factor == known_noise_factor() || history.num_registered() > 1 ||
+      return found.noise_factor == known_noise_factor() || residual_noise.has_told() ||
              found.alignment.residual_sigmas >= tracking_limits::least_residual_sigmas;
     };
     const auto is_found = [&] {
@@ -102,15 +102,28 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
     }
   }
   if (result.is_lost()) result = track(current, target, prior, odometry, hypothesis, may_search ? options : nearby);
-  if (is_repeated) return result;  // it tells nothing of the next one
-  if (result.decision == Decision::accepted && result.expectation == Expectation::expected) {
-    usual_consistency.add(result.consistency);
-  }
-  if (learns_noise() && result.decision == Decision::accepted && !result.is_on_plane && !(shape && shape->is_bent())) {
-    residual_noise.add(noise_factor * result.alignment.residual_sigmas);
+  if (result.decision == Decision::accepted) learn_from(result);
+  return result;
+}
+
+void Pipeline::learn_from(const TrackingResult& tracking) {
+  if (tracking.expectation == Expectation::expected) usual_consistency.add(tracking.consistency);
+  residual_noise.add_frame();
+  if (!tells_noise(tracking)) return;
+  telling_frame = history.num_registered();
+  if (learns_noise() && !tracking.is_on_plane && !(shape && shape->is_bent())) {
+    residual_noise.add(noise_factor * tracking.alignment.residual_sigmas);
     set_noise_factor(residual_noise.factor());
   }
-  return result;
+}
+
+// Whether the frame sees with other pixels than the one that told last: errors that stay where they are in the image
+// show between the two.
+bool Pipeline::tells_noise(const TrackingResult& tracking) const {
+  const std::size_t newest = history.num_registered() - 1;
+  const Pose last = history.registered_pose(newest - std::min(telling_frame, newest));
+  return mean_pixel_motion(cells, last.inverse() * tracking.alignment.target_from_source) >=
+         tracking_limits::telling_motion;
 }
 
 // Whether the camera's last motion was none that goes on: views far apart, in any order.

@@ -13,7 +13,6 @@
 #include "camera/point_spacing.hpp"
 #include "deformation/shown_surface.hpp"
 #include "depth/cleaning.hpp"
-#include "depth/image_digest.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/pixel_binning.hpp"
 #include "fusion/attribute_fusion.hpp"
@@ -85,12 +84,8 @@ FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras
   require_camera_size("depth", depth.rows(), depth.cols(), given_camera);
   check_extras(given_camera, extras, cloud);
   if (files.is_on()) make_room();
-  const std::uint64_t image = image_digest(depth);
-  is_repeated = image == digest;
   try {
-    FrameReport report = add_whole(depth, extras);
-    digest = image;
-    return report;
+    return add_whole(depth, extras);
   } catch (const std::filesystem::filesystem_error& error) {
     torn = error.what();
     throw;

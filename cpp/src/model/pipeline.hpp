@@ -62,8 +62,7 @@ struct Pipeline {
   FrameOdometry odometry;              // up to the newest
   PlaceHypothesis hypothesis;          // while the camera is lost
   std::vector<ObjectView> views;       // of an object that stands on a plane, from different directions
-  std::uint64_t digest = 0;            // of the newest image
-  bool is_repeated = false;            // whether the newest is the image before once more
+  std::size_t telling_frame = 0;       // of those registered, the newest that told of noise, or the first
   double spacing = 0.0;
   std::int64_t num_lost = 0;             // frames in a row, up to the newest
   std::int64_t num_vain = 0;             // of them, those that showed something
@@ -115,6 +114,8 @@ struct Pipeline {
   void recall_layers(std::int32_t oldest_frame);
   TrackingResult register_frame(const FrameExtras& extras, const RegionReport& region_report);
   bool learns_noise() const;
+  bool tells_noise(const TrackingResult& tracking) const;
+  void learn_from(const TrackingResult& tracking);
   void set_noise_factor(double factor);
   TrackingResult track_frame(TrackingPrior prior, bool may_search);
   std::vector<Pose> guesses(const FrameExtras& extras) const;

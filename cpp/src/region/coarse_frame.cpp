@@ -85,6 +85,19 @@ CoarseFrame::CoarseFrame(const Frame& frame, const Camera& camera, const MaskRef
   }
 }
 
+double mean_pixel_motion(const CoarseFrame& cells, const Pose& before_from_now) {
+  double sum = 0.0;
+  std::int64_t count = 0;
+  for (const Cell& cell : cells.cells) {
+    if (!cell.has_point()) continue;
+    const Eigen::Vector3d point = cell.point.cast<double>(), ray = point.normalized();
+    const Eigen::Vector3d motion = before_from_now * point - point;
+    sum += (motion - motion.dot(ray) * ray).norm() * cells.step / cell.footprint;
+    ++count;
+  }
+  return count > 0 ? sum / static_cast<double>(count) : 0.0;
+}
+
 bool are_linked(const Cell& a, const Cell& b, int steps) {
   const float reach = region_limits::steepest * static_cast<float>(steps) * std::min(a.footprint, b.footprint);
   return (a.point - b.point).squaredNorm() < reach * reach;

@@ -79,6 +79,9 @@ inline double cut_off(std::int32_t num_border, std::int32_t size) {
   return static_cast<double>(num_border) * num_border / std::max(1, size);
 }
 
+// By how many pixels, on average, what a frame shows is elsewhere in the image from where the camera was before.
+double mean_pixel_motion(const CoarseFrame& cells, const Pose& before_from_now);
+
 // Whether a surface may go from one cell to another that is so many steps away.
 bool are_linked(const Cell& a, const Cell& b, int steps);
 

@@ -64,6 +64,7 @@ constexpr int squares_across = 40;  // [1] tuned: of an image, three of which a 
 constexpr double noise_per_residual = 1.376;  // [1] derived: standard deviation by median absolute value, of Laplace's distribution; test_residual_noise
 constexpr double largest_noise_factor = 16.0;  // [1] budget: of the noise that is tried until it is known; d435-t265-shelf
 constexpr double least_residual_sigmas = 0.5;  // [sigma] derived: that confirm a noise that was tried: with half of it the frame had been lost; unrelated
+constexpr double telling_motion = 3.0;  // [pixel] tuned: by which a frame sees with other pixels than one before; test_residual_noise
 constexpr double enough_frames = 5.0;  // [frames] tuned: that tell how noisy registered frames are, and what they contradict; unrelated
 constexpr std::int64_t least_judged = 20;  // [points] derived: that tell a part of all; test_tracking
 

@@ -20,6 +20,6 @@ double ResidualNoise::factor() const {
   return count_ > 0.0 ? std::clamp(noise_per_residual * std::exp(log_scale_), 1.0, largest_noise_factor) : 1.0;
 }
 
-bool ResidualNoise::is_known() const { return count_ >= enough_frames; }
+bool ResidualNoise::is_known() const { return has_told() && static_cast<double>(num_frames_) >= enough_frames; }
 
 }  // namespace nacre

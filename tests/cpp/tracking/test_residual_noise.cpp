@@ -23,8 +23,20 @@ TEST_CASE("residuals of Laplace's distribution tell its standard deviation") {
 TEST_CASE("the noise is known when some frames have told") {
   ResidualNoise noise;
   int frames = 0;
-  for (; !noise.is_known(); ++frames) noise.add(3.0);
+  for (; !noise.is_known(); ++frames) {
+    noise.add_frame();
+    noise.add(3.0);
+  }
   CHECK(frames == 5);
+}
+
+TEST_CASE("a camera at rest tells nothing of noise, and when it moves one frame does") {
+  ResidualNoise noise;
+  for (int i = 0; i < 100; ++i) noise.add_frame();
+  CHECK(!noise.is_known());
+  noise.add_frame();
+  noise.add(3.0);
+  CHECK(noise.is_known());
 }
 
 TEST_CASE("a frame among many counts little, and drift is followed") {

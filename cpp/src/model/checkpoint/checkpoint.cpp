@@ -51,7 +51,7 @@ void exchange_state(Archive& archive, Pipeline& state) {
   archive(state.options.fusion.reference_sigma, state.options.depth.tilt, state.depth_view_frames, state.region,
           state.calibration, state.confidence_noise, state.residual_noise, state.usual_consistency, state.cloud,
           state.loops, state.history, state.before, state.still_scene, state.carried, state.odometry, state.hypothesis,
-          state.views, state.digest, state.spacing, state.num_lost, state.num_vain, state.start_frames);
+          state.views, state.telling_frame, state.spacing, state.num_lost, state.num_vain, state.start_frames);
   std::vector<BlockIndex::Gap> gaps = state.blocks.gaps();
   if (state.files.is_on()) archive(state.files, state.parked, gaps);
   state.blocks.set_gaps(std::move(gaps));
@@ -273,7 +273,8 @@ bool PrivateState::is_sound(const ConfidenceNoise& noise) {
 }
 
 bool PrivateState::is_sound(const ResidualNoise& noise) {
-  return std::isfinite(noise.log_scale_) && std::isfinite(noise.count_) && noise.count_ >= 0.0;
+  return std::isfinite(noise.log_scale_) && std::isfinite(noise.count_) && noise.count_ >= 0.0 &&
+         noise.num_frames_ >= 0;
 }
 
 bool PrivateState::is_sound(const UsualConsistency& usual) {
