@@ -158,9 +158,9 @@ DepthImage clean_depth(const DepthRef& measured, const Camera& camera, const Dep
   options.check();
   require_camera_size("depth", measured.rows(), measured.cols(), camera);
   if (mask.size() > 0) require_camera_size("mask", mask.rows(), mask.cols(), camera);
-  require_plausible_median(measured);
   const RestoredDepth restored(measured, camera, num_threads);
   const DepthRef& depth = restored.image();
+  require_plausible_median(depth);
 
   // The tests see every measurement, so that range and mask do not make edges where there are none.
   const PlanarImage image(depth, camera, num_threads);

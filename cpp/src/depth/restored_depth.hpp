@@ -1,5 +1,8 @@
-// A depth image without what its storage did to it: rounding to coarse units, and gaps one pixel wide.
+// A depth image without what its storage did to it: a value for no measurement, rounding to coarse units, and gaps one
+// pixel wide.
 #pragma once
+
+#include <optional>
 
 #include "nacre/depth.hpp"
 
@@ -12,14 +15,14 @@ class RestoredDepth {
   RestoredDepth(const RestoredDepth&) = delete;
   RestoredDepth& operator=(const RestoredDepth&) = delete;
 
-  const DepthRef& image() const { return image_; }
+  const DepthRef& image() const { return *image_; }
   // That depth was rounded to, where it shows.
   const DepthUnit& unit() const { return unit_; }
 
  private:
   DepthUnit unit_;
   DepthImage own_;
-  DepthRef image_;
+  std::optional<DepthRef> image_;
 };
 
 }  // namespace nacre

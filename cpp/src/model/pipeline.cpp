@@ -15,6 +15,7 @@
 #include "depth/cleaning.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/pixel_binning.hpp"
+#include "depth/saturation.hpp"
 #include "fusion/attribute_fusion.hpp"
 #include "fusion/correction.hpp"
 #include "fusion/fuse.hpp"
@@ -78,14 +79,15 @@ Pipeline::Pipeline(const Camera& camera_in, const ModelOptions& options_in, int 
   if (options.calibrate_depth && sees_one_scene && !shape && can_calibrate_depth(camera)) depth_views.emplace(camera);
 }
 
-// Pixels are averaged, and their systematic error is taken away, before all else.
+// What is no measurement goes, pixels are averaged, and their systematic error is taken away, before all else.
 FrameReport Pipeline::add_frame(const DepthRef& depth, const FrameExtras& extras) {
   require_whole();
   require_camera_size("depth", depth.rows(), depth.cols(), given_camera);
   check_extras(given_camera, extras, cloud);
   if (files.is_on()) make_room();
+  const DepthImage measured = without_saturated(depth);
   try {
-    return add_whole(depth, extras);
+    return add_whole(measured.size() > 0 ? DepthRef(measured) : depth, extras);
   } catch (const std::filesystem::filesystem_error& error) {
     torn = error.what();
     throw;
