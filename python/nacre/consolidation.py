@@ -201,6 +201,7 @@ def consolidate(
     return Consolidated(moved, attributes, sources, options.radius, done, done < options.iterations)
 
 
+@guided()
 def project_samples(
     samples: npt.ArrayLike,
     points: npt.ArrayLike,

@@ -13,6 +13,7 @@ from nacre import _core
 from nacre._internal.arrays import as_camera, as_count, as_depth, as_flag, as_mask
 from nacre._internal.core_options import mirrored, to_core
 from nacre._internal.guided import guided
+from nacre._internal.kinds import as_kind
 from nacre.noise import Noise, NoiseModel, as_noise, estimate_noise
 from nacre.parameters import DepthParameters, EdgeTest
 
@@ -94,6 +95,7 @@ def preprocess_depth(
     return_report: Literal[True],
     num_threads: int = ...,
 ) -> tuple[DepthArray, DepthReport]: ...
+@guided()
 def preprocess_depth(
     depth: npt.ArrayLike,
     camera: _core.Camera,
@@ -208,6 +210,7 @@ def preprocess_depth(
     return (clean, mirrored(DepthReport, report)) if wants_report else clean
 
 
+@guided()
 def label_pixels(
     depth: npt.ArrayLike,
     camera: _core.Camera,
@@ -247,9 +250,9 @@ def label_pixels(
     """
     image = as_depth("depth", depth, depth_scale)
     camera = as_camera("camera", camera)
-    if not isinstance(parameters, DepthParameters | None):
-        raise TypeError(f"parameters must be nacre.DepthParameters, got {type(parameters).__name__}")
-    options = to_core((parameters or DepthParameters()).for_camera(camera), _core.DepthOptions())
+    given = DepthParameters() if parameters is None else parameters
+    as_kind("parameters", given, DepthParameters, "nacre.DepthParameters")
+    options = to_core(given.for_camera(camera), _core.DepthOptions())
     labels: npt.NDArray[np.uint8] = _core.label_pixels(
         image,
         camera,
@@ -301,6 +304,7 @@ def back_project(
     return points
 
 
+@guided()
 def depth_normals(
     depth: npt.ArrayLike,
     camera: _core.Camera,

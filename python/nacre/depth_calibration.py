@@ -12,6 +12,8 @@ import numpy.typing as npt
 from nacre import _core
 from nacre._internal.arrays import as_camera, as_depth, as_pose
 from nacre._internal.core_options import mirrored
+from nacre._internal.guided import guided
+from nacre._internal.kinds import as_items
 from nacre.camera import Camera
 from nacre.depth import preprocess_depth
 
@@ -111,6 +113,7 @@ class DepthCalibration:
         return _core.correct_depth(_checked(depth, camera), camera, self.tilt, 0)
 
 
+@guided()
 def calibrate_depth(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera: Camera) -> DepthCalibration:
     """
     Find the systematic error of depth and the focal length that make overlapping views agree best.
@@ -143,7 +146,10 @@ def calibrate_depth(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera
     """
     _check_camera(camera)
     calibrator = _core.DepthCalibrator(camera)
-    for depth, pose in views:
+    for view in as_items("views", views):
+        if not isinstance(view, tuple | list) or len(view) != 2:
+            raise TypeError(f"views must be pairs of depth and world_from_camera, got {type(view).__name__}")
+        depth, pose = view
         matrix = as_pose("world_from_camera", pose)
         image = _checked(depth, camera)
         if calibrator.has_enough:

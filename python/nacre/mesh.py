@@ -6,7 +6,7 @@ import dataclasses
 import functools
 import math
 from collections.abc import Callable
-from typing import Literal, NoReturn
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from nacre import _core
 from nacre._internal import arrays
 from nacre._internal.core_options import to_core
-from nacre._internal.guided import GuidedNames
+from nacre._internal.guided import GuidedNames, guided
 from nacre._internal.value_equality import Value
 from nacre.noise import NoiseModel, NoiseName, as_noise
 
@@ -87,6 +87,13 @@ class Mesh(GuidedNames):
         another number than there are vertices.
     """
 
+    @guided(
+        "model.to_mesh() makes a mesh of a model, nacre.meshing.mesh_points(points, normals) of points, and "
+        "nacre.read_mesh(path) reads one",
+        faces="triangles",
+        vertex_normals="normals",
+        vertex_colors="colors",
+    )
     def __init__(
         self,
         vertices: npt.ArrayLike,
@@ -118,9 +125,6 @@ class Mesh(GuidedNames):
     def __reduce__(self) -> tuple[Callable[..., Mesh], tuple[arrays.FloatArray, npt.NDArray[np.int32]]]:
         make = functools.partial(Mesh, normals=self.normals, colors=self.colors)
         return make, (self.vertices, self.triangles)
-
-    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> NoReturn:
-        raise TypeError("a Mesh is two arrays: give its vertices or its triangles")
 
     @property
     def vertices(self) -> arrays.FloatArray:

@@ -30,6 +30,7 @@ from nacre._internal.arrays import (
 from nacre._internal.checkpoint import Checkpointed, checkpoint_of, file_name, read_checkpoint
 from nacre._internal.core_options import from_core, mirrored, to_core, updated
 from nacre._internal.guided import guided
+from nacre._internal.kinds import as_kind
 from nacre._internal.point_exchange import ExchangeablePoints
 from nacre.camera import Camera, camera_of
 from nacre.depth_calibration import DepthCalibration
@@ -100,8 +101,7 @@ class Model(ExchangeablePoints, Checkpointed):
         given = as_camera("camera", camera)
         if parameters is None:
             parameters = ModelParameters.preset(preset)
-        elif not isinstance(parameters, ModelParameters):
-            raise TypeError(f"parameters must be nacre.ModelParameters, got {type(parameters).__name__}")
+        as_kind("parameters", parameters, ModelParameters, "nacre.ModelParameters")
         parameters = updated(parameters, changes)
         self.parameters = replace(parameters, depth=parameters.depth.for_camera(camera))
         self._camera = given if isinstance(given, Camera) else camera_of(given)
@@ -211,6 +211,7 @@ class Model(ExchangeablePoints, Checkpointed):
             return checkpoint_of(self._core, self._depth_scale, more)
 
     @classmethod
+    @guided()
     def load(
         cls, path: str | os.PathLike[str], *, points_folder: str | os.PathLike[str] | None = None
     ) -> Model:

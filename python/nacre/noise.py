@@ -12,13 +12,15 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal.arrays import as_camera, as_count, as_depth, as_number, as_real
-from nacre._internal.core_options import mirrored, to_core
+from nacre._internal.core_options import TypedFields, mirrored, to_core
+from nacre._internal.guided import guided
+from nacre._internal.kinds import as_items
 
 NoiseName = Literal["auto", "kinect", "stereo", "tof"]
 
 
 @dataclass(frozen=True)
-class NoiseModel:
+class NoiseModel(TypedFields):
     """
     The standard deviation of a depth value: ``sigma(z) = constant + quadratic * (z - offset) ** 2``.
 
@@ -133,6 +135,7 @@ def as_noise_choice(name: str, value: Noise) -> NoiseModel | NoiseName | None:
     return NoiseModel(constant=as_number(name, value))
 
 
+@guided()
 def estimate_noise(
     depth: npt.ArrayLike, camera: _core.Camera, *, depth_scale: float = 1.0, num_threads: int = 0
 ) -> NoiseModel:
@@ -175,6 +178,7 @@ def estimate_noise(
     )
 
 
+@guided()
 def calibrate_noise(
     images: Iterable[npt.ArrayLike],
     camera: _core.Camera,
@@ -212,6 +216,6 @@ def calibrate_noise(
     """
     calibration = _core.NoiseCalibration(as_camera("camera", camera))
     threads = as_count("num_threads", num_threads)
-    for image in images:
+    for image in as_items("images", images):
         calibration.add(as_depth("images", image, depth_scale), threads)
     return mirrored(NoiseModel, calibration.model())

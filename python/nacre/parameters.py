@@ -8,7 +8,7 @@ from typing import Literal
 
 from nacre import _core
 from nacre._internal.arrays import as_camera
-from nacre._internal.core_options import from_core
+from nacre._internal.core_options import TypedFields, from_core
 from nacre.noise import NoiseModel, NoiseName, as_noise
 
 EdgeTest = Literal["inverse_depth", "gradient", "none"]
@@ -17,7 +17,7 @@ Preset = Literal["default", "paper"]
 
 
 @dataclass(frozen=True)
-class DepthParameters:
+class DepthParameters(TypedFields):
     """
     What :func:`nacre.preprocess_depth` removes; see there for each field.
 
@@ -44,7 +44,7 @@ class DepthParameters:
 
 
 @dataclass(frozen=True)
-class RegionParameters:
+class RegionParameters(TypedFields):
     """
     The region of interest; see :func:`nacre.select_region` for each field.
 
@@ -63,7 +63,7 @@ class RegionParameters:
 
 
 @dataclass(frozen=True)
-class RegistrationParameters:
+class RegistrationParameters(TypedFields):
     """How :func:`nacre.align` works; see there for each field. Mirrors ``AlignOptions``, less its threads."""
 
     method: Method = "symmetric"
@@ -83,7 +83,7 @@ class RegistrationParameters:
 
 
 @dataclass(frozen=True)
-class GlobalRegistrationParameters:
+class GlobalRegistrationParameters(TypedFields):
     """
     How :func:`nacre.align_global` works; see there for each field.
 
@@ -107,7 +107,7 @@ class GlobalRegistrationParameters:
 
 
 @dataclass(frozen=True)
-class FusionParameters:
+class FusionParameters(TypedFields):
     """
     How frames are fused into a model. Mirrors the C++ ``FusionOptions``.
 
@@ -131,7 +131,7 @@ class FusionParameters:
 
 
 @dataclass(frozen=True)
-class WlopParameters:
+class WlopParameters(TypedFields):
     """
     How WLOP fuses frames; see :func:`nacre.consolidate`. Mirrors the C++ ``WlopOptions``.
 
@@ -172,7 +172,7 @@ class WlopParameters:
 
 
 @dataclass(frozen=True)
-class ModelParameters:
+class ModelParameters(TypedFields):
     """
     All parameters of a model. Mirrors the C++ ``ModelOptions``.
 

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from nacre import _core
 from nacre._internal.arrays import as_camera, as_count, as_depth, as_flag, as_mask
 from nacre._internal.core_options import mirrored, to_core, updated
+from nacre._internal.guided import guided
 from nacre._internal.value_equality import Value
 from nacre.noise import Noise, as_noise
 from nacre.parameters import RegionParameters
@@ -67,6 +68,7 @@ def select_region(
     num_threads: int = ...,
     **changes: Any,
 ) -> tuple[Mask, RegionReport]: ...
+@guided()
 def select_region(
     depth: npt.ArrayLike,
     camera: _core.Camera,

@@ -108,6 +108,7 @@ def simulate_depth(
     )
 
 
+@guided()
 def turntable_poses(
     mesh: Mesh | npt.ArrayLike,
     num_views: int = 12,
@@ -146,8 +147,10 @@ def turntable_poses(
     num_views = arrays.as_count("num_views", num_views, minimum=1)
     if camera is not None:
         arrays.as_camera("camera", camera)
-    if not math.isfinite(arrays.as_number("step", step)):
-        raise ValueError(f"step must be a finite angle in radians, got {step!r}")
+    if not abs(arrays.as_number("step", step)) <= 2 * math.tau:
+        raise ValueError(
+            f"step must be radians, two turns at most, got {step!r}; math.radians(30) is 30 degrees"
+        )
     if not abs(arrays.as_number("elevation", elevation)) < math.pi / 2:
         raise ValueError(f"elevation must lie between -pi/2 and pi/2, got {elevation!r}")
     lower, upper = _bounds(mesh)
@@ -176,6 +179,7 @@ def turntable_poses(
     return poses
 
 
+@guided()
 def default_camera(
     mesh: Mesh | npt.ArrayLike, model: Literal["orthographic", "pinhole"] = "orthographic"
 ) -> Camera:

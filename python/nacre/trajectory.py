@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_length, as_real, as_times
+from nacre._internal.guided import guided
 from nacre._internal.quaternions import matrix_from_quaternion, quaternion_from_matrix
 from nacre._internal.value_equality import Value
 
@@ -98,6 +99,7 @@ def _frozen(values: npt.ArrayLike) -> Float64:
     return copy
 
 
+@guided()
 def associate(
     timestamps_a: npt.ArrayLike, timestamps_b: npt.ArrayLike, max_difference: float = 0.02
 ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:

@@ -154,9 +154,9 @@ def test_a_cloud_a_model_and_a_result_are_written_with_all_they_have(
 
 def test_a_mesh_is_not_an_array() -> None:
     mesh = nacre.Mesh(np.eye(3), [[0, 1, 2]])
-    with pytest.raises(TypeError, match="a Mesh is two arrays: give its vertices or its triangles"):
+    with pytest.raises(TypeError, match="a Mesh is no array: give its vertices or its triangles"):
         np.asarray(mesh)
-    with pytest.raises(ValueError, match=r"points must be an array, got Mesh: a Mesh is two arrays"):
+    with pytest.raises(TypeError, match=r"points must be an array, got Mesh: a Mesh is no array: give"):
         nacre.KdTree(mesh)
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import public_names
 import pytest
 
 import nacre
@@ -98,6 +100,10 @@ WORKS = {
     "nacre.voxel_downsample(points, 0.5)": "1 < len(it) < 400",
     "nacre.voxel_downsample(cloud, voxel_size=0.5).normals": "np.allclose(np.linalg.norm(it, axis=1), 1)",
     "nacre.voxel_downsample(points, 9.0, colors=rgb).colors[0].tolist()": "it == [255, 128, 0]",
+    # Points and colours in lists, and of what has points.
+    "nacre.Cloud([[0, 0, 1]], colors=[[1.0, 0.5, 0.0]])": "it.colors.tolist() == [[255, 128, 0]]",
+    "nacre.Cloud(model)": "np.array_equal(it.points, model.points)",
+    "nacre.datasets.write_nerfstudio(folder / 'n', done.sequence, done.poses, cloud=done)": "it == 3",
     # A model of whatever holds depth images.
     "nacre.reconstruct(depths, camera=camera)": "it.num_tracked == 3",
     "nacre.reconstruct(np.stack(depths), camera=camera)": "it.num_tracked == 3",
@@ -163,6 +169,42 @@ TOLD = {
     "done.points": ["cloud.points"],
     "np.asarray(done)": ["cloud.points", "poses"],
     "nacre.KdTree(done)": ["points must be an array, got Reconstruction", "cloud.points"],
+    "mesh.on_surface(points)": ["mesh.distance(points)", "nacre.meshing.on_surface"],
+    "cloud.on_surface(mesh)": ["nacre.meshing.on_surface", "model.cloud()"],
+    "done.write(out)": ["nacre.write_points(path, done)"],
+    # What is no array says what of it is one.
+    "np.asarray(camera)": ["a Camera is no array", "matrix"],
+    "np.asarray(done.trajectory)": ["a Trajectory is no array", "poses", "timestamps"],
+    "np.asarray(done.sequence)": ["a SequenceFrame is no array", "depth", "color"],
+    "np.asarray(result)": ["an AlignResult is no array", "target_from_source"],
+    "nacre.KdTree(tree)": ["points must be an array, got KdTree", "its points"],
+    "nacre.KdTree(None)": ["points must be an array of real numbers, got dtype object (NoneType)"],
+    "nacre.Model(camera).add_frame(done.sequence[0])": ["depth must be an array, got SequenceFrame", "depth"],
+    "nacre.Model(camera).add_frame('a.png')": ["depth must be an array", "got 'a.png'", "read_depth(path)"],
+    "nacre.evaluation.absolute_trajectory_error(done.trajectory, done.poses)": ["got Trajectory", "poses"],
+    "nacre.associate(done.trajectory, done.trajectory)": ["timestamps_a must be", "timestamps"],
+    # Arguments that are missing.
+    "nacre.Mesh(cloud)": ["Mesh needs triangles", "model.to_mesh()", "mesh_points(points, normals)"],
+    "nacre.Mesh(points, faces=faces)": ["it is triangles"],
+    "nacre.meshing.texture_mesh(mesh)": ["needs triangles and views", "texture_views(sequence, poses)"],
+    "nacre.meshing.texture_views(done)": ["needs poses", "sequence and poses"],
+    "nacre.meshing.on_surface(cloud)": ["needs normals and confidence", "model.cloud()"],
+    "nacre.write_animation(out, model)": ["needs triangles", "(F, N, 3)"],
+    "nacre.write_animation('a.glb', [mesh, mesh], faces)": ["vertices must be an array", "vertices"],
+    "nacre.write_recording(out, done)": ["needs depth_images and depth_scale", "camera", "frames with depth"],
+    "nacre.write_mesh(out)": ["needs vertices", "a Mesh"],
+    "nacre.evaluation.sample_surface(mesh)": ["needs triangles", "mesh.vertices, mesh.triangles"],
+    "nacre.viewer.export_html(done)": ["needs path", "read_timeline(folder)"],
+    # Arguments that changed places.
+    "nacre.write_camera(camera, out)": ["path must be a path, as in write_camera(path, camera), got Camera"],
+    "nacre.read_camera(camera)": ["path must be a path, as in read_camera(path), got Camera"],
+    "nacre.read_trajectory(done.trajectory)": ["path must be", "got Trajectory"],
+    "nacre.write_recording(camera, depths, out, depth_scale=1000)": ["path must be", "got Camera"],
+    "nacre.write_animation(mesh.vertices, mesh.triangles, out)": ["path must be a path", "got ndarray"],
+    "nacre.Model.load(model)": ["path must be a path, as in load(path), got Model"],
+    "model.save(model)": ["path must be a path, as in save(path), got Model"],
+    "nacre.viewer.export_html(out, done)": ["path must be", "got Reconstruction"],
+    "nacre.io.images.read_depth(depths[0])": ["path must be", "got ndarray"],
     # Arguments of other libraries.
     "model.add_frame(depths[0], pose=np.eye(4))": ["it is guess"],
     "model.add_frame(depths[0], extrinsic=np.eye(4))": ["guess takes its inverse"],
@@ -178,7 +220,29 @@ TOLD = {
     "tree.query(points, p=1)": ["Euclidean"],
     "nacre.reconstruct(depths, camera=camera, voxel_size=0.01)": ["spacing"],
     "nacre.reconstruct(depths, camera=camera, max_depth=2.0)": ["depth.max_depth"],
+    "nacre.write_animation(out, [corners], faces, fps=30)": ["times", "numpy.arange(F) / fps"],
     # Values that cannot be right.
+    "nacre.turntable_poses(mesh, 12, 30)": ["step must be radians", "math.radians(30)"],
+    "nacre.NoiseModel('kinect')": ["constant must be of type float, got 'kinect'"],
+    "nacre.DepthParameters(max_depth='far')": ["max_depth must be of type float, got 'far'"],
+    "nacre.RegionParameters(object='yes')": ["object must be of type bool, got 'yes'"],
+    "nacre.ModelParameters(max_points=1e6)": ["max_points must be of type int, got 1000000.0"],
+    "nacre.ModelParameters(depth='fine')": ["depth must be of type DepthParameters, got 'fine'"],
+    "nacre.Cloud([])": ["points must have shape (N, 3), got (0,)"],
+    "nacre.Cloud(points, normals=points[:9])": ["normals must have one row per point", "400", "9"],
+    "nacre.Cloud(points, colors=rgb[:9])": ["colors must have shape (400, 3)", "(9, 3)"],
+    "nacre.calibrate_depth(depths, camera)": ["views must be pairs of depth and world_from_camera"],
+    "nacre.calibrate_noise(folder / 'recording', camera)": ["images must be a sequence of items"],
+    "nacre.write_recording(folder / 'g', camera, 5, depth_scale=1000)": ["depth_images must be a sequence"],
+    "nacre.write_points(out, points, attributes=[1])": ["attributes must be a mapping", "got list"],
+    "nacre.write_points(out, points, comments=3)": ["comments must be a sequence of items, got 3"],
+    "nacre.evaluation.seen_samples(mesh, points, camera, done.poses)": ["samples must be", "got ndarray"],
+    "nacre.meshing.texture_views(done, done.poses)": ["must be a nacre.Sequence", "give its .sequence"],
+    "nacre.datasets.write_colmap(folder / 'c', done, done.poses)": ["nacre.Sequence", "give its .sequence"],
+    "nacre.report.write_report(out, done)": ["data must be", "report_data(title=...)", "got Reconstruction"],
+    "nacre.viewer.Viewer(done)": ["timeline must be a nacre.viewer.Timeline, got Reconstruction"],
+    "nacre.viewer.export_html(done, folder / 'a.html')": ["must be a nacre.viewer.Timeline"],
+    "nacre.reconstruction.Reconstruction(depths, camera)": ["model must be a nacre.Model, got Camera"],
     "nacre.reconstruct(depths)": ["camera", "Camera.from_fov"],
     "nacre.reconstruct(millimetres, camera=camera)": ["depth_scale", "1000 for millimetres"],
     "nacre.reconstruct(files, camera=camera)": ["depth_scale", "1000 for millimetres"],
@@ -224,3 +288,16 @@ def test_a_guess_is_answered_by_what_to_do(guess: str, world: dict[str, Any]) ->
         eval(guess, dict(world))
     for word in TOLD[guess]:
         assert word in str(told.value)
+
+
+TAKES_ARGUMENTS = [
+    name
+    for name, value in public_names.members().items()
+    if inspect.isroutine(value) and inspect.signature(value).parameters
+]
+
+
+@pytest.mark.parametrize("function", TAKES_ARGUMENTS)
+def test_an_unknown_argument_is_named_or_what_is_missing(function: str) -> None:
+    with pytest.raises(TypeError, match=r"has no argument 'nonesuch'|needs \w+"):
+        public_names.members()[function](nonesuch=1)

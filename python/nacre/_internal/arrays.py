@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 import os
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -27,16 +28,26 @@ def as_array(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
         raise TypeError(f"{name} must have no masked values, got some: fill them first, with NaN or with 0")
     try:
         return np.asarray(value)
-    except (TypeError, ValueError) as error:  # rows of different lengths
-        raise ValueError(f"{name} must be an array, got {type(value).__name__}: {error}") from None
+    except (TypeError, ValueError) as error:  # what is no array says so itself; rows of different lengths
+        kind = TypeError if isinstance(error, TypeError) else ValueError
+        raise kind(f"{name} must be an array, got {type(value).__name__}: {error}") from None
 
 
 def as_real(name: str, value: npt.ArrayLike) -> npt.NDArray[Any]:
     """Return ``value`` as an array of real numbers, in its dtype."""
     array = as_array(name, value)
     if array.dtype.kind not in "buif":
-        raise TypeError(f"{name} must be an array of real numbers, got dtype {array.dtype}")
+        raise TypeError(f"{name} must be an array of real numbers, got {_what_came(value, array)}")
     return array
+
+
+def _what_came(value: npt.ArrayLike, array: npt.NDArray[Any]) -> str:
+    """Say what came in place of an array of numbers: of a file how to read it."""
+    if isinstance(value, str | os.PathLike):
+        reads = "nacre.read_points(path) reads points, nacre.io.images.read_depth(path) a depth image"
+        return f"{value!r}{f'; {reads}' if Path(value).suffix else ''}"
+    is_none = array.ndim == 0 and array.dtype.kind == "O"
+    return f"dtype {array.dtype}{f' ({type(value).__name__})' * is_none}"
 
 
 def as_rows(array: npt.NDArray[Any], dtype: npt.DTypeLike) -> npt.NDArray[Any]:
@@ -58,10 +69,6 @@ def as_points(name: str, value: npt.ArrayLike) -> FloatArray:
     float32 and float64 arrays that are already C-contiguous are returned as they are; other real dtypes
     become float64.
     """
-    if isinstance(value, str | os.PathLike):
-        raise TypeError(
-            f"{name} must be an array of real numbers, got {value!r}; nacre.read_points(path) reads a file"
-        )
     array = as_real(name, value)
     if array.ndim != 2 or array.shape[1] != 3:
         raise ValueError(f"{name} must have shape (N, 3), got {array.shape}")

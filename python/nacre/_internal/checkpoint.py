@@ -11,7 +11,7 @@ from typing import Any
 
 from nacre import _core
 from nacre._internal.arrays import as_scale
-from nacre._internal.guided import GuidedNames
+from nacre._internal.guided import GuidedNames, guided
 from nacre.errors import FileFormatError
 
 POINTS_AND_MESHES = frozenset([
@@ -23,6 +23,7 @@ POINTS_AND_MESHES = frozenset([
 class Checkpointed(GuidedNames, ABC):
     """What can be written to a file between any two frames, and goes on from there to the same bits."""
 
+    @guided()
     def save(self, path: str | os.PathLike[str]) -> None:
         """
         Write all that is known to a file, so that ``load`` can go on with it.

@@ -17,6 +17,29 @@ Parameters = TypeVar("Parameters")
 Result = TypeVar("Result")
 
 
+_NUMBERS = {int: "__index__", float: "__float__"}
+"""Types of numbers, and what every number has that stands for one."""
+
+
+class TypedFields:
+    """Base of dataclasses of parameters: a value of another type than its default is refused at once."""
+
+    def __post_init__(self) -> None:
+        """Raise where a value is of another type."""
+        for field in dataclasses.fields(self):  # type: ignore[arg-type]
+            value, kind = getattr(self, field.name), type(field.default)
+            if field.default is dataclasses.MISSING:
+                kind = field.default_factory  # type: ignore[assignment]
+            if kind in _NUMBERS:
+                fits = hasattr(value, _NUMBERS[kind])
+            else:  # what words and None stand for is known where they are used
+                fits = kind in (str, type(None)) or isinstance(
+                    value, (bool, np.bool_) if kind is bool else kind
+                )
+            if not fits:
+                raise TypeError(f"{field.name} must be of type {kind.__name__}, got {value!r}")
+
+
 def to_core(parameters: Any, core: Core) -> Core:
     """
     Copy every field of a dataclass into the C++ options object ``core`` and return it.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import os
 from collections.abc import Callable, Iterable, Mapping
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
@@ -18,6 +19,8 @@ def guided(
 ) -> Callable[[Callable[Arguments, Result]], Callable[Arguments, Result]]:
     """
     Decorate a function so that a call with missing, unknown or too many arguments says how to call it.
+
+    So does a call that fails with something else in place of its path.
 
     Parameters
     ----------
@@ -35,14 +38,22 @@ def guided(
             if elsewhere.keys().isdisjoint(named):
                 try:
                     return function(*given, **named)
-                except TypeError:
+                except TypeError as error:
                     if _fits(signature, given, named):
+                        if not str(error).startswith("path must"):
+                            _require_path(function, signature.bind(*given, **named))
                         raise
             raise TypeError(_how_to_call(function, signature, given, named, hint, elsewhere))
 
         return call
 
     return decorate
+
+
+_PATH = "str | os.PathLike[str]"
+_NO_PARAMETER = inspect.Parameter("none", inspect.Parameter.POSITIONAL_ONLY)
+_VOWELS = ("A", "E", "I", "O", "FS")
+_PLACED = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 
 
 def _fits(signature: inspect.Signature, given: tuple[Any, ...], named: Mapping[str, Any]) -> bool:
@@ -53,6 +64,22 @@ def _fits(signature: inspect.Signature, given: tuple[Any, ...], named: Mapping[s
     return True
 
 
+def _require_path(function: Callable[..., Any], bound: inspect.BoundArguments) -> None:
+    """Raise where the path of a call is none, as where it changed places with what is to be written."""
+    path = bound.arguments.get("path", "")
+    takes_path_alone = bound.signature.parameters.get("path", _NO_PARAMETER).annotation == _PATH
+    if takes_path_alone and not isinstance(path, str | os.PathLike):
+        own = [
+            p.name for p in bound.signature.parameters.values() if p.default is p.empty and p.kind in _PLACED
+        ]
+        call = f"{_name_of(function)}({', '.join(name for name in own if name not in ('self', 'cls'))})"
+        raise TypeError(f"path must be a path, as in {call}, got {type(path).__name__}") from None
+
+
+def _name_of(function: Callable[..., Any]) -> str:
+    return function.__qualname__.removesuffix(".__init__").rpartition(".")[2]
+
+
 def _how_to_call(
     function: Callable[..., Any],
     signature: inspect.Signature,
@@ -61,7 +88,7 @@ def _how_to_call(
     hint: str,
     elsewhere: Mapping[str, str],
 ) -> str:
-    name = function.__qualname__.removesuffix(".__init__").rpartition(".")[2]
+    name = _name_of(function)
     parameters = [p for p in signature.parameters.values() if p.name not in ("self", "cls")]
     own_object = len(signature.parameters) - len(parameters)
     takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters)
@@ -106,13 +133,23 @@ def no_such_member(kind: type, name: str, owner: Any) -> AttributeError:
         return AttributeError(f"{kind.__name__!r} object has no attribute {name!r}")
     from nacre._internal.names_elsewhere import OF_CLASS
 
-    article = "an" if kind.__name__.startswith(("A", "E", "I", "O", "FS")) else "a"
+    article = "an" if kind.__name__.startswith(_VOWELS) else "a"
     known = (word for word in dir(owner) if not word.startswith("_"))
     return no_such_name(f"{article} {kind.__name__}", name, known, OF_CLASS.get(kind.__name__, {}))
 
 
+def no_array(value: Any) -> TypeError:
+    """Return the error for an object that NumPy is to make an array of, and which is none."""
+    from nacre._internal.names_elsewhere import ARRAYS_OF
+
+    kind = type(value).__name__
+    article = "an" if kind.startswith(_VOWELS) else "a"
+    parts = ARRAYS_OF.get(kind)
+    return TypeError(f"{article} {kind} is no array{f': give its {parts}' if parts else ''}")
+
+
 class GuidedNames:
-    """Base of classes whose missing attributes are answered by what takes their place."""
+    """Base of classes whose missing attributes, and arrays, are answered by what takes their place."""
 
     __slots__ = ()
 
@@ -123,3 +160,6 @@ class GuidedNames:
             if name in dir(kind):  # a property that raised
                 return object.__getattribute__(self, name)
             raise no_such_member(kind, name, self)
+
+        def __array__(self, dtype: Any = None, copy: bool | None = None) -> Any:
+            raise no_array(self)

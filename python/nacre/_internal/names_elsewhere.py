@@ -8,6 +8,8 @@ _GLOBAL = "it is nacre.align_global(source, target), which needs no features"
 _FUSION = "nacre.Model(camera).add_frame(depth, color) fuses images, and finds their poses"
 _TREE = "it is nacre.KdTree(points)"
 _VOXELS = "it is nacre.voxel_downsample(points, voxel_size)"
+_TEXTURE = "nacre.meshing.texture_mesh(mesh.vertices, mesh.triangles, views) paints one"
+_ON_SURFACE = "nacre.meshing.on_surface(points, normals, confidence) tells which points are a surface"
 _MODULES = "functions on points and images are in nacre itself: nacre.align, nacre.KdTree, nacre.read_points"
 _OUTLIERS = (
     "nacre.KdTree(points).query(points, k) has the distances to threshold; "
@@ -147,6 +149,7 @@ OF_CLASS = {
         "transform": _MOVE,
         "rotate": _MOVE,
         "translate": _MOVE,
+        "on_surface": f"{_ON_SURFACE}; model.cloud() has those of a model",
         "crop": "it is cloud[mask], with a mask of its points",
         "select_by_index": "it is cloud[indices]",
         "save": _WRITE_CLOUD,
@@ -172,6 +175,7 @@ OF_CLASS = {
     },
     "Mesh": {
         "faces": "it is triangles",
+        "on_surface": f"mesh.distance(points) has their distances to it; {_ON_SURFACE}",
         "area": "sum the cross products of its edges: numpy.cross",
         "simplify": _SIMPLIFY,
         "simplify_quadric_decimation": _SIMPLIFY,
@@ -182,6 +186,7 @@ OF_CLASS = {
         "save": "it is nacre.write_mesh(path, mesh)",
         "export": "it is nacre.write_mesh(path, mesh)",
         "show": _VIEW,
+        "texture": _TEXTURE,
         "to_trimesh": "trimesh.Trimesh(mesh.vertices, mesh.triangles, vertex_colors=mesh.colors) makes one",
     },
     "Model": {
@@ -191,6 +196,7 @@ OF_CLASS = {
         "extract_triangle_mesh": "it is to_mesh()",
         "mesh": "it is to_mesh()",
         "pose": "it is poses[-1]",
+        "on_surface": "cloud() has the points that are a surface",
         "trajectory": "it is poses",
         "write": "it is nacre.write_points(path, model)",
         "show": _VIEW,
@@ -201,6 +207,7 @@ OF_CLASS = {
         "colors": "it is cloud.colors",
         "mesh": "it is model.to_mesh()",
         "to_mesh": "it is model.to_mesh()",
+        "write": "it is nacre.write_points(path, done), or of its trajectory nacre.write_trajectory",
     },
     "FrameReport": {
         "pose": "it is world_from_camera",
@@ -212,6 +219,21 @@ OF_CLASS = {
         "save": "it is nacre.write_trajectory(path, trajectory)",
     },
 }
+
+ARRAYS_OF = {
+    "AlignResult": "target_from_source",
+    "Camera": "matrix",
+    "CameraFile": "camera.matrix",
+    "FrameReport": "world_from_camera",
+    "GlobalAlignResult": "target_from_source",
+    "KdTree": "points",
+    "Mesh": "vertices or its triangles",
+    "Reconstruction": "cloud.points, its poses or its model",
+    "SequenceFrame": "depth or its color",
+    "SurfaceSamples": "points",
+    "Trajectory": "poses or its timestamps",
+}
+"""What of an object is an array."""
 
 SOME_FRAMES = dict.fromkeys(
     ("every", "step", "stride", "first", "last", "start", "stop", "end", "max_frames"),

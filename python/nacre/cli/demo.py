@@ -21,7 +21,9 @@ def demo(
         "nacre-demo"
     ),
     views: Annotated[int, typer.Option(min=1, help="How many depth images.")] = 12,
-    step: Annotated[float, typer.Option(help="Turn of the camera from view to view (degrees).")] = 30.0,
+    step: Annotated[
+        float, typer.Option(min=-720, max=720, help="Turn of the camera from view to view (degrees).")
+    ] = 30.0,
     noise: Annotated[
         float, typer.Option(min=0, help="Standard deviation of the depth noise (metres).")
     ] = 0.0005,

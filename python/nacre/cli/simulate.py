@@ -37,7 +37,9 @@ def simulate(
         Path, typer.Option("--out", "-o", metavar="OUT", help="Folder for the recording.", show_default=False)
     ],
     views: Annotated[int, typer.Option(min=1, help="How many depth images.")] = 12,
-    step: Annotated[float, typer.Option(help="Turn of the camera from view to view (degrees).")] = 30.0,
+    step: Annotated[
+        float, typer.Option(min=-720, max=720, help="Turn of the camera from view to view (degrees).")
+    ] = 30.0,
     noise: Annotated[
         str,
         typer.Option(

@@ -121,8 +121,10 @@ def reopen(
     import numpy as np
 
     recording = run.report.get("recording") or {}
-    path = Path(recording.get("path") or "")
-    if not recording.get("path") or not path.exists():
+    if not recording.get("path"):
+        raise CommandError(f"{run.folder} is not of a recording, which would have the images", 2)
+    path = Path(recording["path"])
+    if not path.exists():
         raise CommandError(f"{run.folder}: its recording, which has the images, is no longer at {path}")
     sequence = open(path, recording.get("format"), run.camera, recording.get("depth_scale"))
     poses = np.full((len(sequence), 4, 4), np.nan)

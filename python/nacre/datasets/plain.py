@@ -19,6 +19,8 @@ import numpy.typing as npt
 
 from nacre import Camera
 from nacre._internal import arrays
+from nacre._internal.guided import guided
+from nacre._internal.kinds import as_items
 from nacre.datasets.listing import describe, files, require_order
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
@@ -89,6 +91,10 @@ def read(folder: Path, given: Overrides) -> Sequence:
     )
 
 
+@guided(
+    "it is write_recording(path, camera, depth_images, depth_scale=...); a Sequence has its camera, its "
+    "depth_scale and frames with depth"
+)
 def write_recording(
     path: str | os.PathLike[str],
     camera: Camera,
@@ -144,7 +150,7 @@ def write_recording(
         (folder / "color").mkdir(exist_ok=True)
 
     given = {"depth_images": depth_images, "colors": colors, "poses": poses, "timestamps": timestamps}
-    iterators = {name: iter(values) for name, values in given.items() if values is not None}
+    iterators = {name: iter(as_items(name, values)) for name, values in given.items() if values is not None}
     times: list[float] = []
     truth: list[npt.NDArray[np.float64]] = []
     index = 0

@@ -5,15 +5,17 @@ from __future__ import annotations
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
 from nacre._internal.arrays import FloatArray, as_poses
+from nacre._internal.kinds import as_kind
 from nacre.datasets.sequence import Sequence
 from nacre.errors import FileFormatError
-from nacre.io.cloud import Cloud
+from nacre.io.cloud import cloud_of
 from nacre.io.images import write_color_png
 
 # Those programs have the origin in the corner of the first pixel, which in nacre is at its centre.
@@ -34,7 +36,7 @@ class PosedImage:
 
 def pinhole_of(sequence: Sequence) -> Camera:
     """Return the camera of a recording, which must be one that other programs know."""
-    camera = sequence.camera
+    camera = as_kind("sequence", sequence, Sequence, "a nacre.Sequence").camera
     if camera.model != "pinhole":
         raise FileFormatError(sequence.path, f"images need a pinhole camera, this one is {camera.model}")
     return camera
@@ -79,8 +81,9 @@ def write_images(folder: Path, sequence: Sequence, poses: npt.ArrayLike) -> list
     return written
 
 
-def colored_points(cloud: Cloud) -> tuple[FloatArray, npt.NDArray[np.uint8]]:
-    """Return the finite points and their colours, gray where they have none."""
+def colored_points(given: Any) -> tuple[FloatArray, npt.NDArray[np.uint8]]:
+    """Return the finite points of what has some and their colours, gray where they have none."""
+    cloud = cloud_of(given)
     finite = np.isfinite(cloud.points).all(axis=1)
     points = cloud.points[finite]
     colors = np.full(points.shape, _GRAY, np.uint8) if cloud.colors is None else cloud.colors[finite]

@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable, Iterator
 
+from nacre._internal.guided import guided
 from nacre.datasets.sequence import Sequence
 
 _FRAMES_PER_SECOND = 30.0
 
 
+@guided()
 def in_real_time(sequence: Sequence, indices: Iterable[int]) -> Iterator[int]:
     """
     Yield indices of a recording when their time has come, the first one at once.

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_matching_points, as_points
+from nacre._internal.guided import guided
 from nacre.evaluation.result import Count, Fraction, Radians, Result
 
 
@@ -24,6 +25,7 @@ class NormalError(Result):
     num_normals: Count  #: pairs that were compared
 
 
+@guided()
 @np.errstate(over="ignore", invalid="ignore")
 def normal_error(normals: npt.ArrayLike, reference_normals: npt.ArrayLike) -> NormalError:
     """

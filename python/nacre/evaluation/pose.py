@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_poses, as_vector
+from nacre._internal.guided import guided
 from nacre.evaluation.result import Array, Count, Metres, Radians, Result
 from nacre.evaluation.trajectory import absolute_trajectory_error
 
@@ -32,6 +33,7 @@ class PoseError(Result):
     rotation_errors: Array = field(repr=False)  #: one per frame [rad], likewise
 
 
+@guided()
 def pose_error(
     estimated: npt.ArrayLike,
     truth: npt.ArrayLike,

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_array, as_count, as_matching_points, as_points, as_real
+from nacre._internal.guided import guided
 from nacre.evaluation.result import Array, Count, ManyFractions, ManyMetres, Metres, Result
 from nacre.mesh import Mesh
 
@@ -61,6 +62,7 @@ class FScore(Result):
 _MOST_SAMPLES = 10_000_000  # what memory surely holds
 
 
+@guided("it is sample_surface(mesh.vertices, mesh.triangles, num_samples)")
 @np.errstate(over="ignore", invalid="ignore")
 def sample_surface(
     vertices: npt.ArrayLike, triangles: npt.ArrayLike, num_samples: int = 100_000, *, seed: int = 0
@@ -117,6 +119,7 @@ def sample_surface(
     return SurfaceSamples(points, cross[chosen] / doubled_area[chosen, None], chosen)
 
 
+@guided()
 @np.errstate(over="ignore", invalid="ignore")
 def surface_accuracy(
     points: npt.ArrayLike, reference: Mesh | npt.ArrayLike, *, reference_normals: npt.ArrayLike | None = None
@@ -177,6 +180,7 @@ def surface_accuracy(
     )
 
 
+@guided()
 @np.errstate(over="ignore", invalid="ignore")
 def completeness(
     points: npt.ArrayLike,
@@ -241,6 +245,7 @@ def completeness_of(distances: Array, tau: tuple[float, ...]) -> Completeness:
     )
 
 
+@guided()
 @np.errstate(over="ignore", invalid="ignore")
 def f_score(
     points: npt.ArrayLike,

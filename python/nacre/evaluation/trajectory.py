@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_count, as_length, as_number, as_poses, as_times, as_values
+from nacre._internal.guided import guided
 from nacre._internal.rotations import rotation_angles
 from nacre.evaluation.result import Array, Count, Fraction, Metres, Radians, Result
 from nacre.trajectory import associate
@@ -58,6 +59,7 @@ class RelativePoseError(Result):
     num_pairs: Count
 
 
+@guided()
 def absolute_trajectory_error(
     estimated: npt.ArrayLike,
     truth: npt.ArrayLike,
@@ -156,6 +158,7 @@ def absolute_trajectory_error(
     )
 
 
+@guided()
 def relative_pose_error(
     estimated: npt.ArrayLike,
     truth: npt.ArrayLike,

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_points
+from nacre._internal.guided import guided
 from nacre.evaluation.result import Count, Fraction, Metres, Result
 
 
@@ -24,6 +25,7 @@ class Uniformity(Result):
     num_points: Count  #: points that are finite
 
 
+@guided()
 @np.errstate(over="ignore", invalid="ignore")
 def uniformity(points: npt.ArrayLike) -> Uniformity:
     """

@@ -9,10 +9,13 @@ import numpy.typing as npt
 
 from nacre import Camera
 from nacre._internal.arrays import as_camera, as_number, as_poses
+from nacre._internal.guided import guided
+from nacre._internal.kinds import as_kind
 from nacre.evaluation.surface import SurfaceSamples
 from nacre.mesh import Mesh
 
 
+@guided()
 def seen_samples(
     mesh: Mesh,
     samples: SurfaceSamples,
@@ -49,8 +52,8 @@ def seen_samples(
         When a pose or the slant is out of its range.
     """
     as_camera("camera", camera)
-    if not isinstance(mesh, Mesh):
-        raise TypeError(f"mesh must be a nacre.Mesh, got {type(mesh).__name__}")
+    as_kind("mesh", mesh, Mesh, "a nacre.Mesh")
+    as_kind("samples", samples, SurfaceSamples, "nacre.evaluation.sample_surface(...)")
     if not 0 < as_number("max_slant", max_slant) <= math.pi / 2:
         raise ValueError(f"max_slant must be an angle from 0 to pi / 2, got {max_slant!r}")
     seen = np.zeros(len(samples.points), dtype=bool)

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal import arrays
+from nacre._internal.guided import guided
 from nacre.io.cloud import check_cloud
 from nacre.io.glb import VERTEX_BUFFER, document_of, store, unit
 from nacre.io.mesh_arrays import MeshArrays
@@ -18,6 +19,11 @@ from nacre.io.mesh_arrays import MeshArrays
 _RATE = 30.0  # frames a second, where no times are given
 
 
+@guided(
+    "the vertices at each frame, (F, N, 3), and the triangles that join them at all",
+    faces="triangles",
+    fps="times has the seconds of each frame: numpy.arange(F) / fps",
+)
 def write_animation(
     path: str | os.PathLike[str],
     vertices: npt.ArrayLike,

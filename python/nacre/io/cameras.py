@@ -11,7 +11,7 @@ from typing import Any
 
 from nacre import Camera
 from nacre._internal.arrays import as_camera, as_scale
-from nacre._internal.guided import GuidedNames
+from nacre._internal.guided import GuidedNames, guided
 from nacre._internal.warned import warn
 from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
@@ -45,6 +45,7 @@ class CameraFile(GuidedNames):
     depth_scale: float | None
 
 
+@guided()
 def read_camera(path: str | os.PathLike[str]) -> CameraFile:
     """
     Read a camera from a plain recording's ``camera.json`` or from Open3D's intrinsics JSON.
@@ -96,6 +97,7 @@ def check_lens(path: str | os.PathLike[str], camera: Camera) -> Camera:
     return camera
 
 
+@guided()
 def write_camera(path: str | os.PathLike[str], camera: Camera, depth_scale: float | None = None) -> None:
     """
     Write a camera as a plain recording's ``camera.json``, atomically.

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal import arrays
+from nacre._internal.kinds import as_items, as_kind
 from nacre._internal.point_exchange import ArrayOfPoints
 from nacre._internal.value_equality import Value
 from nacre.io.raw import MAX_COMMENTS
@@ -48,6 +49,20 @@ class Cloud(ArrayOfPoints, Value):
     comments: tuple[str, ...] = ()
     shape: tuple[int, int] | None = None
     path: Path | None = None
+
+    def __post_init__(self) -> None:
+        """Take lists, and colours from 0 to 1, for the arrays that they stand for."""
+        points = self.points
+        if not (isinstance(points, np.ndarray) and points.ndim == 2 and points.shape[1] == 3):
+            points = arrays.as_points("points", points)
+            object.__setattr__(self, "points", points)
+        if self.normals is not None and np.shape(self.normals) != points.shape:
+            arrays.as_matching_points("normals", self.normals, "points", len(points))
+        colors = self.colors
+        if colors is not None and not (
+            getattr(colors, "dtype", None) == np.uint8 and colors.shape == points.shape
+        ):
+            object.__setattr__(self, "colors", arrays.as_colors("colors", colors, points.shape))
 
     def __len__(self) -> int:
         return len(self.points)
@@ -129,7 +144,9 @@ def check_cloud(
         normals = arrays.as_matching_points("normals", normals, "points", len(points))
     if colors is not None:
         colors = arrays.as_colors("colors", colors, (len(points), 3))
-    checked = {name: _as_attribute(name, value, len(points)) for name, value in (attributes or {}).items()}
+    given = {} if attributes is None else attributes
+    as_kind("attributes", given, Mapping, "a mapping of names to arrays")
+    checked = {name: _as_attribute(name, value, len(points)) for name, value in given.items()}
     return Cloud(points, normals, colors, checked)
 
 
@@ -145,7 +162,9 @@ def check_comments(comments: Sequence[str]) -> list[str]:
     """Return the comments line by line."""
     if isinstance(comments, str):
         raise TypeError(f"comments must be a sequence of strings, got the string {comments!r}")
-    lines = [line for comment in comments for line in (str(comment).splitlines() or [""])]
+    lines = [
+        line for comment in as_items("comments", comments) for line in (str(comment).splitlines() or [""])
+    ]
     if len(lines) > MAX_COMMENTS:
         raise ValueError(f"comments must be at most {MAX_COMMENTS} lines, got {len(lines)}")
     return lines

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre._internal.guided import guided
 from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
 from nacre.io.image_limits import check_exr, check_pixels, checked_png
@@ -33,6 +34,7 @@ _PGM_GAP = rb"(?:\s|#[^\n]*\n){1,1000}"
 _PGM_HEADER = re.compile(_PGM_GAP.join((rb"P5", *3 * (rb"(\d{1,20})",))) + rb"\s")
 
 
+@guided()
 def read_depth(path: str | os.PathLike[str]) -> npt.NDArray[Any]:
     """
     Read a depth image as it is stored, without any scaling.
@@ -67,6 +69,7 @@ def read_depth(path: str | os.PathLike[str]) -> npt.NDArray[Any]:
     return stored
 
 
+@guided()
 def read_color(path: str | os.PathLike[str]) -> npt.NDArray[np.uint8]:
     """
     Read a colour image as (H, W, 3) uint8 RGB; grey images are repeated, transparency is dropped.

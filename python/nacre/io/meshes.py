@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from nacre._internal import arrays
 from nacre._internal.arrays import as_flag
+from nacre._internal.guided import guided
 from nacre._internal.warned import warn_of_loss
 from nacre.errors import FileFormatError
 from nacre.io import glb, glb_reader, obj, off, ply, stl
@@ -32,6 +33,7 @@ TEXTURE_SUFFIXES = (".glb", ".obj")
 _CALLS = "write_mesh(path, mesh) and read_mesh(path)"
 
 
+@guided()
 def read_mesh(path: str | os.PathLike[str]) -> Mesh:
     """
     Read a triangle mesh.
@@ -78,6 +80,7 @@ def read_mesh_arrays(path: str | os.PathLike[str]) -> MeshArrays:
     return mesh
 
 
+@guided("a Mesh, or vertices and triangles", faces="triangles", mesh="vertices")
 def write_mesh(
     path: str | os.PathLike[str],
     vertices: npt.ArrayLike | Mesh,

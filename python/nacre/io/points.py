@@ -32,6 +32,7 @@ STREAMED_SUFFIXES = (".ply", ".pcd", ".las", ".laz")
 """Of formats that can be written in pieces."""
 
 
+@guided()
 def read_points(path: str | os.PathLike[str]) -> Cloud:
     """
     Read a point file.

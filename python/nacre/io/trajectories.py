@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import FARTHEST
+from nacre._internal.guided import guided
 from nacre._internal.quaternions import matrix_from_quaternion, quaternion_from_matrix
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_writer
@@ -53,6 +54,7 @@ class _Format:
     parse: Callable[[_Block], tuple[Float64, Float64]]
 
 
+@guided()
 def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     """
     Read a trajectory; the format is recognised from the content.
@@ -86,6 +88,7 @@ def read_trajectory(path: str | os.PathLike[str]) -> Trajectory:
     return Trajectory(timestamps, poses)
 
 
+@guided()
 def write_trajectory(
     path: str | os.PathLike[str],
     timestamps: npt.ArrayLike | Trajectory,

@@ -6,8 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal import arrays
+from nacre._internal.guided import guided
 
 
+@guided()
 def boundary_loops(triangles: npt.ArrayLike) -> list[npt.NDArray[np.int32]]:
     """
     Return the loops of edges that have a triangle on one side alone.

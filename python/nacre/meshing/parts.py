@@ -7,8 +7,10 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal import arrays
+from nacre._internal.guided import guided
 
 
+@guided()
 def largest_part(triangles: npt.ArrayLike) -> npt.NDArray[np.int32]:
     """
     Return the triangles of the part that has most of them.
@@ -33,6 +35,7 @@ def largest_part(triangles: npt.ArrayLike) -> npt.NDArray[np.int32]:
     return largest
 
 
+@guided()
 def part_sizes(triangles: npt.ArrayLike) -> npt.NDArray[np.int64]:
     """
     Return of how many triangles each part consists, the largest first.

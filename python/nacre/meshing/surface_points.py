@@ -7,11 +7,13 @@ import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal import arrays
+from nacre._internal.guided import guided
 from nacre.meshing.triangulation import triangulate
 
 _LEAST_OF_OBJECT = 0.01  # of the points of its largest part, tuned: smaller ones lie beside it
 
 
+@guided("a Model has normals and confidence; model.cloud() has its points that are a surface")
 def on_surface(
     points: npt.ArrayLike, normals: npt.ArrayLike, confidence: npt.ArrayLike, *, num_threads: int = 0
 ) -> npt.NDArray[np.bool_]:

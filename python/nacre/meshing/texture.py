@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal import arrays
+from nacre._internal.kinds import as_kind
 from nacre._internal.value_equality import Value
 
 
@@ -34,8 +35,7 @@ class Texture(Value):
 
 def check_texture(texture: Any, num_triangles: int) -> Texture:
     """Return a texture, which must fit a mesh of so many triangles."""
-    if not isinstance(texture, Texture):
-        raise TypeError(f"texture must be a nacre.meshing.Texture, got {type(texture).__name__}")
+    as_kind("texture", texture, Texture, "a nacre.meshing.Texture")
     image = arrays.as_array("texture.image", texture.image)
     if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3 or not image.size:
         raise ValueError(f"texture.image must be (H, W, 3) uint8, got {image.shape} of {image.dtype}")

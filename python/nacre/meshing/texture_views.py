@@ -12,6 +12,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal import arrays
+from nacre._internal.guided import guided
+from nacre._internal.kinds import as_kind
 from nacre._internal.value_equality import Value
 from nacre.camera import Camera, camera_of
 from nacre.errors import FileFormatError
@@ -73,6 +75,7 @@ def _checked(name: str, view: Any) -> TextureView:
     return TextureView(color, camera, pose, depth)
 
 
+@guided("a Reconstruction has sequence and poses")
 def texture_views(sequence: Sequence, poses: npt.ArrayLike, *, most: int = _MOST_VIEWS) -> list[TextureView]:
     """
     Choose the views of a recording that a mesh is to be painted from: spread over the path, and sharp.
@@ -103,6 +106,7 @@ def texture_views(sequence: Sequence, poses: npt.ArrayLike, *, most: int = _MOST
     The path, measured by how far the image moves, is cut into ``most`` stretches; of each, the image whose
     Laplacian varies most is taken.
     """
+    as_kind("sequence", sequence, collections.abc.Sequence, "a nacre.Sequence")
     known = arrays.as_poses("poses", poses)
     if len(known) != len(sequence):
         raise ValueError(f"poses must have one matrix per view ({len(sequence)}), got {len(known)}")

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal import arrays
+from nacre._internal.guided import guided
 from nacre.camera import Camera
 from nacre.mesh import Mesh
 from nacre.meshing.texture import Texture
@@ -37,6 +38,10 @@ _SAMPLES = 5  # of the colours along an edge
 _GRAY = 128.0  # where neither an image nor a colour is known
 
 
+@guided(
+    "nacre.meshing.texture_views(sequence, poses) has views, and a Mesh vertices and triangles",
+    faces="triangles",
+)
 def texture_mesh(
     vertices: npt.ArrayLike,
     triangles: npt.ArrayLike,

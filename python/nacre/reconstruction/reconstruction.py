@@ -11,13 +11,15 @@ import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_count, as_flag, stacked_poses
 from nacre._internal.checkpoint import Checkpointed
+from nacre._internal.guided import guided
+from nacre._internal.kinds import as_kind
 from nacre.datasets.read_ahead import read_ahead
 from nacre.datasets.sequence import SequenceFrame
 from nacre.depth_calibration import DepthCalibration
@@ -95,8 +97,8 @@ class Reconstruction(Checkpointed):
     """
 
     def __init__(self, sequence: collections.abc.Sequence[SequenceFrame], model: Model) -> None:
-        self.sequence = sequence
-        self.model = model
+        self.sequence = as_kind("sequence", sequence, collections.abc.Sequence, "a nacre.Sequence")
+        self.model = as_kind("model", model, Model, "a nacre.Model")
         self.frames: list[FrameRecord] = []
         self.evaluation: dict[str, Result] = {}
         self.cancelled = False
@@ -113,9 +115,6 @@ class Reconstruction(Checkpointed):
             f"Reconstruction({len(self.frames)} of {len(self.sequence)} frames done"
             f"{f' ({statuses})' * bool(statuses)}, {len(self.model)} points{ended})"
         )
-
-    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> NoReturn:
-        raise TypeError("a Reconstruction is no array: give its cloud.points, its poses or its model")
 
     def complete(
         self,
@@ -260,6 +259,7 @@ class Reconstruction(Checkpointed):
         return self.model._checkpoint(run=run, **more)
 
     @classmethod
+    @guided()
     def load(
         cls,
         path: str | os.PathLike[str],

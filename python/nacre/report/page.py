@@ -8,6 +8,8 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from nacre import __version__
+from nacre._internal.guided import guided
+from nacre._internal.kinds import as_kind
 from nacre.errors import printable
 from nacre.evaluation import AbsoluteTrajectoryError
 from nacre.io.atomic import atomic_writer
@@ -34,6 +36,7 @@ class Section(NamedTuple):
     content: Any
 
 
+@guided()
 def write_report(path: str | os.PathLike[str], data: ReportData) -> None:
     """
     Write a reconstruction's report: one HTML file with its pictures inside, without network or script.
@@ -63,6 +66,7 @@ def write_report(path: str | os.PathLike[str], data: ReportData) -> None:
 
 def render_page(data: ReportData) -> str:
     """Return the report as HTML text."""
+    as_kind("data", data, ReportData, "nacre.report.ReportData, as done.report_data(title=...) makes it")
     summary = summarize(data)
     model = None if data.model is None else draw_model(data.model, data.frames)
     page = render(

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
+from nacre._internal.guided import guided
+from nacre._internal.kinds import as_kind
 from nacre.io.atomic import atomic_writer
 from nacre.viewer.packing import pack_files
 from nacre.viewer.page_data import PageData
@@ -46,6 +48,7 @@ def page_html(title: str, data: bytes = b"") -> str:
     return page
 
 
+@guided("nacre.viewer.read_timeline(folder) has the timeline of a run")
 def export_html(
     timeline: Timeline,
     path: str | os.PathLike[str],
@@ -77,6 +80,7 @@ def export_html(
     Positions are rounded to 1 / 65535 of the model's longest side, confidence and standard deviations to
     0.02 %, and of more than a million points every second, third, ... is kept.
     """
+    as_kind("timeline", timeline, Timeline, "a nacre.viewer.Timeline")
     if not timeline.has_points:
         raise ValueError("timeline must hold a state of the model to export, got none")
     data = PageData([timeline] if other is None else [timeline, other])

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from nacre._internal.kinds import as_kind
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_path
 from nacre.report.reported_frame import ReportedFrame
@@ -39,6 +40,7 @@ def export_rrd(timeline: Timeline, path: str | os.PathLike[str]) -> None:
     OSError
         When the file cannot be written.
     """
+    as_kind("timeline", timeline, Timeline, "a nacre.viewer.Timeline")
     try:
         import rerun
     except ImportError as error:

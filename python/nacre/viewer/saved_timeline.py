@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import KdTree, estimate_normals
+from nacre._internal.guided import guided
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Cloud
 from nacre.io.meshes import READ_SUFFIXES, read_mesh_arrays
@@ -20,6 +21,7 @@ from nacre.report.saved_run import SavedRun
 from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline
 
 
+@guided()
 def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     """
     Read what a reconstruction wrote, or the points or the mesh of a file.

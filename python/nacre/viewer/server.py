@@ -11,6 +11,7 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
+from nacre._internal.kinds import as_kind
 from nacre.parameters import DepthParameters
 from nacre.viewer.controls import Controls
 from nacre.viewer.page import page_html
@@ -57,6 +58,7 @@ class Viewer:
     ) -> None:
         self.timeline = timeline
         self.controls = controls
+        as_kind("timeline", timeline, Timeline, "a nacre.viewer.Timeline")
         self._timelines: Sequence[Timeline] = [timeline] if other is None else [timeline, other]
         self._parameters = parameters
         self.revision = 0

@@ -112,6 +112,11 @@ def test_a_recording_that_is_gone_or_gray(painted_run, tmp_path):
     assert "has no colour images, which --texture paints with" in fails(1, "mesh", folder, "--texture")
     shutil.rmtree(recording)
     assert f"is no longer at {recording}" in fails(1, "mesh", folder, "--texture")
+    report["recording"] = None  # as after nacre demo, whose views are simulated
+    (folder / "report.json").write_text(json.dumps(report))
+    assert f"{folder} is not of a recording, which would have the images" in fails(
+        2, "mesh", folder, "--texture"
+    )
     (folder / "report.json").unlink()
     assert "has no report.json" in fails(2, "mesh", folder, "--texture")
     assert not (folder / "mesh.glb").exists()

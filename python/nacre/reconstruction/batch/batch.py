@@ -11,6 +11,7 @@ from typing import Any
 from nacre._internal.arrays import as_count, as_flag
 from nacre._internal.core_options import updated
 from nacre._internal.guided import guided
+from nacre._internal.kinds import as_kind
 from nacre.parameters import ModelParameters, Preset
 from nacre.progress import as_progress
 from nacre.reconstruction.batch.result import BatchResult
@@ -120,9 +121,8 @@ def batch(
     >>> results = nacre.batch("scans/*", "models", every=2, progress=print)  # doctest: +SKIP
     >>> [result.name for result in results if result.level != "ok"]  # doctest: +SKIP
     """
-    if parameters is not None and not isinstance(parameters, ModelParameters):
-        raise TypeError(f"parameters must be nacre.ModelParameters, got {type(parameters).__name__}")
-    of_model = updated(ModelParameters.preset(preset) if parameters is None else parameters, changes)
+    given = ModelParameters.preset(preset) if parameters is None else parameters
+    of_model = updated(as_kind("parameters", given, ModelParameters, "nacre.ModelParameters"), changes)
     if not isinstance(attributes, Mapping | None):
         raise TypeError(f"attributes must be folders by their names, got {attributes!r}")
     options = RunOptions(
