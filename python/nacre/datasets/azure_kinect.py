@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre._internal.warned import warn
 from nacre.datasets.listing import describe, files
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.rational_lens import polynomial_of
@@ -25,7 +25,6 @@ LAYOUT = "calibration.json and the depth images, in depth/ or beside it, as ffmp
 SUFFIXES = (".mkv",)
 DEPTH_SCALE = 1000.0
 
-_log = logging.getLogger(__name__)
 # Size of the depth images: the side of the sensor in their pixels, and where on it they begin.
 _MODES = {
     (640, 576): (1024, 192, 180),
@@ -103,7 +102,7 @@ def _camera(path: Path, width: int, height: int) -> Camera:
     cx, cy, fx, fy, *lens = _parameters(path)
     (k1, k2, k3), error = polynomial_of(np.array(lens[:6]), np.hypot(width, height) / (2 * side * fx))
     if error * side * fx > 1:
-        _log.warning("the lens is known to %.1f pixels at the edges of the images", error * side * fx)
+        warn(f"{path}: the lens is known to {error * side * fx:.1f} pixels at the edges of the images")
     # The file measures from the corner of the sensor in its sides; pixel centres are integers.
     try:
         camera = Camera(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 import time
 from collections.abc import Iterator
@@ -12,11 +11,10 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre._internal.warned import warn
 from nacre.datasets.closable import Closable
 from nacre.datasets.sequence import SequenceFrame
 from nacre.errors import CameraError
-
-_log = logging.getLogger(__name__)
 
 _MISSING = (
     "cameras of OpenNI and Orbbec need OpenCV's cv2, built with -D WITH_OPENNI2=ON or -D WITH_OBSENSOR=ON; "
@@ -191,11 +189,9 @@ class OpenCVCamera(Closable):
         color = self._color[1]
         if color.shape[:2] == (self.camera.height, self.camera.width):
             return color
-        _log.warning(
-            "colours are left out: the images are %d x %d, and the depth images %d x %d",
-            color.shape[1], color.shape[0], self.camera.width, self.camera.height,
-        )  # fmt: skip
         self._wants_color, self._color = False, None
+        size, wanted = f"{color.shape[1]} x {color.shape[0]}", f"{self.camera.width} x {self.camera.height}"
+        warn(f"colours are left out: the images are {size}, and the depth images {wanted}")
         return None
 
 

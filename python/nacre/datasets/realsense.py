@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import os
 import time
 from collections.abc import Iterator
@@ -12,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from nacre import Camera
+from nacre._internal.warned import warn
 from nacre.datasets.closable import Closable
 from nacre.datasets.sequence import SequenceFrame
 from nacre.errors import CameraError, FileFormatError
 
-_log = logging.getLogger(__name__)
 _MISSING = 'RealSense cameras need pyrealsense2: pip install "nacre[realsense]"'
 
 
@@ -202,7 +201,7 @@ def _camera(intrinsics: Any) -> Camera:
     distortion = [float(c) for c in intrinsics.coeffs]
     model = str(intrinsics.model).rpartition(".")[2]
     if any(distortion) and model != "brown_conrady":
-        _log.warning("the depth camera's distortion (%s) is left out", model)
+        warn(f"the depth camera's distortion ({model}) is left out")
         distortion = [0.0] * 5
     return Camera(
         intrinsics.width, intrinsics.height, intrinsics.fx, intrinsics.fy, intrinsics.ppx, intrinsics.ppy,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 import re
 from pathlib import Path
 
 import numpy as np
 
 from nacre import Camera
+from nacre._internal.warned import warn
 from nacre.datasets.listing import describe, files, pair
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
@@ -22,7 +22,6 @@ FORMAT = "redwood"
 LAYOUT = "depth/ and image/, color/ or rgb/, optionally an Open3D intrinsics .json and a trajectory .log"
 DEPTH_SCALE = 1000.0
 
-_log = logging.getLogger(__name__)
 _COLOR_FOLDERS = ("image", "color", "rgb")
 _TRUTH_PATTERNS = ("*groundtruth*.log", "trajectory.log", "*-traj.txt")
 
@@ -49,7 +48,7 @@ def read(folder: Path, given: Overrides) -> Sequence:
     camera = given.camera
     if camera is None:
         camera = Camera(width=640, height=480, fx=525.0, fy=525.0, cx=319.5, cy=239.5)
-        _log.warning("%s: no intrinsics .json; assumed a PrimeSense camera, %r", folder, camera)
+        warn(f"{folder}: no intrinsics .json; assumed a PrimeSense camera, {camera!r}")
     colors: list[Path | None] = [None] * len(depth)
     for name in _COLOR_FOLDERS:
         if files(folder / name, COLOR_SUFFIXES):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import struct
 from pathlib import Path
 from typing import Any
@@ -11,12 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre._internal.warned import warn
 from nacre.datasets.rational_lens import polynomial_of
 from nacre.errors import FileFormatError
 from nacre.io.cameras import check_lens
 from nacre.io.images import decode_color, decoded
-
-_log = logging.getLogger("nacre")
 
 IMAGE, COMPRESSED_IMAGE = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
 CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
@@ -114,12 +112,12 @@ def _distortion(info: Any) -> list[float]:
     if not d.any() or (model != "equidistant" and len(d) in (4, 5)):
         return [float(c) for c in d[:5]] if len(d) in (4, 5) else [0.0] * 5
     if model != "rational_polynomial" or len(d) < 8 or not np.isfinite(d).all() or d[8:].any():
-        _log.warning("the distortion of the depth camera (%s, %d coefficients) is left out", model, len(d))
+        warn(f"the distortion of the depth camera ({model}, {len(d)} coefficients) is left out")
         return [0.0] * 5
     radius = np.hypot(info.width, info.height) / (2 * matrix[0, 0])
     (k1, k2, k3), error = polynomial_of(d[[0, 1, 4, 5, 6, 7]], radius)
     if error * matrix[0, 0] > 1:
-        _log.warning("the lens is known to %.1f pixels at the edges of the images", error * matrix[0, 0])
+        warn(f"the lens is known to {error * matrix[0, 0]:.1f} pixels at the edges of the images")
     return [k1, k2, float(d[2]), float(d[3]), k3]
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-import logging
 import threading
 import time
 from collections import deque
@@ -16,12 +15,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre._internal.warned import warn
 from nacre.datasets.closable import Closable
 from nacre.datasets.ros_messages import METRES, camera_of, color_of, depth_of, have_one_lens
 from nacre.datasets.sequence import SequenceFrame
 from nacre.errors import CameraError, FileFormatError
-
-_log = logging.getLogger(__name__)
 
 _MISSING = (
     "ROS 2 topics need rclpy, which comes with ROS 2 and not from pip: source its setup.bash in this shell, "
@@ -210,10 +208,8 @@ class RosTopic(Closable):
         return None
 
     def _leave_out_color(self, reason: str) -> None:
-        _log.warning(
-            "colours of %s are left out: %s; align them to the depth images", self._color_topic, reason
-        )
-        self._color_topic = None
+        topic, self._color_topic = self._color_topic, None
+        warn(f"colours of {topic} are left out: {reason}; align them to the depth images")
 
     def _told(self, read: Callable[..., Any], *arguments: Any) -> Any:
         """Read a message; what is wrong with it is the camera's error."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import re
 import weakref
 from collections.abc import Generator
@@ -15,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre._internal.warned import warn
 from nacre.datasets.listing import describe
 from nacre.datasets.open_file import OpenFile
 from nacre.datasets.overrides import Overrides
@@ -34,8 +34,6 @@ from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
 from nacre.io.images import decode_color
 from nacre.io.raw import read_file, require_regular
-
-_log = logging.getLogger(__name__)
 
 FORMAT = "rosbag"
 LAYOUT = (
@@ -172,9 +170,7 @@ class _Bag(OpenFile):
             if "/device_" in topic
             else ""
         )
-        _log.warning(
-            "%s: %s is left out: its camera is not that of %s%s", self.path, topic, self.depth_topic, hint
-        )
+        warn(f"{self.path}: {topic} is left out: its camera is not that of {self.depth_topic}{hint}")
         return False
 
     def _first(self, connection: Any) -> Any:

@@ -20,6 +20,7 @@ from nacre import Camera
 from nacre._internal import arrays
 from nacre._internal.guided import guided
 from nacre._internal.value_equality import Value
+from nacre._internal.warned import warn
 from nacre.datasets.listing import files, pair
 from nacre.datasets.sanity_check import depth_oddity
 from nacre.errors import FileFormatError, printable
@@ -404,7 +405,7 @@ def check_first_view(sequence: Sequence) -> Sequence:
         try:
             check_size(source.color, _named(sequence._load_color, source.color), sequence.camera)
         except FileFormatError as error:
-            _log.warning("colour is left out: %s", error)
+            warn(f"colour is left out: {error}")
             return sequence.without_color()
         break
     else:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import logging
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre._internal.warned import warn
 from nacre.datasets.listing import describe, natural_key
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
@@ -19,8 +19,6 @@ from nacre.trajectory import Trajectory
 FORMAT = "7-scenes"
 LAYOUT = "frame-000000.depth.png, optionally frame-000000.color.png and frame-000000.pose.txt"
 DEPTH_SCALE = 1000.0
-
-_log = logging.getLogger(__name__)
 
 
 def recognise(folder: Path) -> bool:
@@ -36,12 +34,18 @@ def read(folder: Path, given: Overrides) -> Sequence:
             folder,
             f"a 7-Scenes recording needs frame-000000.depth.png, ...; the folder holds {describe(folder)}",
         )
-    sources = []
+    sources, damaged = [], []
     for index, path in enumerate(depth):
         stem = path.name.removesuffix(".depth.png")
         color = folder / f"{stem}.color.png"
-        pose = _read_pose(folder / f"{stem}.pose.txt")
+        try:
+            pose = _read_pose(folder / f"{stem}.pose.txt")
+        except FileFormatError as error:
+            pose = None
+            damaged.append(error)
         sources.append(FrameSource(index, path, color if color.is_file() else None, None, pose))
+    if damaged:
+        warn(f"{folder}: {len(damaged)} of {len(depth)} views have no true pose; the first: {damaged[0]}")
     known = [(source.index, source.truth) for source in sources if source.truth is not None]
     truth = (
         Trajectory(np.array([i for i, _ in known]), np.array([pose for _, pose in known])) if known else None
@@ -57,12 +61,8 @@ def read(folder: Path, given: Overrides) -> Sequence:
 
 
 def _read_pose(path: Path) -> npt.NDArray[np.float64] | None:
-    """Read a view's pose; the recordings mark a view whose pose is not known by numbers that are none."""
+    """Read a view's pose; a view whose pose is not known has no file, or numbers in it that are none."""
     if not path.is_file():
         return None
-    try:
-        pose: npt.NDArray[np.float64] = read_trajectory(path).poses[0]
-    except FileFormatError as error:
-        _log.warning("no true pose for this view: %s", error)
-        return None
+    pose: npt.NDArray[np.float64] = read_trajectory(path).poses[0]
     return pose

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 import re
 from collections.abc import Iterator
@@ -14,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
+from nacre._internal.warned import warn
 from nacre.datasets.listing import describe, inside, require_order
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
@@ -25,8 +25,6 @@ from nacre.trajectory import Trajectory, associate
 FORMAT = "tum"
 LAYOUT = "depth.txt with lines 'timestamp file', optionally rgb.txt and groundtruth.txt"
 DEPTH_SCALE = 5000.0
-
-_log = logging.getLogger(__name__)
 
 # fx fy cx cy and distortion of the colour camera, to which the depth images are registered, as the
 # benchmark's page gives them; the third camera's images come undistorted.
@@ -139,7 +137,7 @@ def _default_camera(folder: Path) -> Camera:
     (fx, fy, cx, cy), distortion = _CALIBRATIONS[number] if number is not None else _ROS_DEFAULT
     camera = Camera(width=640, height=480, fx=fx, fy=fy, cx=cx, cy=cy, distortion=distortion)
     if number is None:
-        _log.warning("%s: nothing says freiburg1, 2 or 3; assumed the driver's default, %r", folder, camera)
+        warn(f"{folder}: nothing says freiburg1, 2 or 3; assumed the driver's default, {camera!r}")
     return camera
 
 

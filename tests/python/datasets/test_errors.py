@@ -1,7 +1,5 @@
 """What is missing or wrong in a recording is told."""
 
-import logging
-
 import numpy as np
 import pytest
 from recording_folders import SMALL, colors, stored, write_plain, write_redwood, write_seven_scenes, write_tum
@@ -108,12 +106,13 @@ def test_a_view_of_another_size_is_told(tmp_path):
         sequence[2]
 
 
-def test_color_of_another_size_is_left_out(tmp_path, caplog):
+def test_color_of_another_size_is_left_out(tmp_path):
     folder = write_plain(tmp_path / "p")
     (folder / "color").mkdir()
     for i in range(3):
         write_color_png(folder / "color" / f"view{i}.png", colors(i, (12, 16)))
-    with caplog.at_level(logging.WARNING, logger="nacre"):
+    with pytest.warns(UserWarning, match="colour is left out") as told:
         sequence = open_sequence(folder)
-    assert "colour is left out" in caplog.text
+    assert len(told) == 1
+    assert told[0].filename == __file__
     assert sequence[0].color is None

@@ -164,6 +164,7 @@ class TestBroken:
         with pytest.raises(ImportError, match=r'pip install "nacre\[record3d\]"'):
             nacre.open_sequence(path)
 
+    @pytest.mark.filterwarnings("ignore:colour is left out:UserWarning")
     def test_flipped_bytes_give_nothing_but_nacres_own_error(self, tmp_path: Path) -> None:
         files = {n: d for n, d in contents().items() if n == "metadata" or "/0." in n}
         whole = packed(tmp_path / "a.r3d", files).read_bytes()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import sys
 from collections.abc import Iterator
 from io import BytesIO
@@ -143,17 +142,15 @@ def test_images_that_are_not_newer_are_left_out(monkeypatch: pytest.MonkeyPatch)
     ],
 )
 def test_colours_of_another_camera_or_size_are_left_out(
-    lens: Any, shape: tuple[int, int], reason: str, monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-) -> None:  # fmt: skip
+    lens: Any, shape: tuple[int, int], reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     sent = [(DEPTH_INFO, info()), (COLOR_INFO, lens), (COLOR, image(7, rgb(0, shape), "rgb8"))]
     sent += [(DEPTH, image(7 + i / 10, millimetres(i), "16UC1")) for i in range(2)]
     Ros(TOPICS, sent).install(monkeypatch)
-    with caplog.at_level(logging.WARNING, "nacre"):
+    with pytest.warns(UserWarning, match=f"colours of {COLOR} are left out: {reason}") as told:
         frames = frames_of(RosTopic(DEPTH, COLOR), 2)
     assert [frame.color for frame in frames] == [None, None]
-    (told,) = caplog.messages
-    assert f"colours of {COLOR} are left out: {reason}" in told
+    assert len(told) == 1
 
 
 @pytest.mark.parametrize(

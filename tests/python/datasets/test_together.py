@@ -102,6 +102,8 @@ def test_forked_processes(sequence: nacre.datasets.Sequence) -> None:
 FOLDERS = (write_tum, write_redwood, write_seven_scenes, write_icl_nuim, write_plain)
 
 
+@pytest.mark.filterwarnings("ignore:.*assumed a PrimeSense camera:UserWarning")
+@pytest.mark.filterwarnings("ignore:.*views have no true pose:UserWarning")
 @pytest.mark.parametrize("write", [*WRITERS.values(), *FOLDERS])
 def test_copies(write: Callable[[Path], Path], tmp_path: Path) -> None:
     folder = tmp_path / "recording"
