@@ -15,10 +15,12 @@ from nacre.errors import FileFormatError, shown
 from nacre.io.glb import BINARY_CHUNK, JSON_CHUNK, MAGIC, VERSION
 from nacre.io.json_files import parse_json
 from nacre.io.mesh_arrays import MeshArrays
+from nacre.io.painting import Painting, is_known_image
 from nacre.io.raw import read_file
 from nacre.io.srgb import srgb_from_linear
 
 Array = npt.NDArray[Any]
+Float32 = npt.NDArray[np.float32]
 Float64 = npt.NDArray[np.float64]
 
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -34,6 +36,24 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
 
     Normals and colours are taken where all of them have some; textures and animations are left out.
     """
+    file, pieces = _read_pieces(path)
+    comments = _comments(file.document)
+    return dataclasses.replace(_joined([mesh for _, mesh in pieces]), comments=comments)
+
+
+def read_painting(path: str | os.PathLike[str]) -> Painting | None:
+    """Read the image that is painted on all meshes of a GLB file's scene; None where there is not one."""
+    file, pieces = _read_pieces(path)
+    painted = [file.painted(primitive, len(mesh.vertices)) for primitive, mesh in pieces]
+    found = [place for place in painted if place is not None]
+    if len(found) < len(painted) or len({image for image, _ in found}) > 1:
+        return None
+    image = file.image(found[0][0])
+    return None if image is None else Painting(image, np.concatenate([uv for _, uv in found]))
+
+
+def _read_pieces(path: str | os.PathLike[str]) -> tuple[_Gltf, list[tuple[dict[str, Any], MeshArrays]]]:
+    """Return the file, and its primitives that have triangles with these triangles in the world."""
     document, binary = _read_chunks(path, read_file(path))
     file = _Gltf(path, document, binary)
     unknown = sorted(set(map(str, file.items(document, "extensionsRequired"))) - _KNOWN_EXTENSIONS)
@@ -42,13 +62,13 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
     pieces = []
     for mesh, place in file.meshes():
         for primitive in file.entries(mesh, "primitives"):
-            pieces.append(_placed(file.primitive(primitive), place))
+            pieces.append((primitive, _placed(file.primitive(primitive), place)))
             if len(pieces) > _MOST_PIECES:
                 raise FileFormatError(path, f"more than {_MOST_PIECES} pieces", offset=20)
-    pieces = [piece for piece in pieces if len(piece.triangles)]
+    pieces = [(primitive, piece) for primitive, piece in pieces if len(piece.triangles)]
     if not pieces:
         raise FileFormatError(path, "not a mesh: there is no triangle in its scene", offset=20)
-    return dataclasses.replace(_joined(pieces), comments=_comments(document))
+    return file, pieces
 
 
 def _comments(document: dict[str, Any]) -> tuple[str, ...]:
@@ -209,6 +229,30 @@ class _Gltf:
         strip[1::2, :2] = strip[1::2, 1::-1]  # every other one is turned round
         return strip
 
+    def painted(self, primitive: dict[str, Any], num_vertices: int) -> tuple[object, Float32] | None:
+        """Return which image is painted on a primitive, and where on it the vertices are, if one is."""
+        if "material" not in primitive:
+            return None
+        material = self.entry("materials", primitive["material"]).get("pbrMetallicRoughness")
+        texture = material.get("baseColorTexture") if isinstance(material, dict) else None
+        if not isinstance(texture, dict):
+            return None
+        place = f"TEXCOORD_{self.whole(texture, 'texCoord', 0)}"
+        uv = self.accessor(primitive["attributes"].get(place), (2,)).astype(np.float32)
+        if len(uv) != num_vertices or not np.isfinite(uv).all():
+            raise self.wrong(place, len(uv), f"finite places of the {num_vertices} vertices")
+        return self.entry("textures", texture.get("index")).get("source"), _transformed(self, texture, uv)
+
+    def image(self, index: object) -> bytes | None:
+        """Return an image file, if it is in this one, and PNG or JPEG."""
+        image = self.entry("images", index)
+        if "bufferView" not in image:
+            return None
+        view = self.entry("bufferViews", image["bufferView"])
+        start = self.whole(view, "byteOffset", 0)
+        data = self.binary[start : start + self.whole(view, "byteLength")]
+        return data if is_known_image(data) else None
+
     def accessor(self, index: object, widths: tuple[int, ...]) -> Array:
         """Return the (count, width) values of an accessor."""
         accessor = self.entry("accessors", index)
@@ -236,6 +280,18 @@ class _Gltf:
             raise FileFormatError(self.path, f"accessor {index} does not end within the data", offset=20)
         values: Array = np.ndarray(shape, dtype, self.binary, start, (stride, dtype.itemsize))
         return _fractions(values) if accessor.get("normalized") is True else values
+
+
+def _transformed(file: _Gltf, texture: dict[str, Any], uv: Float32) -> Float32:
+    """Return places on an image as the extension KHR_texture_transform moves them."""
+    extensions = texture.get("extensions")
+    change = extensions.get("KHR_texture_transform") if isinstance(extensions, dict) else None
+    if not isinstance(change, dict):
+        return uv
+    (angle,) = file.numbers({"rotation": [change.get("rotation", 0.0)]}, "rotation", [0.0])
+    turn = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    scaled = uv * file.numbers(change, "scale", [1.0, 1.0])
+    return np.asarray(scaled @ turn.T + file.numbers(change, "offset", [0.0, 0.0]), np.float32)
 
 
 def _fractions(values: Array) -> Array:

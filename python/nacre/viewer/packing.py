@@ -49,21 +49,29 @@ def _shuffled(table: Column) -> bytes:
     return stored[..., None].view(np.uint8).transpose(0, 2, 1).tobytes()
 
 
-def quantized(points: npt.NDArray[np.floating[Any]]) -> tuple[npt.NDArray[np.uint16], list[float], float]:
+def quantized(
+    points: npt.NDArray[np.floating[Any]], least: float = 1e-6
+) -> tuple[npt.NDArray[np.uint16], list[float], float]:
     """
     Return points as whole multiples of a step from an origin.
 
+    Parameters
+    ----------
+    points : (N, D) array
+        Such as positions [m].
+    least : float
+        No step is smaller.
+
     Returns
     -------
-    rows : (N, 3) uint16
-    origin : list of 3 float
-        [m].
+    rows : (N, D) uint16
+    origin : list of D float
     step : float
-        The longest side of the points' box by 65535 [m]; at least 1 micrometre.
+        The longest side of the points' box by 65535.
     """
     exact = points.astype(np.float64)
-    origin = exact.min(axis=0, initial=np.inf) if len(exact) else np.zeros(3)
-    step = max(float(np.max(exact - origin, initial=0.0)) / 65535, 1e-6)
+    origin = exact.min(axis=0, initial=np.inf) if len(exact) else np.zeros(points.shape[1])
+    step = max(float(np.max(exact - origin, initial=0.0)) / 65535, least)
     return np.rint((exact - origin) / step).astype(np.uint16), origin.tolist(), step
 
 

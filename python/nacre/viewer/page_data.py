@@ -81,6 +81,9 @@ class PageData:
             for run, timeline in enumerate(timelines)
             for place, cloud in timeline.snapshots
         ]
+        # Of a run alone: two are compared by their points.
+        painted = timelines[0].painted if len(timelines) == 1 else None
+        self._painted = [] if painted is None else [State(0, len(timelines[0].frames), painted)]
         self.document = json.dumps(self._described(), allow_nan=False).encode()
         self._last: tuple[State, Snapshot] | None = None
         self._last_triangles: tuple[State, npt.NDArray[np.int32]] | None = None
@@ -92,9 +95,12 @@ class PageData:
 
     @property
     def surface_names(self) -> list[str]:
-        """Of the triangles of the newest state of each run, and of the holes in those that are no mesh."""
+        """Of triangles, images and holes: of the newest state of each run, and of its painted mesh."""
         newest = {state.run: state for state in self._states}.values()
         triangles = [f"triangles/{state.name}" for state in newest]
+        for state in self._painted:
+            triangles += [f"{kind}/{state.name}" for kind in ("points", "triangles")]
+        triangles += [f"image/{s.name}" for s in (*newest, *self._painted) if s.cloud.painting is not None]
         return triangles + [f"holes/{state.name}" for state in newest if not state.is_mesh]
 
     def read(self, name: str) -> bytes:
@@ -111,9 +117,11 @@ class PageData:
         kind, _, rest = name.partition("/")
         if kind == "depth":
             return self._depth(rest)
-        if kind not in ("points", "triangles", "holes"):
+        if kind not in ("points", "triangles", "holes", "image"):
             raise KeyError(name)
-        state = {state.name: state for state in self._states}[rest]
+        state = {state.name: state for state in (*self._states, *self._painted)}[rest]
+        if kind == "image":
+            return self._image(state)
         if kind == "holes" and state.is_mesh:
             raise KeyError(name)
         if kind == "triangles":
@@ -159,6 +167,7 @@ class PageData:
             "frustum": frustum_corners(timeline.camera).tolist(),
             "frames": frames,
             "states": states,
+            "painted": next((state.name for state in self._painted if state.run == run), None),
         }
 
     def _prepared(self, state: State) -> Snapshot:
@@ -197,6 +206,9 @@ class PageData:
             "normals": octahedral(cloud.normals),
             "sizes": _logarithms(disk_radii(cloud) / cloud.spacing),
         }
+        header: dict[str, Any] = {"spacing": cloud.spacing, "origin": origin, "step": step}
+        if cloud.painting is not None:
+            columns["uv"], header["uvOrigin"], header["uvStep"] = quantized(cloud.painting.uv, 1e-9)
         if cloud.colors is not None:
             columns["colors"] = cloud.colors
         if cloud.confidence is not None:
@@ -205,13 +217,20 @@ class PageData:
             columns["sigma"] = rounded(_known_sigma(cloud.sigma))
         if cloud.last_seen is not None:
             columns["lastSeen"] = np.maximum(cloud.last_seen, 0).astype(np.uint32)
-        if len(timeline.snapshots) == 1:
+        if len(timeline.snapshots) == 1 and not state.is_mesh:
             first = first_seen(cloud, timeline, state.place)
             columns |= {} if first is None else {"firstSeen": first}
         if len(self._timelines) == 2:
             other = self._timelines[1 - state.run].snapshots[-1][1]
             columns["deviation"] = rounded(deviation(cloud, other))
-        return pack({"spacing": cloud.spacing, "origin": origin, "step": step}, columns)
+        return pack(header, columns)
+
+    def _image(self, state: State) -> bytes:
+        """Return the file of the image that is painted on a state."""
+        painting = self._prepared(state).painting
+        if painting is None:
+            raise KeyError(state.name)
+        return painting.image
 
     def _depth(self, place: str) -> bytes:
         """Return the depth image, with what was removed, of the first run's frame at a place."""

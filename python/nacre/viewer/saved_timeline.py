@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,12 @@ import numpy.typing as npt
 
 from nacre import KdTree, estimate_normals
 from nacre._internal.guided import guided
+from nacre._internal.warned import warn
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Cloud
+from nacre.io.glb_reader import read_painting
 from nacre.io.meshes import READ_SUFFIXES, read_mesh_arrays
+from nacre.io.painting import Painting
 from nacre.io.ply_header import read_header
 from nacre.io.points import read_points
 from nacre.io.raw import read_head
@@ -26,7 +30,8 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     """
     Read what a reconstruction wrote, or the points or the mesh of a file.
 
-    Depth images are shown where the recording is still in its place.
+    Depth images are shown where the recording is still in its place; on the mesh of a GLB file, or of
+    ``OUT/mesh.glb``, the image that is painted on it.
 
     Parameters
     ----------
@@ -42,10 +47,10 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     """
     path = Path(path)
     if path.is_file():
-        file, triangles = _read(path)
+        file, triangles, painting = _read(path)
         is_upright = not any(CAMERA_FRAME in comment for comment in file.comments)
         timeline = Timeline(path.name, None, is_upright=is_upright)
-        timeline.set_snapshot(_cloud(file, None, triangles))
+        timeline.set_snapshot(_cloud(file, None, triangles, painting))
         return timeline
     out = SavedRun(path)
     timeline = Timeline(
@@ -64,11 +69,19 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     if model.normals is None:
         raise FileFormatError(path / "model.ply", "a model of nacre reconstruct has normals")
     timeline.set_snapshot(_cloud(model, out.report.get("spacing")))
+    if (path / "mesh.glb").is_file():
+        file, triangles, painting = _read(path / "mesh.glb")
+        timeline.painted = None if painting is None else _cloud(file, None, triangles, painting)
     return timeline
 
 
-def _cloud(file: Cloud, spacing: float | None, triangles: npt.NDArray[np.int32] | None = None) -> Snapshot:
-    """Return the points of a file that are finite, and the triangles between them."""
+def _cloud(
+    file: Cloud,
+    spacing: float | None,
+    triangles: npt.NDArray[np.int32] | None = None,
+    painting: Painting | None = None,
+) -> Snapshot:
+    """Return the finite points of a file, the triangles between them, and what is painted on these."""
     kept = np.flatnonzero(np.isfinite(file.points).all(axis=1))
     points = np.asarray(file.points, np.float32)
     spacing = max(float(spacing or _usual_spacing(points[kept])), 1e-6)
@@ -83,16 +96,26 @@ def _cloud(file: Cloud, spacing: float | None, triangles: npt.NDArray[np.int32] 
     normals = np.where(known, normals, (0, 0, -1)).astype(np.float32)
     known_of = file.attributes.get
     columns = (known_of("confidence"), known_of("last_seen"), known_of("sigma"))
-    return Snapshot(points, normals, spacing, file.colors, *columns, triangles).rows(kept, spacing)
+    cloud = Snapshot(points, normals, spacing, file.colors, *columns, triangles, painting)
+    return cloud.rows(kept, spacing)
 
 
-def _read(path: Path) -> tuple[Cloud, npt.NDArray[np.int32] | None]:
-    """Return the points of a file, or the vertices of a mesh, and its triangles."""
+def _read(path: Path) -> tuple[Cloud, npt.NDArray[np.int32] | None, Painting | None]:
+    """Return the points of a file, or the vertices of a mesh, its triangles, and what is painted on these."""
     if path.suffix.lower() in set(READ_SUFFIXES) - {".ply"}:
-        mesh = read_mesh_arrays(path)
-        cloud = Cloud(mesh.vertices, mesh.normals, mesh.colors, comments=mesh.comments)
-        return cloud, mesh.triangles
-    return read_points(path), _triangles(path)
+        mesh, painting, colors = read_mesh_arrays(path), None, None
+        try:
+            if path.suffix.lower() == ".glb":
+                painting = read_painting(path)
+            with suppress(ImportError):  # without pillow only the page decodes the image
+                colors = None if painting is None else painting.colors(path)
+        except FileFormatError as error:
+            painting = None
+            warn(f"the texture is left out: {error}")
+        colors = mesh.colors if mesh.colors is not None else colors
+        cloud = Cloud(mesh.vertices, mesh.normals, colors, comments=mesh.comments)
+        return cloud, mesh.triangles, painting
+    return read_points(path), _triangles(path), None
 
 
 def _triangles(path: Path) -> npt.NDArray[np.int32] | None:
@@ -129,12 +152,13 @@ def _estimated_normals(points: npt.NDArray[np.float32]) -> npt.NDArray[np.float3
 
 
 def _usual_spacing(points: npt.NDArray[np.float32]) -> float:
-    """Return the median distance of a point to its nearest neighbor, of a sample of them."""
+    """Return the median distance of a point to its nearest neighbor elsewhere, of a sample of them."""
     sample = points[:: max(len(points) // 10_000, 1)]
     if len(points) < 2:
         return 0.001
     distances, _ = KdTree(points).query(sample, k=2)
-    return float(np.median(distances[:, 1]))
+    apart = distances[:, 1][distances[:, 1] > 0]  # not from itself at another place of an image
+    return float(np.median(apart)) if len(apart) else 0.001
 
 
 def _recorded_depth(out: SavedRun) -> Any:

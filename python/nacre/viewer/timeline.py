@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from nacre import Camera
 from nacre.errors import printable
+from nacre.io.painting import Painting
 from nacre.model import Model
 from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import count, quantity
@@ -40,6 +41,8 @@ class Snapshot:
         The expected standard deviation of each point across the surface [m]; NaN where not known.
     triangles : (T, 3) integer, optional
         Rows of the points, of a mesh; otherwise the viewer joins the points itself.
+    painting : Painting, optional
+        The image that is painted on the triangles.
     """
 
     points: npt.NDArray[np.float32]
@@ -50,6 +53,7 @@ class Snapshot:
     last_seen: npt.NDArray[Any] | None = None
     sigma: npt.NDArray[Any] | None = None
     triangles: npt.NDArray[np.int32] | None = None
+    painting: Painting | None = None
 
     @classmethod
     def of(cls, model: Model) -> Snapshot:
@@ -79,6 +83,7 @@ class Snapshot:
             chosen_of(self.last_seen),
             chosen_of(self.sigma),
             self._triangles_between(chosen),
+            None if self.painting is None else self.painting.rows(chosen),
         )
 
     def _triangles_between(self, chosen: slice | npt.NDArray[np.int64]) -> npt.NDArray[np.int32] | None:
@@ -94,7 +99,9 @@ class Snapshot:
         step = max(-(-len(self.points) // max_points), 1)
         if step == 1:
             return self
-        return replace(self, triangles=None).rows(slice(None, None, step), self.spacing * step**0.5)
+        return replace(self, triangles=None, painting=None).rows(
+            slice(None, None, step), self.spacing * step**0.5
+        )
 
 
 _FIGURES: dict[str, tuple[str, Callable[[Any], str]]] = {
@@ -141,6 +148,8 @@ class Timeline:
     ----------
     frames : list of ReportedFrame
         In the order in which they came; their true poses in the world of the model.
+    painted : Snapshot or None
+        A mesh of the model that an image is painted on.
     placement : str
         Of a run that is compared with another: how it came into the other's world frame; "" where not known.
     """
@@ -164,6 +173,7 @@ class Timeline:
         self.depth_range = depth_range
         self.is_upright = is_upright
         self.frames: list[ReportedFrame] = []
+        self.painted: Snapshot | None = None
         self.placement = ""
         self._snapshots: list[tuple[int, Snapshot]] = []
         self._max_snapshots = max_snapshots

@@ -17,6 +17,7 @@ import pytest
 
 import nacre
 from nacre.cli import main
+from nacre.meshing import Texture
 from nacre.reconstruction import Reconstruction
 from nacre.report import ReportedFrame
 from nacre.report.lost_frames import plain_reason
@@ -248,6 +249,57 @@ def test_a_glb_file_of_nacre_stands_upright(tmp_path: Path) -> None:
     for comments in ([], ["metres; the world is the first camera's frame"]):
         nacre.write_mesh(tmp_path / "a.glb", corners, triangles, comments=comments)
         assert viewer.read_timeline(tmp_path / "a.glb").is_upright == (not comments)
+
+
+def painted_plane(path: Path) -> Path:
+    """Write the plane as two triangles, painted red on the left and blue on the right."""
+    image = np.zeros((64, 64, 3), np.uint8)
+    image[:, :32, 0] = image[:, 32:, 2] = 255
+    uv = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], np.float32)
+    vertices = np.column_stack([0.2 * uv - 0.1, np.full(4, 0.5)])
+    triangles = np.array([[0, 2, 1], [1, 2, 3]], np.int32)
+    nacre.write_mesh(path, vertices, triangles, texture=Texture(image, uv, triangles))
+    return path
+
+
+def test_the_page_gets_the_image_of_a_painted_mesh(tmp_path: Path) -> None:
+    timeline = viewer.read_timeline(painted_plane(tmp_path / "a.glb"))
+    ((_, read),) = timeline.snapshots
+    data = PageData([timeline])
+    (name,) = (name for name in data.surface_names if name.startswith("image/"))
+    assert data.read(name) == read.painting.image
+    assert read.painting.image.startswith(b"\xff\xd8\xff")
+    assert b'"uvStep"' in data.read(name.replace("image", "points"))
+    left = read.points[:, 0] < 0
+    assert np.abs(read.colors[left] - [255.0, 0, 0]).max() < 9  # what is painted at the vertices
+    assert np.abs(read.colors[~left] - [0, 0, 255.0]).max() < 9
+    assert read.thinned(2).painting is None
+    assert read.thinned(2).colors is not None
+
+
+def test_a_run_shows_its_painted_mesh(out: Path, tmp_path: Path) -> None:
+    folder = shutil.copytree(out, tmp_path / "out")
+    assert json.loads(PageData([viewer.read_timeline(folder)]).document)["runs"][0]["painted"] is None
+    painted_plane(folder / "mesh.glb")
+    timeline = viewer.read_timeline(folder)
+    data = PageData([timeline])
+    name = json.loads(data.document)["runs"][0]["painted"]
+    assert {f"{kind}/{name}" for kind in ("points", "triangles", "image")} <= set(data.surface_names)
+    assert all(data.read(wanted) for wanted in data.surface_names)
+    assert name not in {state["name"] for state in json.loads(data.document)["runs"][0]["states"]}
+    compared = json.loads(PageData([timeline, timeline]).document)["runs"]
+    assert [run["painted"] for run in compared] == [None, None]  # two runs by their points
+
+
+def test_a_mesh_whose_texture_is_damaged_is_shown_without(tmp_path: Path) -> None:
+    path = painted_plane(tmp_path / "a.glb")
+    data = path.read_bytes()
+    start = data.index(b"\xff\xd8\xff")
+    path.write_bytes(data[: start + 20] + bytes(len(data) - start - 20))
+    with pytest.warns(UserWarning, match=r"the texture is left out: .*a\.glb"):
+        ((_, read),) = viewer.read_timeline(path).snapshots
+    assert (read.painting, read.colors) == (None, None)
+    assert len(read.triangles) == 2
 
 
 def test_faces_that_are_no_triangles_leave_the_points(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ const LOWEST = 0.02, HIGHEST = 0.98; // quantiles at the ends of color scales
 class Cloud {
   constructor(bytes) {
     const { header, columns } = unpack(bytes);
-    Object.assign(this, header, columns); // spacing, origin, step; points, normals, colors, confidence, ...
+    Object.assign(this, header, columns); // spacing, origin, step; points, normals, colors, uv, confidence, ...
     this.size = this.points.length / 3;
     this.normals = decodedNormals(this.normals);
     this.paint = new Uint8Array(4 * this.size); // red, green, blue, and 255 where the point is shown
@@ -35,7 +35,7 @@ class Cloud {
 
   /** What the points can be colored by. */
   get kinds() {
-    const known = { colour: this.colors, shading: true, normal: true, uncertainty: this.sigma };
+    const known = { texture: this.image, colour: this.colors, shading: true, normal: true, uncertainty: this.sigma };
     Object.assign(known, { age: this.lastSeen, deviation: this.deviation });
     return Object.keys(known).filter((kind) => known[kind]);
   }
@@ -64,7 +64,7 @@ class Cloud {
       for (let i = 0; i < this.size; i++) {
         for (let c = 0; c < 3; c++) {
           this.paint[4 * i + c] =
-            kind === "colour" ? this.colors[3 * i + c]
+            kind === "colour" || (kind === "texture" && this.colors) ? this.colors[3 * i + c]
             : kind === "normal" ? 127.5 + (c ? -1 : 1) * this.normals[4 * i + c] // green up, blue towards the camera
             : [214, 217, 220][c];
         }

@@ -42,7 +42,8 @@ class Holes {
 
   /** A mesh of a file is as it is: holes are those of points that were joined here. */
   #canFind(name, run) {
-    return !this.app.document.runs[run].isMesh && this.app.source.has(`holes/${name}`);
+    const { isMesh, painted } = this.app.document.runs[run];
+    return !isMesh && name !== painted && this.app.source.has(`holes/${name}`);
   }
 
   async #read(name, run) {

@@ -60,6 +60,7 @@ class App {
       document.getElementById("reverse").checked = !isLive && !runs[0].frames.length;
       if (runs[0].isMesh) document.getElementById("surface").value = "mesh";
     }
+    document.querySelector("#surface [value=painted]").hidden = !this.#hasPainted(runs[0]);
     this.player.update();
     this.#forget();
     if (view && !this.orbit.touched && runs[0].frames.length >= 2 * this.framesAtReset) this.reset();
@@ -68,13 +69,15 @@ class App {
 
   /** Give back states that the document has no more. */
   #forget() {
-    const named = new Set(this.document.runs.flatMap((run) => run.states.map((state) => state.name)));
+    const { runs } = this.document, painted = runs.map((run) => run.painted);
+    const named = new Set([...painted, ...runs.flatMap((run) => run.states.map((state) => state.name))]);
     for (const name of this.cache.keys()) if (!named.has(name)) this.cache.delete(name);
   }
 
   /** Read the states of the models that belong to the chosen frame, and draw them. */
   async load() {
     const names = this.document.runs.map((run, i) => {
+      if (this.showsPainted && this.#hasPainted(run)) return run.painted;
       const place = i === 0 ? this.player.place : Infinity;
       return (run.states.findLast((state) => state.place <= place) ?? run.states[0])?.name;
     });
@@ -94,9 +97,9 @@ class App {
     if (isOther) {
       this.renderer?.keepOnly(clouds);
       showKinds(this);
-      await this.#loadTriangles();
-      this.color();
     }
+    await this.#loadTriangles();
+    if (isOther) this.color();
     this.select();
     this.holes.load();
   }
@@ -105,7 +108,17 @@ class App {
     if (!this.cache.has(name)) this.cache.set(name, new Cloud(await this.source.read(`points/${name}`)));
     const cloud = this.cache.get(name);
     cloud.name = name;
+    if (cloud.uv && this.source.has(`image/${name}`)) cloud.image ??= await this.#image(name);
     return cloud;
+  }
+
+  /** The image that is painted on a mesh, as large as can be drawn. */
+  async #image(name) {
+    const image = await createImageBitmap(new Blob([await this.source.read(`image/${name}`)]));
+    const most = this.renderer?.maxImageSize ?? Infinity, larger = Math.max(image.width, image.height);
+    if (larger <= most) return image;
+    const [resizeWidth, resizeHeight] = [image.width, image.height].map((n) => Math.max(Math.floor((n * most) / larger), 1));
+    return createImageBitmap(image, { resizeWidth, resizeHeight, resizeQuality: "high" });
   }
 
   async #loadTriangles() {
@@ -118,8 +131,17 @@ class App {
     this.#say("");
   }
 
+  /** Whether there is a mesh of a run that an image is painted on. */
+  #hasPainted(run) {
+    return Boolean(run.painted) && this.source.has(`points/${run.painted}`);
+  }
+
   get showsMesh() {
-    return document.getElementById("surface").value === "mesh";
+    return document.getElementById("surface").value !== "points";
+  }
+
+  get showsPainted() {
+    return document.getElementById("surface").value === "painted";
   }
 
   get kind() {
@@ -195,9 +217,10 @@ class App {
     const cloud = this.clouds[part.run], run = this.document.runs[part.run], matrices = this.matrices(part);
     const asMesh = this.showsMesh && Boolean(cloud.triangles);
     const pointSize = +document.getElementById("size").value;
-    const ambient = { shading: 0.25, colour: 0.5 }[this.kind] ?? 0.6;
+    const isPainted = this.kind === "texture" && Boolean(cloud.image);
+    const ambient = { shading: 0.25, colour: 0.5, texture: 0.8 }[this.kind] ?? 0.6; // photographs have light of their own
     const showReverse = isChecked("reverse");
-    this.renderer.drawCloud(cloud, matrices, part, { asMesh, showReverse, pointSize, ambient });
+    this.renderer.drawCloud(cloud, matrices, part, { asMesh, isPainted, showReverse, pointSize, ambient });
     const chosen = { path: isChecked("path"), cameras: isChecked("cameras") };
     const place = part.run === 0 ? this.player.place : run.frames.length;
     const size = 0.06 * (this.document.view?.radius ?? 1);
@@ -251,7 +274,7 @@ class App {
   #listen() {
     const on = (id, event, action) => document.getElementById(id).addEventListener(event, action);
     on("kind", "change", () => this.color());
-    on("surface", "change", () => this.#loadTriangles().then(() => this.redraw()));
+    on("surface", "change", () => this.load());
     on("size", "input", () => this.redraw());
     on("uncertainty", "input", () => this.select());
     for (const id of ["reverse", "path", "cameras"]) on(id, "change", () => this.redraw());

@@ -1,6 +1,7 @@
 // The words of the panel.
 
 const LEGENDS = {
+  texture: "as the images that are painted on the mesh saw it",
   colour: "as the camera saw it",
   shading: "by how the surface lies to the light",
   normal: "red: to the right, green: up, blue: towards the first camera",
@@ -29,10 +30,12 @@ function showDocument({ title, runs, depthLegend }) {
 /** Offer what the points can be colored by; at first the differences of two runs, or colors where they have any. */
 function showKinds({ clouds }) {
   const select = document.getElementById("kind"), before = select.value;
+  const hadTexture = [...select.options].some(({ value }) => value === "texture");
   const kinds = clouds[0].kinds.filter((kind) => clouds.every((cloud) => cloud.kinds.includes(kind)));
   select.replaceChildren(...kinds.map((value) => element("option", { value }, value)));
   const first = kinds.includes("deviation") ? "deviation" : kinds[0];
-  select.value = kinds.includes(before) ? before : first;
+  const isNew = kinds[0] === "texture" && !hadTexture;
+  select.value = kinds.includes(before) && !isNew ? before : first;
   document.getElementById("uncertainty-row").hidden = !clouds[0].sigma;
 }
 

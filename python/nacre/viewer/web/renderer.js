@@ -3,16 +3,20 @@
 const CLOUD_VERTEX = `#version 300 es
 uniform mat4 view, clip;
 uniform vec3 origin;
-uniform float step, radius, pixelsPerUnit;
+uniform vec2 uvOrigin;
+uniform float step, radius, pixelsPerUnit, uvStep;
 uniform bool isMesh;
 in vec3 point;
 in vec4 normal;
 in vec4 color;
 in float size;
+in vec2 uv;
 out vec3 viewNormal, viewPoint;
 out vec4 shade;
+out vec2 place;
 out float diskRadius, pixels;
 void main() {
+  place = uvOrigin + uvStep * uv;
   vec4 position = view * vec4(origin + step * point, 1.0);
   viewPoint = position.xyz;
   viewNormal = mat3(view) * normal.xyz;
@@ -26,14 +30,17 @@ void main() {
 const CLOUD_FRAGMENT = `#version 300 es
 precision highp float;
 uniform mat4 clip;
-uniform bool isMesh, showReverse;
+uniform bool isMesh, showReverse, isPainted;
 uniform float ambient;
+uniform sampler2D image;
 in vec3 viewNormal, viewPoint;
 in vec4 shade;
+in vec2 place;
 in float diskRadius, pixels;
 out vec4 result;
 const vec3 light = normalize(vec3(-0.35, 0.55, 1.0));
 void main() {
+  vec3 painted = texture(image, place).rgb; // before any pixel is discarded, whose neighbours choose the mipmap
   if (shade.a < 0.999) discard;
   vec3 n = normalize(viewNormal);
   bool isReverse = dot(n, viewPoint) > 0.0;
@@ -49,7 +56,7 @@ void main() {
   }
   gl_FragDepth = 0.5 + 0.5 * (clip[2][2] * z + clip[3][2]) / -z;
   float lit = ambient + (1.0 - ambient) * 1.1 * max(dot(n, light), 0.0);
-  result = vec4(shade.rgb * lit * (isReverse ? 0.6 : 1.0), 1.0);
+  result = vec4((isPainted ? painted : shade.rgb) * lit * (isReverse ? 0.6 : 1.0), 1.0);
 }`;
 
 const LINE_VERTEX = `#version 300 es
@@ -70,7 +77,8 @@ in vec4 shade;
 out vec4 result;
 void main() { result = vec4(shade.rgb * shade.a, shade.a); }`;
 
-const CLOUD_INPUTS = ["point", "normal", "color", "size"];
+const ANISOTROPY = 4;
+const CLOUD_INPUTS = ["point", "normal", "color", "size", "uv"];
 
 class Renderer {
   constructor(canvas) {
@@ -82,9 +90,15 @@ class Renderer {
     this.cloudProgram = this.#program(CLOUD_VERTEX, CLOUD_FRAGMENT, CLOUD_INPUTS);
     this.lineProgram = this.#program(LINE_VERTEX, LINE_FRAGMENT, ["point", "color"]);
     this.lineBuffers = [gl.createBuffer(), gl.createBuffer()];
+    this.noImage = this.#textureOf(new ImageData(1, 1));
     gl.enable(gl.DEPTH_TEST);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
+  }
+
+  /** The most pixels in a row of an image. */
+  get maxImageSize() {
+    return this.gl.getParameter(this.gl.MAX_TEXTURE_SIZE);
   }
 
   /** Fit the drawing to the page; true where that changed it. */
@@ -108,12 +122,13 @@ class Renderer {
     for (const [cloud, buffers] of this.clouds) {
       if (clouds.includes(cloud)) continue;
       Object.values(buffers).forEach((buffer) => buffer instanceof WebGLBuffer && this.gl.deleteBuffer(buffer));
+      this.gl.deleteTexture(buffers.image ?? null);
       this.clouds.delete(cloud);
     }
   }
 
   /** Draw a cloud into a part of the canvas: from left to left + width, parts of 1. */
-  drawCloud(cloud, { view, clip }, part, { asMesh, showReverse, pointSize, ambient }) {
+  drawCloud(cloud, { view, clip }, part, { asMesh, isPainted, showReverse, pointSize, ambient }) {
     const gl = this.gl, program = this.cloudProgram, buffers = this.#buffers(cloud);
     const height = this.#viewport(part);
     gl.useProgram(program.id);
@@ -126,10 +141,18 @@ class Renderer {
     gl.uniform1f(program.at("ambient"), ambient);
     gl.uniform1i(program.at("isMesh"), asMesh ? 1 : 0);
     gl.uniform1i(program.at("showReverse"), showReverse ? 1 : 0);
+    gl.uniform1i(program.at("isPainted"), isPainted ? 1 : 0);
+    gl.bindTexture(gl.TEXTURE_2D, buffers.image ?? this.noImage);
     this.#attribute(0, buffers.points, 3, gl.UNSIGNED_SHORT, false);
     this.#attribute(1, buffers.normals, 4, gl.BYTE, true);
     this.#attribute(2, buffers.paint, 4, gl.UNSIGNED_BYTE, true);
     this.#attribute(3, buffers.sizes, 1, gl.UNSIGNED_BYTE, false);
+    gl.disableVertexAttribArray(4);
+    if (isPainted) {
+      gl.uniform2fv(program.at("uvOrigin"), cloud.uvOrigin);
+      gl.uniform1f(program.at("uvStep"), cloud.uvStep);
+      this.#attribute(4, buffers.uv, 2, gl.UNSIGNED_SHORT, false);
+    }
     if (asMesh) {
       gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, buffers.triangles);
       gl.drawElements(gl.TRIANGLES, cloud.triangles.length, gl.UNSIGNED_INT, 0);
@@ -153,8 +176,7 @@ class Renderer {
     });
     this.#attribute(0, this.lineBuffers[0], 3, gl.FLOAT, false);
     this.#attribute(1, this.lineBuffers[1], 4, gl.UNSIGNED_BYTE, true);
-    gl.disableVertexAttribArray(2);
-    gl.disableVertexAttribArray(3);
+    for (const place of [2, 3, 4]) gl.disableVertexAttribArray(place);
     for (let x = 0; x < pixels; x++) {
       for (let y = 0; y < pixels; y++) {
         gl.uniform2f(program.at("shift"), (2 * x - pixels + 1) / width, (2 * y - pixels + 1) / height);
@@ -182,6 +204,7 @@ class Renderer {
     if (!buffers) {
       buffers = { points: this.#filled(cloud.points), normals: this.#filled(cloud.normals), paint: gl.createBuffer() };
       buffers.sizes = this.#filled(cloud.sizes);
+      if (cloud.image) Object.assign(buffers, { uv: this.#filled(cloud.uv), image: this.#textureOf(cloud.image) });
       this.clouds.set(cloud, buffers);
     }
     if (buffers.version !== cloud.version) {
@@ -200,6 +223,18 @@ class Renderer {
     this.gl.bindBuffer(target, buffer);
     this.gl.bufferData(target, data, this.gl.STATIC_DRAW);
     return buffer;
+  }
+
+  /** An image for a surface that is seen from near and far, at any slant; beyond its borders it begins again. */
+  #textureOf(image) {
+    const gl = this.gl, texture = gl.createTexture();
+    gl.bindTexture(gl.TEXTURE_2D, texture);
+    gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGBA8, gl.RGBA, gl.UNSIGNED_BYTE, image);
+    gl.generateMipmap(gl.TEXTURE_2D);
+    gl.texParameteri(gl.TEXTURE_2D, gl.TEXTURE_MIN_FILTER, gl.LINEAR_MIPMAP_LINEAR);
+    const slanted = gl.getExtension("EXT_texture_filter_anisotropic");
+    if (slanted) gl.texParameterf(gl.TEXTURE_2D, slanted.TEXTURE_MAX_ANISOTROPY_EXT, ANISOTROPY);
+    return texture;
   }
 
   #program(vertex, fragment, inputs) {
