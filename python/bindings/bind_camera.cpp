@@ -60,7 +60,8 @@ using nacre::DepthKind;
 int as_pixels(const char* name, const Whole& value) {
   if (PyIndex_Check(value.ptr()) == 0) refuse(name, "an integer", value);
   const Py_ssize_t number = PyNumber_AsSsize_t(value.ptr(), nullptr);  // the nearest that there is
-  return static_cast<int>(std::clamp<Py_ssize_t>(number, -1, std::numeric_limits<int>::max()));
+  using Limits = std::numeric_limits<int>;
+  return static_cast<int>(std::clamp<Py_ssize_t>(number, Limits::min(), Limits::max()));
 }
 
 double as_number(const char* name, const py::handle& value) {

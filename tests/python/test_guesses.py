@@ -223,6 +223,7 @@ TOLD = {
     "nacre.write_animation(out, [corners], faces, fps=30)": ["times", "numpy.arange(F) / fps"],
     # Values that cannot be right.
     "nacre.turntable_poses(mesh, 12, 30)": ["step must be radians", "math.radians(30)"],
+    "nacre.Camera(-640, 480, 525, 525, 319.5, 239.5)": ["width must be 1 to 65536 pixels, got -640"],
     "nacre.NoiseModel('kinect')": ["constant must be of type float, got 'kinect'"],
     "nacre.DepthParameters(max_depth='far')": ["max_depth must be of type float, got 'far'"],
     "nacre.RegionParameters(object='yes')": ["object must be of type bool, got 'yes'"],
