@@ -120,11 +120,12 @@ def preprocess_depth(
     """
     Return a copy of a depth image in metres in which noise is NaN.
 
-    Pixels go, in this order: without a measurement (0, negative, NaN, inf; 65535 of integer images); outside
-    the depth range; outside the mask; at depth edges, where a pixel mixes two surfaces; on surfaces seen too
-    steeply; isolated ones. What is kept has the value that it came with, but for two kinds of images: depth
-    in units coarser than its noise is interpolated between its plateaus, by half a unit at most; and where
-    cracks or pixels missing at random riddle surfaces, gaps one pixel wide are filled.
+    Pixels go, in this order: without a measurement (0, negative, NaN, inf; 65535 of integer images; a largest
+    value to which nothing comes near); outside the depth range; outside the mask; at depth edges, where a
+    pixel mixes two surfaces; on surfaces seen too steeply; isolated ones. What is kept has the value that it
+    came with, but for two kinds of images: depth in units coarser than its noise is interpolated between its
+    plateaus, by half a unit at most; and where cracks or pixels missing at random riddle surfaces, gaps one
+    pixel wide are filled.
 
     Parameters
     ----------

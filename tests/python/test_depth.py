@@ -311,6 +311,19 @@ def test_invalid_codes_of_integer_images():
     assert report.num_invalid == 20 * WIDTH
 
 
+@pytest.mark.parametrize("largest", [4.095, 10.0, 1e10])
+def test_the_value_for_what_is_too_far_is_no_measurement(largest):
+    thing, camera = nacre.built_in_object(), nacre.Camera(160, 120, 190, 190, 79.5, 59.5)
+    measured, filled = nacre.Model(camera), nacre.Model(camera)
+    for seed, pose in enumerate(nacre.turntable_poses(thing, 3, 0.05, camera=camera, distance=0.3)):
+        depth = np.array(thing.simulate_depth(camera, pose, noise=0.0005, seed=seed))
+        assert np.isnan(depth).sum() > 1000
+        measured.add_frame(depth)
+        report = filled.add_frame(np.where(np.isnan(depth), np.float32(largest), depth))
+        assert report.status == "TRACKED"
+    np.testing.assert_array_equal(filled.points, measured.points)
+
+
 def test_nothing_in_nothing_out():
     clean, report = nacre.preprocess_depth(np.zeros((HEIGHT, WIDTH)), PINHOLE, return_report=True)
     assert np.isnan(clean).all()
