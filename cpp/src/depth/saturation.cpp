@@ -1,52 +1,42 @@
 #include "depth/saturation.hpp"
 
-#include <cstddef>
+#include <algorithm>
+#include <cstdint>
 #include <limits>
-#include <vector>
 
-#include "base/statistics.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/limits.hpp"
 
 namespace nacre {
 namespace {
 
-float largest_measurement(const DepthRef& depth) {
-  float largest = 0.0F;
+template <class Visit>
+void for_each_probed(const DepthRef& depth, Visit&& visit) {
   for (Eigen::Index v = 0; v < depth.rows(); v += depth_limits::probed_rows) {
-    for (Eigen::Index u = 0; u < depth.cols(); ++u) {
-      const float z = depth(v, u);
-      if (is_measurement(z) && z > largest) largest = z;
-    }
+    for (Eigen::Index u = 0; u < depth.cols(); ++u) visit(depth(v, u));
   }
-  return largest;
 }
 
 bool is_saturated(float largest, const DepthRef& depth) {
-  const float near = (1.0F - depth_limits::saturation_gap) * largest;
-  std::size_t num_probed = 0, num_largest = 0, num_near = 0;
-  std::vector<float> others;
-  for (Eigen::Index v = 0; v < depth.rows(); v += depth_limits::probed_rows) {
-    for (Eigen::Index u = 0; u < depth.cols(); ++u) {
-      const float z = depth(v, u);
-      ++num_probed;
-      if (z == largest) {
-        ++num_largest;
-      } else if (is_measurement(z)) {
-        others.push_back(z);
-        num_near += z > near;
-      }
-    }
-  }
-  if (static_cast<double>(num_largest) < depth_limits::least_saturated * static_cast<double>(num_probed)) return false;
-  if (others.empty() || num_near > num_largest) return false;
-  return largest >= depth_limits::far_saturation * median_of(std::move(others));
+  const float near = (1.0F - depth_limits::saturation_gap) * largest, far = largest / depth_limits::far_saturation;
+  std::int64_t num_probed = 0, num_largest = 0, num_near = 0, num_between = 0, num_nearer = 0;
+  for_each_probed(depth, [&](float z) {
+    const bool is_other = is_measurement(z) && z < largest;
+    ++num_probed;
+    num_largest += z == largest;
+    num_near += is_other && z > near;
+    num_between += is_other && z > far;
+    num_nearer += is_other && z <= far;
+  });
+  return static_cast<double>(num_largest) >= depth_limits::least_saturated * static_cast<double>(num_probed) &&
+         num_near <= num_largest && num_between < num_nearer;
 }
 
 }  // namespace
 
 DepthImage without_saturated(const DepthRef& depth) {
-  const float largest = largest_measurement(depth);
+  float largest = 0.0F;
+  for_each_probed(depth, [&](float z) { largest = is_measurement(z) ? std::max(largest, z) : largest; });
   if (!is_saturated(largest, depth)) return {};
   return (depth < largest).select(depth, std::numeric_limits<float>::quiet_NaN());
 }

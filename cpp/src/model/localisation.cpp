@@ -110,19 +110,18 @@ void Pipeline::learn_from(const TrackingResult& tracking) {
   if (tracking.expectation == Expectation::expected) usual_consistency.add(tracking.consistency);
   residual_noise.add_frame();
   if (!tells_noise(tracking)) return;
-  telling_frame = history.num_registered();
   if (learns_noise() && !tracking.is_on_plane && !(shape && shape->is_bent())) {
     residual_noise.add(noise_factor * tracking.alignment.residual_sigmas);
     set_noise_factor(residual_noise.factor());
   }
 }
 
-// Whether the frame sees with other pixels than the one that told last: errors that stay where they are in the image
-// show between the two.
+// Whether the camera has not rested lately: errors that stay where they are in the image show where others saw what it
+// sees.
 bool Pipeline::tells_noise(const TrackingResult& tracking) const {
-  const std::size_t newest = history.num_registered() - 1;
-  const Pose last = history.registered_pose(newest - std::min(telling_frame, newest));
-  return mean_pixel_motion(cells, last.inverse() * tracking.alignment.target_from_source) >=
+  const Pose before_it =
+      history.registered_pose(std::min(tracking_limits::telling_frames, history.num_registered() - 1));
+  return mean_pixel_motion(cells, before_it.inverse() * tracking.alignment.target_from_source) >=
          tracking_limits::telling_motion;
 }
 

@@ -62,7 +62,6 @@ struct Pipeline {
   FrameOdometry odometry;              // up to the newest
   PlaceHypothesis hypothesis;          // while the camera is lost
   std::vector<ObjectView> views;       // of an object that stands on a plane, from different directions
-  std::size_t telling_frame = 0;       // of those registered, the newest that told of noise, or the first
   double spacing = 0.0;
   std::int64_t num_lost = 0;             // frames in a row, up to the newest
   std::int64_t num_vain = 0;             // of them, those that showed something

@@ -49,7 +49,7 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   const Pairing pairing = paired(surfaces, gate);
   if (asks_few_first_) {
     AlignOptions coarse = pairing.options;
-    coarse.max_iterations = std::min(coarse.max_iterations, tracking_limits::most_coarse_turn_steps);
+    coarse.max_iterations = std::min(coarse.max_iterations, tracking_limits::most_coarse_steps);
     IcpResult few = align_to(pairing.target, pairing.source.few(), start, coarse);
     const TrackingResult of_few = test(std::move(few), surfaces, guess, expectation);
     if (of_few.is_hopeless) return of_few;

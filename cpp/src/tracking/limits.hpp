@@ -31,7 +31,7 @@ constexpr Eigen::Index most_object_samples = 2000;  // [points] budget: of an ob
 constexpr int num_turns = 72;  // [1] budget: from which the search on the plane starts; dog
 constexpr std::size_t num_turn_candidates = 10;  // [motions] budget: of them, that are refined; dog
 constexpr Eigen::Index coarse_turn_samples = 300;  // [points] budget: of the search's start; dog
-constexpr int most_coarse_turn_steps = 14;  // [steps] budget: of each turn; dog
+constexpr int most_coarse_steps = 14;  // [steps] budget: of a registration that finds the way alone; dog
 constexpr double turn_gate = 4.0;  // [tolerance] tuned: at the end of the search, and of the candidates at first; dog
 constexpr int most_turn_steps = 30;  // [steps] budget: of both; dog
 constexpr double least_climb_step = 0.1;  // [tolerance] budget: of the search by outlines, halved until then; dog
@@ -65,6 +65,7 @@ constexpr double noise_per_residual = 1.376;  // [1] derived: standard deviation
 constexpr double largest_noise_factor = 16.0;  // [1] budget: of the noise that is tried until it is known; d435-t265-shelf
 constexpr double least_residual_sigmas = 0.5;  // [sigma] derived: that confirm a noise that was tried: with half of it the frame had been lost; unrelated
 constexpr double telling_motion = 3.0;  // [pixel] tuned: by which a frame sees with other pixels than one before; test_residual_noise
+constexpr std::size_t telling_frames = 30;  // [frames] budget: so long ago; test_residual_noise
 constexpr double enough_frames = 5.0;  // [frames] tuned: that tell how noisy registered frames are, and what they contradict; unrelated
 constexpr std::int64_t least_judged = 20;  // [points] derived: that tell a part of all; test_tracking
 

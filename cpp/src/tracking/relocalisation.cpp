@@ -17,7 +17,7 @@ std::vector<Pose> most_promising(const AlignCloud& model, const IcpSource& sourc
   const IcpTarget target(model, options);
   AlignOptions coarse = options;
   coarse.num_threads = 1;
-  coarse.max_iterations = tracking_limits::most_coarse_turn_steps;
+  coarse.max_iterations = tracking_limits::most_coarse_steps;
 
   struct Candidate {
     Pose guess, found;

@@ -54,7 +54,7 @@ class TurntableSearch {
       candidates[static_cast<std::size_t>(i)] =
           align(few_, plane_ * turn * ground_frame_.inverse(),
                 gates(registration_limits::first_gate * frame_.size, tracking_limits::turn_gate,
-                      tracking_limits::most_coarse_turn_steps));
+                      tracking_limits::most_coarse_steps));
     });
     candidates = different(std::move(candidates), tracking_limits::num_turn_candidates);
     parallel_for(static_cast<std::int64_t>(candidates.size()), 1, num_threads_, [&](std::int64_t i) {

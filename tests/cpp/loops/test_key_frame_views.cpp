@@ -1,6 +1,5 @@
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
@@ -13,6 +12,7 @@
 #include "meshes.hpp"
 #include "nacre/model_options.hpp"
 #include "nacre/simulation.hpp"
+#include "parking.hpp"
 
 using namespace nacre;
 using namespace nacre_test;
@@ -33,25 +33,8 @@ KeyFrameView view_of(int key_frame) {
   return view;
 }
 
-std::string bytes_of(KeyFrameView view) {
-  std::string bytes;
-  StateWriter archive(bytes);
-  archive(view);
-  return bytes;
-}
-
-struct Folder {
-  fs::path path = fs::temp_directory_path() / "nacre-test-key-frame-views";
-  Folder() { fs::remove_all(path); }
-  ~Folder() { fs::remove_all(path); }
-  int num_files() const {
-    return fs::exists(path) ? static_cast<int>(std::distance(fs::directory_iterator(path), fs::directory_iterator()))
-                            : 0;
-  }
-};
-
 struct Views {
-  Folder folder;
+  ParkingFolder folder{"nacre-test-key-frame-views"};
   ParkedFiles files{folder.path.string()};
   KeyFrameViews views{files};
   std::vector<std::string> expected;
@@ -135,7 +118,7 @@ TEST_CASE("loops close to the same bits whether key frames leave memory or not, 
   const std::vector<LoopReport> stayed = walk.reports("", 1);
   int num_closed = 0;
   for (const int num_threads : {1, 3}) {
-    const Folder folder;
+    const ParkingFolder folder("nacre-test-key-frame-views");
     const std::vector<LoopReport> left = walk.reports(folder.path.string(), num_threads);
     REQUIRE(left.size() == stayed.size());
     for (std::size_t k = 0; k < left.size(); ++k) {
@@ -153,9 +136,9 @@ TEST_CASE("loops close to the same bits whether key frames leave memory or not, 
 
 TEST_CASE("what older key frames saw leaves memory, and is the same when it is asked for") {
   Views there;
-  CHECK(there.folder.num_files() == 0);
+  CHECK(there.folder.files().size() == 0);
   there.views.park();
-  CHECK(there.folder.num_files() == num_views - newest);
+  CHECK(there.folder.files().size() == num_views - newest);
   CHECK(there.num_in_memory() == newest + recalled);
   for (int round = 0; round < 3; ++round) {
     for (int i = 0; i < num_views; ++i) {
@@ -182,7 +165,7 @@ TEST_CASE("what a key frame saw is replaced wherever it is") {
     there.views.replace(k, view_of(-k - 1));
     there.expected[static_cast<std::size_t>(k)] = bytes_of(view_of(-k - 1));
   }
-  CHECK(there.folder.num_files() == num_views - newest);
+  CHECK(there.folder.files().size() == num_views - newest);
   for (int k = 0; k < num_views; ++k) {
     CHECK(bytes_of(*there.views[k]) == there.expected[static_cast<std::size_t>(k)]);
   }
@@ -205,7 +188,7 @@ TEST_CASE("where what key frames saw cannot be written, it stays") {
   }
   fs::remove(there.folder.path);
   there.views.park();
-  CHECK(there.folder.num_files() == num_views - newest);
+  CHECK(there.folder.files().size() == num_views - newest);
 }
 
 TEST_CASE("a damaged file of a key frame is named") {

@@ -11,8 +11,10 @@
 #include "model/checkpoint/fields.hpp"
 #include "model/limits.hpp"
 #include "model/parked_points.hpp"
+#include "parking.hpp"
 
 using namespace nacre;
+using namespace nacre_test;
 
 namespace {
 
@@ -41,13 +43,6 @@ PointModel wall() {
   return model;
 }
 
-std::string bytes_of(PointModel model) {
-  std::string bytes;
-  StateWriter archive(bytes);
-  archive(model);
-  return bytes;
-}
-
 // From the middle of a part of the wall.
 ViewVolume view_at(double x) {
   Pose pose = Pose::Identity();
@@ -66,19 +61,8 @@ std::vector<Pose> corrections() {
   return all;
 }
 
-struct Folder {
-  fs::path path = fs::temp_directory_path() / "nacre-test-parked-points";
-  Folder() { fs::remove_all(path); }
-  ~Folder() { fs::remove_all(path); }
-  std::vector<fs::path> files() const {
-    std::vector<fs::path> all;
-    for (const fs::directory_entry& entry : fs::directory_iterator(path)) all.push_back(entry.path());
-    return all;
-  }
-};
-
 struct Parked {
-  Folder folder;
+  ParkingFolder folder{"nacre-test-parked-points"};
   PointModel model = wall();
   BlockIndex blocks{model};
   ParkedFiles files{folder.path.string()};
@@ -131,7 +115,7 @@ TEST_CASE("what happens to a model happens to the points that have left it, to t
 }
 
 TEST_CASE("points that leave little by little, from between others that have left, are in few files") {
-  Folder folder;
+  ParkingFolder folder{"nacre-test-parked-points"};
   PointModel model = wall();
   BlockIndex blocks(model);
   ParkedFiles files(folder.path.string());
@@ -165,7 +149,7 @@ TEST_CASE("a file that is damaged or missing is named, and the model stays as it
 }
 
 TEST_CASE("where points cannot be written, they stay") {
-  Folder folder;
+  ParkingFolder folder{"nacre-test-parked-points"};
   std::ofstream(folder.path) << "no folder";
   PointModel model = wall();
   BlockIndex blocks(model);

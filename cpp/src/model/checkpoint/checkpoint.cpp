@@ -51,7 +51,7 @@ void exchange_state(Archive& archive, Pipeline& state) {
   archive(state.options.fusion.reference_sigma, state.options.depth.tilt, state.depth_view_frames, state.region,
           state.calibration, state.confidence_noise, state.residual_noise, state.usual_consistency, state.cloud,
           state.loops, state.history, state.before, state.still_scene, state.carried, state.odometry, state.hypothesis,
-          state.views, state.telling_frame, state.spacing, state.num_lost, state.num_vain, state.start_frames);
+          state.views, state.spacing, state.num_lost, state.num_vain, state.start_frames);
   std::vector<BlockIndex::Gap> gaps = state.blocks.gaps();
   if (state.files.is_on()) archive(state.files, state.parked, gaps);
   state.blocks.set_gaps(std::move(gaps));
