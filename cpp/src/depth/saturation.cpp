@@ -28,7 +28,8 @@ bool is_saturated(float largest, const DepthRef& depth) {
     num_between += is_other && z > far;
     num_nearer += is_other && z <= far;
   });
-  return static_cast<double>(num_largest) >= depth_limits::least_saturated * static_cast<double>(num_probed) &&
+  return num_largest >= depth_limits::fewest_saturated &&
+         static_cast<double>(num_largest) >= depth_limits::least_saturated * static_cast<double>(num_probed) &&
          num_near <= num_largest && num_between < num_nearer;
 }
 
