@@ -98,7 +98,7 @@ def repeated(every: int) -> Callable[[Case], Case]:
 
 
 def rested(count: int) -> Callable[[Case], Case]:
-    """Give the first image so many times, with noise of its own each time: a camera that rests before it moves."""
+    """Let the camera rest first: its first image so many times, each with noise of its own."""
 
     def change(case: Case) -> Case:
         still = replace(case, depths=[case.depths[0]] * count)
