@@ -27,6 +27,12 @@ void DeformingShape::show(PointModel& model, int num_threads) {
   model.normals = bent_.normals;
 }
 
+bool DeformingShape::was_bending() const {
+  if (states_.size() < 2) return false;
+  const NodeStates& earlier = states_[states_.size() - 2];
+  return !std::equal(earlier.begin(), earlier.end(), states_.back().begin());
+}
+
 void DeformingShape::bend(PointModel& model, int num_threads) {
   nodes_before_ = field_.nodes;
   nodes_bent_.clear();
@@ -37,7 +43,7 @@ void DeformingShape::bend(PointModel& model, int num_threads) {
 
 WarpFit DeformingShape::follow(PointModel& model, const std::vector<std::int32_t>& in_view, const ShownSurface& shown,
                                int num_threads) {
-  const WarpFit fit = register_warp(field_, canonical_, in_view, shown, num_threads);
+  const WarpFit fit = register_warp(field_, canonical_, in_view, shown, num_threads, was_bending());
   is_bent_ = fit.is_bent;
   if (!is_bent_) nodes_bent_ = fit.bent;
   show(model, num_threads);

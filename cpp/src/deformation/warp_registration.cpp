@@ -32,10 +32,11 @@ struct WarpRow {
 class WarpRegistration {
  public:
   WarpRegistration(WarpField& field, const OrientedPoints& canonical, const std::vector<std::int32_t>& in_view,
-                   const ShownSurface& shown, int num_threads)
+                   const ShownSurface& shown, int num_threads, bool was_bending)
       : field_(field),
         shown_(shown),
         num_threads_(num_threads),
+        was_bending_(was_bending),
         tree_(shown.points.data(), shown.points.rows(), num_threads),
         rows_(chosen_rows(field, canonical, in_view)),
         nearest_(rows_.size(), no_slot),
@@ -196,8 +197,8 @@ class WarpRegistration {
       explained += moved * (2.0 * noise_of(i) - row.weight * moved);
     }
     const auto num_rows = static_cast<double>(rows_.size());
-    return deformation_limits::misfit_by_noise * explained +
-           deformation_limits::misfit_per_shared * shown_.shared_error * (num_rows - explained);
+    const double by_noise = was_bending_ ? deformation_limits::misfit_of_bending : deformation_limits::misfit_by_noise;
+    return by_noise * explained + deformation_limits::misfit_per_shared * shown_.shared_error * (num_rows - explained);
   }
 
   std::vector<Vector6> solved() const {
@@ -214,14 +215,15 @@ class WarpRegistration {
     if (!(normal.dot(other) > deformation_limits::least_neighbor_cosine)) return;
     const Eigen::Vector3f apart = shown_.points.row(found).transpose() - point;
     const double reach = std::max(gate, static_cast<double>(shown_.reach[found]));
-    row.residual = static_cast<double>(other.dot(apart));
-    const double part = row.residual / reach;
+    const double off = static_cast<double>(other.dot(apart)), part = off / reach;
     if (!(std::abs(part) < 1.0) || static_cast<double>(apart.norm()) > std::max(gate, std::sqrt(2.0) * reach)) return;
     const double sigma = static_cast<double>(shown_.sigma[found]);
     const double robust = (1.0 - part * part) * (1.0 - part * part);  // Tukey's
     row.weight = robust / (sigma * sigma);
     row.misfit = std::min(largest_misfit, reach * reach / (3.0 * sigma * sigma) * (1.0 - robust * (1.0 - part * part)));
-    const Eigen::Vector3d direction = other.cast<double>();
+    // Along the mean of both normals: on a curved surface the chord between two of its points has no part in it.
+    const Eigen::Vector3d direction = 0.5 * (other + normal).cast<double>();
+    row.residual = direction.dot(apart.cast<double>());
     const Eigen::Vector3d canonical = row.canonical.point.cast<double>();
     for (int k = 0; k < row.num_nodes; ++k) {
       const WarpNode& node = node_of(row, k);
@@ -270,9 +272,12 @@ class WarpRegistration {
       const double size = (b.rest - a.rest).norm();
       if (!(size > 0.0)) continue;
       const double length = deformation_limits::strain * size, held = deformation_limits::change * size;
-      const double by_rest = stiffness / (length * length), by_last = stiffness / (held * held);
-      const double weight = by_rest + by_last;
       WarpGap out = gap_between(a, b), back = gap_between(b, a);
+      // In standard deviations, the same for both ways.
+      const double strained = std::sqrt(0.5 * (out.gap.squaredNorm() + back.gap.squaredNorm())) / length;
+      const double yielding = deformation_limits::even_strain / std::max(deformation_limits::even_strain, strained);
+      const double by_rest = stiffness * yielding / (length * length), by_last = stiffness / (held * held);
+      const double weight = by_rest + by_last;
       out.gap -= by_last / weight * neighbor.out_before;
       back.gap -= by_last / weight * neighbor.back_before;
       Matrix6& own = equations_.block(neighbor.own_block);
@@ -297,6 +302,7 @@ class WarpRegistration {
   WarpField& field_;
   const ShownSurface& shown_;
   int num_threads_;
+  bool was_bending_;
   BlockTree<float> tree_;
   std::vector<WarpRow> rows_;
   std::vector<std::uint32_t> nearest_;  // of the rows, in the tree
@@ -308,9 +314,9 @@ class WarpRegistration {
 }  // namespace
 
 WarpFit register_warp(WarpField& field, const OrientedPoints& canonical, const std::vector<std::int32_t>& in_view,
-                      const ShownSurface& shown, int num_threads) {
+                      const ShownSurface& shown, int num_threads, bool was_bending) {
   if (shown.points.rows() == 0) return {};
-  return WarpRegistration(field, canonical, in_view, shown, num_threads).fit();
+  return WarpRegistration(field, canonical, in_view, shown, num_threads, was_bending).fit();
 }
 
 }  // namespace nacre

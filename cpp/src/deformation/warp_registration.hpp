@@ -17,10 +17,12 @@ struct WarpFit {
 
 // Bends the field until the model's points in view (their rows; canonical) lie on what the frame shows: Gauss and
 // Newton's method on point-to-plane residuals, and as rigid as possible between nodes (Sorkine and Alexa 2007):
-//   sum of w (n . (q - phi(x)))^2 / sigma^2 + sum over edges, both ways, |e|^2 / strain^2 + |e - e_before|^2 / change^2
-//   with e = R_l (g_m - g_l) + p_l - p_m, e_before: at the frame before,
+//   sum of w (n . (q - phi(x)))^2 / sigma^2 + sum over edges, both ways, h(|e| / strain) + |e - e_before|^2 / change^2
+//   with n the mean normal of both sides (Rusinkiewicz 2019), h Huber's, e = R_l (g_m - g_l) + p_l - p_m, e_before: at
+//   the frame before,
 // with the nearest points q of what is shown, within a gate that narrows from half the distance between nodes.
+// was_bending: at the frame before: then it most likely goes on.
 WarpFit register_warp(WarpField& field, const OrientedPoints& canonical, const std::vector<std::int32_t>& in_view,
-                      const ShownSurface& shown, int num_threads);
+                      const ShownSurface& shown, int num_threads, bool was_bending = false);
 
 }  // namespace nacre

@@ -264,9 +264,8 @@ void Pipeline::deform(const FrameExtras& extras, FrameReport& report) {
                               .from(guesses(extras).front(), FrameRegistration::Gate::narrow, Expectation::expected)
                               .alignment.target_from_source;
   ShownSurface shown = shown_surface(sample_frame(frame, observer, options), pose, camera, spacing);
-  // What registered frames err by beyond one image's noise, neighbours share; until they tell, it may be all.
-  const bool is_noise_known = !learns_noise() || residual_noise.is_known();
-  shown.shared_error = is_noise_known ? 1.0 - 1.0 / (noise_factor * noise_factor) : 1.0;
+  // What registered frames err by beyond one image's noise, neighbours share.
+  shown.shared_error = 1.0 - 1.0 / (noise_factor * noise_factor);
   const WarpFit fit = shape->follow(cloud, rows_facing(cloud, camera, pose), shown, options.num_threads);
   report.deformation.explained = fit.explained;
   blocks.renew(cloud);

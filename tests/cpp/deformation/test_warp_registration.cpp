@@ -116,6 +116,12 @@ TEST_CASE("what noise explains bends nothing") {
   }
 }
 
+TEST_CASE("what was bent goes on where what was still would stay") {
+  Scene still, bending;
+  CHECK(!register_warp(still.field, still.canonical, still.rows, shown(0.03F), 1, false).is_bent);
+  CHECK(register_warp(bending.field, bending.canonical, bending.rows, shown(0.03F), 1, true).is_bent);
+}
+
 TEST_CASE("a frame that shows nothing near leaves the shape") {
   Scene scene;
   ShownSurface far = shown(0.0F);
