@@ -82,6 +82,13 @@ def in_disparity(unit: float) -> Callable[[Case], Case]:
     return lambda case: each(case, change)
 
 
+def filled(value: float) -> Callable[[Case], Case]:
+    """Give a value where nothing was measured [m], as simulators and some cameras do."""
+    return lambda case: each(
+        case, lambda depth: np.where(np.isfinite(depth) & (depth > 0), depth, np.float32(value))
+    )
+
+
 def repeated(every: int) -> Callable[[Case], Case]:
     """Give every so many-th image twice, as recordings do that wait for no new depth."""
 
@@ -214,6 +221,7 @@ DAMAGES: dict[str, Callable[[Case], Case]] = {
     **{f"{100 * part:.0f} % of the pixels missing": missing(part) for part in (0.1, 0.3, 0.5)},
     **{f"rounded to {1000 * unit:.0f} mm": rounded(unit) for unit in (0.005, 0.01, 0.02, 0.05, 0.1)},
     **{f"disparity in steps of {unit} / m": in_disparity(unit) for unit in (0.0075, 0.015, 0.03)},
+    "10 m where nothing was measured": filled(10.0),
     "every third image twice": repeated(3),
     "at rest for 30 frames first": rested(30),
     "every second pixel": every_pixel(2),

@@ -52,7 +52,7 @@ SOURCES = sorted(CPP.rglob("*.[ch]pp"))
 FOLDERS = ("cpp", "python", "tests", "examples", "benchmarks", "docs", "third_party", ".ci", ".github")
 CODE = {".py", ".pyi", ".cpp", ".hpp", ".cmake", ".txt", ".toml", ".yml", ".yaml", ".json", ".in", ".sh", ""}
 TEXT = CODE | {".md"}
-GENERATED = {"__pycache__", ".env", "results"}  # what git ignores
+GENERATED = {"__pycache__", ".env", "results", ".hypothesis"}  # what git ignores
 
 
 def files(*folders: str, suffixes: set[str] = TEXT) -> list[Path]:
