@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <vector>
 
 #include "depth/inverse_depth_image.hpp"
 #include "depth/limits.hpp"
@@ -18,6 +19,7 @@ void for_each_probed(const DepthRef& depth, Visit&& visit) {
 }
 
 bool is_saturated(float largest, const DepthRef& depth) {
+  std::vector<float> levels;  // some of the rest
   const float near = (1.0F - depth_limits::saturation_gap) * largest, far = largest / depth_limits::far_saturation;
   std::int64_t num_probed = 0, num_largest = 0, num_near = 0, num_between = 0, num_nearer = 0;
   for_each_probed(depth, [&](float z) {
@@ -27,10 +29,13 @@ bool is_saturated(float largest, const DepthRef& depth) {
     num_near += is_other && z > near;
     num_between += is_other && z > far;
     num_nearer += is_other && z <= far;
+    const bool asks = is_other && static_cast<std::int64_t>(levels.size()) < depth_limits::least_levels;
+    if (asks && std::find(levels.begin(), levels.end(), z) == levels.end()) levels.push_back(z);
   });
   return num_largest >= depth_limits::fewest_saturated &&
          static_cast<double>(num_largest) >= depth_limits::least_saturated * static_cast<double>(num_probed) &&
-         num_near <= num_largest && num_between < num_nearer;
+         static_cast<std::int64_t>(levels.size()) == depth_limits::least_levels && num_near <= num_largest &&
+         num_between < num_nearer;
 }
 
 }  // namespace
