@@ -68,8 +68,8 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
 }
 
 // Until frames have told how noisy the camera is, a frame that is lost may be noisier where it is expected; elsewhere
-// it is looked for with the noise that is known. Before the second frame none has told: its residuals must show the
-// noise that was tried.
+// it is looked for with the noise that is known. Before one has told, its residuals must show the noise that was
+// tried.
 TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
   const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
   const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
@@ -109,11 +109,9 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
 void Pipeline::learn_from(const TrackingResult& tracking) {
   if (tracking.expectation == Expectation::expected) usual_consistency.add(tracking.consistency);
   residual_noise.add_frame();
-  if (!tells_noise(tracking)) return;
-  if (learns_noise() && !tracking.is_on_plane && !(shape && shape->is_bent())) {
-    residual_noise.add(noise_factor * tracking.alignment.residual_sigmas);
-    set_noise_factor(residual_noise.factor());
-  }
+  if (!learns_noise() || tracking.is_on_plane || (shape && shape->is_bent()) || !tells_noise(tracking)) return;
+  residual_noise.add(noise_factor * tracking.alignment.residual_sigmas);
+  set_noise_factor(residual_noise.factor());
 }
 
 // Whether the camera has not rested lately: errors that stay where they are in the image show where others saw what it

@@ -15,7 +15,7 @@ class ResidualNoise {
   // By which the standard deviation that an image shows is multiplied: at least 1.
   double factor() const;
   bool has_told() const { return count_ > 0.0; }
-  // Whether one has told, and it is none of the first.
+  // Whether one has told, and enough have been registered.
   bool is_known() const;
 
  private:
