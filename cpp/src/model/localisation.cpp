@@ -108,9 +108,8 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
 
 void Pipeline::learn_from(const TrackingResult& tracking) {
   if (tracking.expectation == Expectation::expected) usual_consistency.add(tracking.consistency);
-  residual_noise.add_frame();
-  if (!learns_noise() || tracking.is_on_plane || (shape && shape->is_bent()) || !tells_noise(tracking)) return;
-  residual_noise.add(noise_factor * tracking.alignment.residual_sigmas);
+  if (!learns_noise() || tracking.is_on_plane || (shape && shape->is_bent())) return residual_noise.add(0.0, false);
+  residual_noise.add(noise_factor * tracking.alignment.residual_sigmas, tells_noise(tracking));
   set_noise_factor(residual_noise.factor());
 }
 

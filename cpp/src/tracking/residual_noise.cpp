@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "depth/limits.hpp"
 #include "tracking/limits.hpp"
@@ -10,8 +11,10 @@ namespace nacre {
 
 using namespace tracking_limits;
 
-void ResidualNoise::add(double residual_sigmas) {
-  if (!(residual_sigmas > 0.0)) return;
+void ResidualNoise::add(double residual_sigmas, bool tells) {
+  ++num_frames_;
+  if (!(residual_sigmas > 0.0) || (has_told_ && !tells)) return;
+  if (tells && !std::exchange(has_told_, true)) count_ = 0.0;
   count_ = std::min(count_ + 1.0, depth_limits::most_frames);
   log_scale_ += (std::log(residual_sigmas) - log_scale_) / count_;
 }

@@ -113,7 +113,7 @@ struct PrivateState {
 
   template <class Archive>
   static void exchange(Archive& archive, ResidualNoise& noise) {
-    archive(noise.log_scale_, noise.count_, noise.num_frames_);
+    archive(noise.log_scale_, noise.count_, noise.has_told_, noise.num_frames_);
   }
 
   template <class Archive>
