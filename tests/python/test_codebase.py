@@ -42,6 +42,7 @@ ORDER = [
     "simulation",
     "region",
     "registration",
+    "keypoints",
     "outlines",
 ]
 ORDER += ["consolidation", "fusion", "tracking", "loops", "deformation", "model"]
@@ -131,8 +132,8 @@ def test_no_modules_include_each_other_in_a_circle() -> None:
 
 
 # Folders whose numbers decide about data, and stand in their limits.hpp; those before only decide how fast.
-DECIDING = ["camera", "depth", "simulation", "region", "registration", "outlines", "consolidation", "fusion"]
-DECIDING += ["tracking", "loops", "deformation", "model"]
+DECIDING = ["camera", "depth", "simulation", "region", "registration", "keypoints", "outlines"]
+DECIDING += ["consolidation", "fusion", "tracking", "loops", "deformation", "model"]
 # What decides nothing about data: sizes of blocks and arrays, names of values.
 STRUCTURE = "block_size capacity border right_border tile_size size side radius shift group per_chunk"
 STRUCTURE += " version_at bytes_per_pixel none any nothing missing largest infinity nan reach step kWordBits"

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <vector>
 
 #include "camera/point_projection.hpp"
 #include "nacre/camera.hpp"
@@ -15,7 +16,8 @@ namespace nacre {
 struct DepthView {
   Values depth, sigma;  // of each pixel [m], NaN where nothing was measured
   Pose world_from_camera = Pose::Identity();
-  Values measured = {};  // the depth before it was cleaned, 0 or NaN for none; empty: the same
+  Values measured = {};                       // the depth before it was cleaned, 0 or NaN for none; empty: the same
+  std::vector<std::uint8_t> brightness = {};  // empty: unknown
 };
 
 // What a view shows, in its camera's frame: a row for each pixel, or each `step`-th across and down; NaN where it shows

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "base/parked_files.hpp"
+#include "keypoints/keypoints.hpp"
 #include "nacre/types.hpp"
 #include "outlines/occluding_edges.hpp"
 
@@ -17,6 +18,7 @@ namespace nacre {
 struct KeyFrameView {
   Points points, normals;  // of the surface, at random
   std::vector<OutlinePoint> outline;
+  Keypoints keypoints;
 };
 
 template <class Archive>
@@ -28,8 +30,11 @@ void exchange(Archive& archive, OutlinePoint& point) {
 
 template <class Archive>
 void exchange(Archive& archive, KeyFrameView& view) {
-  archive(view.points, view.normals, view.outline);
+  archive(view.points, view.normals, view.outline, view.keypoints.points, view.keypoints.descriptors);
   archive.require(view.points.rows() == view.normals.rows(), "not every point of a key frame has a normal");
+  archive.require(view.keypoints.points.rows() == static_cast<Eigen::Index>(view.keypoints.descriptors.size()),
+                  "not every keypoint of a key frame has a descriptor");
+  archive.require(view.keypoints.points.allFinite(), "a keypoint is not finite");
 }
 
 // By the number of the key frame. One that is on disk is read when it is asked for; those that were asked for last stay

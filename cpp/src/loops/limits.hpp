@@ -11,9 +11,10 @@
 namespace nacre::loops_limits {
 
 constexpr int key_frame_points = 3000;  // [points] budget: of the surface that a key frame keeps; test_loop_closure
-constexpr std::size_t most_key_frames = 1000;  // [views] budget: about 90 kB each, in memory or on disk; test_loop_closure
+constexpr std::size_t most_key_frames = 1000;  // [views] budget: about 90 kB each, 130 with keypoints, in memory or on disk; test_loop_closure
 constexpr std::size_t newest_key_frames = 32;  // [views] budget: that stay in memory where older ones may leave; test_key_frame_views
 constexpr std::size_t recalled_key_frames = 32;  // [views] budget: of those on disk, that are in memory too; test_key_frame_views
+constexpr int most_asked_key_frames = 30;  // [views] budget: whose keypoints a lost frame is compared with at once; test_keypoints
 constexpr std::size_t most_candidates = 4;  // [views] budget: that a frame is registered to at once; test_loop_closure
 constexpr int verified_nodes = 12;  // [nodes] tuned: of the trajectory: what was seen since is taken to be in place; test_loop_closure, teddy
 constexpr double least_overlap = 0.3;  // [1] tuned: of a frame and a key frame; test_loop_closure

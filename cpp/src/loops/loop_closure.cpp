@@ -9,6 +9,7 @@
 #include "base/statistics.hpp"
 #include "camera/limits.hpp"
 #include "depth/tilt.hpp"
+#include "keypoints/motion.hpp"
 #include "loops/limits.hpp"
 #include "outlines/match.hpp"
 #include "registration/icp.hpp"
@@ -49,6 +50,26 @@ double tolerance_of(const LoopFrame& frame) {
 
 bool LoopClosure::is_verified(int key_frame) const {
   return time() - key_frames_[static_cast<std::size_t>(key_frame)].last_verified <= loops_limits::verified_nodes;
+}
+
+// What is around them is as large in all views.
+Keypoints LoopClosure::keypoints_of(const DepthView& view) const {
+  return find_keypoints(view, camera_, key_frames_.front().depth, options_.num_threads);
+}
+
+std::optional<Pose> LoopClosure::place_by_keypoints(const DepthView& view, std::int64_t turn) const {
+  if (key_frames_.empty()) return std::nullopt;
+  const Keypoints seen = keypoints_of(view);
+  const int every = (num_key_frames() + loops_limits::most_asked_key_frames - 1) / loops_limits::most_asked_key_frames;
+  std::int64_t most = 0;
+  std::optional<Pose> best;
+  for (auto k = static_cast<int>(turn % every); k < num_key_frames(); k += every) {
+    const auto motion = keypoint_motion(seen, views_[k]->keypoints, options_.registration.seed, options_.num_threads);
+    if (!motion || motion->num_matches <= most) continue;
+    most = motion->num_matches;
+    best = pose_of(k) * motion->target_from_source;
+  }
+  return best;
 }
 
 std::int32_t LoopClosure::oldest_frame() const {
@@ -160,7 +181,7 @@ bool LoopClosure::insert(const LoopFrame& frame, const FrameCloud& cloud, const 
   if (is_key_frame) {
     const double depth = cloud.depth;
     key_frames_.push_back({frame.index, depth, bounds_of(cloud.points), time()});
-    views_.add({cloud.points, cloud.normals, frame.outline});
+    views_.add({cloud.points, cloud.normals, frame.outline, keypoints_of(frame.view)});
     node = graph_.add_node(pose, frame.is_given);
     if (!trajectory_.empty()) {
       const int from = frame.to_whole_model && most_seen >= 0 ? most_seen : trajectory_.back().key_frame;
@@ -201,6 +222,10 @@ void LoopClosure::straighten(double tilt, const std::vector<Pose>& motions) {
       outline.point = straight.point.cast<double>();
       outline.normal = straight.normal.cast<double>();
       outline.outward = (outline.outward - outline.outward.dot(outline.normal) * outline.normal).normalized();
+    }
+    for (Eigen::Index i = 0; i < view.keypoints.points.rows(); ++i) {
+      auto point = view.keypoints.points.row(i);
+      point = without_tilt({point, Eigen::Vector3f::UnitZ()}, tilt).point;
     }
     views_.replace(k, std::move(view));
   }

@@ -47,6 +47,10 @@ class LoopClosure {
   // The outlines of the oldest key frames that are near a pose, and verified (world frame).
   std::vector<std::vector<OutlinePoint>> outlines_near(const Pose& pose) const;
 
+  // Where a lost camera is, by keypoints of key frames: of the one that shares most; nothing where none shares enough.
+  // turn: of many key frames a part is asked, at each turn another.
+  std::optional<Pose> place_by_keypoints(const DepthView& view, std::int64_t turn) const;
+
   // Of what was last seen by earlier frames it is not known whether it is still in place.
   std::int32_t oldest_frame() const;
 
@@ -92,6 +96,7 @@ class LoopClosure {
   LoopReport close(const LoopFrame& frame, const Match& loop, const std::vector<int>& in_question);
   LoopReport adjust_loop_of_views(const LoopFrame& frame, const std::vector<SeenKeyFrame>& seen);
 
+  Keypoints keypoints_of(const DepthView& view) const;
   double part_in_view(int key_frame, const LoopFrame& frame) const;
   IcpTarget target_of(const std::vector<int>& key_frames, const AlignOptions& options) const;
   PoseEdge edge(int from, int to, const Pose& pose, const AlignResult& alignment, double depth, bool is_loop) const;

@@ -157,7 +157,10 @@ RelocalisationPlaces Pipeline::elsewhere(const RegionReport& region_report, bool
   if (!options.relocalise || !may_search) return places;
   places.views = &views;
   places.view_of_frame = [&] { return view_of_object(region_report); };
-  if (num_vain % model_limits::search_interval == 0) places.key_poses = [this] { return key_poses(); };
+  if (num_vain % model_limits::search_interval == 0) {
+    places.by_keypoints = [this] { return loops.place_by_keypoints(now, num_vain / model_limits::search_interval); };
+    places.key_poses = [this] { return key_poses(); };
+  }
   places.everywhere = places.key_poses && (num_vain < model_limits::patience || num_vain % model_limits::patience == 0);
   return places;
 }

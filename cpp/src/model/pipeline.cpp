@@ -232,6 +232,7 @@ void Pipeline::observe(const FrameExtras& extras, FrameReport& report) {
   leave_out_carried(report);
   if (!(options.fusion.reference_sigma > 0.0)) options.fusion.reference_sigma = median_sigma(frame);
   observer.look_at(frame, extras.colors, options.num_threads);
+  now.brightness = brightness_of(extras.colors);
   now.depth = frame.points.col(2);
   now.sigma = frame.sigma;
   noise_factor = 1.0;

@@ -12,6 +12,16 @@
 #include "registration/limits.hpp"
 
 namespace nacre {
+
+std::vector<std::uint8_t> brightness_of(const ColorsRef& colors) {
+  std::vector<std::uint8_t> brightness(static_cast<std::size_t>(colors.rows()));
+  for (Eigen::Index i = 0; i < colors.rows(); ++i) {
+    const int sum = 77 * colors(i, 0) + 150 * colors(i, 1) + 29 * colors(i, 2);  // luma in parts of 256
+    brightness[static_cast<std::size_t>(i)] = static_cast<std::uint8_t>((sum + 128) >> 8);
+  }
+  return brightness;
+}
+
 BrightCloud::BrightCloud(const PointsRef& points_in, const ValuesRef& brightness_in) {
   std::vector<Eigen::Index> rows;
   for (Eigen::Index i = 0; i < brightness_in.size(); ++i) {

@@ -12,6 +12,9 @@ namespace nacre {
 // Of red, green and blue (ITU-R BT.601).
 inline float luma(const Eigen::Vector3f& color) { return color.dot(Eigen::Vector3f(0.299F, 0.587F, 0.114F)); }
 
+// The same of each pixel, in whole numbers.
+std::vector<std::uint8_t> brightness_of(const ColorsRef& colors);
+
 // Points with a brightness each, as they were measured; those without one are not kept.
 struct BrightCloud {
   Points points;

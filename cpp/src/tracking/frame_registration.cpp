@@ -9,6 +9,7 @@
 #include "camera/limits.hpp"
 #include "camera/point_spacing.hpp"
 #include "camera/view_distance.hpp"
+#include "keypoints/motion.hpp"
 #include "nacre/global_registration.hpp"
 #include "outlines/limits.hpp"
 #include "registration/limits.hpp"
@@ -306,6 +307,17 @@ std::vector<Pose> FrameRegistration::around(const Pose& world_from_camera) const
     }
   }
   return poses;
+}
+
+std::optional<Pose> FrameRegistration::by_keypoints() const {
+  const auto keypoints_of = [&](const DepthView& view) {
+    return find_keypoints(view, now_.camera, depth_, options_.num_threads);
+  };
+  const DepthView& last = target_.last_view;
+  if (last.brightness.empty()) return std::nullopt;
+  const auto motion =
+      keypoint_motion(keypoints_of(now_.view), keypoints_of(last), options_.registration.seed, options_.num_threads);
+  return motion ? std::optional(last.world_from_camera * motion->target_from_source) : std::nullopt;
 }
 
 bool FrameRegistration::may_be_beside(const TrackingResult& found, const Pose& guess) const {

@@ -76,6 +76,8 @@ class FrameRegistration {
   // Cameras beside a known one, about as far apart as a registration finds its way: it turned about itself, or about
   // what it saw.
   std::vector<Pose> beside(const Pose& world_from_camera) const;
+  // Where keypoints of the last view say that the camera is; nothing where too few match.
+  std::optional<Pose> by_keypoints() const;
   // Whether what was found from a guess is nearer to one beside it, and nothing rules those out.
   bool may_be_beside(const TrackingResult& found, const Pose& guess) const;
 

@@ -100,6 +100,7 @@ void try_beside(const FrameRegistration& registration, double noise_factor, Trac
     const PointsInView& view = registration.in_view(last);
     prior.beside = most_promising(AlignCloud(view.points, view.normals), registration.source(),
                                   registration.beside(last), options.registration);
+    if (const auto place = registration.by_keypoints()) prior.beside->insert(prior.beside->begin(), *place);
   }
   std::vector<Pose> starts = *prior.beside;
   if (const auto found = best_with_less_noise(prior, noise_factor)) starts.push_back(*found);
@@ -238,7 +239,10 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     keep_if_possible(registration.from(*followed, FrameRegistration::Gate::narrow, Expectation::unexpected));
   }
   const bool goes_on = followed && hypothesis.is_confirmed_by(best);
-  if (!goes_on && places.key_poses) {
+  if (!goes_on && places.by_keypoints) {
+    if (const auto place = places.by_keypoints()) keep_if_possible(found_at(*place, registration, prior));
+  }
+  if (!goes_on && places.key_poses && best.is_lost()) {
     keep_if_possible(around_key_poses(registration, target.model, prior, options));
   }
   if (best.is_lost() && !goes_on && places.everywhere) {

@@ -16,6 +16,7 @@ namespace nacre {
 struct RelocalisationPlaces {
   const std::vector<ObjectView>* views = nullptr;  // of an object that stands on a plane: it may have turned on it
   std::function<std::optional<ObjectView>()> view_of_frame;  // the same of the frame, made when it is needed
+  std::function<std::optional<Pose>()> by_keypoints;         // of earlier views, likewise
   std::function<std::vector<Pose>()> key_poses;              // and around them, likewise
   bool everywhere = false;
   bool beside = false;  // the last guess

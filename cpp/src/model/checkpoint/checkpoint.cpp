@@ -389,6 +389,8 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   archive.require(is_surface(state.cloud, num_frames), "the points are not all there, or no surface");
   archive.require(is_first || (is_pixels(before.depth) && is_pixels(before.sigma) && is_pixels(before.measured)),
                   "the newest view has another size than the camera");
+  archive.require(before.brightness.empty() || before.brightness.size() == static_cast<std::size_t>(num_pixels),
+                  "the newest view has another size in colour");
   archive.require(is_first || state.history.num_registered() > 0, "the poses are missing");
   archive.require(PrivateState::is_sound(state.parked, state.blocks, state.cloud.points.size(), num_frames),
                   "the points that left memory contradict the others");

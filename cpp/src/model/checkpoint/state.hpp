@@ -17,7 +17,7 @@ namespace nacre {
 
 template <class Archive>
 void exchange(Archive& archive, DepthView& view) {
-  archive(view.depth, view.sigma, view.world_from_camera, view.measured);
+  archive(view.depth, view.sigma, view.world_from_camera, view.measured, view.brightness);
 }
 
 template <class Archive>
