@@ -118,7 +118,7 @@ def write_recording(
     camera : Camera
         The depth camera.
     depth_images : iterable of (H, W) arrays
-        Metres; 0, negative and not finite values mean no measurement.
+        At least one. Metres; 0, negative and not finite values mean no measurement.
     depth_scale : float
         Stored units per metre. The depth is rounded to the nearest unit.
     colors : iterable of (H, W, 3) arrays, optional
@@ -136,8 +136,8 @@ def write_recording(
     Raises
     ------
     ValueError
-        A depth does not fit 16 bits at this ``depth_scale``, an image has not the camera's size, or the
-        iterables have different lengths.
+        A depth does not fit 16 bits at this ``depth_scale``, an image has not the camera's size, the
+        iterables have different lengths, or there is no image.
     FileExistsError
         The folder holds a recording already.
     """
@@ -145,16 +145,19 @@ def write_recording(
     arrays.as_camera("camera", camera)
     depth_scale = arrays.as_scale("depth_scale", depth_scale)
     require_no_recording(folder)
-    (folder / "depth").mkdir(parents=True, exist_ok=True)
-    if colors is not None:
-        (folder / "color").mkdir(exist_ok=True)
 
     given = {"depth_images": depth_images, "colors": colors, "poses": poses, "timestamps": timestamps}
     iterators = {name: iter(as_items(name, values)) for name, values in given.items() if values is not None}
+    view = _next_view(iterators, 0)
+    if not view:
+        raise ValueError("depth_images must have at least one image, got none")
+    (folder / "depth").mkdir(parents=True, exist_ok=True)
+    if colors is not None:
+        (folder / "color").mkdir(exist_ok=True)
     times: list[float] = []
     truth: list[npt.NDArray[np.float64]] = []
     index = 0
-    while view := _next_view(iterators, index):
+    while view:
         write_depth_png(
             folder / "depth" / f"{index:06d}.png", _stored(view["depth_images"], camera, depth_scale, index)
         )
@@ -165,8 +168,9 @@ def write_recording(
         if "poses" in view:
             truth.append(arrays.as_pose(f"poses[{index}]", view["poses"]))
         index += 1
+        view = _next_view(iterators, index)
 
-    if poses is not None and index:
+    if poses is not None:
         write_trajectory(folder / "groundtruth.txt", times, truth)
     if timestamps is not None:
         with atomic_writer(folder / "timestamps.txt") as stream:

@@ -84,6 +84,13 @@ def test_a_depth_that_would_vanish_names_the_scale(tmp_path):
         write_recording(tmp_path / "p", SMALL, [np.full((6, 8), 0.4)], depth_scale=1)
 
 
+@pytest.mark.parametrize("views", [{}, {"colors": []}, {"poses": np.empty((0, 4, 4)), "timestamps": []}])
+def test_a_recording_without_frames_is_refused(tmp_path, views):
+    with pytest.raises(ValueError, match="depth_images must have at least one image, got none"):
+        write_recording(tmp_path / "p", SMALL, iter([]), depth_scale=1000, **views)
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize("scale", [0, -5, np.nan, np.inf])
 def test_written_scale_must_be_positive(tmp_path, scale):
     with pytest.raises(ValueError, match="depth_scale"):
