@@ -96,7 +96,7 @@ def write_mesh(
     """
     Write a triangle mesh, whole or not at all.
 
-    What the format has no place for is left out, with a warning.
+    What the format has no place for is left out, with a warning; of normals none, as triangles have their own.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def write_mesh(
     checked = check_cloud(points, normals, colors, attributes)
     painted = None if texture is None else check_texture(texture, len(corners))
     mesh = MeshArrays(checked.points, corners, checked.normals, checked.colors, checked.attributes, painted)
-    warn_of_loss(path, lost_in(path, mesh))
+    warn_of_loss(path, [name for name in lost_in(path, mesh) if name != "normals"])
     _WRITERS[Path(path).suffix.lower()].write_mesh(path, mesh, comments=comments, binary=binary)
 
 

@@ -88,7 +88,7 @@ def test_a_mesh_keeps_its_normals_and_colours(tmp_path, suffix):
 
 @pytest.mark.parametrize(
     ("suffix", "lost"),
-    [(".ply", None), (".glb", "heat"), (".obj", "heat"), (".stl", "heat, normals and colors")],
+    [(".ply", None), (".glb", "heat"), (".obj", "heat"), (".stl", "heat and colors")],
 )
 def test_what_a_format_has_no_place_for_is_warned_of(tmp_path, suffix, lost):
     mesh = nacre.Mesh(TETRAHEDRON, TRIANGLES, normals=NORMALS, colors=COLORS)
@@ -97,6 +97,12 @@ def test_what_a_format_has_no_place_for_is_warned_of(tmp_path, suffix, lost):
         nacre.write_mesh(tmp_path / f"a{suffix}", mesh, attributes={"heat": np.arange(4.0)})
     assert [warning.filename for warning in told] == [__file__] * (lost is not None)
     assert all(f"{suffix} files have no place for {lost}" in str(warning.message) for warning in told)
+
+
+def test_normals_of_an_stl_file_are_those_of_its_triangles_without_a_word(tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        write(tmp_path / "a.stl", normals=NORMALS)
 
 
 @pytest.mark.parametrize("binary", [True, False])
