@@ -112,6 +112,7 @@ def _mesh(job: Job) -> Figures:
         normals=mesh.normals,
         colors=mesh.colors,
         attributes=mesh.attributes,
+        comments=mesh.comments,
     )
     lost = lost_in(job.out, mesh)
     fields = {"normals": mesh.normals, "colors": mesh.colors, **mesh.attributes}

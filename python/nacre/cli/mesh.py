@@ -142,9 +142,9 @@ def _surface(path: Path, closed: bool) -> tuple[MeshArrays, tuple[str, ...]]:
     from nacre import read_points
     from nacre.io.meshes import read_mesh_arrays
 
-    comments: tuple[str, ...] = ()
     if not closed and path.suffix.lower() in mesh_suffixes() and has_faces(path):
         mesh = read_mesh_arrays(path)
+        comments = mesh.comments
     else:
         cloud = read_points(path)
         if cloud.normals is None:

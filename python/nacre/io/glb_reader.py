@@ -6,17 +6,18 @@ import dataclasses
 import os
 import struct
 from collections.abc import Iterator
+from itertools import islice
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from nacre.errors import FileFormatError, shown
+from nacre.errors import FileFormatError, printable, shown
 from nacre.io.glb import BINARY_CHUNK, JSON_CHUNK, MAGIC, VERSION
 from nacre.io.json_files import parse_json
 from nacre.io.mesh_arrays import MeshArrays
 from nacre.io.painting import Painting, is_known_image
-from nacre.io.raw import read_file
+from nacre.io.raw import MAX_COMMENTS, read_file
 from nacre.io.srgb import srgb_from_linear
 
 Array = npt.NDArray[Any]
@@ -76,7 +77,9 @@ def _comments(document: dict[str, Any]) -> tuple[str, ...]:
     found: Any = document
     for name in ("asset", "extras", "comments"):
         found = found.get(name) if isinstance(found, dict) else None
-    return tuple(line for line in found if isinstance(line, str)) if isinstance(found, list) else ()
+    texts = [text for text in found if isinstance(text, str)] if isinstance(found, list) else []
+    lines = (printable(line) for text in texts for line in text.splitlines() or [""])
+    return tuple(islice(lines, MAX_COMMENTS))
 
 
 def _read_chunks(path: str | os.PathLike[str], data: bytes) -> tuple[dict[str, Any], bytes]:

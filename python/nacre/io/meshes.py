@@ -96,7 +96,7 @@ def write_mesh(
     """
     Write a triangle mesh, whole or not at all.
 
-    What the format has no place for is left out, with a warning; of normals none, as triangles have their own.
+    What the format has no place for is left out, with a warning; normals without one: STL has its triangles'.
 
     Parameters
     ----------

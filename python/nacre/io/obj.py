@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from array import array
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from io import BytesIO
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +17,7 @@ from nacre.errors import FileFormatError
 from nacre.io.cloud import check_comments
 from nacre.io.images import encode_jpeg
 from nacre.io.mesh_arrays import MeshArrays, Polygons, float_of
-from nacre.io.raw import code_lines, excerpt, file_writer, read_file
+from nacre.io.raw import MAX_COMMENTS, code_lines, decode, excerpt, file_writer, read_file
 from nacre.io.rows import encode_lines
 from nacre.meshing.texture import Texture
 
@@ -32,7 +35,8 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
     vertex has the same one in all its faces; texture coordinates and materials are left out.
     """
     mesh = _Attributed()
-    for line_number, line in code_lines(read_file(path)):
+    data = read_file(path)
+    for line_number, line in code_lines(data):
         keyword, *words = line.split() or [b""]
         try:
             if keyword == b"v":
@@ -47,7 +51,16 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
             raise FileFormatError(path, f"cannot read {excerpt(line.strip())}", line=line_number) from None
     if not mesh.counts:
         raise FileFormatError(path, "not a mesh: there is no face")
-    return mesh.finish(path)
+    comments = tuple(islice(_comments(data), MAX_COMMENTS))
+    return dataclasses.replace(mesh.finish(path), comments=comments)
+
+
+def _comments(data: bytes) -> Iterator[str]:
+    """Yield the lines of comment with which a file begins."""
+    for line in BytesIO(data):
+        if not line.startswith(b"#"):
+            return
+        yield decode(line[1:].strip())
 
 
 class _Attributed(Polygons):

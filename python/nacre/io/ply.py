@@ -133,7 +133,9 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
         raise FileFormatError(path, f"{reason}; nacre.read_points(path) reads points")
     triangles = fan(path, faces.values.astype(np.int64), faces.counts.astype(np.int64), len(cloud))
     attributes = {name: values for name, values in cloud.attributes.items() if values.dtype.kind in "buif"}
-    return MeshArrays(cloud.points, triangles, cloud.normals, cloud.colors, attributes)
+    return MeshArrays(
+        cloud.points, triangles, cloud.normals, cloud.colors, attributes, comments=cloud.comments
+    )
 
 
 def _vertices(file: PlyFile) -> Cloud:

@@ -46,6 +46,16 @@ def test_a_mesh_is_simplified_as_it_is(sheet, tmp_path):
     )
 
 
+@pytest.mark.parametrize("suffix", [".ply", ".glb", ".obj"])
+def test_a_mesh_keeps_its_comments(tmp_path, suffix):
+    source = tmp_path / f"a{suffix}"
+    nacre.write_mesh(source, np.eye(3), [[0, 1, 2]], comments=["mine"])
+    run("mesh", source, "-o", tmp_path / "b.ply")
+    run("convert", source, tmp_path / "c.obj")
+    for name in ("b.ply", "c.obj"):
+        assert read_mesh_arrays(tmp_path / name).comments == ("mine",)
+
+
 def test_what_a_format_has_no_place_for_is_told(sheet, tmp_path):
     said = run("mesh", sheet, "-o", tmp_path / "a.stl").err
     assert said == f"warning: {tmp_path / 'a.stl'}: .stl files have no place for colors\n"

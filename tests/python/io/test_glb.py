@@ -36,6 +36,12 @@ def test_corners_without_indices(tmp_path):
     assert mesh.triangles.tolist() == [[0, 1, 2]]
 
 
+def test_comments_can_be_written_to_any_format(tmp_path):
+    asset = {"version": "2.0", "extras": {"comments": ["one\ntwo", "\ud800", 3]}}
+    mesh = read(tmp_path, glb([SQUARE[:3]], {"attributes": {"POSITION": 0}}, asset=asset))
+    assert mesh.comments == ("one", "two", "\\ud800")
+
+
 def test_nodes_place_their_meshes(tmp_path):
     """A quarter turn about z above a shift; and a mirror, which turns the triangles round."""
     half = float(np.sqrt(0.5))

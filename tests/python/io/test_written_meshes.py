@@ -143,6 +143,13 @@ def test_normals_of_glb_are_unit_vectors(tmp_path):
     assert normals.tolist() == [[0, 0, 1], [0, 0, 1], [0, 0, 1], [1, 0, 0]]
 
 
+@pytest.mark.parametrize("suffix", COLORED)
+def test_comments_are_read_again(tmp_path, suffix):
+    assert read_mesh_arrays(write(tmp_path / f"a{suffix}")).comments == ()
+    comments = ("made by hand", "", "café")
+    assert read_mesh_arrays(write(tmp_path / f"a{suffix}", comments=comments)).comments == comments
+
+
 def test_comments(tmp_path):
     comments = ["made by hand", "café"]
     assert "# made by hand\n# café\nv 0" in write(tmp_path / "a.obj", comments=comments).read_text("utf-8")

@@ -244,11 +244,12 @@ def test_meshes_of_other_formats_are_shown(tmp_path: Path, ending: str) -> None:
     np.testing.assert_allclose(read.normals, np.broadcast_to((0, 0, 1), (3, 3)))
 
 
-def test_a_glb_file_of_nacre_stands_upright(tmp_path: Path) -> None:
-    corners, triangles = [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]
+@pytest.mark.parametrize("ending", ["glb", "obj", "ply"])
+def test_a_mesh_file_of_nacre_stands_upright(tmp_path: Path, ending: str) -> None:
+    path, corners, triangles = tmp_path / f"a.{ending}", [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]
     for comments in ([], ["metres; the world is the first camera's frame"]):
-        nacre.write_mesh(tmp_path / "a.glb", corners, triangles, comments=comments)
-        assert viewer.read_timeline(tmp_path / "a.glb").is_upright == (not comments)
+        nacre.write_mesh(path, corners, triangles, comments=comments)
+        assert viewer.read_timeline(path).is_upright == (not comments)
 
 
 def painted_plane(path: Path) -> Path:
