@@ -43,7 +43,7 @@ void DeformingShape::bend(PointModel& model, int num_threads) {
 
 WarpFit DeformingShape::follow(PointModel& model, const std::vector<std::int32_t>& in_view, const ShownSurface& shown,
                                int num_threads) {
-  const WarpFit fit = register_warp(field_, canonical_, in_view, shown, num_threads, was_bending());
+  const WarpFit fit = register_warp(field_, canonical_, in_view, shown, num_threads, was_bending(), model.colors);
   is_bent_ = fit.is_bent;
   if (!is_bent_) nodes_bent_ = fit.bent;
   show(model, num_threads);

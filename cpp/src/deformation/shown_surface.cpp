@@ -1,5 +1,7 @@
 #include "deformation/shown_surface.hpp"
 
+#include <numeric>
+
 #include "camera/point_spacing.hpp"
 #include "depth/depth_view.hpp"
 #include "fusion/limits.hpp"
@@ -19,6 +21,21 @@ ShownSurface shown_surface(const FrameSamples& samples, const Pose& world_from_c
     shown.reach[i] = static_cast<float>(largest_offset(spacing_at(point.z(), sigma, camera, spacing), sigma));
   }
   return shown;
+}
+
+void add_brightness(ShownSurface& shown, const FrameSamples& samples, const Pose& world_from_camera,
+                    const BrightCloud& pixels, double spacing, int num_threads) {
+  ColorField field(pixels, samples.points, samples.normals, 4.0 * spacing, num_threads);
+  std::vector<std::uint32_t> rows(static_cast<std::size_t>(samples.points.rows()));
+  std::iota(rows.begin(), rows.end(), 0U);
+  field.fit(rows);
+  shown.spacing = spacing;
+  shown.brightness.resize(samples.points.rows());
+  shown.gradient.resize(samples.points.rows(), 3);
+  for (Eigen::Index i = 0; i < samples.points.rows(); ++i) {
+    shown.brightness[i] = field.brightness(i);
+    shown.gradient.row(i) = (world_from_camera.linear() * field.gradient(i)).transpose().cast<float>();
+  }
 }
 
 std::vector<std::int32_t> rows_facing(const PointModel& model, const Camera& camera, const Pose& world_from_camera) {

@@ -2,13 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "base/random.hpp"
+#include "base/statistics.hpp"
 #include "deformation/limits.hpp"
 #include "deformation/node_equations.hpp"
+#include "registration/color_field.hpp"
+#include "registration/limits.hpp"
 #include "spatial/nearest_batch.hpp"
 
 namespace nacre {
@@ -17,28 +21,36 @@ namespace {
 // Of a match that is as bad as none.
 const double largest_misfit = base_limits::noise_sigmas * base_limits::noise_sigmas;
 
+// What a match says of the motions of the nodes that move a point.
+struct WarpEquation {
+  std::array<Vector6, WarpBinding::blended> jacobian;  // of the residual, by each node's motion
+  double residual = 0.0;                               // [m] or [1]
+  double weight = 0.0;                                 // one by its square; 0: there is no match
+};
+
 // A point of the model, and what the frame shows next to it.
 struct WarpRow {
   OrientedPoint canonical;
   WarpBinding binding;
   int num_nodes;  // that move it
   std::array<double, WarpBinding::blended> weights;
-  std::array<Vector6, WarpBinding::blended> jacobian;  // of the residual, by each node's motion
-  double residual = 0.0;                               // [m]
-  double weight = 0.0;                                 // [1/m^2]; 0: matched with nothing
-  double misfit = 0.0;                                 // [1]
+  float brightness;      // NaN: unknown
+  double texture = 0.0;  // by how much it changes from one point to the next
+  WarpEquation shape, color;
+  double misfit = 0.0;  // [1]
 };
 
 class WarpRegistration {
  public:
   WarpRegistration(WarpField& field, const OrientedPoints& canonical, const std::vector<std::int32_t>& in_view,
-                   const ShownSurface& shown, int num_threads, bool was_bending)
+                   const ShownSurface& shown, int num_threads, bool was_bending,
+                   const std::vector<Eigen::Vector3f>& colors)
       : field_(field),
         shown_(shown),
         num_threads_(num_threads),
         was_bending_(was_bending),
         tree_(shown.points.data(), shown.points.rows(), num_threads),
-        rows_(chosen_rows(field, canonical, in_view)),
+        rows_(chosen_rows(field, canonical, in_view, colors)),
         nearest_(rows_.size(), no_slot),
         equations_(field.nodes.size(), pairs()) {
     uses_.resize(field.nodes.size());
@@ -87,7 +99,7 @@ class WarpRegistration {
       match(0.0);
     }
     const auto num_matched =
-        std::count_if(rows_.begin(), rows_.end(), [](const WarpRow& row) { return row.weight > 0.0; });
+        std::count_if(rows_.begin(), rows_.end(), [](const WarpRow& row) { return row.shape.weight > 0.0; });
     found.explained = static_cast<double>(num_matched) / static_cast<double>(rows_.size());
     return found;
   }
@@ -105,7 +117,8 @@ class WarpRegistration {
   };
 
   static std::vector<WarpRow> chosen_rows(const WarpField& field, const OrientedPoints& canonical,
-                                          const std::vector<std::int32_t>& in_view) {
+                                          const std::vector<std::int32_t>& in_view,
+                                          const std::vector<Eigen::Vector3f>& colors) {
     const std::size_t step =
         std::max<std::size_t>(1, (in_view.size() + deformation_limits::most_rows - 1) / deformation_limits::most_rows);
     std::vector<WarpRow> rows;
@@ -117,6 +130,7 @@ class WarpRegistration {
       row.binding = binding;
       row.num_nodes = binding.num_blended();
       row.weights = binding.weights(field.reach());
+      row.brightness = colors.empty() ? std::numeric_limits<float>::quiet_NaN() : luma(colors[i]);
       rows.push_back(row);
     }
     return rows;
@@ -161,6 +175,7 @@ class WarpRegistration {
                                   nearest_[static_cast<std::size_t>(i)], gate);
                       }
                     });
+    weigh_colors();
   }
 
   // The residuals' squares in standard deviations, robustly (Tukey's).
@@ -176,25 +191,26 @@ class WarpRegistration {
   double misfit_by_chance() {
     equations_.set_right_side_zero();
     const auto noise_of = [&](std::size_t i) {
-      return std::sqrt(rows_[i].weight) * (random_bits(1, i) % 2 == 0 ? 1.0 : -1.0);
+      return std::sqrt(rows_[i].shape.weight) * (random_bits(1, i) % 2 == 0 ? 1.0 : -1.0);
     };
     for (std::size_t node = 0; node < uses_.size(); ++node) {
       for (const Use& use : uses_[node]) {
-        if (!(rows_[use.row].weight > 0.0)) continue;
-        equations_.right_side(node) += noise_of(use.row) * rows_[use.row].jacobian[static_cast<std::size_t>(use.k)];
+        if (!(rows_[use.row].shape.weight > 0.0)) continue;
+        equations_.right_side(node) +=
+            noise_of(use.row) * rows_[use.row].shape.jacobian[static_cast<std::size_t>(use.k)];
       }
     }
     const std::vector<Vector6> motion = solved();
     double explained = 0.0;
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       const WarpRow& row = rows_[i];
-      if (!(row.weight > 0.0)) continue;
+      if (!(row.shape.weight > 0.0)) continue;
       double moved = 0.0;
       for (int k = 0; k < row.num_nodes; ++k) {
         const auto j = static_cast<std::size_t>(k);
-        moved += row.jacobian[j].dot(motion[static_cast<std::size_t>(row.binding.nodes[j])]);
+        moved += row.shape.jacobian[j].dot(motion[static_cast<std::size_t>(row.binding.nodes[j])]);
       }
-      explained += moved * (2.0 * noise_of(i) - row.weight * moved);
+      explained += moved * (2.0 * noise_of(i) - row.shape.weight * moved);
     }
     const auto num_rows = static_cast<double>(rows_.size());
     const double by_noise = was_bending_ ? deformation_limits::misfit_of_bending : deformation_limits::misfit_by_noise;
@@ -207,7 +223,7 @@ class WarpRegistration {
 
   void linearise(WarpRow& row, const Eigen::Vector3f& point, const Eigen::Vector3f& normal, std::uint32_t slot,
                  double gate) const {
-    row.weight = 0.0;
+    row.shape.weight = row.color.weight = 0.0;
     row.misfit = largest_misfit;
     if (slot == no_slot) return;
     const auto found = static_cast<Eigen::Index>(tree_.id(slot));
@@ -219,16 +235,48 @@ class WarpRegistration {
     if (!(std::abs(part) < 1.0) || static_cast<double>(apart.norm()) > std::max(gate, std::sqrt(2.0) * reach)) return;
     const double sigma = static_cast<double>(shown_.sigma[found]);
     const double robust = (1.0 - part * part) * (1.0 - part * part);  // Tukey's
-    row.weight = robust / (sigma * sigma);
     row.misfit = std::min(largest_misfit, reach * reach / (3.0 * sigma * sigma) * (1.0 - robust * (1.0 - part * part)));
     // Along the mean of both normals: on a curved surface the chord between two of its points has no part in it.
     const Eigen::Vector3d direction = 0.5 * (other + normal).cast<double>();
-    row.residual = direction.dot(apart.cast<double>());
+    set(row.shape, row, direction, direction.dot(apart.cast<double>()), robust / (sigma * sigma));
+    if (shown_.brightness.size() == 0) return;
+    const Eigen::Vector3d gradient = shown_.gradient.row(found).transpose().cast<double>();
+    const double expected = static_cast<double>(shown_.brightness[found]) - gradient.dot(apart.cast<double>());
+    const double residual = static_cast<double>(row.brightness) - expected;
+    if (!std::isfinite(residual)) return;
+    row.texture = gradient.norm() * static_cast<double>(shown_.spacing);
+    set(row.color, row, gradient, residual, 1.0);
+  }
+
+  // direction: in which the point's motion changes the residual.
+  void set(WarpEquation& equation, const WarpRow& row, const Eigen::Vector3d& direction, double residual,
+           double weight) const {
+    equation.residual = residual;
+    equation.weight = weight;
     const Eigen::Vector3d canonical = row.canonical.point.cast<double>();
     for (int k = 0; k < row.num_nodes; ++k) {
-      const WarpNode& node = node_of(row, k);
-      const double weight = row.weights[static_cast<std::size_t>(k)];
-      row.jacobian[static_cast<std::size_t>(k)] = weight * derivative(node, canonical, direction);
+      const auto j = static_cast<std::size_t>(k);
+      equation.jacobian[j] = row.weights[j] * derivative(node_of(row, k), canonical, direction);
+    }
+  }
+
+  // By how much brightness errs, and by how much the image's exposure differs from the model's, the residuals tell. A
+  // gradient that changes it by less from point to point is noise.
+  void weigh_colors() {
+    std::vector<double> residuals;
+    for (const WarpRow& row : rows_) {
+      if (row.color.weight > 0.0) residuals.push_back(row.color.residual);
+    }
+    if (residuals.empty()) return;
+    const double exposure = median_of(residuals);
+    for (double& residual : residuals) residual = std::abs(residual - exposure);
+    const double sigma = std::max(registration_limits::least_brightness_noise, mad_to_sigma * median_of(residuals));
+    for (WarpRow& row : rows_) {
+      WarpEquation& color = row.color;
+      if (!(color.weight > 0.0)) continue;
+      color.residual -= exposure;
+      const bool tells = row.texture > sigma;
+      color.weight = tells ? robust_weight(color.residual, sigma, 1.0 / (sigma * sigma)) : 0.0;
     }
   }
 
@@ -254,12 +302,14 @@ class WarpRegistration {
     const auto node = static_cast<std::size_t>(number);
     for (const Use& use : uses_[node]) {
       const WarpRow& row = rows_[use.row];
-      if (!(row.weight > 0.0)) continue;
-      const Vector6 own = row.weight * row.jacobian[static_cast<std::size_t>(use.k)];
-      equations_.right_side(node) += row.residual * own;
-      for (int m = 0; m < row.num_nodes; ++m) {
-        const auto other = static_cast<std::size_t>(m);
-        equations_.block(use.blocks[other]).noalias() += own * row.jacobian[other].transpose();
+      for (const WarpEquation* equation : {&row.shape, &row.color}) {
+        if (!(equation->weight > 0.0)) continue;
+        const Vector6 own = equation->weight * equation->jacobian[static_cast<std::size_t>(use.k)];
+        equations_.right_side(node) += equation->residual * own;
+        for (int m = 0; m < row.num_nodes; ++m) {
+          const auto other = static_cast<std::size_t>(m);
+          equations_.block(use.blocks[other]).noalias() += own * equation->jacobian[other].transpose();
+        }
       }
     }
   }
@@ -314,9 +364,10 @@ class WarpRegistration {
 }  // namespace
 
 WarpFit register_warp(WarpField& field, const OrientedPoints& canonical, const std::vector<std::int32_t>& in_view,
-                      const ShownSurface& shown, int num_threads, bool was_bending) {
+                      const ShownSurface& shown, int num_threads, bool was_bending,
+                      const std::vector<Eigen::Vector3f>& colors) {
   if (shown.points.rows() == 0) return {};
-  return WarpRegistration(field, canonical, in_view, shown, num_threads, was_bending).fit();
+  return WarpRegistration(field, canonical, in_view, shown, num_threads, was_bending, colors).fit();
 }
 
 }  // namespace nacre

@@ -21,8 +21,11 @@ struct WarpFit {
 //   with n the mean normal of both sides (Rusinkiewicz 2019), h Huber's, e = R_l (g_m - g_l) + p_l - p_m, e_before: at
 //   the frame before,
 // with the nearest points q of what is shown, within a gate that narrows from half the distance between nodes.
+// colors: of the model's points; where both sides have brightness, rows (b - B(phi(x)) - exposure)^2 / sigma_b^2 join,
+// linear in the frame's brightness B along its surface (Park, Zhou and Koltun 2017), weighed as Geman and McClure do.
 // was_bending: at the frame before: then it most likely goes on.
 WarpFit register_warp(WarpField& field, const OrientedPoints& canonical, const std::vector<std::int32_t>& in_view,
-                      const ShownSurface& shown, int num_threads, bool was_bending = false);
+                      const ShownSurface& shown, int num_threads, bool was_bending = false,
+                      const std::vector<Eigen::Vector3f>& colors = {});
 
 }  // namespace nacre

@@ -264,7 +264,11 @@ void Pipeline::deform(const FrameExtras& extras, FrameReport& report) {
                         : FrameRegistration(current, target, options)
                               .from(guesses(extras).front(), FrameRegistration::Gate::narrow, Expectation::expected)
                               .alignment.target_from_source;
-  ShownSurface shown = shown_surface(sample_frame(frame, observer, options), pose, camera, spacing);
+  const FrameSamples samples = sample_frame(frame, observer, options);
+  ShownSurface shown = shown_surface(samples, pose, camera, spacing);
+  if (observer.has_colors() && !cloud.colors.empty()) {
+    add_brightness(shown, samples, pose, bright_cloud(frame, observer), spacing, options.num_threads);
+  }
   // What registered frames err by beyond one image's noise, neighbours share.
   shown.shared_error = 1.0 - 1.0 / (noise_factor * noise_factor);
   const WarpFit fit = shape->follow(cloud, rows_facing(cloud, camera, pose), shown, options.num_threads);

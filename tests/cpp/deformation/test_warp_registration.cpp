@@ -12,13 +12,11 @@ namespace {
 constexpr float spacing = 0.008F;
 constexpr double sigma = 0.0005;
 
-float relief(float x, float y) { return 0.01F * std::sin(40.0F * x) * std::cos(35.0F * y); }
-
 // A sheet with relief that is rolled up around an axis along y: its length along x stays.
-OrientedPoint on_sheet(float x, float y, float curvature) {
-  const float angle = curvature * x, height = relief(x, y);
-  const float slope_x = 0.4F * std::cos(40.0F * x) * std::cos(35.0F * y);
-  const float slope_y = -0.35F * std::sin(40.0F * x) * std::sin(35.0F * y);
+OrientedPoint on_sheet(float x, float y, float curvature, float relief = 0.01F) {
+  const float angle = curvature * x, height = relief * std::sin(40.0F * x) * std::cos(35.0F * y);
+  const float slope_x = 40.0F * relief * std::cos(40.0F * x) * std::cos(35.0F * y);
+  const float slope_y = -35.0F * relief * std::sin(40.0F * x) * std::sin(35.0F * y);
   const Eigen::Vector3f along(std::cos(angle), 0.0F, std::sin(angle)), up(std::sin(angle), 0.0F, -std::cos(angle));
   const Eigen::Vector3f base =
       curvature == 0.0F ? Eigen::Vector3f(x, y, 0.6F)
@@ -32,11 +30,12 @@ struct Scene {
   OrientedPoints canonical;
   std::vector<std::int32_t> rows;
 
-  Scene() {
+  explicit Scene(float relief = 0.01F) {
     std::vector<std::int32_t> last_seen;
     for (int i = -20; i <= 20; ++i) {
       for (int j = -15; j <= 15; ++j) {
-        const OrientedPoint point = on_sheet(spacing * static_cast<float>(i), spacing * static_cast<float>(j), 0.0F);
+        const OrientedPoint point =
+            on_sheet(spacing * static_cast<float>(i), spacing * static_cast<float>(j), 0.0F, relief);
         rows.push_back(static_cast<std::int32_t>(canonical.points.size()));
         canonical.points.push_back(point.point);
         canonical.normals.push_back(point.normal);
@@ -65,12 +64,12 @@ struct Scene {
   }
 };
 
-ShownSurface shown(float curvature) {
+ShownSurface shown(float curvature, float relief = 0.01F) {
   constexpr int size = 90;
   ShownSurface surface{Points(size * size, 3), Points(size * size, 3), Values(size * size), Values(size * size)};
   for (int k = 0; k < size * size; ++k) {
     const OrientedPoint point = on_sheet(0.004F * static_cast<float>(k % size - size / 2),
-                                         0.003F * static_cast<float>(k / size - size / 2), curvature);
+                                         0.003F * static_cast<float>(k / size - size / 2), curvature, relief);
     const auto noise = static_cast<float>(sigma * random_normal(3, static_cast<std::uint64_t>(k)));
     surface.points.row(k) = (point.point + noise * point.normal).transpose();
     surface.normals.row(k) = point.normal.transpose();
@@ -131,6 +130,46 @@ TEST_CASE("a frame that shows nothing near leaves the shape") {
   CHECK(fit.explained == 0.0);
   CHECK(!register_warp(scene.field, scene.canonical, scene.rows, ShownSurface(), 1).is_bent);
   CHECK(scene.error(0.0F) < 1e-6);
+}
+
+// Of a smooth sheet: 0 to 200 on its material.
+float paint(float x, float y) { return 100.0F + 90.0F * std::sin(60.0F * x) * std::cos(70.0F * y); }
+
+TEST_CASE("what slides along itself is followed by its colours, in whatever exposure") {
+  const float curvature = 1.2F, slide = 0.008F, exposure = 20.0F;
+  Scene with_colors(0.0F), without(0.0F);
+  std::vector<Eigen::Vector3f> colors;
+  for (const Eigen::Vector3f& point : with_colors.canonical.points) {
+    colors.push_back(Eigen::Vector3f::Constant(paint(point.x(), point.y())));
+  }
+  ShownSurface surface = shown(curvature, 0.0F);
+  surface.spacing = static_cast<double>(spacing);
+  surface.brightness.resize(surface.points.rows());
+  surface.gradient.resize(surface.points.rows(), 3);
+  for (Eigen::Index k = 0; k < surface.points.rows(); ++k) {
+    const Eigen::Vector3f normal = surface.normals.row(k).transpose(), along = normal.cross(Eigen::Vector3f::UnitY());
+    const float x = std::atan2(normal.x(), -normal.z()) / curvature, y = surface.points(k, 1) - slide;
+    const float by_x = 90.0F * 60.0F * std::cos(60.0F * x) * std::cos(70.0F * y);
+    const float by_y = -90.0F * 70.0F * std::sin(60.0F * x) * std::sin(70.0F * y);
+    surface.brightness[k] =
+        exposure + paint(x, y) + static_cast<float>(random_normal(4, static_cast<std::uint64_t>(k)));
+    const float towards = along.x() > 0.0F ? 1.0F : -1.0F;
+    surface.gradient.row(k) = (by_x * towards * along + by_y * Eigen::Vector3f::UnitY()).transpose();
+  }
+  register_warp(without.field, without.canonical, without.rows, surface, 1);
+  register_warp(with_colors.field, with_colors.canonical, with_colors.rows, surface, 1, false, colors);
+  const auto error = [&](const Scene& scene) {
+    const OrientedPoints moved = warped(scene.field, scene.canonical.points, scene.canonical.normals, 1);
+    double sum = 0.0;
+    for (std::size_t i = 0; i < moved.points.size(); ++i) {
+      const Eigen::Vector3f& rest = scene.canonical.points[i];
+      const OrientedPoint truth = on_sheet(rest.x(), rest.y() + slide, curvature, 0.0F);
+      sum += static_cast<double>((moved.points[i] - truth.point).squaredNorm());
+    }
+    return std::sqrt(sum / static_cast<double>(moved.points.size()));
+  };
+  CHECK(error(without) > 0.006);
+  CHECK(error(with_colors) < 0.25 * error(without));
 }
 
 TEST_CASE("any number of threads bends to the same bits") {
