@@ -60,6 +60,7 @@ Keypoints LoopClosure::keypoints_of(const DepthView& view) const {
 std::optional<Pose> LoopClosure::place_by_keypoints(const DepthView& view, std::int64_t turn) const {
   if (key_frames_.empty()) return std::nullopt;
   const Keypoints seen = keypoints_of(view);
+  if (seen.descriptors.empty()) return std::nullopt;
   const int every = (num_key_frames() + loops_limits::most_asked_key_frames - 1) / loops_limits::most_asked_key_frames;
   std::int64_t most = 0;
   std::optional<Pose> best;
