@@ -18,7 +18,7 @@ namespace nacre {
 struct KeyFrameView {
   Points points, normals;  // of the surface, at random
   std::vector<OutlinePoint> outline;
-  Keypoints keypoints;
+  Keypoints keypoints = {};
 };
 
 template <class Archive>

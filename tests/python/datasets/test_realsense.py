@@ -305,7 +305,7 @@ class TestTheCommand:
         assert "--depth-scale is for recordings, and realsense:7 is a camera" in capsys.readouterr().err
         monkeypatch.setattr(realsense, "_library", lambda: fake.Library())
         nacre.write_recording(
-            tmp_path / "out" / "recording", nacre.Camera(4, 3, 5, 5, 1.5, 1), [], depth_scale=1
+            tmp_path / "out" / "recording", nacre.Camera(4, 3, 5, 5, 1.5, 1), [np.ones((3, 4))], depth_scale=1
         )
         assert run(["reconstruct", "realsense", "-o", out]) == 2
         assert "holds a recording already; give another folder" in capsys.readouterr().err
