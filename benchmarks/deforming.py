@@ -24,7 +24,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 from cases import Array, recorded
-from deforming_scenes import THINGS, Recording, record
+from deforming_scenes import THINGS, Recording, paint, record
 from track import peers
 
 import nacre
@@ -78,12 +78,16 @@ HEAD = (
 
 
 def run_nacre(
-    camera: nacre.Camera, depths: Sequence[Array], *, deform: bool = False
+    camera: nacre.Camera,
+    depths: Sequence[Array],
+    *,
+    deform: bool = False,
+    colors: Sequence[npt.NDArray[np.uint8]] | None = None,
 ) -> tuple[nacre.Model, Run]:
     """Run the loop; the model at a frame is what is there at the end, as it was then where it deforms."""
     model = nacre.Model(camera, num_threads=2, deform=deform)
-    for depth in depths:
-        model.add_frame(depth)
+    for index, depth in enumerate(depths):
+        model.add_frame(depth, None if colors is None else colors[index])
 
     def points_at(index: int) -> Array | None:
         report = model.frames[index]
@@ -221,6 +225,8 @@ def contest(name: str, sensor: str, seed: int, num_frames: int) -> None:
         print(f"| {title} | {loop} | {measure(recording, run)} |", flush=True)
 
     row("nacre, deforming", bent, run_nacre(bent.camera, bent.depths, deform=True)[1])
+    painted = run_nacre(bent.camera, bent.depths, deform=True, colors=paint(bent))[1]
+    row("nacre, deforming, painted", bent, painted)
     row("nacre, deforming, held still", rigid, run_nacre(rigid.camera, rigid.depths, deform=True)[1])
     row("nacre", bent, run_nacre(bent.camera, bent.depths)[1])
     row("nacre, held still", rigid, run_nacre(rigid.camera, rigid.depths)[1])

@@ -17,8 +17,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from cases import SENSORS, Array, object_mesh
+from scipy.ndimage import map_coordinates
 
 import nacre
+
+SPOTS = (0.016, 0.04)
+"""Between spots of paint [m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +44,7 @@ class Recording:
     depths: list[Array]
     vertices: list[Array]
     triangles: npt.NDArray[np.int32]
+    rest: Array  # vertices at rest
 
     def mesh(self, index: int) -> nacre.Mesh:
         """Return the true surface at a frame, in its camera's frame."""
@@ -71,7 +76,38 @@ def record(
         mesh = nacre.Mesh(seen, thing.triangles)
         depths.append(mesh.simulate_depth(camera, np.eye(4), seed=1000 * seed + i, **errors))
         vertices.append(seen)
-    return Recording(name, camera, depths, vertices, thing.triangles)
+    return Recording(name, camera, depths, vertices, thing.triangles, thing.shape(0.0))
+
+
+def paint(recording: Recording) -> list[npt.NDArray[np.uint8]]:
+    """Return what a colour camera sees: spots that stay on the material, lit from one side, and noise."""
+    random = np.random.default_rng(7)
+    grids = {size: random.integers(0, 110, (64, 64, 64)).astype(float) for size in SPOTS}
+    camera = recording.camera
+    v, u = np.indices((camera.height, camera.width))
+    rays = np.stack([(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, np.ones(u.shape)], -1)
+    rays = rays.reshape(-1, 3)
+    images = []
+    for index in range(len(recording.depths)):
+        hits = recording.mesh(index).cast(np.zeros_like(rays), rays)
+        seen = np.isfinite(hits.distances)
+        points = hits.distances[seen, None] * rays[seen]
+        triangles = recording.triangles[hits.triangles[seen]]
+        corners = recording.vertices[index][triangles]
+        weights = np.linalg.solve(corners.transpose(0, 2, 1), points[..., None])
+        material = (weights * recording.rest[triangles]).sum(axis=1)
+        spots = [
+            map_coordinates(grid, material.T / size, order=1, mode="grid-wrap")
+            for size, grid in grids.items()
+        ]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        light = 0.6 + 0.4 * np.abs(normals @ (0.3, -0.5, -0.81))
+        brightness = np.zeros(len(rays))
+        brightness[seen] = np.sum(spots, axis=0) * light + random.normal(0, 3, seen.sum())
+        image = np.clip(brightness, 0, 255).reshape(camera.height, camera.width, 1)
+        images.append(np.repeat(image, 3, axis=-1).astype(np.uint8))
+    return images
 
 
 def pipe(rng: np.random.Generator, *, around: int = 120, along: int = 200) -> Thing:
