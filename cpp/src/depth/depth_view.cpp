@@ -8,17 +8,20 @@
 
 namespace nacre {
 
+Eigen::RowVector3f point_at(const DepthView& view, const Camera& camera, int u, int v) {
+  const Ray ray = camera.ray(u, v);
+  const float z = view.depth[static_cast<Eigen::Index>(v) * camera.width() + u], along = z / ray.direction_z;
+  return {ray.origin_x + along * ray.direction_x, ray.origin_y + along * ray.direction_y, z};
+}
+
 SeenPoints::SeenPoints(const DepthView& view, const Camera& camera, int step) {
   const int across = camera.width() / step, down = camera.height() / step;
   points.resize(static_cast<Eigen::Index>(across) * down, 3);
   sigma.resize(points.rows());
   for (Eigen::Index i = 0; i < points.rows(); ++i) {
     const int u = static_cast<int>(i % across) * step + step / 2, v = static_cast<int>(i / across) * step + step / 2;
-    const Eigen::Index pixel = static_cast<Eigen::Index>(v) * camera.width() + u;
-    const Ray ray = camera.ray(u, v);
-    const float z = view.depth[pixel], along = z / ray.direction_z;
-    points.row(i) << ray.origin_x + along * ray.direction_x, ray.origin_y + along * ray.direction_y, z;
-    sigma[i] = view.sigma[pixel];
+    points.row(i) = point_at(view, camera, u, v);
+    sigma[i] = view.sigma[static_cast<Eigen::Index>(v) * camera.width() + u];
   }
 }
 

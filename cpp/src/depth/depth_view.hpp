@@ -20,6 +20,9 @@ struct DepthView {
   std::vector<std::uint8_t> brightness = {};  // empty: unknown
 };
 
+// What a pixel shows, in its camera's frame; NaN where that is nothing.
+Eigen::RowVector3f point_at(const DepthView& view, const Camera& camera, int u, int v);
+
 // What a view shows, in its camera's frame: a row for each pixel, or each `step`-th across and down; NaN where it shows
 // nothing.
 struct SeenPoints {

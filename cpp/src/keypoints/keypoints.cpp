@@ -195,9 +195,7 @@ Keypoints find_keypoints(const DepthView& view, const Camera& camera, double usu
   found.descriptors.resize(windows.size());
   parallel_for(count, 16, num_threads, [&](std::int64_t i) {
     const Window& window = windows[static_cast<std::size_t>(i)];
-    const Ray ray = camera.ray(window.u, window.v);
-    const float z = view.depth[static_cast<Eigen::Index>(window.v) * width + window.u], along = z / ray.direction_z;
-    found.points.row(i) << ray.origin_x + along * ray.direction_x, ray.origin_y + along * ray.direction_y, z;
+    found.points.row(i) = point_at(view, camera, window.u, window.v);
     found.descriptors[static_cast<std::size_t>(i)] = describe(window, sums, pairs);
   });
   return found;
