@@ -20,6 +20,7 @@ struct Kernels {
   simd::FitNormals* fit_normals;
   simd::MarkEdges* mark_edges;
   simd::MarkGradients* mark_gradients;
+  simd::DilateMarks* dilate_marks;
   simd::FitWindows* fit_windows;
   simd::KeepPixels* keep_pixels;
   simd::RemoveIsolated* remove_isolated;
@@ -32,12 +33,12 @@ struct Kernels {
   simd::GatherPoints* gather_points;
 };
 
-#define KERNELS_OF(isa)                                                                                            \
-  Kernels {                                                                                                        \
-    #isa, simd::isa::fit_normals, simd::isa::mark_edges, simd::isa::mark_gradients, simd::isa::fit_windows,        \
-        simd::isa::keep_pixels, simd::isa::remove_isolated, simd::isa::select_kept, simd::isa::link_pixels,        \
-        simd::isa::fill_depth_row, simd::isa::fill_planar_row, simd::isa::fill_point_row, simd::isa::count_points, \
-        simd::isa::gather_points                                                                                   \
+#define KERNELS_OF(isa)                                                                                           \
+  Kernels {                                                                                                       \
+#isa, simd::isa::fit_normals, simd::isa::mark_edges, simd::isa::mark_gradients, simd::isa::dilate_marks,      \
+        simd::isa::fit_windows, simd::isa::keep_pixels, simd::isa::remove_isolated, simd::isa::select_kept,       \
+        simd::isa::link_pixels, simd::isa::fill_depth_row, simd::isa::fill_planar_row, simd::isa::fill_point_row, \
+        simd::isa::count_points, simd::isa::gather_points                                                         \
   }
 
 inline std::vector<Kernels> all_kernels() {

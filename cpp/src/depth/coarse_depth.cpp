@@ -73,6 +73,17 @@ bool is_unit(float unit, const std::vector<float>& steps, const std::vector<floa
   return std::unique(sorted.begin(), sorted.end()) - sorted.begin() >= depth_limits::least_levels;
 }
 
+// visit(z, next) for each two measured pixels that are neighbours in a probed row.
+template <class Visit>
+void for_each_neighbors(const DepthRef& depth, Visit&& visit) {
+  for (Eigen::Index v = 0; v < depth.rows(); v += depth_limits::probed_rows) {
+    const float* const row = &depth.coeffRef(v, 0);
+    for (Eigen::Index u = 0; u + 1 < depth.cols(); ++u) {
+      if (is_measurement(row[u]) && is_measurement(row[u + 1])) visit(row[u], row[u + 1]);
+    }
+  }
+}
+
 // Between the plateaus of an image whose steps are of this size.
 DepthImage interpolate(const DepthRef& depth, float step, int num_threads) {
   DepthImage sum = depth, weight = DepthImage::Zero(depth.rows(), depth.cols());
@@ -96,22 +107,19 @@ DepthImage interpolate(const DepthRef& depth, float step, int num_threads) {
 }  // namespace
 
 DepthUnit coarse_unit(const DepthRef& depth) {
-  std::size_t num_equal = 0;
+  std::int64_t num_equal = 0, num_steps = 0;
+  for_each_neighbors(depth, [&](float z, float next) {
+    num_equal += z == next;
+    num_steps += z != next;
+  });
+  if (num_steps == 0 || num_equal <= num_steps) return {};
   std::vector<float> steps, levels, nexts;
-  for (Eigen::Index v = 0; v < depth.rows(); v += depth_limits::probed_rows) {
-    for (Eigen::Index u = 0; u + 1 < depth.cols(); ++u) {
-      const float z = depth(v, u), next = depth(v, u + 1);
-      if (!is_measurement(z) || !is_measurement(next)) continue;
-      if (z == next) {
-        ++num_equal;
-      } else {
-        steps.push_back(std::abs(z - next));
-        levels.push_back(z);
-        nexts.push_back(next);
-      }
-    }
-  }
-  if (steps.empty() || num_equal <= steps.size()) return {};
+  for_each_neighbors(depth, [&](float z, float next) {
+    if (z == next) return;
+    steps.push_back(std::abs(z - next));
+    levels.push_back(z);
+    nexts.push_back(next);
+  });
   if (const float unit = smallest_step(steps); is_unit(unit, steps, levels)) return {unit, false};
   for (std::size_t i = 0; i < steps.size(); ++i) {
     const float step = std::abs(1.0F / levels[i] - 1.0F / nexts[i]);

@@ -129,16 +129,11 @@ ByteImage mark_gradient_edges(const DepthRef& measured, const DepthOptions& opti
 
 ByteImage dilated(const ByteImage& first_marks, int radius, int num_threads) {
   ByteImage marks = copy(first_marks);
+  const auto dilate_marks = simd::dilate_marks();
   for (int step = 0; step < radius; ++step) {
     ByteImage grown(marks.width(), marks.height());
-    parallel_for(marks.height(), rows_per_block(marks.width()), num_threads, [&](std::int64_t v) {
-      const std::uint8_t *const above = marks.row(v - 1), *const row = marks.row(v), *const below = marks.row(v + 1);
-      std::uint8_t* const target = grown.row(v);
-      const int width = marks.width();
-      for (int u = 0; u < width; ++u) {
-        target[u] = static_cast<std::uint8_t>(row[u] | row[u - 1] | row[u + 1] | above[u] | below[u]);
-      }
-    });
+    parallel_for(marks.height(), rows_per_block(marks.width()), num_threads,
+                 [&](std::int64_t v) { dilate_marks(marks.row(v), marks.stride(), marks.width(), grown.row(v)); });
     marks = std::move(grown);
   }
   return marks;

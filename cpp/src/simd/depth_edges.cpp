@@ -100,4 +100,10 @@ void mark_gradients(const DepthRows& rows, float squared_limit, uint8_t* marks) 
   }
 }
 
+void dilate_marks(const uint8_t* marks, ptrdiff_t stride, int width, uint8_t* dilated) {
+  for (int u = 0; u < width; ++u) {
+    dilated[u] = static_cast<uint8_t>(marks[u] | marks[u - 1] | marks[u + 1] | marks[u - stride] | marks[u + stride]);
+  }
+}
+
 }  // namespace nacre::simd::NACRE_ISA

@@ -1,6 +1,7 @@
 // The edge tests of a row of the planar image.
 #pragma once
 
+#include <stddef.h>
 #include <stdint.h>
 
 #include "simd/depth_row.hpp"
@@ -37,5 +38,9 @@ struct DepthRows {
 };
 using MarkGradients = void(const DepthRows& rows, float squared_limit, uint8_t* marks);
 NACRE_DECLARE_KERNEL(MarkGradients, mark_gradients)
+
+// Each pixel's marks, with those of its four neighbours: one byte a pixel. Around the image `marks` is 0.
+using DilateMarks = void(const uint8_t* marks, ptrdiff_t stride, int width, uint8_t* dilated);
+NACRE_DECLARE_KERNEL(DilateMarks, dilate_marks)
 
 }  // namespace nacre::simd

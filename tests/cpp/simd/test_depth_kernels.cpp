@@ -232,6 +232,30 @@ TEST_CASE("pixels are kept and dropped as plain loops say") {
   }
 }
 
+TEST_CASE("marks grow to the four neighbours, and not beyond the image") {
+  for (const int w : widths) {
+    ByteImage marks(w, rows);
+    for (int v = 0; v < rows; ++v) {
+      for (int u = 0; u < w; ++u) {
+        const double chance = random_uniform(5, static_cast<std::uint64_t>(v * w + u));
+        marks.row(v)[u] = static_cast<std::uint8_t>(chance < 0.1 ? 1 + 20.0 * chance : 0);
+      }
+    }
+    const auto at = [&](int u, int v) { return u >= 0 && u < w && v >= 0 && v < rows ? int{marks.row(v)[u]} : 0; };
+    for (const Kernels& kernels : all_kernels()) {
+      CAPTURE(kernels.name);
+      ByteImage grown(w, rows);
+      for (int v = 0; v < rows; ++v) kernels.dilate_marks(marks.row(v), marks.stride(), w, grown.row(v));
+      for (int v = 0; v < rows; ++v) {
+        for (int u = -1; u <= w; ++u) {
+          const int expected = at(u, v) | at(u - 1, v) | at(u + 1, v) | at(u, v - 1) | at(u, v + 1);
+          REQUIRE(int{grown.row(v)[u]} == (u >= 0 && u < w ? expected : 0));
+        }
+      }
+    }
+  }
+}
+
 TEST_CASE("raw values become metres") {
   std::vector<std::uint16_t> raw = {0, 1, 1000, 65534, 65535};
   for (int i = 0; i < 70; ++i) raw.push_back(static_cast<std::uint16_t>(937 * i));
