@@ -129,13 +129,16 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
     """
     Return a view of the main thing: from where most frames saw it, upright as the cameras were.
 
-    Main is what most frames saw and many observations confirm; specks and far walls have no say.
+    Main is what most frames saw and many observations confirm; specks and far walls have no say. Without
+    cameras it is seen from the side to which it faces.
     """
     few = cloud.thinned(_MAX_POINTS)
     places = posed_places(timeline, place)
     if timeline.camera is None or not places:
         sign = 1 if timeline.is_upright else -1
-        return _view(few.points, _main_part(few, np.ones(len(few.points))), sign * _FORWARD, sign * _DOWN)
+        core = _main_part(few, np.ones(len(few.points)))
+        toward = _in_front(_mean_normal(cloud), sign * _FORWARD, sign * _DOWN)
+        return _view(few.points, core, toward, sign * _DOWN)
     poses = _poses(timeline, places)
     seen = np.array([sees(timeline.camera, pose, few.points, few.normals) for pose in poses])
     core = _main_part(few, seen.sum(axis=0))
@@ -146,6 +149,41 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
 
 
 _DOWN, _FORWARD = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])
+_CLOSED = 0.05  # of the mean normal: a surface of a shorter one faces nowhere
+_RAISED, _STEEP, _STEEPEST = np.radians([15, 30, 60])
+_ROWS_AT_ONCE = 1 << 18  # for the sake of memory
+
+
+def _mean_normal(cloud: Snapshot) -> Array:
+    """Return the mean of a surface's unit normals, by area where it has triangles; 0 where it is closed."""
+    total, area = np.zeros(3), 0.0
+    for start in range(0, len(cloud.normals if cloud.triangles is None else cloud.triangles), _ROWS_AT_ONCE):
+        rows = slice(start, start + _ROWS_AT_ONCE)
+        if cloud.triangles is None:
+            normals = cloud.normals[rows].astype(np.float64)
+        else:
+            a, b, c = cloud.points[cloud.triangles[rows]].astype(np.float64).transpose(1, 0, 2)
+            normals = np.cross(b - a, c - a)
+        total += normals.sum(axis=0)
+        area += float(np.linalg.norm(normals, axis=1).sum())
+    return total / area if area > 0 else total
+
+
+def _in_front(normal: Array, toward: Array, up: Array) -> Array:
+    """
+    Return the direction from which to look at a surface of a mean normal.
+
+    It is ``toward`` where the surface faces there, or nowhere; else the one to which it faces, raised
+    a little; from high above where it lies on the ground, and from below where it hangs over who looks.
+    """
+    length, rise = float(np.linalg.norm(normal)), float(normal @ up)
+    if length < _CLOSED or normal @ toward > np.cos(_RAISED) * length:
+        return toward
+    ahead = normal - rise * up
+    ahead = ahead / np.linalg.norm(ahead) if np.linalg.norm(ahead) >= _CLOSED else toward
+    elevation = np.arcsin(np.clip(rise, -1, 1))
+    elevation = np.clip(elevation, _RAISED if elevation > -_STEEP else -_STEEPEST, _STEEPEST)
+    return np.asarray(np.cos(elevation) * ahead + np.sin(elevation) * up)
 
 
 def _main_part(cloud: Snapshot, num_views: npt.NDArray[np.integer] | Array) -> npt.NDArray[np.bool_]:

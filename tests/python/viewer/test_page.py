@@ -163,6 +163,31 @@ def test_a_box_keeps_what_is_in_it_and_saves_it(exported: Browser, tmp_path: Pat
     np.testing.assert_allclose(saved.attributes["confidence"], 1 + rows[:, 0] + 21 * rows[:, 1])
 
 
+def test_the_box_is_upright_where_the_first_view_is_from_above(browser: Browser, tmp_path: Path) -> None:
+    floor = plane()
+    floor = replace(
+        floor,
+        points=np.ascontiguousarray(floor.points[:, [0, 2, 1]]),  # 1 m below who looks
+        normals=np.broadcast_to(np.array([0, -1, 0], np.float32), floor.points.shape),
+    )
+    timeline = Timeline("floor", None)
+    timeline.set_snapshot(floor)
+    export_html(timeline, tmp_path / "view.html")
+    browser.open((tmp_path / "view.html").as_uri())
+    browser.wait_for(LOADED)
+    np.testing.assert_allclose(browser.evaluate("page.orbit.backward"), [0, -(0.75**0.5), -0.5], atol=1e-5)
+    browser.press_button("crop")
+    np.testing.assert_allclose(
+        browser.evaluate("page.crop.box.axes"), [[1, 0, 0], [0, -1, 0], [0, 0, -1]], atol=1e-5
+    )
+    browser.choose("box-bottom", -0.999)
+    assert num_shown(browser) == 0  # the floor goes at once
+    browser.choose("box-bottom", -1.001)
+    assert num_shown(browser) == 441
+    browser.choose("box-front", 0.0)
+    assert num_shown(browser) == 231
+
+
 def test_points_of_large_uncertainty_are_hidden(browser: Browser, tmp_path: Path) -> None:
     sigma = np.arange(1, 442) / 10_000
     export_html(two_looks(replace(plane(), sigma=sigma)), tmp_path / "view.html")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,13 +68,89 @@ def test_the_view_is_of_the_ball_that_all_frames_saw_and_not_of_far_specks() -> 
     assert 0.08 < view.radius < 0.25
 
 
-def test_a_model_without_frames_is_seen_from_the_world_s_camera() -> None:
+def test_a_model_that_faces_the_world_s_camera_is_seen_from_there() -> None:
     view = first_view(plane(), Timeline("plane", None), -1)
     np.testing.assert_allclose(view.direction, (0, 0, -1), atol=1e-6)
     np.testing.assert_allclose(view.up, (0, -1, 0), atol=1e-6)
     assert np.linalg.norm(view.target - (0, 0, 1)) < 0.05
-    upright = first_view(plane(), Timeline("plane", None, is_upright=True), -1)
+    turned = replace(plane(), points=plane().points * (1, -1, -1), normals=plane().normals * (1, -1, -1))
+    upright = first_view(turned, Timeline("plane", None, is_upright=True), -1)
     np.testing.assert_allclose([upright.direction, upright.up], -np.array([view.direction, view.up]))
+
+
+def sheet(normal: tuple[float, float, float]) -> Snapshot:
+    """Return two triangles, a unit square about (0, 0, 1) that faces a direction."""
+    facing = np.array(normal) / np.linalg.norm(normal)
+    right = np.cross(facing, (0.3, 0.5, 0.8))
+    right /= np.linalg.norm(right)
+    above = np.cross(facing, right)
+    corners = [[0, 0, 1] + 0.5 * (x * right + y * above) for x, y in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+    points, triangles = np.array(corners, np.float32), np.array([[0, 1, 2], [0, 2, 3]], np.int32)
+    return Snapshot(
+        points, np.broadcast_to(facing, points.shape).astype(np.float32), 1.0, triangles=triangles
+    )
+
+
+def seen_from(cloud: Snapshot, *, is_upright: bool = False) -> tuple[float, float]:
+    """Return from where a model without cameras is seen: degrees to the left of the usual, and above it."""
+    view = first_view(cloud, Timeline("sheet", None, is_upright=is_upright), -1)
+    x, y, z = view.direction if is_upright else view.direction * (1, -1, -1)
+    assert np.linalg.norm(view.direction) == pytest.approx(1)
+    np.testing.assert_allclose(view.up, (0, 1 if is_upright else -1, 0))
+    return math.degrees(math.atan2(-x, z)), math.degrees(math.asin(y))
+
+
+@pytest.mark.parametrize(
+    ("facing", "sideways", "above"),
+    [
+        ((0.0, 0, -1), 0, 0),  # the camera of the world
+        ((0.2, 0, -1), 0, 0),  # nearly
+        ((-0.9, 0, -0.1), 83.66, 15),  # a shelf at the side: from its front, raised a little
+        ((1.0, 0, 1), -135, 15),  # its back to the camera
+        ((0.0, -0.9, -0.9), 0, 45),  # a table, and a wall behind it
+        ((0.0, -1, 0), 0, 60),  # a floor
+        ((0.0, 1, 0), 0, -60),  # a ceiling
+        ((-1.0, 0.3, 0), 90, 15),  # leans over
+    ],
+)
+def test_without_cameras_a_surface_is_seen_from_where_it_faces(
+    facing: tuple[float, float, float], sideways: float, above: float
+) -> None:
+    cloud = sheet(facing)
+    points_alone = replace(cloud, triangles=None)
+    for shown in (cloud, points_alone):
+        assert seen_from(shown) == pytest.approx((sideways, above), abs=0.01)
+    turned = sheet((facing[0], -facing[1], -facing[2]))  # y up and z to who looks
+    assert seen_from(turned, is_upright=True) == pytest.approx((sideways, above), abs=0.01)
+
+
+def test_triangles_tell_by_their_area_where_a_mesh_faces() -> None:
+    small, large = sheet((0, 0, -1)), sheet((1, 0, 0))
+    mesh = Snapshot(
+        np.concatenate([0.2 * small.points, large.points]),
+        np.concatenate([small.normals, small.normals]),  # of the vertices: they have no say
+        1.0,
+        triangles=np.concatenate([small.triangles, large.triangles + 4]),
+    )
+    sideways, above = seen_from(mesh)
+    assert (sideways, above) == pytest.approx((-90, 15), abs=3)
+
+
+def test_a_closed_surface_faces_nowhere_and_holes_do_not_turn_it() -> None:
+    points, normals = ball((0, 0, 1), 0.1, 4000)
+    closed = Snapshot(points.astype(np.float32), normals.astype(np.float32), 0.005)
+    assert seen_from(closed) == (0, 0)
+    with_hole = normals @ (1, 0, 0) < 0.95  # 1 / 40 of a ball
+    assert seen_from(Snapshot(closed.points[with_hole], closed.normals[with_hole], 0.005)) == (0, 0)
+    half = normals @ (1, 0, 0) < 0
+    assert seen_from(Snapshot(closed.points[half], closed.normals[half], 0.005)) == pytest.approx(
+        (90, 15), abs=3
+    )
+
+
+def test_a_mesh_of_no_area_is_seen_as_ever() -> None:
+    for triangles in (np.zeros((0, 3), np.int32), np.zeros((5, 3), np.int32)):
+        assert seen_from(replace(sheet((1, 0, 0)), triangles=triangles)) == (0, 0)
 
 
 def test_a_camera_that_looks_along_up_still_has_an_up() -> None:

@@ -2,10 +2,10 @@
 
 const SIDES = [["left", "right"], ["bottom", "top"], ["back", "front"]];
 
-/** A box along the axes of the first view: right, up, and towards the eye. */
+/** An upright box, turned as the first view: its axes lead right, up, and towards the eye. */
 class Box {
   constructor({ target, direction, up, radius }) {
-    this.axes = axesOf(direction, up);
+    this.axes = axesOf(unit(subtract(direction, scaled(up, dot(direction, up)))), up);
     // About the main thing, so that the sliders are fine there; at their ends they leave nothing out.
     this.reach = this.axes.map((axis) => [dot(axis, target) - 2 * radius, dot(axis, target) + 2 * radius]);
     this.limits = this.reach.map((range) => [...range]);
