@@ -117,7 +117,7 @@ def mesh(
             colors=mesh.colors,
             attributes=mesh.attributes,
             texture=mesh.texture,
-            comments=[] if target.suffix.lower() == ".stl" else comments,
+            comments=comments,
         )
     figures: dict[str, Any] = {
         "mesh": str(target),

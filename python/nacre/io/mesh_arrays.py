@@ -36,7 +36,7 @@ class MeshArrays:
     texture : Texture or None
         What is painted on the triangles; not read.
     comments : tuple of str
-        Of the header; STL and OFF have none.
+        Of the header; OFF and STL texts have none.
     """
 
     vertices: arrays.FloatArray

@@ -121,7 +121,7 @@ def write_mesh(
         What is painted on the triangles, in place of ``colors``: in a GLB file, or beside an OBJ file as
         ``NAME.mtl`` and ``NAME_texture.jpg``. As a JPEG image, which needs pillow.
     comments : sequence of str
-        Lines for the header; STL has none.
+        Lines for the header; of a binary STL file those that fit its 69 bytes, of a text none.
     binary : bool
         Binary little-endian; else text. Of PLY and STL: GLB is always binary, OBJ always text.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from collections.abc import Iterator, Sequence
 from io import BytesIO
@@ -10,12 +11,14 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.errors import FileFormatError
+from nacre.io.cloud import check_comments
 from nacre.io.mesh_arrays import MeshArrays, Polygons
-from nacre.io.raw import excerpt, file_writer, read_file
+from nacre.io.raw import decode, excerpt, file_writer, read_file
 from nacre.io.rows import encode_lines, encode_rows
 
 _FACET = np.dtype([("normal", "<f4", (3,)), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
-_HEADER_BYTES = 84
+_TEXT_BYTES, _HEADER_BYTES = 80, 84
+_TITLE = b"binary STL"
 _FACETS_AT_ONCE = 1 << 16
 _TEXT_FACET = """facet normal {} {} {}
   outer loop
@@ -28,19 +31,29 @@ endfacet
 
 
 def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
-    """Read an STL file; equal corners become one vertex, normals and colours are left out."""
+    """
+    Read an STL file; equal corners become one vertex, normals and colours are left out.
+
+    Comments are those that nacre writes in the 80 bytes with which binary files begin.
+    """
     data = read_file(path)
     num_facets = int.from_bytes(data[80:84], "little")
     expected = _HEADER_BYTES + num_facets * _FACET.itemsize
     if len(data) == expected:
         facets = np.frombuffer(data, _FACET, num_facets, _HEADER_BYTES)
-        return _merge(facets["corners"].reshape(-1, 3))
+        mesh = _merge(facets["corners"].reshape(-1, 3))
+        return dataclasses.replace(mesh, comments=_comments(data[:_TEXT_BYTES]))
     if data[:5].lower() == b"solid":
         return _merge(_read_text(path, data))
     if len(data) < _HEADER_BYTES:
         raise FileFormatError(path, "neither a binary STL file nor a text that begins with 'solid'", offset=0)
     reason = f"a binary STL file of {num_facets} facets has {expected} bytes, this one {len(data)}"
     raise FileFormatError(path, reason, offset=80)
+
+
+def _comments(text: bytes) -> tuple[str, ...]:
+    title, *lines = text.rstrip(b" ").split(b"\n")
+    return tuple(map(decode, lines)) if title == _TITLE else ()
 
 
 def _read_text(path: str | os.PathLike[str], data: bytes) -> npt.NDArray[np.float32]:
@@ -70,9 +83,13 @@ def write_mesh(
     path: str | os.PathLike[str], mesh: MeshArrays, *, comments: Sequence[str] = (), binary: bool = True
 ) -> None:
     """Write an STL file, of which each facet has its own normal; :func:`nacre.write_mesh` says the rest."""
+    text = _TITLE
+    for line in check_comments(comments):
+        longer = text + b"\n" + line.encode()
+        text = longer if len(longer) <= _TEXT_BYTES else text
     with file_writer(path) as stream:
         if binary:
-            stream.write(b"binary STL".ljust(80) + np.uint32(len(mesh.triangles)).astype("<u4").tobytes())
+            stream.write(text.ljust(_TEXT_BYTES) + np.uint32(len(mesh.triangles)).astype("<u4").tobytes())
             for facets in _facets(mesh):
                 attribute = np.zeros(len(facets[0]), np.uint16)
                 stream.writelines(encode_rows([*facets, attribute], binary=True))

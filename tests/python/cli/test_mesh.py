@@ -46,13 +46,14 @@ def test_a_mesh_is_simplified_as_it_is(sheet, tmp_path):
     )
 
 
-@pytest.mark.parametrize("suffix", [".ply", ".glb", ".obj"])
+@pytest.mark.parametrize("suffix", WRITE_SUFFIXES)
 def test_a_mesh_keeps_its_comments(tmp_path, suffix):
     source = tmp_path / f"a{suffix}"
     nacre.write_mesh(source, np.eye(3), [[0, 1, 2]], comments=["mine"])
     run("mesh", source, "-o", tmp_path / "b.ply")
     run("convert", source, tmp_path / "c.obj")
-    for name in ("b.ply", "c.obj"):
+    run("mesh", source, "-o", tmp_path / "d.stl")
+    for name in ("b.ply", "c.obj", "d.stl"):
         assert read_mesh_arrays(tmp_path / name).comments == ("mine",)
 
 

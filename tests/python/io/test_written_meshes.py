@@ -143,11 +143,35 @@ def test_normals_of_glb_are_unit_vectors(tmp_path):
     assert normals.tolist() == [[0, 0, 1], [0, 0, 1], [0, 0, 1], [1, 0, 0]]
 
 
-@pytest.mark.parametrize("suffix", COLORED)
+@pytest.mark.parametrize("suffix", WRITE_SUFFIXES)
 def test_comments_are_read_again(tmp_path, suffix):
     assert read_mesh_arrays(write(tmp_path / f"a{suffix}")).comments == ()
     comments = ("made by hand", "", "café")
     assert read_mesh_arrays(write(tmp_path / f"a{suffix}", comments=comments)).comments == comments
+
+
+def test_stl_has_place_for_comments_of_69_bytes(tmp_path):
+    for comments, kept in (
+        (["a" * 69], ["a" * 69]),
+        (["a" * 70], []),
+        (["first", "a" * 60, "é" * 30, "last"], ["first", "a" * 60]),
+        (["first", "é" * 30, "a" * 60, "last"], ["first", "é" * 30]),
+        (["a" * 80, "solid"], ["solid"]),
+    ):
+        path = write(tmp_path / "a.stl", comments=comments)
+        data = path.read_bytes()
+        assert len(data) == 84 + 50 * len(TRIANGLES)
+        assert not data.startswith(b"solid")  # as texts do
+        assert read_mesh_arrays(path).comments == tuple(kept)
+        seen_by_trimesh(path)
+    assert read_mesh_arrays(write(tmp_path / "b.stl", comments=["a"], binary=False)).comments == ()
+
+
+def test_what_other_programs_write_where_stl_has_comments_is_left_out(tmp_path):
+    data = write(tmp_path / "a.stl").read_bytes()
+    for title in (b"", b"Exported from Blender", b"COLOR=\xff\x00\n", b"binary STL output\nmine"):
+        (tmp_path / "b.stl").write_bytes(title.ljust(80, b"\0") + data[80:])
+        assert read_mesh_arrays(tmp_path / "b.stl").comments == ()
 
 
 def test_comments(tmp_path):
@@ -168,8 +192,6 @@ def test_comments(tmp_path):
     ],
 )
 def test_illegal_arguments_write_nothing(tmp_path, suffix, arguments, message):
-    if suffix == ".stl" and "comments" in arguments:
-        pytest.skip("STL files have no comments")
     with pytest.raises((ValueError, TypeError), match=message):
         write(tmp_path / f"a{suffix}", **arguments)
     assert not list(tmp_path.iterdir())

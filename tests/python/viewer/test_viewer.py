@@ -244,10 +244,10 @@ def test_meshes_of_other_formats_are_shown(tmp_path: Path, ending: str) -> None:
     np.testing.assert_allclose(read.normals, np.broadcast_to((0, 0, 1), (3, 3)))
 
 
-@pytest.mark.parametrize("ending", ["glb", "obj", "ply"])
+@pytest.mark.parametrize("ending", ["glb", "obj", "ply", "stl"])
 def test_a_mesh_file_of_nacre_stands_upright(tmp_path: Path, ending: str) -> None:
     path, corners, triangles = tmp_path / f"a.{ending}", [[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]]
-    for comments in ([], ["metres; the world is the first camera's frame"]):
+    for comments in ([], ["nacre 0.1.0", "metres; the world is the first camera's frame"]):
         nacre.write_mesh(path, corners, triangles, comments=comments)
         assert viewer.read_timeline(path).is_upright == (not comments)
 
