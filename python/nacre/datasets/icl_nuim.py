@@ -14,12 +14,13 @@ from pathlib import Path
 import numpy as np
 
 from nacre import Camera
-from nacre.datasets.listing import describe, files, inside, pair, require_order
+from nacre.datasets.listing import describe, files, pair, require_order
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.datasets.tum import lines_of, poses_at, time_of
 from nacre.errors import FileFormatError
 from nacre.io.images import COLOR_SUFFIXES, DEPTH_SUFFIXES
+from nacre.io.named_files import inside
 from nacre.io.raw import excerpt
 from nacre.io.trajectories import read_trajectory
 from nacre.trajectory import Trajectory

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import errno
 import re
 from collections.abc import Iterable
-from pathlib import Path, PurePosixPath, PureWindowsPath
+from pathlib import Path
 
 from nacre.errors import FileFormatError
-from nacre.io.raw import excerpt
-
-_LONGEST_NAME = 1000
 
 
 def natural_key(path: Path) -> list[tuple[int, str]]:
@@ -46,27 +42,6 @@ def pair(depth: list[Path], color: list[Path]) -> list[Path | None]:
         if unique and None not in by_key and any(k in by_key for k in keys):
             return [by_key.get(k) for k in keys]
     return [None] * len(depth)
-
-
-def inside(folder: Path, name: str, listing: Path, line: int) -> Path:
-    """
-    Return the file that a recording's list names, which must be in its folder.
-
-    Symbolic links in the folder are followed: they are the user's own.
-    """
-    if len(name) > _LONGEST_NAME:
-        raise FileFormatError(listing, f"refused: a name of {len(name)} letters", line=line)
-    place = PurePosixPath(name.replace("\\", "/"))
-    if place.is_absolute() or ".." in place.parts or "\0" in name or PureWindowsPath(name).drive:
-        reason = f"refused: the name {excerpt(name.encode())} leads outside the recording's folder"
-        raise FileFormatError(listing, reason, line=line)
-    try:
-        (folder / name).is_file()
-    except OSError as error:
-        if error.errno != errno.ENAMETOOLONG:
-            raise
-        raise FileFormatError(listing, f"refused: a name of {len(name)} letters", line=line) from None
-    return folder / name
 
 
 def require_order(path: Path, line: int, time: float, before: float | None) -> None:

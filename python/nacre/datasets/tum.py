@@ -14,10 +14,11 @@ import numpy.typing as npt
 
 from nacre import Camera
 from nacre._internal.warned import warn
-from nacre.datasets.listing import describe, inside, require_order
+from nacre.datasets.listing import describe, require_order
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence
 from nacre.errors import FileFormatError
+from nacre.io.named_files import inside
 from nacre.io.raw import excerpt, number_of, read_text
 from nacre.io.trajectories import read_trajectory
 from nacre.trajectory import Trajectory, associate

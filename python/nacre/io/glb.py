@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import os
 import struct
@@ -15,7 +14,7 @@ import numpy.typing as npt
 from nacre._internal.arrays import localize
 from nacre.io.cloud import check_comments
 from nacre.io.images import encode_jpeg
-from nacre.io.mesh_arrays import MeshArrays
+from nacre.io.mesh_arrays import MeshArrays, split
 from nacre.io.raw import file_writer
 from nacre.io.srgb import linear_from_srgb
 
@@ -98,16 +97,8 @@ def _split(mesh: MeshArrays) -> tuple[MeshArrays, npt.NDArray[np.float32] | None
     texture = mesh.texture
     if texture is None:
         return mesh, None
-    pairs = mesh.triangles.astype(np.int64) * len(texture.uv) + texture.triangles
-    corners, triangles = np.unique(pairs, return_inverse=True)
-    rows, places = np.divmod(corners, len(texture.uv))
-    split = dataclasses.replace(
-        mesh,
-        vertices=mesh.vertices[rows],
-        triangles=triangles.reshape(-1, 3).astype(np.int32),
-        normals=None if mesh.normals is None else mesh.normals[rows],
-    )
-    return split, texture.uv[places]
+    mesh, places = split(mesh, texture.triangles)
+    return mesh, texture.uv[places]
 
 
 def _add_image(document: dict[str, Any], buffer: Buffer, data: bytes) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 from array import array
 from collections.abc import Sequence
@@ -73,6 +74,41 @@ def fan(
     triangles = np.column_stack((first, first + step + 1, first + step + 2))
     result: npt.NDArray[np.int32] = corners.astype(np.int32)[triangles]
     return result
+
+
+def vertex_normals(points: arrays.FloatArray, triangles: npt.NDArray[np.int32]) -> npt.NDArray[np.float64]:
+    """Return the mean direction of the triangles about each point, by area; NaN where there are none."""
+    a, b, c = points.astype(np.float64)[triangles].transpose(1, 0, 2)
+    with np.errstate(invalid="ignore"):
+        areas = np.repeat(np.cross(b - a, c - a), 3, axis=0)
+        sums = [np.bincount(triangles.ravel(), areas[:, axis], len(points)) for axis in range(3)]
+        normals = np.stack(sums, axis=1)
+        return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
+
+
+def split(mesh: MeshArrays, places: npt.NDArray[np.integer]) -> tuple[MeshArrays, npt.NDArray[np.int64]]:
+    """
+    Return a mesh whose vertices have one place on an image each, and the places.
+
+    Parameters
+    ----------
+    mesh : MeshArrays
+        Its attributes stay as they are.
+    places : (M, 3) array
+        Of the corners of the triangles, counted from 0.
+    """
+    num_places = int(places.max(initial=0)) + 1
+    pairs = mesh.triangles.astype(np.int64) * num_places + places
+    corners, triangles = np.unique(pairs, return_inverse=True)
+    rows, chosen = np.divmod(corners, num_places)
+    parted = dataclasses.replace(
+        mesh,
+        vertices=mesh.vertices[rows],
+        triangles=triangles.reshape(-1, 3).astype(np.int32),
+        normals=None if mesh.normals is None else mesh.normals[rows],
+        colors=None if mesh.colors is None else mesh.colors[rows],
+    )
+    return parted, chosen
 
 
 class Polygons:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from io import BytesIO
 from itertools import islice
 from pathlib import Path
@@ -34,7 +34,11 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
     Colours are the three numbers from 0 to 1 that may follow the coordinates. Normals are taken where each
     vertex has the same one in all its faces; texture coordinates and materials are left out.
     """
-    mesh = _Attributed()
+    return read_into(Attributed(), path)
+
+
+def read_into(mesh: Attributed, path: str | os.PathLike[str]) -> MeshArrays:
+    """Read an OBJ file; what else ``mesh`` takes of it is there afterwards."""
     data = read_file(path)
     for line_number, line in code_lines(data):
         keyword, *words = line.split() or [b""]
@@ -45,6 +49,8 @@ def read_mesh(path: str | os.PathLike[str]) -> MeshArrays:
                 mesh.normals.extend(map(float_of, words[:3]))
             elif keyword == b"f":
                 mesh.add_corners(words)
+            elif keyword in mesh.others:
+                mesh.others[keyword](line.strip()[len(keyword) :].strip(), line_number)
             elif not keyword.isascii() or (keyword and not keyword[:1].isalpha()):
                 raise ValueError
         except (ValueError, OverflowError):
@@ -63,29 +69,40 @@ def _comments(data: bytes) -> Iterator[str]:
         yield decode(line[1:].strip())
 
 
-class _Attributed(Polygons):
-    """A mesh with normals and colours as it grows line by line."""
+class Attributed(Polygons):
+    """
+    A mesh with normals and colours as it grows line by line.
+
+    Attributes
+    ----------
+    others : dict of bytes to callable
+        What takes in lines that begin so, but for those of vertices, normals and faces: the rest of the line
+        and its number.
+    """
 
     def __init__(self) -> None:
         super().__init__()
         self.colors = array("d")
         self.normals = array("d")
         self.normal_of_corner = array("q")
+        self.others: dict[bytes, Callable[[bytes, int], None]] = {}
 
     def add_vertex(self, words: Sequence[bytes]) -> None:
+        """Take in three coordinates, and the colour that may follow them."""
         super().add_vertex(words)
         if len(words) == 6:
             self.colors.extend(map(float_of, words[3:]))
 
     def add_corners(self, words: Sequence[bytes]) -> None:
         """Take in a polygon, given as words ``v``, ``v/vt``, ``v//vn`` or ``v/vt/vn``."""
-        self.add_face([_index(word.partition(b"/")[0], self.num_vertices) for word in words])
+        self.add_face([index_of(word.partition(b"/")[0], self.num_vertices) for word in words])
         num_normals = len(self.normals) // 3
         for word in words:
             normal = b"".join(word.split(b"/")[2:3])
-            self.normal_of_corner.append(_index(normal, num_normals) if normal else _NO_NORMAL)
+            self.normal_of_corner.append(index_of(normal, num_normals) if normal else _NO_NORMAL)
 
     def finish(self, path: str | os.PathLike[str]) -> MeshArrays:
+        """Return vertices and triangles, with normals and colours where all vertices have them."""
         bare = super().finish(path)
         colors = np.frombuffer(self.colors, np.float64).reshape(-1, 3)
         has_colors = len(colors) == len(bare.vertices) and colors.min() >= 0 and colors.max() <= 1
@@ -109,7 +126,7 @@ class _Attributed(Polygons):
         return normals if is_same and np.isfinite(normals).all() else None
 
 
-def _index(text: bytes, count: int) -> int:
+def index_of(text: bytes, count: int) -> int:
     """Return the place, from 0, of an index that counts from 1 or, of the ``count`` so far, back from -1."""
     index = int(text)
     if b"_" in text or index == 0 or -index > count:

@@ -16,7 +16,9 @@ from nacre._internal.warned import warn
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Cloud
 from nacre.io.glb_reader import read_painting
+from nacre.io.mesh_arrays import MeshArrays, vertex_normals
 from nacre.io.meshes import READ_SUFFIXES, read_mesh_arrays
+from nacre.io.obj_painting import read_painted
 from nacre.io.painting import Painting
 from nacre.io.ply_header import read_header
 from nacre.io.points import read_points
@@ -30,7 +32,7 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     """
     Read what a reconstruction wrote, or the points or the mesh of a file.
 
-    Depth images are shown where the recording is still in its place; on the mesh of a GLB file, or of
+    Depth images are shown where the recording is still in its place; on the mesh of a GLB or OBJ file, or of
     ``OUT/mesh.glb``, the image that is painted on it.
 
     Parameters
@@ -88,7 +90,7 @@ def _cloud(
     if file.normals is not None:
         normals = file.normals
     elif triangles is not None:
-        normals = _vertex_normals(points, triangles)
+        normals = vertex_normals(points, triangles)
     else:
         normals = np.full(points.shape, np.nan)
         normals[kept] = _estimated_normals(points[kept])
@@ -103,19 +105,25 @@ def _cloud(
 def _read(path: Path) -> tuple[Cloud, npt.NDArray[np.int32] | None, Painting | None]:
     """Return the points of a file, or the vertices of a mesh, its triangles, and what is painted on these."""
     if path.suffix.lower() in set(READ_SUFFIXES) - {".ply"}:
-        mesh, painting, colors = read_mesh_arrays(path), None, None
+        colors = None
         try:
-            if path.suffix.lower() == ".glb":
-                painting = read_painting(path)
+            mesh, painting = _painted(path)
             with suppress(ImportError):  # without pillow only the page decodes the image
                 colors = None if painting is None else painting.colors(path)
         except FileFormatError as error:
-            painting = None
+            mesh, painting = read_mesh_arrays(path), None
             warn(f"the texture is left out: {error}")
         colors = mesh.colors if mesh.colors is not None else colors
         cloud = Cloud(mesh.vertices, mesh.normals, colors, comments=mesh.comments)
         return cloud, mesh.triangles, painting
     return read_points(path), _triangles(path), None
+
+
+def _painted(path: Path) -> tuple[MeshArrays, Painting | None]:
+    """Return the mesh of a file, and what is painted on it."""
+    if path.suffix.lower() == ".obj":
+        return read_painted(path)
+    return read_mesh_arrays(path), read_painting(path) if path.suffix.lower() == ".glb" else None
 
 
 def _triangles(path: Path) -> npt.NDArray[np.int32] | None:
@@ -129,18 +137,6 @@ def _triangles(path: Path) -> npt.NDArray[np.int32] | None:
         return read_mesh_arrays(path).triangles
     except FileFormatError:
         return None
-
-
-def _vertex_normals(
-    points: npt.NDArray[np.float32], triangles: npt.NDArray[np.int32]
-) -> npt.NDArray[np.float64]:
-    """Return the mean direction of the triangles about each point, by area; NaN where there are none."""
-    a, b, c = points.astype(np.float64)[triangles].transpose(1, 0, 2)
-    with np.errstate(invalid="ignore"):
-        areas = np.repeat(np.cross(b - a, c - a), 3, axis=0)
-        sums = [np.bincount(triangles.ravel(), areas[:, axis], len(points)) for axis in range(3)]
-        normals = np.stack(sums, axis=1)
-        return np.asarray(normals / np.linalg.norm(normals, axis=1, keepdims=True))
 
 
 def _estimated_normals(points: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

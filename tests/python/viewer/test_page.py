@@ -375,14 +375,15 @@ def test_a_mesh_file_is_shown_as_its_mesh(browser: Browser, tmp_path: Path) -> N
     assert browser.evaluate("document.getElementById('holes-row').hidden")
 
 
-def test_a_painted_mesh_shows_its_image(browser: Browser, tmp_path: Path) -> None:
+@pytest.mark.parametrize("ending", ["glb", "obj"])
+def test_a_painted_mesh_shows_its_image(browser: Browser, tmp_path: Path, ending: str) -> None:
     image = np.zeros((64, 64, 3), np.uint8)
     image[:32, :32, 0] = image[:32, 32:, 1] = image[32:, :32, 2] = 255  # red, green; blue, black
     uv = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], np.float32)
     vertices = np.column_stack([0.2 * uv - 0.1, np.full(4, 0.5)])
     triangles = np.array([[0, 2, 1], [1, 2, 3]], np.int32)
-    nacre.write_mesh(tmp_path / "a.glb", vertices, triangles, texture=Texture(image, uv, triangles))
-    export_html(read_timeline(tmp_path / "a.glb"), tmp_path / "view.html")
+    nacre.write_mesh(tmp_path / f"a.{ending}", vertices, triangles, texture=Texture(image, uv, triangles))
+    export_html(read_timeline(tmp_path / f"a.{ending}"), tmp_path / "view.html")
     browser.open((tmp_path / "view.html").as_uri())
     browser.wait_for(LOADED)
     assert browser.evaluate("page.kind") == "texture"

@@ -263,8 +263,9 @@ def painted_plane(path: Path) -> Path:
     return path
 
 
-def test_the_page_gets_the_image_of_a_painted_mesh(tmp_path: Path) -> None:
-    timeline = viewer.read_timeline(painted_plane(tmp_path / "a.glb"))
+@pytest.mark.parametrize("ending", ["glb", "obj"])
+def test_the_page_gets_the_image_of_a_painted_mesh(tmp_path: Path, ending: str) -> None:
+    timeline = viewer.read_timeline(painted_plane(tmp_path / f"a.{ending}"))
     ((_, read),) = timeline.snapshots
     data = PageData([timeline])
     (name,) = (name for name in data.surface_names if name.startswith("image/"))
@@ -300,6 +301,29 @@ def test_a_mesh_whose_texture_is_damaged_is_shown_without(tmp_path: Path) -> Non
     with pytest.warns(UserWarning, match=r"the texture is left out: .*a\.glb"):
         ((_, read),) = viewer.read_timeline(path).snapshots
     assert (read.painting, read.colors) == (None, None)
+    assert len(read.triangles) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("a.mtl", None, r"a\.mtl: it cannot be read: No such file"),
+        ("a_texture.jpg", None, r"a_texture\.jpg: it cannot be read: No such file"),
+        ("a_texture.jpg", b"\xff\xd8\xff damaged", r"a\.obj: .*image"),
+        ("a.mtl", b"1 2 3", r"a\.mtl, line 1: cannot read '1 2 3'"),
+    ],
+)
+def test_an_obj_file_whose_texture_is_missing_or_damaged_is_shown_without(
+    tmp_path: Path, name: str, content: bytes | None, said: str
+) -> None:
+    path = painted_plane(tmp_path / "a.obj")
+    (tmp_path / name).unlink()
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.warns(UserWarning, match=f"the texture is left out: .*{said}"):
+        ((_, read),) = viewer.read_timeline(path).snapshots
+    assert (read.painting, read.colors) == (None, None)
+    assert len(read.points) == 4
     assert len(read.triangles) == 2
 
 
