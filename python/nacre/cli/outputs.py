@@ -91,7 +91,7 @@ def file_rows(folder: Path, *, page: bool = True) -> list[tuple[str, str]]:
     return [
         ("model", str(folder / "model.ply")),
         *([("as it moved", str(folder / "animation.glb"))] if (folder / "animation.glb").exists() else []),
-        ("trajectory", str(folder / "trajectory.txt")),
+        *([("trajectory", str(folder / "trajectory.txt"))] if (folder / "trajectory.txt").exists() else []),
         ("figures", str(folder / "report.json")),
         *([("report", str(folder / "report.html"))] if page else []),
     ]

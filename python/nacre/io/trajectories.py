@@ -106,7 +106,7 @@ def write_trajectory(
     timestamps : (N,) array, or Trajectory
         Seconds, or the frames' indices.
     poses : (N, 4, 4) array
-        ``world_from_camera``; not with a Trajectory, which has its own.
+        ``world_from_camera``, at least one; not with a Trajectory, which has its own.
     format : {"tum", "redwood", "kitti"}, optional
         - ``"tum"``: ``t tx ty tz qx qy qz qw``;
         - ``"redwood"``: three whole numbers and a 4x4 matrix; times that are fractions become 0, 1, 2, ...;
@@ -136,6 +136,10 @@ def write_trajectory(
     else:
         timestamps = Trajectory(timestamps, poses)  # type: ignore[arg-type]
     trajectory = timestamps
+    if not len(trajectory):
+        raise ValueError(
+            "poses must be at least one, got none: a file of none cannot be told from a broken one"
+        )
     if not np.isfinite(trajectory.poses).all():
         raise ValueError("poses must be finite, got NaN or infinity")
     farthest = np.abs(trajectory.poses[:, :3, 3]).max(initial=0.0)

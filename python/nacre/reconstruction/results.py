@@ -41,14 +41,18 @@ def write_results(
     """
     Write the files of a run, the page if wanted, and return what report.json, the last one, holds.
 
-    What bends is written as a mesh that moves, too, when the run is finished.
+    What bends is written as a mesh that moves, too, when the run is finished. There is no trajectory where no
+    frame was tracked.
     """
     write_points(
         folder / "model.ply",
         done.cloud,
         comments=[f"nacre {__version__}", "metres; the world is the first camera's frame"],
     )
-    write_trajectory(folder / "trajectory.txt", done.trajectory)
+    if len(done.trajectory):
+        write_trajectory(folder / "trajectory.txt", done.trajectory)
+    else:
+        (folder / "trajectory.txt").unlink(missing_ok=True)  # of an earlier model
     interrupted = bool(document.get("interrupted"))
     animation = folder / "animation.glb"
     if done.model.parameters.deform and not interrupted:

@@ -104,8 +104,12 @@ def test_frames_that_cannot_be_read_are_lost_and_the_run_goes_on(copied, tmp_pat
 def test_every_frame_lost(copied, tmp_path):
     for path in (copied / "depth").iterdir():
         write_depth_png(path, np.zeros((112, 112), np.uint16))
+    (tmp_path / "o").mkdir()
+    (tmp_path / "o" / "trajectory.txt").write_text("0 0 0 0 0 0 0 1\n")  # of an earlier run
     result = run("reconstruct", copied, "-o", tmp_path / "o")
     assert result.code == 3
+    assert not (tmp_path / "o" / "trajectory.txt").exists()
+    assert "trajectory.txt" not in result.out
     assert "every frame was lost: no usable pixel" in result.err
     assert strict_json(tmp_path / "o" / "report.json")["num_tracked"] == 0
     assert len(nacre.read_points(tmp_path / "o" / "model.ply")) == 0

@@ -301,6 +301,17 @@ def test_lines_that_are_not_of_kitti(tmp_path, text, message):
         read_trajectory(tmp_path / "t.txt")
 
 
+@pytest.mark.parametrize("format", ["tum", "redwood", "kitti"])
+def test_no_poses_are_not_written_as_no_file_of_them_is_read(tmp_path, format):
+    for trajectory in ([Trajectory([], np.zeros((0, 4, 4)))], ([], np.zeros((0, 4, 4)))):
+        with pytest.raises(ValueError, match="poses must be at least one, got none"):
+            write_trajectory(tmp_path / "t.txt", *trajectory, format=format)
+    assert not list(tmp_path.iterdir())
+    (tmp_path / "t.txt").write_text("# timestamp tx ty tz qx qy qz qw\n")
+    with pytest.raises(FileFormatError, match="the trajectory is empty"):
+        read_trajectory(tmp_path / "t.txt")
+
+
 def test_an_unknown_format(tmp_path):
     with pytest.raises(ValueError, match="format must be one of tum, redwood, kitti, got 'euroc'"):
         write_trajectory(tmp_path / "t.txt", [0], [np.eye(4)], format="euroc")

@@ -150,10 +150,13 @@ def _go_on(task: Task, unfinished: UnfinishedRun) -> Outcome | None:
         _require_same_options("begun", unfinished.document()["options"], task.options)
         carry_out(resume_run(unfinished))
         return "resumed"
-    names = ["model.ply", "trajectory.txt", "report.json", *["report.html"] * task.options.report]
+    names = ["model.ply", "report.json", *["report.html"] * task.options.report]
     if not all((task.folder / name).is_file() for name in names):
         return None
-    report = SavedRun(task.folder).report
+    saved = SavedRun(task.folder)
+    report, is_tracked = saved.report, any(frame.world_from_camera is not None for frame in saved.frames)
+    if is_tracked and not (task.folder / "trajectory.txt").is_file():
+        return None
     if report.get("interrupted"):
         return None
     _require_same_options("done", report.get("options", {}), task.options)

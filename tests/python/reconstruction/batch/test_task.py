@@ -82,9 +82,23 @@ def test_what_nacre_reconstruct_finished_counts(task_for: MakeTask, scans: Path,
     assert reconstruct_recording(task_for()).outcome == "finished before"
 
 
-def test_a_file_that_is_missing_is_made_again(task_for: MakeTask, alone: Any, tmp_path: Path) -> None:
+def test_what_is_finished_without_a_pose_has_no_trajectory(tmp_path: Path) -> None:
+    camera = nacre.Camera(64, 48, 50, 50, 31.5, 23.5)
+    nacre.write_recording(tmp_path / "dark", camera, np.zeros((2, 48, 64)), depth_scale=1000)
+    options = RunOptions(source="", report=False)
+    (task,) = make_tasks({"dark": tmp_path / "dark"}, options, nacre.ModelParameters(), tmp_path / "out")
+    first = reconstruct_recording(task)
+    assert (first.num_frames, first.num_tracked) == (2, 0)
+    assert not (tmp_path / "out" / "dark" / "trajectory.txt").exists()
+    assert reconstruct_recording(task).outcome == "finished before"
+
+
+@pytest.mark.parametrize("name", ["model.ply", "trajectory.txt"])
+def test_a_file_that_is_missing_is_made_again(
+    task_for: MakeTask, alone: Any, tmp_path: Path, name: str
+) -> None:
     reconstruct_recording(task_for())
-    (tmp_path / "cup" / "model.ply").unlink()
+    (tmp_path / "cup" / name).unlink()
     assert reconstruct_recording(task_for()).outcome == "reconstructed"
     assert results(tmp_path / "cup") == alone["cup"]
 
