@@ -78,7 +78,8 @@ def export_html(
     Notes
     -----
     Positions are rounded to 1 / 65535 of the model's longest side, confidence and standard deviations to
-    0.02 %, and of more than a million points every second, third, ... is kept.
+    0.02 %, and of more than a million points, or four million corners of a mesh, every second, third, ... is
+    kept: as points, which the page joins by triangles of its own.
     """
     as_kind("timeline", timeline, Timeline, "a nacre.viewer.Timeline")
     if not timeline.has_points:

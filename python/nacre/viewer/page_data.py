@@ -24,7 +24,8 @@ from nacre.viewer.packing import morton_order, octahedral, pack, quantized, roun
 from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline, words
 from nacre.viewer.views import first_seen, first_view
 
-MAX_POINTS = 1_000_000
+MAX_POINTS, MAX_VERTICES = 1_000_000, 4_000_000
+"""Of points alone, of which fewer show the same, and of a mesh, of which they would leave no triangle."""
 
 
 class State(NamedTuple):
@@ -43,6 +44,11 @@ class State(NamedTuple):
     def is_mesh(self) -> bool:
         """Whether its triangles came with the points."""
         return self.cloud.triangles is not None
+
+    @property
+    def shown(self) -> Snapshot:
+        """The points that the page gets: not too many."""
+        return self.cloud.thinned(MAX_VERTICES if self.is_mesh else MAX_POINTS)
 
 
 class PageData:
@@ -100,7 +106,7 @@ class PageData:
         triangles = [f"triangles/{state.name}" for state in newest]
         for state in self._painted:
             triangles += [f"{kind}/{state.name}" for kind in ("points", "triangles")]
-        triangles += [f"image/{s.name}" for s in (*newest, *self._painted) if s.cloud.painting is not None]
+        triangles += [f"image/{s.name}" for s in (*newest, *self._painted) if s.shown.painting is not None]
         return triangles + [f"holes/{state.name}" for state in newest if not state.is_mesh]
 
     def read(self, name: str) -> bytes:
@@ -175,7 +181,7 @@ class PageData:
         last = self._last
         if last is not None and last[0] is state:
             return last[1]
-        cloud = state.cloud.thinned(MAX_POINTS)
+        cloud = state.shown
         rows, _, _ = quantized(cloud.points)
         ordered = cloud.rows(morton_order(rows), cloud.spacing)
         self._last = state, ordered

@@ -279,6 +279,22 @@ def test_the_page_gets_the_image_of_a_painted_mesh(tmp_path: Path, ending: str) 
     assert read.thinned(2).colors is not None
 
 
+def test_a_mesh_keeps_its_triangles_and_its_image_where_points_alone_are_thinned(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nacre.viewer.page_data.MAX_POINTS", 2)
+    data = PageData([viewer.read_timeline(painted_plane(tmp_path / "a.glb"))])
+    assert data.surface_names == ["triangles/0/-1/4", "image/0/-1/4"]
+    assert b'"rows": 4' in data.read("points/0/-1/4")
+    assert b'"rows": 2' in data.read("triangles/0/-1/4")
+    monkeypatch.setattr("nacre.viewer.page_data.MAX_VERTICES", 3)
+    few = PageData([viewer.read_timeline(tmp_path / "a.glb")])
+    assert few.surface_names == ["triangles/0/-1/4"]
+    assert b'"uv"' not in few.read("points/0/-1/4")
+    viewer.export_html(viewer.read_timeline(tmp_path / "a.glb"), tmp_path / "view.html")
+    assert b'"rows": 2' in embedded(tmp_path / "view.html")
+
+
 def test_a_run_shows_its_painted_mesh(out: Path, tmp_path: Path) -> None:
     folder = shutil.copytree(out, tmp_path / "out")
     assert json.loads(PageData([viewer.read_timeline(folder)]).document)["runs"][0]["painted"] is None
