@@ -13,6 +13,7 @@ from nacre.cli.align import read_matrix
 from nacre.cli.config import model_parameters
 from nacre.io.cameras import read_camera
 from nacre.io.images import read_attribute, read_color, read_depth
+from nacre.io.obj_painting import read_painted
 from nacre.io.ply import read_range_grid
 from nacre.reconstruction import Reconstruction
 
@@ -104,6 +105,7 @@ def read_run(path: Path) -> Any:
 READERS: dict[str, Callable[[Path], Any]] = {
     "points": nacre.read_points,
     "mesh": nacre.read_mesh,
+    "painted mesh": lambda path: read_painted(path / "a.obj"),
     "range grid": read_range_grid,
     "depth": read_depth,
     "color": read_color,

@@ -2,7 +2,7 @@
 
 import struct
 
-from hostile_files.case import single
+from hostile_files.case import Case, single
 from hostile_files.ply import FACES, TEXT, text, vertices
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
@@ -139,8 +139,43 @@ _GLB = {
         "accessor 0 does not end within the data",
     ),
 }
+_MATERIAL = "mtllib {}\nusemtl a\n" + TRIANGLE + "vt 0 0\nf 1/1 2/1 3/1\n"
+_PAINTED = {
+    "library leads up": (_MATERIAL.format("../a.mtl"), "", r"a\.obj, line 1: refused: .*outside"),
+    "library absolute": (_MATERIAL.format("/dev/zero"), "", r"a\.obj, line 1: refused: .*outside"),
+    "library missing": (_MATERIAL.format("b.mtl"), "", r"b\.mtl: it cannot be read: No such file"),
+    "library of nul bytes": (_MATERIAL.format("a.mtl"), "\0" * 1000, r"a\.mtl, line 1: cannot read"),
+    "image leads up": (
+        _MATERIAL.format("a.mtl"), "newmtl a\nmap_Kd x/../../a.png\n", r"a\.mtl, line 2: refused: .*outside",
+    ),
+    "image absolute": (
+        _MATERIAL.format("a.mtl"), "newmtl a\nmap_Kd /dev/zero\n", r"a\.mtl, line 2: refused: .*outside",
+    ),
+    "image on a drive": (
+        _MATERIAL.format("a.mtl"), "newmtl a\nmap_Kd C:a.png\n", r"a\.mtl, line 2: refused: .*outside",
+    ),
+    "image no image": (
+        _MATERIAL.format("a.mtl"), "newmtl a\nmap_Kd a.obj\n", r"a\.obj, byte 0: neither a PNG nor a JPEG",
+    ),
+    "place of 30 digits": (
+        TRIANGLE + f"vt 0 0\nf 1/{10**30} 2/1 3/1\n", "", r"a\.obj, line 5: cannot read",
+    ),
+    "place beyond": (
+        _MATERIAL.format("a.mtl").replace("3/1", "3/2"), "newmtl a\nmap_Kd a.png\n",
+        "names texture coordinates 1, counted from 0, of 1",
+    ),
+}  # fmt: skip
 MESHES = (
-    single("mesh", "mesh", ".obj", _OBJ)
+    [
+        Case(
+            f"painted/{name.replace(' ', '_')}",
+            "painted mesh",
+            {"a.obj": text.encode(), "a.mtl": material.encode(), "a.png": b"\x89PNG\r\n\x1a\n"},
+            message,
+        )
+        for name, (text, material, message) in _PAINTED.items()
+    ]
+    + single("mesh", "mesh", ".obj", _OBJ)
     + single("mesh", "mesh", ".off", _OFF)
     + single("mesh", "mesh", ".stl", _STL)
     + single("mesh", "mesh", ".ply", _PLY)
