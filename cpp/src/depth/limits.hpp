@@ -34,6 +34,7 @@ constexpr double unit_quantile = 0.1;  // [1] tuned: of the steps between neighb
 constexpr float unit_tolerance = 0.1F;  // [unit] derived: to which steps are multiples of the unit; test_coarse_depth
 constexpr double least_multiples = 0.99;  // [1] tuned: part of the steps that are; test_coarse_depth
 constexpr std::int64_t least_levels = 8;  // [levels] tuned: two walls are no unit, nor one a largest value; test_coarse_depth, test_depth
+constexpr int farthest_pixels = 16;  // [pixel] budget: from one measured pixel to the next, what is farther is a hole; test_pixel_binning
 constexpr double most_worked_on = 100000.0;  // [pixels] budget: measured, of the first image; pixels are averaged where there are more; test_pixel_binning
 constexpr double least_saturated = 0.005;  // [1] tuned: part of an image that has its largest value; test_saturation
 constexpr std::int64_t fewest_saturated = 40;  // [pixels] tuned: probed, that have it by no chance; test_saturation, test_depth

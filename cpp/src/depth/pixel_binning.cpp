@@ -14,6 +14,40 @@
 #include "depth/limits.hpp"
 
 namespace nacre {
+namespace {
+
+// From one measured pixel of a row or column to the next, in a third of all cases at most: 1 but where an image was
+// spread over more pixels than its camera has, as that of another camera.
+int pixels_apart(const DepthRef& depth, Eigen::Index step_along, Eigen::Index step_across) {
+  constexpr int most = depth_limits::farthest_pixels;
+  const bool is_row = step_along == 1;
+  const Eigen::Index length = is_row ? depth.cols() : depth.rows(), lines = is_row ? depth.rows() : depth.cols();
+  std::array<std::int64_t, most + 1> counts{};
+  std::int64_t num_steps = 0;
+  for (Eigen::Index line = 0; line < lines; line += depth_limits::probed_rows) {
+    const float* const first = depth.data() + line * step_across;
+    Eigen::Index last = -1;
+    for (Eigen::Index i = 0; i < length; ++i) {
+      if (!is_measurement(first[i * step_along])) continue;
+      if (last >= 0 && i - last <= most) {
+        ++counts[static_cast<std::size_t>(i - last)];
+        ++num_steps;
+      }
+      last = i;
+    }
+  }
+  int apart = 1;
+  for (std::int64_t sum = counts[1]; 3 * sum < num_steps; sum += counts[static_cast<std::size_t>(apart)]) ++apart;
+  return apart;
+}
+
+// For pixels of which nearly all are measured, or between which gaps are one wide, and will be filled.
+int least_binning(const DepthRef& depth) {
+  const int along = pixels_apart(depth, 1, depth.outerStride()), down = pixels_apart(depth, depth.outerStride(), 1);
+  return std::max(std::min(along, down), (std::max(along, down) + 1) / 2);
+}
+
+}  // namespace
 
 int binning_for(const DepthRef& depth, const MaskRef& mask, const Camera& camera) {
   require_camera_size("depth", depth.rows(), depth.cols(), camera);
@@ -28,7 +62,8 @@ int binning_for(const DepthRef& depth, const MaskRef& mask, const Camera& camera
   }
   const std::size_t count = measured.empty() ? static_cast<std::size_t>(depth.size()) : measured.size();
   const double wanted = std::ceil(std::sqrt(static_cast<double>(count) / depth_limits::most_worked_on));
-  const int factor = std::min({std::max(1, static_cast<int>(wanted)), camera.width(), camera.height()});
+  const int factor =
+      std::min({std::max(least_binning(depth), static_cast<int>(wanted)), camera.width(), camera.height()});
   if (factor == 1 || measured.empty()) return factor;
   const auto middle = measured.begin() + static_cast<std::ptrdiff_t>(measured.size() / 2);
   std::nth_element(measured.begin(), middle, measured.end());
@@ -41,7 +76,8 @@ PixelBinning::PixelBinning(const DepthRef& depth, const Camera& camera, int fact
       gate_slope_(depth_limits::gate_slope * static_cast<float>(camera.footprint(1.0) * 0.5 * factor)),
       factor_(factor),
       num_threads_(num_threads),
-      binned_(depth.rows() / factor, depth.cols() / factor) {
+      binned_(depth.rows() / factor, depth.cols() / factor),
+      usual_count_(usual_count()) {
   parallel_blocks(binned_.rows(), rows_per_block(depth_.cols()), num_threads_,
                   [&](std::int64_t, std::int64_t begin, std::int64_t end) {
                     std::vector<float> values;
@@ -61,9 +97,26 @@ void PixelBinning::for_each_pixel(Eigen::Index row, Eigen::Index col, Visit&& vi
   }
 }
 
+// The measured pixels of a block that has any, the median.
+int PixelBinning::usual_count() const {
+  std::vector<std::int64_t> blocks(static_cast<std::size_t>(factor_ * factor_ + 1), 0);
+  std::int64_t num_blocks = 0;
+  for (Eigen::Index row = 0; row < binned_.rows(); row += depth_limits::probed_rows) {
+    for (Eigen::Index col = 0; col < binned_.cols(); ++col) {
+      std::size_t count = 0;
+      for_each_pixel(row, col, [&](float z) { count += is_measurement(z); });
+      if (count == 0) continue;
+      ++blocks[count];
+      ++num_blocks;
+    }
+  }
+  int usual = 0;
+  for (std::int64_t sum = 0; 2 * sum < num_blocks; sum += blocks[static_cast<std::size_t>(usual)]) ++usual;
+  return usual;
+}
+
 // Where the pixels differ by more than noise, of those around their median.
 float PixelBinning::mean_depth(Eigen::Index row, Eigen::Index col, std::vector<float>& values) const {
-  const int size = factor_ * factor_;
   float nearest = std::numeric_limits<float>::infinity(), farthest = 0.0F, sum = 0.0F;
   int count = 0;
   for_each_pixel(row, col, [&](float z) {
@@ -73,7 +126,7 @@ float PixelBinning::mean_depth(Eigen::Index row, Eigen::Index col, std::vector<f
     sum += 1.0F / z;
     ++count;
   });
-  if (2 * count < size) return std::numeric_limits<float>::quiet_NaN();
+  if (count == 0 || 2 * count < usual_count_) return std::numeric_limits<float>::quiet_NaN();
   if (!(farthest - nearest > gate_slope_ * nearest)) return static_cast<float>(count) / sum;
 
   values.clear();
@@ -89,7 +142,8 @@ float PixelBinning::mean_depth(Eigen::Index row, Eigen::Index col, std::vector<f
     sum += 1.0F / z;
     ++count;
   });
-  return 2 * count < size ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(count) / sum;
+  return count == 0 || 2 * count < usual_count_ ? std::numeric_limits<float>::quiet_NaN()
+                                                : static_cast<float>(count) / sum;
 }
 
 template <class Visit>

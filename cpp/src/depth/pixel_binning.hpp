@@ -8,14 +8,15 @@
 
 namespace nacre {
 
-// The least factor with which a recording that begins with an image has so few measured pixels as are worked on; 1
-// where depth comes in units coarser than such pixels: the mean would hide them.
+// The least factor with which a recording that begins with an image has so few measured pixels as are worked on, and
+// hardly any gaps between them; 1 where depth comes in units coarser than such pixels: the mean would hide them.
 int binning_for(const DepthRef& depth, const MaskRef& mask, const Camera& camera);
 
 // What is seen in blocks of pixels.
 class PixelBinning {
  public:
-  // The mean inverse depth of those of a block that are of its median's surface; none where they are less than half.
+  // The mean inverse depth of those of a block that are of its median's surface; none where they are less than half of
+  // the measured pixels that blocks have where they have any.
   PixelBinning(const DepthRef& depth, const Camera& camera, int factor, int num_threads);
 
   const DepthImage& depth() const { return binned_; }
@@ -28,6 +29,7 @@ class PixelBinning {
   MaskImage majority(const MaskImage& mask) const;
 
  private:
+  int usual_count() const;
   // `values` is room for those of a block.
   float mean_depth(Eigen::Index row, Eigen::Index col, std::vector<float>& values) const;
   // visit(depth) for each pixel of a block, row by row.
@@ -41,6 +43,7 @@ class PixelBinning {
   float gate_slope_;
   int factor_, num_threads_;
   DepthImage binned_;
+  int usual_count_;
 };
 
 }  // namespace nacre

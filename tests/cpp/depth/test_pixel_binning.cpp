@@ -49,12 +49,43 @@ TEST_CASE("nothing is invented between two surfaces") {
   CHECK((three.isNaN()).count() == 0);
 }
 
-TEST_CASE("less than half of a block is no measurement") {
-  DepthImage depth = DepthImage::Constant(4, 6, 2.0F);
+TEST_CASE("an image that was spread over more pixels than its camera has becomes whole") {
+  const Plane plane = slanted_plane(2.0, 0.4, 0.2);
+  const auto spread = [&](auto&& is_measured) {
+    DepthImage depth = render(vga, plane);
+    for (Eigen::Index v = 0; v < depth.rows(); ++v) {
+      for (Eigen::Index u = 0; u < depth.cols(); ++u) {
+        if (!is_measured(u, v)) depth(v, u) = missing;
+      }
+    }
+    return depth;
+  };
+  const auto check = [&](const DepthImage& depth, int factor) {
+    REQUIRE(binning_for(depth, MaskImage(), vga) == factor);
+    const Camera coarse = vga.binned(factor);
+    const DepthImage clean = preprocess_depth(factor > 1 ? binned(depth, vga, factor) : depth, coarse);
+    const DepthImage exact = render(coarse, plane);
+    const auto num_kept = static_cast<double>((!clean.isNaN()).count());
+    CHECK(num_kept > 0.95 * static_cast<double>(clean.size()));
+    // A block tells of some of its pixels, of which each looks a little aside.
+    CHECK(clean.isNaN().select(0.0F, (clean / exact - 1.0F).abs()).maxCoeff() < 0.004F * static_cast<float>(factor));
+  };
+  check(spread([](auto u, auto v) { return u % 3 != 0 && v % 3 != 0; }), 2);
+  check(spread([](auto u, auto v) { return (u + v) % 2 == 0; }), 2);
+  check(spread([](auto u, auto v) { return u % 2 == 0 && v % 2 == 0; }), 2);
+  check(spread([](auto, auto v) { return v % 4 == 0; }), 2);
+  for (const int apart : {3, 4, 5, 8}) {
+    CAPTURE(apart);
+    check(spread([&](auto u, auto v) { return u % apart == 0 && v % apart == 0; }), apart);
+  }
+}
+
+TEST_CASE("less than half of what a block usually has is no measurement") {
+  DepthImage depth = DepthImage::Constant(4, 12, 2.0F);
   depth(0, 0) = depth(0, 1) = missing;
   depth(0, 2) = depth(0, 3) = depth(1, 2) = 0.0F;
   depth(2, 4) = -1.0F;
-  const DepthImage mean = binned(depth, Camera::pinhole(6, 4, 50.0, 50.0, 2.5, 1.5), 2);
+  const DepthImage mean = binned(depth, Camera::pinhole(12, 4, 50.0, 50.0, 5.5, 1.5), 2);
   CHECK(mean(0, 0) == 2.0F);
   CHECK(std::isnan(mean(0, 1)));
   CHECK(mean(1, 2) == 2.0F);
