@@ -64,6 +64,32 @@ def missing(part: float) -> Callable[[Case], Case]:
     return change
 
 
+def wrong(part: float) -> Callable[[Case], Case]:
+    """Give pixels at random any value, as outliers of time of flight have."""
+
+    def change(case: Case) -> Case:
+        rng = np.random.default_rng(1)
+
+        def scatter(depth: Depth) -> Depth:
+            is_wrong = rng.random(depth.shape) < part
+            return np.where(is_wrong, rng.uniform(0.3, 6.0, depth.shape), depth).astype(np.float32)
+
+        return each(case, scatter)
+
+    return change
+
+
+def spread(apart: int) -> Callable[[Case], Case]:
+    """Leave one pixel of each block, as where images are moved into those of a camera with finer pixels."""
+
+    def change(depth: Depth) -> Depth:
+        points = np.full_like(depth, np.nan)
+        points[::apart, ::apart] = depth[::apart, ::apart]
+        return points
+
+    return lambda case: each(case, change)
+
+
 def rounded(unit: float) -> Callable[[Case], Case]:
     """Round depth to multiples of a unit [m]."""
     return lambda case: each(case, lambda depth: np.round(depth / np.float32(unit)) * np.float32(unit))
@@ -219,6 +245,8 @@ DAMAGES: dict[str, Callable[[Case], Case]] = {
     "as it is": unchanged,
     **{f"{times} times its noise added": noisier(times) for times in (1, 2, 4, 8)},
     **{f"{100 * part:.0f} % of the pixels missing": missing(part) for part in (0.1, 0.3, 0.5)},
+    **{f"{100 * part:.0f} % of the pixels wrong": wrong(part) for part in (0.05, 0.1)},
+    "one pixel of nine left": spread(3),
     **{f"rounded to {1000 * unit:.0f} mm": rounded(unit) for unit in (0.005, 0.01, 0.02, 0.05, 0.1)},
     **{f"disparity in steps of {unit} / m": in_disparity(unit) for unit in (0.0075, 0.015, 0.03)},
     "10 m where nothing was measured": filled(10.0),

@@ -1,6 +1,7 @@
 #include "depth/gaps.hpp"
 
 #include <cmath>
+#include <limits>
 
 #include "depth/inverse_depth_image.hpp"
 #include "depth/limits.hpp"
@@ -25,6 +26,29 @@ class OneSurface {
   bool is_pinhole_;
 };
 
+// Whether what a pixel inside the image measures lies on no surface with any of the eight around it: it is taken for no
+// measurement.
+bool is_lone(const DepthRef& depth, Eigen::Index v, Eigen::Index u, const OneSurface& one_surface) {
+  const float z = depth(v, u);
+  if (!is_measurement(z) || one_surface(z, depth(v, u - 1))) return false;
+  for (const Eigen::Index row : {v, v - 1, v + 1}) {
+    for (const Eigen::Index col : {u - 1, u, u + 1}) {
+      if ((row != v || col != u) && one_surface(z, depth(row, col))) return false;
+    }
+  }
+  return true;
+}
+
+DepthImage without_lone_pixels(const DepthRef& depth, const OneSurface& one_surface) {
+  DepthImage result = depth;
+  for (Eigen::Index v = 1; v + 1 < depth.rows(); ++v) {
+    for (Eigen::Index u = 1; u + 1 < depth.cols(); ++u) {
+      if (is_lone(depth, v, u, one_surface)) result(v, u) = std::numeric_limits<float>::quiet_NaN();
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 bool has_gaps(const DepthRef& depth, const Camera& camera) {
@@ -32,7 +56,7 @@ bool has_gaps(const DepthRef& depth, const Camera& camera) {
   std::int64_t num_measured = 0, num_gaps = 0;
   for (Eigen::Index v = 1; v + 1 < depth.rows(); v += depth_limits::probed_rows) {
     for (Eigen::Index u = 1; u + 1 < depth.cols(); ++u) {
-      if (is_measurement(depth(v, u))) {
+      if (is_measurement(depth(v, u)) && !is_lone(depth, v, u, one_surface)) {
         ++num_measured;
       } else if (one_surface(depth(v, u - 1), depth(v, u + 1)) || one_surface(depth(v - 1, u), depth(v + 1, u))) {
         ++num_gaps;
@@ -43,8 +67,9 @@ bool has_gaps(const DepthRef& depth, const Camera& camera) {
   return num_gaps >= depth_limits::least_windows && side * side * num_gaps > num_measured;
 }
 
-DepthImage fill_gaps(const DepthRef& depth, const Camera& camera) {
+DepthImage fill_gaps(const DepthRef& measured, const Camera& camera) {
   const OneSurface one_surface(camera);
+  const DepthImage depth = without_lone_pixels(measured, one_surface);
   DepthImage rows = depth;
   for (Eigen::Index v = 0; v < depth.rows(); ++v) {
     for (Eigen::Index u = 1; u + 1 < depth.cols(); ++u) {

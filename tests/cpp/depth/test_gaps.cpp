@@ -84,3 +84,27 @@ TEST_CASE("pixels missing at random do not change what noise is found") {
     CHECK(noise.sigma(1.5) == doctest::Approx(expected.sigma(1.5)).epsilon(0.25));
   }
 }
+
+TEST_CASE("pixels that are wrong at random are taken for missing, and the noise of the others is measured") {
+  const DepthImage whole = render(pinhole, slanted_plane(1.5, 0.4, 0.8));
+  DepthImage depth = whole;
+  add_noise(depth, {0.002, 0.0, 0.0}, 3);
+  const NoiseModel without = estimate_noise(depth, pinhole);
+  for (Eigen::Index i = 0; i < depth.size(); ++i) {
+    const auto pixel = static_cast<std::uint64_t>(i);
+    if (random_uniform(7, pixel) < 0.1) depth.data()[i] = static_cast<float>(0.3 + 5.0 * random_uniform(8, pixel));
+  }
+  REQUIRE(has_gaps(depth, pinhole));
+  const DepthImage clean = preprocess_depth(depth, pinhole);
+  CHECK((clean.isFinite() && (clean - whole).abs() > 0.1F).count() < clean.size() / 1000);
+  CHECK(clean.isFinite().count() > 0.9 * static_cast<double>(clean.size()));
+  CHECK(estimate_noise(depth, pinhole).sigma(1.5) == doctest::Approx(without.sigma(1.5)).epsilon(0.2));
+}
+
+TEST_CASE("a wire before a wall is no gap") {
+  DepthImage depth = DepthImage::Constant(height, width, 2.0F);
+  for (Eigen::Index u = 5; u < width; u += 10) depth.col(u).setConstant(1.0F);
+  CHECK_FALSE(has_gaps(depth, pinhole));
+  const DepthImage filled = fill_gaps(depth, pinhole);
+  CHECK((filled == depth).all());
+}
