@@ -1,8 +1,12 @@
 #include "depth/gaps.hpp"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
+#include "base/statistics.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/limits.hpp"
 #include "depth/window_fits.hpp"
@@ -26,17 +30,31 @@ class OneSurface {
   bool is_pinhole_;
 };
 
-// Whether what a pixel inside the image measures lies on no surface with any of the eight around it: it is taken for no
-// measurement.
+// Whether what a pixel inside the image measures lies on no surface with any of the eight around it, and farther from
+// these than they scatter: it is taken for no measurement.
 bool is_lone(const DepthRef& depth, Eigen::Index v, Eigen::Index u, const OneSurface& one_surface) {
   const float z = depth(v, u);
   if (!is_measurement(z) || one_surface(z, depth(v, u - 1))) return false;
-  for (const Eigen::Index row : {v, v - 1, v + 1}) {
-    for (const Eigen::Index col : {u - 1, u, u + 1}) {
-      if ((row != v || col != u) && one_surface(z, depth(row, col))) return false;
+  std::array<float, 8> around{};
+  std::size_t count = 0;
+  for (Eigen::Index row = v - 1; row <= v + 1; ++row) {
+    for (Eigen::Index col = u - 1; col <= u + 1; ++col) {
+      const float other = depth(row, col);
+      if ((row == v && col == u) || !is_measurement(other)) continue;
+      if (one_surface(z, other)) return false;
+      around[count++] = other;
     }
   }
-  return true;
+  if (2 * count <= around.size()) return false;
+  const auto median_of_them = [&] {
+    const auto middle = around.begin() + static_cast<std::ptrdiff_t>(count / 2);
+    std::nth_element(around.begin(), middle, around.begin() + static_cast<std::ptrdiff_t>(count));
+    return *middle;
+  };
+  const float median = median_of_them();
+  for (float& other : around) other = std::abs(other - median);
+  const auto scatter = static_cast<float>(mad_to_sigma) * median_of_them();
+  return std::abs(z - median) > depth_limits::step_sigmas * scatter;
 }
 
 DepthImage without_lone_pixels(const DepthRef& depth, const OneSurface& one_surface) {

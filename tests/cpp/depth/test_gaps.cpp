@@ -108,3 +108,12 @@ TEST_CASE("a wire before a wall is no gap") {
   const DepthImage filled = fill_gaps(depth, pinhole);
   CHECK((filled == depth).all());
 }
+
+TEST_CASE("noise that is larger than pixels are wide leaves no gaps") {
+  for (const double sigma : {0.3, 0.6, 1.2}) {
+    CAPTURE(sigma);
+    DepthImage depth = render(pinhole, slanted_plane(5.0, 0.2, 0.0));
+    add_noise(depth, {sigma, 0.0, 0.0}, 5);
+    CHECK_FALSE(has_gaps(depth, pinhole));
+  }
+}
