@@ -35,7 +35,7 @@ struct Kernels {
 
 #define KERNELS_OF(isa)                                                                                           \
   Kernels {                                                                                                       \
-#isa, simd::isa::fit_normals, simd::isa::mark_edges, simd::isa::mark_gradients, simd::isa::dilate_marks,      \
+    #isa, simd::isa::fit_normals, simd::isa::mark_edges, simd::isa::mark_gradients, simd::isa::dilate_marks,      \
         simd::isa::fit_windows, simd::isa::keep_pixels, simd::isa::remove_isolated, simd::isa::select_kept,       \
         simd::isa::link_pixels, simd::isa::fill_depth_row, simd::isa::fill_planar_row, simd::isa::fill_point_row, \
         simd::isa::count_points, simd::isa::gather_points                                                         \

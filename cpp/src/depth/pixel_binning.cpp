@@ -19,17 +19,16 @@ namespace {
 // From one measured pixel of a row or column to the next, in a third of all cases at most: 1 but where an image was
 // spread over more pixels than its camera has, as that of another camera.
 int pixels_apart(const DepthRef& depth, Eigen::Index step_along, Eigen::Index step_across) {
-  constexpr int most = depth_limits::farthest_pixels;
   const bool is_row = step_along == 1;
   const Eigen::Index length = is_row ? depth.cols() : depth.rows(), lines = is_row ? depth.rows() : depth.cols();
-  std::array<std::int64_t, most + 1> counts{};
+  std::array<std::int64_t, depth_limits::farthest_pixels + 1> counts{};
   std::int64_t num_steps = 0;
   for (Eigen::Index line = 0; line < lines; line += depth_limits::probed_rows) {
     const float* const first = depth.data() + line * step_across;
     Eigen::Index last = -1;
     for (Eigen::Index i = 0; i < length; ++i) {
       if (!is_measurement(first[i * step_along])) continue;
-      if (last >= 0 && i - last <= most) {
+      if (last >= 0 && i - last <= depth_limits::farthest_pixels) {
         ++counts[static_cast<std::size_t>(i - last)];
         ++num_steps;
       }
