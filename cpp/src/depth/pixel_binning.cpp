@@ -16,8 +16,8 @@
 namespace nacre {
 namespace {
 
-// From one measured pixel of a row or column to the next, in a third of all cases at most: 1 but where an image was
-// spread over more pixels than its camera has, as that of another camera.
+// From one measured pixel of a row or column to the next, what a third of these distances do not exceed: 1 but where an
+// image was spread over more pixels than its camera has, as those of another one.
 int pixels_apart(const DepthRef& depth, Eigen::Index step_along, Eigen::Index step_across) {
   const bool is_row = step_along == 1;
   const Eigen::Index length = is_row ? depth.cols() : depth.rows(), lines = is_row ? depth.rows() : depth.cols();
