@@ -185,8 +185,9 @@ class ModelParameters(TypedFields):
         model and new points, or WLOP repaired for incremental use.
     binning : int
         Of a pinhole camera: each so many by so many pixels are averaged to one before all else. 1: none; 0:
-        as few as leave 100 000 measured pixels of the first image, none where the unit of its depth is
-        coarser than such a pixel, or where a ``region`` is asked for. See :attr:`nacre.Model.binning`.
+        as few as leave 100 000 measured pixels of the first image, and hardly any gaps between them; none
+        where the unit of its depth is coarser than such a pixel, or where a ``region`` is asked for. See
+        :attr:`nacre.Model.binning`.
     calibrate_depth : bool
         Of a pinhole camera that sees one scene (no ``region``), depth along its axis: where views in several
         directions show that its depth is systematically wrong, correct it from then on, and what was there
