@@ -44,8 +44,8 @@ struct ModelOptions : TrackingOptions {
   FusionOptions fusion;
   WlopOptions wlop;
   /// Of a pinhole camera, each so many by so many pixels are averaged to one before all else. 1: none; 0: as few as
-  /// leave 100 000 measured pixels of the first image, and hardly any gaps between them; none where its unit of depth is
-  /// coarser or a region is asked for.
+  /// leave 100 000 measured pixels of the first image, and hardly any gaps between them; none where its unit of depth
+  /// is coarser or a region is asked for.
   int binning = 0;
   bool calibrate_depth = true;  ///< of a pinhole camera that looks at one scene, depth along its axis: find and correct
                                 ///< its systematic error (depth_calibration.hpp)
