@@ -2,75 +2,26 @@
 
 from __future__ import annotations
 
-import io
-import json
 import math
 import re
 import sys
 import time
-from collections.abc import Iterator
 from dataclasses import replace
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import nacre
-from nacre.io.painting import Painting
-from nacre.meshing import Texture
 from nacre.report import ReportedFrame
-from nacre.viewer import Controls, Timeline, Viewer, export_html, read_timeline
+from nacre.viewer import Timeline, Viewer, export_html
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
-from browser import CHROMIUM, Browser
+from browser import Browser
+from shown_page import IN_A_BROWSER, LOADED, color_at, look_along_the_normal, on_plane
 from viewer_scenes import SPACING, plane, two_looks
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(CHROMIUM is None, reason="no Chromium"),
-]
-LOADED = "page.clouds.length > 0 && page.clouds[0].version > 1"
-# Pixels per metre at the target: half the height by the tangent of half the field of view, 0.7 rad.
-PIXEL = "(page.canvas.clientHeight / 2) / Math.tan(0.35) / page.orbit.distance"
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
-    pytest.importorskip("websockets")
-    with Browser(tmp_path_factory.mktemp("profile")) as browser:
-        yield browser
-
-
-@pytest.fixture
-def exported(browser: Browser, tmp_path: Path) -> Browser:
-    """Return the browser with the page of the plane, opened from disk."""
-    export_html(two_looks(plane()), tmp_path / "view.html")
-    browser.open((tmp_path / "view.html").as_uri())
-    browser.wait_for(LOADED)
-    browser.download_to(tmp_path)
-    return browser
-
-
-def on_plane(browser: Browser, x: float, y: float) -> tuple[float, float]:
-    """Return the pixel of a point of the plane, which the first view looks at along its normal."""
-    target, width, height, pixels = json.loads(
-        browser.evaluate(
-            f"JSON.stringify([page.orbit.target, page.canvas.clientWidth, page.canvas.clientHeight, {PIXEL}])"
-        )
-    )
-    return width / 2 + pixels * (x - target[0]), height / 2 + pixels * (y - target[1])
-
-
-def look_along_the_normal(browser: Browser) -> None:
-    browser.evaluate("page.orbit.backward = [0, 0, -1]; page.orbit.up = [0, -1, 0]; page.draw()")
-
-
-def color_at(browser: Browser, x: float, y: float) -> np.ndarray:
-    image = pytest.importorskip("PIL.Image")
-    browser.evaluate("page.draw()")
-    pixels = np.asarray(image.open(io.BytesIO(browser.screenshot())).convert("RGB"), dtype=int)
-    return pixels[round(y), round(x)]
+pytestmark = IN_A_BROWSER
 
 
 def num_shown(browser: Browser) -> int:
@@ -360,146 +311,3 @@ def test_a_lost_frame_is_told_plainly(browser: Browser, tmp_path: Path) -> None:
     assert told == ["frame 2, LOST: it does not fit the model well enough", reason]
     browser.choose("frame", 1)
     assert browser.evaluate("document.getElementById('frame-details').textContent") == ""
-
-
-def test_a_mesh_file_is_shown_as_its_mesh(browser: Browser, tmp_path: Path) -> None:
-    cloud, triangles = plane(), np.array([[0, 440, 20], [0, 420, 440]])  # two, over all of the plane
-    nacre.write_mesh(tmp_path / "mesh.ply", cloud.points, triangles)
-    export_html(read_timeline(tmp_path / "mesh.ply"), tmp_path / "view.html")
-    browser.open((tmp_path / "view.html").as_uri())
-    browser.wait_for(LOADED)
-    assert browser.evaluate("document.getElementById('surface').value") == "mesh"
-    corners = browser.evaluate("Array.from(page.clouds[0].triangles, (i) => page.clouds[0].position(i))")
-    assert len(corners) == 6
-    assert np.abs(np.array(corners)[:, :2]) == pytest.approx(0.1, abs=1e-5)
-    assert browser.evaluate("document.getElementById('holes-row').hidden")
-
-
-@pytest.mark.parametrize("ending", ["glb", "obj"])
-def test_a_painted_mesh_shows_its_image(browser: Browser, tmp_path: Path, ending: str) -> None:
-    image = np.zeros((64, 64, 3), np.uint8)
-    image[:32, :32, 0] = image[:32, 32:, 1] = image[32:, :32, 2] = 255  # red, green; blue, black
-    uv = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], np.float32)
-    vertices = np.column_stack([0.2 * uv - 0.1, np.full(4, 0.5)])
-    triangles = np.array([[0, 2, 1], [1, 2, 3]], np.int32)
-    nacre.write_mesh(tmp_path / f"a.{ending}", vertices, triangles, texture=Texture(image, uv, triangles))
-    export_html(read_timeline(tmp_path / f"a.{ending}"), tmp_path / "view.html")
-    browser.open((tmp_path / "view.html").as_uri())
-    browser.wait_for(LOADED)
-    assert browser.evaluate("page.kind") == "texture"
-    look_along_the_normal(browser)
-    for x, y, brightest in [(-0.05, -0.05, 0), (0.05, -0.05, 1), (-0.05, 0.05, 2)]:
-        color = color_at(browser, *on_plane(browser, x, y))
-        assert color[brightest] > 150
-        assert np.delete(color, brightest).max() < 60
-    assert color_at(browser, *on_plane(browser, 0.05, 0.05)).max() < 60
-    browser.choose("kind", "shading")
-    grey = color_at(browser, *on_plane(browser, -0.05, -0.05))
-    assert np.ptp(grey) < 20
-    assert browser.evaluate("page.renderer.gl.getError()") == 0
-
-
-def test_a_painted_mesh_of_a_run_is_shown_on_demand(browser: Browser, tmp_path: Path) -> None:
-    timeline = two_looks(plane())
-    image = BytesIO()
-    pytest.importorskip("PIL.Image").new("RGB", (8, 8), (0, 255, 0)).save(image, "PNG")
-    corners = replace(plane(), triangles=np.array([[0, 440, 20], [0, 420, 440]], np.int32))
-    timeline.painted = replace(corners, painting=Painting(image.getvalue(), np.zeros((441, 2), np.float32)))
-    export_html(timeline, tmp_path / "view.html")
-    browser.open((tmp_path / "view.html").as_uri())
-    browser.wait_for(LOADED)
-    assert browser.evaluate("page.kind") == "colour"
-    look_along_the_normal(browser)
-    browser.choose("surface", "painted")
-    browser.wait_for("page.kind === 'texture' && Boolean(page.clouds[0].triangles)")
-    red, green, _ = color_at(browser, *on_plane(browser, 0, 0))
-    assert green > 150 > 60 > red
-    assert browser.evaluate("document.getElementById('holes-row').hidden")
-    browser.choose("surface", "points")
-    browser.wait_for("page.kind === 'colour'")
-    red, green, _ = color_at(browser, *on_plane(browser, 0, 0))
-    assert red > 2 * green
-
-
-@pytest.fixture
-def phone(browser: Browser) -> Iterator[Browser]:
-    size = {"width": 412, "height": 800, "deviceScaleFactor": 1, "mobile": True}
-    browser.send("Emulation.setDeviceMetricsOverride", **size)
-    yield browser
-    browser.send("Emulation.clearDeviceMetricsOverride")
-
-
-def test_on_a_phone_the_panel_is_folded_away(phone: Browser, tmp_path: Path) -> None:
-    export_html(two_looks(plane()), tmp_path / "view.html")
-    phone.open((tmp_path / "view.html").as_uri())
-    phone.wait_for(LOADED)
-    assert phone.evaluate("page.canvas.clientWidth") == 412
-    assert "Colour by" not in phone.text()
-    phone.press_button("fold")
-    assert "Colour by" in phone.text()
-    assert phone.evaluate("page.canvas.clientWidth") == 412
-    assert phone.evaluate("page.canvas.clientHeight") == pytest.approx(0.55 * 800, abs=1)
-    phone.press_button("fold")
-    assert phone.evaluate("page.canvas.clientHeight") == 800
-
-
-def test_on_a_wide_page_the_panel_can_be_folded_away(exported: Browser) -> None:
-    before = exported.evaluate("page.canvas.clientWidth")
-    assert "Colour by" in exported.text()
-    exported.press_button("fold")
-    assert exported.evaluate("page.canvas.clientWidth") == before + 300
-    assert exported.evaluate("document.getElementById('fold').ariaExpanded") == "false"
-
-
-@pytest.fixture
-def without_webgl(browser: Browser) -> Iterator[Browser]:
-    script = """const get = HTMLCanvasElement.prototype.getContext;
-        HTMLCanvasElement.prototype.getContext = function (kind) {
-            return kind === "2d" ? get.call(this, kind) : null;
-        };"""
-    added = browser.send("Page.addScriptToEvaluateOnNewDocument", source=script)
-    yield browser
-    browser.send("Page.removeScriptToEvaluateOnNewDocument", identifier=added["identifier"])
-
-
-def test_without_webgl_a_camera_s_buttons_work(without_webgl: Browser) -> None:
-    viewer = Viewer(two_looks(plane()), port=0, controls=Controls())
-    try:
-        without_webgl.open(viewer.url)
-        without_webgl.wait_for("document.body.innerText.includes('cannot draw the model')")
-        without_webgl.wait_for("!document.getElementById('start').disabled")
-        without_webgl.press_button("start")
-        without_webgl.wait_for("page.live.now.state === 'recording'")
-        assert without_webgl.evaluate("document.getElementById('stop').getBoundingClientRect().width") > 20
-        without_webgl.wait_for("document.body.innerText.includes('441 points')")
-        assert "cannot draw the model" in without_webgl.text()
-    finally:
-        viewer.close()
-
-
-def test_on_a_phone_a_camera_s_buttons_are_in_sight(phone: Browser) -> None:
-    viewer = Viewer(two_looks(plane()), port=0, controls=Controls())
-    try:
-        phone.open(viewer.url)
-        phone.wait_for("!document.getElementById('start').disabled")
-        assert phone.evaluate("document.getElementById('start').getBoundingClientRect().bottom") < 800
-    finally:
-        viewer.close()
-
-
-def test_a_title_is_no_markup(browser: Browser, tmp_path: Path) -> None:
-    title = "</script><b id='injected'>x</b> <!-- data -->"
-    export_html(two_looks(plane(), title), tmp_path / "view.html", triangles=False)
-    browser.open((tmp_path / "view.html").as_uri())
-    browser.wait_for(LOADED)
-    assert browser.evaluate("document.getElementById('injected')") is None
-    assert browser.evaluate("document.title") == title
-
-
-def test_an_empty_run_says_so(browser: Browser) -> None:
-    viewer = Viewer(Timeline("nothing", None), port=0)
-    try:
-        browser.open(viewer.url)
-        browser.wait_for("document.body.innerText.includes('There is no model yet')")
-    finally:
-        viewer.close()
