@@ -50,16 +50,20 @@ void bind_depth(py::module_& m) {
            py::arg("num_threads"), ReleaseGil())
       .def("model", &NoiseCalibration::model);
   py::class_<DepthCalibration>(m, "DepthCalibration")
-      .def(py::init([](double tilt, double sigma, int num_pairs, double focal_scale, double focal_sigma) {
-        return DepthCalibration{tilt, sigma, num_pairs, focal_scale, focal_sigma};
+      .def(py::init([](double tilt, double sigma, int num_pairs, double focal_scale, double focal_sigma, double radial,
+                       double radial_sigma) {
+        return DepthCalibration{tilt, sigma, num_pairs, focal_scale, focal_sigma, radial, radial_sigma};
       }))
       .def_readonly("tilt", &DepthCalibration::tilt)
       .def_readonly("sigma", &DepthCalibration::sigma)
       .def_readonly("num_pairs", &DepthCalibration::num_pairs)
       .def_readonly("focal_scale", &DepthCalibration::focal_scale)
       .def_readonly("focal_sigma", &DepthCalibration::focal_sigma)
+      .def_readonly("radial", &DepthCalibration::radial)
+      .def_readonly("radial_sigma", &DepthCalibration::radial_sigma)
       .def_property_readonly("is_significant", &DepthCalibration::is_significant)
-      .def_property_readonly("has_wrong_focal_length", &DepthCalibration::has_wrong_focal_length);
+      .def_property_readonly("has_wrong_focal_length", &DepthCalibration::has_wrong_focal_length)
+      .def_property_readonly("has_radial_depth", &DepthCalibration::has_radial_depth);
   py::class_<DepthCalibrator>(m, "DepthCalibrator")
       .def(py::init<const Camera&>(), py::arg("camera"))
       .def("add", [](DepthCalibrator& views, const DepthRef& depth,

@@ -21,7 +21,7 @@ from nacre.depth import preprocess_depth
 @dataclass(frozen=True)
 class DepthCalibration:
     """
-    How the inverse depth of a camera is off from one side of the image to the other, and its focal length.
+    How a camera's inverse depth is off across the image, its focal length, and along what depth is measured.
 
     Structured light and stereo measure a disparity along the image's rows, which is ``fx * baseline``
     times the inverse depth. Where pattern and camera, or the two cameras, do not fit each other quite in
@@ -41,6 +41,11 @@ class DepthCalibration:
         along the camera's axis. Depth that is wrong by a factor shows in nothing.
     focal_sigma : float
         Its standard deviation, likewise.
+    radial : float
+        0 where depth is along the camera's axis, as was said, 1 where it is the distance along each pixel's
+        ray; what the views agree best with.
+    radial_sigma : float
+        Its standard deviation, likewise.
     """
 
     tilt: float
@@ -48,6 +53,8 @@ class DepthCalibration:
     num_pairs: int
     focal_scale: float = 1.0
     focal_sigma: float = math.inf
+    radial: float = 0.0
+    radial_sigma: float = math.inf
 
     @property
     def is_significant(self) -> bool:
@@ -59,9 +66,14 @@ class DepthCalibration:
         """Whether the focal length is off by more than 4 %, as five sigma of many pairs are."""
         return _core.DepthCalibration(*astuple(self)).has_wrong_focal_length
 
-    def focal_length_advice(self, camera: Camera) -> str:
+    @property
+    def has_radial_depth(self) -> bool:
+        """Whether depth is along the rays rather than the axis (`radial` above a half), as surely."""
+        return _core.DepthCalibration(*astuple(self)).has_radial_depth
+
+    def camera_advice(self, camera: Camera) -> str:
         """
-        Return which focal length a camera seems to have.
+        Return what seems to be wrong with a camera as it was given, and what would be right.
 
         Parameters
         ----------
@@ -71,7 +83,7 @@ class DepthCalibration:
         Returns
         -------
         str
-            A sentence; empty where the camera's focal length is not clearly wrong.
+            A sentence; empty where nothing is clearly wrong.
 
         Raises
         ------
@@ -79,14 +91,21 @@ class DepthCalibration:
             It is no camera, or no pinhole camera.
         """
         _check_camera(camera)
-        if not self.has_wrong_focal_length:
-            return ""
-        fx, fy = (self.focal_scale * length for length in (camera.fx, camera.fy))
-        return (
-            f"views in different directions fit each other best with fx {fx:.0f} and fy {fy:.0f} pixels, "
-            f"{self.focal_scale:.2f} times what the camera says (sigma {self.focal_sigma:.3f}): "
-            "its focal length is wrong"
-        )
+        told = []
+        if self.has_radial_depth:
+            told.append(
+                "views in different directions fit each other best if depth is the distance along each "
+                f"pixel's ray, not along the camera's axis ({self.radial:.2f} times the difference, sigma "
+                f"{self.radial_sigma:.3f}): give the camera depth='radial'"
+            )
+        if self.has_wrong_focal_length:
+            fx, fy = (self.focal_scale * length for length in (camera.fx, camera.fy))
+            told.append(
+                f"views in different directions fit each other best with fx {fx:.0f} and fy {fy:.0f} pixels, "
+                f"{self.focal_scale:.2f} times what the camera says (sigma {self.focal_sigma:.3f}): "
+                "its focal length is wrong"
+            )
+        return "; ".join(told)
 
     def correct(self, depth: npt.ArrayLike, camera: Camera) -> npt.NDArray[np.float32]:
         """
@@ -116,14 +135,15 @@ class DepthCalibration:
 @guided()
 def calibrate_depth(views: Iterable[tuple[npt.ArrayLike, npt.ArrayLike]], camera: Camera) -> DepthCalibration:
     """
-    Find the systematic error of depth and the focal length that make overlapping views agree best.
+    Find what is systematically wrong with a camera's depth, by which overlapping views agree best.
 
     Two views of one surface from different directions see it in different columns, stretched along
     different axes; what the tilt of the inverse depth, a focal length and their relative pose together
     explain is fitted to all pairs of successive views that are 0.1 to 0.6 rad apart (point to plane, Gauss
-    and Newton, robust). Poses need to be about right only. The idea, to calibrate depth by what overlaps in
-    a recording, is that of Teichman, Miller and Thrun 2013. A :class:`nacre.Model` does the same with its
-    own frames (``calibrate_depth``); what is known of a camera can be given to it as ``depth.tilt``.
+    and Newton, robust), and whether depth is the distance along the rays. Poses need to be about right
+    only. The idea, to calibrate depth by what overlaps in a recording, is that of Teichman, Miller and Thrun
+    2013. A :class:`nacre.Model` does the same with its own frames (``calibrate_depth``); what is known of a
+    camera can be given to it as ``depth.tilt``.
 
     Parameters
     ----------

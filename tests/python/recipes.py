@@ -252,8 +252,8 @@ RECIPES: dict[str, Recipe] = {
     "nacre.depth_calibration.DepthCalibration.correct": Recipe(
         nacre.DepthCalibration(0.01, 0.001, 7).correct, {"depth": DEPTH, "camera": CAMERA}
     ),
-    "nacre.depth_calibration.DepthCalibration.focal_length_advice": Recipe(
-        nacre.DepthCalibration(0.01, 0.001, 7, 0.9, 0.001).focal_length_advice, {"camera": CAMERA}
+    "nacre.depth_calibration.DepthCalibration.camera_advice": Recipe(
+        nacre.DepthCalibration(0.01, 0.001, 7, 0.9, 0.001).camera_advice, {"camera": CAMERA}
     ),
     "nacre.depth_calibration.calibrate_depth": Recipe(
         lambda depth, world_from_camera, camera: nacre.calibrate_depth(

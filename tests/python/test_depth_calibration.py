@@ -105,7 +105,7 @@ def test_it_finds_the_focal_length(room, factor, tilt):
     found = nacre.calibrate_depth(zip(tilted, poses, strict=True), camera)
     assert found.has_wrong_focal_length
     assert found.focal_scale * factor == pytest.approx(1.0, abs=0.005)
-    advice = found.focal_length_advice(camera)
+    advice = found.camera_advice(camera)
     assert f"fx {camera.fx * found.focal_scale:.0f} " in advice
 
 
@@ -115,7 +115,7 @@ def test_a_focal_length_that_is_about_right_is_no_cause_for_advice(room, factor)
     camera = nacre.Camera(width=320, height=240, fx=260 * factor, fy=260 * factor, cx=159.5, cy=119.5)
     found = nacre.calibrate_depth(zip(depths, poses, strict=True), camera)
     assert not found.has_wrong_focal_length
-    assert found.focal_length_advice(camera) == ""
+    assert found.camera_advice(camera) == ""
 
 
 def test_a_wrong_focal_length_is_told_once_by_a_reconstruction(room, caplog):
@@ -126,6 +126,28 @@ def test_a_wrong_focal_length_is_told_once_by_a_reconstruction(room, caplog):
         done = nacre.reconstruct(frames)
     assert done.depth_calibration.focal_scale == pytest.approx(1 / 0.9, abs=0.01)
     assert len([record for record in caplog.records if "focal length is wrong" in record.message]) == 1
+
+
+@pytest.mark.parametrize("factor", [0.9, 1.0, 1.1])
+def test_depth_along_the_rays_that_is_given_as_depth_along_the_axis_is_told(room, factor):
+    depths, poses = room
+    camera = nacre.Camera(width=320, height=240, fx=260 * factor, fy=260 * factor, cx=159.5, cy=119.5)
+    lengths = [depth * np.sqrt(1 + SIDE**2 + DOWN**2) for depth in depths]
+    found = nacre.calibrate_depth(zip(lengths, poses, strict=True), camera)
+    assert found.has_radial_depth
+    assert found.radial == pytest.approx(1.0, abs=0.01 if factor == 1.0 else 0.2)
+    assert found.focal_scale * factor == pytest.approx(1.0, abs=0.01)
+    assert "depth='radial'" in found.camera_advice(camera)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 0.02])
+def test_depth_along_the_axis_is_not_taken_for_depth_along_the_rays(room, tilt):
+    depths, poses = room
+    tilted = [depth / (1.0 + tilt * SIDE * depth) for depth in depths]
+    found = nacre.calibrate_depth(zip(tilted, poses, strict=True), CAMERA)
+    assert not found.has_radial_depth
+    assert found.radial == pytest.approx(0.0, abs=0.02)
+    assert found.camera_advice(CAMERA) == ""
 
 
 def test_depth_that_is_wrong_by_a_factor_shows_in_nothing(room):

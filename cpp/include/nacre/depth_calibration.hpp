@@ -11,7 +11,8 @@
 
 namespace nacre {
 
-/// How the inverse depth of a camera is off from one side of the image to the other, and its focal length.
+/// How the inverse depth of a camera is off from one side of the image to the other, its focal length, and along what
+/// its depth is measured.
 ///
 /// Structured light and stereo measure a disparity along the image's rows, which is fx * baseline times the inverse
 /// depth. Where pattern and camera, or the two cameras, do not fit each other quite in direction or focal length, it is
@@ -22,9 +23,12 @@ struct DepthCalibration {
   int num_pairs = 0;                                       ///< of views that it is from
   double focal_scale = 1.0;  ///< the focal length that makes the views agree best, by the camera's
   double focal_sigma = std::numeric_limits<double>::infinity();  ///< its standard deviation, likewise
+  double radial = 0.0;  ///< 0 where depth is along the axis, as was said, 1 where it is along the rays
+  double radial_sigma = std::numeric_limits<double>::infinity();  ///< its standard deviation, likewise
 
   bool is_significant() const;          ///< whether the tilt matters, and is beyond doubt
   bool has_wrong_focal_length() const;  ///< whether the focal length is off by more than 4 %, beyond doubt
+  bool has_radial_depth() const;        ///< whether depth is along the rays rather than the axis, beyond doubt
 };
 
 /// Whether the depth of a camera can be calibrated: pinhole, with depth along its axis.
@@ -35,7 +39,8 @@ bool can_calibrate_depth(const Camera& camera);
 /// depth and camera differ in size.
 DepthImage correct_depth(const DepthRef& depth, const Camera& camera, double tilt, int num_threads = 0);
 
-/// Finds the systematic error of depth and the focal length that make overlapping views agree best.
+/// Finds the systematic error of depth and the focal length that make overlapping views agree best, and whether depth
+/// is the distance along the rays.
 ///
 /// Two views of one surface from different directions see it in different columns, stretched along different axes; what
 /// the tilt of the inverse depth, a focal length and their relative pose together explain is fitted to all pairs of
@@ -82,13 +87,14 @@ class DepthCalibrator {
   };
   struct Fit {
     std::int32_t iteration = 0;
-    double tilt = 0.0, stretch = 1.0;
-    Eigen::Vector2d last_step = Eigen::Vector2d::Zero();  // [sigma] of Gauss and Newton
+    double tilt = 0.0, stretch = 1.0, radial = 0.0;
+    Eigen::Vector3d last_step = Eigen::Vector3d::Zero();  // [sigma] of Gauss and Newton
     double length = 1.0;                                  // of the step that was taken, of theirs
-    bool is_done = false;
+    bool asks_radial = false, is_done = false;
     std::vector<Pair> pairs;
   };
   Fit begun() const;
+  DepthCalibration settled(Fit fit, int num_threads) const;
   DepthCalibration iterate(Fit& fit, int num_threads) const;
   double typical_depth() const;
 

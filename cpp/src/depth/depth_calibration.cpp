@@ -22,10 +22,16 @@ namespace {
 
 using PointBlocks = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
-// What the camera measures wrongly: by so much the inverse depth is tilted, and the scene too narrow.
+// What the camera measures wrongly: by so much the inverse depth is tilted, the scene too narrow, and depth measured
+// along the rays.
 struct Distortion {
-  double tilt = 0.0, stretch = 1.0;
+  double tilt = 0.0, stretch = 1.0, radial = 0.0;
 };
+
+// By what the length of a point's ray is larger than its depth: the logarithm of the factor.
+double log_ray_length(const Eigen::Vector3d& point) {
+  return 0.5 * std::log1p(point.head<2>().squaredNorm() / (point.z() * point.z()));
+}
 
 void require_calibrable(const Camera& camera) {
   if (!can_calibrate_depth(camera)) {
@@ -83,10 +89,11 @@ Points average(const DepthRef& depth, const Camera& camera) {
   return blocks;
 }
 
-// A measured point without the tilt (1 / z less tilt * x / z), and stretched across the axis.
+// A measured point without the tilt (1 / z less tilt * x / z), nearer by a power of its ray's length, and stretched
+// across the axis.
 Eigen::Vector3d corrected(const Points& points, Eigen::Index i, const Distortion& distortion) {
   Eigen::Vector3d result = points.row(i).transpose().cast<double>();
-  result /= 1.0 - distortion.tilt * result.x();
+  result *= std::exp(-distortion.radial * log_ray_length(result)) / (1.0 - distortion.tilt * result.x());
   result.head<2>() *= distortion.stretch;
   return result;
 }
@@ -123,16 +130,16 @@ class CorrectedView {
   PointBlocks normals_;
 };
 
-// What a pair of views says of tilt and stretch beside their relative pose.
+// What a pair of views says of tilt, stretch and depth along the rays beside their relative pose.
 struct PairFit {
-  Eigen::Matrix2d information;
-  Eigen::Vector2d gradient;
-  Eigen::Matrix<double, 6, 3> response;  // less the twist, by tilt and stretch and as the residuals want it
+  Eigen::Matrix3d information;
+  Eigen::Vector3d gradient;
+  Eigen::Matrix<double, 6, 4> response;  // less the twist, by these three and as the residuals want it
 };
 
 std::optional<PairFit> linearise(const CorrectedView& target, const CorrectedView& source, const Pose& motion,
                                  double stretch, const Camera& camera) {
-  using Row = Eigen::Matrix<double, 9, 1>;
+  using Row = Eigen::Matrix<double, 10, 1>;
   const BlockGrid grid(camera);
   std::vector<Row> rows;
   std::vector<double> depths;
@@ -155,7 +162,8 @@ std::optional<PairFit> linearise(const CorrectedView& target, const CorrectedVie
     const Eigen::Vector3d wide(middle.x(), middle.y(), 0.0), wide_there(there.x(), there.y(), 0.0);
     Row row;
     row << -p.cross(n), -n, n.dot(middle * middle.x() - motion.linear() * (there * there.x())),
-        n.dot(wide - motion.linear() * wide_there) / stretch, residual;
+        n.dot(wide - motion.linear() * wide_there) / stretch,
+        n.dot(motion.linear() * (there * log_ray_length(there)) - middle * log_ray_length(middle)), residual;
     rows.push_back(row);
     depths.push_back(q.z());
   }
@@ -166,9 +174,9 @@ std::optional<PairFit> linearise(const CorrectedView& target, const CorrectedVie
   for (const double depth : depths) squares.push_back(depth * depth);
   const double middle_square = median_of(squares);
   std::vector<double> whitened;
-  for (std::size_t i = 0; i < rows.size(); ++i) whitened.push_back(std::abs(rows[i](8)) * middle_square / squares[i]);
+  for (std::size_t i = 0; i < rows.size(); ++i) whitened.push_back(std::abs(rows[i](9)) * middle_square / squares[i]);
   const double scale = std::max(mad_to_sigma * median_of(whitened), 1e-9);
-  Eigen::Matrix<double, 9, 9> sums = Eigen::Matrix<double, 9, 9>::Zero();
+  Eigen::Matrix<double, 10, 10> sums = Eigen::Matrix<double, 10, 10>::Zero();
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const double noise = scale * squares[i] / middle_square;
     sums += robust_weight(whitened[i], scale) / (noise * noise) * (rows[i] * rows[i].transpose());
@@ -176,19 +184,27 @@ std::optional<PairFit> linearise(const CorrectedView& target, const CorrectedVie
   Eigen::Matrix<double, 6, 6> hessian = sums.topLeftCorner<6, 6>();
   hessian.diagonal().array() += 1e-9 * hessian.trace();
   PairFit fit;
-  fit.response = solve_symmetric_columns(hessian, sums.topRightCorner<6, 3>());
-  const Eigen::Matrix<double, 2, 3> left = sums.block<2, 3>(6, 6) - sums.block<2, 6>(6, 0) * fit.response;
+  fit.response = solve_symmetric_columns(hessian, sums.topRightCorner<6, 4>());
+  const Eigen::Matrix<double, 3, 4> left = sums.block<3, 4>(6, 6) - sums.block<3, 6>(6, 0) * fit.response;
   // Rounding leaves less of the information than this where the pose explains all.
-  if (!(left(0, 0) > depth_limits::least_part_left * sums(6, 6) &&
-        left(1, 1) > depth_limits::least_part_left * sums(7, 7))) {
+  if (!(left.leftCols<3>().diagonal().array() > depth_limits::least_part_left * sums.diagonal().segment<3>(6).array())
+           .all()) {
     return std::nullopt;
   }
-  fit.information = left.leftCols<2>();
-  fit.gradient = left.col(2);
+  fit.information = left.leftCols<3>();
+  fit.gradient = left.col(3);
   return fit;
 }
 
-Pose followed(const Pose& motion, const PairFit& fit, const Eigen::Vector3d& step) {
+// Depth along the axis, as was said: nothing else is asked.
+void hold_radial(PairFit& fit) {
+  fit.information.row(2).setZero();
+  fit.information.col(2).setZero();
+  fit.information(2, 2) = 1.0;
+  fit.gradient(2) = 0.0;
+}
+
+Pose followed(const Pose& motion, const PairFit& fit, const Eigen::Vector4d& step) {
   const Eigen::Matrix<double, 6, 1> twist = -fit.response * step;
   return motion_about(Eigen::Vector3d::Zero(), twist) * motion;
 }
@@ -213,6 +229,10 @@ bool DepthCalibration::is_significant() const {
 bool DepthCalibration::has_wrong_focal_length() const {
   const double error = std::abs(focal_scale - 1.0);
   return is_beyond_doubt(error / focal_sigma, num_pairs) && error > depth_limits::least_focal_error;
+}
+
+bool DepthCalibration::has_radial_depth() const {
+  return is_beyond_doubt(radial / radial_sigma, num_pairs) && radial > depth_limits::least_radial;
 }
 
 bool can_calibrate_depth(const Camera& camera) {
@@ -254,12 +274,24 @@ bool DepthCalibrator::add(const DepthRef& depth, const Pose& world_from_camera) 
   return true;
 }
 
-DepthCalibration DepthCalibrator::fit(int num_threads) const {
-  Fit fit = begun();
+DepthCalibration DepthCalibrator::settled(Fit fit, int num_threads) const {
   for (;;) {
     const DepthCalibration found = iterate(fit, num_threads);
     if (fit.is_done) return found;
   }
+}
+
+// Depth is along the axis or along the rays, nothing between: what both fits say of tilt and focal length differs by
+// noise alone where it is along the axis, and is better known there if nothing else is asked.
+DepthCalibration DepthCalibrator::fit(int num_threads) const {
+  Fit either = begun();
+  either.asks_radial = true;
+  const DepthCalibration along_rays = settled(std::move(either), num_threads);
+  if (along_rays.has_radial_depth()) return along_rays;
+  DepthCalibration found = settled(begun(), num_threads);
+  found.radial = along_rays.radial;
+  found.radial_sigma = along_rays.radial_sigma;
+  return found;
 }
 
 void DepthCalibrator::begin_fit() { fit_ = begun(); }
@@ -300,7 +332,7 @@ double DepthCalibrator::typical_depth() const {
 // What the views say; the fit is done where they are at rest, or may not come to it.
 DepthCalibration DepthCalibrator::iterate(Fit& fit, int num_threads) const {
   fit.is_done = true;
-  const Distortion distortion{fit.tilt, fit.stretch};
+  const Distortion distortion{fit.tilt, fit.stretch, fit.radial};
   std::vector<CorrectedView> views(views_.size());
   parallel_for(num_views(), 1, num_threads, [&](std::int64_t k) {
     const auto i = static_cast<std::size_t>(k);
@@ -312,10 +344,11 @@ DepthCalibration DepthCalibrator::iterate(Fit& fit, int num_threads) const {
     fits[static_cast<std::size_t>(k)] =
         linearise(views[static_cast<std::size_t>(pair.first)], views[static_cast<std::size_t>(pair.second)],
                   pair.motion, distortion.stretch, camera_);
+    if (fits[static_cast<std::size_t>(k)] && !fit.asks_radial) hold_radial(*fits[static_cast<std::size_t>(k)]);
   });
   DepthCalibration result;
-  Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
-  Eigen::Vector2d gradient = Eigen::Vector2d::Zero();
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
   for (const std::optional<PairFit>& pair : fits) {
     if (!pair) continue;
     information += pair->information;
@@ -323,34 +356,39 @@ DepthCalibration DepthCalibrator::iterate(Fit& fit, int num_threads) const {
     ++result.num_pairs;
   }
   if (result.num_pairs < 2) return result;
-  const Eigen::Matrix2d covariance = information.inverse();
-  Eigen::Vector2d step = -covariance * gradient;
+  const Eigen::Matrix3d covariance = information.inverse();
+  Eigen::Vector3d step = -covariance * gradient;
   // From the scatter, as neighbours share their errors; two pairs share a view.
-  Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const std::optional<PairFit>& pair : fits) {
     if (!pair) continue;
-    const Eigen::Vector2d left = pair->gradient + pair->information * step;
+    const Eigen::Vector3d left = pair->gradient + pair->information * step;
     scatter += left * left.transpose();
   }
-  const Eigen::Array2d sigmas = (2.0 * (covariance * scatter * covariance).diagonal().array()).sqrt();
-  const Eigen::Vector2d in_sigmas = step.array() / sigmas.max(1e-12);
+  const Eigen::Array3d sigmas = (2.0 * (covariance * scatter * covariance).diagonal().array()).sqrt();
+  const Eigen::Vector3d in_sigmas = step.array() / sigmas.max(1e-12);
   const double longest = depth_limits::largest_stretch_step / std::max(std::abs(step(1)), 1e-12);
-  fit.length = std::min(step_length(fit.last_step, fit.length, in_sigmas, Eigen::Matrix2d::Identity()), longest);
+  fit.length = std::min(step_length(fit.last_step, fit.length, in_sigmas, Eigen::Matrix3d::Identity()), longest);
   fit.last_step = in_sigmas;
   step *= fit.length;
   fit.tilt += step(0);
   // What lies across the axis looks turned by so much: by more than the views are, and turns and tilt change places.
   if (!(std::abs(fit.tilt) * typical_depth() <= depth_limits::least_turn)) return DepthCalibration{};
   fit.stretch += step(1);
+  fit.radial += step(2);
   result.tilt = fit.tilt;
   result.sigma = sigmas(0);
   result.focal_scale = 1.0 / fit.stretch;
   result.focal_sigma = sigmas(1) / (fit.stretch * fit.stretch);
-  const bool is_at_rest = (step.array().abs() < depth_limits::at_rest * sigmas).all();
+  if (fit.asks_radial) {
+    result.radial = fit.radial;
+    result.radial_sigma = sigmas(2);
+  }
+  const bool is_at_rest = (step.array().abs() <= depth_limits::at_rest * sigmas).all();
   fit.is_done = is_at_rest || ++fit.iteration == depth_limits::most_calibration_steps;
   if (fit.is_done) return result;
   for (std::size_t i = 0; i < fits.size(); ++i) {
-    if (fits[i]) fit.pairs[i].motion = followed(fit.pairs[i].motion, *fits[i], {step(0), step(1), fit.length});
+    if (fits[i]) fit.pairs[i].motion = followed(fit.pairs[i].motion, *fits[i], {step(0), step(1), step(2), fit.length});
   }
   return result;
 }
@@ -364,18 +402,18 @@ std::vector<Pose> DepthCalibrator::correct(double tilt, int num_threads) {
   std::vector<CorrectedView> views(views_.size());
   parallel_for(num_views(), 1, num_threads, [&](std::int64_t k) {
     const auto i = static_cast<std::size_t>(k);
-    views[i] = CorrectedView(views_[i].blocks, {tilt, 1.0}, BlockGrid(camera_));
+    views[i] = CorrectedView(views_[i].blocks, {tilt}, BlockGrid(camera_));
   });
   std::vector<Pose> motions(views_.size(), Pose::Identity());
   parallel_for(num_views() - 1, 1, num_threads, [&](std::int64_t k) {
     const auto i = static_cast<std::size_t>(k);
     Pose motion = views_[i].world_from_camera.inverse() * views_[i + 1].world_from_camera;
     const std::optional<PairFit> fit = linearise(views[i], views[i + 1], motion, 1.0, camera_);
-    motions[i + 1] = fit ? followed(motion, *fit, {0.0, 0.0, 1.0}) : motion;
+    motions[i + 1] = fit ? followed(motion, *fit, {0.0, 0.0, 0.0, 1.0}) : motion;
   });
   for (View& view : views_) {
     for (Eigen::Index i = 0; i < view.blocks.rows(); ++i) {
-      view.blocks.row(i) = corrected(view.blocks, i, {tilt, 1.0}).cast<float>();
+      view.blocks.row(i) = corrected(view.blocks, i, {tilt}).cast<float>();
     }
   }
   std::vector<Pose> poses;

@@ -59,6 +59,7 @@ constexpr double largest_block_step = 0.1;  // [1] tuned: of the depth, across t
 constexpr double sure_sigmas = 5.0;  // [sigma] derived: of a Gaussian: an error of depth is beyond chance; test_depth_calibration
 constexpr double least_tilt = 0.002;  // [1/m] derived: noise of one pixel's inverse depth, structured light; test_depth_calibration
 constexpr double least_focal_error = 0.04;  // [1] tuned: calibrated cameras show up to 0.03; test_depth_calibration
+constexpr double least_radial = 0.5;  // [1] derived: between depth along the axis, 0, and along the rays, 1; test_depth_calibration
 constexpr float largest_correction = 0.5F;  // [1] derived: of the depth: no calibration reaches; test_depth_calibration
 
 }  // namespace nacre::depth_limits

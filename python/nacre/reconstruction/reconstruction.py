@@ -387,7 +387,7 @@ class Reconstruction(Checkpointed):
     def camera_doubt(self) -> str:
         """What the frames say is wrong with the camera as it was given; empty where nothing is."""
         calibration = self.depth_calibration
-        return "" if calibration is None else calibration.focal_length_advice(self.model.camera)
+        return "" if calibration is None else calibration.camera_advice(self.model.camera)
 
     @property
     def doubled_surfaces(self) -> DoubledSurfaces | None:

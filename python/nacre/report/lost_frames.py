@@ -15,7 +15,8 @@ _NEXT_STEPS = {
     "depth scale? nacre info shows what is in the recording.",
     "unusable": "Hardly a pixel was left after cleaning: is the depth scale right, and do --min-depth, "
     "--max-depth, --box and masks leave what is of interest?",
-    "registration": "Is the depth scale right (nacre info shows the median depth)? Does each frame overlap "
+    "registration": "Are depth scale (nacre info shows the median depth) and focal length right? Is depth "
+    'measured along the axis of the camera (else its file needs "depth": "radial")? Does each frame overlap '
     "what was seen before? Does an object turn before a background that stands still (--object)?",
     "overlap": "What a frame sees must overlap what was seen before: look at these frames in the viewer; "
     "move more slowly there, or go back to where the camera was tracked and record on from there.",

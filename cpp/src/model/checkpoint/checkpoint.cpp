@@ -258,7 +258,7 @@ bool PrivateState::is_sound(const DepthCalibrator& calibrator) {
     };
     const bool goes_on = fit->iteration >= 0 && fit->iteration < depth_limits::most_calibration_steps;
     if (!goes_on || !std::isfinite(fit->tilt) || !(std::abs(fit->stretch) > 0.0) || !std::isfinite(fit->stretch) ||
-        !std::all_of(fit->pairs.begin(), fit->pairs.end(), is_of_views)) {
+        !std::isfinite(fit->radial) || !std::all_of(fit->pairs.begin(), fit->pairs.end(), is_of_views)) {
       return false;
     }
   }

@@ -99,7 +99,7 @@ struct PrivateState {
   }
   template <class Archive>
   static void exchange(Archive& archive, DepthCalibrator::Fit& fit) {
-    archive(fit.iteration, fit.tilt, fit.stretch, fit.last_step, fit.length, fit.pairs);
+    archive(fit.iteration, fit.tilt, fit.stretch, fit.radial, fit.last_step, fit.length, fit.pairs);
   }
   template <class Archive>
   static void exchange(Archive& archive, DepthCalibrator& calibrator) {
