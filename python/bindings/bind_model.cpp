@@ -147,6 +147,7 @@ void bind_model(py::module_& m) {
       .def_readonly("score", &FrameReport::score)
       .def_property_readonly("probability", &FrameReport::probability)
       .def_readonly("rmse", &FrameReport::rmse)
+      .def_readonly("center", &FrameReport::center)
       .def_property_readonly("information",
                              [](const FrameReport& report) { return Eigen::Matrix<double, 6, 6>(report.information); })
       .def_property_readonly("weak_directions",

@@ -61,8 +61,8 @@ class FrameReport(Value):
     world_from_camera : (4, 4) float64
         The camera's pose; of a lost frame the last known one. Where a later frame corrects earlier ones, the
         reports in ``Model.frames`` have what is known then.
-    num_inliers, overlap, rmse, information, weak_directions
-        Of the registration; see :class:`nacre.AlignResult`.
+    num_inliers, overlap, rmse, center, information, weak_directions
+        Of the registration; see :class:`nacre.AlignResult`. The target is the model, its frame the world.
     consistency : float
         Part of the model's points in view that the frame does not see through.
     score : float
@@ -110,6 +110,7 @@ class FrameReport(Value):
     score: float
     probability: float
     rmse: float
+    center: npt.NDArray[np.float64]
     information: npt.NDArray[np.float64]
     weak_directions: npt.NDArray[np.float64]
     loop_frame: int | None

@@ -48,7 +48,8 @@ class AlignResult(Value):
         "point_to_point") [m]; NaN where nothing matched.
     information : (6, 6) float64
         Inverse covariance of the pose, for a twist (rotation [rad], translation [m]) about ``center`` in the
-        target's frame. It takes the residuals for independent, so it is optimistic.
+        target's frame. Residuals count as the independent ones that they are worth; what the target errs by
+        is not in it.
     weak_directions : (K, 6) float64
         Unit twists about ``center``, rotations in units of the inliers' extent, that the data does not
         determine; the pose keeps its initial value along them. K is 0 for a well determined pose, 3 for a

@@ -28,6 +28,7 @@ struct TrackingReport {
                              ///< match, times overlap^2 consistency^4 (^8 far from all guesses), less
                              ///< where residuals of neighbours agree beyond noise
   double rmse = 0.0;         ///< of the inliers, along the normals [m]
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();          ///< see AlignResult; world frame
   Matrix6 information = Matrix6::Zero();                     ///< see AlignResult
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult
 

@@ -4,9 +4,10 @@
 
 namespace nacre {
 
-void turn_uncertainty(FrameReport& report, const Eigen::Matrix3d& rotation) {
+void move_uncertainty(FrameReport& report, const Pose& motion) {
   Matrix6 turn = Matrix6::Zero();
-  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = rotation;
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = motion.linear();
+  report.center = motion * report.center;
   report.information = turn * report.information * turn.transpose();
   report.weak_directions = turn * report.weak_directions;
 }
@@ -15,7 +16,7 @@ void FrameHistory::add(const FrameReport& report) {
   if (size() % per_chunk == 0) chunks_.emplace_back();
   if (report.status != FrameStatus::lost) registered_.push_back(static_cast<std::int32_t>(size()));
   FrameReport kept = report;
-  turn_uncertainty(kept, report.world_from_camera.linear().transpose());
+  move_uncertainty(kept, report.world_from_camera.inverse());
   Chunk& chunk = chunks_.back();
   chunk.poses.emplace_back(report.world_from_camera.matrix().topRows<3>());
   StateWriter archive(chunk.bytes);
@@ -40,7 +41,7 @@ FrameReport FrameHistory::operator[](std::size_t index) const {
   archive.require_end();
   report.index = static_cast<std::int64_t>(index);
   report.world_from_camera = pose(index);
-  turn_uncertainty(report, report.world_from_camera.linear());
+  move_uncertainty(report, report.world_from_camera);
   return report;
 }
 

@@ -8,8 +8,8 @@
 
 namespace nacre {
 
-// Turns what a report says of its pose's uncertainty.
-void turn_uncertainty(FrameReport& report, const Eigen::Matrix3d& rotation);
+// Moves what a report says of its pose's uncertainty.
+void move_uncertainty(FrameReport& report, const Pose& motion);
 
 class FrameHistory {
  public:

@@ -305,7 +305,7 @@ void Pipeline::move_all(const std::vector<Pose>& corrections, FrameReport& repor
   parked.move(corrections);
   report.world_from_camera = corrections.back() * report.world_from_camera;
   still_scene.move(corrections.back());
-  turn_uncertainty(report, corrections.back().linear());
+  move_uncertainty(report, corrections.back());
 }
 
 // What moves before the scene is no part of it.

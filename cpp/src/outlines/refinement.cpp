@@ -80,7 +80,7 @@ void refine_by_outlines(IcpResult& result, const std::vector<OutlinePoint>& outl
     if (step.head<3>().norm() < 1e-5 && step.tail<3>().norm() < 1e-3 * pixel) break;
   }
   result.target_from_source = motion_about(result.center, twist) * start;
-  result.information += outlines_limits::pairs_for_one * equations.hessian;
+  result.information += equations.hessian;
 }
 
 }  // namespace nacre

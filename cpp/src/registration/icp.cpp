@@ -199,7 +199,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   result.off_planes = share_off_planes(pairs, result.residual_ratio);
   result.center = last.center;
   const double variance = std::max(last.variance, resolution * resolution);
-  result.information = last.hessian / variance;
+  result.information = last.hessian * (result.num_independent / static_cast<double>(pairs.size())) / variance;
   result.shape_information = last.shape / variance;
   result.weak_directions = last.weak_directions;
   result.signal = last.signal;

@@ -42,6 +42,7 @@ struct TrackingResult : Acceptance {
             consistency.of_target,
             score,
             alignment.rmse,
+            alignment.center,
             alignment.information,
             alignment.weak_directions};
   }
