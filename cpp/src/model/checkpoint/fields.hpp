@@ -144,8 +144,12 @@ void exchange(Archive& archive, FrameReport& report) {
   archive.choice(report.status, FrameStatus::relocalised);
   archive(report.timestamp, report.reason, report.num_inliers);
   archive.single(report.overlap, report.consistency, report.score, report.rmse, report.loop_distance);
-  archive.single(report.center.x(), report.center.y(), report.center.z());
-  exchange_symmetric(archive, report.information);
+  bool was_matched = !report.information.isZero(0.0);
+  archive(was_matched);
+  if (was_matched) {
+    archive.single(report.center.x(), report.center.y(), report.center.z());
+    exchange_symmetric(archive, report.information);
+  }
   archive(report.weak_directions, report.loop_frame, report.corrects_earlier, report.depth, report.region,
           report.num_moving, report.fusion, report.num_points, report.spacing, report.milliseconds, report.deformation);
 }
