@@ -7,7 +7,7 @@ namespace nacre {
 void move_uncertainty(FrameReport& report, const Pose& motion) {
   Matrix6 turn = Matrix6::Zero();
   turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = motion.linear();
-  report.center = motion * report.center;
+  if (!report.information.isZero(0.0)) report.center = motion * report.center;
   report.information = turn * report.information * turn.transpose();
   report.weak_directions = turn * report.weak_directions;
 }
