@@ -29,7 +29,8 @@ _ADVICE = {
     "together in time. More overlap, and coming back to the start, keep drift small.",
     "doubled": "Frames disagree there, by their poses or by systematic errors of their depth: look at it in "
     "the viewer; record it more slowly, come back to it so that a loop closes, or calibrate the camera.",
-    "camera": "Give the camera as it was calibrated (--camera FILE.json), for images of this size.",
+    "camera": "Give the camera as it was calibrated, for images of this size (--camera FILE.json), with "
+    '"depth": "radial" where its depth is the distance along the rays.',
     "dropped": "Move more slowly, or give less to register: --max-depth, --object, --set spacing=0.005, "
     "--set binning=4. What was kept of a camera (OUT/recording) can be gone over again.",
     "doubtful": "Look at these frames in the viewer: does what they see lie on the model?",
@@ -60,9 +61,9 @@ def find_problems(data: ReportData, trajectory: AbsoluteTrajectoryError | None) 
     distance = _distance_seen(data)
     yield from _jumps(data.frames, distance)
     yield from _pose_errors(data.frames, trajectory, distance)
-    yield from _doubled(data)
     if data.camera_doubt:
         yield Finding("camera", "weak", "Inaccurate", data.camera_doubt, _ADVICE["camera"])
+    yield from _doubled(data)
     yield from _doubtful(data.frames)
     if lost and data.num_dropped:
         came = count(data.num_dropped + len(data.frames))

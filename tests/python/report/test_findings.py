@@ -70,6 +70,12 @@ def test_a_camera_whose_numbers_are_doubted_is_not_good() -> None:
     assert "--camera" in verdict.next_step
 
 
+def test_what_doubles_surfaces_comes_before_them() -> None:
+    doubled = DoubledSurfaces(0.2, 0.02, (0.0, 0.0, 1.0))
+    verdict = verdict_on(walk(), camera_doubt="its depth is along the rays", doubled=doubled)
+    assert [finding.kind for finding in verdict.findings] == ["camera", "doubled"]
+
+
 def test_frames_that_came_too_fast_are_what_is_told_where_others_were_lost() -> None:
     assert verdict_on(walk(), num_dropped=9).level == "ok"
     frames = [
