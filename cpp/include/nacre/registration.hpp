@@ -72,6 +72,7 @@ struct AlignResult {
   double rmse = 0.0;     ///< of the inliers' residuals along the normals (distances, for point_to_point) [m]
   Eigen::Vector3d center = Eigen::Vector3d::Zero();  ///< centroid of the inliers, target frame [m]
   /// Inverse covariance of the pose: a twist (rotation [rad], translation [m]) about `center`, in the target frame.
+  /// Residuals count as the independent ones that they are worth; what the target errs by is not in it.
   Matrix6 information = Matrix6::Zero();
   /// One column per direction that the data does not determine: unit twists about `center` with the rotation in units
   /// of the inliers' extent. The pose keeps its initial value along them.
