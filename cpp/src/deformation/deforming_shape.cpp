@@ -14,8 +14,8 @@ namespace {
 
 // So that what the first frame shows gets about so many nodes.
 double first_node_spacing(std::size_t num_points, double spacing) {
-  const double area = static_cast<double>(num_points) * spacing * spacing;
-  return std::max(deformation_limits::node_spacings * spacing, std::sqrt(area / deformation_limits::first_nodes));
+  const double points_per_node = static_cast<double>(num_points) / deformation_limits::first_nodes;
+  return spacing * std::max(deformation_limits::node_spacings, std::sqrt(points_per_node));
 }
 
 }  // namespace
@@ -27,10 +27,12 @@ void DeformingShape::show(PointModel& model, int num_threads) {
   model.normals = bent_.normals;
 }
 
-bool DeformingShape::was_bending() const {
-  if (states_.size() < 2) return false;
-  const NodeStates& earlier = states_[states_.size() - 2];
-  return !std::equal(earlier.begin(), earlier.end(), states_.back().begin());
+std::vector<std::uint8_t> DeformingShape::was_bending() const {
+  if (states_.size() < 2) return {};
+  const NodeStates &earlier = states_[states_.size() - 2], &last = states_.back();
+  std::vector<std::uint8_t> flags;
+  for (std::size_t node = 0; node < earlier.size(); ++node) flags.push_back(earlier[node] != last[node] ? 1 : 0);
+  return flags;
 }
 
 void DeformingShape::bend(PointModel& model, int num_threads) {
@@ -86,7 +88,7 @@ void DeformingShape::unbend(PointModel& model, const Pose& world_from_camera, do
   for (std::size_t i = num_known; i < model.points.size(); ++i) {
     spacings.push_back(spacing_of((camera_from_world * model.points[i]).z()));
   }
-  grow(field_, {model.points, model.normals, spacings, model.last_seen, frame});
+  grow(field_, {model.points, model.normals, spacings, model.last_seen, frame, spacing});
   canonical_.points.resize(model.points.size());
   canonical_.normals.resize(model.points.size());
   parallel_for(static_cast<std::int64_t>(model.points.size()), block_size, num_threads, [&](std::int64_t number) {

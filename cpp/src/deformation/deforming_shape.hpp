@@ -41,7 +41,7 @@ class DeformingShape {
 
  private:
   friend struct PrivateState;
-  bool was_bending() const;  // at the newest frame that has ended
+  std::vector<std::uint8_t> was_bending() const;  // each node, at the newest frame that has ended
   void show(PointModel& model, int num_threads);
 
   WarpField field_;

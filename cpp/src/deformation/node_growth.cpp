@@ -133,10 +133,10 @@ void grow(WarpField& field, const GrownSurface& surface) {
   if (surface.points.size() == first) return;
   const SurfaceGraph graph(field, surface);
   field.bindings.resize(surface.points.size());
-  std::vector<float> apart;  // nodes, around each point: as far as hold enough points
+  std::vector<float> apart;  // nodes, around each point
   for (const float spacing : surface.spacings) {
-    apart.push_back(std::max(static_cast<float>(field.node_spacing),
-                             static_cast<float>(deformation_limits::node_spacings) * spacing));
+    const double farther = std::max(1.0, static_cast<double>(spacing) / surface.spacing);
+    apart.push_back(static_cast<float>(farther * field.node_spacing));
   }
   NodeDistances ways(graph, field.bindings, first, apart);
   for (const SurfaceGraph::Border& border : graph.borders()) {

@@ -15,10 +15,12 @@ struct GrownSurface {
   const std::vector<float>& spacings;          // of the new points, to their neighbours [m]
   const std::vector<std::int32_t>& last_seen;  // of all points
   std::int32_t frame;
+  double spacing;  // where the points are densest [m]
 };
 
-// Adds nodes a spacing apart along the new surface, farther where its points are, and bindings of its points. Distances
-// along the surface are the shortest ways over neighbouring points.
+// Adds nodes along the new surface, and bindings of its points: as far apart as field.node_spacing where points are
+// densest, else farther by as much as points are. Distances along the surface are the shortest ways over neighbouring
+// points.
 void grow(WarpField& field, const GrownSurface& surface);
 
 }  // namespace nacre

@@ -76,6 +76,9 @@ struct WarpField {
   double strain() const;
 };
 
+// Parts of the surface that share no nodes, as a thing and the wall behind it: of each node the first of its part.
+std::vector<std::int32_t> parts_of(const WarpField& field);
+
 // The rotation nearest to a blend of rotations.
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& blend);
 

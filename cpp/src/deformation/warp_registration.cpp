@@ -43,9 +43,10 @@ struct WarpRow {
 class WarpRegistration {
  public:
   WarpRegistration(WarpField& field, const OrientedPoints& canonical, const std::vector<std::int32_t>& in_view,
-                   const ShownSurface& shown, int num_threads, bool was_bending,
+                   const ShownSurface& shown, int num_threads, const std::vector<std::uint8_t>& was_bending,
                    const std::vector<Eigen::Vector3f>& colors)
       : field_(field),
+        parts_(parts_of(field)),
         shown_(shown),
         num_threads_(num_threads),
         was_bending_(was_bending),
@@ -84,20 +85,23 @@ class WarpRegistration {
     if (rows_.empty()) return found;
     const std::vector<WarpNode> before = field_.nodes;
     match(0.0);
-    const double misfit_before = misfit();
+    std::vector<double> gain = misfit();
     for (int step = 0; step < deformation_limits::steps; ++step) {
       const double part = 1.0 - static_cast<double>(step + 1) / deformation_limits::steps;  // to 0
       match(part * widest);
       move(1.0 + part * (deformation_limits::first_stiffness - 1.0));
     }
-    const double by_chance = misfit_by_chance();
+    const std::vector<double> by_chance = misfit_by_chance();
     match(0.0);
     found.bent = field_.nodes;
-    found.is_bent = misfit_before - misfit() > by_chance;
-    if (!found.is_bent) {
-      field_.nodes = before;
-      match(0.0);
+    const std::vector<double> left = misfit();
+    for (std::size_t node = 0; node < gain.size(); ++node) gain[node] -= left[node];
+    const std::vector<std::uint8_t> bends = bending(gain, by_chance);
+    found.is_bent = std::find(bends.begin(), bends.end(), 1) != bends.end();
+    for (std::size_t node = 0; node < bends.size(); ++node) {
+      if (bends[node] == 0) field_.nodes[node] = before[node];
     }
+    if (std::find(bends.begin(), bends.end(), 0) != bends.end()) match(0.0);
     const auto num_matched =
         std::count_if(rows_.begin(), rows_.end(), [](const WarpRow& row) { return row.shape.weight > 0.0; });
     found.explained = static_cast<double>(num_matched) / static_cast<double>(rows_.size());
@@ -178,17 +182,40 @@ class WarpRegistration {
     weigh_colors();
   }
 
-  // The residuals' squares in standard deviations, robustly (Tukey's).
-  double misfit() const {
-    double sum = 0.0;
-    for (const WarpRow& row : rows_) sum += row.misfit;
-    return sum;
+  std::size_t part_of(const WarpRow& row) const {
+    return static_cast<std::size_t>(parts_[static_cast<std::size_t>(row.binding.nodes[0])]);
   }
 
-  // What a bend may explain without there being one: many times what the last step's equations explain of noise alone,
-  // of one standard deviation and either sign at each row (Hutchinson's estimate of degrees of freedom, which stiffness
-  // makes fewer than the unknowns). An error that neighbours share counts as often as there are rows.
-  double misfit_by_chance() {
+  // The residuals' squares in standard deviations, robustly (Tukey's), of each part at its first node.
+  std::vector<double> misfit() const {
+    std::vector<double> sums(field_.nodes.size(), 0.0);
+    for (const WarpRow& row : rows_) sums[part_of(row)] += row.misfit;
+    return sums;
+  }
+
+  // Which nodes are of parts that bend: those whose bend explains more than chance may. A part that is not in view goes
+  // with what its first node was added to.
+  std::vector<std::uint8_t> bending(const std::vector<double>& gain, const std::vector<double>& by_chance) const {
+    std::vector<std::uint8_t> bends(field_.nodes.size(), 0), is_seen(field_.nodes.size(), 0);
+    for (const WarpRow& row : rows_) is_seen[part_of(row)] = 1;
+    for (std::size_t node = 0; node < bends.size(); ++node) {
+      const auto part = static_cast<std::size_t>(parts_[node]);
+      const std::int32_t parent = field_.nodes[node].parents.nodes[0];
+      if (part != node) {
+        bends[node] = bends[part];
+      } else if (is_seen[node] != 0) {
+        bends[node] = gain[node] > by_chance[node] ? 1 : 0;
+      } else if (parent >= 0) {
+        bends[node] = bends[static_cast<std::size_t>(parent)];
+      }
+    }
+    return bends;
+  }
+
+  // What the bend of each part may explain without there being one: many times what the last step's equations explain
+  // of noise alone, of one standard deviation and either sign at each row (Hutchinson's estimate of degrees of freedom,
+  // which stiffness makes fewer than the unknowns). An error that neighbours share counts as often as there are rows.
+  std::vector<double> misfit_by_chance() {
     equations_.set_right_side_zero();
     const auto noise_of = [&](std::size_t i) {
       return std::sqrt(rows_[i].shape.weight) * (random_bits(1, i) % 2 == 0 ? 1.0 : -1.0);
@@ -201,20 +228,30 @@ class WarpRegistration {
       }
     }
     const std::vector<Vector6> motion = solved();
-    double explained = 0.0;
+    std::vector<double> explained(field_.nodes.size(), 0.0), num_rows(field_.nodes.size(), 0.0);
     for (std::size_t i = 0; i < rows_.size(); ++i) {
       const WarpRow& row = rows_[i];
+      num_rows[part_of(row)] += 1.0;
       if (!(row.shape.weight > 0.0)) continue;
       double moved = 0.0;
       for (int k = 0; k < row.num_nodes; ++k) {
         const auto j = static_cast<std::size_t>(k);
         moved += row.shape.jacobian[j].dot(motion[static_cast<std::size_t>(row.binding.nodes[j])]);
       }
-      explained += moved * (2.0 * noise_of(i) - row.shape.weight * moved);
+      explained[part_of(row)] += moved * (2.0 * noise_of(i) - row.shape.weight * moved);
     }
-    const auto num_rows = static_cast<double>(rows_.size());
-    const double by_noise = was_bending_ ? deformation_limits::misfit_of_bending : deformation_limits::misfit_by_noise;
-    return by_noise * explained + deformation_limits::misfit_per_shared * shown_.shared_error * (num_rows - explained);
+    std::vector<std::uint8_t> went_on(field_.nodes.size(), 0);
+    for (std::size_t node = 0; node < was_bending_.size(); ++node) {
+      if (was_bending_[node] != 0) went_on[static_cast<std::size_t>(parts_[node])] = 1;
+    }
+    std::vector<double> by_chance(field_.nodes.size());
+    for (std::size_t part = 0; part < by_chance.size(); ++part) {
+      const double by_noise =
+          went_on[part] != 0 ? deformation_limits::misfit_of_bending : deformation_limits::misfit_by_noise;
+      const double shared = deformation_limits::misfit_per_shared * shown_.shared_error;
+      by_chance[part] = by_noise * explained[part] + shared * (num_rows[part] - explained[part]);
+    }
+    return by_chance;
   }
 
   std::vector<Vector6> solved() const {
@@ -350,9 +387,10 @@ class WarpRegistration {
   }
 
   WarpField& field_;
+  std::vector<std::int32_t> parts_;  // of each node: the first node of its part
   const ShownSurface& shown_;
   int num_threads_;
-  bool was_bending_;
+  const std::vector<std::uint8_t>& was_bending_;
   BlockTree<float> tree_;
   std::vector<WarpRow> rows_;
   std::vector<std::uint32_t> nearest_;  // of the rows, in the tree
@@ -364,7 +402,7 @@ class WarpRegistration {
 }  // namespace
 
 WarpFit register_warp(WarpField& field, const OrientedPoints& canonical, const std::vector<std::int32_t>& in_view,
-                      const ShownSurface& shown, int num_threads, bool was_bending,
+                      const ShownSurface& shown, int num_threads, const std::vector<std::uint8_t>& was_bending,
                       const std::vector<Eigen::Vector3f>& colors) {
   if (shown.points.rows() == 0) return {};
   return WarpRegistration(field, canonical, in_view, shown, num_threads, was_bending, colors).fit();

@@ -11,7 +11,7 @@ namespace nacre {
 
 struct WarpFit {
   double explained = 0.0;      // part of the points in view that the frame shows where they are
-  bool is_bent = false;        // or the shape as it was explains as much as noise lets it, and stays
+  bool is_bent = false;        // a part of it; or the shape as it was explains as much as noise lets it, and stays
   std::vector<WarpNode> bent;  // the nodes as the frame would have them, in any case
 };
 
@@ -23,9 +23,10 @@ struct WarpFit {
 // with the nearest points q of what is shown, within a gate that narrows from half the distance between nodes.
 // colors: of the model's points; where both sides have brightness, rows (b - B(phi(x)) - exposure)^2 / sigma_b^2 join,
 // linear in the frame's brightness B along its surface (Park, Zhou and Koltun 2017), weighed as Geman and McClure do.
-// was_bending: at the frame before: then it most likely goes on.
+// Each part of the field (see parts_of) that a bend explains by chance alone stays as it was.
+// was_bending: the first nodes, at the frame before: then their parts most likely go on.
 WarpFit register_warp(WarpField& field, const OrientedPoints& canonical, const std::vector<std::int32_t>& in_view,
-                      const ShownSurface& shown, int num_threads, bool was_bending = false,
+                      const ShownSurface& shown, int num_threads, const std::vector<std::uint8_t>& was_bending = {},
                       const std::vector<Eigen::Vector3f>& colors = {});
 
 }  // namespace nacre

@@ -23,9 +23,10 @@ struct Sheet {
       }
     }
   }
-  void grow(WarpField& field) const {
+  // densest: the spacing of points somewhere else.
+  void grow(WarpField& field, float densest = spacing) const {
     const std::vector<float> spacings(points.size() - field.bindings.size(), spacing);
-    nacre::grow(field, {points, normals, spacings, last_seen, 0});
+    nacre::grow(field, {points, normals, spacings, last_seen, 0, static_cast<double>(densest)});
   }
 };
 
@@ -52,6 +53,30 @@ TEST_CASE("nodes are a spacing apart, and no point is farther from one") {
     CHECK(binding.distances[0] <= 0.06F);
     const Eigen::Vector3d place = field.nodes[static_cast<std::size_t>(binding.nodes[0])].rest;
     CHECK((place - sheet.points[i].cast<double>()).norm() <= static_cast<double>(binding.distances[0]) + 1e-6);
+  }
+}
+
+TEST_CASE("nodes are farther apart by as much as points are") {
+  Sheet sheet;
+  sheet.add(0, 40, 0.5F);
+  WarpField dense = empty_field(), sparse = empty_field();
+  sheet.grow(dense);
+  sheet.grow(sparse, 0.5F * spacing);
+  CHECK(3 * sparse.nodes.size() < dense.nodes.size());
+  for (const WarpBinding& binding : sparse.bindings) CHECK(binding.distances[0] <= 0.12F);
+}
+
+TEST_CASE("parts are what shares no nodes") {
+  Sheet sheet;
+  sheet.add(0, 20, 0.5F);
+  WarpField field = empty_field();
+  sheet.grow(field);
+  const std::size_t num_first = field.nodes.size();
+  sheet.add(0, 20, 0.54F);
+  sheet.grow(field);
+  const std::vector<std::int32_t> parts = parts_of(field);
+  for (std::size_t node = 0; node < parts.size(); ++node) {
+    CHECK(parts[node] == static_cast<std::int32_t>(node < num_first ? 0 : num_first));
   }
 }
 

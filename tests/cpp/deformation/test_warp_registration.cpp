@@ -44,7 +44,7 @@ struct Scene {
     }
     field.node_spacing = 0.05;
     const std::vector<float> spacings(canonical.points.size(), spacing);
-    grow(field, {canonical.points, canonical.normals, spacings, last_seen, 0});
+    grow(field, {canonical.points, canonical.normals, spacings, last_seen, 0, static_cast<double>(spacing)});
   }
 
   // Root mean square distance of points, from a column on, from where the sheet, rolled up, has them [m].
@@ -117,8 +117,9 @@ TEST_CASE("what noise explains bends nothing") {
 
 TEST_CASE("what was bent goes on where what was still would stay") {
   Scene still, bending;
-  CHECK(!register_warp(still.field, still.canonical, still.rows, shown(0.03F), 1, false).is_bent);
-  CHECK(register_warp(bending.field, bending.canonical, bending.rows, shown(0.03F), 1, true).is_bent);
+  CHECK(!register_warp(still.field, still.canonical, still.rows, shown(0.03F), 1).is_bent);
+  const std::vector<std::uint8_t> was_bending(bending.field.nodes.size(), 1);
+  CHECK(register_warp(bending.field, bending.canonical, bending.rows, shown(0.03F), 1, was_bending).is_bent);
 }
 
 TEST_CASE("a frame that shows nothing near leaves the shape") {
