@@ -67,10 +67,10 @@ def write_animation(
 
     Notes
     -----
-    The frames are the first one plus weighted sums of a few displacements (morph targets): the principal
-    components of the motion, as many as the tolerance asks for (Alexa and Müller 2000). A thing that bends
-    needs some ten, whatever the number of frames; between two frames vertices go straight. All frames must
-    fit memory.
+    The frames are the first one plus weighted sums of displacements (morph targets): the principal
+    components of the motion, as many as the tolerance asks for (Alexa and Müller 2000). What jitters from
+    frame to frame by more than that needs nearly one for each: with a tenth of the spacing, deforming models
+    took 22 for 30 frames and 66 for 80. Between two frames vertices go straight. All frames must fit memory.
 
     References
     ----------
