@@ -69,8 +69,10 @@ void ModelOptions::check() const {
   require(binning >= 0, "binning", "0 (automatic) or more", binning);
   require(spacing >= 0.0 && spacing < farthest_place, "spacing",
           "0 (automatic) or a positive distance in metres below 1e30", spacing);
-  require(!deform || fusion_method == FusionMethod::fuse, "deform", "used with fusion_method fuse", deform);
-  require(!deform || registration.method != Metric::paper, "deform", "used with another method than paper", deform);
+  require(!deform || fusion_method == FusionMethod::fuse, "fusion_method", "fuse for a model that deforms",
+          fusion_method == FusionMethod::wlop ? "wlop" : "wlop+");
+  require(!deform || registration.method != Metric::paper, "registration.method",
+          "another than paper for a model that deforms", "paper");
   require(points_folder.empty() || !deform, "points_folder", "empty for a model that deforms", points_folder);
   require(points_folder.empty() || (loop_closure && fusion_method == FusionMethod::fuse), "points_folder",
           "used with loop_closure and fusion_method fuse", points_folder);

@@ -106,6 +106,17 @@ def test_a_rigid_model_has_one_shape() -> None:
         nacre.Model(CAMERA).points_at(0)
 
 
-def test_the_paper_is_rigid() -> None:
-    with pytest.raises(ValueError, match="deform must be used with"):
-        nacre.Model(CAMERA, "paper", deform=True)
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"preset": "paper"}, "fusion_method must be fuse for a model that deforms, got wlop"),
+        ({"fusion_method": "wlop+"}, r"fusion_method must be fuse for a model that deforms, got wlop\+"),
+        (
+            {"registration": {"method": "paper"}},
+            "registration.method must be another than paper for a model that deforms, got paper",
+        ),
+    ],
+)
+def test_what_is_for_rigid_models_is_refused(options, message) -> None:
+    with pytest.raises(ValueError, match=message):
+        nacre.Model(CAMERA, deform=True, **options)
