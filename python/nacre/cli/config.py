@@ -73,7 +73,7 @@ def model_parameters(
     preset: Preset | None, config: Path | None, settings: Sequence[str] | None, **more: Any
 ) -> tuple[ModelParameters, str]:
     """Return the parameters and the preset's name; settings win over the file, and that over the preset."""
-    from nacre._internal.core_options import updated
+    from nacre._internal.core_options import leaves, updated
     from nacre.parameters import ModelParameters
 
     document = dict(_read_toml(config)) if config is not None else {}
@@ -88,7 +88,17 @@ def model_parameters(
     for setting in settings or ():
         changes.update(_setting(setting))
     changes.update({key: value for key, value in more.items() if value is not None})
-    return updated(parameters, {k: _checked(parameters, k, v) for k, v in changes.items()}), name
+    parameters = updated(parameters, {k: _checked(parameters, k, v) for k, v in changes.items()})
+    if parameters.deform:
+        _refuse_for_what_bends({**dict(leaves(document)), **changes})
+    return parameters, name
+
+
+def _refuse_for_what_bends(asked: Mapping[str, Any]) -> None:
+    """Refuse what was asked for, and what a model that deforms does without."""
+    for key, option in (("loop_closure", "--loop-closure"), ("calibrate_depth", "--calibrate")):
+        if asked.get(key):
+            raise CommandError(f"{key} ({option}) must be off for a model that deforms, got on", 2)
 
 
 def _told_by_file(path: Path, document: Mapping[str, Any], parameters: ModelParameters) -> ModelParameters:

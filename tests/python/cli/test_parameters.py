@@ -39,6 +39,31 @@ def test_depth_options_are_parameters(recording, tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--loop-closure"], "loop_closure (--loop-closure) must be off for a model that deforms, got on"),
+        (["--calibrate"], "calibrate_depth (--calibrate) must be off for a model that deforms, got on"),
+        (["--set", "loop_closure=true"], "loop_closure (--loop-closure) must be off"),
+        (["--preset", "paper"], "fusion_method must be fuse for a model that deforms, got wlop"),
+        (["--set", "fusion_method=wlop+"], "fusion_method must be fuse for a model that deforms, got wlop+"),
+    ],
+)
+def test_what_bends_refuses_what_it_would_ignore(recording, tmp_path, arguments, message):
+    assert message in fails(2, "reconstruct", recording, "-o", tmp_path / "o", "--deform", *arguments)
+    assert not (tmp_path / "o").exists()
+
+
+def test_what_bends_may_be_asked_to_leave_out_what_it_does_without(recording, tmp_path):
+    config = tmp_path / "c.toml"
+    config.write_text("loop_closure = true\n")
+    assert "--loop-closure" in fails(
+        2, "reconstruct", recording, "-o", tmp_path / "o", "--deform", "--config", config
+    )
+    report = reports(recording, tmp_path, "--deform", "--config", config, "--no-loop-closure")
+    assert report["parameters"]["deform"] is True
+
+
+@pytest.mark.parametrize(
     ("setting", "words"),
     [
         ("foo=1", "spacing"),
