@@ -13,6 +13,7 @@ from nacre._internal.signals import interruptible
 from nacre.cli.config import ConfigOption, PresetOption, SetOption, model_parameters
 from nacre.cli.reconstruct_options import (
     ColorOption,
+    DeformOption,
     MaxDepthOption,
     MinDepthOption,
     ObjectOption,
@@ -41,6 +42,7 @@ def record(
     max_depth: MaxDepthOption = None,
     object: ObjectOption = False,
     color: ColorOption = True,
+    deform: DeformOption = False,
     last: Annotated[
         int | None,
         typer.Option(min=0, metavar="INDEX", help="The last frame, from 0.", show_default="when stopped"),
@@ -79,6 +81,7 @@ def record(
             "depth.min_depth": min_depth,
             "depth.max_depth": max_depth,
             "region.object": object or None,
+            "deform": deform or None,
         },
     )
     is_live = is_camera(camera)

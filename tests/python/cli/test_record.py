@@ -74,6 +74,18 @@ def test_a_recording_is_played_as_a_camera(recording: Path, tmp_path: Path) -> N
     assert not (tmp_path / "out" / "recording").exists()  # it is where it was
 
 
+@pytest.mark.usefixtures("no_browser")
+def test_what_bends_is_recorded_as_it_is(plug: Callable[..., fake.Library], tmp_path: Path) -> None:
+    plug(seconds=0.005)
+    done = run("record", "realsense", "-o", tmp_path, "--last", 2, "--no-report", "--deform", "--json")
+    assert done.code == 0, done.err
+    assert done.json["parameters"]["deform"] is True
+    assert done.json["deformation"]["num_nodes"] > 0
+    refused = run("record", "realsense", "-o", tmp_path, "--deform", "--set", "loop_closure=true")
+    assert refused.code == 2
+    assert "loop_closure (--loop-closure) must be off" in refused.err
+
+
 def test_without_a_frame_nothing_is_left(plug: Callable[..., fake.Library], tmp_path: Path) -> None:
     plug(frames=0, unplugged=True)
     done = run("record", "realsense", "-o", tmp_path / "out", "--no-window")
