@@ -52,6 +52,7 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
 
 def verdict_rows(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return the verdict that report.json holds, what else was found, and how well the points are known."""
+    from nacre.report.summary import noise_alone
     from nacre.report.text import quantity
 
     rows = []
@@ -63,12 +64,10 @@ def verdict_rows(report: Mapping[str, Any]) -> list[tuple[str, str]]:
             rows.append(("next", verdict["next_step"]))
     if spread is not None:
         median, p95 = (quantity(spread[name], "m") for name in ("median", "p95"))
-        rows.append(
-            (
-                "points known to",
-                f"{median} (standard deviation expected from noise alone: median; for 95 % at most {p95})",
-            )
-        )
+        is_bent = bool((report.get("deformation") or {}).get("num_bent"))
+        counted = noise_alone(is_bent=is_bent)
+        label = "noise of points" if is_bent else "points known to"
+        rows.append((label, f"{median} (standard deviation {counted}: median; for 95 % at most {p95})"))
     return rows
 
 

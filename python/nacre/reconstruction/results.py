@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import re
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -62,9 +63,8 @@ def write_results(
     if page:
         from nacre.report import render_page
 
-        text = render_page(
-            done.report_data(title, source, figures, interrupted=interrupted, min_tracked=min_tracked)
-        )
+        data = done.report_data(title, source, figures, interrupted=interrupted, min_tracked=min_tracked)
+        text = render_page(replace(data, animation=animation.name if animation.exists() else ""))
         _write(folder / "report.html", text.encode())
         if pictures:
             _write_pictures(folder / "pictures", text)

@@ -55,4 +55,5 @@ class ReportData:
     doubled: DoubledSurfaces | None = None  #: of the model; None where nobody looked
     num_dropped: int = 0  #: frames that came faster than they could be registered
     camera_doubt: str = ""  #: what the frames say is wrong with the camera as it was given
+    animation: str = ""  #: where the model as it moved is, relative to the page; empty where nowhere
     min_tracked: float = MIN_TRACKED  #: part of the frames; with less the run has failed

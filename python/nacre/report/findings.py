@@ -12,7 +12,8 @@ from nacre._internal.rotations import rotation_angles
 from nacre.evaluation import AbsoluteTrajectoryError
 from nacre.evaluation.trajectory import MIN_ALIGNED
 from nacre.report.data import ReportData
-from nacre.report.limits import FLIP_ANGLE, MAX_DOUBLED, MAX_POSE_ERROR, MIN_PROBABILITY
+from nacre.report.deformation import deformation_figures, explained_part
+from nacre.report.limits import FLIP_ANGLE, MAX_DOUBLED, MAX_POSE_ERROR, MIN_EXPLAINED, MIN_PROBABILITY
 from nacre.report.lost_frames import advice_on, most_common_reason
 from nacre.report.motion_check import Jump, find_jumps
 from nacre.report.reported_frame import ReportedFrame
@@ -33,6 +34,8 @@ _ADVICE = {
     '"depth": "radial" where its depth is the distance along the rays.',
     "dropped": "Move more slowly, or give less to register: --max-depth, --object, --set spacing=0.005, "
     "--set binning=4. What was kept of a camera (OUT/recording) can be gone over again.",
+    "unexplained": "Look at animation.glb there: does it move as the thing did? What moves far from frame to "
+    "frame is left behind: more frames per second, no --every, or slower.",
     "doubtful": "Look at these frames in the viewer: does what they see lie on the model?",
     "interrupted": "nacre reconstruct --resume goes on with it.",
     "single": "Points are confirmed where three frames saw them: record more views.",
@@ -60,10 +63,13 @@ def find_problems(data: ReportData, trajectory: AbsoluteTrajectoryError | None) 
         yield _failure(data, lost)
     distance = _distance_seen(data)
     yield from _jumps(data.frames, distance)
-    yield from _pose_errors(data.frames, trajectory, distance)
+    bent = deformation_figures(data.frames)
+    if bent is None or not bent.is_bent:  # else poses are relative to the shape, and the truth is not
+        yield from _pose_errors(data.frames, trajectory, distance)
     if data.camera_doubt:
         yield Finding("camera", "weak", "Inaccurate", data.camera_doubt, _ADVICE["camera"])
     yield from _doubled(data)
+    yield from _unexplained(data.frames)
     yield from _doubtful(data.frames)
     if lost and data.num_dropped:
         came = count(data.num_dropped + len(data.frames))
@@ -192,6 +198,19 @@ def _doubled(data: ReportData) -> Iterator[Finding]:
         place = ", ".join(quantity(value, "m") for value in found.center)
         statement = f"{part} of the surface is there twice, {apart} apart, around ({place})"
         yield Finding("doubled", "weak", "Inaccurate", statement, _ADVICE["doubled"])
+
+
+def _unexplained(frames: Sequence[ReportedFrame]) -> Iterator[Finding]:
+    parts = [(frame, part) for frame in frames if (part := explained_part(frame)) is not None]
+    found = [(frame, part) for frame, part in parts if part < MIN_EXPLAINED]
+    if found:
+        least = quantity(min(part for _, part in found), "fraction")
+        show = "frames show" if len(found) > 1 else "frame shows"
+        statement = (
+            f"{count(len(found))} {show} down to {least} of the points in view where they were bent to"
+        )
+        chosen = [frame for frame, _ in found]
+        yield _of_frames("unexplained", "weak", "Doubtful", statement, chosen, _ADVICE["unexplained"])
 
 
 def _doubtful(frames: Sequence[ReportedFrame]) -> Iterator[Finding]:

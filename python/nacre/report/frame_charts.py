@@ -11,6 +11,8 @@ import numpy.typing as npt
 
 from nacre.evaluation import AbsoluteTrajectoryError
 from nacre.report.charts import Mark, Series, group_size, grouped, line_chart, map_chart, runs, stacked_chart
+from nacre.report.deformation import explained_part
+from nacre.report.limits import MIN_EXPLAINED
 from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import label, length_unit, quantity
 
@@ -140,6 +142,21 @@ def registration_charts(
         charts.append(_line_figure(frames, "Size of the model", [one], "thousand points"))
     if not charts:
         return None
+    return {"charts": charts, "marked": _marked(frames), "group_size": group_size(len(frames))}
+
+
+def deformation_charts(frames: Sequence[ReportedFrame]) -> dict[str, Any] | None:
+    """Return what each frame showed of a model that deforms, and how far it was strained."""
+    if len(frames) < 2:
+        return None
+    parts = np.array([np.nan if (part := explained_part(frame)) is None else part for frame in frames])
+    strains = np.array([(frame.deformation or {}).get("strain", np.nan) for frame in frames], np.float64)
+    charts = []
+    if np.isfinite(parts).any():
+        one, level = Series("", 100 * parts), 100 * MIN_EXPLAINED
+        charts.append(_line_figure(frames, "Explained", [one], "part [%]", y_max=100, level=level))
+    if np.isfinite(strains).any():
+        charts.append(_line_figure(frames, "Strain", [Series("", 100 * strains)], "strain [%]"))
     return {"charts": charts, "marked": _marked(frames), "group_size": group_size(len(frames))}
 
 

@@ -17,4 +17,9 @@ MIN_PROBABILITY = 0.95  # [1] that a registration is right
 MAX_DOUBLED = 0.005  # [1] part of the points
 SHEET_COSINE = 0.7  # [1] between normals of one sheet: 45 degrees
 
+# Things that bend slowly showed 0.78 of it at least; the same several times as fast, 0.73 to 0.45 at the
+# worst frame.
+MIN_EXPLAINED = 0.75  # [1] part of the points in view that a frame shows, where the model deforms
+LEAST_STRAIN = 1e-6  # [1] of a shape that is bent: less is the rounding of nodes in single precision
+
 MIN_TRACKED = 0.5  # [1] part of the frames: the user's --min-tracked

@@ -11,17 +11,16 @@ from nacre import __version__
 from nacre._internal.guided import guided
 from nacre._internal.kinds import as_kind
 from nacre.errors import printable
-from nacre.evaluation import AbsoluteTrajectoryError
 from nacre.io.atomic import atomic_writer
 from nacre.report.charts import status_strip
 from nacre.report.data import ReportData
 from nacre.report.depth_pictures import draw_depth
-from nacre.report.frame_charts import registration_charts, time_chart, trajectory_charts
+from nacre.report.frame_charts import deformation_charts, registration_charts, time_chart, trajectory_charts
 from nacre.report.lost_frames import stretches
 from nacre.report.pictures import ModelPictures, draw_model
 from nacre.report.pixel_counts import pixel_counts, removed_chart
 from nacre.report.reported_frame import ReportedFrame
-from nacre.report.summary import summarize
+from nacre.report.summary import Summary, summarize
 from nacre.report.tables import frame_table, result_tables
 from nacre.report.templating import render
 from nacre.report.text import flatten, ranges
@@ -75,19 +74,17 @@ def render_page(data: ReportData) -> str:
         summary=summary,
         model=model,
         states=_states(data.frames),
-        sections=_sections(data, summary.trajectory, model),
+        sections=_sections(data, summary, model),
         version=__version__,
     )
     return printable(page)
 
 
-def _sections(
-    data: ReportData, trajectory: AbsoluteTrajectoryError | None, model: ModelPictures | None
-) -> list[Section]:
+def _sections(data: ReportData, summary: Summary, model: ModelPictures | None) -> list[Section]:
     """Return the folded parts that have something to show."""
     frames = data.frames
     views = "six sides, point spacing, confidence" + ", shape" * bool(model and model.shape)
-    path = trajectory_charts(frames, trajectory)
+    path = trajectory_charts(frames, summary.trajectory)
     registration = registration_charts(frames, data.parameters)
     depth = {
         "examples": [(example, draw_depth(example)) for example in data.depth],
@@ -96,16 +93,28 @@ def _sections(
     sections = [
         Section("look", "Frames not fused", "where, and why", stretches(frames)),
         Section("model", "Model", views, model),
+        Section("deformation", "Deformation", "how the shape was bent", _deformation(data, summary)),
         Section("trajectory", "Trajectory", "path of the camera, errors", path),
         Section("frames", "Registration", "of each frame: inliers, score, residual", registration),
         Section("depth", "Depth cleaning", "images before and after", depth if data.depth else None),
         Section("funnel", "Pixels", "how many were measured, kept and fused", pixel_counts(frames)),
         Section("time", "Time", "of each step in each frame", time_chart(frames)),
-        Section("figures", "Evaluation", "all figures", result_tables(data, trajectory)),
+        Section("figures", "Evaluation", "all figures", result_tables(data, summary.trajectory)),
         Section("table", "Frames", "a row for each", frame_table(frames)),
         Section("parameters", "Parameters", "all of them", flatten(data.parameters)),
     ]
     return [section for section in sections if section.content]
+
+
+def _deformation(data: ReportData, summary: Summary) -> dict[str, Any] | None:
+    """Return how the model was bent, and where it can be seen to move."""
+    if summary.deformation is None:
+        return None
+    return {
+        "figures": summary.deformation,
+        "drawn": deformation_charts(data.frames),
+        "animation": data.animation,
+    }
 
 
 def _states(frames: Sequence[ReportedFrame]) -> dict[str, Any] | None:

@@ -29,7 +29,8 @@ def run_dict(run: Reconstruction, *, min_tracked: float = MIN_TRACKED, **more: A
     counts = run.counts
     times = run.milliseconds
     told = run_report(run, "", "", interrupted=bool(more.get("interrupted")), min_tracked=min_tracked)
-    verdict, sigma = summarize(told).verdict, None if told.model is None else told.model.sigma
+    summary, sigma = summarize(told), None if told.model is None else told.model.sigma
+    verdict, bent = summary.verdict, summary.deformation
     figures: dict[str, Any] = plain(
         {
             "nacre": __version__,
@@ -49,6 +50,7 @@ def run_dict(run: Reconstruction, *, min_tracked: float = MIN_TRACKED, **more: A
             "spacing": run.model.spacing,
             "point_sigma": None if sigma is None else sigma_statistics(sigma),
             "doubled_surfaces": None if told.doubled is None else dataclasses.asdict(told.doubled),
+            "deformation": None if bent is None else dataclasses.asdict(bent),
             "noise": dataclasses.asdict(run.model.noise),
             "milliseconds": {
                 "mean": times.mean() if len(times) else None,

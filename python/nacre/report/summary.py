@@ -18,6 +18,7 @@ from nacre.evaluation import (
 )
 from nacre.evaluation.trajectory import MIN_ALIGNED
 from nacre.report.data import ReportData
+from nacre.report.deformation import DeformationFigures, deformation_figures
 from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import count, length_unit, quantity
 from nacre.report.verdict import Verdict, judge
@@ -41,6 +42,7 @@ class Summary:
     verdict: Verdict | None
     tiles: tuple[Tile, ...]
     trajectory: AbsoluteTrajectoryError | None  #: given, or worked out from the poses
+    deformation: DeformationFigures | None  #: of a model that deforms
 
 
 def find(data: ReportData, kind: type[ResultType]) -> ResultType | None:
@@ -51,16 +53,23 @@ def find(data: ReportData, kind: type[ResultType]) -> ResultType | None:
 def summarize(data: ReportData) -> Summary:
     """Work out what to say first."""
     trajectory = find(data, AbsoluteTrajectoryError) or _trajectory_error(data.frames)
-    tiles = [*_frame_tiles(data.frames), *_model_tiles(data), *_evaluation_tiles(data)]
+    deformation = deformation_figures(data.frames)
+    is_bent = deformation is not None and deformation.is_bent
+    tiles = [
+        *_frame_tiles(data.frames),
+        *_deformation_tiles(deformation),
+        *_model_tiles(data, is_bent=is_bent),
+        *_evaluation_tiles(data),
+    ]
     if trajectory is not None:
-        tiles.append(_trajectory_tile(trajectory))
+        tiles.append(_trajectory_tile(trajectory, is_bent=is_bent))
     times = [time for frame in data.frames if (time := frame.total_milliseconds) is not None]
     if times:
         slow = quantity(float(np.percentile(times, 99)), "ms")
         tiles.append(
             Tile("Time per frame", quantity(float(np.median(times)), "ms"), f"median; 99 % within {slow}")
         )
-    return Summary(judge(data, trajectory), tuple(tiles), trajectory)
+    return Summary(judge(data, trajectory), tuple(tiles), trajectory, deformation)
 
 
 def _frame_tiles(frames: Sequence[ReportedFrame]) -> Iterator[Tile]:
@@ -78,14 +87,22 @@ def _frame_tiles(frames: Sequence[ReportedFrame]) -> Iterator[Tile]:
         )
 
 
-def _model_tiles(data: ReportData) -> Iterator[Tile]:
+def _deformation_tiles(bent: DeformationFigures | None) -> Iterator[Tile]:
+    if bent is None:
+        return
+    frames = f"{count(bent.num_bent)} frame{'s' * (bent.num_bent != 1)}"
+    note = f"part of the points in view, median; the shape was bent at {frames}"
+    yield Tile("Explained", quantity(bent.explained, "fraction"), note)
+
+
+def _model_tiles(data: ReportData, *, is_bent: bool) -> Iterator[Tile]:
     if data.model is None:
         return
     num_points = int(np.isfinite(np.asarray(data.model.points)).all(axis=1).sum())
     yield Tile("Model points", count(num_points), _extent(data))
     spread = None if data.model.sigma is None else sigma_statistics(data.model.sigma)
     if spread is not None:
-        note = f"median, expected from noise alone; for 95 % at most {quantity(spread['p95'], 'm')}"
+        note = f"median, {noise_alone(is_bent=is_bent)}; for 95 % at most {quantity(spread['p95'], 'm')}"
         yield Tile("Point standard deviation", quantity(spread["median"], "m"), note)
 
 
@@ -100,9 +117,15 @@ def _evaluation_tiles(data: ReportData) -> Iterator[Tile]:
         yield Tile("Completeness", part, f"within {quantity(covered.tau[middle], 'm')}")
 
 
-def _trajectory_tile(error: AbsoluteTrajectoryError) -> Tile:
+def noise_alone(*, is_bent: bool) -> str:
+    """Return what a point's standard deviation counts, in words."""
+    return "expected from noise alone" + ", without the error of the warp" * is_bent
+
+
+def _trajectory_tile(error: AbsoluteTrajectoryError, *, is_bent: bool) -> Tile:
     rmse, of = told_trajectory_error(error)
     more = f"; {quantity(error.rotation_rmse, 'rad')} in rotation" * (error.num_compared >= MIN_ALIGNED)
+    more += "; of a camera relative to the shape" * is_bent
     return Tile("Trajectory error (ATE)", rmse, of + more)
 
 

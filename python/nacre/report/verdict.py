@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from nacre.evaluation import AbsoluteTrajectoryError
 from nacre.evaluation.trajectory import MIN_ALIGNED
 from nacre.report.data import ReportData
+from nacre.report.deformation import deformation_figures
 from nacre.report.findings import Finding, Level, find_problems
 from nacre.report.text import count, quantity
 
@@ -21,8 +22,15 @@ class Verdict:
     findings: tuple[Finding, ...]  #: what speaks against the run, the worst first
 
 
-def _known(trajectory: AbsoluteTrajectoryError | None) -> str:
-    """Say what holds the frames to be right: each other, or a truth that is near."""
+def _known(data: ReportData, trajectory: AbsoluteTrajectoryError | None) -> str:
+    """Say what holds the frames to be right: each other, or a truth that is near; not what is bent to fit."""
+    bent = deformation_figures(data.frames)
+    if bent is not None and bent.is_bent:
+        part = quantity(bent.explained, "fraction")
+        return (
+            f"and show {part} of the points in view where they were bent to (median); how far the others are "
+            "off, and what slid along itself, they do not tell"
+        )
     if trajectory is None or trajectory.num_compared < MIN_ALIGNED:
         return "and nothing contradicts them"
     return f"with a trajectory error of {quantity(trajectory.rmse, 'm')}"
@@ -35,7 +43,10 @@ def judge(data: ReportData, trajectory: AbsoluteTrajectoryError | None) -> Verdi
     findings = tuple(find_problems(data, trajectory))
     if not findings:
         return Verdict(
-            "ok", f"Good: all {count(len(data.frames))} frames were tracked, {_known(trajectory)}.", "", ()
+            "ok",
+            f"Good: all {count(len(data.frames))} frames were tracked, {_known(data, trajectory)}.",
+            "",
+            (),
         )
     worst = findings[0]
     level: Level = "lost" if any(finding.level == "lost" for finding in findings) else "weak"

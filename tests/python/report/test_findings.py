@@ -11,6 +11,7 @@ import numpy.typing as npt
 import pytest
 
 from nacre.report import DoubledSurfaces, ModelCloud, ReportData, ReportedFrame
+from nacre.report.deformation import deformation_figures
 from nacre.report.motion_check import find_jumps
 from nacre.report.summary import summarize
 from nacre.report.verdict import Verdict
@@ -205,6 +206,101 @@ class TestTruth:
         told = tiles["Trajectory error (ATE)"]
         assert (told.value == "not known") == (num_tracked < 3)
         assert f"{num_tracked} of 48 frames" in told.note
+
+
+def bent(number: int = 20, explained: float = 0.95, strain: float = 0.02, **more: Any) -> list[ReportedFrame]:
+    """A walk about a thing that bends more and more; the first frame has nothing to be registered to."""
+    return [
+        with_figures(
+            frame,
+            num_inliers=900 if i else 0,
+            deformation={
+                "num_nodes": 50 + i,
+                "explained": explained if i else 0.0,
+                "strain": strain * i / number,
+            },
+        )
+        for i, frame in enumerate(walk(number, **more))
+    ]
+
+
+class TestWhatBends:
+    def test_its_figures(self) -> None:
+        figures = deformation_figures(bent(21))
+        assert figures is not None
+        assert (figures.num_nodes, figures.num_bent, figures.explained) == (70, 20, 0.95)
+        assert figures.strain_median == pytest.approx(0.02 * 10 / 21)
+        assert figures.strain_max == pytest.approx(0.02 * 20 / 21)
+        assert deformation_figures(walk()) is None
+
+    def test_what_lost_frames_claim_does_not_count(self) -> None:
+        frames = bent()
+        frames[5] = with_figures(
+            frames[5], status="LOST", deformation={"num_nodes": 99, "explained": 0.1, "strain": 0.5}
+        )
+        figures = deformation_figures(frames)
+        assert figures is not None
+        assert (figures.num_nodes, figures.num_bent) == (69, 18)
+        assert figures.strain_max < 0.02
+
+    def test_frames_that_bent_it_do_not_vouch_for_it(self) -> None:
+        verdict = verdict_on(bent())
+        assert verdict.level == "ok"
+        assert "nothing contradicts" not in verdict.sentence
+        assert verdict.sentence == (
+            "Good: all 20 frames were tracked, and show 95.0 % of the points in view where they were bent to "
+            "(median); how far the others are off, and what slid along itself, they do not tell."
+        )
+
+    def test_what_was_never_bent_is_judged_as_rigid(self) -> None:
+        assert verdict_on(bent(strain=0.0)).sentence == verdict_on(walk()).sentence
+
+    def test_frames_that_show_little_of_it_are_named(self) -> None:
+        frames = bent()
+        figures = {"num_nodes": 60, "explained": 0.6, "strain": 0.02}
+        frames[8:10] = [with_figures(frame, deformation=figures) for frame in frames[8:10]]
+        verdict = verdict_on(frames)
+        assert (verdict.level, verdict.findings[0].kind, verdict.findings[0].frames) == (
+            "weak",
+            "unexplained",
+            (8, 9),
+        )
+        assert verdict.sentence == (
+            "Doubtful: 2 frames show down to 60.0 % of the points in view where they were bent to "
+            "(frames 8 to 9)."
+        )
+        assert "animation.glb" in verdict.next_step
+
+    def test_lost_frames_count(self) -> None:
+        frames = [
+            with_figures(frame, status="LOST", world_from_camera=None) if frame.index in (4, 5, 6) else frame
+            for frame in bent()
+        ]
+        assert verdict_on(frames).sentence.startswith("Incomplete: 3 of 20 frames were lost")
+        assert verdict_on(frames, min_tracked=0.9).level == "lost"
+
+    def test_the_truth_of_the_camera_is_not_that_of_one_relative_to_the_shape(self) -> None:
+        def turned_away(frames: list[ReportedFrame]) -> list[ReportedFrame]:
+            poses = [turned(2.0 * frame.index) @ frame.world_from_camera for frame in frames]
+            return [
+                with_figures(frame, world_from_camera=pose) for frame, pose in zip(frames, poses, strict=True)
+            ]
+
+        assert verdict_on(turned_away(walk(truth=True))).level == "lost"
+        frames = turned_away(bent(truth=True))
+        assert verdict_on(frames).level == "ok"
+        tiles = {tile.label: tile for tile in summarize(ReportData("x", frames=frames)).tiles}
+        assert "of a camera relative to the shape" in tiles["Trajectory error (ATE)"].note
+
+    def test_noise_is_not_all_that_moves_its_points(self) -> None:
+        cloud = ModelCloud(np.array([[0, 0, 1.0], [0, 1, 1.0]]), sigma=np.array([0.001, 0.002]))
+
+        def note(frames: list[ReportedFrame]) -> str:
+            tiles = summarize(ReportData("x", frames=frames, model=cloud)).tiles
+            return next(tile.note for tile in tiles if tile.label == "Point standard deviation")
+
+        assert "without the error of the warp" in note(bent())
+        assert "warp" not in note(walk())
 
 
 class TestFrames:
