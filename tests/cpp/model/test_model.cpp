@@ -2,6 +2,7 @@
 #include <cstring>
 #include <limits>
 #include <map>
+#include <memory>
 
 #include "base/numbers.hpp"
 #include "base/random.hpp"
@@ -83,6 +84,30 @@ Model grown(int frames, const ModelOptions& options = {}) {
   for (int i = 0; i < frames; ++i) model.add_frame(turntable().view(20.0 * i));
   return model;
 }
+
+// The built-in object, stretched to both sides.
+class Stretched {
+ public:
+  explicit Stretched(float factor) : mesh_(built_in_object()) {
+    mesh_.vertices.col(0) *= factor;
+    tree_ = std::make_unique<MeshTree>(mesh_.vertices, mesh_.triangles);
+  }
+
+  DepthImage view() const { return simulate_depth(*tree_, Turntable::camera(), turntable().pose(0.0)); }
+
+  // Of points in the world frame, which is the first camera's.
+  double rms_of(const std::vector<Eigen::Vector3f>& points) const {
+    double sum = 0.0;
+    for (const Eigen::Vector3f& point : points) {
+      sum += std::pow(tree_->closest(turntable().pose(0.0) * point.cast<double>()).distance, 2);
+    }
+    return std::sqrt(sum / static_cast<double>(points.size()));
+  }
+
+ private:
+  Mesh mesh_;
+  std::unique_ptr<MeshTree> tree_;
+};
 
 DepthImage constant(float value) { return DepthImage::Constant(176, 208, value); }
 
@@ -202,6 +227,35 @@ TEST_CASE("the model never grows beyond its size") {
     last = report.spacing;
   }
   CHECK(last > 0.002);
+}
+
+TEST_CASE("a model that deforms has a shape at each frame") {
+  ModelOptions options;
+  options.deform = true;
+  Model model(Turntable::camera(), options);
+  const std::vector<float> factors = {1.0F, 1.02F, 1.04F};
+  for (const float factor : factors) CHECK(model.add_frame(Stretched(factor).view()).status != FrameStatus::lost);
+  for (std::size_t i = 0; i < factors.size(); ++i) {
+    const ShapeAtFrame shape = model.shape_at(static_cast<std::int64_t>(i));
+    CHECK(shape.points.size() == model.cloud().points.size());
+    CHECK(shape.normals.size() == shape.points.size());
+    CHECK(shape.nodes.size() == static_cast<std::size_t>(model.frames().back().deformation.num_nodes));
+    CHECK(Stretched(factors[i]).rms_of(shape.points) < 0.00045);
+  }
+  CHECK(Stretched(1.0F).rms_of(model.shape_at(2).points) > 0.0006);
+  CHECK_THROWS_WITH_AS(model.shape_at(3), doctest::Contains("frame must be"), std::invalid_argument);
+  CHECK_THROWS_WITH_AS(grown(1).shape_at(0), doctest::Contains("deform must be"), std::invalid_argument);
+}
+
+TEST_CASE("what is for rigid models is refused of one that deforms, by its name") {
+  ModelOptions options = ModelOptions::preset("paper");
+  options.deform = true;
+  CHECK_THROWS_WITH_AS(options.check(), "fusion_method must be fuse for a model that deforms, got wlop",
+                       std::invalid_argument);
+  options.fusion_method = FusionMethod::fuse;
+  CHECK_THROWS_WITH_AS(options.check(),
+                       "registration.method must be another than paper for a model that deforms, got paper",
+                       std::invalid_argument);
 }
 
 TEST_CASE("presets") {
