@@ -27,10 +27,7 @@ def _known(data: ReportData, trajectory: AbsoluteTrajectoryError | None) -> str:
     bent = deformation_figures(data.frames)
     if bent is not None and bent.is_bent:
         part = quantity(bent.explained, "fraction")
-        return (
-            f"and show {part} of the points in view where they were bent to (median); how far the others are "
-            "off, and what slid along itself, they do not tell"
-        )
+        return f"and show {part} of the points in view (median); what they do not show may be off"
     if trajectory is None or trajectory.num_compared < MIN_ALIGNED:
         return "and nothing contradicts them"
     return f"with a trajectory error of {quantity(trajectory.rmse, 'm')}"

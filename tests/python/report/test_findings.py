@@ -248,8 +248,8 @@ class TestWhatBends:
         assert verdict.level == "ok"
         assert "nothing contradicts" not in verdict.sentence
         assert verdict.sentence == (
-            "Good: all 20 frames were tracked, and show 95.0 % of the points in view where they were bent to "
-            "(median); how far the others are off, and what slid along itself, they do not tell."
+            "Good: all 20 frames were tracked, and show 95.0 % of the points in view (median); "
+            "what they do not show may be off."
         )
 
     def test_what_was_never_bent_is_judged_as_rigid(self) -> None:
