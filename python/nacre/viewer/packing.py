@@ -49,46 +49,6 @@ def _shuffled(table: Column) -> bytes:
     return stored[..., None].view(np.uint8).transpose(0, 2, 1).tobytes()
 
 
-def quantized(
-    points: npt.NDArray[np.floating[Any]], least: float = 1e-6
-) -> tuple[npt.NDArray[np.uint16], list[float], float]:
-    """
-    Return points as whole multiples of a step from an origin.
-
-    Parameters
-    ----------
-    points : (N, D) array
-        Such as positions [m].
-    least : float
-        No step is smaller.
-
-    Returns
-    -------
-    rows : (N, D) uint16
-    origin : list of D float
-    step : float
-        The longest side of the points' box by 65535.
-    """
-    exact = points.astype(np.float64)
-    origin = exact.min(axis=0, initial=np.inf) if len(exact) else np.zeros(points.shape[1])
-    step = max(float(np.max(exact - origin, initial=0.0)) / 65535, least)
-    return np.rint((exact - origin) / step).astype(np.uint16), origin.tolist(), step
-
-
-def octahedral(normals: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.uint8]:
-    """
-    Return unit vectors as two bytes each, true to a degree.
-
-    Notes
-    -----
-    The octahedron, folded flat, of Meyer et al. 2010, "On floating-point normal vectors".
-    """
-    n = normals / np.maximum(np.abs(normals).sum(axis=1, keepdims=True), 1e-12)
-    folded = np.where(n[:, :2] < 0, -1, 1) * (1 - np.abs(n[:, 1::-1]))
-    flat = np.where(n[:, 2:] < 0, folded, n[:, :2])
-    return np.asarray(np.rint(127.5 * (flat + 1))).astype(np.uint8)
-
-
 def rounded(values: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
     """Return positive numbers rounded to 12 bits, 0.02 %: the rest is noise that does not compress."""
     bits = values.astype(np.float32).view(np.uint32)

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from nacre import Camera
 from nacre.errors import FileFormatError
+from nacre.io.quantization import octahedral, quantized
 from nacre.meshing import triangulate
 from nacre.parameters import DepthParameters
 from nacre.report.colormap import viridis
@@ -20,7 +21,7 @@ from nacre.viewer.colors import STATUS_COLORS
 from nacre.viewer.depth_picture import depth_legend, depth_picture
 from nacre.viewer.disks import deviation, disk_radii
 from nacre.viewer.holes import find_holes
-from nacre.viewer.packing import morton_order, octahedral, pack, quantized, rounded
+from nacre.viewer.packing import morton_order, pack, rounded
 from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline, words
 from nacre.viewer.views import first_seen, first_view
 

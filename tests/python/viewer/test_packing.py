@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nacre.viewer.packing import morton_order, octahedral, pack, quantized, rounded
+from nacre.viewer.packing import morton_order, pack, rounded
 
 
 def unpacked(block: bytes) -> dict[str, np.ndarray[Any, Any]]:
@@ -41,33 +41,6 @@ def test_floats_come_back() -> None:
     values = np.random.default_rng(1).exponential(size=200).astype(np.float32)
     np.testing.assert_array_equal(unpacked(pack({}, {"values": values}))["values"][:, 0], values)
     assert np.abs(rounded(values) / values - 1).max() <= 2**-12
-
-
-def test_positions_are_true_to_half_a_step() -> None:
-    points = np.random.default_rng(2).uniform(-3, 5, (1000, 3)).astype(np.float32)
-    rows, origin, step = quantized(points)
-    assert step == pytest.approx(np.ptp(points, axis=0).max() / 65535)
-    assert np.abs(origin + step * rows - points).max() <= 0.51 * step
-
-
-@pytest.mark.parametrize("points", [np.zeros((0, 3)), np.ones((1, 3)), np.full((4, 3), 7.0)])
-def test_positions_without_extent(points: np.ndarray[Any, Any]) -> None:
-    rows, origin, step = quantized(points)
-    np.testing.assert_allclose(np.asarray(origin) + step * rows, points)
-
-
-def test_normals_are_true_to_a_degree() -> None:
-    normals = np.random.default_rng(3).normal(size=(2000, 3))
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    x, y = (octahedral(normals) / 127.5 - 1).T
-    z = 1 - np.abs(x) - np.abs(y)
-    below = z < 0
-    x, y = (
-        np.where(below, np.copysign(1 - np.abs(y), x), x),
-        np.where(below, np.copysign(1 - np.abs(x), y), y),
-    )
-    back = np.column_stack([x, y, z]) / np.linalg.norm(np.column_stack([x, y, z]), axis=1, keepdims=True)
-    assert np.degrees(np.arccos(np.clip((back * normals).sum(axis=1), -1, 1))).max() < 1
 
 
 def test_neighbors_in_space_are_near_in_order_and_compress_well() -> None:
