@@ -23,7 +23,7 @@ _LARGEST_RATIO = 1032  # of deflate
 
 def read_cloud(path: str | os.PathLike[str]) -> Cloud:
     """Read the arrays of an NPZ file; :func:`nacre.read_points` says what is returned and raised."""
-    members = _members(path, read_file(path))
+    members = read_arrays(path)
     if "points" not in members:
         found = ", ".join(members) or "nothing"
         raise FileFormatError(path, f"there is no array points in it, but {found}", offset=0)
@@ -40,8 +40,9 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
     )
 
 
-def _members(path: str | os.PathLike[str], data: bytes) -> Columns:
-    """Return the arrays of the archive by their names."""
+def read_arrays(path: str | os.PathLike[str]) -> Columns:
+    """Return the arrays of an NPZ file by their names; FileFormatError where it is damaged."""
+    data = read_file(path)
     arrays: Columns = {}
     try:
         with zipfile.ZipFile(BytesIO(data)) as archive:
@@ -81,7 +82,15 @@ def write_cloud(
     lines = check_comments(comments)
     if any(lines):
         columns["comments"] = np.array(lines)
+    write_arrays(path, columns)
+
+
+def write_arrays(path: str | os.PathLike[str], columns: Columns, *, compressed: bool = False) -> None:
+    """Write arrays by their names to an NPZ file, the same bytes at all times."""
+    method = zipfile.ZIP_DEFLATED if compressed else zipfile.ZIP_STORED
     with file_writer(path) as stream, zipfile.ZipFile(stream, "w") as archive:
         for name, array in columns.items():
-            with archive.open(zipfile.ZipInfo(f"{name}.npy"), "w", force_zip64=True) as member:
+            entry = zipfile.ZipInfo(f"{name}.npy")
+            entry.compress_type = method
+            with archive.open(entry, "w", force_zip64=True) as member:
                 np.lib.format.write_array(member, array, allow_pickle=False)

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.io.animations import write_animation
-from nacre.meshing.surface_points import surface_rows
 from nacre.meshing.triangulation import triangulate, used_rows
 from nacre.model import Model
 from nacre.reconstruction.frame_record import FrameRecord
+from nacre.reconstruction.motion import shown_rows
 
 _MOST_VERTICES = 20_000_000  # of all frames together: half a GB
 _TOLERANCE = 0.1  # [spacing] that a vertex may be off
@@ -57,14 +57,10 @@ def write_model_animation(
 
 def _surface(model: Model, all_points: bool) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int32]]:
     """Return the points of the canonical shape that are shown, and triangles between them."""
-    points, normals = model.points, model.normals
-    if not len(points):
-        return np.zeros(0, np.int64), np.zeros((0, 3), np.int32)
-    surface = np.arange(len(points))
-    if not all_points:
-        is_object = model.parameters.region.object
-        surface = surface_rows(points, normals, model.confidence, is_object=is_object)
-    rows, triangles = used_rows(triangulate(points[surface], normals[surface]))
+    surface = shown_rows(model, all_points)
+    if not len(surface):
+        return surface, np.zeros((0, 3), np.int32)
+    rows, triangles = used_rows(triangulate(model.points[surface], model.normals[surface]))
     return surface[rows], triangles
 
 

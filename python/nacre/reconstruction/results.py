@@ -15,10 +15,12 @@ from nacre.io.json_files import to_json
 from nacre.io.points import write_points
 from nacre.io.trajectories import write_trajectory
 from nacre.reconstruction.animation import write_model_animation
+from nacre.reconstruction.motion import write_model_motion
 
 if TYPE_CHECKING:
     from nacre.reconstruction.reconstruction import Reconstruction
 
+_OF_WHAT_BENDS = {"animation.glb": write_model_animation, "motion.npz": write_model_motion}
 _PICTURE_NAMES = {
     "the-model": "model",
     "as-measured": "depth-before",
@@ -42,8 +44,8 @@ def write_results(
     """
     Write the files of a run, the page if wanted, and return what report.json, the last one, holds.
 
-    What bends is written as a mesh that moves, too, when the run is finished. There is no trajectory where no
-    frame was tracked.
+    How what bends moved is written, too, of a mesh and of the points, when the run is finished. There is no
+    trajectory where no frame was tracked.
     """
     write_points(
         folder / "model.ply",
@@ -55,11 +57,11 @@ def write_results(
     else:
         (folder / "trajectory.txt").unlink(missing_ok=True)  # of an earlier model
     interrupted = bool(document.get("interrupted"))
-    animation = folder / "animation.glb"
-    if done.model.parameters.deform and not interrupted:
-        write_model_animation(animation, done.model, done.frames, all_points=done.all_points)
-    else:
-        animation.unlink(missing_ok=True)  # of an earlier model
+    for name, write in _OF_WHAT_BENDS.items():
+        if done.model.parameters.deform and not interrupted:
+            write(folder / name, done.model, done.frames, all_points=done.all_points)
+        else:
+            (folder / name).unlink(missing_ok=True)  # of an earlier model
     if page:
         from nacre.report import render_page
 
