@@ -6,6 +6,7 @@ import time
 
 from nacre.reconstruction import Reconstruction
 from nacre.reconstruction.frame_record import FrameRecord
+from nacre.reconstruction.motion import frames_shown
 from nacre.report.reported_frame import ReportedFrame
 from nacre.viewer.controls import Controls
 from nacre.viewer.server import Viewer
@@ -58,10 +59,16 @@ class LiveView:
         """Show the newest frame and the model as it is now."""
         start = time.monotonic()
         if len(self._done.model):
-            self.timeline.set_snapshot(Snapshot.of(self._done.model))
+            self.timeline.set_snapshot(Snapshot.of(self._done.model, self._frame_shown()))
         self.viewer.refresh()
         now = time.monotonic()
         self._next = now + _SHARE * (now - start)
+
+    def _frame_shown(self) -> int | None:
+        """Return the frame of a model that deforms whose shape the newest frame of the run has."""
+        if not self._done.model.parameters.deform:
+            return None
+        return next(iter(frames_shown([frame.report for frame in self._done.frames])[-1:]), None)
 
     def finish(self, message: str = "") -> None:
         """Show the end, with a message: poses as loops have corrected them, frames found after all."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -47,6 +48,11 @@ class State(NamedTuple):
         return self.cloud.triangles is not None
 
     @property
+    def has_holes(self) -> bool:
+        """Whether they are looked for: in points that are joined here, and stay where they are."""
+        return not self.is_mesh and self.cloud.motion is None
+
+    @property
     def shown(self) -> Snapshot:
         """The points that the page gets: not too many."""
         return self.cloud.thinned(MAX_VERTICES if self.is_mesh else MAX_POINTS)
@@ -83,8 +89,9 @@ class PageData:
         self._timelines = timelines
         self._parameters = parameters
         self._is_live = is_live
+        # Of a run alone: what bends is compared in its canonical shape.
         self._states = [
-            State(run, place, cloud)
+            State(run, place, cloud if len(timelines) == 1 else replace(cloud, motion=None))
             for run, timeline in enumerate(timelines)
             for place, cloud in timeline.snapshots
         ]
@@ -108,7 +115,7 @@ class PageData:
         for state in self._painted:
             triangles += [f"{kind}/{state.name}" for kind in ("points", "triangles")]
         triangles += [f"image/{s.name}" for s in (*newest, *self._painted) if s.shown.painting is not None]
-        return triangles + [f"holes/{state.name}" for state in newest if not state.is_mesh]
+        return triangles + [f"holes/{state.name}" for state in newest if state.has_holes]
 
     def read(self, name: str) -> bytes:
         """
@@ -129,7 +136,7 @@ class PageData:
         state = {state.name: state for state in (*self._states, *self._painted)}[rest]
         if kind == "image":
             return self._image(state)
-        if kind == "holes" and state.is_mesh:
+        if kind == "holes" and not state.has_holes:
             raise KeyError(name)
         if kind == "triangles":
             return pack({}, {"triangles": _sorted_triangles(self._triangulated(state))})
@@ -227,6 +234,13 @@ class PageData:
         if len(timeline.snapshots) == 1 and not state.is_mesh:
             first = first_seen(cloud, timeline, state.place)
             columns |= {} if first is None else {"firstSeen": first}
+        if cloud.motion is not None:
+            motion = cloud.motion
+            # A point's places one after the other, which differ by little.
+            columns["shapes"] = motion.points.transpose(1, 0, 2).reshape(-1, 3)
+            columns["shapeNormals"] = motion.normals.transpose(1, 0, 2).reshape(-1, 2)
+            moments = motion.moments.round(4).tolist()
+            header["motion"] = {"origin": motion.origin.tolist(), "step": motion.step, "moments": moments}
         if len(self._timelines) == 2:
             other = self._timelines[1 - state.run].snapshots[-1][1]
             columns["deviation"] = rounded(deviation(cloud, other))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_path
 from nacre.report.reported_frame import ReportedFrame
 from nacre.viewer.colors import STATUS_COLORS, point_colors
-from nacre.viewer.timeline import Timeline, words
+from nacre.viewer.timeline import Snapshot, Timeline, words
 
 _MISSING = 'files for Rerun need rerun-sdk: pip install "nacre[rerun]"'
 _MOST_DEPTH_IMAGES = 100
@@ -55,11 +56,12 @@ def _write(rr: Any, path: Path, timeline: Timeline) -> None:
     recording.save(str(path))
     recording.send_recording_name(timeline.title)
     recording.log("world", rr.ViewCoordinates.RDF, static=True)
-    for place, cloud in timeline.snapshots:
-        if len(timeline.snapshots) > 1:
+    states = [shape for place, cloud in timeline.snapshots for shape in _shapes(place, cloud)]
+    for place, cloud in states:
+        if len(states) > 1:
             recording.set_time("frame", sequence=timeline.frames[place].index)
         points = rr.Points3D(cloud.points, colors=point_colors(cloud), radii=0.6 * cloud.spacing)
-        recording.log("world/model", points, static=len(timeline.snapshots) == 1)
+        recording.log("world/model", points, static=len(states) == 1)
     step = -(-len(timeline.frames) // _MOST_DEPTH_IMAGES)
     for place, frame in enumerate(timeline.frames):
         recording.set_time("frame", sequence=frame.index)
@@ -69,6 +71,16 @@ def _write(rr: Any, path: Path, timeline: Timeline) -> None:
         recording.log("world/path", rr.LineStrips3D([np.array(path_points)]), static=True)
     recording.flush()
     recording.disconnect()
+
+
+def _shapes(place: int, cloud: Snapshot) -> Iterator[tuple[int, Snapshot]]:
+    """Yield a state of the model, or each shape that what bends had, with the place of the frame."""
+    if cloud.motion is None:
+        yield place, cloud
+        return
+    moments = cloud.motion.moments
+    for place in np.flatnonzero((moments % 1 == 0) & (np.diff(moments, prepend=-1) > 0)).tolist():
+        yield place, cloud.at(place)
 
 
 def _log_frame(rr: Any, recording: Any, timeline: Timeline, frame: ReportedFrame, with_depth: bool) -> None:

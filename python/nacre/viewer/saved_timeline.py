@@ -23,6 +23,7 @@ from nacre.io.painting import Painting
 from nacre.io.ply_header import read_header
 from nacre.io.points import read_points
 from nacre.io.raw import read_head
+from nacre.reconstruction.motion import Motion, read_motion
 from nacre.report.saved_run import SavedRun
 from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline
 
@@ -33,7 +34,8 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     Read what a reconstruction wrote, or the points or the mesh of a file.
 
     Depth images are shown where the recording is still in its place; on the mesh of a GLB or OBJ file, or of
-    ``OUT/mesh.glb``, the image that is painted on it.
+    ``OUT/mesh.glb``, the image that is painted on it. The points of a run with ``--deform`` are at each frame
+    where they were.
 
     Parameters
     ----------
@@ -70,7 +72,8 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     model = read_points(path / "model.ply")
     if model.normals is None:
         raise FileFormatError(path / "model.ply", "a model of nacre reconstruct has normals")
-    timeline.set_snapshot(_cloud(model, out.report.get("spacing")))
+    motion = _motion(path / "motion.npz", len(timeline.frames), len(model.points))
+    timeline.set_snapshot(_cloud(model, out.report.get("spacing"), motion=motion))
     if (path / "mesh.glb").is_file():
         file, triangles, painting = _read(path / "mesh.glb")
         timeline.painted = None if painting is None else _cloud(file, None, triangles, painting)
@@ -82,8 +85,9 @@ def _cloud(
     spacing: float | None,
     triangles: npt.NDArray[np.int32] | None = None,
     painting: Painting | None = None,
+    motion: Motion | None = None,
 ) -> Snapshot:
-    """Return the finite points of a file, the triangles between them, and what is painted on these."""
+    """Return the finite points of a file, triangles between them, what is painted there, how they moved."""
     kept = np.flatnonzero(np.isfinite(file.points).all(axis=1))
     points = np.asarray(file.points, np.float32)
     spacing = max(float(spacing or _usual_spacing(points[kept])), 1e-6)
@@ -98,8 +102,24 @@ def _cloud(
     normals = np.where(known, normals, (0, 0, -1)).astype(np.float32)
     known_of = file.attributes.get
     columns = (known_of("confidence"), known_of("last_seen"), known_of("sigma"))
-    cloud = Snapshot(points, normals, spacing, file.colors, *columns, triangles, painting)
+    cloud = Snapshot(points, normals, spacing, file.colors, *columns, triangles, painting, motion)
     return cloud.rows(kept, spacing)
+
+
+def _motion(path: Path, num_frames: int, num_points: int) -> Motion | None:
+    """Return how the points of a run moved, where a file tells; what is damaged is left out."""
+    if not path.is_file():
+        return None
+    try:
+        motion = read_motion(path)
+        frames, points = len(motion.moments), motion.points.shape[1]
+        if (frames, points) != (num_frames, num_points):
+            told = f"{frames} frames of {points} points, the run {num_frames} of {num_points}"
+            raise FileFormatError(path, f"it has {told}")
+    except FileFormatError as error:
+        warn(f"the motion is left out: {error}")
+        return None
+    return motion
 
 
 def _read(path: Path) -> tuple[Cloud, npt.NDArray[np.int32] | None, Painting | None]:

@@ -13,6 +13,8 @@ from nacre import Camera
 from nacre.errors import printable
 from nacre.io.painting import Painting
 from nacre.model import Model
+from nacre.reconstruction.frame_record import FrameRecord
+from nacre.reconstruction.motion import Motion, motion_of
 from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import count, quantity
 
@@ -43,6 +45,9 @@ class Snapshot:
         Rows of the points, of a mesh; otherwise the viewer joins the points itself.
     painting : Painting, optional
         The image that is painted on the triangles.
+    motion : Motion, optional
+        Where the points were at each frame of the timeline, if they moved; they themselves are the canonical
+        shape.
     """
 
     points: npt.NDArray[np.float32]
@@ -54,13 +59,27 @@ class Snapshot:
     sigma: npt.NDArray[Any] | None = None
     triangles: npt.NDArray[np.int32] | None = None
     painting: Painting | None = None
+    motion: Motion | None = None
 
     @classmethod
-    def of(cls, model: Model) -> Snapshot:
-        """Copy the points of a model as it is now."""
+    def of(cls, model: Model, frame: int | None = None) -> Snapshot:
+        """
+        Copy the points of a model as it is now.
+
+        Parameters
+        ----------
+        model : Model
+            Where it deforms, its points are taken as they were at a frame.
+        frame : int, optional
+            Of the model; by default the newest.
+        """
+        points, normals = model.points, model.normals
+        if model.parameters.deform and len(model.frames):
+            shown = len(model.frames) - 1 if frame is None else frame
+            points, normals = model.points_at(shown), model.normals_at(shown)
         return cls(
-            model.points,
-            model.normals,
+            points,
+            normals,
             model.spacing,
             model.colors,
             model.confidence,
@@ -84,7 +103,15 @@ class Snapshot:
             chosen_of(self.sigma),
             self._triangles_between(chosen),
             None if self.painting is None else self.painting.rows(chosen),
+            None if self.motion is None else self.motion.of_points(chosen),
         )
+
+    def at(self, place: int) -> Snapshot:
+        """Return the points as they were at the frame of that place; what does not move, itself."""
+        if self.motion is None:
+            return self
+        points, normals = self.motion.at(place)
+        return replace(self, points=points, normals=normals, motion=None)
 
     def _triangles_between(self, chosen: slice | npt.NDArray[np.int64]) -> npt.NDArray[np.int32] | None:
         if self.triangles is None:
@@ -178,6 +205,27 @@ class Timeline:
         self._snapshots: list[tuple[int, Snapshot]] = []
         self._max_snapshots = max_snapshots
         self._max_points = max_points
+
+    @classmethod
+    def of(cls, model: Model, title: str = "model") -> Timeline:
+        """
+        Return what a model tells: its frames, and its points after the last.
+
+        Of a model that deforms the points move: at each frame they are where they were.
+        """
+        depth = model.parameters.depth
+        timeline = cls(title, model.camera, depth_range=(depth.min_depth, depth.max_depth))
+        reports = list(model.frames)
+        for i, report in enumerate(reports):
+            record = FrameRecord(i, report.timestamp, report.status, report.reason, report, None)
+            timeline.add(ReportedFrame(**record.as_dict()))
+        cloud = Snapshot.of(model)
+        if model.parameters.deform:
+            motion = motion_of(model, reports)
+            cloud = replace(cloud, points=model.points, normals=model.normals, motion=motion)
+        if len(model):
+            timeline.set_snapshot(cloud)
+        return timeline
 
     def add(self, frame: ReportedFrame) -> None:
         """Append a frame."""

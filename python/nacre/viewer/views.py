@@ -119,7 +119,8 @@ def first_seen(cloud: Snapshot, timeline: Timeline, place: int) -> npt.NDArray[n
     first = np.full(len(cloud.points), places[-1], np.uint32)
     unseen = np.arange(len(cloud.points))
     for i, pose in zip(places, _poses(timeline, places), strict=True):
-        seen = sees(timeline.camera, pose, cloud.points[unseen], cloud.normals[unseen])
+        shape = cloud.at(i)
+        seen = sees(timeline.camera, pose, shape.points[unseen], shape.normals[unseen])
         first[unseen[seen]] = i
         unseen = unseen[~seen]
     return first
@@ -140,12 +141,17 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
         toward = _in_front(_mean_normal(cloud), sign * _FORWARD, sign * _DOWN)
         return _view(few.points, core, toward, sign * _DOWN)
     poses = _poses(timeline, places)
-    seen = np.array([sees(timeline.camera, pose, few.points, few.normals) for pose in poses])
+    shapes = [few.at(i) for i in places]
+    views = zip(poses, shapes, strict=True)
+    seen = np.array([sees(timeline.camera, pose, shape.points, shape.normals) for pose, shape in views])
     core = _main_part(few, seen.sum(axis=0))
     best = poses[np.argmax(seen[:, core].sum(axis=1))]
-    target = np.median(few.points[core], axis=0)
+    points = few.points
+    if few.motion is not None:  # all of the way
+        points, core = np.concatenate([shape.points for shape in shapes]), np.tile(core, len(shapes))
+    target = np.median(points[core], axis=0)
     toward = best[:3, 3] - target if timeline.camera.model == "pinhole" else -best[:3, 2]
-    return _view(few.points, core, toward, -poses[:, :3, 1].mean(axis=0))
+    return _view(points, core, toward, -poses[:, :3, 1].mean(axis=0))
 
 
 _DOWN, _FORWARD = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])

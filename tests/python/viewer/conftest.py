@@ -6,12 +6,16 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from nacre.datasets import write_recording
 from nacre.viewer import export_html
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from bending_sheet import CAMERA, CURVATURES, sheet
 from browser import Browser
+from command_line import run
 from shown_page import LOADED
 from viewer_scenes import plane, two_looks
 
@@ -31,3 +35,14 @@ def exported(browser: Browser, tmp_path: Path) -> Browser:
     browser.wait_for(LOADED)
     browser.download_to(tmp_path)
     return browser
+
+
+@pytest.fixture(scope="session")
+def bent(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a run of a sheet that is rolled up, whose fourth image is of nothing."""
+    folder = tmp_path_factory.mktemp("sheet")
+    depths = [sheet(curvature).simulate_depth(CAMERA, np.eye(4)) for curvature in CURVATURES]
+    depths.insert(3, np.full_like(depths[0], np.nan))
+    write_recording(folder / "recording", CAMERA, depths, depth_scale=10_000)
+    run("reconstruct", folder / "recording", "--deform", "-o", folder / "out", "--no-report")
+    return folder / "out"

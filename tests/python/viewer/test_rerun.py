@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ import pytest
 import nacre
 import nacre.viewer
 from nacre.cli.app import run
+from nacre.reconstruction.motion import Motion
 from nacre.report import ReportedFrame
 from nacre.viewer import Snapshot, Timeline, export_rrd
 
@@ -58,6 +60,22 @@ def test_rerun_reads_what_was_written(
     for entity in ("/world/model", "/world/path", "/world/camera", "/world/camera/depth", "/frames"):
         assert entity in told
     assert "LOST" in told
+
+
+def test_each_shape_of_what_bends_is_there(tmp_path: Path) -> None:
+    pytest.importorskip("rerun")
+    wave = timeline()
+    ((_, cloud),) = wave.snapshots[-1:]
+    moments = np.array([0.0, 0.0, 1.0])
+    steps = np.zeros((2, len(cloud.points), 3), np.uint16)
+    moving = Motion(moments, steps, np.full((2, len(cloud.points), 2), 128, np.uint8), np.zeros(3), 1e-4)
+    alone = Timeline("wave", None)
+    for frame in wave.frames:
+        alone.add(frame)
+    alone.set_snapshot(replace(cloud, motion=moving))
+    export_rrd(alone, tmp_path / "view.rrd")
+    told = rerun("rrd", "print", "-vvv", "--entity", "/world/model", tmp_path / "view.rrd")
+    assert "with 2 rows" in told
 
 
 def test_without_the_library(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,27 @@ class Cloud {
     this.paint = new Uint8Array(4 * this.size); // red, green, blue, and 255 where the point is shown
     this.numShown = this.size;
     this.version = 0; // of the paint
+    this.moment = undefined; // of what bends: which shape the points have now
+  }
+
+  /** Put the points of what bends where they were at the frame of a place; whether that is elsewhere than now. */
+  bend(place) {
+    if (!this.motion) return false;
+    const { moments, origin, step } = this.motion, moment = moments[Math.min(place, moments.length - 1)];
+    if (moment === this.moment) return false;
+    const low = Math.floor(moment), high = Math.ceil(moment), part = moment - low;
+    this.points = blended(this.#shape(low), this.#shape(high), part);
+    this.normals = blended(this.#shapeNormals(low), this.#shapeNormals(high), part);
+    Object.assign(this, { origin, step, moment });
+    return true;
+  }
+
+  #shape(k) {
+    return everyNth(this.shapes, 3, this.shapes.length / this.points.length, k);
+  }
+
+  #shapeNormals(k) {
+    return decodedNormals(everyNth(this.shapeNormals, 2, this.shapes.length / this.points.length, k));
   }
 
   position(i) {
@@ -94,6 +115,17 @@ function mapped(colormap, at) {
   const low = Math.min(Math.floor(place), colormap.length - 2), part = place - low;
   return colormap[low].map((value, c) => value + part * (colormap[low + 1][c] - value));
 }
+
+/** Of rows of a width every nth, from the kth on. */
+function everyNth(rows, width, n, k) {
+  const out = new rows.constructor(rows.length / n);
+  for (let i = 0; i < out.length / width; i++) {
+    for (let c = 0; c < width; c++) out[width * i + c] = rows[width * (n * i + k) + c];
+  }
+  return out;
+}
+
+const blended = (a, b, part) => (part ? a.map((value, i) => Math.round(value + part * (b[i] - value))) : a);
 
 /** Unit vectors as four signed bytes, of octahedral ones (Meyer et al. 2010). */
 function decodedNormals(octahedral) {

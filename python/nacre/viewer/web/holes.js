@@ -40,10 +40,10 @@ class Holes {
     setTimeout(() => this.app.clouds.some(({ name }, run) => name !== this.runs[run]?.name) && this.load(), rest + 1);
   }
 
-  /** A mesh of a file is as it is: holes are those of points that were joined here. */
+  /** A mesh of a file is as it is: holes are those of points that were joined here, and that do not move. */
   #canFind(name, run) {
     const { isMesh, painted } = this.app.document.runs[run];
-    return !isMesh && name !== painted && this.app.source.has(`holes/${name}`);
+    return !isMesh && !this.app.clouds[run].motion && name !== painted && this.app.source.has(`holes/${name}`);
   }
 
   async #read(name, run) {

@@ -62,6 +62,7 @@ class App {
     }
     document.querySelector("#surface [value=painted]").hidden = !this.#hasPainted(runs[0]);
     this.player.update();
+    if (isFirst) this.player.goToAddress();
     this.#forget();
     if (view && !this.orbit.touched && runs[0].frames.length >= 2 * this.framesAtReset) this.reset();
     await this.load();
@@ -93,13 +94,14 @@ class App {
     if (request !== this.request) return; // another frame was chosen meanwhile
     const isOther = clouds.some((cloud, i) => cloud !== this.clouds[i]);
     this.clouds = clouds;
+    const isBent = clouds[0].bend(this.player.place);
     this.#say("");
     if (isOther) {
       this.renderer?.keepOnly(clouds);
       showKinds(this);
     }
     await this.#loadTriangles();
-    if (isOther) this.color();
+    if (isOther || (isBent && this.kind === "normal")) this.color();
     this.select();
     this.holes.load();
   }

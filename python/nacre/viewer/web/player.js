@@ -29,10 +29,21 @@ class Player {
   }
 
   go(place) {
+    this.#choose(place);
+    return this.app.load();
+  }
+
+  /** Choose the frame that the page's address names, if it names one: view.html#frame=40. */
+  goToAddress() {
+    const index = new URLSearchParams(location.hash.slice(1)).get("frame");
+    const place = this.app.document.runs[0].frames.findIndex((frame) => String(frame.index) === index);
+    if (place >= 0) this.#choose(place);
+  }
+
+  #choose(place) {
     this.slider.value = place;
     this.isFollowing = place >= this.last;
     this.show();
-    return this.app.load();
   }
 
   play() {

@@ -204,18 +204,28 @@ class Renderer {
     if (!buffers) {
       buffers = { points: this.#filled(cloud.points), normals: this.#filled(cloud.normals), paint: gl.createBuffer() };
       buffers.sizes = this.#filled(cloud.sizes);
+      buffers.moment = cloud.moment;
       if (cloud.image) Object.assign(buffers, { uv: this.#filled(cloud.uv), image: this.#textureOf(cloud.image) });
       this.clouds.set(cloud, buffers);
     }
     if (buffers.version !== cloud.version) {
-      gl.bindBuffer(gl.ARRAY_BUFFER, buffers.paint);
-      gl.bufferData(gl.ARRAY_BUFFER, cloud.paint, gl.DYNAMIC_DRAW);
+      this.#fill(buffers.paint, cloud.paint);
       buffers.version = cloud.version;
+    }
+    if (buffers.moment !== cloud.moment) {
+      this.#fill(buffers.points, cloud.points);
+      this.#fill(buffers.normals, cloud.normals);
+      buffers.moment = cloud.moment;
     }
     if (cloud.triangles && !buffers.triangles) {
       buffers.triangles = this.#filled(cloud.triangles, gl.ELEMENT_ARRAY_BUFFER);
     }
     return buffers;
+  }
+
+  #fill(buffer, data) {
+    this.gl.bindBuffer(this.gl.ARRAY_BUFFER, buffer);
+    this.gl.bufferData(this.gl.ARRAY_BUFFER, data, this.gl.DYNAMIC_DRAW);
   }
 
   #filled(data, target = this.gl.ARRAY_BUFFER) {
