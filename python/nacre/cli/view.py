@@ -46,8 +46,8 @@ def view(
 
     The page shows the model as points or as a mesh, coloured as seen or by shading, normal, uncertainty or
     age, measures distances, crops and saves points, hides those of large uncertainty, and plays how the model
-    grew; with --compare also how far two runs are apart, after the other is brought into the frame of
-    the first where frames differ. --rrd needs the extra "rerun".
+    grew, and how it moved in a run with --deform; with --compare also how far two runs are apart, after the
+    other is brought into the frame of the first where frames differ. --rrd needs the extra "rerun".
     """
     terminal = Terminal(False, quiet, verbose)
     from nacre.viewer import Viewer, export_html, export_rrd, in_frame_of, read_timeline

@@ -13,10 +13,13 @@ import numpy as np
 import pytest
 
 import nacre
+from nacre.io.quantization import octahedral
 from nacre.reconstruction import Reconstruction
 from nacre.reconstruction.motion import Motion, read_motion
+from nacre.report import ReportedFrame
 from nacre.viewer import LiveView, Snapshot, Timeline, in_frame_of, read_timeline
 from nacre.viewer.page_data import PageData
+from nacre.viewer.views import first_seen, first_view
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from bending_sheet import CAMERA, CURVATURES, sheet
@@ -120,16 +123,25 @@ def test_while_it_grows_each_state_is_as_it_was(bent: Path) -> None:
         live.viewer.close()
 
 
-def test_the_first_view_has_the_whole_way() -> None:
-    def way(size: float) -> Any:
-        cloud = plane()
-        places = np.array([0.0, size]) / 1e-4
-        points = np.rint((cloud.points - cloud.points.min(axis=0)) / 1e-4)[None] + places[:, None, None]
-        normals = np.broadcast_to(np.array([128, 128], np.uint8), (2, len(cloud.points), 2))
-        origin = cloud.points.min(axis=0).astype(np.float64)
-        motion = Motion(np.array([0.0, 1.0]), points.astype(np.uint16), normals, origin, 1e-4)
-        return json.loads(PageData([two_looks(replace(cloud, motion=motion))]).document)["view"]
+def moved(cloud: Snapshot, *shifts: float) -> Snapshot:
+    """Return a cloud that is shifted at each frame, along each axis [m]."""
+    step, origin = 1e-4, cloud.points.min(axis=0).astype(np.float64)
+    shapes = cloud.points[None] - origin + np.array(shifts)[:, None, None]
+    normals = np.broadcast_to(octahedral(cloud.normals), (len(shifts), len(cloud.points), 2))
+    moments = np.arange(len(shifts), dtype=np.float64)
+    motion = Motion(moments, np.rint(shapes / step).astype(np.uint16), normals, origin, step)
+    return replace(cloud, motion=motion)
 
-    still, moving = way(0.0), way(0.2)
-    np.testing.assert_allclose(np.subtract(moving["target"], still["target"]), [0.1, 0.1, 0.1], atol=0.02)
-    assert moving["radius"] > still["radius"] + 0.05
+
+def test_the_first_view_has_the_whole_way() -> None:
+    still, moving = (first_view(moved(plane(), 0, size), two_looks(plane()), 1) for size in (0.0, 0.2))
+    np.testing.assert_allclose(moving.target - still.target, [0.1, 0.1, 0.1], atol=0.02)
+    assert moving.radius > still.radius + 0.05
+
+
+def test_points_appear_with_the_frame_that_had_them_in_view_where_they_were() -> None:
+    timeline = Timeline("plane", CAMERA)
+    for index in range(3):
+        timeline.add(ReportedFrame(index, "TRACKED", world_from_camera=np.eye(4)))
+    assert set(first_seen(plane(), timeline, 2).tolist()) == {0}
+    assert set(first_seen(moved(plane(), 5, 0, 5), timeline, 2).tolist()) == {1}
