@@ -52,16 +52,24 @@ class Recording:
 
 
 def record(
-    name: str, num_frames: int, *, sensor: str = "kinect", seed: int = 0, is_rigid: bool = False
+    name: str,
+    num_frames: int,
+    *,
+    sensor: str = "kinect",
+    seed: int = 0,
+    is_rigid: bool = False,
+    camera: nacre.Camera | None = None,
 ) -> Recording:
     """
     Film one of THINGS; ``is_rigid``: held still in the shape of the first frame, on the same path.
+
+    The camera is the sensor's, where none is given.
 
     The thing goes from rest to its farthest shape and back, twice, while the camera goes about it and comes
     back.
     """
     thing = THINGS[name](np.random.default_rng(seed))
-    camera = SENSORS[sensor]
+    camera = camera or SENSORS[sensor]
     errors: dict[str, Any] = (
         {"noise": "kinect", "edge_mixing": 1.0} if sensor == "kinect" else {"sensor": sensor}
     )

@@ -59,6 +59,38 @@ def test_reports_tell_how_it_is_bent(model) -> None:
     assert 0 < last.strain < 0.05
 
 
+def before_wall(mesh: nacre.Mesh) -> nacre.Mesh:
+    x, y = np.meshgrid(np.linspace(-0.8, 0.8, 61), np.linspace(-0.6, 0.6, 46))
+    wall = np.stack([x, y, 0.9 + 0.015 * np.sin(20 * x) * np.cos(22 * y)], axis=-1).reshape(-1, 3)
+    rows = len(mesh.vertices) + np.arange(46 * 61).reshape(46, 61)
+    a, b, c, d = (part.ravel() for part in (rows[:-1, :-1], rows[:-1, 1:], rows[1:, :-1], rows[1:, 1:]))
+    triangles = np.concatenate([np.stack([a, b, c], axis=-1), np.stack([b, d, c], axis=-1)])
+    return nacre.Mesh(
+        np.concatenate([mesh.vertices, wall]).astype(np.float32),
+        np.concatenate([mesh.triangles, triangles]).astype(np.int32),
+    )
+
+
+def test_what_bends_before_a_wall_bends_alone() -> None:
+    curvatures = np.linspace(0, 0.5, 11)
+
+    def small(curvature: float) -> nacre.Mesh:
+        mesh = sheet(curvature)
+        return nacre.Mesh((mesh.vertices * (0.5, 0.5, 1)).astype(np.float32), mesh.triangles)
+
+    model = grown(
+        before_wall(small(curvature)).simulate_depth(CAMERA, np.eye(4), noise="kinect", seed=index)
+        for index, curvature in enumerate(curvatures)
+    )
+    nodes = model.nodes_at(0)
+    is_wall = nodes[:, 2] > 0.8
+    assert is_wall.any() and not is_wall.all()
+    np.testing.assert_array_equal(model.nodes_at(10)[is_wall], nodes[is_wall])
+    for frame in (5, 10):
+        points = in_camera(model, frame)
+        assert error(points[points[:, 2] < 0.8], small(curvatures[frame])) < 0.001
+
+
 def test_any_number_of_threads_gives_the_same_bits(depths, model) -> None:
     for threads in (1, 3):
         other = grown(depths, num_threads=threads)
