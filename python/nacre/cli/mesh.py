@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from nacre.meshing import TextureView
 
 _UNSEEN = 128  # grey
+_SEEN = 224  # light grey, of a model without colours
 
 
 class Keep(str, enum.Enum):
@@ -75,8 +76,8 @@ def mesh(
     Their corners are its points, with normals and colours. The mesh is open where the model has no points.
     """
     terminal = Terminal(json, quiet, verbose)
-    from nacre import write_mesh
-    from nacre.io.meshes import require_mesh_suffix
+    from nacre import read_points, write_mesh
+    from nacre.io.meshes import read_mesh_arrays, require_mesh_suffix
     from nacre.meshing import largest_part, part_sizes
 
     if not source.exists():
@@ -87,11 +88,21 @@ def mesh(
     target = writable_file(out or path.with_name("mesh.glb" if texture else "mesh.ply"))
     require_mesh_suffix(target, textured=texture)
     views = _views(source) if texture else []
-    steps = 2 + (keep is Keep.largest) + (num_triangles is not None) + texture
+    is_mesh = not closed and path.suffix.lower() in mesh_suffixes() and has_faces(path)
+    steps = 3 - is_mesh + (keep is Keep.largest) + (num_triangles is not None) + texture
     left_out: list[int] = []
     with terminal.progress("steps", steps) as begin:
-        begin("laying triangles")
-        mesh, comments = _surface(path, closed)
+        begin("reading")
+        if is_mesh:
+            mesh = read_mesh_arrays(path)
+            comments = mesh.comments
+        else:
+            cloud = read_points(path)
+            comments = cloud.comments
+            begin("closing the surface" if closed else "laying triangles")
+            mesh = _surface(path, cloud, closed)
+        if not len(mesh.triangles):
+            raise CommandError(f"{path} has too few points for a surface, or normals that contradict it")
         if keep is Keep.largest:
             begin("choosing parts")
             left_out = part_sizes(mesh.triangles)[1:].tolist()
@@ -115,7 +126,7 @@ def mesh(
             mesh.triangles,
             normals=mesh.normals,
             colors=mesh.colors,
-            attributes=mesh.attributes,
+            attributes=_stored_attributes(target, mesh),
             texture=mesh.texture,
             comments=comments,
         )
@@ -137,22 +148,24 @@ def mesh(
         )
 
 
-def _surface(path: Path, closed: bool) -> tuple[MeshArrays, tuple[str, ...]]:
-    """Return the mesh that a file has, or that its points make, and its comments."""
-    from nacre import read_points
-    from nacre.io.meshes import read_mesh_arrays
+def _surface(path: Path, cloud: Cloud, closed: bool) -> MeshArrays:
+    """Return the mesh that the points of a file make."""
+    if cloud.normals is None:
+        raise CommandError(f"{path} has no normals: nacre normals {path} OUT.ply estimates them")
+    return _closed(cloud) if closed else _open(cloud)
 
-    if not closed and path.suffix.lower() in mesh_suffixes() and has_faces(path):
-        mesh = read_mesh_arrays(path)
-        comments = mesh.comments
-    else:
-        cloud = read_points(path)
-        if cloud.normals is None:
-            raise CommandError(f"{path} has no normals: nacre normals {path} OUT.ply estimates them")
-        mesh, comments = _closed(cloud) if closed else _open(cloud), cloud.comments
-    if not len(mesh.triangles):
-        raise CommandError(f"{path} has too few points for a surface, or normals that contradict it")
-    return mesh, comments
+
+def _stored_attributes(target: Path, mesh: MeshArrays) -> dict[str, Any]:
+    """Return what is written of the vertices; where the format has colours, these tell what was seen."""
+    from nacre.io.meshes import lost_in
+
+    lost = lost_in(target, mesh)
+    is_told = mesh.colors is not None and "colors" not in lost
+    return {
+        name: values
+        for name, values in mesh.attributes.items()
+        if not (name == "seen" and name in lost and is_told)
+    }
 
 
 def _words(name: str, value: Any) -> str:
@@ -221,7 +234,7 @@ def _open(cloud: Cloud) -> MeshArrays:
 
 
 def _closed(cloud: Cloud) -> MeshArrays:
-    """Lay a closed surface through the points; what was never seen is grey."""
+    """Lay a closed surface through the points; what was never seen is grey, else light without colours."""
     import numpy as np
 
     from nacre import KdTree
@@ -230,10 +243,10 @@ def _closed(cloud: Cloud) -> MeshArrays:
 
     assert cloud.normals is not None
     found = close_surface(cloud.points, cloud.normals)
-    colors = None
+    colors = np.full(found.vertices.shape, _SEEN, np.uint8)
     if cloud.colors is not None:
-        nearest = KdTree(cloud.points).query(found.vertices, 1)[1]
-        colors = np.where(found.is_seen[:, None], cloud.colors[nearest], np.uint8(_UNSEEN))
+        colors = cloud.colors[KdTree(cloud.points).query(found.vertices, 1)[1]]
+    colors[~found.is_seen] = _UNSEEN
     seen = {"seen": found.is_seen.astype(np.uint8)}
     return MeshArrays(found.vertices, found.triangles, found.normals, colors, seen)
 

@@ -23,6 +23,19 @@ def sheet(tmp_path_factory):
     return path
 
 
+@pytest.fixture(scope="module")
+def bowl(tmp_path_factory):
+    """Return points of a sphere of 10 cm of which nothing was seen above 7 cm, with normals and colours."""
+    i = np.arange(2000) + 0.5
+    z, angle = 1 - i / 1000, np.pi * (1 + 5**0.5) * i
+    ring = np.sqrt(1 - z * z)
+    normals = np.stack([ring * np.cos(angle), ring * np.sin(angle), z], axis=1)[z < 0.7]
+    path = tmp_path_factory.mktemp("mesh") / "bowl.ply"
+    colors = np.tile(np.array([200, 10, 10], np.uint8), (len(normals), 1))
+    nacre.write_points(path, 0.1 * normals, normals=normals, colors=colors)
+    return path
+
+
 @pytest.mark.parametrize("suffix", WRITE_SUFFIXES)
 def test_the_ending_chooses_the_format(sheet, tmp_path, suffix):
     told = run("mesh", sheet, "-o", tmp_path / f"a{suffix}", "--json").json
@@ -68,7 +81,46 @@ def test_what_a_format_has_no_place_for_is_told(sheet, tmp_path):
         assert ("no place for colors" in told.err) == (not kept)
 
 
-def test_its_steps_are_told(sheet, tmp_path, monkeypatch):
+def read_by_trimesh(path):
+    """Return a mesh's vertices and, for each, how bright it is, as another program reads them."""
+    trimesh = pytest.importorskip("trimesh")
+    found = trimesh.load(path, process=False, force="mesh", skip_materials=True)
+    return found.vertices, found.visual.vertex_colors[:, :3].astype(int).sum(axis=1)
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".glb", ".obj"])
+def test_a_guess_is_darker_where_there_are_no_colors(bowl, tmp_path, suffix):
+    pytest.importorskip("gpytoolbox")
+    cloud = nacre.read_points(bowl)
+    nacre.write_points(tmp_path / "model.ply", cloud.points, normals=cloud.normals)
+    done = run("mesh", tmp_path / "model.ply", "--closed", "-o", tmp_path / f"a{suffix}", "--json")
+    assert 0.7 < done.json["seen"] < 0.95
+    assert done.err == "", "the colours have it, whether or not the format has a place for more"
+    vertices, brightness = read_by_trimesh(tmp_path / f"a{suffix}")
+    dark, light = np.unique(brightness)
+    assert dark < 0.7 * light
+    assert vertices[brightness == dark, 2].min() > 0.068
+    assert vertices[brightness == light, 2].max() < 0.085  # two spacings beyond the rim
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".obj"])
+def test_a_guess_is_grey_where_there_are_colors(bowl, tmp_path, suffix):
+    pytest.importorskip("gpytoolbox")
+    run("mesh", bowl, "--closed", "-o", tmp_path / "a.ply")
+    for source, options in ((bowl, ["--closed"]), (tmp_path / "a.ply", [])):
+        assert run("mesh", source, *options, "-o", tmp_path / f"b{suffix}").err == ""
+        exact, found = (read_mesh_arrays(tmp_path / name) for name in ("a.ply", f"b{suffix}"))
+        assert np.array_equal(found.colors, exact.colors)
+        assert (found.colors[exact.attributes["seen"] == 0] == 128).all()
+
+
+def test_a_guess_that_a_format_cannot_mark_is_told_once(bowl, tmp_path):
+    pytest.importorskip("gpytoolbox")
+    said = run("mesh", bowl, "--closed", "-o", tmp_path / "a.stl").err
+    assert said == f"warning: {tmp_path / 'a.stl'}: .stl files have no place for seen and colors\n"
+
+
+def test_its_steps_are_told(sheet, bowl, tmp_path, monkeypatch):
     told = []
 
     @contextmanager
@@ -78,4 +130,11 @@ def test_its_steps_are_told(sheet, tmp_path, monkeypatch):
 
     monkeypatch.setattr(Terminal, "progress", progress)
     run("mesh", sheet, "-o", tmp_path / "a.ply", "--keep", "largest", "--simplify", "50")
-    assert told == [4, "laying triangles", "choosing parts", "simplifying", "writing"]
+    assert told == [5, "reading", "laying triangles", "choosing parts", "simplifying", "writing"]
+    told.clear()
+    run("mesh", tmp_path / "a.ply", "-o", tmp_path / "b.stl")
+    assert told == [2, "reading", "writing"], "a mesh has its triangles"
+    pytest.importorskip("gpytoolbox")
+    told.clear()
+    run("mesh", bowl, "-o", tmp_path / "a.ply", "--closed")
+    assert told == [3, "reading", "closing the surface", "writing"]
