@@ -22,8 +22,14 @@ _MOVE = "it is an array of rows: points @ pose[:3, :3].T + pose[:3, 3]"
 _MESH_NORMALS = "it is normals, where there are some; mesh.closest(points).normals has those of triangles"
 _VIEW = "nacre reconstruct --view and nacre view show runs in the browser; notebooks show models and clouds"
 _WRITE_CLOUD = "it is nacre.write_points(path, cloud)"
+_WRITE_MESH = "it is nacre.write_mesh(path, mesh)"
+_WRITE_GLTF = "it is nacre.write_mesh(path, mesh), with a path that ends in .glb"
+_READ_PLY = "it is nacre.read_points(path), or nacre.read_mesh(path) of a mesh"
+_WRITE_PLY = "it is nacre.write_points(path, points), or nacre.write_mesh(path, mesh) of a mesh"
 _DOWNSAMPLE_CLOUD = "it is nacre.voxel_downsample(cloud, voxel_size)"
 _CAMERA_FILE = "it is nacre.read_camera(path).camera"
+_PINHOLE = "Camera(width, height, fx, fy, cx, cy)"
+_FROM_MATRIX = "it is Camera.from_matrix(width, height, K)"
 _POSE = "it is target_from_source"
 
 OF_PACKAGE = {
@@ -53,10 +59,21 @@ OF_PACKAGE = {
     "read_point_cloud": "it is nacre.read_points(path)",
     "write_point_cloud": "it is nacre.write_points(path, points)",
     "load_points": "it is nacre.read_points(path)",
+    "save_points": "it is nacre.write_points(path, points)",
     "loadPCDFile": "it is nacre.read_points(path)",
     "savePCDFile": "it is nacre.write_points(path, points)",
     "read_triangle_mesh": "it is nacre.read_mesh(path)",
-    "write_triangle_mesh": "it is nacre.write_mesh(path, mesh)",
+    "write_triangle_mesh": _WRITE_MESH,
+    "save_mesh": _WRITE_MESH,
+    "export_mesh": _WRITE_MESH,
+    "write_gltf": _WRITE_GLTF,
+    "write_glb": _WRITE_GLTF,
+    "write_obj": _WRITE_MESH,
+    "write_stl": _WRITE_MESH,
+    "read_ply": _READ_PLY,
+    "load_ply": _READ_PLY,
+    "write_ply": _WRITE_PLY,
+    "save_ply": _WRITE_PLY,
     "load_mesh": "it is nacre.read_mesh(path)",
     "load": "it is nacre.read_mesh(path), nacre.read_points(path) or nacre.Model.load(path)",
     "open": "it is nacre.open_sequence(path) of recordings, nacre.read_points(path) or nacre.read_mesh(path)",
@@ -77,7 +94,7 @@ OF_PACKAGE = {
     "remove_outliers": _OUTLIERS,
     "statistical_outlier_removal": _OUTLIERS,
     "StatisticalOutlierRemoval": _OUTLIERS,
-    "PinholeCameraIntrinsic": "it is nacre.Camera(width, height, fx, fy, cx, cy)",
+    "PinholeCameraIntrinsic": f"it is nacre.{_PINHOLE}",
     "RGBDImage": "depth and colour are arrays: nacre.Model(camera).add_frame(depth, color)",
     "ScalableTSDFVolume": _FUSION,
     "UniformTSDFVolume": _FUSION,
@@ -91,6 +108,8 @@ OF_PACKAGE = {
     "poisson": "it is nacre.meshing.close_surface(points, normals)",
     "ball_pivoting": "it is nacre.meshing.mesh_points(points, normals)",
     "wlop_simplify_and_regularize_point_set": "it is nacre.consolidate(points, method='cgal')",
+    "record": "the command nacre record CAMERA -o OUT does; "
+    "nacre.write_recording(path, camera, depth_images, depth_scale=...) keeps images that you have",
     "evaluate": "nacre.evaluation.surface_accuracy(points, mesh) and nacre.evaluation.f_score(points, mesh) "
     "measure points, nacre.evaluation.absolute_trajectory_error(poses, truths) poses",
 }
@@ -117,7 +136,9 @@ OF_CLASS = {
         "K": "it is matrix",
         "intrinsic_matrix": "it is matrix",
         "intrinsics": "it is matrix",
-        "from_intrinsics": "it is Camera.from_matrix(width, height, K)",
+        "pinhole": f"it is {_PINHOLE}",
+        "from_intrinsics": _FROM_MATRIX,
+        "from_K": _FROM_MATRIX,
         "from_json": _CAMERA_FILE,
         "from_file": _CAMERA_FILE,
         "load": _CAMERA_FILE,
@@ -183,8 +204,8 @@ OF_CLASS = {
         "compute_vertex_normals": _MESH_NORMALS,
         "vertex_normals": _MESH_NORMALS,
         "sample_points_uniformly": "it is nacre.evaluation.sample_surface(mesh.vertices, mesh.triangles, n)",
-        "save": "it is nacre.write_mesh(path, mesh)",
-        "export": "it is nacre.write_mesh(path, mesh)",
+        "save": _WRITE_MESH,
+        "export": _WRITE_MESH,
         "show": _VIEW,
         "texture": _TEXTURE,
         "to_trimesh": "trimesh.Trimesh(mesh.vertices, mesh.triangles, vertex_colors=mesh.colors) makes one",
