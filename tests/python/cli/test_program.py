@@ -13,10 +13,20 @@ from command_line import fails, run
 
 import nacre
 
+SCRIPT = Path(sys.executable).with_name("nacre")
 
-def test_the_installed_entry_works():
-    script = Path(sys.executable).with_name("nacre")  # in an environment that nacre is installed into
-    program = [script] if script.exists() else [sys.executable, "-c", "from nacre.cli import main; main()"]
+
+@pytest.mark.parametrize(
+    "program",
+    [
+        pytest.param(
+            [SCRIPT], marks=pytest.mark.skipif(not SCRIPT.exists(), reason="nacre is not installed here")
+        ),
+        [sys.executable, "-m", "nacre"],
+    ],
+    ids=["script", "module"],
+)
+def test_the_entries_work(program):
     done = subprocess.run([*program, "--version"], capture_output=True, text=True, check=True)
     assert done.stdout == f"nacre {nacre.__version__}\n"
     assert done.stderr == ""
