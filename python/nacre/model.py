@@ -461,18 +461,20 @@ class Model(ExchangeablePoints, Checkpointed):
             self._whole = self._points
             try:
                 points, normals, colors = self.points, self.normals, self.colors
+                confidence, last_seen = self.confidence, self.last_seen
                 more = {
-                    "confidence": self.confidence,
-                    "last_seen": self.last_seen,
+                    "confidence": confidence,
+                    "last_seen": last_seen,
                     "sigma": self.point_sigma.astype(np.float32),
                     **self.attributes,
                 }
+                frames = self.frames
             finally:
                 self._whole = None
         rows = (
             slice(None)
             if all_points
-            else surface_rows(points, normals, more["confidence"], is_object=self.parameters.region.object)
+            else surface_rows(points, normals, confidence, last_seen, frames, self.parameters.region)
         )
         return Cloud(
             points[rows],

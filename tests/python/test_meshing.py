@@ -189,15 +189,33 @@ class TestOnSurface:
             on_surface(points, normals, np.ones(49))
 
 
-def test_scraps_beside_an_object_are_told_from_it() -> None:
-    points, normals = sphere(4000)
-    few, up = sphere(39)
-    both = np.concatenate([points, 0.1 * few + [0.2, 0, 0]]).astype(np.float32)
-    facing = np.concatenate([normals, up]).astype(np.float32)
-    assert on_main_parts(both, facing).tolist() == [True] * 4000 + [False] * 39
-    larger = slice(1000, None)  # of fewer points a part of 39 is more than a hundredth
-    assert on_main_parts(both[larger], facing[larger])[-39:].all()
-    assert not len(on_main_parts(both[:0], facing[:0]))
+class TestOnMainParts:
+    """An object of 4000 points, and a part of 39 beside it."""
+
+    FEW = 39
+
+    def both(self) -> tuple[np.ndarray, np.ndarray]:
+        points, normals = sphere(4000)
+        few, facing = sphere(self.FEW)
+        return (
+            np.concatenate([points, 0.1 * few + [0.2, 0, 0]]).astype(np.float32),
+            np.concatenate([normals, facing]).astype(np.float32),
+        )
+
+    def test_scraps_are_told_from_the_object(self) -> None:
+        points, normals = self.both()
+        nowhere = np.zeros(len(points), bool)
+        assert on_main_parts(points, normals, nowhere).tolist() == [True] * 4000 + [False] * self.FEW
+        larger = slice(1000, None)  # of fewer points a part of 39 is more than a hundredth
+        assert on_main_parts(points[larger], normals[larger], nowhere[larger])[-self.FEW :].all()
+        assert not len(on_main_parts(points[:0], normals[:0], nowhere[:0]))
+
+    def test_a_part_goes_where_most_of_it_lies_on_the_plane_and_the_object_stays(self) -> None:
+        points, normals = (rows[1000:] for rows in self.both())
+        lies = np.ones(len(points), bool)
+        assert on_main_parts(points, normals, lies).tolist() == [True] * 3000 + [False] * self.FEW
+        lies[-20:] = False
+        assert on_main_parts(points, normals, lies).all()
 
 
 class TestCloseSurface:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
 from nacre._internal import arrays
 from nacre._internal.guided import guided
+from nacre.frame_report import FrameReport
+from nacre.meshing.support_planes import on_support
 from nacre.meshing.triangulation import triangulate
+from nacre.parameters import RegionParameters
 
 _LEAST_OF_OBJECT = 0.01  # of the points of its largest part, tuned: smaller ones lie beside it
 
@@ -54,15 +59,21 @@ def on_surface(
 
 
 def on_main_parts(
-    points: npt.NDArray[np.float32], normals: npt.NDArray[np.float32], *, num_threads: int = 0
+    points: npt.NDArray[np.float32],
+    normals: npt.NDArray[np.float32],
+    is_support: npt.NDArray[np.bool_],
+    *,
+    num_threads: int = 0,
 ) -> npt.NDArray[np.bool_]:
     """
-    Tell the points of an object from small parts that no triangle joins to it.
+    Tell the points of an object from parts that no triangle joins to it: small ones, and some of its support.
 
     Parameters
     ----------
     points, normals : (N, 3) float32
         [m], and unit vectors.
+    is_support : (N,) bool
+        Which points lie on the plane that it stands on. A part goes where most do; the largest stays.
     num_threads : int
         0 uses all. The result does not depend on it.
 
@@ -74,16 +85,22 @@ def on_main_parts(
         return np.zeros(0, bool)
     parts = _core.connected_parts(triangulate(points, normals, num_threads=num_threads), len(points))
     sizes = np.bincount(parts)
-    return np.asarray(sizes[parts] >= _LEAST_OF_OBJECT * sizes.max())
+    is_main = (sizes >= _LEAST_OF_OBJECT * sizes.max()) & (2 * np.bincount(parts, is_support) <= sizes)
+    is_main[sizes.argmax()] = True
+    return np.asarray(is_main[parts])
 
 
 def surface_rows(
     points: npt.NDArray[np.float32],
     normals: npt.NDArray[np.float32],
-    confidence: npt.ArrayLike,
-    *,
-    is_object: bool,
+    confidence: npt.NDArray[np.float32],
+    last_seen: npt.NDArray[np.int32],
+    frames: Sequence[FrameReport],
+    region: RegionParameters,
 ) -> npt.NDArray[np.int64]:
-    """Return which points of a model are written: those on a surface, of an object without small parts."""
+    """Return which points of a model are written: those on a surface, of an object without scraps."""
     rows = np.flatnonzero(on_surface(points, normals, confidence))
-    return rows[on_main_parts(points[rows], normals[rows])] if is_object else rows
+    if not region.object:
+        return rows
+    is_support = on_support(points[rows], normals[rows], last_seen[rows], frames, margin=region.plane_margin)
+    return rows[on_main_parts(points[rows], normals[rows], is_support)]

@@ -137,8 +137,9 @@ def shown_rows(model: Model, all_points: bool) -> npt.NDArray[np.int64]:
     points = model.points
     if all_points or not len(points):
         return np.arange(len(points))
-    is_object = model.parameters.region.object
-    return surface_rows(points, model.normals, model.confidence, is_object=is_object)
+    return surface_rows(
+        points, model.normals, model.confidence, model.last_seen, model.frames, model.parameters.region
+    )
 
 
 def write_model_motion(
