@@ -224,6 +224,8 @@ def imported_modules(path: Path) -> set[str]:
 def room(module: str) -> str:
     """Return the folder of a module, or the facade: which all that is private in it belongs to."""
     name = module.split(".")[1]
+    if name == "__main__":  # the command line, too: python -m nacre
+        return "cli"
     return name if name in ROOMS else "facade"
 
 
@@ -238,7 +240,12 @@ def test_python_modules_import_what_is_below_them(path: Path) -> None:
 
 def test_nothing_below_the_command_line_knows_it() -> None:
     """Not even a function, when it is called: who embeds nacre has no command line."""
-    below = [path for path in files("python/nacre", suffixes={".py"}) if "cli" not in path.parts]
+    above = (ROOT / "python/nacre/cli", ROOT / "python/nacre/__main__.py")
+    below = [
+        path
+        for path in files("python/nacre", suffixes={".py"})
+        if not any(path.is_relative_to(part) for part in above)
+    ]
     assert lines_matching(r"(from|import) nacre\.cli", below) == []
 
 

@@ -31,6 +31,7 @@ class Bars:
     def show(self, step: Step) -> None:
         """Bring the bars to where a run is after a step."""
         from nacre.reconstruction.runner import FrameDone, StageBegun
+        from nacre.report.text import count
 
         done = self._run.done
         num_lost = done.counts["LOST"]
@@ -42,4 +43,4 @@ class Bars:
             if self._num_lost is not None:
                 self._advance(f"{self._num_lost - num_lost} found")
             else:
-                self._advance(f"{len(done.model):,} points" + f", {num_lost} lost" * bool(num_lost))
+                self._advance(f"{count(len(done.model))} points" + f", {num_lost} lost" * bool(num_lost))

@@ -127,6 +127,7 @@ def _recording(sequence: Any) -> tuple[dict[str, Any], Rows]:
 
 def _points(path: Path) -> tuple[dict[str, Any], Rows]:
     import nacre
+    from nacre.report.text import count
 
     cloud = nacre.read_points(path)
     figures, rows = _geometry(cloud.points)
@@ -142,7 +143,7 @@ def _points(path: Path) -> tuple[dict[str, Any], Rows]:
         [] if cloud.shape is None else [("organised", f"{cloud.shape[0]} rows x {cloud.shape[1]} columns")]
     )
     head = [
-        ("points", f"{len(cloud):,} ({cloud.points.dtype.name})"),
+        ("points", f"{count(len(cloud))} ({cloud.points.dtype.name})"),
         ("fields", ", ".join(words) or "coordinates only"),
     ]
     return figures, [*head, *organised, *rows, *(("comment", text) for text in cloud.comments[:5])]
@@ -150,6 +151,7 @@ def _points(path: Path) -> tuple[dict[str, Any], Rows]:
 
 def _mesh(path: Path) -> tuple[dict[str, Any], Rows]:
     import nacre
+    from nacre.report.text import count
 
     mesh = nacre.read_mesh(path)
     figures, rows = _geometry(mesh.vertices)
@@ -157,7 +159,7 @@ def _mesh(path: Path) -> tuple[dict[str, Any], Rows]:
         "kind": "mesh", "path": str(path), "num_vertices": len(mesh.vertices),
         "num_triangles": len(mesh.triangles), **figures,
     }  # fmt: skip
-    head = [("mesh", f"{len(mesh.vertices):,} vertices, {len(mesh.triangles):,} triangles")]
+    head = [("mesh", f"{count(len(mesh.vertices))} vertices, {count(len(mesh.triangles))} triangles")]
     return figures, head + rows
 
 
@@ -165,6 +167,7 @@ def _geometry(points: Any) -> tuple[dict[str, Any], Rows]:
     import numpy as np
 
     from nacre.evaluation import uniformity
+    from nacre.report.text import count
 
     finite = points[np.isfinite(points).all(axis=1)]
     figures: dict[str, Any] = {"num_finite": len(finite), "lower": None, "upper": None, "spacing": None}
@@ -182,7 +185,7 @@ def _geometry(points: Any) -> tuple[dict[str, Any], Rows]:
         told = f"{spacing.mean:.4g} mean" if math.isfinite(spacing.mean) else "too wide to be measured"
         rows.append(("spacing", told + f", variation {variation:.3f}" * math.isfinite(variation)))
     if len(finite) < len(points):
-        rows.append(("not finite", f"{len(points) - len(finite):,} points"))
+        rows.append(("not finite", f"{count(len(points) - len(finite))} points"))
     return figures, rows
 
 

@@ -169,15 +169,19 @@ def _stored_attributes(target: Path, mesh: MeshArrays) -> dict[str, Any]:
 
 
 def _words(name: str, value: Any) -> str:
+    from nacre.report.text import count
+
     if name == "seen":
         return f"{value:.1%} of the area; the rest is a guess"
     if name == "left_out":
         return (
-            f"{len(value)} parts, of {value[0]} triangles at most"
+            f"{count(len(value))} parts, of {count(value[0])} triangles at most"
             if len(value) > 1
-            else f"a part of {value[0]}"
+            else f"a part of {count(value[0])}"
         )
-    return " x ".join(map(str, value)) if name == "texture" else str(value)
+    if name == "texture":
+        return " x ".join(map(str, value))
+    return count(value) if isinstance(value, int) else str(value)
 
 
 def _seen_area(mesh: MeshArrays) -> float:
