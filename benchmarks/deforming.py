@@ -57,6 +57,7 @@ class Figures:
     rms: float  # [mm] of all points
     worst: float  # [mm] that of the worst frame
     seen: float  # [mm] of points on what the camera saw
+    middle: float  # [mm] the median of those
     followed: float  # root mean square of how far points are from the material they began on [pixels]
     followed_p95: float
     complete: float  # part of what was seen up to the last tracked frame, then
@@ -66,13 +67,13 @@ class Figures:
         """One line of a table."""
         return (
             f"{self.tracked:3d} of {self.frames} | {self.rms:6.2f} | {self.worst:6.2f} | {self.seen:6.2f} | "
-            f"{self.followed:5.2f} | {self.followed_p95:5.2f} | {self.complete:6.1%} | "
+            f"{self.middle:6.2f} | {self.followed:5.2f} | {self.followed_p95:5.2f} | {self.complete:6.1%} | "
             f"{self.run.num_points:6d} | {self.run.milliseconds:6.1f}"
         )
 
 
 HEAD = (
-    "| frames | loop | tracked | RMS [mm] | worst frame | seen | followed [pixels] | 95 % | complete "
+    "| frames | loop | tracked | RMS [mm] | worst frame | seen | its median | followed [pixels] | 95 % | complete "
     "| points | ms |"
 )
 
@@ -145,7 +146,7 @@ def measure(recording: Recording, run: Run) -> Figures:
         seen_squares.append(found.distances[on_seen] ** 2)
         apart.append(material.follow(points, found, on_seen, corners, recording.camera))
     if last is None:
-        nothing = (float("nan"),) * 5
+        nothing = (float("nan"),) * 6
         return Figures(0, len(recording.depths), *nothing, 0.0, run)
     errors = np.concatenate(apart)
     _, points, exact = last
@@ -156,6 +157,7 @@ def measure(recording: Recording, run: Run) -> Figures:
         rms=1e3 * float(np.sqrt(np.concatenate(squares).mean())),
         worst=1e3 * float(np.sqrt(max(square.mean() for square in squares))),
         seen=1e3 * float(np.sqrt(np.concatenate(seen_squares).mean())),
+        middle=1e3 * float(np.sqrt(np.median(np.concatenate(seen_squares)))),
         followed=float(np.sqrt((errors**2).mean())) if len(errors) else float("nan"),
         followed_p95=float(np.percentile(errors, 95)) if len(errors) else float("nan"),
         complete=completeness(points, samples, tau=NEAR).fraction[0],

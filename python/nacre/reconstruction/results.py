@@ -20,7 +20,8 @@ from nacre.reconstruction.motion import write_model_motion
 if TYPE_CHECKING:
     from nacre.reconstruction.reconstruction import Reconstruction
 
-_OF_WHAT_BENDS = {"animation.glb": write_model_animation, "motion.npz": write_model_motion}
+_ANIMATION = "animation.glb"
+_OF_WHAT_BENDS = {_ANIMATION: write_model_animation, "motion.npz": write_model_motion}
 _PICTURE_NAMES = {
     "the-model": "model",
     "as-measured": "depth-before",
@@ -66,7 +67,8 @@ def write_results(
         from nacre.report import render_page
 
         data = done.report_data(title, source, figures, interrupted=interrupted, min_tracked=min_tracked)
-        text = render_page(replace(data, animation=animation.name if animation.exists() else ""))
+        animation = _ANIMATION if (folder / _ANIMATION).exists() else ""
+        text = render_page(replace(data, animation=animation))
         _write(folder / "report.html", text.encode())
         if pictures:
             _write_pictures(folder / "pictures", text)
