@@ -47,7 +47,7 @@ WarpFit DeformingShape::follow(PointModel& model, const std::vector<std::int32_t
                                int num_threads) {
   const WarpFit fit = register_warp(field_, canonical_, in_view, shown, num_threads, was_bending(), model.colors);
   is_bent_ = fit.is_bent;
-  if (!is_bent_) nodes_bent_ = fit.bent;
+  if (!fit.is_whole) nodes_bent_ = fit.bent;
   show(model, num_threads);
   return fit;
 }

@@ -85,7 +85,7 @@ class WarpRegistration {
     if (rows_.empty()) return found;
     const std::vector<WarpNode> before = field_.nodes;
     match(0.0);
-    std::vector<double> gain = misfit();
+    const std::vector<double> misfits = row_misfits();
     for (int step = 0; step < deformation_limits::steps; ++step) {
       const double part = 1.0 - static_cast<double>(step + 1) / deformation_limits::steps;  // to 0
       match(part * widest);
@@ -94,14 +94,15 @@ class WarpRegistration {
     const std::vector<double> by_chance = misfit_by_chance();
     match(0.0);
     found.bent = field_.nodes;
-    const std::vector<double> left = misfit();
-    for (std::size_t node = 0; node < gain.size(); ++node) gain[node] -= left[node];
-    const std::vector<std::uint8_t> bends = bending(gain, by_chance);
-    found.is_bent = std::find(bends.begin(), bends.end(), 1) != bends.end();
+    const std::vector<std::uint8_t> bends = bending(misfits, by_chance);
+    const auto num_bent =
+        std::count_if(rows_.begin(), rows_.end(), [&](const WarpRow& row) { return bends[part_of(row)] != 0; });
+    found.is_bent = 2 * static_cast<std::size_t>(num_bent) > rows_.size();
+    found.is_whole = std::find(bends.begin(), bends.end(), 0) == bends.end();
     for (std::size_t node = 0; node < bends.size(); ++node) {
       if (bends[node] == 0) field_.nodes[node] = before[node];
     }
-    if (std::find(bends.begin(), bends.end(), 0) != bends.end()) match(0.0);
+    if (!found.is_whole) match(0.0);
     const auto num_matched =
         std::count_if(rows_.begin(), rows_.end(), [](const WarpRow& row) { return row.shape.weight > 0.0; });
     found.explained = static_cast<double>(num_matched) / static_cast<double>(rows_.size());
@@ -186,25 +187,57 @@ class WarpRegistration {
     return static_cast<std::size_t>(parts_[static_cast<std::size_t>(row.binding.nodes[0])]);
   }
 
-  // The residuals' squares in standard deviations, robustly (Tukey's), of each part at its first node.
-  std::vector<double> misfit() const {
-    std::vector<double> sums(field_.nodes.size(), 0.0);
-    for (const WarpRow& row : rows_) sums[part_of(row)] += row.misfit;
-    return sums;
+  // The residuals' squares in standard deviations, robustly (Tukey's).
+  std::vector<double> row_misfits() const {
+    std::vector<double> misfits;
+    for (const WarpRow& row : rows_) misfits.push_back(row.misfit);
+    return misfits;
   }
+
+  // What the rows of a part say of its bend.
+  struct Evidence {
+    double gain = 0.0;        // of misfit, of rows that were matched before
+    double gain_found = 0.0;  // and of those that are only now
+    double left = 0.0;        // misfit of matched rows
+    std::int64_t num_rows = 0, num_matched = 0, num_missing = 0, num_found = 0;  // missing: before, found of those
+
+    void add(double before, double now) {
+      const bool is_matched = now < largest_misfit, was_matched = before < largest_misfit;
+      ++num_rows;
+      if (is_matched) {
+        ++num_matched;
+        left += now;
+      }
+      if (!was_matched) {
+        ++num_missing;
+        num_found += is_matched ? 1 : 0;
+      }
+      (was_matched ? gain : gain_found) += before - now;
+    }
+
+    // Where most of a part matches nothing, a bend explains nothing. Some rows at its rim are matched by chance, or
+    // most that were missing by the bend. Noise may be greater than is known: the matched rows tell.
+    bool is_bent(double by_chance) const {
+      if (2 * num_matched <= num_rows) return false;
+      const double noise = std::max(1.0, left / static_cast<double>(num_matched));
+      return gain + (2 * num_found > num_missing ? gain_found : 0.0) > noise * by_chance;
+    }
+  };
 
   // Which nodes are of parts that bend: those whose bend explains more than chance may. A part that is not in view goes
   // with what its first node was added to.
-  std::vector<std::uint8_t> bending(const std::vector<double>& gain, const std::vector<double>& by_chance) const {
-    std::vector<std::uint8_t> bends(field_.nodes.size(), 0), is_seen(field_.nodes.size(), 0);
-    for (const WarpRow& row : rows_) is_seen[part_of(row)] = 1;
+  std::vector<std::uint8_t> bending(const std::vector<double>& misfits_before,
+                                    const std::vector<double>& by_chance) const {
+    std::vector<Evidence> parts(field_.nodes.size());
+    for (std::size_t i = 0; i < rows_.size(); ++i) parts[part_of(rows_[i])].add(misfits_before[i], rows_[i].misfit);
+    std::vector<std::uint8_t> bends(field_.nodes.size(), 0);
     for (std::size_t node = 0; node < bends.size(); ++node) {
       const auto part = static_cast<std::size_t>(parts_[node]);
       const std::int32_t parent = field_.nodes[node].parents.nodes[0];
       if (part != node) {
         bends[node] = bends[part];
-      } else if (is_seen[node] != 0) {
-        bends[node] = gain[node] > by_chance[node] ? 1 : 0;
+      } else if (parts[node].num_rows > 0) {
+        bends[node] = parts[node].is_bent(by_chance[node]) ? 1 : 0;
       } else if (parent >= 0) {
         bends[node] = bends[static_cast<std::size_t>(parent)];
       }

@@ -11,7 +11,8 @@ namespace nacre {
 
 struct WarpFit {
   double explained = 0.0;      // part of the points in view that the frame shows where they are
-  bool is_bent = false;        // a part of it; or the shape as it was explains as much as noise lets it, and stays
+  bool is_bent = false;        // most of it; or the shape as it was explains as much as noise lets it, and stays
+  bool is_whole = false;       // all of it is bent
   std::vector<WarpNode> bent;  // the nodes as the frame would have them, in any case
 };
 
