@@ -18,6 +18,7 @@ from nacre.parameters import DepthParameters
 from nacre.report.colormap import viridis
 from nacre.report.image_files import encode_png
 from nacre.report.lost_frames import plain_reason
+from nacre.viewer.camera_path import make_path
 from nacre.viewer.colors import STATUS_COLORS
 from nacre.viewer.depth_picture import depth_legend, depth_picture
 from nacre.viewer.disks import deviation, disk_radii
@@ -178,6 +179,7 @@ class PageData:
             "placement": timeline.placement,
             "isMesh": any(s.is_mesh for s in self._states if s.run == run),
             "hasDepth": timeline.depth_of is not None and timeline.camera is not None,
+            "hasPath": make_path(timeline.frames),
             "frustum": frustum_corners(timeline.camera).tolist(),
             "frames": frames,
             "states": states,

@@ -13,6 +13,7 @@ from nacre._internal.kinds import as_kind
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_path
 from nacre.report.reported_frame import ReportedFrame
+from nacre.viewer.camera_path import make_path
 from nacre.viewer.colors import STATUS_COLORS, point_colors
 from nacre.viewer.timeline import Snapshot, Timeline, words
 
@@ -67,7 +68,7 @@ def _write(rr: Any, path: Path, timeline: Timeline) -> None:
         recording.set_time("frame", sequence=frame.index)
         _log_frame(rr, recording, timeline, frame, place % step == 0)
     path_points = [m.world_from_camera[:3, 3] for m in timeline.frames if m.world_from_camera is not None]
-    if len(path_points) > 1:
+    if make_path(timeline.frames):
         recording.log("world/path", rr.LineStrips3D([np.array(path_points)]), static=True)
     recording.flush()
     recording.disconnect()

@@ -19,7 +19,7 @@ from nacre.viewer import Timeline, Viewer, export_html
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from browser import Browser
 from shown_page import IN_A_BROWSER, LOADED, color_at, look_along_the_normal, on_plane
-from viewer_scenes import SPACING, plane, two_looks
+from viewer_scenes import CAMERA, SPACING, plane, two_looks
 
 pytestmark = IN_A_BROWSER
 
@@ -296,6 +296,23 @@ def test_a_served_page_follows_the_run(browser: Browser) -> None:
         assert browser.evaluate("page.player.place") == 1  # where a hand has put it
     finally:
         viewer.close()
+
+
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_a_path_is_drawn_where_the_camera_goes_on(browser: Browser, tmp_path: Path, goes_on: bool) -> None:
+    timeline = Timeline("plane", CAMERA)
+    for index in range(20):
+        pose = np.eye(4)
+        pose[0, 3] = 0.01 * (index if goes_on else index % 2)
+        timeline.add(ReportedFrame(index, "TRACKED", world_from_camera=pose))
+    timeline.set_snapshot(plane())
+    export_html(timeline, tmp_path / "view.html")
+    browser.open((tmp_path / "view.html").as_uri())
+    browser.wait_for(LOADED)
+    browser.evaluate("page.renderer.drawLines = (positions) => { page.numLines = positions.length / 6; }")
+    browser.evaluate("page.draw()")
+    assert browser.evaluate("page.numLines") == (19 if goes_on else 0)
+    assert browser.evaluate("document.getElementById('path-row').hidden") is not goes_on
 
 
 def test_a_lost_frame_is_told_plainly(browser: Browser, tmp_path: Path) -> None:

@@ -15,11 +15,11 @@ class Lines {
 
 const centerOf = (pose) => pose.map((row) => row[3]);
 
-/** The lines of a run up to a place: its path and the true one, and some cameras of a size, the last larger. */
+/** The lines of a run up to a place: its path and the true one, if it has one, and some cameras of a size, the last larger. */
 function cameraLines(run, place, statusColors, size, { path, cameras }) {
   const lines = new Lines(), frames = run.frames.slice(0, place + 1);
   const posed = frames.filter((frame) => frame.pose);
-  if (path) {
+  if (path && run.hasPath) {
     chain(lines, posed.map((frame) => [centerOf(frame.pose), statusColors[frame.status]]), 150);
     chain(lines, frames.filter((frame) => frame.truth).map((frame) => [centerOf(frame.truth), TRUTH]), 60);
   }

@@ -25,6 +25,7 @@ function showDocument({ title, runs, depthLegend }) {
   const parts = [...counts].map(([status, count]) => `${count} ${status.toLowerCase()}`);
   document.getElementById("summary").textContent = frames.length ? `${frames.length} frames: ${parts.join(", ")}` : "";
   document.querySelectorAll(".of-frames").forEach((part) => (part.hidden = !frames.length));
+  document.getElementById("path-row").hidden = !runs.some((run) => run.hasPath);
 }
 
 /** Offer what the points can be colored by; at first the differences of two runs, or colors where they have any. */
