@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from nacre.camera import Camera
 from nacre.report.doubled_surfaces import DoubledSurfaces
 from nacre.report.limits import MIN_TRACKED
 from nacre.report.reported_frame import ReportedFrame
@@ -46,6 +47,7 @@ class ReportData:
     title: str
     source: str = ""  #: where the frames come from, in words
     frames: Sequence[ReportedFrame] = ()
+    camera: Camera | None = None  #: of every frame
     model: ModelCloud | None = None
     depth: Sequence[DepthExample] = ()
     evaluation: Mapping[str, Any] = field(default_factory=dict)  #: heading -> a result of nacre.evaluation

@@ -67,7 +67,7 @@ def render_page(data: ReportData) -> str:
     """Return the report as HTML text."""
     as_kind("data", data, ReportData, "nacre.report.ReportData, as done.report_data(title=...) makes it")
     summary = summarize(data)
-    model = None if data.model is None else draw_model(data.model, data.frames)
+    model = None if data.model is None else draw_model(data.model, data.frames, data.camera)
     page = render(
         "page.html",
         data=data,

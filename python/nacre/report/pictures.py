@@ -12,10 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.arrays import as_points
+from nacre.camera import Camera
 from nacre.kdtree import KdTree
-from nacre.rendering import SIDES, View, measure_spacing, render_points
+from nacre.rendering import SIDES, View, render_points
 from nacre.report.colormap import viridis
 from nacre.report.data import ModelCloud
+from nacre.report.deformation import deformation_figures
+from nacre.report.first_view import disk_radii, first_view
 from nacre.report.image_files import encode_small
 from nacre.report.reported_frame import ReportedFrame
 from nacre.report.reverse_sides import ReverseParts, reverse_parts
@@ -84,8 +87,14 @@ def draw(caption: str, image: npt.NDArray[np.uint8], kind: str, *, note: str = "
     return Picture(caption, f"data:image/webp;base64,{data}", (image.shape[1], image.shape[0]), note, alt)
 
 
-def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> ModelPictures | None:
-    """Draw the model from all sides, a scene also as its cameras saw it; None where there is no point."""
+def draw_model(
+    model: ModelCloud, frames: Sequence[ReportedFrame] = (), camera: Camera | None = None
+) -> ModelPictures | None:
+    """
+    Draw the model as the viewer shows it first, and from all sides; None where there is no point.
+
+    A scene is also drawn as its cameras saw it, but one that bends, to which their poses are relative.
+    """
     model, spacing = _thinned(model)
     points = model.points
     if not len(points):
@@ -93,10 +102,10 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
     extent = points[:: -(-len(points) // _FITTED_POINTS)]
     sides, scale = _fit_sides(extent, 0.001)
     reverse = functools.cache(functools.partial(reverse_parts, points, model.normals))
-    is_scene = _surrounds_its_cameras(reverse, sides)
+    is_scene = _surrounds_its_cameras(reverse, sides) and deformation_figures(frames) is None
     if is_scene:
         sides, scale = _fit_sides(extent, 0.02)  # what lies far away would make the rest tiny
-    reach = measure_spacing(points, 5 if is_scene else 2)
+    reach = disk_radii(model)
 
     def picture(
         caption: str,
@@ -104,16 +113,19 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
         kind: str,
         colors: npt.NDArray[np.uint8] | None = model.colors,
         by: str = "shaded grey" if model.colors is None else "in its colours",
+        *,
+        hide_reverse: bool = False,
     ) -> Picture:
-        hidden = reverse(view).inside_out
+        is_inside_out = reverse(view).inside_out
         image = render_points(
-            points, model.normals, colors, view=view, spacing=reach, hide_reverse=hidden, background=None
-        )
+            points, model.normals, colors, view=view, spacing=reach,
+            hide_reverse=hide_reverse or is_inside_out, background=None,
+        )  # fmt: skip
         alt = f"The model, {by}: {caption.lower()}"
-        return draw(caption, image, kind, note="reverse sides left out" if hidden else "", alt=alt)
+        return draw(caption, image, kind, note="reverse sides left out" if is_inside_out else "", alt=alt)
 
     poses = [f for f in frames if f.world_from_camera is not None and f.status.upper() != "LOST"]
-    main = _main_view(extent, is_scene and bool(poses), _MAIN_SIZE)
+    main = first_view(model, frames, camera, _MAIN_SIZE)
     views = {
         "from the front": View.fit(extent, OBLIQUE, size=_SIZE, outliers=0.004),
         "from behind": View.fit(extent, BEHIND, size=_SIZE, outliers=0.004),
@@ -150,7 +162,7 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
             picture(f"Shape, {where}", view, "attribute", None, "shaded grey") for where, view in few
         )
     return ModelPictures(
-        main=picture("The model", main, "main"),
+        main=picture("The model", main, "main", hide_reverse=bool(poses)),
         cameras=tuple(picture(_capital(name), view, "camera") for name, view in cameras.items()),
         sides=tuple(picture(side.capitalize(), view, "side") for side, view in sides.items()),
         spacing=attribute("Spacing", spacing),
@@ -160,38 +172,25 @@ def draw_model(model: ModelCloud, frames: Sequence[ReportedFrame] = ()) -> Model
     )
 
 
-def draw_thumbnail(model: ModelCloud) -> bytes | None:
-    """Return the model as a small WebP file, from where the report shows it; None where there is no point."""
-    points = as_points("model.points", model.points)
-    rows = np.flatnonzero(np.isfinite(points).all(axis=1))
-    if not len(rows):
+def draw_thumbnail(
+    model: ModelCloud, frames: Sequence[ReportedFrame] = (), camera: Camera | None = None
+) -> bytes | None:
+    """Return the model as a small WebP file, as the report shows it first; None where there is no point."""
+    model, _ = _thinned(model, _FITTED_POINTS)
+    if not len(model.points):
         return None
-    rows = rows[:: -(-len(rows) // _FITTED_POINTS)]
-    points, normals = points[rows], None if model.normals is None else model.normals[rows]
-    sides, _ = _fit_sides(points, 0.001)
-    reverse = functools.partial(reverse_parts, points, normals)
-    view = _main_view(points, _surrounds_its_cameras(reverse, sides), _THUMBNAIL_SIZE)
+    view = first_view(model, frames, camera, _THUMBNAIL_SIZE)
+    hidden = any(frame.world_from_camera is not None for frame in frames)
     image = render_points(
-        points,
-        normals,
-        None if model.colors is None else model.colors[rows],
-        view=view,
-        spacing=measure_spacing(points, 5),
-        hide_reverse=reverse(view).inside_out,
-        background=None,
-    )
+        model.points, model.normals, model.colors, view=view, spacing=disk_radii(model),
+        hide_reverse=hidden or reverse_parts(model.points, model.normals, view).inside_out, background=None,
+    )  # fmt: skip
     return encode_small(image, _MAX_BYTES["thumbnail"])
 
 
 def _surrounds_its_cameras(reverse: Callable[[View], ReverseParts], sides: Mapping[str, View]) -> bool:
     """Return whether a model is a scene: two or more of its sides are seen from behind."""
     return sum(reverse(view).from_behind for view in sides.values()) >= 2
-
-
-def _main_view(points: npt.NDArray[Any], is_scene: bool, size: tuple[int, int]) -> View:
-    if is_scene:
-        return View.from_camera(points, np.eye(4), size=size)
-    return View.fit(points, OBLIQUE, size=size, outliers=0.004)
 
 
 def _capital(text: str) -> str:
@@ -226,9 +225,9 @@ def _positions(values: npt.NDArray[np.float64], low: float, high: float) -> npt.
     return np.asarray((values - low) / (high - low))
 
 
-def _thinned(model: ModelCloud) -> tuple[ModelCloud, npt.NDArray[np.float64]]:
+def _thinned(model: ModelCloud, most: int = _MAX_POINTS) -> tuple[ModelCloud, npt.NDArray[np.float64]]:
     """
-    Return the finite points of a model, as many as pictures of this size can show.
+    Return the finite points of a model, as many as pictures can show.
 
     And how far each of them is from the nearest other point of the whole model [m].
     """
@@ -236,8 +235,8 @@ def _thinned(model: ModelCloud) -> tuple[ModelCloud, npt.NDArray[np.float64]]:
     rows = np.flatnonzero(np.isfinite(points).all(axis=1))
     spacing = np.zeros(len(points))
     spacing[rows] = _nearest_distances(points[rows])
-    if len(rows) > _MAX_POINTS:
-        rows = np.sort(np.random.default_rng(0).choice(rows, _MAX_POINTS, replace=False))
+    if len(rows) > most:
+        rows = np.sort(np.random.default_rng(0).choice(rows, most, replace=False))
 
     def pick(name: str, values: Any) -> Any:
         if values is None:

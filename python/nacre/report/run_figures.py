@@ -88,6 +88,7 @@ def run_report(
         title=title,
         source=source,
         frames=_reported_frames(run),
+        camera=run.model.camera,
         model=model,
         depth=_depth_examples(run) if with_depth else (),
         evaluation={label(name): result for name, result in run.evaluation.items()},

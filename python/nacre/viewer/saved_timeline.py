@@ -90,7 +90,7 @@ def _cloud(
     """Return the finite points of a file, triangles between them, what is painted there, how they moved."""
     kept = np.flatnonzero(np.isfinite(file.points).all(axis=1))
     points = np.asarray(file.points, np.float32)
-    spacing = max(float(spacing or _usual_spacing(points[kept])), 1e-6)
+    spacing = max(float(spacing or usual_spacing(points[kept])), 1e-6)
     if file.normals is not None:
         normals = file.normals
     elif triangles is not None:
@@ -167,7 +167,7 @@ def _estimated_normals(points: npt.NDArray[np.float32]) -> npt.NDArray[np.float3
     return np.asarray(estimate_normals(points, viewpoint=afar), np.float32)
 
 
-def _usual_spacing(points: npt.NDArray[np.float32]) -> float:
+def usual_spacing(points: npt.NDArray[np.float32]) -> float:
     """Return the median distance of a point to its nearest neighbor elsewhere, of a sample of them."""
     sample = points[:: max(len(points) // 10_000, 1)]
     if len(points) < 2:

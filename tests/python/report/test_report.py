@@ -14,7 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from nacre import DepthCalibration
+from nacre import Camera, DepthCalibration
 from nacre.evaluation import Completeness, SurfaceAccuracy, absolute_trajectory_error
 from nacre.report import (
     DepthExample,
@@ -28,6 +28,7 @@ from nacre.report import (
 from nacre.report.charts import MAX_VALUES, Mark, Series, grouped, line_chart, map_chart, stacked_chart
 from nacre.report.colormap import viridis
 from nacre.report.depth_pictures import draw_depth
+from nacre.report.first_view import disk_radii, first_view
 from nacre.report.pictures import draw_model
 from nacre.report.text import flatten, label, quantity, ranges, ticks
 
@@ -432,7 +433,38 @@ class TestPictures:
         assert not outside.cameras
         assert [picture.caption for picture in inside.cameras] == [f"As frame {i} saw it" for i in (0, 2, 3)]
         assert all(picture.note == "" for picture in outside.sides)
+        for frame in frames:  # poses relative to what bends are no places to look from
+            frame.figures["deformation"] = {"num_nodes": 9, "strain": 0.1}
+        bent = draw_model(room, frames)
+        assert bent is not None
+        assert not bent.cameras
         assert all(picture.note == "reverse sides left out" for picture in inside.sides)
+
+    def test_the_first_picture_is_as_the_viewer_opens(self) -> None:
+        ball = ModelCloud(sphere(3000) + np.array([0.3, 0, 1]), sphere(3000))
+        camera = Camera(64, 48, 50, 50, 31.5, 23.5)
+        aside = np.eye(4)
+        aside[:3] = [[0, 0, -1, 1.3], [0, 1, 0, 0], [1, 0, 0, 1]]  # right of the ball, looks at it
+        frames = [ReportedFrame(0, "TRACKED", world_from_camera=aside)]
+        view = first_view(ball, frames, camera, (200, 100))
+        eye = view.center - view.distance * view.view_from_model[2]
+        np.testing.assert_allclose(eye[1:], (0, 1), atol=0.02)
+        assert eye[0] > 0.5
+        np.testing.assert_allclose(view.view_from_model[1], (0, 1, 0), atol=0.01)  # upright
+        u, v, _ = view.project(ball.points).T
+        assert np.abs(v).max() < 50
+        assert np.ptp(v) == pytest.approx(np.ptp(u), rel=0.02)
+        from_the_front = first_view(ball, (), None, (200, 100))
+        np.testing.assert_allclose(from_the_front.view_from_model, np.eye(3), atol=1e-6)
+
+    def test_disks_close_what_is_far(self) -> None:
+        x, y = np.mgrid[0:30, 0:30].reshape(2, -1)
+        near = np.column_stack([0.01 * x, 0.01 * y, np.ones(900)])
+        far = np.column_stack([0.1 * x, 0.1 * y, np.full(900, 9)])[:600]
+        points = np.concatenate([near, far])
+        radii = disk_radii(ModelCloud(points, np.broadcast_to((0.0, 0, -1), points.shape)))
+        assert np.median(radii[:900]) == pytest.approx(0.01, rel=1e-3)
+        assert np.median(radii[900:]) == pytest.approx(0.1, rel=1e-3)
 
     def test_the_scale_bar_is_true(self) -> None:
         drawn = draw_model(ModelCloud(sphere(3000), sphere(3000)))

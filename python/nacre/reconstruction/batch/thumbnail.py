@@ -9,6 +9,7 @@ from nacre.io.points import read_points
 from nacre.reconstruction.batch.sources import thumbnail_path
 from nacre.report.data import ModelCloud
 from nacre.report.pictures import draw_thumbnail
+from nacre.report.saved_run import SavedRun
 
 
 def write_thumbnail(folder: Path) -> None:
@@ -17,7 +18,10 @@ def write_thumbnail(folder: Path) -> None:
     if path.is_file() and path.stat().st_mtime >= model.stat().st_mtime:
         return
     cloud = read_points(model)
-    data = draw_thumbnail(ModelCloud(cloud.points, cloud.normals, cloud.colors))
+    run = SavedRun(folder)
+    confidence = cloud.attributes.get("confidence")
+    shown = ModelCloud(cloud.points, cloud.normals, cloud.colors, confidence)
+    data = draw_thumbnail(shown, run.frames, run.camera)
     if data is None:
         path.unlink(missing_ok=True)
         return
