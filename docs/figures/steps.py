@@ -15,6 +15,24 @@ import nacre
 NOISE = 0.0005  # [m]
 
 
+def demo(table: Turntable, size):
+    """Draw a noisy depth image, and the model after 1, 4 and all views, from aside."""
+    model, num_views = nacre.Model(table.camera), len(table.poses)
+    depth = table.view(0, NOISE, 1.0)
+    seen = np.argwhere(np.isfinite(depth))
+    (top, left), (bottom, right) = seen.min(axis=0), seen.max(axis=0) + 1
+    shades = draw.by_value(-depth, -np.nanmax(depth), -np.nanmin(depth))[top:bottom, left:right]
+    panels, shown = [("a depth image", draw.image_panel(shades, size))], []
+    for k in range(num_views):
+        model.add_frame(table.view(k, NOISE, 1.0))
+        if k + 1 in (1, 4, num_views):
+            cloud = model.cloud()
+            shown.append((f"{k + 1} view{'s' if k else ''}", cloud.points, cloud.normals))
+    view = draw.View.fit(cloud.points, (0.8, -0.4, -0.8), size=size, outliers=0)
+    panels += [(caption, draw.points_panel(*points, view=view, size=size)) for caption, *points in shown]
+    return draw.sheet(panels)
+
+
 def noise(table: Turntable, size):
     """Draw the noise models of sensors, and what is measured from images with the Kinect's."""
     z = np.linspace(0.5, 4.0, 60)
@@ -293,6 +311,7 @@ def worse(table: Turntable, size):
 
 
 FIGURES = {
+    "demo": demo,
     "noise": noise,
     "weak": weak,
     "anywhere": anywhere,
