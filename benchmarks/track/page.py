@@ -13,9 +13,9 @@ from track.rows import Goal, Row
 from track.table import ROWS
 
 PICTURES = {
-    "model-bunny12.png": "The bunny from 12 noisy views (Stanford 3D Scanning Repository)",
-    "model-spot12.png": "Spot from 12 noisy views (Keenan Crane)",
-    "model-teddy.png": "tum-fr3-teddy (TUM RGB-D benchmark, CC BY 4.0)",
+    "model-bunny12.webp": "The bunny from 12 noisy views (Stanford 3D Scanning Repository)",
+    "model-spot12.webp": "Spot from 12 noisy views (Keenan Crane)",
+    "model-teddy.webp": "tum-fr3-teddy (TUM RGB-D benchmark, CC BY 4.0)",
 }
 """What may be shown; the others stay in the folder of the results."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,10 @@ import numpy.typing as npt
 
 import nacre
 from nacre.rendering import View, render_points
-from nacre.report.image_files import encode_png
+from nacre.report import ModelCloud
+from nacre.report.first_view import disk_radii, first_view
+from nacre.report.image_files import encode_png, encode_small
+from nacre.report.saved_run import SavedRun
 from track.rows import Places
 
 Image = npt.NDArray[np.uint8]
@@ -23,7 +25,8 @@ COLORS = {
     "isolated": (60, 110, 230),
 }
 """Of removed pixels; where nothing was measured is black, what is kept is grey, the nearer the lighter."""
-OBLIQUE = (-0.75, -0.55, -1.0)
+
+MAX_BYTES = 60_000  # of a model's picture
 
 
 def draw_labels(depth: npt.NDArray[np.float32], camera: Any) -> Image:
@@ -82,14 +85,16 @@ def depth_images(places: Places) -> Iterator[tuple[str, npt.NDArray[np.float32],
 
 
 def draw_model(out: Path, size: tuple[int, int] = (560, 480)) -> Image | None:
-    """Return the model that a reconstruction wrote, from obliquely before it; None where there is none."""
+    """Return the model that was written to OUT, as the viewer shows it first; None where there is none."""
     if not (out / "model.ply").exists():
         return None
-    cloud = nacre.read_points(out / "model.ply")
-    spacing = json.loads((out / "report.json").read_text()).get("spacing")
-    view = View.fit(cloud.points, OBLIQUE, size=size)
+    cloud, run = nacre.read_points(out / "model.ply"), SavedRun(out)
+    model = ModelCloud(cloud.points, cloud.normals, cloud.colors, cloud.attributes["confidence"])
+    view = first_view(model, run.frames, run.camera, size)
     colors = None if cloud.colors is None else np.asarray(cloud.colors)
-    return np.asarray(render_points(cloud.points, cloud.normals, colors, view=view, spacing=spacing))[..., :3]
+    radii = disk_radii(model)
+    picture = render_points(cloud.points, cloud.normals, colors, view=view, spacing=radii, hide_reverse=True)
+    return np.asarray(picture)[..., :3]
 
 
 def write_all(places: Places, folder: Path) -> list[str]:
@@ -102,6 +107,6 @@ def write_all(places: Places, folder: Path) -> list[str]:
     for row in ("bunny12", "bunny-kinect36", "homer12", "spot12", "fandisk12", "teddy", "rpy", "dog"):
         image = draw_model(places.work / "out" / row / "nacre")
         if image is not None:
-            (folder / f"model-{row}.png").write_bytes(encode_png(np.ascontiguousarray(image)))
-            names.append(f"model-{row}.png")
+            (folder / f"model-{row}.webp").write_bytes(encode_small(image, MAX_BYTES))
+            names.append(f"model-{row}.webp")
     return names
