@@ -163,7 +163,9 @@ def draw_model(
         )
     return ModelPictures(
         main=picture("The model", main, "main", hide_reverse=bool(poses)),
-        cameras=tuple(picture(_capital(name), view, "camera") for name, view in cameras.items()),
+        cameras=tuple(
+            picture(_capital(name), view, "camera", hide_reverse=True) for name, view in cameras.items()
+        ),
         sides=tuple(picture(side.capitalize(), view, "side") for side, view in sides.items()),
         spacing=attribute("Spacing", spacing),
         confidence=confidence,
