@@ -15,7 +15,7 @@ class Lines {
 
 const centerOf = (pose) => pose.map((row) => row[3]);
 
-/** The lines of a run up to a place: its path and the true one, if it has one, and some cameras of a size, the last larger. */
+/** The lines of a run up to a place: its path, if it has one, the true one, and some cameras, the last larger. */
 function cameraLines(run, place, statusColors, size, { path, cameras }) {
   const lines = new Lines(), frames = run.frames.slice(0, place + 1);
   const posed = frames.filter((frame) => frame.pose);

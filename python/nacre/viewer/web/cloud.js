@@ -87,7 +87,7 @@ class Cloud {
           this.paint[4 * i + c] =
             kind === "colour" || (kind === "texture" && this.colors) ? this.colors[3 * i + c]
             : kind === "normal" ? 127.5 + (c ? -1 : 1) * this.normals[4 * i + c] // green up, blue towards the camera
-            : [178, 181, 184][c];
+            : [172, 175, 178][c];
         }
       }
     }

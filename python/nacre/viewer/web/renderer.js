@@ -55,7 +55,8 @@ void main() {
     z += diskRadius * (rise - 0.5 * squared);
   }
   gl_FragDepth = 0.5 + 0.5 * (clip[2][2] * z + clip[3][2]) / -z;
-  float lit = ambient + (1.0 - ambient) * 1.1 * max(dot(n, light), 0.0);
+  float wrapped = 0.5 + 0.5 * dot(n, light); // half Lambert (Mitchell et al. 2007): shape shows in the shade, too
+  float lit = ambient + (1.0 - ambient) * 1.1 * wrapped * wrapped;
   result = vec4((isPainted ? painted : shade.rgb) * lit * (isReverse ? 0.6 : 1.0), 1.0);
 }`;
 
