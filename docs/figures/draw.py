@@ -160,7 +160,7 @@ def sheet(panels: Sequence[tuple[str, np.ndarray]], columns: int | None = None):
     return np.asarray(picture)
 
 
-def save(path: Path, picture) -> None:
+def save(path: Path, picture, quality: int = 82) -> None:
     """Write a picture as WebP, which for shaded surfaces is a fifth of a PNG."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    Image.fromarray(picture).save(path, "WEBP", quality=82, method=6)
+    Image.fromarray(picture).save(path, "WEBP", quality=quality, method=6)

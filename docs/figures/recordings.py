@@ -56,7 +56,8 @@ RECORDINGS = [
 SHOWN = 6  # of them, whose screens are drawn
 LOADED = "page.clouds.length > 0 && page.clouds[0].version > 1"
 PAGE, VIEW = (1200, 657), (900, 657)  # pixels; beside the view are the viewer's tools
-WIDTH = {PAGE: 370, VIEW: 235}  # of their pictures
+WIDTH = {PAGE: 480, VIEW: 290}  # of their pictures
+QUALITY = 60  # of the files, which stay below 150 kB
 
 
 def beside(points, pose):
@@ -193,7 +194,7 @@ def main() -> None:
     cases.DATA = arguments.data
     for name in arguments.names or FIGURES:
         path = arguments.out / f"recordings-{name}.webp"
-        draw.save(path, FIGURES[name]())
+        draw.save(path, FIGURES[name](), QUALITY)
         print(f"{path}  {path.stat().st_size / 1e3:.0f} kB")
 
 
