@@ -56,7 +56,7 @@ RECORDINGS = [
 SHOWN = 6  # of them, whose screens are drawn
 LOADED = "page.clouds.length > 0 && page.clouds[0].version > 1"
 PAGE, VIEW = (1200, 657), (900, 657)  # pixels; beside the view are the viewer's tools
-WIDTH = {PAGE: 480, VIEW: 290}  # of their pictures
+WIDTH = {PAGE: 480, VIEW: 370}  # of their pictures
 QUALITY = 60  # of the files, which stay below 150 kB
 
 
