@@ -4,7 +4,7 @@ Draw the pictures of real recordings, which ask for the recordings and Open3D.
 
 ``python docs/figures/recordings.py --data FOLDER`` draws all into ``docs/images``. ``meshes``: nacre's beside
 Open3D's, from the same poses. ``surfaces``: all points of models, and those that are written. ``screens``:
-the viewer and the report as they open.
+the viewer and the report as they open. ``dog``: an object on a turntable, from its sides.
 """
 
 from __future__ import annotations
@@ -41,6 +41,7 @@ METHODS = {
 }
 SIDE, BACK = 0.2, 0.3  # of the distance: where the picture is taken, right of the camera, and behind it
 PANEL = (300, 225)
+DOG_CAMERA = nacre.Camera(640, 480, 616.87, 617.06, 319.57, 233.06)
 RECORDINGS = [
     "tum-fr3-teddy",
     "d435-t265-shelf",
@@ -181,7 +182,23 @@ def screens():
     return draw.sheet(panels, columns=2)
 
 
-FIGURES = {"meshes": meshes, "surfaces": surfaces, "screens": screens}
+def dog():
+    """Draw a toy of which six views, far apart, were joined, from four sides."""
+    folder = cases.DATA / "realsense-turntable-dog" / "data1"
+    model = nacre.Model(DOG_CAMERA, region={"object": True})
+    for i in range(6):
+        depth, color = (np.asarray(Image.open(folder / f"{kind}_{i}.png")) for kind in ("depth", "rgb"))
+        model.add_frame(depth.astype(np.float32) / 1000, color[..., :3])
+    cloud = model.cloud()
+    size, spacing = (360, 360), 1.5 * model.spacing
+    more = {"hide_reverse": True, "spacing": spacing, "size": size}
+    sides = ("front", "right", "back", "left")
+    return draw.sheet(
+        [(side, draw.points_panel(cloud.points, cloud.normals, cloud.colors, view_from=side, **more)) for side in sides]
+    )
+
+
+FIGURES = {"meshes": meshes, "surfaces": surfaces, "screens": screens, "dog": dog}
 
 
 def main() -> None:
