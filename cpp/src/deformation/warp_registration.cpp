@@ -215,17 +215,17 @@ class WarpRegistration {
       (was_matched ? gain : gain_found) += before - now;
     }
 
-    // Where most of a part matches nothing, a bend explains nothing. Some rows at its rim are matched by chance, or
-    // most that were missing by the bend. Noise may be greater than is known: the matched rows tell.
+    bool is_shown() const { return 2 * num_matched > num_rows; }
+    // Some rows at its rim are matched by chance, or most that were missing by the bend. Noise may be greater than is
+    // known: the matched rows tell.
     bool is_bent(double by_chance) const {
-      if (2 * num_matched <= num_rows) return false;
       const double noise = std::max(1.0, left / static_cast<double>(num_matched));
       return gain + (2 * num_found > num_missing ? gain_found : 0.0) > noise * by_chance;
     }
   };
 
-  // Which nodes are of parts that bend: those whose bend explains more than chance may. A part that is not in view goes
-  // with what its first node was added to.
+  // Which nodes are of parts that bend: those whose bend explains more than chance may. A part that the frame does not
+  // show goes with what its first node was added to.
   std::vector<std::uint8_t> bending(const std::vector<double>& misfits_before,
                                     const std::vector<double>& by_chance) const {
     std::vector<Evidence> parts(field_.nodes.size());
@@ -236,7 +236,7 @@ class WarpRegistration {
       const std::int32_t parent = field_.nodes[node].parents.nodes[0];
       if (part != node) {
         bends[node] = bends[part];
-      } else if (parts[node].num_rows > 0) {
+      } else if (parts[node].is_shown()) {
         bends[node] = parts[node].is_bent(by_chance[node]) ? 1 : 0;
       } else if (parent >= 0) {
         bends[node] = bends[static_cast<std::size_t>(parent)];
