@@ -12,14 +12,16 @@ the model's points; and the rigid loop on the same images. Time is the median of
 from __future__ import annotations
 
 import sys
+from typing import Any
 
 import numpy as np
+from cases import Array
 from deforming_scenes import THINGS, record
 
 import nacre
 
 SIZES = ("160x120", "320x240", "640x480")
-SPACINGS = (1.0, 0.5, 0.35)
+SPACINGS = (1.0, 0.5)
 """Of the spacing that nacre chooses."""
 NUM_FRAMES = 40
 
@@ -36,9 +38,9 @@ def time_of(model: nacre.Model) -> float:
     return float(np.median([report.milliseconds["total"] for report in model.frames[1:]]))
 
 
-def run(camera: nacre.Camera, depths: list[np.ndarray], **options: object) -> nacre.Model:
+def run(camera: nacre.Camera, depths: list[Array], **options: Any) -> nacre.Model:
     """Return a model of images."""
-    model = nacre.Model(camera, num_threads=2, **options)  # type: ignore[arg-type]
+    model = nacre.Model(camera, num_threads=2, **options)
     for depth in depths:
         model.add_frame(depth)
     return model
