@@ -158,7 +158,7 @@ TEST_CASE("what slides along itself is followed by its colours, in whatever expo
     surface.gradient.row(k) = (by_x * towards * along + by_y * Eigen::Vector3f::UnitY()).transpose();
   }
   register_warp(without.field, without.canonical, without.rows, surface, 1);
-  register_warp(with_colors.field, with_colors.canonical, with_colors.rows, surface, 1, false, colors);
+  register_warp(with_colors.field, with_colors.canonical, with_colors.rows, surface, 1, {}, colors);
   const auto error = [&](const Scene& scene) {
     const OrientedPoints moved = warped(scene.field, scene.canonical.points, scene.canonical.normals, 1);
     double sum = 0.0;
