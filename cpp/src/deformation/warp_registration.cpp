@@ -198,16 +198,12 @@ class WarpRegistration {
   struct Evidence {
     double gain = 0.0;        // of misfit, of rows that were matched before
     double gain_found = 0.0;  // and of those that are only now
-    double left = 0.0;        // misfit of matched rows
     std::int64_t num_rows = 0, num_matched = 0, num_missing = 0, num_found = 0;  // missing: before, found of those
 
     void add(double before, double now) {
       const bool is_matched = now < largest_misfit, was_matched = before < largest_misfit;
       ++num_rows;
-      if (is_matched) {
-        ++num_matched;
-        left += now;
-      }
+      num_matched += is_matched ? 1 : 0;
       if (!was_matched) {
         ++num_missing;
         num_found += is_matched ? 1 : 0;
@@ -216,11 +212,9 @@ class WarpRegistration {
     }
 
     bool is_shown() const { return 2 * num_matched > num_rows; }
-    // Some rows at its rim are matched by chance, or most that were missing by the bend. Noise may be greater than is
-    // known: the matched rows tell.
+    // Some rows at its rim are matched by chance, or most that were missing by the bend.
     bool is_bent(double by_chance) const {
-      const double noise = std::max(1.0, left / static_cast<double>(num_matched));
-      return gain + (2 * num_found > num_missing ? gain_found : 0.0) > noise * by_chance;
+      return gain + (2 * num_found > num_missing ? gain_found : 0.0) > by_chance;
     }
   };
 
