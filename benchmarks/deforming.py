@@ -73,8 +73,8 @@ class Figures:
 
 
 HEAD = (
-    "| frames | loop | tracked | RMS [mm] | worst frame | seen | its median | followed [pixels] | 95 % | complete "
-    "| points | ms |"
+    "| frames | loop | tracked | RMS [mm] | worst frame | seen | its median | followed [pixels] | 95 % "
+    "| complete | points | ms |"
 )
 
 

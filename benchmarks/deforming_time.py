@@ -5,8 +5,8 @@ Measure how the time of a frame grows with the points and nodes of what bends.
     python benchmarks/deforming_time.py
     python benchmarks/deforming_time.py pipe 640x480
 
-The things of `deforming_scenes.py` as a camera of several sizes sees them, on two threads, at several spacings of
-the model's points; and the rigid loop on the same images. Time is the median of a frame.
+The things of `deforming_scenes.py` as a camera of several sizes sees them, on two threads, at several
+spacings of the model's points; and the rigid loop on the same images. Time is the median of a frame.
 """
 
 from __future__ import annotations
@@ -59,10 +59,8 @@ def main() -> None:
             for factor in SPACINGS:
                 bent = run(camera, recording.depths, deform=True, spacing=factor * rigid.spacing)
                 nodes = bent.frames[-1].deformation.num_nodes
-                print(
-                    f"| {name} | {size} | {len(bent)} | {nodes} | {time_of(bent):.0f} | {time_of(rigid):.0f} |",
-                    flush=True,
-                )
+                times = f"{time_of(bent):.0f} | {time_of(rigid):.0f}"
+                print(f"| {name} | {size} | {len(bent)} | {nodes} | {times} |", flush=True)
 
 
 if __name__ == "__main__":

@@ -192,10 +192,11 @@ def dog():
     cloud = model.cloud()
     size, spacing = (360, 360), 1.5 * model.spacing
     more = {"hide_reverse": True, "spacing": spacing, "size": size}
-    sides = ("front", "right", "back", "left")
-    return draw.sheet(
-        [(side, draw.points_panel(cloud.points, cloud.normals, cloud.colors, view_from=side, **more)) for side in sides]
-    )
+    panels = []
+    for side in ("front", "right", "back", "left"):
+        picture = draw.points_panel(cloud.points, cloud.normals, cloud.colors, view_from=side, **more)
+        panels.append((side, picture))
+    return draw.sheet(panels)
 
 
 FIGURES = {"meshes": meshes, "surfaces": surfaces, "screens": screens, "dog": dog}

@@ -84,7 +84,8 @@ def test_what_bends_before_a_wall_bends_alone() -> None:
     )
     nodes = model.nodes_at(0)
     is_wall = nodes[:, 2] > 0.8
-    assert is_wall.any() and not is_wall.all()
+    assert is_wall.any()
+    assert not is_wall.all()
     np.testing.assert_array_equal(model.nodes_at(10)[is_wall], nodes[is_wall])
     for frame in (5, 10):
         points = in_camera(model, frame)
