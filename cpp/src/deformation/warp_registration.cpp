@@ -213,9 +213,7 @@ class WarpRegistration {
 
     bool is_shown() const { return 2 * num_matched > num_rows; }
     // Some rows at its rim are matched by chance, or most that were missing by the bend.
-    bool is_bent(double by_chance) const {
-      return gain + (2 * num_found > num_missing ? gain_found : 0.0) > by_chance;
-    }
+    bool is_bent(double by_chance) const { return gain + (2 * num_found > num_missing ? gain_found : 0.0) > by_chance; }
   };
 
   // Which nodes are of parts that bend: those whose bend explains more than chance may. A part that the frame does not
