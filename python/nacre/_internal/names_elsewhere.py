@@ -28,7 +28,7 @@ _READ_PLY = "it is nacre.read_points(path), or nacre.read_mesh(path) of a mesh"
 _WRITE_PLY = "it is nacre.write_points(path, points), or nacre.write_mesh(path, mesh) of a mesh"
 _DOWNSAMPLE_CLOUD = "it is nacre.voxel_downsample(cloud, voxel_size)"
 _CAMERA_FILE = "it is nacre.read_camera(path).camera"
-_PINHOLE = "Camera(width, height, fx, fy, cx, cy)"
+_PINHOLE = "it is nacre.Camera(width, height, fx, fy, cx, cy)"
 _FROM_MATRIX = "it is Camera.from_matrix(width, height, K)"
 _POSE = "it is target_from_source"
 
@@ -94,7 +94,7 @@ OF_PACKAGE = {
     "remove_outliers": _OUTLIERS,
     "statistical_outlier_removal": _OUTLIERS,
     "StatisticalOutlierRemoval": _OUTLIERS,
-    "PinholeCameraIntrinsic": f"it is nacre.{_PINHOLE}",
+    "PinholeCameraIntrinsic": _PINHOLE,
     "RGBDImage": "depth and colour are arrays: nacre.Model(camera).add_frame(depth, color)",
     "ScalableTSDFVolume": _FUSION,
     "UniformTSDFVolume": _FUSION,
@@ -136,7 +136,7 @@ OF_CLASS = {
         "K": "it is matrix",
         "intrinsic_matrix": "it is matrix",
         "intrinsics": "it is matrix",
-        "pinhole": f"it is {_PINHOLE}",
+        "pinhole": _PINHOLE,
         "from_intrinsics": _FROM_MATRIX,
         "from_K": _FROM_MATRIX,
         "from_json": _CAMERA_FILE,
