@@ -3,8 +3,8 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
+#include "base/disjoint_sets.hpp"
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
 #include "deformation/limits.hpp"
@@ -60,23 +60,16 @@ std::array<double, WarpBinding::blended> WarpBinding::weights(double reach) cons
 }
 
 std::vector<std::int32_t> parts_of(const WarpField& field) {
-  std::vector<std::int32_t> first(field.nodes.size());
-  std::iota(first.begin(), first.end(), 0);
-  const auto root = [&](std::int32_t node) {
-    while (first[static_cast<std::size_t>(node)] != node) {
-      std::int32_t& next = first[static_cast<std::size_t>(node)];
-      next = first[static_cast<std::size_t>(next)];
-      node = next;
-    }
-    return node;
-  };
+  DisjointSets sets(field.nodes.size());
   for (const WarpBinding& binding : field.bindings) {
     for (int k = 1; k < binding.num_blended(); ++k) {
-      const std::int32_t a = root(binding.nodes[0]), b = root(binding.nodes[static_cast<std::size_t>(k)]);
-      first[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+      sets.join(binding.nodes[0], binding.nodes[static_cast<std::size_t>(k)]);
     }
   }
-  for (std::size_t node = 0; node < first.size(); ++node) first[node] = root(static_cast<std::int32_t>(node));
+  std::vector<std::int32_t> first;
+  for (std::size_t node = 0; node < field.nodes.size(); ++node) {
+    first.push_back(sets.first_of(static_cast<std::int32_t>(node)));
+  }
   return first;
 }
 
