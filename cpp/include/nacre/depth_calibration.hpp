@@ -78,7 +78,7 @@ class DepthCalibrator {
  private:
   friend struct PrivateState;
   struct View {
-    Points blocks;  // a point for each block of pixels, NaN where there is none; camera frame
+    Values depths;  // of each block of pixels, NaN where there is none [m]
     Pose world_from_camera;
   };
   struct Pair {
@@ -99,6 +99,7 @@ class DepthCalibrator {
   double typical_depth() const;
 
   Camera camera_;
+  Eigen::Matrix<float, Eigen::Dynamic, 2, Eigen::RowMajor> rays_;  // of each block of pixels: x / z and y / z
   std::vector<View> views_;
   std::optional<Fit> fit_;
 };

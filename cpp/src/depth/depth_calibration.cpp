@@ -20,8 +20,6 @@
 namespace nacre {
 namespace {
 
-using PointBlocks = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
-
 // What the camera measures wrongly: by so much the inverse depth is tilted, the scene too narrow, and depth measured
 // along the rays.
 struct Distortion {
@@ -64,70 +62,79 @@ struct BlockGrid {
   }
 };
 
-// One point for each block of pixels, from the means of their rays and of their inverse depths.
-Points average(const DepthRef& depth, const Camera& camera) {
+using BlockRays = Eigen::Matrix<float, Eigen::Dynamic, 2, Eigen::RowMajor>;
+
+// The means of the pixels' rays, x / z and y / z.
+BlockRays mean_rays(const Camera& camera) {
   const BlockGrid grid(camera);
-  Points blocks = Points::Constant(grid.size(), 3, std::numeric_limits<float>::quiet_NaN());
+  BlockRays means(grid.size(), 2);
   const double pixels = static_cast<double>(grid.side) * grid.side;
   for (int row = 0; row < grid.rows; ++row) {
     for (int column = 0; column < grid.columns; ++column) {
-      double x = 0.0, y = 0.0, inverse = 0.0;
+      Eigen::RowVector2d sum = Eigen::RowVector2d::Zero();
       for (int v = row * grid.side; v < (row + 1) * grid.side; ++v) {
         const simd::RayRow rays = camera.ray_table().row(v);
         for (int u = column * grid.side; u < (column + 1) * grid.side; ++u) {
-          x += static_cast<double>(rays.x[u]);
-          y += static_cast<double>(rays.y != nullptr ? rays.y[u] : rays.row_y);
+          sum += Eigen::RowVector2f(rays.x[u], rays.y != nullptr ? rays.y[u] : rays.row_y).cast<double>();
+        }
+      }
+      means.row(static_cast<Eigen::Index>(row) * grid.columns + column) = (sum / pixels).cast<float>();
+    }
+  }
+  return means;
+}
+
+// The depths that belong to the means of the pixels' inverse depths; NaN where a pixel has none.
+Values mean_depths(const DepthRef& depth, const Camera& camera) {
+  const BlockGrid grid(camera);
+  Values means = Values::Constant(grid.size(), std::numeric_limits<float>::quiet_NaN());
+  const double pixels = static_cast<double>(grid.side) * grid.side;
+  for (int row = 0; row < grid.rows; ++row) {
+    for (int column = 0; column < grid.columns; ++column) {
+      double inverse = 0.0;
+      for (int v = row * grid.side; v < (row + 1) * grid.side; ++v) {
+        for (int u = column * grid.side; u < (column + 1) * grid.side; ++u) {
           inverse += 1.0 / static_cast<double>(depth(v, u));
         }
       }
-      if (!(std::isfinite(inverse) && inverse > 0.0 && std::isfinite(x))) continue;
-      const double z = pixels / inverse;
-      blocks.row(static_cast<Eigen::Index>(row) * grid.columns + column) =
-          Eigen::RowVector3d(x / pixels * z, y / pixels * z, z).cast<float>();
+      if (!(std::isfinite(inverse) && inverse > 0.0)) continue;
+      means(static_cast<Eigen::Index>(row) * grid.columns + column) = static_cast<float>(pixels / inverse);
     }
   }
-  return blocks;
+  return means;
 }
 
-// A measured point without the tilt (1 / z less tilt * x / z), nearer by a power of its ray's length, and stretched
-// across the axis.
-Eigen::Vector3d corrected(const Points& points, Eigen::Index i, const Distortion& distortion) {
-  Eigen::Vector3d result = points.row(i).transpose().cast<double>();
-  result *= std::exp(-distortion.radial * log_ray_length(result)) / (1.0 - distortion.tilt * result.x());
-  result.head<2>() *= distortion.stretch;
-  return result;
-}
-
-// A view without a distortion. Of the blocks of pixels normals are kept; points, of which a quarter is asked for, are
-// not.
+// A view without a distortion, worked out where it is asked; NaN where a block has no depth or no ray.
 class CorrectedView {
  public:
-  CorrectedView() = default;
-  CorrectedView(const Points& blocks, const Distortion& distortion, const BlockGrid& grid)
-      : blocks_(&blocks), distortion_(distortion), normals_(blocks.rows(), 3) {
-    normals_.setConstant(std::numeric_limits<double>::quiet_NaN());
-    PointBlocks points(blocks.rows(), 3);
-    for (Eigen::Index i = 0; i < points.rows(); ++i) points.row(i) = point(i);
-    for (int row = 1; row + 1 < grid.rows; ++row) {
-      for (int column = 1; column + 1 < grid.columns; ++column) {
-        const Eigen::Index i = static_cast<Eigen::Index>(row) * grid.columns + column;
-        const Eigen::RowVector3d across = points.row(i + 1) - points.row(i - 1);
-        const Eigen::RowVector3d down = points.row(i + grid.columns) - points.row(i - grid.columns);
-        const double step = std::max(std::abs(across.z()), std::abs(down.z()));
-        if (!(step <= depth_limits::largest_block_step * points(i, 2))) continue;
-        normals_.row(i) = down.cross(across).normalized();
-      }
-    }
+  CorrectedView(const Values& depths, const BlockRays& rays, const BlockGrid& grid, const Distortion& distortion)
+      : depths_(depths), rays_(rays), grid_(grid), distortion_(distortion) {}
+
+  // Without the tilt (1 / z less tilt * x / z), nearer by a power of its ray's length, and stretched across the axis.
+  Eigen::Vector3d point(Eigen::Index i) const {
+    const double z = static_cast<double>(depths_(i));
+    Eigen::Vector3d result(static_cast<double>(rays_(i, 0)) * z, static_cast<double>(rays_(i, 1)) * z, z);
+    const double nearer = distortion_.radial == 0.0 ? 1.0 : std::exp(-distortion_.radial * log_ray_length(result));
+    result *= nearer / (1.0 - distortion_.tilt * result.x());
+    result.head<2>() *= distortion_.stretch;
+    return result;
+  }
+  // From the neighbours to all sides, towards the camera; NaN beside steps and at the image's border.
+  Eigen::Vector3d normal(Eigen::Index i) const {
+    const Eigen::Index row = i / grid_.columns, column = i % grid_.columns;
+    const Eigen::Vector3d none = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+    if (!(row > 0 && row + 1 < grid_.rows && column > 0 && column + 1 < grid_.columns)) return none;
+    const Eigen::Vector3d across = point(i + 1) - point(i - 1);
+    const Eigen::Vector3d down = point(i + grid_.columns) - point(i - grid_.columns);
+    const double step = std::max(std::abs(across.z()), std::abs(down.z()));
+    return step <= depth_limits::largest_block_step * point(i).z() ? down.cross(across).normalized() : none;
   }
 
-  Eigen::Vector3d point(Eigen::Index i) const { return corrected(*blocks_, i, distortion_); }
-  // From the neighbours to all sides, towards the camera; NaN beside steps.
-  Eigen::Vector3d normal(Eigen::Index i) const { return normals_.row(i); }
-
  private:
-  const Points* blocks_ = nullptr;
+  const Values& depths_;
+  const BlockRays& rays_;
+  BlockGrid grid_;
   Distortion distortion_;
-  PointBlocks normals_;
 };
 
 // What a pair of views says of tilt, stretch and depth along the rays beside their relative pose.
@@ -255,7 +262,10 @@ DepthImage correct_depth(const DepthRef& depth, const Camera& camera, double til
   return result;
 }
 
-DepthCalibrator::DepthCalibrator(const Camera& camera) : camera_(camera) { require_calibrable(camera); }
+DepthCalibrator::DepthCalibrator(const Camera& camera) : camera_(camera) {
+  require_calibrable(camera);
+  rays_ = mean_rays(camera);
+}
 
 std::int64_t DepthCalibrator::num_blocks() const { return BlockGrid(camera_).size(); }
 
@@ -270,7 +280,7 @@ bool DepthCalibrator::add(const DepthRef& depth, const Pose& world_from_camera) 
   require_camera_size("depth", depth.rows(), depth.cols(), camera_);
   require_rigid(world_from_camera, "world_from_camera");
   if (!is_new_direction(world_from_camera) || has_enough()) return false;
-  views_.push_back({average(depth, camera_), world_from_camera});
+  views_.push_back({mean_depths(depth, camera_), world_from_camera});
   return true;
 }
 
@@ -323,7 +333,7 @@ DepthCalibrator::Fit DepthCalibrator::begun() const {
 // The median of the first view.
 double DepthCalibrator::typical_depth() const {
   std::vector<double> depths;
-  for (const float z : views_.front().blocks.col(2)) {
+  for (const float z : views_.front().depths) {
     if (std::isfinite(z)) depths.push_back(static_cast<double>(z));
   }
   return depths.empty() ? 0.0 : median_of(depths);
@@ -333,17 +343,15 @@ double DepthCalibrator::typical_depth() const {
 DepthCalibration DepthCalibrator::iterate(Fit& fit, int num_threads) const {
   fit.is_done = true;
   const Distortion distortion{fit.tilt, fit.stretch, fit.radial};
-  std::vector<CorrectedView> views(views_.size());
-  parallel_for(num_views(), 1, num_threads, [&](std::int64_t k) {
-    const auto i = static_cast<std::size_t>(k);
-    views[i] = CorrectedView(views_[i].blocks, distortion, BlockGrid(camera_));
-  });
+  const BlockGrid grid(camera_);
+  const auto view = [&](std::int32_t i) {
+    return CorrectedView(views_[static_cast<std::size_t>(i)].depths, rays_, grid, distortion);
+  };
   std::vector<std::optional<PairFit>> fits(fit.pairs.size());
   parallel_for(static_cast<std::int64_t>(fits.size()), 1, num_threads, [&](std::int64_t k) {
     const Pair& pair = fit.pairs[static_cast<std::size_t>(k)];
     fits[static_cast<std::size_t>(k)] =
-        linearise(views[static_cast<std::size_t>(pair.first)], views[static_cast<std::size_t>(pair.second)],
-                  pair.motion, distortion.stretch, camera_);
+        linearise(view(pair.first), view(pair.second), pair.motion, distortion.stretch, camera_);
     if (fits[static_cast<std::size_t>(k)] && !fit.asks_radial) hold_radial(*fits[static_cast<std::size_t>(k)]);
   });
   DepthCalibration result;
@@ -399,21 +407,19 @@ void DepthCalibrator::set_poses(const std::vector<Pose>& world_from_camera) {
 
 std::vector<Pose> DepthCalibrator::correct(double tilt, int num_threads) {
   fit_.reset();
-  std::vector<CorrectedView> views(views_.size());
-  parallel_for(num_views(), 1, num_threads, [&](std::int64_t k) {
-    const auto i = static_cast<std::size_t>(k);
-    views[i] = CorrectedView(views_[i].blocks, {tilt}, BlockGrid(camera_));
-  });
+  const BlockGrid grid(camera_);
+  const auto straight = [&](const View& view) { return CorrectedView(view.depths, rays_, grid, {tilt}); };
   std::vector<Pose> motions(views_.size(), Pose::Identity());
   parallel_for(num_views() - 1, 1, num_threads, [&](std::int64_t k) {
     const auto i = static_cast<std::size_t>(k);
     Pose motion = views_[i].world_from_camera.inverse() * views_[i + 1].world_from_camera;
-    const std::optional<PairFit> fit = linearise(views[i], views[i + 1], motion, 1.0, camera_);
+    const std::optional<PairFit> fit = linearise(straight(views_[i]), straight(views_[i + 1]), motion, 1.0, camera_);
     motions[i + 1] = fit ? followed(motion, *fit, {0.0, 0.0, 0.0, 1.0}) : motion;
   });
   for (View& view : views_) {
-    for (Eigen::Index i = 0; i < view.blocks.rows(); ++i) {
-      view.blocks.row(i) = corrected(view.blocks, i, {tilt}).cast<float>();
+    const CorrectedView corrected = straight(view);
+    for (Eigen::Index i = 0; i < view.depths.size(); ++i) {
+      view.depths(i) = static_cast<float>(corrected.point(i).z());
     }
   }
   std::vector<Pose> poses;

@@ -8,7 +8,6 @@
 
 #include "base/check.hpp"
 #include "base/concatenate.hpp"
-#include "base/kept_rows.hpp"
 #include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "base/pose_check.hpp"
@@ -125,20 +124,6 @@ KnownSurface update(PointModel& model, const std::vector<PointRange>& ranges, co
 }
 
 }  // namespace
-
-void PointModel::keep(const std::vector<std::uint8_t>& flags) {
-  const std::vector<KeptRun> runs = runs_of(flags);
-  keep_runs(points, runs);
-  keep_runs(normals, runs);
-  keep_runs(colors, runs);
-  for (PointAttribute& attribute : attributes) {
-    keep_runs(attribute.values, runs, static_cast<std::size_t>(attribute.num_channels));
-  }
-  keep_runs(confidence, runs);
-  keep_runs(last_seen, runs);
-  keep_runs(observations, runs);
-  keep_runs(free_space_violations, runs);
-}
 
 void FusionOptions::check() const {
   require(support >= 0.0, "support", "0 (automatic) or a positive distance in metres", support);

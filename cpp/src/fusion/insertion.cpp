@@ -9,6 +9,7 @@
 #include "camera/point_spacing.hpp"
 #include "fusion/exposure.hpp"
 #include "fusion/limits.hpp"
+#include "fusion/point_arrays.hpp"
 #include "fusion/same_surface.hpp"
 
 namespace nacre {
@@ -127,6 +128,7 @@ std::int64_t insert_points(PointModel& model, KnownSurface known, const Register
     known.covered.insert(candidate.cover);
     if (is_known[k] != 0 || is_near(points, candidate)) continue;
     points.add(candidate.row, model.points.size());
+    make_room(model, model.points.size() + 1);
     model.points.push_back(candidate.point);
     model.normals.push_back(candidate.normal);
     if (with_colors) model.colors.push_back(candidate.color);

@@ -23,6 +23,7 @@ constexpr std::size_t exposure_blocks = 8;  // [blocks] budget: of points, one o
 constexpr std::size_t least_exposure_points = 100;  // [points] derived: whose median ratio is sure to a tenth of their scatter; test_exposure
 constexpr float darkest_color = 16.0F;  // [grey levels] derived: below it rounding is more than 3 %; test_exposure
 constexpr float brightest_color = 239.0F;  // [grey levels] derived: as far from the other end, where sensors saturate; test_exposure
+constexpr std::size_t points_per_free = 4;  // [1] budget: of a model, for each that there is room for beside them; test_point_arrays
 constexpr double behind_sigmas = 12.0;  // [sigma] derived: behind all that is measured nothing is said of a point: noise_sigmas twice, and as much again; test_block_index
 constexpr double behind_spacings = 4.0;  // [spacing] derived: likewise: more than surface_spacings; test_block_index
 constexpr double behind_pixels = 12.0;  // [pixels] derived: likewise: largest_support twice, and as much again; test_block_index

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "fusion/correction.hpp"
+#include "fusion/point_arrays.hpp"
 #include "model/checkpoint/fields.hpp"
 #include "model/checkpoint/surface_check.hpp"
 #include "model/limits.hpp"
@@ -78,10 +79,13 @@ const std::vector<float>& values_of_attribute(const PointModel& points, const st
 void insert_points(PointModel& model, const std::vector<PlacedPoints>& parts) {
   const float not_known = std::numeric_limits<float>::quiet_NaN();
   bool with_colors = !model.colors.empty();
+  std::size_t num_points = model.points.size();
   for (const PlacedPoints& part : parts) {
+    num_points += part.points.points.size();
     with_colors = with_colors || !part.points.colors.empty();
     append_range(model, part.points, 0, 0);  // its attributes
   }
+  make_room(model, num_points);
   for (PointAttribute& attribute : model.attributes) {
     const auto values_of = [&](const PointModel& points) -> const auto& {
       return values_of_attribute(points, attribute.name);
@@ -277,6 +281,7 @@ void ParkedPoints::take_out(PointModel& model, BlockIndex& blocks, const std::ve
   parcels_ = std::move(parcels);
   blocks.set_gaps(std::move(gaps));
   model.keep(flags);
+  give_back_room(model);
   blocks.keep(flags);
 }
 

@@ -263,7 +263,7 @@ bool PrivateState::is_sound(const DepthCalibrator& calibrator) {
     }
   }
   return std::all_of(views.begin(), views.end(),
-                     [&](const DepthCalibrator::View& view) { return view.blocks.rows() == calibrator.num_blocks(); });
+                     [&](const DepthCalibrator::View& view) { return view.depths.size() == calibrator.num_blocks(); });
 }
 
 bool PrivateState::is_sound(const ConfidenceNoise& noise) {

@@ -91,7 +91,7 @@ struct PrivateState {
 
   template <class Archive>
   static void exchange(Archive& archive, DepthCalibrator::View& view) {
-    archive(view.blocks, view.world_from_camera);
+    archive(view.depths, view.world_from_camera);
   }
   template <class Archive>
   static void exchange(Archive& archive, DepthCalibrator::Pair& pair) {
