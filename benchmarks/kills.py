@@ -2,6 +2,7 @@
 Kill ``nacre reconstruct`` at random moments, resume it, and compare what comes out with an undisturbed run.
 
     python benchmarks/kills.py --kills 300
+    python benchmarks/kills.py --kills 60 --along-wall  # points leave memory, and come back
 
 A small recording is simulated (with colours, frames that see nothing and frames that are only found at the
 end), and run once undisturbed. Then runs are begun, killed with SIGKILL after a random time, resumed, killed
@@ -35,22 +36,41 @@ from nacre.reconstruction.journal import read_journal
 
 NACRE = "from nacre.cli import main; main()"
 PLAIN = "import nacre.report; nacre.report.render_page = lambda data: '<html></html>'; " + NACRE
+CAMERA = nacre.Camera(128, 96, 105.0, 105.0, 63.5, 47.5)
 CADENCES = ((), ("--checkpoint-every", "1"), ("--checkpoint-every", "4"), ("--checkpoint-every", "0"))
 
 
 def simulate(folder: Path, views: int) -> None:
     """Write a recording of an object on a turntable."""
     mesh = nacre.built_in_object()
-    camera = nacre.Camera(128, 96, 105.0, 105.0, 63.5, 47.5)
     poses = nacre.turntable_poses(mesh, 36, np.radians(10))
     order = [*range(views - 4), 18, 19, *range(views - 4, views - 1)]  # the other side comes too early
     depth = [mesh.simulate_depth(camera, poses[i], noise=0.0003, seed=i) for i in order]
     depth[5] = np.full_like(depth[5], np.nan)
     colors = [np.repeat((np.nan_to_num(d) * 200).astype(np.uint8)[..., None], 3, axis=2) for d in depth]
     write_recording(
-        folder, camera, depth, depth_scale=20000, colors=colors, poses=[poses[i] for i in order],
+        folder, CAMERA, depth, depth_scale=20000, colors=colors, poses=[poses[i] for i in order],
         timestamps=[0.1 * i for i in range(len(order))],
     )  # fmt: skip
+
+
+def simulate_wall(folder: Path, views: int) -> None:
+    """Write a recording of a camera that goes along a wall in relief, and back."""
+    step, size = 0.25, 0.02  # [m] of the camera, of a square of the wall
+    x, y = np.mgrid[-1 : views * step / 2 + 1 : size, -0.8:0.8:size]
+    waves = np.random.default_rng(3).uniform([-9, -9, 0], [9, 9, 2 * np.pi], (12, 3))
+    z = 1 + 0.05 * np.sin(np.tensordot(waves, [x, y, np.ones_like(x)], axes=1)).sum(axis=0)
+    index = np.arange(x.size).reshape(x.shape)
+    corner, right, below, opposite = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
+    triangles = [
+        np.stack(half, axis=-1).reshape(-1, 3)
+        for half in ([corner, right, below], [below, right, opposite])
+    ]
+    mesh = nacre.Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), np.concatenate(triangles))
+    poses = np.tile(np.eye(4), (views, 1, 1))
+    poses[:, 0, 3] = step * np.minimum(np.arange(views), views - np.arange(views))
+    depth = [mesh.simulate_depth(CAMERA, pose, noise=0.0005, seed=i) for i, pose in enumerate(poses)]
+    write_recording(folder, CAMERA, depth, depth_scale=20000, poses=list(poses))
 
 
 def start(log: Path, program: str, *arguments: str | Path) -> subprocess.Popen[bytes]:
@@ -108,7 +128,8 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--kills", type=int, default=300)
-    parser.add_argument("--views", type=int, default=24)
+    parser.add_argument("--views", type=int, help="default 24, along a wall 60")
+    parser.add_argument("--along-wall", action="store_true", help="a recording of which points leave memory")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument(
         "--plain-page", action="store_true", help="report.html without its pictures: much faster"
@@ -116,12 +137,18 @@ def main() -> None:
     arguments = parser.parse_args()
     program = PLAIN if arguments.plain_page else NACRE
     chance = random.Random(arguments.seed)
+    options: tuple[str, ...]
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         recording, log = folder / "recording", folder / "log.txt"
-        simulate(recording, arguments.views)
+        if arguments.along_wall:
+            simulate_wall(recording, arguments.views or 60)
+            options = ("--set", "max_points=8000")
+        else:
+            simulate(recording, arguments.views or 24)
+            options = ()
         begin = time.monotonic()
-        process = start(log, program, "reconstruct", recording, "-o", folder / "undisturbed")
+        process = start(log, program, "reconstruct", recording, "-o", folder / "undisturbed", *options)
         while process.poll() is None and not (folder / "undisturbed" / "model.ply").exists():
             time.sleep(0.01)
         frames_took = time.monotonic() - begin
@@ -138,7 +165,7 @@ def main() -> None:
         while num_kills < arguments.kills:
             out = folder / f"out{num_runs}"
             cadence = CADENCES[num_runs % len(CADENCES)]
-            command: tuple[str | Path, ...] = ("reconstruct", recording, "-o", out, *cadence)
+            command: tuple[str | Path, ...] = ("reconstruct", recording, "-o", out, *options, *cadence)
             num_before = num_saved = 0
             while True:
                 process = start(log, program, *command)

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "base/free_memory.hpp"
 #include "fusion/correction.hpp"
 #include "fusion/point_arrays.hpp"
 #include "model/checkpoint/fields.hpp"
@@ -283,6 +284,7 @@ void ParkedPoints::take_out(PointModel& model, BlockIndex& blocks, const std::ve
   model.keep(flags);
   give_back_room(model);
   blocks.keep(flags);
+  give_back_free_memory();
 }
 
 void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vector<ViewVolume>& volumes) {
