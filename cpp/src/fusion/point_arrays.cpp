@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/free_memory.hpp"
 #include "base/kept_rows.hpp"
 #include "fusion/limits.hpp"
 
@@ -36,6 +37,7 @@ void give_back_room(PointModel& model) {
     smaller.assign(values.begin(), values.end());
     values = std::move(smaller);
   });
+  give_back_free_memory();
 }
 
 }  // namespace nacre

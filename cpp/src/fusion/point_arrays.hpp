@@ -25,7 +25,8 @@ void for_each_array(PointModel& model, Visit&& visit) {
 // Room for so many points and some more, where there is less: arrays that double would be half empty.
 void make_room(PointModel& model, std::size_t num_points);
 
-// Leaves the arrays no more room than make_room would.
+// Leaves the arrays no more room than make_room would, and the system what is free: for moments after which there are
+// fewer points.
 void give_back_room(PointModel& model);
 
 }  // namespace nacre

@@ -89,6 +89,7 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
     };
     RelocalisationPlaces elsewhere = std::exchange(prior.elsewhere, {});
     prior.elsewhere.beside = elsewhere.beside;
+    prior.elsewhere.beside_if_open = elsewhere.beside_if_open;
     for (double factor = noise_factor; factor <= tracking_limits::largest_noise_factor && !is_found(); factor *= 2.0) {
       set_noise_factor(factor);
       result = track(current, target, prior, odometry, hypothesis, nearby);
@@ -154,6 +155,7 @@ std::vector<Pose> Pipeline::key_poses() const {
 RelocalisationPlaces Pipeline::elsewhere(const RegionReport& region_report, bool may_search) const {
   RelocalisationPlaces places;
   places.beside = options.relocalise && (!may_search || (!was_lost() && !jumped()));
+  places.beside_if_open = num_open % model_limits::search_interval == 0;
   if (!options.relocalise || !may_search) return places;
   places.views = &views;
   places.view_of_frame = [&] { return view_of_object(region_report); };

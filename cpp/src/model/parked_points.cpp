@@ -6,7 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "base/free_memory.hpp"
 #include "fusion/correction.hpp"
 #include "fusion/point_arrays.hpp"
 #include "model/checkpoint/fields.hpp"
@@ -282,9 +281,8 @@ void ParkedPoints::take_out(PointModel& model, BlockIndex& blocks, const std::ve
   parcels_ = std::move(parcels);
   blocks.set_gaps(std::move(gaps));
   model.keep(flags);
-  give_back_room(model);
   blocks.keep(flags);
-  give_back_free_memory();
+  give_back_room(model);
 }
 
 void ParkedPoints::recall(PointModel& model, BlockIndex& blocks, const std::vector<ViewVolume>& volumes) {

@@ -19,6 +19,7 @@
 #include "fusion/attribute_fusion.hpp"
 #include "fusion/correction.hpp"
 #include "fusion/fuse.hpp"
+#include "fusion/point_arrays.hpp"
 #include "model/limits.hpp"
 #include "model/object_views.hpp"
 #include "model/stopwatch.hpp"
@@ -147,6 +148,7 @@ FrameReport Pipeline::add_worked_on(const DepthRef& depth, const FrameExtras& ex
     odometry.end_frame(report.status, report.world_from_camera, report.weak_directions);
     const bool is_lost = report.status == FrameStatus::lost && history.num_registered() > 0;
     num_lost = is_lost ? num_lost + 1 : 0;
+    num_open = report.status == FrameStatus::weak ? num_open + 1 : 0;
     num_vain = is_lost ? num_vain + (frame.valid.size() >= base_limits::least_points) : 0;
     report.num_points = num_points();
     report.spacing = spacing;
@@ -354,6 +356,7 @@ void Pipeline::close_loops(const TrackingResult& tracking, bool is_given, FrameR
   });
   blocks.keep(kept);
   blocks.renew(cloud);
+  give_back_room(cloud);
   parked.forget_violations();
   for (ObjectView& view : views) {
     view.world_from_camera = loop.corrections[static_cast<std::size_t>(view.frame)] * view.world_from_camera;

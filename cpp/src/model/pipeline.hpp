@@ -65,6 +65,7 @@ struct Pipeline {
   double spacing = 0.0;
   std::int64_t num_lost = 0;             // frames in a row, up to the newest
   std::int64_t num_vain = 0;             // of them, those that showed something
+  std::int64_t num_open = 0;             // frames in a row that left directions open
   std::string torn;                      // why the newest frame is part of the model in part alone
   std::vector<StartFrame> start_frames;  // while the model holds one frame: the newest that may begin another
   bool is_trial = false;                 // whether the third frame is to confirm the first two

@@ -216,7 +216,9 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     try_guesses(registration, prior, best);
     best.is_to_whole_model = true;
   }
-  if (prior.elsewhere.beside && registration.may_be_beside(best, prior.guesses.front())) {
+  const bool looks_beside =
+      prior.elsewhere.beside && (best.decision != Decision::undetermined || prior.elsewhere.beside_if_open);
+  if (looks_beside && registration.may_be_beside(best, prior.guesses.front())) {
     try_beside(registration, now.noise_factor, prior, options, best);
     if (best.is_lost()) {
       if (const auto only = only_near(prior, options, target.usual)) return *only;

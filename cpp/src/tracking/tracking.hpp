@@ -19,7 +19,8 @@ struct RelocalisationPlaces {
   std::function<std::optional<Pose>()> by_keypoints;         // of earlier views, likewise
   std::function<std::vector<Pose>()> key_poses;              // and around them, likewise
   bool everywhere = false;
-  bool beside = false;  // the last guess
+  bool beside = false;         // the last guess
+  bool beside_if_open = true;  // there also where the guesses explain the frame, but leave directions open
 };
 
 // What is known of the camera before the frame is registered.
