@@ -17,7 +17,7 @@ from nacre.io.octree import CELLS_PER_SIDE, Cube, Key, Records, nodes
 SUFFIX = ".copc.laz"
 
 _INFO = struct.Struct("<5d2Q2d88x")  # centre, half side, spacing; hierarchy: place, bytes; times
-_ENTRY = struct.Struct("<4iQ2i")  # key, place, bytes, points
+ENTRY = struct.Struct("<4iQ2i")  # key, place, bytes, points
 _EXTENDED_RECORD = struct.Struct("<2x16sHQ32s")
 _NODES_AT_ONCE = 32  # which threads compress
 
@@ -115,7 +115,7 @@ def _entries(keys: list[Key], table: list[tuple[int, int]], place: int) -> Itera
     told: set[Key] = set()
     for key, (num_points, num_bytes) in zip(keys, table, strict=True):
         told.add(key)
-        yield _ENTRY.pack(*key, place, num_bytes, num_points)
+        yield ENTRY.pack(*key, place, num_bytes, num_points)
         place += num_bytes
     for key in keys:
         level, x, y, z = key
@@ -124,4 +124,4 @@ def _entries(keys: list[Key], table: list[tuple[int, int]], place: int) -> Itera
             if (level, x, y, z) in told:
                 break
             told.add((level, x, y, z))
-            yield _ENTRY.pack(level, x, y, z, 0, 0, 0)
+            yield ENTRY.pack(level, x, y, z, 0, 0, 0)

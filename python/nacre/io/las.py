@@ -22,8 +22,8 @@ from nacre.io.cloud import Cloud, Columns, native
 from nacre.io.raw import require_regular
 
 _MISSING = 'LAS and LAZ files need laspy and lazrs: pip install "nacre[las]"'
-_NORMALS = ("NormalX", "NormalY", "NormalZ")  # as the Point Data Abstraction Library names them
-_COLORS = ("red", "green", "blue")
+NORMALS = ("NormalX", "NormalY", "NormalZ")  # as the Point Data Abstraction Library names them
+COLORS = ("red", "green", "blue")
 _POINTS_PER_CHUNK = 1_000_000
 _HEADER = struct.Struct("<96xIIBHI116x")  # data offset, number of records, point format, bytes and number
 _RECORD_BYTES = 54  # of a variable length record, at least
@@ -45,9 +45,9 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
     """
     with _opened(path) as reader:
         chunks = list(reader.chunk_iterator(_POINTS_PER_CHUNK))
-        is_wide = any(map(_is_wide, chunks))
+        is_wide = any(map(has_wide_colors, chunks))
         names = list(reader.header.point_format.dimension_names)
-        cloud = _cloud_of(Path(path), chunks, names, is_wide, keep_all=False)
+        cloud = cloud_of(Path(path), chunks, names, is_wide, keep_all=False)
     _check_count(path, len(cloud), reader.header.point_count)
     return cloud
 
@@ -60,8 +60,14 @@ def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud]:
         names = list(reader.header.point_format.dimension_names)
         for chunk in reader.chunk_iterator(num_rows):
             num_read += len(chunk)
-            yield _cloud_of(Path(path), [chunk], names, is_wide, keep_all=True)
+            yield cloud_of(Path(path), [chunk], names, is_wide, keep_all=True)
     _check_count(path, num_read, reader.header.point_count)
+
+
+def count_points(path: str | os.PathLike[str]) -> int:
+    """Return how many points the header promises."""
+    with _opened(path) as reader:
+        return int(reader.header.point_count)
 
 
 def default_of(name: str) -> int:
@@ -72,20 +78,26 @@ def default_of(name: str) -> int:
 @contextmanager
 def _opened(path: str | os.PathLike[str]) -> Iterator[Any]:
     """Open a file; what laspy and lazrs raise while it is read becomes a FileFormatError."""
-    laspy = _import_laspy()
+    laspy = import_laspy()
     size = require_regular(path).stat().st_size
     with Path(path).open("rb") as stream:
-        _check_header(path, stream, size)
+        check_header(path, stream, size)
         stream.seek(0)
-        try:
-            with laspy.open(stream, closefd=False, read_evlrs=False) as reader:
-                yield reader
-        except (MemoryError, OSError, GeneratorExit):
+        with readable(path), laspy.open(stream, closefd=False, read_evlrs=False) as reader:
+            yield reader
+
+
+@contextmanager
+def readable(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Make a FileFormatError of what laspy and lazrs raise."""
+    try:
+        yield
+    except (MemoryError, OSError, GeneratorExit, FileFormatError):
+        raise
+    except BaseException as error:  # of laspy, and of lazrs, which panics
+        if isinstance(error, KeyboardInterrupt | SystemExit):
             raise
-        except BaseException as error:  # of laspy, and of lazrs, which panics
-            if isinstance(error, KeyboardInterrupt | SystemExit):
-                raise
-            raise FileFormatError(path, f"not a readable LAS file: {error}", offset=0) from error
+        raise FileFormatError(path, f"not a readable LAS file: {error}", offset=0) from error
 
 
 def _check_count(path: str | os.PathLike[str], found: int, expected: int) -> None:
@@ -94,7 +106,7 @@ def _check_count(path: str | os.PathLike[str], found: int, expected: int) -> Non
         raise FileFormatError(path, reason, offset=Path(path).stat().st_size)
 
 
-def _check_header(path: str | os.PathLike[str], stream: BinaryIO, size: int) -> None:
+def check_header(path: str | os.PathLike[str], stream: BinaryIO, size: int) -> None:
     """Refuse a header whose tables cannot be in the file, before memory and time are spent on them."""
     header = stream.read(_HEADER.size)
     if not header.startswith(b"LASF") or len(header) < _HEADER.size:
@@ -127,7 +139,7 @@ def _check_chunk_table(path: str | os.PathLike[str], stream: BinaryIO, start: in
         raise FileFormatError(path, f"{num_chunks} chunks are promised in {size} bytes", offset=max(place, 0))
 
 
-def _cloud_of(path: Path, chunks: list[Any], names: list[str], is_wide: bool, *, keep_all: bool) -> Cloud:
+def cloud_of(path: Path, chunks: list[Any], names: list[str], is_wide: bool, *, keep_all: bool) -> Cloud:
     def column(name: str) -> npt.NDArray[Any]:
         parts = [np.asarray(chunk[name]) for chunk in chunks]
         return native(np.concatenate(parts)) if parts else np.zeros(0)
@@ -135,13 +147,13 @@ def _cloud_of(path: Path, chunks: list[Any], names: list[str], is_wide: bool, *,
     points = np.column_stack([column(axis) for axis in "xyz"]).astype(np.float64).reshape(-1, 3)
     normals, colors = None, None
     used = {"X", "Y", "Z"}
-    if set(_NORMALS) <= set(names):
-        normals = np.column_stack([column(name) for name in _NORMALS])
-        used.update(_NORMALS)
-    if set(_COLORS) <= set(names):
-        stored = np.column_stack([column(name) for name in _COLORS]).astype(np.uint16)
+    if set(NORMALS) <= set(names):
+        normals = np.column_stack([column(name) for name in NORMALS])
+        used.update(NORMALS)
+    if set(COLORS) <= set(names):
+        stored = np.column_stack([column(name) for name in COLORS]).astype(np.uint16)
         colors = (stored >> (8 * is_wide)).astype(np.uint8)
-        used.update(_COLORS)
+        used.update(COLORS)
     attributes: Columns = {}
     for name in (name for name in names if name not in used):
         values = column(name)
@@ -150,18 +162,18 @@ def _cloud_of(path: Path, chunks: list[Any], names: list[str], is_wide: bool, *,
     return Cloud(points, normals, colors, attributes, path=path)
 
 
-def _is_wide(chunk: Any) -> bool:
+def has_wide_colors(chunk: Any) -> bool:
     """Say whether colours fill 16 bits: some programs store 8."""
     names = set(chunk.point_format.dimension_names)
-    return set(_COLORS) <= names and any(np.asarray(chunk[name]).max(initial=0) > 255 for name in _COLORS)
+    return set(COLORS) <= names and any(np.asarray(chunk[name]).max(initial=0) > 255 for name in COLORS)
 
 
 def _any_is_wide(path: str | os.PathLike[str], num_rows: int) -> bool:
     """Say the same of a whole file, of which mostly the first points tell it."""
     with _opened(path) as reader:
-        if not set(_COLORS) <= set(reader.header.point_format.dimension_names):
+        if not set(COLORS) <= set(reader.header.point_format.dimension_names):
             return False
-        return any(map(_is_wide, reader.chunk_iterator(num_rows)))
+        return any(map(has_wide_colors, reader.chunk_iterator(num_rows)))
 
 
 def write_cloud(
@@ -183,7 +195,7 @@ def write_chunks(
     path: str | os.PathLike[str], chunks: Iterable[Cloud], num_points: int, extremes: arrays.FloatArray
 ) -> None:
     """Write pieces of a cloud, all with the same fields, within the bounds of ``extremes``, as one file."""
-    laspy = _import_laspy()
+    laspy = import_laspy()
     pieces = iter(chunks)
     first = next(pieces)
     header = _las_header(laspy, first, extremes)
@@ -252,9 +264,9 @@ def _extra_columns(cloud: Cloud) -> Columns:
     """Return what is written beside coordinates and colours, by its name in the file."""
     columns: Columns = {}
     if cloud.normals is not None:
-        columns.update(zip(_NORMALS, cloud.normals.T, strict=True))
+        columns.update(zip(NORMALS, cloud.normals.T, strict=True))
     for name, values in cloud.attributes.items():
-        if name in columns or name in {"X", "Y", "Z", "x", "y", "z", *_COLORS}:
+        if name in columns or name in {"X", "Y", "Z", "x", "y", "z", *COLORS}:
             raise ValueError(f"attributes must not be called {name!r}: the file has that name already")
         if (values.ndim == 2 and not 1 <= values.shape[1] <= 3) or len(name) > 32:
             raise ValueError(
@@ -281,7 +293,7 @@ def _fitted(name: str, values: npt.NDArray[Any], point_format: Any) -> npt.NDArr
     return values.astype(np.int64)
 
 
-def _import_laspy() -> Any:
+def import_laspy() -> Any:
     try:
         import laspy
         import lazrs  # noqa: F401

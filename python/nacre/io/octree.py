@@ -81,7 +81,7 @@ def nodes(
     """
     if num_points <= _POINTS_PER_BLOCK:
         whole = np.concatenate(list(records))
-        yield from _divided(whole, cube.codes(whole), _hashes(whole), level=0)
+        yield from divided(whole, cube)
         return
     with tempfile.TemporaryFile(dir=folder) as unsorted, tempfile.TemporaryFile(dir=folder) as stream:
         blocks, dtype = _keep(records, cube, unsorted)
@@ -96,6 +96,11 @@ def nodes(
             here = blocks.read(stream, block, dtype)
             here = here[above.left(block, len(here))]
             yield from _divided(here, cube.codes(here), _hashes(here), level)
+
+
+def divided(records: Records, cube: Cube) -> Iterator[tuple[Key, Records]]:
+    """Yield the same nodes of points in memory."""
+    yield from _divided(records, cube.codes(records), _hashes(records), level=0)
 
 
 @dataclass(frozen=True)
@@ -244,7 +249,13 @@ def _lowest_of_cells(codes: Codes, hashes: Hashes, level: int) -> npt.NDArray[np
 
 
 def _order(codes: Codes, hashes: Hashes) -> npt.NDArray[np.intp]:
-    return np.lexsort((hashes, codes))
+    """Return the order by codes, and of the few points that have the same one by hashes."""
+    order = np.argsort(codes)
+    same = np.diff(codes[order]) == 0
+    tied = np.flatnonzero(np.concatenate([same, [False]]) | np.concatenate([[False], same]))
+    rows = np.sort(order[tied])
+    order[tied] = rows[np.lexsort((hashes[rows], codes[rows]))]
+    return order
 
 
 def _hashes(records: Records) -> Hashes:

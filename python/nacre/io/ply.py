@@ -92,6 +92,13 @@ def _check_vertices(path: str | os.PathLike[str], header: Header) -> None:
         raise FileFormatError(path, f"element vertex has no single value {missing}", line=vertex.line)
 
 
+def count_points(path: str | os.PathLike[str]) -> int:
+    """Return how many vertices the header promises."""
+    header = read_header(path, read_head(path, b"end_header"))
+    _check_vertices(path, header)
+    return next(element.num_rows for element in header.elements if element.name == "vertex")
+
+
 def read_cloud(path: str | os.PathLike[str]) -> Cloud:
     """Read the vertices of a PLY file; :func:`nacre.read_points` says what is returned and raised."""
     return _vertices(read_ply(path))

@@ -164,6 +164,13 @@ def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud]:
         yield cloud[first : first + num_rows]
 
 
+def count_points(path: str | os.PathLike[str]) -> int | None:
+    """Return how many points the header of a PLY, LAS or LAZ file promises; None of other formats."""
+    require_point_suffix(path)
+    format = _FORMATS[Path(path).suffix.lower()]
+    return format.count_points(path) if hasattr(format, "count_points") else None
+
+
 def is_streamed(path: str | os.PathLike[str]) -> bool:
     """Say whether a point file can be read in pieces."""
     require_point_suffix(path)

@@ -46,6 +46,7 @@ class LiveView:
             depth_of=lambda index: self._done.sequence[index].depth,
             depth_range=(depth.min_depth, depth.max_depth),
         )
+        self.timeline.is_growing = True
         self.viewer = Viewer(self.timeline, host=host, port=port, parameters=depth, controls=controls)
         self._next = 0.0
 
@@ -72,6 +73,7 @@ class LiveView:
 
     def finish(self, message: str = "") -> None:
         """Show the end, with a message: poses as loops have corrected them, frames found after all."""
+        self.timeline.is_growing = False
         self.timeline.frames[:] = [ReportedFrame(**record.as_dict()) for record in self._done.frames]
         self.show()
         if self.viewer.controls is not None:

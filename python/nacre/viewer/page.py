@@ -18,8 +18,9 @@ from nacre.viewer.timeline import Timeline
 
 _WEB = Path(__file__).with_name("web")
 _SCRIPTS = (
-    "linear.js", "data.js", "cloud.js", "orbit.js", "renderer.js", "cameras.js", "picking.js", "measure.js",
-    "crop.js", "deviation.js", "holes.js", "player.js", "live.js", "panel.js", "main.js",
+    "linear.js", "data.js", "cloud.js", "frustum.js", "disk_sizes.js", "octree.js", "orbit.js", "renderer.js",
+    "cameras.js", "picking.js", "measure.js", "crop.js", "deviation.js", "holes.js", "player.js", "live.js",
+    "panel.js", "main.js",
 )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
@@ -12,7 +13,7 @@ import numpy.typing as npt
 
 from nacre import Camera
 from nacre.errors import FileFormatError
-from nacre.io.quantization import octahedral, quantized
+from nacre.io.quantization import quantized
 from nacre.meshing import triangulate
 from nacre.parameters import DepthParameters
 from nacre.report.colormap import viridis
@@ -21,14 +22,19 @@ from nacre.report.lost_frames import plain_reason
 from nacre.viewer.camera_path import make_path
 from nacre.viewer.colors import STATUS_COLORS
 from nacre.viewer.depth_picture import depth_legend, depth_picture
-from nacre.viewer.disks import deviation, disk_radii
+from nacre.viewer.disks import deviation
 from nacre.viewer.holes import find_holes
+from nacre.viewer.levels import Levels, pack_node, pack_tree
 from nacre.viewer.packing import morton_order, pack, rounded
+from nacre.viewer.point_columns import point_columns
+from nacre.viewer.snapshot_levels import SnapshotLevels
 from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline, words
 from nacre.viewer.views import first_seen, first_view
 
 MAX_POINTS, MAX_VERTICES = 1_000_000, 4_000_000
-"""Of points alone, of which fewer show the same, and of a mesh, of which they would leave no triangle."""
+"""At once: of points alone, and of a mesh, of which fewer would leave no triangle."""
+COARSE_POINTS = 50_000
+"""Of a first picture, while the points are divided among nodes."""
 
 
 class State(NamedTuple):
@@ -102,6 +108,14 @@ class PageData:
         self.document = json.dumps(self._described(), allow_nan=False).encode()
         self._last: tuple[State, Snapshot] | None = None
         self._last_triangles: tuple[State, npt.NDArray[np.int32]] | None = None
+        self._built: Levels | None = None
+        self._building = threading.Lock()
+
+    def prepare(self) -> None:
+        """Begin to divide what is streamed among the nodes of an octree."""
+        streamed = self._streamed
+        if streamed is not None and self._timelines[0].levels is None:
+            threading.Thread(target=self._levels_of, args=(streamed,), daemon=True).start()
 
     @property
     def names(self) -> list[str]:
@@ -132,6 +146,8 @@ class PageData:
         kind, _, rest = name.partition("/")
         if kind == "depth":
             return self._depth(rest)
+        if kind in ("tree", "node", "coarse"):
+            return self._detail(kind, rest)
         if kind not in ("points", "triangles", "holes", "image"):
             raise KeyError(name)
         state = {state.name: state for state in (*self._states, *self._painted)}[rest]
@@ -143,6 +159,48 @@ class PageData:
             return pack({}, {"triangles": _sorted_triangles(self._triangulated(state))})
         return self._holes(state) if kind == "holes" else self._points(state)
 
+    @property
+    def _streamed(self) -> State | None:
+        """
+        The state whose points the page reads node by node: too many to be read at once.
+
+        The newest of a run alone that has ended; not a mesh, and not what bends.
+        """
+        timeline = self._timelines[0]
+        if len(self._timelines) > 1 or timeline.is_growing or self._is_live or not self._states:
+            return None
+        newest = self._states[-1]
+        if timeline.levels is not None:
+            return newest
+        is_whole = newest.is_mesh or newest.cloud.motion is not None
+        return None if is_whole or len(newest.cloud.points) <= MAX_POINTS else newest
+
+    def _total(self, state: State) -> int:
+        """Return how many points a state has, of which the page may get fewer."""
+        levels = self._timelines[state.run].levels
+        if levels is not None and state is self._states[-1]:
+            return sum(levels.counts.values())
+        return len(state.cloud.points)
+
+    def _detail(self, kind: str, rest: str) -> bytes:
+        """Return the nodes of the state that is streamed, the points of one, or a few until these are there."""
+        name, _, node = rest.rpartition("/") if kind == "node" else (rest, "", "")
+        streamed = self._streamed
+        if streamed is None or name != streamed.name:
+            raise KeyError(rest)
+        if kind == "coarse":
+            return self._packed(streamed, _ordered(streamed.cloud.thinned(COARSE_POINTS)))
+        levels = self._levels_of(streamed)
+        return pack_tree(levels) if kind == "tree" else pack_node(levels, node)
+
+    def _levels_of(self, state: State) -> Levels:
+        levels = self._timelines[0].levels
+        if levels is not None:
+            return levels
+        with self._building:
+            self._built = self._built or SnapshotLevels(state.cloud)
+        return self._built
+
     def _described(self) -> dict[str, Any]:
         newest = {state.run: state for state in self._states}
         view = None
@@ -152,7 +210,7 @@ class PageData:
             "title": " and ".join(timeline.title for timeline in self._timelines),
             "isLive": self._is_live,
             "view": view,
-            "comment": "metres" if self._timelines[0].is_upright else f"metres; {CAMERA_FRAME}",
+            "comment": "metres" if self._timelines[0].is_upright or self._timelines[0].is_survey else f"metres; {CAMERA_FRAME}",
             "statusColors": STATUS_COLORS,
             "colormap": viridis(np.linspace(0, 1, 9)).tolist(),
             "depthLegend": depth_legend(),
@@ -173,10 +231,15 @@ class PageData:
             }
             for frame in timeline.frames
         ]
-        states = [{"name": s.name, "place": s.place} for s in self._states if s.run == run]
+        states = [
+            {"name": s.name, "place": s.place, "total": self._total(s), "isStreamed": s is self._streamed}
+            for s in self._states
+            if s.run == run
+        ]
         return {
             "title": timeline.title,
             "placement": timeline.placement,
+            "origin": timeline.origin.tolist(),
             "isMesh": any(s.is_mesh for s in self._states if s.run == run),
             "hasDepth": timeline.depth_of is not None and timeline.camera is not None,
             "hasPath": make_path(timeline.frames),
@@ -191,9 +254,7 @@ class PageData:
         last = self._last
         if last is not None and last[0] is state:
             return last[1]
-        cloud = state.shown
-        rows, _, _ = quantized(cloud.points)
-        ordered = cloud.rows(morton_order(rows), cloud.spacing)
+        ordered = _ordered(state.shown)
         self._last = state, ordered
         return ordered
 
@@ -215,24 +276,15 @@ class PageData:
         return pack({"sizes": found.sizes}, {"segments": found.segments, "isHole": found.is_hole})
 
     def _points(self, state: State) -> bytes:
-        cloud, timeline = self._prepared(state), self._timelines[state.run]
+        return self._packed(state, self._prepared(state))
+
+    def _packed(self, state: State, cloud: Snapshot) -> bytes:
+        timeline = self._timelines[state.run]
         rows, origin, step = quantized(cloud.points)
-        columns: dict[str, npt.NDArray[Any]] = {
-            "points": rows,
-            "normals": octahedral(cloud.normals),
-            "sizes": _logarithms(disk_radii(cloud) / cloud.spacing),
-        }
+        columns: dict[str, npt.NDArray[Any]] = {"points": rows, **point_columns(cloud)}
         header: dict[str, Any] = {"spacing": cloud.spacing, "origin": origin, "step": step}
         if cloud.painting is not None:
             columns["uv"], header["uvOrigin"], header["uvStep"] = quantized(cloud.painting.uv, 1e-9)
-        if cloud.colors is not None:
-            columns["colors"] = cloud.colors
-        if cloud.confidence is not None:
-            columns["confidence"] = rounded(np.maximum(np.nan_to_num(cloud.confidence), 0))
-        if cloud.sigma is not None and np.isfinite(cloud.sigma).any():
-            columns["sigma"] = rounded(_known_sigma(cloud.sigma))
-        if cloud.last_seen is not None:
-            columns["lastSeen"] = np.maximum(cloud.last_seen, 0).astype(np.uint32)
         if len(timeline.snapshots) == 1 and not state.is_mesh:
             first = first_seen(cloud, timeline, state.place)
             columns |= {} if first is None else {"firstSeen": first}
@@ -276,15 +328,10 @@ def frustum_corners(camera: Camera | None) -> npt.NDArray[np.float64]:
     return np.array([(-x, -y, 1), (x, -y, 1), (x, y, 1), (-x, y, 1)], dtype=np.float64)
 
 
-def _logarithms(factors: npt.NDArray[np.float32]) -> npt.NDArray[np.uint8]:
-    """Return factors from 1/4 to 4000, true to 2 %, as 18 times their binary logarithms above that of 1/4."""
-    return np.asarray(np.rint(np.clip(18 * (np.log2(factors) + 2), 0, 255)), np.uint8)
-
-
-def _known_sigma(sigma: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """Return standard deviations of a micrometre at least; those that are not known as the largest."""
-    known = np.isfinite(sigma)
-    return np.maximum(np.where(known, sigma, sigma[known].max()), 1e-6)
+def _ordered(cloud: Snapshot) -> Snapshot:
+    """Return the points so that neighbors in space are near in order."""
+    rows, _, _ = quantized(cloud.points)
+    return cloud.rows(morton_order(rows), cloud.spacing)
 
 
 def _rounded_pose(pose: npt.NDArray[np.float64] | None) -> list[list[float]] | None:

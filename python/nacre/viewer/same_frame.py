@@ -39,6 +39,11 @@ def in_frame_of(first: Timeline, other: Timeline) -> Timeline:
     """
     if not (first.has_points and other.has_points):
         return other
+    if not np.array_equal(first.origin, other.origin):
+        apart = np.eye(4)
+        apart[:3, 3] = other.origin - first.origin
+        other = _placed(other, apart, "")
+        other.origin = first.origin
     still, moving = (timeline.snapshots[-1][1] for timeline in (first, other))
     if max(_share_near(still, moving), _share_near(moving, still)) >= 0.5:
         return _placed(other, np.eye(4), "in the first run's world frame")
@@ -69,7 +74,9 @@ def _placed(timeline: Timeline, motion: npt.NDArray[np.float64], words: str) -> 
         depth_of=timeline.depth_of,
         depth_range=timeline.depth_range,
         is_upright=timeline.is_upright,
+        is_survey=timeline.is_survey,
     )
+    moved.origin = timeline.origin
     moved.placement = words
     states = dict(timeline.snapshots)
     if -1 in states:

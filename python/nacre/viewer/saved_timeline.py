@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +16,24 @@ from nacre._internal.guided import guided
 from nacre._internal.warned import warn
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Cloud
+from nacre.io.copc import SUFFIX, is_copc
 from nacre.io.glb_reader import read_painting
 from nacre.io.mesh_arrays import MeshArrays, vertex_normals
 from nacre.io.meshes import READ_SUFFIXES, read_mesh_arrays
 from nacre.io.obj_painting import read_painted
 from nacre.io.painting import Painting
 from nacre.io.ply_header import read_header
-from nacre.io.points import read_points
+from nacre.io.points import count_points, read_points
 from nacre.io.raw import read_head
 from nacre.reconstruction.motion import Motion, read_motion
 from nacre.report.saved_run import SavedRun
+from nacre.report.text import count
+from nacre.viewer.copc_levels import CopcLevels
 from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline
+
+_COARSE_POINTS = 1_000_000
+_MOST_POINTS = 50_000_000
+_FAR = 8.0  # sides of the points' box from 0: more, and float32 has no millionth of a side
 
 
 @guided()
@@ -42,20 +50,19 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     path : path-like
         ``OUT``, which holds ``model.ply`` and ``report.json``; or a file of points or of a mesh. Where it has
         no normals, they come from the triangles, or else are estimated; y is up unless a comment says that it
-        is nacre's.
+        is nacre's. Of a COPC file (``.copc.laz``, extra ``las``), in which z is up, only the coarse levels are
+        read; it stays open, and the viewer reads nodes of its octree as they are looked at.
 
     Raises
     ------
     FileFormatError, OSError
-        When a file is damaged or missing.
+        When a file is damaged or missing, or no COPC file and has more than 50 million points.
+    ImportError
+        When the format needs a package that is not installed; the message says how to install it.
     """
     path = Path(path)
     if path.is_file():
-        file, triangles, painting = _read(path)
-        is_upright = not any(CAMERA_FRAME in comment for comment in file.comments)
-        timeline = Timeline(path.name, None, is_upright=is_upright)
-        timeline.set_snapshot(_cloud(file, None, triangles, painting))
-        return timeline
+        return _streamed(path) if is_copc(path) else _of_file(path)
     out = SavedRun(path)
     timeline = Timeline(
         out.report.get("title") or path.name,
@@ -78,6 +85,37 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
         file, triangles, painting = _read(path / "mesh.glb")
         timeline.painted = None if painting is None else _cloud(file, None, triangles, painting)
     return timeline
+
+
+def _of_file(path: Path) -> Timeline:
+    """Return the points or the mesh of a file; those far from the origin about one of their own."""
+    file, triangles, painting = _read(path)
+    is_upright = not any(CAMERA_FRAME in comment for comment in file.comments)
+    timeline = Timeline(path.name, None, is_upright=is_upright)
+    timeline.origin = _origin(file.points)
+    near = file if not timeline.origin.any() else replace(file, points=file.points - timeline.origin)
+    timeline.set_snapshot(_cloud(near, None, triangles, painting))
+    return timeline
+
+
+def _streamed(path: Path) -> Timeline:
+    """Return the coarse points of a COPC file, and its levels of detail."""
+    levels = CopcLevels(path)
+    timeline = Timeline(path.name, None, is_survey=True)
+    timeline.origin = levels.origin
+    timeline.set_snapshot(levels.coarsest(_COARSE_POINTS))
+    timeline.levels = levels
+    return timeline
+
+
+def _origin(points: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.float64]:
+    """Return the middle of points that are far from 0, as surveys are, to a metre; else 0."""
+    kept = points[np.isfinite(points).all(axis=1)]
+    if points.dtype != np.float64 or not len(kept):
+        return np.zeros(3)
+    lower, upper = kept.min(axis=0), kept.max(axis=0)
+    middle = np.round(lower / 2 + upper / 2)
+    return middle if np.abs(middle).max() > _FAR * (upper - lower).max() else np.zeros(3)
 
 
 def _cloud(
@@ -136,7 +174,21 @@ def _read(path: Path) -> tuple[Cloud, npt.NDArray[np.int32] | None, Painting | N
         colors = mesh.colors if mesh.colors is not None else colors
         cloud = Cloud(mesh.vertices, mesh.normals, colors, comments=mesh.comments)
         return cloud, mesh.triangles, painting
-    return read_points(path), _triangles(path), None
+    triangles = _triangles(path)
+    if triangles is None:
+        _check_number(path)
+    return read_points(path), triangles, None
+
+
+def _check_number(path: Path) -> None:
+    """Refuse more points than are read at once."""
+    found = count_points(path)
+    if found is not None and found > _MOST_POINTS:
+        raise FileFormatError(
+            path,
+            f"{count(found)} points are more than the {count(_MOST_POINTS)} that are read at once: nacre convert "
+            f"{path.name} {path.stem}{SUFFIX} writes a file of which nacre view reads what is looked at",
+        )
 
 
 def _painted(path: Path) -> tuple[MeshArrays, Painting | None]:

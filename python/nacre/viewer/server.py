@@ -12,6 +12,7 @@ from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
 from nacre._internal.kinds import as_kind
+from nacre.errors import FileFormatError, printable
 from nacre.parameters import DepthParameters
 from nacre.viewer.controls import Controls
 from nacre.viewer.page import page_html
@@ -77,6 +78,7 @@ class Viewer:
     def refresh(self) -> None:
         """Show what the timeline has gained."""
         self.data = PageData(self._timelines, self._parameters, is_live=self.controls is not None)
+        self.data.prepare()
         self.revision += 1
 
     def read(self, name: str) -> tuple[str, bytes]:
@@ -154,6 +156,8 @@ class _Handler(BaseHTTPRequestHandler):
                 self._answer(*viewer.read(url.path.removeprefix("/data/")))
             except KeyError:
                 self.send_error(HTTPStatus.NOT_FOUND)
+            except (FileFormatError, OSError) as error:
+                self._say_damaged(error)
         else:
             self.send_error(HTTPStatus.NOT_FOUND)
 
@@ -191,6 +195,12 @@ class _Handler(BaseHTTPRequestHandler):
         self.send_header("ETag", str(self.server.viewer.revision))
         self.end_headers()
         self.wfile.write(body)
+
+    def _say_damaged(self, error: Exception) -> None:
+        """Answer that a file has not what it should have; a connection that broke is no such thing."""
+        if isinstance(error, ConnectionError):
+            raise error
+        self.send_error(HTTPStatus.NOT_FOUND, explain=printable(str(error)))
 
     def log_message(self, format: str, *args: object) -> None:
         """Say nothing: the terminal belongs to the run."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -17,6 +17,9 @@ from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.motion import Motion, motion_of
 from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import count, quantity
+
+if TYPE_CHECKING:
+    from nacre.viewer.levels import Levels
 
 CAMERA_FRAME = "the world is the first camera's frame"
 """A comment of point files: x right, y down, z forward."""
@@ -168,6 +171,8 @@ class Timeline:
         Outside of which depth was not used [m].
     is_upright : bool
         Whether y points up and z to who looks, as in files of other programs, and not as in a camera's frame.
+    is_survey : bool
+        Whether z points up, as in surveys.
     max_points : int
         States but the newest keep so many points at most, so that a long run stays within memory.
 
@@ -177,6 +182,12 @@ class Timeline:
         In the order in which they came; their true poses in the world of the model.
     painted : Snapshot or None
         A mesh of the model that an image is painted on.
+    is_growing : bool
+        Whether more is coming: what grows is not put into an octree again and again.
+    levels : Levels or None
+        Of a file that is larger than memory: all points of the newest state, which itself has the coarse ones.
+    origin : (3,) float64
+        Where the origin of all positions lies in the file's coordinates, which may be large [m].
     placement : str
         Of a run that is compared with another: how it came into the other's world frame; "" where not known.
     """
@@ -189,6 +200,7 @@ class Timeline:
         depth_of: Callable[[int], npt.NDArray[np.float32]] | None = None,
         depth_range: tuple[float, float] = (0.0, np.inf),
         is_upright: bool = False,
+        is_survey: bool = False,
         max_snapshots: int = 40,
         max_points: int = 100_000,
     ) -> None:
@@ -199,8 +211,12 @@ class Timeline:
         self.depth_of = depth_of
         self.depth_range = depth_range
         self.is_upright = is_upright
+        self.is_survey = is_survey
         self.frames: list[ReportedFrame] = []
         self.painted: Snapshot | None = None
+        self.is_growing = False
+        self.levels: Levels | None = None
+        self.origin: npt.NDArray[np.float64] = np.zeros(3)
         self.placement = ""
         self._snapshots: list[tuple[int, Snapshot]] = []
         self._max_snapshots = max_snapshots

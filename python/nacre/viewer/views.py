@@ -131,10 +131,12 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
     Return a view of the main thing: from where most frames saw it, upright as the cameras were.
 
     Main is what most frames saw and many observations confirm; specks and far walls have no say. Without
-    cameras it is seen from the side to which it faces.
+    cameras it is seen from the side to which it faces; a survey from the south, at 45 degrees.
     """
     few = cloud.thinned(_MAX_POINTS)
     places = posed_places(timeline, place)
+    if timeline.is_survey:
+        return _view(few.points, np.ones(len(few.points), bool), _OBLIQUE, _SKY)
     if timeline.camera is None or not places:
         sign = 1 if timeline.is_upright else -1
         core = _main_part(few, np.ones(len(few.points)))
@@ -155,6 +157,7 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
 
 
 _DOWN, _FORWARD = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])
+_SKY, _OBLIQUE = np.array([0.0, 0, 1]), np.array([0.0, -1, 1])  # of surveys
 _CLOSED = 0.05  # of the mean normal: a surface of a shorter one faces nowhere
 _RAISED, _STEEP, _STEEPEST = np.radians([15, 30, 60])
 _ROWS_AT_ONCE = 1 << 18  # for the sake of memory

@@ -14,6 +14,24 @@ class Cloud {
     this.moment = undefined; // of what bends: which shape the points have now
   }
 
+  /** What is drawn of it: clouds that have all of their points. */
+  get parts() {
+    return [this];
+  }
+
+  /** What was read of it. */
+  get loaded() {
+    return [this];
+  }
+
+  /** All of it is there, whatever the view. */
+  look() {}
+
+  /** Call take with each part in turn. */
+  async each(take) {
+    take(this);
+  }
+
   /** Put the points of what bends where they were at the frame of a place; whether that is elsewhere than now. */
   bend(place) {
     if (!this.motion) return false;

@@ -1,5 +1,6 @@
 // A box that leaves out what is not in it, and what is shown as a PLY file.
 
+const MOST_SAVED = 20_000_000; // points
 const SIDES = [["left", "right"], ["bottom", "top"], ["back", "front"]];
 
 /** An upright box, turned as the first view: its axes lead right, up, and towards the eye. */
@@ -24,6 +25,15 @@ class Box {
     };
   }
 
+  /** Whether a point of a cube may be inside. */
+  touches(middle, side) {
+    const radius = (Math.sqrt(3) / 2) * side;
+    return this.axes.every((axis, k) => {
+      const at = dot(axis, middle), [low, high] = this.limits[k], [least, most] = this.reach[k];
+      return (low <= least || at + radius >= low) && (high >= most || at - radius <= high);
+    });
+  }
+
   /** The twelve edges, two corners each. */
   get edges() {
     const corner = (bits) =>
@@ -43,7 +53,8 @@ class Crop {
     this.toggle = document.getElementById("crop");
     this.panel = document.getElementById("box");
     this.toggle.addEventListener("change", () => this.#switch());
-    document.getElementById("save").addEventListener("click", () => this.save());
+    this.button = document.getElementById("save");
+    this.button.addEventListener("click", () => this.save());
   }
 
   /** The box, where it is on. */
@@ -77,39 +88,79 @@ class Crop {
     return [element("span", {}, names.join(", ")), ...inputs];
   }
 
-  save() {
+  /** Save what is shown when all is read, not only what the view needs. */
+  async save() {
     const cloud = this.app.clouds[this.app.activeRun];
     if (!cloud) return;
-    const { title } = this.app.document.runs[this.app.activeRun];
+    const { title, origin } = this.app.document.runs[this.app.activeRun];
     const link = element("a", { download: `${title.replace(/(\.\w+)?$/, "").replace(/[^\w-]+/g, "-")}.ply` });
-    link.href = URL.createObjectURL(new Blob([plyBytes(cloud, this.app.document.comment)]));
+    this.button.disabled = true;
+    try {
+      link.href = URL.createObjectURL(await plyFile(cloud, this.app.document.comment, origin));
+    } catch (error) {
+      return this.say(error.message);
+    } finally {
+      this.button.disabled = false;
+    }
+    this.say("");
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10000);
   }
+
+  say(words) {
+    document.getElementById("save-message").textContent = words;
+  }
 }
 
-/** The shown points of a cloud as a binary PLY file. */
-function plyBytes(cloud, comment) {
-  const attributes = ["confidence", "sigma"].filter((name) => cloud[name]);
-  const floats = ["x", "y", "z", "nx", "ny", "nz"], colors = cloud.colors ? ["red", "green", "blue"] : [];
-  const header = [
-    "ply", "format binary_little_endian 1.0", `comment ${comment}`, `element vertex ${cloud.numShown}`,
-    ...floats.map((name) => `property float ${name}`), ...colors.map((name) => `property uchar ${name}`),
-    ...attributes.map((name) => `property float ${name}`), "end_header\n",
-  ].join("\n");
-  const rowSize = 24 + colors.length + 4 * attributes.length;
-  const start = new TextEncoder().encode(header);
-  const bytes = new Uint8Array(start.length + rowSize * cloud.numShown);
-  bytes.set(start);
-  const view = new DataView(bytes.buffer);
-  let at = start.length;
-  for (let i = 0; i < cloud.size; i++) {
-    if (!cloud.isShown(i)) continue;
-    const normal = unit([0, 1, 2].map((k) => cloud.normals[4 * i + k]));
-    [...cloud.position(i), ...normal].forEach((value, k) => view.setFloat32(at + 4 * k, value, true));
-    colors.forEach((_, k) => view.setUint8(at + 24 + k, cloud.colors[3 * i + k]));
-    attributes.forEach((name, k) => view.setFloat32(at + 24 + colors.length + 4 * k, cloud[name][i], true));
-    at += rowSize;
+/** The shown points of a cloud as a binary PLY file, in the coordinates that its points had. */
+async function plyFile(cloud, comment, origin) {
+  const blocks = [];
+  let numPoints = 0, format = null;
+  await cloud.each((part) => {
+    format ??= new PlyRows(part, origin);
+    if (part.numShown) blocks.push(format.bytes(part));
+    numPoints += part.numShown;
+    if (numPoints > MOST_SAVED) throw new Error(`More than ${MOST_SAVED.toLocaleString("en")} points: crop first`);
+  });
+  return new Blob([format.header(comment, numPoints), ...blocks]);
+}
+
+/** How the points are written; all parts of a cloud have the same columns. */
+class PlyRows {
+  constructor(part, origin) {
+    this.origin = origin;
+    this.isFar = origin.some((value) => value); // float32 has too few digits
+    this.hasColors = Boolean(part.colors);
+    this.attributes = ["confidence", "sigma"].filter((name) => part[name]);
   }
-  return bytes;
+
+  header(comment, numPoints) {
+    const colors = this.hasColors ? ["red", "green", "blue"] : [], type = this.isFar ? "double" : "float";
+    return [
+      "ply", "format binary_little_endian 1.0", `comment ${comment}`, `element vertex ${numPoints}`,
+      ...["x", "y", "z"].map((name) => `property ${type} ${name}`),
+      ...["nx", "ny", "nz"].map((name) => `property float ${name}`), ...colors.map((name) => `property uchar ${name}`),
+      ...this.attributes.map((name) => `property float ${name}`), "end_header\n",
+    ].join("\n");
+  }
+
+  bytes(part) {
+    const start = this.isFar ? 36 : 24, colorBytes = this.hasColors ? 3 : 0;
+    const rowSize = start + colorBytes + 4 * this.attributes.length;
+    const view = new DataView(new ArrayBuffer(rowSize * part.numShown));
+    let at = 0;
+    for (let i = 0; i < part.size; i++) {
+      if (!part.isShown(i)) continue;
+      add(this.origin, part.position(i)).forEach((value, k) => {
+        if (this.isFar) view.setFloat64(at + 8 * k, value, true);
+        else view.setFloat32(at + 4 * k, value, true);
+      });
+      const normal = unit([0, 1, 2].map((k) => part.normals[4 * i + k]));
+      normal.forEach((value, k) => view.setFloat32(at + start - 12 + 4 * k, value, true));
+      for (let k = 0; k < colorBytes; k++) view.setUint8(at + start + k, part.colors[3 * i + k]);
+      this.attributes.forEach((name, k) => view.setFloat32(at + start + colorBytes + 4 * k, part[name][i], true));
+      at += rowSize;
+    }
+    return view.buffer;
+  }
 }

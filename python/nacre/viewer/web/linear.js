@@ -24,9 +24,9 @@ function axesOf(backward, up) {
 
 function viewMatrix(eye, axes) {
   const [r, u, b] = axes;
-  return new Float32Array([
+  return [
     r[0], u[0], b[0], 0, r[1], u[1], b[1], 0, r[2], u[2], b[2], 0, -dot(r, eye), -dot(u, eye), -dot(b, eye), 1,
-  ]);
+  ];
 }
 
 function perspective(fieldOfView, aspect, near, far) {

@@ -1,6 +1,7 @@
 // The page: what is chosen, what is loaded for it, and the picture of it.
 
 const POLL = 1000; // [ms]
+const PATIENCE = 300; // [ms]: an octree that takes longer has a few points stand for it meanwhile
 const IS_NARROW = matchMedia("(max-width: 600px)"); // as in style.css: the panel lies below the model
 
 class App {
@@ -72,21 +73,21 @@ class App {
   #forget() {
     const { runs } = this.document, painted = runs.map((run) => run.painted);
     const named = new Set([...painted, ...runs.flatMap((run) => run.states.map((state) => state.name))]);
-    for (const name of this.cache.keys()) if (!named.has(name)) this.cache.delete(name);
+    for (const name of this.cache.keys()) if (!named.has(name.replace("tree/", ""))) this.cache.delete(name);
   }
 
   /** Read the states of the models that belong to the chosen frame, and draw them. */
   async load() {
-    const names = this.document.runs.map((run, i) => {
-      if (this.showsPainted && this.#hasPainted(run)) return run.painted;
+    const states = this.document.runs.map((run, i) => {
+      if (this.showsPainted && this.#hasPainted(run)) return { name: run.painted };
       const place = i === 0 ? this.player.place : Infinity;
-      return (run.states.findLast((state) => state.place <= place) ?? run.states[0])?.name;
+      return run.states.findLast((state) => state.place <= place) ?? run.states[0];
     });
-    if (names.some((name) => !name)) return this.#say(this.document.isLive ? "The model appears here" : "There is no model yet");
+    if (states.some((state) => !state)) return this.#say(this.document.isLive ? "The model appears here" : "There is no model yet");
     const request = (this.request = (this.request ?? 0) + 1);
     let clouds;
     try {
-      clouds = await Promise.all(names.map((name) => this.#cloud(name)));
+      clouds = await Promise.all(states.map((state) => this.#cloud(state)));
     } catch (error) {
       if (!this.clouds.length) this.#say(String(error));
       return; // a state that is gone meanwhile: the next document has another one
@@ -97,7 +98,7 @@ class App {
     const isBent = clouds[0].bend(this.player.place);
     this.#say("");
     if (isOther) {
-      this.renderer?.keepOnly(clouds);
+      this.#release();
       showKinds(this);
     }
     await this.#loadTriangles();
@@ -106,12 +107,43 @@ class App {
     this.holes.load();
   }
 
-  async #cloud(name) {
+  async #cloud({ name, total, isStreamed }) {
+    const isNewest = this.player.place >= this.player.last; // before, points appear with frames
+    if (isStreamed && isNewest && !this.showsMesh && this.source.has(`tree/${name}`)) {
+      return Object.assign(await this.#octree(name), { name, total });
+    }
     if (!this.cache.has(name)) this.cache.set(name, new Cloud(await this.source.read(`points/${name}`)));
-    const cloud = this.cache.get(name);
-    cloud.name = name;
+    const cloud = Object.assign(this.cache.get(name), { name, total });
     if (cloud.uv && this.source.has(`image/${name}`)) cloud.image ??= await this.#image(name);
     return cloud;
+  }
+
+  /** All points of a state, from coarse to fine; a few of them while the server is not so far. */
+  async #octree(name) {
+    const known = this.cache.get(`tree/${name}`);
+    if (known) return known;
+    this.coming ??= this.#readOctree(name).finally(() => (this.coming = null));
+    const octree = await Promise.race([this.coming, new Promise((resolve) => setTimeout(resolve, PATIENCE))]);
+    if (octree) return octree;
+    this.coming?.then(() => this.load(), () => {});
+    return new Cloud(await this.source.read(`coarse/${name}`));
+  }
+
+  async #readOctree(name) {
+    const octree = new OctreeCloud(name, await this.source.read(`tree/${name}`), this.source, () => this.#refine());
+    this.cache.set(`tree/${name}`, await octree.begin());
+    return octree;
+  }
+
+  /** Draw points that came, and leave those that were dropped. */
+  #refine() {
+    if (this.clouds.length) showCount(this);
+    this.#release();
+    this.redraw();
+  }
+
+  #release() {
+    this.renderer?.keepOnly(this.clouds.flatMap((cloud) => cloud.loaded));
   }
 
   /** The image that is painted on a mesh, as large as can be drawn. */
@@ -222,7 +254,10 @@ class App {
     const isPainted = this.kind === "texture" && Boolean(cloud.image);
     const ambient = { shading: 0.25, colour: 0.5, texture: 0.8 }[this.kind] ?? 0.6; // photographs have light of their own
     const showReverse = isChecked("reverse");
-    this.renderer.drawCloud(cloud, matrices, part, { asMesh, isPainted, showReverse, pointSize, ambient });
+    cloud.look(matrices, this.canvas.clientHeight, this.#aspect(part));
+    for (const drawn of cloud.parts) {
+      this.renderer.drawCloud(drawn, matrices, part, { asMesh, isPainted, showReverse, pointSize, ambient });
+    }
     const chosen = { path: isChecked("path"), cameras: isChecked("cameras") };
     const place = part.run === 0 ? this.player.place : run.frames.length;
     const size = 0.06 * (this.document.view?.radius ?? 1);
@@ -258,8 +293,8 @@ class App {
     const cloud = part && this.clouds[part.run];
     if (!cloud) return null;
     const eye = isChecked("reverse") ? null : this.orbit.eye;
-    const i = pick(cloud, this.matrices(part), part, this.canvas, x, y, eye);
-    return i < 0 ? null : cloud.position(i);
+    const found = pick(cloud, this.matrices(part), part, this.canvas, x, y, eye);
+    return found && found.cloud.position(found.i);
   }
 
   #click(x, y) {

@@ -63,9 +63,10 @@ function showUncertainty({ clouds: [cloud] }) {
 
 function showCount({ clouds, parts }) {
   const texts = parts.map(({ run }) => {
-    const { numShown, size } = clouds[run];
-    const all = size.toLocaleString("en");
-    return numShown === size ? `${all} points` : `${numShown.toLocaleString("en")} of ${all} points`;
+    const { numShown, size, total, failed } = clouds[run];
+    const all = (total ?? size).toLocaleString("en"), isWhole = numShown === (total ?? size);
+    const lost = failed ? `; ${failed} part${failed > 1 ? "s" : ""} cannot be read` : "";
+    return (isWhole ? `${all} points` : `${numShown.toLocaleString("en")} of ${all} points`) + lost;
   });
   document.getElementById("count").textContent = texts.join(" and ");
 }

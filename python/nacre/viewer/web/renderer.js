@@ -2,7 +2,7 @@
 
 const CLOUD_VERTEX = `#version 300 es
 uniform mat4 view, clip;
-uniform vec3 origin;
+uniform vec3 viewOrigin;
 uniform vec2 uvOrigin;
 uniform float step, radius, pixelsPerUnit, uvStep;
 uniform bool isMesh;
@@ -17,7 +17,7 @@ out vec2 place;
 out float diskRadius, pixels;
 void main() {
   place = uvOrigin + uvStep * uv;
-  vec4 position = view * vec4(origin + step * point, 1.0);
+  vec4 position = vec4(viewOrigin + mat3(view) * (step * point), 1.0);
   viewPoint = position.xyz;
   viewNormal = mat3(view) * normal.xyz;
   shade = color;
@@ -120,8 +120,9 @@ class Renderer {
 
   /** Give back the buffers of clouds that are not used any more. */
   keepOnly(clouds) {
+    const kept = new Set(clouds);
     for (const [cloud, buffers] of this.clouds) {
-      if (clouds.includes(cloud)) continue;
+      if (kept.has(cloud)) continue;
       Object.values(buffers).forEach((buffer) => buffer instanceof WebGLBuffer && this.gl.deleteBuffer(buffer));
       this.gl.deleteTexture(buffers.image ?? null);
       this.clouds.delete(cloud);
@@ -135,16 +136,16 @@ class Renderer {
     gl.useProgram(program.id);
     gl.uniformMatrix4fv(program.at("view"), false, view);
     gl.uniformMatrix4fv(program.at("clip"), false, clip);
-    gl.uniform3fv(program.at("origin"), cloud.origin);
+    gl.uniform3fv(program.at("viewOrigin"), seen(view, cloud.origin)); // here, as float32 has too few digits
     gl.uniform1f(program.at("step"), cloud.step);
-    gl.uniform1f(program.at("radius"), 0.75 * pointSize * cloud.spacing);
+    gl.uniform1f(program.at("radius"), 0.75 * pointSize * (cloud.sizeUnit ?? cloud.spacing));
     gl.uniform1f(program.at("pixelsPerUnit"), 0.5 * height * clip[5]);
     gl.uniform1f(program.at("ambient"), ambient);
     gl.uniform1i(program.at("isMesh"), asMesh ? 1 : 0);
     gl.uniform1i(program.at("showReverse"), showReverse ? 1 : 0);
     gl.uniform1i(program.at("isPainted"), isPainted ? 1 : 0);
     gl.bindTexture(gl.TEXTURE_2D, buffers.image ?? this.noImage);
-    this.#attribute(0, buffers.points, 3, gl.UNSIGNED_SHORT, false);
+    this.#attribute(0, buffers.points, 3, cloud.points.BYTES_PER_ELEMENT === 4 ? gl.UNSIGNED_INT : gl.UNSIGNED_SHORT, false);
     this.#attribute(1, buffers.normals, 4, gl.BYTE, true);
     this.#attribute(2, buffers.paint, 4, gl.UNSIGNED_BYTE, true);
     this.#attribute(3, buffers.sizes, 1, gl.UNSIGNED_BYTE, false);
@@ -205,6 +206,7 @@ class Renderer {
     if (!buffers) {
       buffers = { points: this.#filled(cloud.points), normals: this.#filled(cloud.normals), paint: gl.createBuffer() };
       buffers.sizes = this.#filled(cloud.sizes);
+      buffers.sizesVersion = cloud.sizesVersion;
       buffers.moment = cloud.moment;
       if (cloud.image) Object.assign(buffers, { uv: this.#filled(cloud.uv), image: this.#textureOf(cloud.image) });
       this.clouds.set(cloud, buffers);
@@ -212,6 +214,10 @@ class Renderer {
     if (buffers.version !== cloud.version) {
       this.#fill(buffers.paint, cloud.paint);
       buffers.version = cloud.version;
+    }
+    if (buffers.sizesVersion !== cloud.sizesVersion) {
+      this.#fill(buffers.sizes, cloud.sizes);
+      buffers.sizesVersion = cloud.sizesVersion;
     }
     if (buffers.moment !== cloud.moment) {
       this.#fill(buffers.points, cloud.points);
