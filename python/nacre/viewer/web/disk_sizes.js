@@ -2,6 +2,8 @@
 
 const OCTAVES = 8; // by which a disk may become smaller
 const LEVEL_BITS = 10; // of the Morton order of a node's points
+const CELL_POINTS = 200; // among which the points of each level are counted
+const OVERLAP = 1.5; // what no longer follows each point's neighbours needs more
 
 class DiskSizes {
   /** Fit the disks of the nodes that are drawn; those below which the same ones are drawn as before are left. */
@@ -24,7 +26,7 @@ class DiskSizes {
       if (this.#shape(child)) this.#visit(child, parts, isNew);
       else {
         if (child) (child.cloud ?? child).shape = undefined; // the points above it are fitted without it
-        shrink(parts);
+        shrinkCells(parts);
       }
     }
   }
@@ -60,12 +62,19 @@ function firstFrom({ points }, depth, octant, low, high) {
   return low;
 }
 
-/** Make disks smaller as all points together need: of a surface, as the root of their number. */
-function shrink(parts) {
-  const total = parts.reduce((sum, { low, high }) => sum + high - low, 0);
+/** Make disks smaller cell by cell. */
+function shrinkCells(parts) {
+  const left = parts.filter(({ low, high }) => low < high);
+  const total = left.reduce((sum, { low, high }) => sum + high - low, 0);
+  if (left.length < 2 || total <= CELL_POINTS || left.every(({ depth }) => depth >= LEVEL_BITS)) shrink(left, total);
+  else for (let octant = 0; octant < 8; octant++) shrinkCells(left.map((part) => octantOf(part, octant)));
+}
+
+/** Make disks smaller as all points of a cell together need: on a surface, by the root of their number. */
+function shrink(parts, total) {
   for (const { cloud, low, high } of parts) {
-    if (low === high) continue;
-    const shift = 18 * (OCTAVES + 0.5 * Math.log2((high - low) / total));
+    const factor = Math.min(OVERLAP * Math.sqrt((high - low) / total), 1);
+    const shift = 18 * (OCTAVES + Math.log2(factor));
     for (let i = low; i < high; i++) cloud.sizes[i] = Math.max(Math.min(cloud.ownSizes[i] + shift, 255), 0);
     cloud.sizesVersion++;
   }

@@ -2,20 +2,22 @@
 
 class Frustum {
   constructor(view, clip, aspect) {
-    this.rows = [0, 1, 2].map((row) => [...viewRow(view, row), view[12 + row]]);
-    this.slopes = [aspect / clip[5], 1 / clip[5]]; // half the picture at a distance of 1
+    const [right, up, back] = [0, 1, 2].map((row) => [...viewRow(view, row), view[12 + row]]);
+    const half = { x: aspect / clip[5], y: 1 / clip[5] }; // of the picture at a distance of 1
+    const plane = (side, sign, slope) => side.map((value, k) => sign * value + slope * back[k]);
+    this.planes = [back, ...[1, -1].flatMap((sign) => [plane(right, sign, half.x), plane(up, sign, half.y)])];
+    this.eye = [0, 1, 2].map((axis) => -[right, up, back].reduce((sum, row) => sum + row[axis] * row[3], 0));
   }
 
-  /** The least distance from the eye to a ball about a cube; null where the ball is outside of the picture. */
+  /** The least distance from the eye to a cube; null where the cube is outside of the picture. */
   distance(middle, side) {
-    const radius = (Math.sqrt(3) / 2) * side;
-    const [x, y, z] = this.rows.map(([a, b, c, d]) => a * middle[0] + b * middle[1] + c * middle[2] + d);
-    const depth = -z;
-    if (depth < -radius) return null;
-    const isOutside = [x, y].some((value, k) => {
-      const slope = this.slopes[k];
-      return Math.abs(value) - slope * depth > radius * Math.hypot(1, slope);
+    const half = side / 2;
+    const isOutside = this.planes.some(([a, b, c, d]) => {
+      const nearest = a * middle[0] + b * middle[1] + c * middle[2] + d;
+      return nearest > half * (Math.abs(a) + Math.abs(b) + Math.abs(c));
     });
-    return isOutside ? null : Math.max(Math.hypot(x, y, z) - radius, 0.01 * side);
+    if (isOutside) return null;
+    const apart = this.eye.map((at, axis) => Math.max(Math.abs(at - middle[axis]) - half, 0));
+    return Math.max(length(apart), 0.01 * side);
   }
 }
