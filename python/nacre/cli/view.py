@@ -19,7 +19,7 @@ def view(
         Path,
         typer.Argument(
             metavar="OUT",
-            help="What nacre reconstruct wrote, or a file of points or a mesh.",
+            help="What nacre reconstruct wrote, or a file of points or a mesh; of any size: .copc.laz.",
             show_default=False,
         ),
     ],
@@ -50,7 +50,9 @@ def view(
     other is brought into the frame of the first where frames differ. --rrd needs the extra "rerun".
     """
     terminal = Terminal(False, quiet, verbose)
+    from nacre.report.text import count
     from nacre.viewer import Viewer, export_html, export_rrd, in_frame_of, read_timeline
+    from nacre.viewer.page_data import kept_points
 
     if rrd is not None and compare is not None:
         raise CommandError("--rrd writes one run: leave out --compare", 2)
@@ -66,7 +68,13 @@ def view(
         terminal.say(f"{other.title}: {other.placement}")
     if html is not None:
         export_html(timeline, html, other=other)
-        terminal.say(table([("page", str(html))]))
+        shown = [("page", str(html))]
+        for one in (timeline, *([] if other is None else [other])):
+            kept, total = kept_points(one), one.num_points
+            if kept < total:
+                told = f"{count(kept)} of {count(total)}, evenly: a page without a server has no more"
+                shown.append(("points", told))
+        terminal.say(table(shown))
     if rrd is not None:
         export_rrd(timeline, rrd)
         terminal.say(table([("Rerun", str(rrd))]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import struct
 import threading
+import weakref
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -66,6 +67,7 @@ class CopcFile:
         laspy = las.import_laspy()
         self._lock = threading.Lock()
         self._stream = require_regular(path).open("rb")
+        self._closing = weakref.finalize(self, self._stream.close)  # as this goes, where nobody closes it
         try:
             self._status = self._state()
             self._size = self._status[0]
@@ -100,7 +102,7 @@ class CopcFile:
 
     def close(self) -> None:
         """Close the file."""
-        self._stream.close()
+        self._closing()
 
     def read(self, key: Key) -> Cloud:
         """

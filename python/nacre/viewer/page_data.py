@@ -65,6 +65,11 @@ class State(NamedTuple):
         return self.cloud.thinned(MAX_VERTICES if self.is_mesh else MAX_POINTS)
 
 
+def kept_points(timeline: Timeline) -> int:
+    """Return how many points of the newest state a page without a server has."""
+    return len(State(0, *timeline.snapshots[-1]).shown.points) if timeline.snapshots else 0
+
+
 class PageData:
     """
     What the page shows of one run, or of two that are compared, as they are now.
@@ -175,13 +180,6 @@ class PageData:
         is_whole = newest.is_mesh or newest.cloud.motion is not None
         return None if is_whole or len(newest.cloud.points) <= MAX_POINTS else newest
 
-    def _total(self, state: State) -> int:
-        """Return how many points a state has, of which the page may get fewer."""
-        levels = self._timelines[state.run].levels
-        if levels is not None and state is self._states[-1]:
-            return sum(levels.counts.values())
-        return len(state.cloud.points)
-
     def _detail(self, kind: str, rest: str) -> bytes:
         """Return the nodes of the state that is streamed, the points of one, or a few until these are there."""
         name, _, node = rest.rpartition("/") if kind == "node" else (rest, "", "")
@@ -232,10 +230,12 @@ class PageData:
             for frame in timeline.frames
         ]
         states = [
-            {"name": s.name, "place": s.place, "total": self._total(s), "isStreamed": s is self._streamed}
+            {"name": s.name, "place": s.place, "total": len(s.cloud.points), "isStreamed": s is self._streamed}
             for s in self._states
             if s.run == run
         ]
+        if states:
+            states[-1]["total"] = timeline.num_points  # of which the page may get fewer
         return {
             "title": timeline.title,
             "placement": timeline.placement,

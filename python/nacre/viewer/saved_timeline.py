@@ -33,6 +33,7 @@ from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline
 
 _COARSE_POINTS = 1_000_000
 _MOST_POINTS = 50_000_000
+_SAMPLES = 10_000
 _FAR = 8.0  # sides of the points' box from 0: more, and float32 has no millionth of a side
 
 
@@ -110,10 +111,11 @@ def _streamed(path: Path) -> Timeline:
 
 def _origin(points: npt.NDArray[np.floating[Any]]) -> npt.NDArray[np.float64]:
     """Return the middle of points that are far from 0, as surveys are, to a metre; else 0."""
-    kept = points[np.isfinite(points).all(axis=1)]
-    if points.dtype != np.float64 or not len(kept):
+    sample = points[:: max(len(points) // _SAMPLES, 1)]
+    sample = sample[np.isfinite(sample).all(axis=1)]
+    if points.dtype != np.float64 or not len(sample):
         return np.zeros(3)
-    lower, upper = kept.min(axis=0), kept.max(axis=0)
+    lower, upper = sample.min(axis=0), sample.max(axis=0)
     middle = np.round(lower / 2 + upper / 2)
     return middle if np.abs(middle).max() > _FAR * (upper - lower).max() else np.zeros(3)
 
@@ -221,7 +223,7 @@ def _estimated_normals(points: npt.NDArray[np.float32]) -> npt.NDArray[np.float3
 
 def usual_spacing(points: npt.NDArray[np.float32]) -> float:
     """Return the median distance of a point to its nearest neighbor elsewhere, of a sample of them."""
-    sample = points[:: max(len(points) // 10_000, 1)]
+    sample = points[:: max(len(points) // _SAMPLES, 1)]
     if len(points) < 2:
         return 0.001
     distances, _ = KdTree(points).query(sample, k=2)

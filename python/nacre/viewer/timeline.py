@@ -265,6 +265,13 @@ class Timeline:
         return list(self._snapshots)
 
     @property
+    def num_points(self) -> int:
+        """Of the newest state, with all levels of detail."""
+        if self.levels is not None:
+            return sum(self.levels.counts.values())
+        return len(self._snapshots[-1][1].points) if self._snapshots else 0
+
+    @property
     def has_points(self) -> bool:
         """Whether some state of the model has a point."""
         return any(len(cloud.points) > 0 for _, cloud in self._snapshots)

@@ -3,31 +3,16 @@
 from __future__ import annotations
 
 import gzip
-import json
-import struct
-from typing import Any
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from nacre.viewer.packing import morton_order, pack, rounded
 
-
-def unpacked(block: bytes) -> dict[str, np.ndarray[Any, Any]]:
-    """Undo pack, as data.js does."""
-    (size,) = struct.unpack_from("<I", block)
-    at, columns = 4 + size, {}
-    for column in json.loads(block[4:at])["columns"]:
-        rows, width = column["rows"], column["width"]
-        dtype = np.dtype(column["type"])
-        planes = np.frombuffer(block, np.uint8, rows * width * dtype.itemsize, at)
-        bits = planes.reshape(width, dtype.itemsize, rows).transpose(0, 2, 1).copy()
-        differences = bits.view(f"<u{dtype.itemsize}").reshape(width, rows)
-        values = np.cumsum(differences, axis=1, dtype=f"u{dtype.itemsize}").T.copy()
-        columns[column["name"]] = values.view(dtype)
-        at += rows * width * dtype.itemsize
-    assert at == len(block)
-    return columns
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from packed_columns import unpacked
 
 
 @pytest.mark.parametrize("rows", [0, 1, 500])

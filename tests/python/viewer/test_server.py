@@ -8,7 +8,6 @@ import sys
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from http.client import HTTPResponse
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ from nacre.report import ReportedFrame
 from nacre.viewer import Controls, Viewer
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
+from asked_server import ask, refused
 from viewer_scenes import CAMERA, plane, two_looks
 
 
@@ -29,20 +29,6 @@ def viewer() -> Iterator[Viewer]:
     viewer = Viewer(timeline, port=0)
     yield viewer
     viewer.close()
-
-
-def ask(viewer: Viewer, path: str, **headers: str) -> HTTPResponse:
-    answer: HTTPResponse = urllib.request.urlopen(urllib.request.Request(viewer.url + path, headers=headers))
-    with answer:
-        answer.body = answer.read()  # type: ignore[attr-defined]
-    return answer
-
-
-def refused(viewer: Viewer, path: str, **headers: str) -> int:
-    with pytest.raises(urllib.error.HTTPError) as error:
-        ask(viewer, path, **headers)
-    error.value.close()
-    return error.value.code
 
 
 def test_it_serves_the_page_and_what_the_page_reads(viewer: Viewer) -> None:
