@@ -140,6 +140,8 @@ def _check_chunk_table(path: str | os.PathLike[str], stream: BinaryIO, start: in
 
 
 def cloud_of(path: Path, chunks: list[Any], names: list[str], is_wide: bool, *, keep_all: bool) -> Cloud:
+    """Return records with the dimensions of these names, of which those that tell nothing may be left out."""
+
     def column(name: str) -> npt.NDArray[Any]:
         parts = [np.asarray(chunk[name]) for chunk in chunks]
         return native(np.concatenate(parts)) if parts else np.zeros(0)
@@ -294,6 +296,7 @@ def _fitted(name: str, values: npt.NDArray[Any], point_format: Any) -> npt.NDArr
 
 
 def import_laspy() -> Any:
+    """Return laspy, where it and lazrs are there."""
     try:
         import laspy
         import lazrs  # noqa: F401

@@ -16,7 +16,7 @@ from nacre.io.octree import Key
 from nacre.viewer.timeline import Snapshot
 
 _AFAR = 1000.0  # sides of the root
-_FIELDS = ("confidence", "last_seen", "sigma")  # in the order of a snapshot
+_FIELDS = ("confidence", "last_seen", "sigma")
 
 
 class CopcLevels:
@@ -72,7 +72,8 @@ class CopcLevels:
             normals = estimate_normals(points, viewpoint=(0, 0, _AFAR * self.side))
         known = np.isfinite(normals).all(axis=1, keepdims=True)
         normals = np.where(known, normals, (0, 0, 1)).astype(np.float32)
-        return Snapshot(points, normals, spacing, cloud.colors, *map(cloud.attributes.get, _FIELDS))
+        confidence, last_seen, sigma = map(cloud.attributes.get, _FIELDS)
+        return Snapshot(points, normals, spacing, cloud.colors, confidence, last_seen, sigma)
 
 
 def _joined(clouds: list[Cloud]) -> Cloud:

@@ -27,8 +27,6 @@ class Levels(Protocol):
         The lowest of the root [m], from the origin of the timeline.
     side, spacing : float
         Of the root, and between its points [m].
-    counts : mapping of Key to int
-        The points of each node.
     """
 
     corner: npt.NDArray[np.float64]
@@ -36,7 +34,9 @@ class Levels(Protocol):
     spacing: float
 
     @property
-    def counts(self) -> Mapping[Key, int]: ...
+    def counts(self) -> Mapping[Key, int]:
+        """The points of each node."""
+        ...
 
     def read(self, key: Key) -> Snapshot:
         """

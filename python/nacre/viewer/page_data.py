@@ -181,7 +181,7 @@ class PageData:
         return None if is_whole or len(newest.cloud.points) <= MAX_POINTS else newest
 
     def _detail(self, kind: str, rest: str) -> bytes:
-        """Return the nodes of the state that is streamed, the points of one, or a few until these are there."""
+        """Return what nodes the streamed state has, the points of one, or a few while these are not there."""
         name, _, node = rest.rpartition("/") if kind == "node" else (rest, "", "")
         streamed = self._streamed
         if streamed is None or name != streamed.name:
@@ -201,14 +201,14 @@ class PageData:
 
     def _described(self) -> dict[str, Any]:
         newest = {state.run: state for state in self._states}
-        view = None
+        first, view = self._timelines[0], None
         if 0 in newest and len(newest[0].cloud.points):
-            view = first_view(newest[0].cloud, self._timelines[0], newest[0].place).as_dict()
+            view = first_view(newest[0].cloud, first, newest[0].place).as_dict()
         return {
             "title": " and ".join(timeline.title for timeline in self._timelines),
             "isLive": self._is_live,
             "view": view,
-            "comment": "metres" if self._timelines[0].is_upright or self._timelines[0].is_survey else f"metres; {CAMERA_FRAME}",
+            "comment": "metres" if first.is_upright or first.is_survey else f"metres; {CAMERA_FRAME}",
             "statusColors": STATUS_COLORS,
             "colormap": viridis(np.linspace(0, 1, 9)).tolist(),
             "depthLegend": depth_legend(),
@@ -229,8 +229,9 @@ class PageData:
             }
             for frame in timeline.frames
         ]
-        states = [
-            {"name": s.name, "place": s.place, "total": len(s.cloud.points), "isStreamed": s is self._streamed}
+        streamed = self._streamed
+        states: list[dict[str, Any]] = [
+            {"name": s.name, "place": s.place, "total": len(s.cloud.points), "isStreamed": s is streamed}
             for s in self._states
             if s.run == run
         ]

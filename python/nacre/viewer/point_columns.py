@@ -14,7 +14,7 @@ from nacre.viewer.timeline import Snapshot
 
 
 def point_columns(cloud: Snapshot) -> dict[str, npt.NDArray[Any]]:
-    """Return the columns for :func:`nacre.viewer.packing.pack`; what is not known of the points is left out."""
+    """Return columns for :func:`nacre.viewer.packing.pack`; what is not known of the points is left out."""
     columns: dict[str, npt.NDArray[Any]] = {
         "normals": octahedral(cloud.normals),
         "sizes": _logarithms(disk_radii(cloud) / cloud.spacing),

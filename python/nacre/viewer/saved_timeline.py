@@ -51,7 +51,7 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     path : path-like
         ``OUT``, which holds ``model.ply`` and ``report.json``; or a file of points or of a mesh. Where it has
         no normals, they come from the triangles, or else are estimated; y is up unless a comment says that it
-        is nacre's. Of a COPC file (``.copc.laz``, extra ``las``), in which z is up, only the coarse levels are
+        is nacre's. Of a COPC file (``.copc.laz``, extra ``las``), in which z is up, only coarse levels are
         read; it stays open, and the viewer reads nodes of its octree as they are looked at.
 
     Raises
@@ -186,11 +186,12 @@ def _check_number(path: Path) -> None:
     """Refuse more points than are read at once."""
     found = count_points(path)
     if found is not None and found > _MOST_POINTS:
-        raise FileFormatError(
-            path,
-            f"{count(found)} points are more than the {count(_MOST_POINTS)} that are read at once: nacre convert "
-            f"{path.name} {path.stem}{SUFFIX} writes a file of which nacre view reads what is looked at",
+        reason = (
+            f"{count(found)} points are more than the {count(_MOST_POINTS)} that are read at once: "
+            f"nacre convert {path.name} {path.stem}{SUFFIX}, or nacre normals by pieces, writes a file of "
+            "which nacre view reads what is looked at"
         )
+        raise FileFormatError(path, reason)
 
 
 def _painted(path: Path) -> tuple[MeshArrays, Painting | None]:

@@ -185,7 +185,7 @@ class Timeline:
     is_growing : bool
         Whether more is coming: what grows is not put into an octree again and again.
     levels : Levels or None
-        Of a file that is larger than memory: all points of the newest state, which itself has the coarse ones.
+        Of a file that memory need not hold: all points of the newest state, which has the coarse ones.
     origin : (3,) float64
         Where the origin of all positions lies in the file's coordinates, which may be large [m].
     placement : str

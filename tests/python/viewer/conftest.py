@@ -9,13 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import nacre
 from nacre.datasets import write_recording
+from nacre.io import octree
 from nacre.viewer import export_html
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from bending_sheet import CAMERA, CURVATURES, sheet
 from browser import Browser
 from command_line import run
+from hills import hills
 from shown_page import LOADED
 from viewer_scenes import plane, two_looks
 
@@ -46,3 +49,15 @@ def bent(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_recording(folder / "recording", CAMERA, depths, depth_scale=10_000)
     run("reconstruct", folder / "recording", "--deform", "-o", folder / "out", "--no-report")
     return folder / "out"
+
+
+@pytest.fixture(scope="session")
+def hill(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a COPC file of hills with several levels."""
+    pytest.importorskip("laspy")
+    pytest.importorskip("lazrs")
+    path = tmp_path_factory.mktemp("hill") / "hill.copc.laz"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(octree, "_LEAF", 1000)
+        nacre.write_points(path, hills())
+    return path

@@ -95,7 +95,11 @@ class OctreeCloud {
   /** Choose what is drawn, of what is there, and ask for what is missing. */
   look({ view, clip }, height, aspect) {
     const frustum = new Frustum(view, clip, aspect), perUnit = 0.5 * height * clip[5];
-    const queue = [{ node: this.root, pixels: Infinity }], missing = [];
+    const pixelsOf = ({ middle, side, spacing }) => {
+      const distance = frustum.distance(middle, side);
+      return distance === null ? null : (perUnit * spacing) / distance;
+    };
+    const queue = [{ node: this.root, pixels: pixelsOf(this.root) ?? 0 }], missing = []; // the root is always there
     let numPoints = 0;
     this.time++;
     this.drawn = [];
@@ -108,8 +112,8 @@ class OctreeCloud {
       } else if (node.count && !node.isDamaged) missing.push(node);
       if (!node.isReady || pixels < PIXELS) continue;
       for (const child of node.children) {
-        const distance = child && frustum.distance(child.middle, child.side);
-        if (child && distance !== null) queue.push({ node: child, pixels: (perUnit * child.spacing) / distance });
+        const pixels = child && pixelsOf(child);
+        if (pixels !== null) queue.push({ node: child, pixels });
       }
     }
     this.disks.fit(this.root, new Set(this.drawn));
@@ -132,7 +136,7 @@ class OctreeCloud {
       if (this.coloring) node.cloud.color(...this.coloring);
       node.cloud.select(...this.selection);
       this.held.add(node);
-      this.#drop();
+      this.drop();
     } catch {
       node.isDamaged = true; // what is above it is shown
       this.failed++;
@@ -141,11 +145,13 @@ class OctreeCloud {
     this.requests--;
   }
 
-  #drop() {
+  /** Leave the nodes that were not needed for the longest time, until there are no more points than that. */
+  drop(most = MAX_HELD) {
     let numPoints = this.size;
-    if (numPoints <= MAX_HELD) return;
+    if (numPoints <= most) return;
     for (const node of [...this.held].sort((a, b) => a.lastUsed - b.lastUsed)) {
-      if (numPoints <= MAX_HELD || node.lastUsed >= this.time || node.cloud === this.first) return;
+      if (numPoints <= most || node.lastUsed >= this.time) return;
+      if (node.cloud === this.first) continue;
       numPoints -= node.count;
       this.held.delete(node);
       node.cloud = null;
