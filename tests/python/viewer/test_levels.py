@@ -27,6 +27,7 @@ from nacre.viewer.snapshot_levels import SnapshotLevels
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from asked_server import ask, refused
+from command_line import run
 from hills import hills
 from packed_columns import header_of, unpacked
 from viewer_scenes import plane, two_looks
@@ -158,6 +159,15 @@ def test_a_page_without_a_server_has_the_coarse_points(
     assert 0 < shown <= 10_000 < timeline.num_points == len(CLOUD)
     export_html(timeline, tmp_path / "view.html", triangles=False)
     assert (tmp_path / "view.html").stat().st_size > 10_000
+
+
+def test_the_terminal_tells_how_many_points_an_exported_page_has(
+    hill: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nacre.viewer.page_data.MAX_POINTS", 1000)
+    told = run("view", hill, "--html", tmp_path / "view.html")
+    assert told.code == 0
+    assert "1 000 of 24 000, evenly" in told.out.replace("\N{NARROW NO-BREAK SPACE}", " ")
 
 
 def test_points_far_from_the_origin_keep_their_digits(tmp_path: Path) -> None:

@@ -130,9 +130,11 @@ def test_a_run_is_shown_while_it_grows(out: Path) -> None:
         for record in done.run():
             live.add(record)
             live.show()
+        assert live.timeline.is_growing
         first, last = (live.timeline.snapshots[i][1] for i in (0, -1))
         assert len(first.points) < len(last.points)
         live.finish()
+        assert not live.timeline.is_growing
         frames = json.loads(live.viewer.data.document)["runs"][0]["frames"]
         assert len(frames) == FRAMES
         assert len(live.timeline.snapshots) == FRAMES

@@ -1,6 +1,6 @@
 // Points in an octree on the server, of which the page reads the nodes that the view needs, coarse ones first.
 
-const PIXELS = 1.4; // between neighbouring points on the screen: closer ones are not asked for
+const PIXELS = 2; // between neighbouring points on the screen: closer ones are not asked for
 const MAX_DRAWN = 3_000_000; // points
 const MAX_HELD = 5_000_000; // points in memory; more, and nodes that were not needed for the longest time are dropped
 const MAX_REQUESTS = 4; // at once
@@ -29,6 +29,7 @@ class OctreeCloud {
     this.root = plantedTree(columns.nodes, header);
     this.held = new Set(); // nodes with points
     this.drawn = [];
+    this.missing = [];
     this.requests = 0;
     this.failed = 0;
     this.time = 0;
@@ -117,14 +118,19 @@ class OctreeCloud {
       }
     }
     this.disks.fit(this.root, new Set(this.drawn));
-    this.#ask(missing);
+    this.missing = missing;
+    this.#ask();
   }
 
-  /** Ask for nodes, the first first; the answers draw the picture again, which asks for more. */
-  #ask(missing) {
-    for (const node of missing) {
+  /** Ask for what is missing, the first first; the answers draw the picture again, which tells what else is. */
+  #ask() {
+    for (const node of this.missing) {
       if (this.requests >= MAX_REQUESTS) return;
-      if (!node.isAsked) this.#read(node).then(() => this.onChange());
+      if (node.isAsked || node.cloud || node.isDamaged) continue;
+      this.#read(node).then(() => {
+        this.#ask();
+        this.onChange();
+      });
     }
   }
 
