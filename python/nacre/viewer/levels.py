@@ -16,6 +16,9 @@ from nacre.viewer.timeline import Snapshot
 STEPS = 1 << 24
 """Of a node's side, to which its points are rounded: a graphics card's float32 tells no more apart."""
 
+_CELL_ABOVE = 2.0
+"""Spacings: a point that no node above has lies in a cell of which one of these has another point."""
+
 
 class Levels(Protocol):
     """
@@ -76,7 +79,8 @@ def pack_node(levels: Levels, name: str) -> bytes:
     order = morton_order((rows >> 8).astype(np.uint16))
     origin = levels.corner + levels.side / 2 ** key[0] * np.array(key[1:])
     header: dict[str, Any] = {"spacing": cloud.spacing, "origin": origin.tolist(), "step": step}
-    return pack(header, {"points": rows[order]} | point_columns(cloud.rows(order, cloud.spacing)))
+    largest = _CELL_ABOVE if key[0] else np.inf
+    return pack(header, {"points": rows[order]} | point_columns(cloud.rows(order, cloud.spacing), largest))
 
 
 def name_of(key: Key) -> str:

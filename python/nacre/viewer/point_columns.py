@@ -13,11 +13,19 @@ from nacre.viewer.packing import rounded
 from nacre.viewer.timeline import Snapshot
 
 
-def point_columns(cloud: Snapshot) -> dict[str, npt.NDArray[Any]]:
-    """Return columns for :func:`nacre.viewer.packing.pack`; what is not known of the points is left out."""
+def point_columns(cloud: Snapshot, largest: float = np.inf) -> dict[str, npt.NDArray[Any]]:
+    """
+    Return columns for :func:`nacre.viewer.packing.pack`; what is not known of the points is left out.
+
+    Parameters
+    ----------
+    cloud : Snapshot
+    largest : float
+        Radius of a disk [spacings].
+    """
     columns: dict[str, npt.NDArray[Any]] = {
         "normals": octahedral(cloud.normals),
-        "sizes": _logarithms(disk_radii(cloud) / cloud.spacing),
+        "sizes": _logarithms(np.minimum(disk_radii(cloud) / cloud.spacing, largest)),
     }
     if cloud.colors is not None:
         columns["colors"] = cloud.colors
