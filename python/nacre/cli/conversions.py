@@ -63,7 +63,8 @@ def _vertices(job: Job) -> Figures:
     from nacre.io.meshes import read_mesh_arrays
 
     mesh = read_mesh_arrays(job.source)
-    return _write_points(job.out, nacre.Cloud(mesh.vertices, mesh.normals, mesh.colors))
+    cloud = nacre.Cloud(mesh.vertices, mesh.normals, mesh.colors, comments=mesh.comments)
+    return _write_points(job.out, cloud)
 
 
 def _model(job: Job) -> Figures:

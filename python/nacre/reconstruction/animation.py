@@ -19,7 +19,12 @@ _TOLERANCE = 0.1  # [spacing] that a vertex may be off
 
 
 def write_model_animation(
-    path: Path, model: Model, frames: Sequence[FrameRecord], *, all_points: bool = False
+    path: Path,
+    model: Model,
+    frames: Sequence[FrameRecord],
+    *,
+    all_points: bool = False,
+    comments: Sequence[str] = (),
 ) -> None:
     """
     Write a model that deforms as a mesh that moves.
@@ -34,6 +39,8 @@ def write_model_animation(
         In their order. Those that are tracked are shown, of many every second, third or so.
     all_points : bool
         Whether to join all points, not those alone that are a surface.
+    comments : sequence of str
+        What the file says about itself.
     """
     shown = [frame for frame in frames if frame.world_from_camera is not None]
     rows, triangles = _surface(model, all_points)
@@ -52,6 +59,7 @@ def write_model_animation(
         colors=None if colors is None else colors[rows],
         times=_times(shown),
         tolerance=_TOLERANCE * model.spacing,
+        comments=comments,
     )
 
 

@@ -6,22 +6,22 @@ import base64
 import re
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nacre import __version__
 from nacre.io.atomic import atomic_writer
 from nacre.io.json_files import to_json
 from nacre.io.points import write_points
 from nacre.io.trajectories import write_trajectory
 from nacre.reconstruction.animation import write_model_animation
+from nacre.reconstruction.comments import file_comments
 from nacre.reconstruction.motion import write_model_motion
 
 if TYPE_CHECKING:
     from nacre.reconstruction.reconstruction import Reconstruction
 
 _ANIMATION = "animation.glb"
-_OF_WHAT_BENDS = {_ANIMATION: write_model_animation, "motion.npz": write_model_motion}
 _PICTURE_NAMES = {
     "the-model": "model",
     "as-measured": "depth-before",
@@ -48,17 +48,15 @@ def write_results(
     How what bends moved is written, too, of a mesh and of the points, when the run is finished. There is no
     trajectory where no frame was tracked.
     """
-    write_points(
-        folder / "model.ply",
-        done.cloud,
-        comments=[f"nacre {__version__}", "metres; the world is the first camera's frame"],
-    )
+    comments = file_comments(done)
+    write_points(folder / "model.ply", done.cloud, comments=comments)
     if len(done.trajectory):
         write_trajectory(folder / "trajectory.txt", done.trajectory)
     else:
         (folder / "trajectory.txt").unlink(missing_ok=True)  # of an earlier model
     interrupted = bool(document.get("interrupted"))
-    for name, write in _OF_WHAT_BENDS.items():
+    write_animation = partial(write_model_animation, comments=comments)
+    for name, write in ((_ANIMATION, write_animation), ("motion.npz", write_model_motion)):
         if done.model.parameters.deform and not interrupted:
             write(folder / name, done.model, done.frames, all_points=done.all_points)
         else:

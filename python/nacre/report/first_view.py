@@ -16,6 +16,7 @@ from nacre.report.reported_frame import ReportedFrame
 
 if TYPE_CHECKING:
     from nacre.viewer import Snapshot
+    from nacre.viewer.view import View as ViewersView
 
 _FIELD_OF_VIEW = 0.7  # of the viewer's page [rad]
 
@@ -37,12 +38,7 @@ def first_view(
     size : (int, int)
         Width and height of the picture [pixels].
     """
-    from nacre.viewer import Timeline, views
-
-    timeline = Timeline("", camera)
-    for frame in frames:
-        timeline.add(frame)
-    view = views.first_view(_snapshot(model), timeline, len(frames) - 1)
+    view = viewers_view(model, frames, camera)
     half = math.tan(_FIELD_OF_VIEW / 2)  # of the height, as a part of the distance
     distance = view.radius / math.sin(math.atan(half * min(size[0] / size[1], 1)))
     forward = -view.direction
@@ -50,6 +46,16 @@ def first_view(
     right /= np.linalg.norm(right)
     axes = np.stack([right, np.cross(forward, right), forward])
     return View(axes, view.target, 2 * half * distance / size[1], size, distance)
+
+
+def viewers_view(model: ModelCloud, frames: Sequence[ReportedFrame], camera: Camera | None) -> ViewersView:
+    """Return that view as the viewer has it; :func:`first_view` has the parameters."""
+    from nacre.viewer import Timeline, views
+
+    timeline = Timeline("", camera)
+    for frame in frames:
+        timeline.add(frame)
+    return views.first_view(_snapshot(model), timeline, len(frames) - 1)
 
 
 def disk_radii(model: ModelCloud) -> npt.NDArray[np.float32]:

@@ -30,6 +30,7 @@ from nacre.report.saved_run import SavedRun
 from nacre.report.text import count
 from nacre.viewer.copc_levels import CopcLevels
 from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline
+from nacre.viewer.view import View
 
 _COARSE_POINTS = 1_000_000
 _MOST_POINTS = 50_000_000
@@ -51,8 +52,9 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     path : path-like
         ``OUT``, which holds ``model.ply`` and ``report.json``; or a file of points or of a mesh. Where it has
         no normals, they come from the triangles, or else are estimated; y is up unless a comment says that it
-        is nacre's. Of a COPC file (``.copc.laz``, extra ``las``), in which z is up, only coarse levels are
-        read; it stays open, and the viewer reads nodes of its octree as they are looked at.
+        is nacre's, and another may say from where to look first. Of a COPC file (``.copc.laz``, extra
+        ``las``), in which z is up, only coarse levels are read; it stays open, and the viewer reads nodes of
+        its octree as they are looked at.
 
     Raises
     ------
@@ -95,6 +97,8 @@ def _of_file(path: Path) -> Timeline:
     timeline = Timeline(path.name, None, is_upright=is_upright)
     timeline.origin = _origin(file.points)
     near = file if not timeline.origin.any() else replace(file, points=file.points - timeline.origin)
+    view = View.of_comments(file.comments)
+    timeline.view = None if view is None else view._replace(target=view.target - timeline.origin)
     timeline.set_snapshot(_cloud(near, None, triangles, painting))
     return timeline
 

@@ -17,6 +17,7 @@ from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.motion import Motion, motion_of
 from nacre.report.reported_frame import ReportedFrame
 from nacre.report.text import count, quantity
+from nacre.viewer.view import View
 
 if TYPE_CHECKING:
     from nacre.viewer.levels import Levels
@@ -188,6 +189,8 @@ class Timeline:
         Of a file that memory need not hold: all points of the newest state, which has the coarse ones.
     origin : (3,) float64
         Where the origin of all positions lies in the file's coordinates, which may be large [m].
+    view : View or None
+        From where to look first, where the file of a model without cameras says it.
     placement : str
         Of a run that is compared with another: how it came into the other's world frame; "" where not known.
     """
@@ -217,6 +220,7 @@ class Timeline:
         self.is_growing = False
         self.levels: Levels | None = None
         self.origin: npt.NDArray[np.float64] = np.zeros(3)
+        self.view: View | None = None
         self.placement = ""
         self._snapshots: list[tuple[int, Snapshot]] = []
         self._max_snapshots = max_snapshots

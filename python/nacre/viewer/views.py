@@ -2,42 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from nacre import Camera
 from nacre.viewer.timeline import Snapshot, Timeline
+from nacre.viewer.view import View
 
 Array = npt.NDArray[np.float64]
 
 _MAX_VIEWS = 60
 _MAX_POINTS = 20_000
-
-
-class View(NamedTuple):
-    """
-    From where to look: all in the world frame.
-
-    Attributes
-    ----------
-    target : (3,) array
-        What is in the middle [m].
-    direction, up : (3,) array
-        Unit vectors: from the target to the eye, and upwards.
-    radius : float
-        Of a sphere about the target that should be in the picture [m].
-    """
-
-    target: Array
-    direction: Array
-    up: Array
-    radius: float
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return what JSON can say, to a micrometre."""
-        return {name: np.asarray(value).round(6).tolist() for name, value in self._asdict().items()}
 
 
 def posed_places(timeline: Timeline, place: int) -> list[int]:
@@ -131,8 +108,11 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
     Return a view of the main thing: from where most frames saw it, upright as the cameras were.
 
     Main is what most frames saw and many observations confirm; specks and far walls have no say. Without
-    cameras it is seen from the side to which it faces; a survey from the south, at 45 degrees.
+    cameras it is seen as its file says, or else from the side to which it faces; a survey from the south, at
+    45 degrees.
     """
+    if timeline.view is not None and _shows(timeline.view, cloud.points):
+        return timeline.view
     few = cloud.thinned(_MAX_POINTS)
     places = posed_places(timeline, place)
     if timeline.is_survey:
@@ -154,6 +134,11 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
     target = np.median(points[core], axis=0)
     toward = best[:3, 3] - target if timeline.camera.model == "pinhole" else -best[:3, 2]
     return _view(points, core, toward, -poses[:, :3, 1].mean(axis=0))
+
+
+def _shows(view: View, points: npt.NDArray[np.float32]) -> bool:
+    """Say whether a point is in view: else a file was moved, and what it says is of where it was."""
+    return bool((np.linalg.norm(points - view.target.astype(np.float32), axis=1) <= view.radius).any())
 
 
 _DOWN, _FORWARD = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])

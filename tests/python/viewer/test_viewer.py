@@ -23,6 +23,8 @@ from nacre.report import ReportedFrame
 from nacre.report.lost_frames import plain_reason
 from nacre.viewer.page_data import PageData
 from nacre.viewer.timeline import words
+from nacre.viewer.view import View
+from nacre.viewer.views import first_view
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
 from viewer_scenes import plane, two_looks
@@ -252,6 +254,21 @@ def test_a_mesh_file_of_nacre_stands_upright(tmp_path: Path, ending: str) -> Non
     for comments in ([], ["nacre 0.1.0", "metres; the world is the first camera's frame"]):
         nacre.write_mesh(path, corners, triangles, comments=comments)
         assert viewer.read_timeline(path).is_upright == (not comments)
+
+
+def opening(path: Path) -> View:
+    timeline = viewer.read_timeline(path)
+    place, cloud = timeline.snapshots[-1]
+    return first_view(cloud, timeline, place)
+
+
+@pytest.mark.parametrize("ending", ["glb", "obj", "ply"])
+def test_a_mesh_of_a_run_opens_as_the_run_does(out: Path, tmp_path: Path, ending: str) -> None:
+    assert run("mesh", out, "-o", tmp_path / f"a.{ending}", "--quiet") == 0
+    assert run("convert", tmp_path / f"a.{ending}", tmp_path / "b.ply", "--quiet") == 0
+    for path in (out / "model.ply", tmp_path / f"a.{ending}", tmp_path / "b.ply"):
+        for expected, value in zip(opening(out), opening(path), strict=True):
+            np.testing.assert_allclose(value, expected, atol=1e-5)
 
 
 def painted_plane(path: Path) -> Path:

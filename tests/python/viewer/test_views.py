@@ -13,6 +13,7 @@ import pytest
 import nacre
 from nacre.report import ReportedFrame
 from nacre.viewer import Snapshot, Timeline
+from nacre.viewer.view import View
 from nacre.viewer.views import first_seen, first_view, sees
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -160,3 +161,35 @@ def test_a_camera_that_looks_along_up_still_has_an_up() -> None:
     view = first_view(plane(), timeline, 1)
     assert abs(view.up @ view.direction) < 0.98
     assert np.linalg.norm(view.up) == pytest.approx(1)
+
+
+def test_a_file_says_from_where_to_look_at_it() -> None:
+    told = View(np.array([1e-4, -0.2, 1.25]), np.array([0.6, 0, -0.8]), np.array([0, -1.0, 0]), 0.3)
+    read = View.of_comments(["metres", told.as_comment()])
+    assert read is not None
+    for expected, value in zip(told, read, strict=True):
+        np.testing.assert_allclose(value, expected, atol=1e-6)
+    timeline = Timeline("plane", None)
+    timeline.view = read._replace(target=np.array([0, 0, 1.0]))
+    assert first_view(plane(), timeline, -1) is timeline.view
+    timeline.view = read._replace(target=np.array([9.0, 0, 1]))  # the points were moved since
+    np.testing.assert_allclose(first_view(plane(), timeline, -1).direction, (0, 0, -1), atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "comment",
+    [
+        "",
+        "first view: from the front",
+        "first view: target 0 0 x, direction 0 0 -1, up 0 -1 0, radius 1",
+        "first view: target 0 0 nan, direction 0 0 -1, up 0 -1 0, radius 1",
+        "first view: target 0 0 1e300, direction 0 0 -1, up 0 -1 0, radius 1",
+        "first view: target 0 0 1, direction 0 0 0, up 0 -1 0, radius 1",
+        "first view: target 0 0 1, direction 0 1e200 0, up 0 -1 0, radius 1",
+        "first view: target 0 0 1, direction 0 1 0, up 0 -1 0, radius 1",
+        "first view: target 0 0 1, direction 0 0 -1, up 0 -1 0, radius -1",
+        "first view: target 0 0 1, direction 0 0 -1, up 0 -1 0, radius inf",
+    ],
+)
+def test_a_comment_that_tells_no_view_is_left_alone(comment: str) -> None:
+    assert View.of_comments([comment]) is None
