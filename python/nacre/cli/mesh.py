@@ -79,6 +79,7 @@ def mesh(
     from nacre import read_points, write_mesh
     from nacre.io.meshes import read_mesh_arrays, require_mesh_suffix
     from nacre.meshing import largest_part, part_sizes
+    from nacre.report.text import count
 
     if not source.exists():
         raise CommandError(
@@ -113,7 +114,7 @@ def mesh(
             mesh = _simplified(mesh, num_triangles)
             if len(mesh.triangles) > num_triangles:
                 terminal.say(
-                    f"{len(mesh.triangles)} triangles are left, since parts and holes do not vanish "
+                    f"{count(len(mesh.triangles))} triangles are left, since parts and holes do not vanish "
                     "(--keep largest, --closed)"
                 )
         if texture:

@@ -22,7 +22,7 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
     counts = {name.lower(): number for name, number in done.counts.items() if number and name != "TRACKED"}
     extra = f" ({', '.join(f'{number} {name}' for name, number in counts.items())})" if counts else ""
     rows = [
-        ("frames tracked", f"{done.num_tracked} of {len(done.frames)}{extra}"),
+        ("frames tracked", f"{count(done.num_tracked)} of {count(len(done.frames))}{extra}"),
         ("model", f"{count(len(done.cloud))} points, {quantity(done.model.spacing, 'm')} apart"),
     ]
     if done.loops:

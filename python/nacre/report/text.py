@@ -56,7 +56,7 @@ def quantity(value: Any, unit: str = "") -> str:
 
 def count(value: int) -> str:
     """Return a whole number with its digits in groups of three."""
-    return f"{value:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")
+    return _grouped(f"{value:,}")
 
 
 def duration(seconds: float) -> str:
@@ -68,7 +68,7 @@ def duration(seconds: float) -> str:
 
 def length_unit(metres: float) -> tuple[str, float]:
     """Return the unit in which a length reads well, and how many of it are in a metre."""
-    if not math.isfinite(metres) or metres >= 2:
+    if not math.isfinite(metres) or metres >= 1:
         return "m", 1.0
     return ("mm", 1e3) if metres >= 5e-5 else ("µm", 1e6)
 
@@ -86,7 +86,7 @@ def ticks(low: float, high: float, count: int = 4) -> list[float]:
 
 def number(value: float) -> str:
     """Return the number at a tick."""
-    text = f"{value:,.0f}".replace(",", "\N{NARROW NO-BREAK SPACE}") if abs(value) >= 1e4 else f"{value:.6g}"
+    text = _grouped(f"{value:,.0f}") if abs(value) >= 1e3 and value == round(value) else f"{value:.6g}"
     return text.replace("-", "\N{MINUS SIGN}")
 
 
@@ -123,13 +123,18 @@ def flatten(parameters: Any, prefix: str = "") -> list[tuple[str, str]]:
     return [(prefix, str(parameters))]
 
 
+def _grouped(digits: str) -> str:
+    """Return a number whose groups of three are set apart by commas as it is shown everywhere."""
+    return digits.replace(",", "\N{NARROW NO-BREAK SPACE}")
+
+
 def _digits(value: float) -> str:
     if isinstance(value, int):
-        return str(value)
+        return count(value).replace("-", "\N{MINUS SIGN}")
     if value == 0:
         return "0"
     magnitude = math.floor(math.log10(abs(value)))
-    text = f"{value:.{min(max(2 - magnitude, 0), 12)}f}" if magnitude > -4 else f"{value:.2e}"
+    text = _grouped(f"{value:,.{min(max(2 - magnitude, 0), 12)}f}") if magnitude > -4 else f"{value:.2e}"
     return text.replace("-", "\N{MINUS SIGN}")
 
 

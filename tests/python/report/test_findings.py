@@ -351,7 +351,7 @@ class TestFrames:
         verdict = verdict_on(frames, doubled=doubled, interrupted=True)
         assert [finding.kind for finding in verdict.findings] == ["flip", "doubled", "lost", "interrupted"]
         assert verdict.findings[1].statement == (
-            "2.0 % of the surface is there twice, 7.00 mm apart, around (0 mm, 0 mm, 1000 mm)"
+            "2.0 % of the surface is there twice, 7.00 mm apart, around (0 mm, 0 mm, 1.00 m)"
         )
         assert verdict.level == "lost"
 

@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 import nacre
+import nacre.viewer
 from nacre.report import ReportedFrame
+from nacre.report.text import count, quantity
 from nacre.viewer import Timeline, Viewer, export_html
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -48,6 +50,15 @@ def test_it_begins_with_the_colored_model_in_the_middle(exported: Browser) -> No
     assert red > 2 * max(green, blue)
     assert max(np.ptp(color_at(exported, 20, 20)), 0) < 60  # the background is grey
     assert exported.evaluate("performance.getEntriesByType('resource').length") == 0  # no network
+
+
+def test_numbers_are_as_in_the_report(exported: Browser) -> None:
+    script = Path(nacre.viewer.__file__).with_name("web").joinpath("linear.js").read_text(encoding="utf-8")
+    for value in (0, 999, 1000, 12345, 1234567):
+        assert exported.evaluate(f"(() => {{ {script}; return countText({value}) }})()") == count(value)
+    for metres in (0.0123, 0.999, 1.0, 4.25):
+        text = exported.evaluate(f"(() => {{ {script}; return lengthText({metres}) }})()")
+        assert text.split()[1] == quantity(metres, "m").split()[1]
 
 
 def test_the_distance_between_two_points_that_were_picked(exported: Browser) -> None:

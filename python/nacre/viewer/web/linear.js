@@ -55,6 +55,11 @@ function quantile(values, part) {
   return sample[low] + (at - low) * ((sample[low + 1] ?? sample[low]) - sample[low]);
 }
 
+/** A whole number with its digits in groups of three, as the report has them. */
+function countText(number) {
+  return String(number).replace(/\B(?=(\d{3})+$)/g, "\u202f");
+}
+
 /** A length in the unit that suits it. */
 function lengthText(metres) {
   if (metres >= 1) return `${metres.toFixed(3)} m`;

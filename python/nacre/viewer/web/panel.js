@@ -23,7 +23,7 @@ function showDocument({ title, runs, depthLegend }) {
   const { frames } = runs[0], counts = new Map();
   frames.forEach(({ status }) => counts.set(status, (counts.get(status) ?? 0) + 1));
   const parts = [...counts].map(([status, count]) => `${count} ${status.toLowerCase()}`);
-  document.getElementById("summary").textContent = frames.length ? `${frames.length} frames: ${parts.join(", ")}` : "";
+  document.getElementById("summary").textContent = frames.length ? `${countText(frames.length)} frames: ${parts.join(", ")}` : "";
   document.querySelectorAll(".of-frames").forEach((part) => (part.hidden = !frames.length));
   document.getElementById("path-row").hidden = !runs.some((run) => run.hasPath);
 }
@@ -64,9 +64,9 @@ function showUncertainty({ clouds: [cloud] }) {
 function showCount({ clouds, parts }) {
   const texts = parts.map(({ run }) => {
     const { numShown, size, total, failed } = clouds[run];
-    const all = (total ?? size).toLocaleString("en"), isWhole = numShown === (total ?? size);
+    const all = countText(total ?? size), isWhole = numShown === (total ?? size);
     const lost = failed ? `; ${failed} part${failed > 1 ? "s" : ""} cannot be read` : "";
-    return (isWhole ? `${all} points` : `${numShown.toLocaleString("en")} of ${all} points`) + lost;
+    return (isWhole ? `${all} points` : `${countText(numShown)} of ${all} points`) + lost;
   });
   document.getElementById("count").textContent = texts.join(" and ");
 }
