@@ -339,7 +339,9 @@ class Model(ExchangeablePoints, Checkpointed):
         From the measured noise: what a point's observations average away of it (``confidence``), and what
         registered frames showed beyond it (``noise_factor``), which is taken for the same in all of them.
         Errors of the poses, and shape that is finer than the pixels, come on top. NaN where
-        ``fusion_method`` is not "fuse".
+        ``fusion_method`` is not "fuse", and as long as nothing tells how much noise there is beyond what one
+        image shows: the noise is not given (``depth.noise``), and every frame's pose was, or was found by
+        the search for an object that turned on its plane.
         """
         with self._lock:
             return point_sigma(self)

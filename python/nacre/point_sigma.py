@@ -22,7 +22,8 @@ def point_sigma(model: Model) -> Array:
     confidence = model.confidence.astype(np.float64)
     fused = (frame.world_from_camera for frame in model.frames if frame.status in ("TRACKED", "RELOCALISED"))
     first = next(fused, None)
-    if model.parameters.fusion_method != "fuse" or not len(confidence) or first is None:
+    is_fused = model.parameters.fusion_method == "fuse" and first is not None
+    if not (is_fused and len(confidence) and _knows_noise(model)):
         return np.full(len(confidence), np.nan)
     noise, factor = model.noise, model.noise_factor
     reference = model.parameters.fusion.reference_sigma or _median_sigma(model, first)
@@ -32,6 +33,19 @@ def point_sigma(model: Model) -> Array:
         variance = averaged * reference**2 / (factor**2 * confidence)
     variance += (1 - factor**-2) * _observation_sigma(model) ** 2
     return np.where(confidence > 0, np.sqrt(variance), np.nan)
+
+
+def _knows_noise(model: Model) -> bool:
+    """
+    Say whether the whole noise is given, or a frame has told by how much it is more than one image shows.
+
+    None tells whose pose was given, and none of an object that turned on its plane, after which the views
+    before it are adjusted, too.
+    """
+    parameters = model.parameters
+    if parameters.depth.noise is not None or parameters.registration.final_distance > 0:
+        return True
+    return any(frame.num_inliers > 0 and not frame.corrects_earlier for frame in model.frames)
 
 
 def _observation_sigma(model: Model) -> Array:

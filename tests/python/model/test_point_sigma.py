@@ -66,6 +66,22 @@ def test_without_fusion_nobody_knows_it() -> None:
     assert model.point_sigma.shape == (len(model),)
 
 
+def test_poses_that_are_given_do_not_tell_it() -> None:
+    """Images of a stereo camera show a tenth of its noise."""
+    mesh = nacre.built_in_object()
+    poses = nacre.turntable_poses(mesh, 3, 0.1, camera=CAMERA, distance=0.35)
+    images = [
+        mesh.simulate_depth(CAMERA, pose, seed=i, sensor="stereo").astype(float) for i, pose in enumerate(poses)
+    ]
+    model = nacre.Model(CAMERA)
+    for depth, pose in zip(images[:2], poses[:2], strict=True):
+        model.add_frame(depth, guess=pose, keep_guess=True)
+    assert len(model) > 0
+    assert np.isnan(model.point_sigma).all()
+    assert model.add_frame(images[2], guess=poses[2]).num_inliers > 0
+    assert np.isfinite(model.point_sigma).all()
+
+
 def test_an_empty_model_has_none() -> None:
     assert nacre.Model(CAMERA).point_sigma.shape == (0,)
 
