@@ -86,6 +86,27 @@ def test_nerfstudio_sees_a_point_at_the_same_pixel(tmp_path, sequence):
     np.testing.assert_array_equal(points.colors[2], [0, 0, 255])
 
 
+def test_nerfstudio_finds_all_that_its_parser_asks_for(tmp_path):
+    """As ``nerfstudio_dataparser.py`` does, which sorts frames, and wants depth of all or none."""
+    from PIL import Image
+
+    sequence = recording(tmp_path / "recording", DISTORTIONS["FULL_OPENCV"], count=3)
+    write_nerfstudio(tmp_path / "out", sequence, poses(3), cloud=CLOUD)
+    document = json.loads((tmp_path / "out" / "transforms.json").read_text())
+    assert document["camera_model"] == "OPENCV"
+    known = [float(document[name]) for name in ("fl_x", "fl_y", "cx", "cy", "k1", "k2", "k3", "p1", "p2")]
+    assert known == [30, 31, 15, 11.5, 0.1, -0.05, 0.01, 0.002, -0.001]
+    size = (int(document["w"]), int(document["h"]))
+    frames = document["frames"]
+    assert frames == sorted(frames, key=lambda frame: frame["file_path"])
+    for i, frame in enumerate(frames):
+        pose = np.array(frame["transform_matrix"], np.float32)
+        np.testing.assert_allclose(pose, poses(3)[i] @ np.diag([1, -1, -1, 1]), atol=1e-7)
+        for name in ("file_path", "depth_file_path"):
+            with Image.open(tmp_path / "out" / frame[name]) as image:
+                assert image.size == size
+
+
 @pytest.mark.parametrize("write", WRITERS)
 def test_views_without_a_pose_are_left_out(tmp_path, sequence, write):
     known = poses()
