@@ -70,9 +70,7 @@ def test_poses_that_are_given_do_not_tell_it() -> None:
     """Images of a stereo camera show a tenth of its noise."""
     mesh = nacre.built_in_object()
     poses = nacre.turntable_poses(mesh, 3, 0.1, camera=CAMERA, distance=0.35)
-    images = [
-        mesh.simulate_depth(CAMERA, pose, seed=i, sensor="stereo").astype(float) for i, pose in enumerate(poses)
-    ]
+    images = [mesh.simulate_depth(CAMERA, pose, seed=i, sensor="stereo") for i, pose in enumerate(poses)]
     model = nacre.Model(CAMERA)
     for depth, pose in zip(images[:2], poses[:2], strict=True):
         model.add_frame(depth, guess=pose, keep_guess=True)

@@ -120,7 +120,7 @@ async function plyFile(cloud, comment, origin) {
     format ??= new PlyRows(part, origin);
     if (part.numShown) blocks.push(format.bytes(part));
     numPoints += part.numShown;
-    if (numPoints > MOST_SAVED) throw new Error(`More than ${MOST_SAVED.toLocaleString("en")} points: crop first`);
+    if (numPoints > MOST_SAVED) throw new Error(`More than ${countText(MOST_SAVED)} points: crop first`);
   });
   return new Blob([format.header(comment, numPoints), ...blocks]);
 }
