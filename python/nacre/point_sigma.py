@@ -22,8 +22,8 @@ def point_sigma(model: Model) -> Array:
     confidence = model.confidence.astype(np.float64)
     fused = (frame.world_from_camera for frame in model.frames if frame.status in ("TRACKED", "RELOCALISED"))
     first = next(fused, None)
-    is_fused = model.parameters.fusion_method == "fuse" and first is not None
-    if not (is_fused and len(confidence) and _knows_noise(model)):
+    is_fused = model.parameters.fusion_method == "fuse" and len(confidence) > 0
+    if not is_fused or first is None or not _knows_noise(model):
         return np.full(len(confidence), np.nan)
     noise, factor = model.noise, model.noise_factor
     reference = model.parameters.fusion.reference_sigma or _median_sigma(model, first)
