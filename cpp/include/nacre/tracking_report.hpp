@@ -32,8 +32,11 @@ struct TrackingReport {
   Matrix6 information = Matrix6::Zero();                     ///< see AlignResult
   Eigen::Matrix<double, 6, Eigen::Dynamic> weak_directions;  ///< see AlignResult
 
-  /// That the registration is right, by its score; of a lost frame, that the best one was, which was not taken. NaN
-  /// where the pose came without a registration.
+  bool is_on_plane = false;  ///< found by the search on the plane on which an object was turned
+
+  /// That the registration is right, by its score; of a lost frame, that the best one was, which was not taken. On a
+  /// plane scores tell little, and it is the part of such views that are right. NaN where the pose came without a
+  /// registration.
   double probability() const;
 };
 

@@ -10,6 +10,7 @@ namespace nacre {
 double TrackingReport::probability() const {
   using namespace tracking_limits;
   if (!(score > 0.0) && status != FrameStatus::lost) return std::numeric_limits<double>::quiet_NaN();
+  if (is_on_plane) return right_on_plane;
   return 1.0 / (1.0 + std::pow(even_odds / score, odds_power));
 }
 

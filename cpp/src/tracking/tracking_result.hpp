@@ -44,7 +44,8 @@ struct TrackingResult : Acceptance {
             alignment.rmse,
             alignment.center,
             alignment.information,
-            alignment.weak_directions};
+            alignment.weak_directions,
+            is_on_plane};
   }
 };
 

@@ -142,7 +142,7 @@ void exchange_symmetric(Archive& archive, Matrix6& matrix) {
 template <class Archive>
 void exchange(Archive& archive, FrameReport& report) {
   archive.choice(report.status, FrameStatus::relocalised);
-  archive(report.timestamp, report.reason, report.num_inliers);
+  archive(report.timestamp, report.reason, report.num_inliers, report.is_on_plane);
   archive.single(report.overlap, report.consistency, report.score, report.rmse, report.loop_distance);
   bool was_matched = !report.information.isZero(0.0);
   archive(was_matched);
