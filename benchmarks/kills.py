@@ -45,7 +45,7 @@ def simulate(folder: Path, views: int) -> None:
     mesh = nacre.built_in_object()
     poses = nacre.turntable_poses(mesh, 36, np.radians(10))
     order = [*range(views - 4), 18, 19, *range(views - 4, views - 1)]  # the other side comes too early
-    depth = [mesh.simulate_depth(camera, poses[i], noise=0.0003, seed=i) for i in order]
+    depth = [mesh.simulate_depth(CAMERA, poses[i], noise=0.0003, seed=i) for i in order]
     depth[5] = np.full_like(depth[5], np.nan)
     colors = [np.repeat((np.nan_to_num(d) * 200).astype(np.uint8)[..., None], 3, axis=2) for d in depth]
     write_recording(

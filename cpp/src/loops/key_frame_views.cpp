@@ -28,14 +28,16 @@ void KeyFrameViews::replace(int key_frame, KeyFrameView view) {
   if (place.view) place.view = std::make_shared<KeyFrameView>(std::move(view));
 }
 
-void KeyFrameViews::park() {
-  if (!files_.is_on()) return;
+bool KeyFrameViews::park() {
+  if (!files_.is_on()) return false;
+  const std::size_t num_before = num_written_;
   for (; num_written_ + loops_limits::newest_key_frames < places_.size(); ++num_written_) {
     Place& place = places_[num_written_];
     place.file = files_.write(*place.view);
     ++num_read_;
     forget_longest_unused();
   }
+  return num_written_ > num_before;
 }
 
 void KeyFrameViews::forget_longest_unused() const {

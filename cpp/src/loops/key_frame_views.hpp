@@ -48,8 +48,8 @@ class KeyFrameViews {
   void add(KeyFrameView view) { places_.push_back({std::make_shared<KeyFrameView>(std::move(view)), {}, 0}); }
   void replace(int key_frame, KeyFrameView view);
 
-  // Writes those that are not among the newest, where something may leave memory.
-  void park();
+  // Writes those that are not among the newest, where something may leave memory. Says whether there was one.
+  bool park();
 
  private:
   friend struct PrivateState;

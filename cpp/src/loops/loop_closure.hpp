@@ -38,7 +38,7 @@ class LoopClosure {
       : camera_(camera), options_(options), views_(files) {}
 
   LoopReport add_frame(const LoopFrame& now);
-  void park() { views_.park(); }
+  bool park() { return views_.park(); }
   // The frames have moved, each by its motion.
   void move(const std::vector<Pose>& motions);
   // A tilt of the inverse depth is taken away from all that was seen; the frames move, each by its motion.

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "base/free_memory.hpp"
 #include "camera/limits.hpp"
 #include "fusion/limits.hpp"
 #include "model/pipeline.hpp"
@@ -20,7 +21,7 @@ void Pipeline::require_whole() const {
 
 // Before a frame changes anything: where the disk is full, all is as it was.
 void Pipeline::make_room() {
-  loops.park();
+  if (loops.park()) give_back_free_memory();
   if (cloud.size() <= options.max_points) return;
   float farthest = 0.0F;
   for (const float z : before.depth) farthest = std::isfinite(z) ? std::max(farthest, z) : farthest;
