@@ -63,8 +63,7 @@ def simulate_wall(folder: Path, views: int) -> None:
     index = np.arange(x.size).reshape(x.shape)
     corner, right, below, opposite = index[:-1, :-1], index[:-1, 1:], index[1:, :-1], index[1:, 1:]
     triangles = [
-        np.stack(half, axis=-1).reshape(-1, 3)
-        for half in ([corner, right, below], [below, right, opposite])
+        np.stack(half, axis=-1).reshape(-1, 3) for half in ([corner, right, below], [below, right, opposite])
     ]
     mesh = nacre.Mesh(np.stack([x, y, z], axis=-1).reshape(-1, 3), np.concatenate(triangles))
     poses = np.tile(np.eye(4), (views, 1, 1))
