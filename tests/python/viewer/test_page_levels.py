@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import nacre
+from nacre.report.text import count
 from nacre.viewer import Viewer, export_html, read_timeline
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -59,7 +60,7 @@ def test_near_there_are_all_points_and_from_afar_few(shown: Browser) -> None:
     assert 0 < num_drawn(shown) < len(CLOUD)
     look_from(shown, 4.0)
     near = num_drawn(shown)
-    assert f"of {len(CLOUD):,} points" in shown.text()
+    assert f"of {count(len(CLOUD))} points" in shown.text()
     look_from(shown, 1000.0)
     assert num_drawn(shown) < near
     look_from(shown, 20.0)
@@ -183,5 +184,5 @@ def test_the_exported_page_tells_how_many_points_it_lacks(
     export_html(read_timeline(hill), tmp_path / "view.html", triangles=False)
     browser.open((tmp_path / "view.html").as_uri())
     browser.wait_for(LOADED)
-    assert f"of {len(CLOUD):,} points" in browser.text()
+    assert f"of {count(len(CLOUD))} points" in browser.text()
     assert browser.evaluate("performance.getEntriesByType('resource').length") == 0
