@@ -29,7 +29,9 @@ def on_plane(browser: Browser, x: float, y: float) -> tuple[float, float]:
 
 
 def look_along_the_normal(browser: Browser) -> None:
-    browser.evaluate("page.orbit.backward = [0, 0, -1]; page.orbit.up = [0, -1, 0]; page.draw()")
+    browser.evaluate(
+        "page.orbit.touched = true; page.orbit.backward = [0, 0, -1]; page.orbit.up = [0, -1, 0]; page.draw()"
+    )
 
 
 def color_at(browser: Browser, x: float, y: float) -> np.ndarray:

@@ -94,7 +94,9 @@ def test_a_drag_turns_the_model_and_is_no_click(exported: Browser) -> None:
 
 
 def test_surfaces_are_seen_from_behind_on_demand(exported: Browser) -> None:
-    exported.evaluate("page.orbit.backward = [0, 0, 1]; page.orbit.up = [0, -1, 0]; page.draw()")
+    exported.evaluate(
+        "page.orbit.touched = true; page.orbit.backward = [0, 0, 1]; page.orbit.up = [0, -1, 0]; page.draw()"
+    )
     middle = [exported.evaluate(f"page.canvas.client{side} / 2") for side in ("Width", "Height")]
     assert np.ptp(color_at(exported, *middle)) < 60
     assert exported.evaluate(f"page.pointAt({middle[0]}, {middle[1]})") is None
