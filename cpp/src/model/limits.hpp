@@ -19,7 +19,8 @@ constexpr int calibration_interval = 6;  // [views] budget: in new directions, f
 constexpr std::size_t most_object_views = 24;  // [views] budget: of an object that turns on a plane; dog
 constexpr double part_in_memory = 0.9;  // [1] budget: of the most points, that are left when points leave; test_parked_points
 constexpr std::size_t parcel_points = 8192;  // [points] budget: of a file, of those that leave; test_parked_points
-constexpr std::size_t most_kept_motions = 100000;  // [poses] budget: of what happened to points that left, until they are written anew; test_parked_points
+constexpr int settled_parcels = 4;  // [files] budget: a frame, of points that left before a loop closed, that are written anew; test_parked_points
+constexpr std::size_t most_kept_motions = 100000;  // [poses] budget: of what happened to points that left, until they are all written anew at once; test_parked_points
 
 }  // namespace nacre::model_limits
 // clang-format on

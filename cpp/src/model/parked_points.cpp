@@ -375,6 +375,21 @@ void ParkedPoints::forget_violations() {
   for (Parcel& parcel : parcels_) parcel.forgets_violations = true;
 }
 
+void ParkedPoints::settle_some() {
+  if (motions_.empty()) return;
+  int num_settled = 0;
+  for (Parcel& parcel : parcels_) {
+    if (is_within(parcel.first_motion, motions_.size())) {
+      if (num_settled++ == model_limits::settled_parcels) return;
+      Parcel settled = write(read(parcel));
+      files_.release(parcel.file);
+      parcel = std::move(settled);
+    }
+  }
+  for (Parcel& parcel : parcels_) parcel.first_motion = 0;
+  motions_.clear();
+}
+
 // So that nothing is left to be done.
 void ParkedPoints::settle() {
   std::vector<Parcel> settled;

@@ -96,6 +96,10 @@ TEST_CASE("what happens to a model happens to the points that have left it, to t
   Parked there;
   PointModel stayed = wall();
   const Eigen::Vector3f gain(1.01F, 0.99F, 1.02F);
+  std::int64_t num_settlings = 0;
+  SUBCASE("when they are read") {}
+  SUBCASE("in part before") { num_settlings = 1; }
+  SUBCASE("before") { num_settlings = num_points / static_cast<std::int64_t>(model_limits::parcel_points); }
   for (int k = 0; k < 2; ++k) {
     move_points(stayed, corrections(), 1);
     expose_points(stayed, gain);
@@ -105,6 +109,7 @@ TEST_CASE("what happens to a model happens to the points that have left it, to t
     there.parked.move(corrections());
     there.parked.expose(gain);
     there.parked.park(there.model, there.blocks, num_points / 4, num_frames, view_at(19.0));
+    for (std::int64_t i = 0; i < num_settlings; ++i) there.parked.settle_some();
   }
   PointModel all;
   there.parked.for_each_part(there.model, there.blocks,
