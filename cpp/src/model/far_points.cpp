@@ -21,8 +21,8 @@ void Pipeline::require_whole() const {
 
 // Before a frame changes anything: where the disk is full, all is as it was.
 void Pipeline::make_room() {
-  if (loops.park()) give_back_free_memory();
-  parked.settle_some();
+  const bool has_parked = loops.park(), has_settled = parked.settle_some();
+  if (has_parked || has_settled) give_back_free_memory();
   if (cloud.size() <= options.max_points) return;
   float farthest = 0.0F;
   for (const float z : before.depth) farthest = std::isfinite(z) ? std::max(farthest, z) : farthest;

@@ -375,12 +375,12 @@ void ParkedPoints::forget_violations() {
   for (Parcel& parcel : parcels_) parcel.forgets_violations = true;
 }
 
-void ParkedPoints::settle_some() {
-  if (motions_.empty()) return;
+bool ParkedPoints::settle_some() {
+  if (motions_.empty()) return false;
   int num_settled = 0;
   for (Parcel& parcel : parcels_) {
     if (is_within(parcel.first_motion, motions_.size())) {
-      if (num_settled++ == model_limits::settled_parcels) return;
+      if (num_settled++ == model_limits::settled_parcels) return false;
       Parcel settled = write(read(parcel));
       files_.release(parcel.file);
       parcel = std::move(settled);
@@ -388,6 +388,7 @@ void ParkedPoints::settle_some() {
   }
   for (Parcel& parcel : parcels_) parcel.first_motion = 0;
   motions_.clear();
+  return true;
 }
 
 // So that nothing is left to be done.

@@ -30,8 +30,9 @@ class ParkedPoints {
     recall(model, blocks, std::vector<std::uint8_t>(parcels_.size(), 1));
   }
 
-  // Some of those to which something has yet to be done are written anew: what it is need not be kept for long.
-  void settle_some();
+  // Some of those to which something has yet to be done are written anew: what it is need not be kept for long. Says
+  // whether they were the last.
+  bool settle_some();
 
   // What has happened to the model; see move_points, straighten_points, expose_points, merge_layers.
   void move(const std::vector<Pose>& corrections);
