@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from cases import DATA, SENSORS, SMALL
+from cases import DATA, SENSORS, SMALL, object_mesh
 from simulated import furnished_room, turn_about_y
 
 import nacre
@@ -30,7 +30,7 @@ Array = npt.NDArray[Any]
 Distance = Callable[[Array], Array]
 """Of points in the truth's frame (N, 3) from the true surface (N,), all in metres."""
 
-OBJECTS = ("built-in", "bunny", *SMALL)
+OBJECTS = ("object", "bunny", *SMALL)
 VIEWS, STEP = 24, math.radians(6)
 AWAY = 0.5
 """[m] The camera from the middle of an object; as far as its sensor sees well."""
@@ -45,17 +45,6 @@ class Scene(NamedTuple):
     distance: Distance
 
 
-def mesh_of(name: str) -> nacre.Mesh:
-    """Return an object, in metres."""
-    if name == "built-in":
-        return nacre.built_in_object()
-    if name == "bunny":
-        return nacre.read_mesh(DATA / "stanford-bunny" / "reconstruction" / "bun_zipper.ply")
-    file, scale = SMALL[name]
-    mesh = nacre.read_mesh(DATA / "meshes" / file)
-    return nacre.Mesh(scale * mesh.vertices, mesh.triangles)
-
-
 def simulated_scenes(kind: str) -> Iterator[Scene]:
     """Yield what a kind of camera sees; "kinect": with independent noise."""
     camera = SENSORS[kind]
@@ -65,7 +54,7 @@ def simulated_scenes(kind: str) -> Iterator[Scene]:
             mesh = furnished_room()
             poses = [turn_about_y(i * STEP) for i in range(VIEWS)]
         else:
-            mesh = mesh_of(name)
+            mesh = object_mesh(name)
             poses = list(nacre.turntable_poses(mesh, VIEWS, STEP, camera=camera, distance=AWAY))
         frames = [(mesh.simulate_depth(camera, pose, seed=i, **sensor), pose) for i, pose in enumerate(poses)]
         yield Scene(f"{kind}, {name}", camera, frames, mesh.distance)

@@ -353,7 +353,7 @@ void ParkedPoints::move(const std::vector<Pose>& corrections) {
   motions_.push_back(corrections);
   std::size_t num_poses = 0;
   for (const std::vector<Pose>& motion : motions_) num_poses += motion.size();
-  if (num_poses > model_limits::most_kept_motions) settle();
+  while (num_poses > model_limits::most_kept_motions && !settle_some()) continue;
 }
 
 // Bounds are not known before it is done.
@@ -389,13 +389,6 @@ bool ParkedPoints::settle_some() {
   for (Parcel& parcel : parcels_) parcel.first_motion = 0;
   motions_.clear();
   return true;
-}
-
-// So that nothing is left to be done.
-void ParkedPoints::settle() {
-  std::vector<Parcel> settled;
-  for (const Parcel& parcel : parcels_) settled.push_back(write(read(parcel)));
-  replace_all(std::move(settled));
 }
 
 void ParkedPoints::replace_all(std::vector<Parcel> parcels) {

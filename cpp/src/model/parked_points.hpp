@@ -69,7 +69,6 @@ class ParkedPoints {
                 std::vector<Parcel> written);
   PointModel read(const Parcel& parcel) const;
   Parcel write(PointModel points);
-  void settle();
   void replace_all(std::vector<Parcel> parcels);
   void recall(PointModel& model, BlockIndex& blocks, const std::vector<std::uint8_t>& is_wanted);
 
