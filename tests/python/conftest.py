@@ -33,6 +33,14 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.skip(reason="no recordings in ../shared/data"))
         if "NACRE_TEST_ALL" not in os.environ and item.get_closest_marker("weekly"):
             item.add_marker(pytest.mark.skip(reason="part of .ci/slow: NACRE_TEST_ALL=1 runs it"))
+        if item.config.pluginmanager.hasplugin("xdist"):
+            item.add_marker(pytest.mark.xdist_group(group_of(item)))
+
+
+def group_of(item: pytest.Item) -> str:
+    """Return what one process of ``pytest --numprocesses 2 --dist loadgroup`` runs: a file, or all that compiles."""
+    compiles = {"library_build", "shared_build"} & set(getattr(item, "fixturenames", ()))
+    return "compiled" if compiles else item.location[0]
 
 
 @pytest.fixture(scope="session")
