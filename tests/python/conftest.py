@@ -38,7 +38,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def group_of(item: pytest.Item) -> str:
-    """Return what one process of ``pytest --numprocesses 2 --dist loadgroup`` runs: a file, or all that compiles."""
+    """Return what one process of ``pytest --dist loadgroup`` runs together: a file, or all that compiles."""
     compiles = {"library_build", "shared_build"} & set(getattr(item, "fixturenames", ()))
     return "compiled" if compiles else item.location[0]
 
