@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 # At least two seconds of a camera's frames. What neighbours share is tracked twice, and each joint adds its
-# error: shorter pieces repeat more of the work and drift more, longer ones leave workers of a short recording idle.
+# error: shorter pieces repeat more of the work and drift more, longer ones leave workers of a short
+# recording idle.
 PIECE = 60
 # Where more work side by side, what one process does for all frames takes longer than they do.
 MOST_PIECES = 32
