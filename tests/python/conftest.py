@@ -5,7 +5,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import hypothesis
@@ -14,6 +15,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(Path(__file__).parent))  # for what tests share
+
+if sys.platform != "win32":
+    import fcntl
 
 RECORDINGS = ROOT.parent / "shared" / "data"
 
@@ -26,7 +30,6 @@ def pytest_report_header() -> str:
     return f"nacre {importlib.metadata.version('nacre')}, numpy {np.__version__}"
 
 
-@pytest.hookimpl(tryfirst=True)  # before pytest-xdist looks at the groups
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Skip the tests that need recordings where there are none, and those of the weekly run elsewhere."""
     for item in items:
@@ -34,8 +37,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             item.add_marker(pytest.mark.skip(reason="no recordings in ../shared/data"))
         if "NACRE_TEST_ALL" not in os.environ and item.get_closest_marker("weekly"):
             item.add_marker(pytest.mark.skip(reason="part of .ci/slow: NACRE_TEST_ALL=1 runs it"))
-        if item.config.pluginmanager.hasplugin("xdist"):
-            item.add_marker(pytest.mark.xdist_group(group_of(item)))
 
 
 @pytest.hookimpl(wrapper=True)
@@ -46,12 +47,6 @@ def pytest_runtest_makereport() -> Generator[None, pytest.TestReport, pytest.Tes
         (name, text.encode("utf-8", "backslashreplace").decode()) for name, text in report.sections
     ]
     return report
-
-
-def group_of(item: pytest.Item) -> str:
-    """Return what one process of ``pytest --dist loadgroup`` runs together: a file, or all that compiles."""
-    compiles = {"library_build", "shared_build"} & set(getattr(item, "fixturenames", ()))
-    return "compiled" if compiles else item.location[0]
 
 
 @pytest.fixture(scope="session")
@@ -112,13 +107,24 @@ def cmake(eigen_prefix: Path | None) -> Callable[..., str]:
     return lambda *arguments, **options: run_program(program, *arguments, **options, **environment)
 
 
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Keep other processes of the tests from a build folder meanwhile."""
+    folder.parent.mkdir(exist_ok=True)
+    with folder.with_suffix(".lock").open("w") as lock:
+        if sys.platform != "win32":
+            fcntl.flock(lock, fcntl.LOCK_EX)
+        yield
+
+
 def build_project(cmake: Callable[..., str], source: Path, name: str, *definitions: str) -> Path:
     """Configure and build a CMake project in ``build/NAME`` and return that folder."""
     folder = ROOT / "build" / name
     strict = "ON" if os.environ.get("CI") else "OFF"  # a stranger's newer compiler may know newer warnings
-    # Fresh: the folder may remember the tools of an environment that is gone. What is compiled stays.
-    cmake("--fresh", "-S", source, "-B", folder, f"-DNACRE_WARNINGS_AS_ERRORS={strict}", *definitions)
-    cmake("--build", folder)
+    with alone_in(folder):
+        # Fresh: the folder may remember the tools of an environment that is gone. What is compiled stays.
+        cmake("--fresh", "-S", source, "-B", folder, f"-DNACRE_WARNINGS_AS_ERRORS={strict}", *definitions)
+        cmake("--build", folder)
     return folder
 
 
@@ -141,7 +147,8 @@ def library_build(cmake: Callable[..., str]) -> Path:
 def installed_library(cmake: Callable[..., str], library_build: Path) -> Path:
     """Install the static library, its headers and package files."""
     folder = ROOT / "build" / "test-installed"
-    cmake("--install", library_build, "--prefix", folder, "--component", "development")
+    with alone_in(folder):
+        cmake("--install", library_build, "--prefix", folder, "--component", "development")
     return folder
 
 
