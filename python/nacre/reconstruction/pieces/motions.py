@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.parameters import ModelParameters
-from nacre.reconstruction.pieces.cut import SHARED, cut
+from nacre.reconstruction.pieces.cut import PIECE, SHARED, cut
 from nacre.reconstruction.pieces.joint import joint
 from nacre.reconstruction.pieces.track import Piece, Poses
 from nacre.reconstruction.pieces.workers import Cluster, Workers
@@ -52,9 +52,10 @@ class PieceMotions:
         How many of the newest frames :meth:`place` wants to know.
     """
 
+    reach = PIECE
+
     def __init__(self, workers: Workers) -> None:
         self._workers = workers
-        self.reach = max((len(piece.indices) for piece in workers.pieces), default=0)
 
     @classmethod
     def of(
@@ -107,11 +108,9 @@ class PieceMotions:
             if index not in poses or not shared:
                 continue
             own = [i for i in shared if i not in piece.indices[:SHARED]]
-            world_from_piece: npt.NDArray[np.float64] | None
+            world_from_piece = joint(placed, poses)
             if len(own) > 1:
                 world_from_piece = placed[own[-1]] @ np.linalg.inv(poses[own[-1]])
-            else:
-                world_from_piece = joint(placed, poses)
-                assert world_from_piece is not None
+            assert world_from_piece is not None
             return Place(world_from_piece @ poses[index], is_first=not own)
         return None

@@ -19,7 +19,7 @@ import pytest
 
 import nacre
 from nacre._internal import cluster as clusters
-from nacre.reconstruction.pieces.cut import MOST_PIECES, PIECE, SHARED, cut
+from nacre.reconstruction.pieces.cut import PIECE, SHARED, cut
 from nacre.reconstruction.pieces.joint import joint
 from nacre.reconstruction.pieces.track import Piece, read_poses, track, write_poses
 from nacre.reconstruction.run_options import RunOptions
@@ -69,15 +69,13 @@ def wait_until(happens: Callable[[], bool]) -> None:
         time.sleep(0.002)
 
 
-@pytest.mark.parametrize("count", [1, PIECE, PIECE + 1, 2 * PIECE - SHARED, 1000, 10_000])
+@pytest.mark.parametrize("count", [1, PIECE, PIECE + 1, 2 * PIECE - SHARED, 1000])
 def test_pieces_hold_every_frame_and_neighbours_share_some(count: int) -> None:
     pieces = cut(range(0, 2 * count, 2))
     assert sorted({index for piece in pieces for index in piece}) == list(range(0, 2 * count, 2))
     for first, second in itertools.pairwise(pieces):
         assert list(first[-SHARED:]) == list(second[:SHARED])
         assert len(second) > SHARED
-    assert len(pieces) <= MOST_PIECES
-    assert len(pieces[0]) == min(count, PIECE if count <= 1000 else 323)
 
 
 def test_a_frame_that_one_piece_has_wrong_does_not_count_where_they_are_joined() -> None:
