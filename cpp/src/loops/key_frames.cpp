@@ -9,17 +9,10 @@
 
 namespace nacre {
 
-void KeyFrame::look_at(const KeyFrameView& view) {
-  const Eigen::Index size = view.points.rows();
-  bounds = Box();
-  for (Eigen::Index i = 0; i < size; ++i) bounds.extend(view.points.row(i).transpose());
-  const Eigen::Index num_few = std::min<Eigen::Index>(size, loops_limits::few_points);
-  few_points.resize(num_few, 3);
-  few_normals.resize(num_few, 3);
-  for (Eigen::Index i = 0; i < num_few; ++i) {
-    few_points.row(i) = view.points.row(i * size / num_few);
-    few_normals.row(i) = view.normals.row(i * size / num_few);
-  }
+Box bounds_of(const Points& points) {
+  Box bounds;
+  for (Eigen::Index i = 0; i < points.rows(); ++i) bounds.extend(points.row(i).transpose());
+  return bounds;
 }
 
 FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, const TrackingOptions& options) {
@@ -30,9 +23,9 @@ FrameCloud sample_cloud(const Frame& frame, const SurfaceObserver& observer, con
   return cloud;
 }
 
-VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, const Pose& camera_from_points,
-                         const DepthView& view, const Camera& camera, double margin) {
-  return compare(points, normals, view, camera_from_points.inverse(), camera,
+VisibilityCounts compare(const KeyFrameView& cloud, const Pose& camera_from_cloud, const DepthView& view,
+                         const Camera& camera, double margin) {
+  return compare(cloud.points, cloud.normals, view, camera_from_cloud.inverse(), camera,
                  {0.0, margin, false, loops_limits::least_facing}, 1);
 }
 

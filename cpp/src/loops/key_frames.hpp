@@ -22,15 +22,13 @@ struct KeyFrame {
   double depth;        // the median [m]
   Box bounds;          // of the points of its view
   int last_verified;   // the last node of the trajectory from which its surface was seen to lie right
-  // Of its view: they tell without it that nothing of it is seen.
-  Points few_points, few_normals;
-
-  void look_at(const KeyFrameView& view);
 };
 
+Box bounds_of(const Points& points);
+
 // What a camera says of another one's points: of so much of the depth as margin it counts as the same place.
-VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, const Pose& camera_from_points,
-                         const DepthView& view, const Camera& camera, double margin);
+VisibilityCounts compare(const KeyFrameView& cloud, const Pose& camera_from_cloud, const DepthView& view,
+                         const Camera& camera, double margin);
 
 // Where points of a cloud are that may agree then.
 ViewVolume agreeing_volume(const DepthView& view, const Pose& world_from_camera, const Camera& camera, double margin);

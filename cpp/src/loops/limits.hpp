@@ -11,7 +11,6 @@
 namespace nacre::loops_limits {
 
 constexpr int key_frame_points = 3000;  // [points] budget: of the surface that a key frame keeps; test_loop_closure
-constexpr int few_points = 32;  // [points] derived: none is in view by chance once in 90 000 times where least_overlap is; test_loop_closure
 constexpr std::size_t most_key_frames = 1000;  // [views] budget: about 90 kB each, 130 with keypoints, in memory or on disk; test_loop_closure
 constexpr std::size_t newest_key_frames = 32;  // [views] budget: that stay in memory where older ones may leave; test_key_frame_views
 constexpr std::size_t recalled_key_frames = 32;  // [views] budget: of those on disk, that are in memory too; test_key_frame_views

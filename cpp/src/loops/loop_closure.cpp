@@ -129,14 +129,9 @@ bool LoopClosure::is_next_node(const LoopFrame& frame) const {
 
 // The part of a key frame's points that is about where the camera measures something.
 double LoopClosure::part_in_view(int key_frame, const LoopFrame& frame) const {
-  const Pose camera_from_view = frame.alignment.target_from_source.inverse() * pose_of(key_frame);
-  const auto num_in_view = [&](const PointsRef& points, const PointsRef& normals) {
-    return compare(points, normals, camera_from_view, frame.view, camera_, loops_limits::search_radius).agreeing;
-  };
-  const KeyFrame& other = key_frames_[static_cast<std::size_t>(key_frame)];
-  if (num_in_view(other.few_points, other.few_normals) == 0) return 0.0;  // behind a wall, mostly
   const auto view = views_[key_frame];
-  return part_of(num_in_view(view->points, view->normals), *view);
+  const Pose camera_from_view = frame.alignment.target_from_source.inverse() * pose_of(key_frame);
+  return part_of(compare(*view, camera_from_view, frame.view, camera_, loops_limits::search_radius).agreeing, *view);
 }
 
 // The key frames whose surfaces are in view.
@@ -186,10 +181,8 @@ bool LoopClosure::insert(const LoopFrame& frame, const FrameCloud& cloud, const 
   const bool is_key_frame = node < 0 && key_frames_.size() < loops_limits::most_key_frames;
   if (is_key_frame) {
     const double depth = cloud.depth;
-    key_frames_.push_back({frame.index, depth, {}, time(), {}, {}});
-    KeyFrameView view{cloud.points, cloud.normals, frame.outline, keypoints_of(frame.view)};
-    key_frames_.back().look_at(view);
-    views_.add(std::move(view));
+    key_frames_.push_back({frame.index, depth, bounds_of(cloud.points), time()});
+    views_.add({cloud.points, cloud.normals, frame.outline, keypoints_of(frame.view)});
     node = graph_.add_node(pose, frame.is_given);
     if (!trajectory_.empty()) {
       const int from = frame.to_whole_model && most_seen >= 0 ? most_seen : trajectory_.back().key_frame;
@@ -224,6 +217,7 @@ void LoopClosure::straighten(double tilt, const std::vector<Pose>& motions) {
       points.row(i) = straight.point;
       normals.row(i) = straight.normal;
     }
+    key_frames_[static_cast<std::size_t>(k)].bounds = bounds_of(points);
     for (OutlinePoint& outline : view.outline) {
       const SurfacePoint straight = without_tilt({outline.point.cast<float>(), outline.normal.cast<float>()}, tilt);
       outline.point = straight.point.cast<double>();
@@ -234,7 +228,6 @@ void LoopClosure::straighten(double tilt, const std::vector<Pose>& motions) {
       auto point = view.keypoints.points.row(i);
       point = without_tilt({point, Eigen::Vector3f::UnitZ()}, tilt).point;
     }
-    key_frames_[static_cast<std::size_t>(k)].look_at(view);
     views_.replace(k, std::move(view));
   }
   move(motions);
@@ -300,8 +293,8 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
   double seen = 0.0, through = 0.0;
   for (const int k : in_question) {
     const auto other = views_[k];
-    const VisibilityCounts counts = compare(other->points, other->normals, pose.inverse() * pose_of(k), frame.view,
-                                            camera_, camera_limits::surface_spacings * frame.spacing / cloud.depth);
+    const VisibilityCounts counts = compare(*other, pose.inverse() * pose_of(k), frame.view, camera_,
+                                            camera_limits::surface_spacings * frame.spacing / cloud.depth);
     seen += part_of(counts.agreeing, *other);
     through += part_of(counts.seen_through, *other);
   }

@@ -28,10 +28,7 @@ void exchange(Archive& archive, ObjectView& view) {
 
 template <class Archive>
 void exchange(Archive& archive, KeyFrame& key_frame) {
-  archive(key_frame.frame, key_frame.depth, key_frame.bounds.min(), key_frame.bounds.max(), key_frame.last_verified,
-          key_frame.few_points, key_frame.few_normals);
-  archive.require(key_frame.few_points.rows() == key_frame.few_normals.rows(),
-                  "not every point of a key frame has a normal");
+  archive(key_frame.frame, key_frame.depth, key_frame.bounds.min(), key_frame.bounds.max(), key_frame.last_verified);
 }
 
 template <class Archive>
