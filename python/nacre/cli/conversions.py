@@ -14,6 +14,7 @@ from nacre.cli.terminal import CommandError, written_file
 if TYPE_CHECKING:
     from nacre import Camera, Cloud, Trajectory
     from nacre.datasets import Sequence
+    from nacre.io.point_conversion import Converted
 
 Figures = dict[str, int | list[str]]
 
@@ -53,46 +54,33 @@ class Job:
 
 
 def _points(job: Job) -> Figures:
-    import nacre
+    from nacre.io.point_conversion import convert_points
 
-    return _write_points(job.out, nacre.read_points(job.source))
+    return _told(convert_points(job.source, job.out))
 
 
 def _vertices(job: Job) -> Figures:
     import nacre
     from nacre.io.meshes import read_mesh_arrays
+    from nacre.io.point_conversion import write_pieces
 
     mesh = read_mesh_arrays(job.source)
     cloud = nacre.Cloud(mesh.vertices, mesh.normals, mesh.colors, comments=mesh.comments)
-    return _write_points(job.out, cloud)
+    return _told(write_pieces(job.out, lambda: [cloud]))
 
 
 def _model(job: Job) -> Figures:
-    import nacre
+    from nacre.io.point_conversion import convert_points
 
-    return _write_points(job.out, nacre.read_points(written_file(job.source, "model.ply")))
+    return _told(convert_points(written_file(job.source, "model.ply"), job.out))
 
 
-def _write_points(out: Path, cloud: Cloud) -> Figures:
-    """Write a cloud as far as the format can hold it, and say what it cannot."""
-    import numpy as np
-
-    import nacre
-    from nacre.io.points import FINITE_SUFFIXES, holds
-
-    kept = np.isfinite(cloud.points).all(axis=1) | (out.suffix.lower() not in FINITE_SUFFIXES)
-    fields = {"normals": cloud.normals, "colors": cloud.colors}
-    own: dict[str, Any] = {name: array[kept] for name, array in fields.items() if array is not None}
-    attributes = {name: a[kept] for name, a in cloud.attributes.items() if a.dtype.kind in "buif"}
-    nacre.write_points(out, cloud.points[kept], attributes=attributes, comments=cloud.comments, **own)
-    figures: Figures = {
-        "num_points": int(kept.sum()),
-        "fields": [name for name in (*own, *attributes) if holds(out, name)],
-    }
-    if not kept.all():
-        figures["not_finite_left_out"] = int((~kept).sum())
-    if len(attributes) < len(cloud.attributes):
-        figures["not_numbers_left_out"] = sorted(set(cloud.attributes) - set(attributes))
+def _told(done: Converted) -> Figures:
+    figures: Figures = {"num_points": done.num_points, "fields": done.fields}
+    if done.not_finite_left_out:
+        figures["not_finite_left_out"] = done.not_finite_left_out
+    if done.not_numbers_left_out:
+        figures["not_numbers_left_out"] = done.not_numbers_left_out
     return figures
 
 

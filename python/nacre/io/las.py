@@ -34,6 +34,7 @@ _DAY_AND_YEAR = (
 )
 _DEFAULTS = {"return_number": 1, "number_of_returns": 1}
 _PLAIN, _COLORED = 6, 7  # the point formats of LAS 1.4
+_EXTREMES_ARE_TOLD = 0b110  # of extra bytes: bits of their options
 
 
 def read_cloud(path: str | os.PathLike[str]) -> Cloud:
@@ -53,7 +54,7 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
 
 
 def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud]:
-    """Yield a LAS or LAZ file in pieces of so many points, with every dimension that it has."""
+    """Yield a LAS or LAZ file in pieces of so many points, one at least, with every dimension that it has."""
     is_wide = _any_is_wide(path, num_rows)
     num_read = 0
     with _opened(path) as reader:
@@ -61,6 +62,8 @@ def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud]:
         for chunk in reader.chunk_iterator(num_rows):
             num_read += len(chunk)
             yield cloud_of(Path(path), [chunk], names, is_wide, keep_all=True)
+        if not num_read:
+            yield cloud_of(Path(path), [], names, is_wide, keep_all=True)
     _check_count(path, num_read, reader.header.point_count)
 
 
@@ -234,6 +237,9 @@ def _las_header(laspy: Any, cloud: Cloud, extremes: arrays.FloatArray) -> Any:
         if name not in standard:
             dtype = values.dtype.str[1:] if values.ndim == 1 else f"{values.shape[1]}{values.dtype.str[1:]}"
             header.add_extra_dim(laspy.ExtraBytesParams(name=name, type=dtype))
+    for record in header.vlrs.get("ExtraBytesVlr"):
+        for dimension in record.extra_bytes_structs:
+            dimension.options &= ~_EXTREMES_ARE_TOLD  # laspy tells those of the first point
     return header
 
 

@@ -323,7 +323,7 @@ def write_chunks(path: str | os.PathLike[str], chunks: Iterable[Cloud], num_poin
         for number, cloud in enumerate(chunks):
             columns = _stored_columns(cloud, True)
             if number == 0:
-                stream.write(_header(columns, num_points, (), True))
+                stream.write(_header(columns, num_points, cloud.comments, True))
             stream.writelines(encode_rows(columns.values(), binary=True))
 
 

@@ -293,7 +293,7 @@ def write_chunks(path: str | os.PathLike[str], chunks: Iterable[Cloud], num_poin
         for number, cloud in enumerate(chunks):
             columns = _vertex_columns(cloud)
             if number == 0:
-                stream.write(_header({"vertex": columns}, {"vertex": num_points}, (), True))
+                stream.write(_header({"vertex": columns}, {"vertex": num_points}, cloud.comments, True))
             stream.writelines(encode_rows(_with_counts(columns), binary=True))
 
 

@@ -192,8 +192,8 @@ def _check_number(path: Path) -> None:
     if found is not None and found > _MOST_POINTS:
         reason = (
             f"{count(found)} points are more than the {count(_MOST_POINTS)} that are read at once: "
-            f"nacre convert {path.name} {path.stem}{SUFFIX}, or nacre normals by pieces, writes a file of "
-            "which nacre view reads what is looked at"
+            f"nacre convert {path.name} {path.stem}{SUFFIX} writes a file of which nacre view reads what is "
+            "looked at"
         )
         raise FileFormatError(path, reason)
 
