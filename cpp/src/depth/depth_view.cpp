@@ -50,9 +50,11 @@ Visibility visibility_in(const DepthView& view, const PointProjection::Block& bl
   const std::int32_t pixel = block.pixel[i];
   const float measured = view.depth[pixel];
   const float systematic = margin.with_systematic_error ? systematic_error(measured) : 0.0F;
-  const float noise = base_limits::noise_sigmas * std::hypot(view.sigma[pixel], sigma);
+  const float noise_squared =
+      base_limits::noise_sigmas * base_limits::noise_sigmas * (view.sigma[pixel] * view.sigma[pixel] + sigma * sigma);
   const float surface = static_cast<float>(margin.distance) + static_cast<float>(margin.part_of_depth) * block.z[i];
-  return visibility(measured - block.z[i], std::max(surface, std::hypot(noise, systematic)) / block.facing[i]);
+  const float error = std::sqrt(noise_squared + systematic * systematic);
+  return visibility(measured - block.z[i], std::max(surface, error) / block.facing[i]);
 }
 
 VisibilityCounts compare(const PointsRef& points, const PointsRef& normals, const DepthView& view,

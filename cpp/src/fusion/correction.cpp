@@ -5,6 +5,7 @@
 
 #include "base/parallel.hpp"
 #include "camera/limits.hpp"
+#include "camera/view_volume.hpp"
 #include "depth/tilt.hpp"
 #include "fusion/limits.hpp"
 #include "spatial/hash_grid.hpp"
@@ -12,12 +13,9 @@
 namespace nacre {
 
 void move_points(PointModel& model, const std::vector<Pose>& corrections, int num_threads) {
-  std::vector<Eigen::Isometry3f> motions;
-  motions.reserve(corrections.size());
-  for (const Pose& correction : corrections) motions.emplace_back(correction.cast<float>());
   parallel_for(model.size(), 4096, num_threads, [&](std::int64_t k) {
     const auto i = static_cast<std::size_t>(k);
-    const Eigen::Isometry3f& motion = motions[static_cast<std::size_t>(model.last_seen[i])];
+    const Eigen::Isometry3f motion(corrections[static_cast<std::size_t>(model.last_seen[i])].cast<float>());
     model.points[i] = motion * model.points[i];
     model.normals[i] = (motion.linear() * model.normals[i]).normalized();
   });
@@ -36,23 +34,30 @@ void straighten_points(PointModel& model, const std::vector<Pose>& poses, double
 
 std::vector<std::uint8_t> merge_layers(PointModel& model, std::int32_t oldest_frame, double spacing,
                                        const std::function<double(const Eigen::Vector3f&)>& spacing_of) {
-  std::vector<std::size_t> old;
-  std::vector<std::uint8_t> flags(model.points.size(), 1);
-  for (std::size_t i = 0; i < model.points.size(); ++i) {
-    if (model.last_seen[i] < oldest_frame) old.push_back(i);
+  const auto reach_of = [&](int level) {
+    return std::ldexp(spacing, level) * std::hypot(1.0, camera_limits::surface_spacings);
+  };
+  std::vector<std::uint8_t> is_old(model.points.size());
+  Box newer;
+  for (std::size_t i = 0; i < is_old.size(); ++i) {
+    is_old[i] = model.last_seen[i] < oldest_frame ? 1 : 0;
+    if (is_old[i] == 0) newer.extend(model.points[i]);
+  }
+  const auto margin = static_cast<float>(reach_of(fusion_limits::layer_levels - 1));
+  const Box reached(newer.min() - Eigen::Vector3f::Constant(margin), newer.max() + Eigen::Vector3f::Constant(margin));
+  std::vector<std::size_t> old;  // those that may have newer ones beside them
+  for (std::size_t i = 0; i < is_old.size(); ++i) {
+    if (is_old[i] != 0 && reached.contains(model.points[i])) old.push_back(i);
   }
   std::vector<PointGrid> grids;
   for (int level = 0; level < fusion_limits::layer_levels; ++level) {
-    grids.emplace_back(std::ldexp(spacing, level) * std::hypot(1.0, camera_limits::surface_spacings), old.size());
+    grids.emplace_back(reach_of(level), old.size());
     for (const std::size_t i : old) grids.back().add(model.points[i]);
   }
 
-  std::size_t next_old = 0;
+  std::vector<std::uint8_t> flags(model.points.size(), 1);
   for (std::size_t i = 0; i < model.points.size(); ++i) {
-    if (next_old < old.size() && old[next_old] == i) {
-      ++next_old;
-      continue;
-    }
+    if (is_old[i] != 0) continue;
     int level = 0;
     const double wanted = spacing_of(model.points[i]);
     while (level + 1 < fusion_limits::layer_levels && std::ldexp(spacing, level) < wanted) ++level;
@@ -96,7 +101,9 @@ std::vector<std::uint8_t> merge_layers(PointModel& model, std::int32_t oldest_fr
         static_cast<std::uint8_t>(std::min(255, model.observations[best] + model.observations[i]));
     model.last_seen[best] = std::max(model.last_seen[best], model.last_seen[i]);
   }
-  for (const std::size_t i : old) model.free_space_violations[i] = 0;
+  for (std::size_t i = 0; i < model.points.size(); ++i) {
+    if (is_old[i] != 0) model.free_space_violations[i] = 0;
+  }
   model.keep(flags);
   return flags;
 }

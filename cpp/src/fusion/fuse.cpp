@@ -87,6 +87,8 @@ KnownSurface update(PointModel& model, const std::vector<PointRange>& ranges, co
                    spacing_at(points.z[j], sigma, camera, spacing));
     }
     observer.observe_and_cover(block, fusion_limits::sheet_cosine);
+    std::vector<Cover>& covered = covers[static_cast<std::size_t>(number)];
+    covered.reserve(static_cast<std::size_t>(block.size()));
     for (int k = 0; k < block.size(); ++k) {
       const int j = seen[k];  // NOLINT(clang-analyzer-core.uninitialized.Assign): filled with the block
       const std::size_t i = first + static_cast<std::size_t>(j);
@@ -105,7 +107,7 @@ KnownSurface update(PointModel& model, const std::vector<PointRange>& ranges, co
         model.last_seen[i] = now.index;
         count_up(model.observations[i]);
         model.free_space_violations[i] = 0;
-        covers[static_cast<std::size_t>(number)].push_back({i, points.pixel[j], block.cover(k)});
+        covered.push_back({i, points.pixel[j], block.cover(k)});
       } else {
         note_free_space_violation(j, block.sigma(k));
       }

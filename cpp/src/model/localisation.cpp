@@ -40,6 +40,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   }
   if (keeps_key_frames()) outline = find_outline(now, camera, model_limits::most_outline_points, options.num_threads);
   if (cloud.size() == 0 || extras.keep_guess) {
+    if (cloud.size() > 0) learn_from_given(*extras.guess);
     result.decision = Decision::accepted;
     result.alignment.target_from_source = extras.guess.value_or(Pose::Identity());
     result.alignment.rmse = 0.0;
@@ -105,6 +106,20 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
   if (result.is_lost()) result = track(current, target, prior, odometry, hypothesis, may_search ? options : nearby);
   if (result.decision == Decision::accepted) learn_from(result);
   return result;
+}
+
+// A frame whose pose is given is registered there as well, until it is known how noisy the camera is, and now and then.
+void Pipeline::learn_from_given(const Pose& pose) {
+  if (options.registration.method == Metric::paper) return;
+  const bool is_due =
+      learns_noise() && (!residual_noise.is_known() || history.size() % model_limits::search_interval == 0);
+  if (is_due) {
+    track_frame({{pose}, Expectation::expected, true, history.num_registered() > 1, was_lost(), {}}, false);
+  } else {
+    const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
+    odometry.look_at(
+        FrameRegistration(current, {cloud, blocks, spacing, before, still_scene, 0, {}}, options).source());
+  }
 }
 
 void Pipeline::learn_from(const TrackingResult& tracking) {

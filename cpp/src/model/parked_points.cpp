@@ -39,6 +39,18 @@ void expose_points(PointModel& points, const std::vector<Eigen::Vector3f>& gains
   }
 }
 
+// Frames, each once, in order.
+std::vector<std::int32_t> distinct(const std::vector<std::int32_t>& frames) {
+  const auto [first, last] = std::minmax_element(frames.begin(), frames.end());
+  std::vector<std::uint8_t> is_among(static_cast<std::size_t>(*last - *first) + 1);
+  for (const std::int32_t frame : frames) is_among[static_cast<std::size_t>(frame - *first)] = 1;
+  std::vector<std::int32_t> found;
+  for (std::size_t i = 0; i < is_among.size(); ++i) {
+    if (is_among[i] != 0) found.push_back(*first + static_cast<std::int32_t>(i));
+  }
+  return found;
+}
+
 // Points, and how many of a model's are before them.
 struct PlacedPoints {
   std::size_t place;
@@ -142,10 +154,7 @@ ParkedPoints::Parcel ParkedPoints::write(PointModel points) {
   for (const Eigen::Vector3f& point : points.points) box.extend(point);
   parcel.lowest = box.min();
   parcel.highest = box.max();
-  parcel.frames = points.last_seen;
-  std::sort(parcel.frames.begin(), parcel.frames.end());
-  parcel.frames.erase(std::unique(parcel.frames.begin(), parcel.frames.end()), parcel.frames.end());
-  parcel.frames.shrink_to_fit();  // there was one for each point
+  parcel.frames = distinct(points.last_seen);
   parcel.first_motion = static_cast<std::int64_t>(motions_.size());
   parcel.first_gain = static_cast<std::int64_t>(gains_.size());
   parcel.file = files_.write(points);

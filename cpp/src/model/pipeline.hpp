@@ -116,6 +116,7 @@ struct Pipeline {
   bool learns_noise() const;
   bool tells_noise(const TrackingResult& tracking) const;
   void learn_from(const TrackingResult& tracking);
+  void learn_from_given(const Pose& world_from_camera);
   void set_noise_factor(double factor);
   TrackingResult track_frame(TrackingPrior prior, bool may_search);
   std::vector<Pose> guesses(const FrameExtras& extras) const;
