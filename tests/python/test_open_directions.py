@@ -163,3 +163,26 @@ def test_colours_tell_that_a_camera_moves_where_shared_errors_hold_it(seed: int)
     come = [report.world_from_camera[0, 3] for report in model.frames if report.tracked]
     assert len(come) == 6
     np.testing.assert_allclose(come, 0.08 * np.arange(6), atol=0.02)
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+def test_a_straight_edge_does_not_lead_along_itself(seed: int) -> None:
+    # A corner of two walls, one of which ends before a room, and a box at their foot, which leaves the view.
+    camera = nacre.Camera(320, 240, 262, 262, 159.5, 119.5)
+    scene = boxes(
+        ([-0.35, -4, 1.0], [0.2, 4, 1.1]),
+        ([0.2, -4, -1], [0.3, 4, 1.1]),
+        ([-4, -4, 2.6], [4, 4, 2.7]),
+        ([-0.1, 0.2, 0.85], [0.15, 0.5, 1.0]),
+    )
+    tilt = np.array([[np.cos(0.02), -np.sin(0.02), 0], [np.sin(0.02), np.cos(0.02), 0], [0, 0, 1]])
+    model = nacre.Model(camera)
+    for k in range(14):
+        yaw = 0.002 * k - 0.05
+        pose = np.eye(4)
+        pose[:3, :3] = [[np.cos(yaw), 0, np.sin(yaw)], [0, 1, 0], [-np.sin(yaw), 0, np.cos(yaw)]] @ tilt
+        pose[:3, 3] = [0.002 * k - 0.1, -0.012 * k, 0.002 * k]
+        depth = scene.simulate_depth(camera, pose, noise="kinect", seed=100 * seed + k)
+        report = model.add_frame(depth, guess=None if k else pose, keep_guess=not k)
+        is_right = abs(report.world_from_camera[1, 3] - pose[1, 3]) < 0.005
+        assert is_right or report.status == "WEAK", k

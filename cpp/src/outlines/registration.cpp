@@ -62,10 +62,12 @@ class EdgeSearch : public OpenDirectionSearch {
     return fit;
   }
 
-  // Down to what leaves a direction no more uncertain than a pixel.
+  // Down to what leaves a direction no more uncertain than a pixel, and to what one point tells: of a straight edge
+  // pixels make steps, which look the same to neighbors, and lead along it.
   Directions determined(const OpenFit& fit, const TwistBasis& open) const override {
     const double of_a_pixel = std::pow(fit.noise / (outlines_limits::least_noise * pixel_), 2);
-    return split_directions(agreed_information(fit.rows, open, fit.extent, 1.0), of_a_pixel);
+    return split_directions(agreed_information(fit.rows, open, fit.extent, 1.0),
+                            std::max(of_a_pixel, outlines_limits::points_for_one));
   }
 
  private:
