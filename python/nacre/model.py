@@ -161,7 +161,7 @@ class Model(ExchangeablePoints, Checkpointed):
         guess : (4, 4), optional
             A pose (world_from_camera) to start the registration from, in place of the last one.
         keep_guess : bool
-            Take the guess for the pose, without registration.
+            Take the guess for the pose. What registration from there tells of the camera's noise is learned.
         movable : bool
             Whether loops that close may move a guess that is kept: where it is as good as the motion since
             the frame before. Without it the frame stays where it is given.
@@ -339,9 +339,9 @@ class Model(ExchangeablePoints, Checkpointed):
         From the measured noise: what a point's observations average away of it (``confidence``), and what
         registered frames showed beyond it (``noise_factor``), which is taken for the same in all of them.
         Errors of the poses, and shape that is finer than the pixels, come on top. NaN where
-        ``fusion_method`` is not "fuse", and as long as nothing tells how much noise there is beyond what one
-        image shows: the noise is not given (``depth.noise``), and every frame's pose was, or was found by
-        the search for an object that turned on its plane.
+        ``fusion_method`` is not "fuse", and, unless the noise is given (``depth.noise``), as long as every
+        frame's pose was given, or was found by the search for an object that turned on its plane: nobody
+        knows how far those are off.
         """
         with self._lock:
             return point_sigma(self)

@@ -39,8 +39,8 @@ def _knows_noise(model: Model) -> bool:
     """
     Say whether the whole noise is given, or a frame has told by how much it is more than one image shows.
 
-    None tells whose pose was given, and none of an object that turned on its plane, after which the views
-    before it are adjusted, too.
+    None tells it of the points whose pose was given, for nobody knows how far that is off, and none of an
+    object that turned on its plane, after which the views before it are adjusted, too.
     """
     parameters = model.parameters
     if parameters.depth.noise is not None or parameters.registration.final_distance > 0:

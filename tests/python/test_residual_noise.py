@@ -126,3 +126,16 @@ def test_an_image_that_comes_twice_tells_no_noise(exact: list[tuple[Array, Array
         assert [report.status for report in reports] == ["TRACKED", "TRACKED"]
     assert once.noise_factor > 1.5
     assert twice.noise_factor == pytest.approx(once.noise_factor, rel=0.2)
+
+
+def test_frames_whose_poses_are_given_tell_noise_too(exact: list[tuple[Array, Array]]) -> None:
+    random = np.random.default_rng(7)
+    tracked, given = nacre.Model(CAMERA), nacre.Model(CAMERA)
+    for i, (depth, truth) in enumerate(exact):
+        error = 0.004 * smooth_field(random, 24) + 0.001 * random.normal(size=depth.shape)
+        image = depth + error * depth**2
+        tracked.add_frame(image, guess=truth if i == 0 else None, keep_guess=i == 0)
+        report = given.add_frame(image, guess=truth, keep_guess=True)
+        np.testing.assert_array_equal(report.world_from_camera, truth)
+    assert given.noise_factor == pytest.approx(tracked.noise_factor, rel=0.3)
+    assert len(given) < 1.1 * len(tracked)

@@ -25,7 +25,7 @@ struct FrameExtras {
                                            ///< registered frames tell; empty: all alike
   std::optional<double> timestamp;         ///< [s]
   std::optional<Pose> guess;               ///< world_from_camera to start the registration from
-  bool keep_guess = false;                 ///< take the guess for the pose, without registration
+  bool keep_guess = false;                 ///< take the guess for the pose; registration only learns the noise from it
   bool movable = false;                    ///< whether loops that close later may move a guess that is kept
   bool search = true;                      ///< look elsewhere, too, for a frame lost near its guess (relocalise)
 };
