@@ -24,6 +24,7 @@ class EdgeSearch : public OpenDirectionSearch {
         outlines_(outlines),
         options_(options),
         held_(options),
+        start_(geometric.target_from_source),
         edges_(moved(outlines.target, outlines.before.world_from_camera)) {
     const double reach =
         options.final_distance > 0.0 ? options.final_distance : camera_limits::surface_spacings * target.spacing();
@@ -62,15 +63,24 @@ class EdgeSearch : public OpenDirectionSearch {
     return fit;
   }
 
-  // Down to what leaves a direction no more uncertain than a pixel, and to what one point tells: of a straight edge
-  // pixels make steps, which look the same to neighbors, and lead along it.
+  // Down to what leaves a direction no more uncertain than a pixel. To lead elsewhere than the camera was going it must
+  // tell as much as one point does: of a straight edge pixels make steps, which look the same to neighbors.
   Directions determined(const OpenFit& fit, const TwistBasis& open) const override {
     const double of_a_pixel = std::pow(fit.noise / (outlines_limits::least_noise * pixel_), 2);
-    return split_directions(agreed_information(fit.rows, open, fit.extent, 1.0),
-                            std::max(of_a_pixel, outlines_limits::points_for_one));
+    const double of_a_point =
+        shift_from_start(fit.result.target_from_source) > pixel_ ? outlines_limits::points_for_one : 0.0;
+    return split_directions(agreed_information(fit.rows, open, fit.extent, 1.0), std::max(of_a_pixel, of_a_point));
   }
 
  private:
+  // Of the outline, root mean square [m].
+  double shift_from_start(const Pose& pose) const {
+    double squares = 0.0;
+    for (const OutlinePoint& edge : outlines_.source)
+      squares += (pose * edge.point - start_ * edge.point).squaredNorm();
+    return std::sqrt(squares / static_cast<double>(outlines_.source.size()));
+  }
+
   double smallest_gate() const { return outlines_limits::last_gate * pixel_; }
 
   // Each source edge with the nearest target edge of its kind, if that lies within the gate; robust weights.
@@ -158,6 +168,7 @@ class EdgeSearch : public OpenDirectionSearch {
   const OutlinePair& outlines_;
   const AlignOptions& options_;
   AlignOptions held_;                // few steps within the last gate, weak directions held
+  Pose start_;                       // where the camera was going, along open directions
   std::vector<OutlinePoint> edges_;  // of the target
   OpenFit free_;                     // along all that geometry leaves open
   double pixel_ = 0.0, widest_ = 0.0, gate_ = 0.0, extent_ = 1.0, noise_ = 1.0;
