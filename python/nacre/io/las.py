@@ -73,6 +73,16 @@ def count_points(path: str | os.PathLike[str]) -> int:
         return int(reader.header.point_count)
 
 
+def is_las(path: str | os.PathLike[str]) -> bool:
+    """Say whether a file is LAS or LAZ, by its name."""
+    return Path(path).suffix.lower() in (".las", ".laz")
+
+
+def silent_among(names: Iterable[str], cloud: Cloud) -> set[str]:
+    """Return those of some attributes that are everywhere as in a file that says nothing of them."""
+    return {name for name in names if (cloud.attributes[name] == default_of(name)).all()}
+
+
 def default_of(name: str) -> int:
     """Return the value of a dimension of which a file says nothing."""
     return _DEFAULTS.get(name, 0)

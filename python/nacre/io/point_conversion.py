@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.io.cloud import Cloud
-from nacre.io.las import default_of
+from nacre.io.las import is_las, silent_among
 from nacre.io.points import (
     FINITE_SUFFIXES,
     STREAMED_SUFFIXES,
@@ -20,12 +20,12 @@ from nacre.io.points import (
     is_streamed,
     read_chunks,
     read_points,
+    widen,
     write_chunks,
     write_points,
 )
 
 _ROWS_AT_ONCE = 1 << 18
-_LAS_SUFFIXES = (".las", ".laz")
 
 
 @dataclass(frozen=True)
@@ -59,21 +59,21 @@ def convert_points(source: str | os.PathLike[str], output: str | os.PathLike[str
     memory as a whole. Errors are those of :func:`nacre.read_points` and :func:`nacre.write_points`.
     """
     if is_streamed(source):
-        return write_pieces(output, lambda: read_chunks(source, _ROWS_AT_ONCE), is_las=_is_las(source))
+        return write_pieces(output, lambda: read_chunks(source, _ROWS_AT_ONCE), may_be_silent=is_las(source))
     cloud = read_points(source)
     return write_pieces(output, lambda: [cloud])
 
 
 def write_pieces(
-    output: str | os.PathLike[str], pieces: Callable[[], Iterable[Cloud]], *, is_las: bool = False
+    output: str | os.PathLike[str], pieces: Callable[[], Iterable[Cloud]], *, may_be_silent: bool = False
 ) -> Converted:
-    """Write a cloud whose pieces can be asked for more than once; of LAS files dimensions may say nothing."""
+    """Write a cloud whose pieces can be asked for more than once; attributes may say nothing, as in LAS."""
     look = _Look()
     for cloud in pieces():
         look.at(cloud)
     suffix = Path(output).suffix.lower()
     is_finite = suffix in FINITE_SUFFIXES
-    kept = [name for name in look.numbers if not is_las or name not in look.silent]
+    kept = [name for name in look.numbers if not may_be_silent or name not in look.silent]
 
     def written() -> Iterator[Cloud]:
         for cloud in pieces():
@@ -82,7 +82,7 @@ def write_pieces(
             yield rest[np.isfinite(rest.points).all(axis=1)] if is_finite and look.num_not_finite else rest
 
     num_points = look.num_points - (look.num_not_finite if is_finite else 0)
-    if suffix in STREAMED_SUFFIXES and all(_is_told_by_type(suffix, name, look.types[name]) for name in kept):
+    if suffix in STREAMED_SUFFIXES and all(_is_told_by_type(output, name, look.types[name]) for name in kept):
         write_chunks(output, written(), num_points, look.extremes)
     else:
         cloud = _joined(list(written()))
@@ -95,15 +95,11 @@ def write_pieces(
     )
 
 
-def _is_las(path: str | os.PathLike[str]) -> bool:
-    return Path(path).suffix.lower() in _LAS_SUFFIXES
-
-
-def _is_told_by_type(suffix: str, name: str, dtype: np.dtype[Any]) -> bool:
+def _is_told_by_type(output: str | os.PathLike[str], name: str, dtype: np.dtype[Any]) -> bool:
     """Say whether the type of an attribute tells how it is stored, which else all of its values do."""
-    if suffix == ".ply":
-        return not (dtype.kind in "iu" and dtype.itemsize == 8)
-    return not (suffix in _LAS_SUFFIXES and name == "intensity" and dtype.kind == "f")
+    if is_las(output):
+        return not (name == "intensity" and dtype.kind == "f")
+    return not (Path(output).suffix.lower() == ".ply" and dtype.kind in "iu" and dtype.itemsize == 8)
 
 
 def _joined(pieces: list[Cloud]) -> Cloud:
@@ -130,15 +126,14 @@ class _Look:
 
     num_points: int = 0
     num_not_finite: int = 0
-    lower: npt.NDArray[np.float64] = field(default_factory=lambda: np.full(3, np.inf))
-    upper: npt.NDArray[np.float64] = field(default_factory=lambda: np.full(3, -np.inf))
+    bounds: npt.NDArray[np.float64] = field(default_factory=lambda: np.outer([np.inf, -np.inf], np.ones(3)))
     own: list[str] = field(default_factory=list)
     types: dict[str, np.dtype[Any]] = field(default_factory=dict)
     silent: set[str] = field(default_factory=set)  # attributes with the value of a LAS file that says nothing
 
     @property
     def extremes(self) -> npt.NDArray[np.float64]:
-        return np.array([self.lower, self.upper])[np.isfinite([self.lower, self.upper]).all(axis=1)]
+        return self.bounds[np.isfinite(self.bounds).all(axis=1)]
 
     @property
     def numbers(self) -> list[str]:
@@ -150,10 +145,7 @@ class _Look:
             self.types = {name: values.dtype for name, values in cloud.attributes.items()}
             self.silent = set(self.numbers)
         self.num_points += len(cloud)
-        self.silent = {name for name in self.silent if (cloud.attributes[name] == default_of(name)).all()}
+        self.silent = silent_among(self.silent, cloud)
         is_finite = np.isfinite(cloud.points).all(axis=1)
         self.num_not_finite += len(cloud) - int(is_finite.sum())
-        finite = cloud.points if is_finite.all() else cloud.points[is_finite]
-        for axis in range(3):  # column by column, for NumPy is slow on rows of three
-            self.lower[axis] = finite[:, axis].min(initial=self.lower[axis])
-            self.upper[axis] = finite[:, axis].max(initial=self.upper[axis])
+        widen(self.bounds, cloud.points if is_finite.all() else cloud.points[is_finite])

@@ -214,6 +214,14 @@ def needs_extremes(path: str | os.PathLike[str]) -> bool:
     return _FORMATS[Path(path).suffix.lower()] is las
 
 
+def widen(extremes: npt.NDArray[Any], points: npt.NDArray[Any]) -> None:
+    """Widen (2, 3) lowest and highest coordinates until they hold finite points."""
+    for axis in range(3):  # column by column, for NumPy is slow on rows of three
+        along = points[:, axis]
+        extremes[0, axis] = along.min(initial=extremes[0, axis])
+        extremes[1, axis] = along.max(initial=extremes[1, axis])
+
+
 def holds(path: str | os.PathLike[str], field: str) -> bool:
     """Say whether the format of a file has a place for a field: normals, colors, or an attribute."""
     return field in getattr(_FORMATS[Path(path).suffix.lower()], "FIELDS", (field,))

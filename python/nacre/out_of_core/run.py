@@ -15,7 +15,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from nacre.io.points import STREAMED_SUFFIXES, needs_extremes, write_chunks
+from nacre.io.points import STREAMED_SUFFIXES, needs_extremes, widen, write_chunks
 from nacre.out_of_core.memory import PER_PROCESS
 from nacre.out_of_core.rows import Rows, to_cloud
 from nacre.out_of_core.store import Cell, Store, open_store
@@ -146,10 +146,7 @@ def write_results(
         num_points = sum(map(len, selected()))
     if needs_extremes(output):
         for rows in selected():
-            for axis in range(3):  # column by column, for NumPy is slow on rows of three
-                along = rows["points"][:, axis]
-                extremes[0, axis] = along.min(initial=extremes[0, axis])
-                extremes[1, axis] = along.max(initial=extremes[1, axis])
+            widen(extremes, rows["points"])
     pieces = chain([np.zeros(0, dtype)], selected())  # one at least, for the header
     write_chunks(output, map(to_cloud, pieces), num_points, extremes)
     return num_points

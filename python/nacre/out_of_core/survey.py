@@ -14,8 +14,8 @@ import numpy.typing as npt
 from nacre._internal.cubes import Hashes, point_hashes
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Cloud
-from nacre.io.las import default_of
-from nacre.io.points import SUFFIXES, is_streamed, read_chunks, require_point_suffix
+from nacre.io.las import is_las, silent_among
+from nacre.io.points import SUFFIXES, is_streamed, read_chunks, require_point_suffix, widen
 from nacre.kdtree import KdTree
 from nacre.out_of_core.rows import Rows, finite_among, row_type, to_cloud, to_rows
 
@@ -119,7 +119,7 @@ class _Look:
         self._first: tuple[Path, np.dtype[Any]] | None = None
         self._silent: set[str] = set()  # dimensions of LAS files that tell nothing up to now
         self._num_points = self._num_left_out = 0
-        self._lower, self._upper = np.full(3, np.inf), np.full(3, -np.inf)
+        self._extremes = np.array([np.full(3, np.inf), np.full(3, -np.inf)])
         self._hashes: Hashes = np.zeros(0, np.uint64)
         self._sample = np.zeros((0, 3))
 
@@ -127,21 +127,19 @@ class _Look:
         dtype = row_type(cloud)
         if self._first is None:
             self._first = path, dtype
-            if path.suffix.lower() in (".las", ".laz"):
+            if is_las(path):
                 self._silent = set(cloud.attributes)
         elif dtype != self._first[1]:
             first = f"{self._first[0]} has {_told(self._first[1])}"
             raise FileFormatError(
                 path, f"its fields must be those of the first file: {first}, it {_told(dtype)}"
             )
-        self._silent = {n for n in self._silent if (cloud.attributes[n] == default_of(n)).all()}
+        self._silent = silent_among(self._silent, cloud)
         finite = finite_among(cloud.points, cloud.points)
         self._num_left_out += len(cloud) - len(finite)
         if len(finite):
             self._num_points += len(finite)
-            for axis in range(3):  # column by column, for NumPy is slow on rows of three
-                self._lower[axis] = min(self._lower[axis], finite[:, axis].min())
-                self._upper[axis] = max(self._upper[axis], finite[:, axis].max())
+            widen(self._extremes, finite)
             self._keep_lowest(finite)
 
     def _keep_lowest(self, points: npt.NDArray[np.float64]) -> None:
@@ -163,8 +161,8 @@ class _Look:
             dtype,
             self._num_points,
             self._num_left_out,
-            self._lower,
-            self._upper,
+            self._extremes[0],
+            self._extremes[1],
             spacing_of(self._sample, len(self._sample) / self._num_points),
             self._sample,
         )

@@ -108,9 +108,10 @@ class PieceMotions:
             if index not in poses or not shared:
                 continue
             own = [i for i in shared if i not in piece.indices[:SHARED]]
-            world_from_piece = joint(placed, poses)
-            if len(own) > 1:
-                world_from_piece = placed[own[-1]] @ np.linalg.inv(poses[own[-1]])
+            goes_on = len(own) > 1
+            world_from_piece = (
+                placed[own[-1]] @ np.linalg.inv(poses[own[-1]]) if goes_on else joint(placed, poses)
+            )
             assert world_from_piece is not None
             return Place(world_from_piece @ poses[index], is_first=not own)
         return None
