@@ -130,6 +130,19 @@ def repeated(every: int) -> Callable[[Case], Case]:
     return change
 
 
+def dropped(every: int, count: int = 1) -> Callable[[Case], Case]:
+    """Let so many images in a row show nothing, after every so many."""
+
+    def change(case: Case) -> Case:
+        depths = [
+            np.zeros_like(depth) if i % (every + count) >= every else depth
+            for i, depth in enumerate(case.depths)
+        ]
+        return replace(case, depths=depths)
+
+    return change
+
+
 def rested(count: int) -> Callable[[Case], Case]:
     """Let the camera rest first: its first image so many times, each with noise of its own."""
 
@@ -251,6 +264,8 @@ DAMAGES: dict[str, Callable[[Case], Case]] = {
     **{f"disparity in steps of {unit} / m": in_disparity(unit) for unit in (0.0075, 0.015, 0.03)},
     "10 m where nothing was measured": filled(10.0),
     "every third image twice": repeated(3),
+    "every tenth image empty": dropped(9),
+    "three images of twenty empty": dropped(17, 3),
     "at rest for 30 frames first": rested(30),
     "every second pixel": every_pixel(2),
     "every fourth pixel": every_pixel(4),

@@ -116,6 +116,18 @@ WRONG: dict[str, Callable[[], Array]] = {
 }
 
 
+def test_a_camera_that_turns_on_while_images_show_nothing_is_found_where_that_leads() -> None:
+    step, missing = 5, range(6, 11)  # 15 degrees a view: only a fifth of the seventh is known
+    model = nacre.Model(CAMERA)
+    for index in range(13):
+        report = model.add_frame(np.zeros(SHAPE) if index in missing else view(step * index))
+        if index in missing:
+            assert report.status == "LOST"
+        else:
+            assert report.status == ("RELOCALISED" if index == missing.stop else "TRACKED")
+            assert is_right(report, step * index)
+
+
 @pytest.mark.parametrize("case", WRONG)
 def test_a_wrong_frame_is_lost_and_changes_no_byte(case: str) -> None:
     model = grown()

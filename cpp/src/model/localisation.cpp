@@ -5,8 +5,10 @@
 #include <utility>
 
 #include "base/limits.hpp"
+#include "base/point_rows.hpp"
 #include "base/se3.hpp"
 #include "camera/limits.hpp"
+#include "camera/view_distance.hpp"
 #include "model/limits.hpp"
 #include "model/paper_loop.hpp"
 #include "model/pipeline.hpp"
@@ -58,7 +60,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   const bool has_moved = history.num_registered() > 1 || is_trial;
   if (!extras.search) hypothesis.forget();
   result = track_frame(
-      {guesses(extras), expectation, is_predicted, has_moved, was_lost(), elsewhere(region_report, extras.search)},
+      {guesses(extras), expectation, is_predicted, has_moved, num_vain > 0, elsewhere(region_report, extras.search)},
       extras.search);
   const bool is_determined = result.decision == Decision::accepted && result.alignment.weak_directions.cols() == 0;
   if (is_determined && !result.is_on_plane) {
@@ -148,9 +150,20 @@ std::vector<Pose> Pipeline::guesses(const FrameExtras& extras) const {
   if (extras.guess) return {*extras.guess};
   const Pose last = history.registered_pose(0);
   const bool goes_on = options.registration.method == Metric::paper || !jumped();  // the paper's is a turntable
-  if (!options.predict_motion || history.num_registered() < 2 || was_lost() || !goes_on) return {last};
+  if (!options.predict_motion || history.num_registered() < 2 || !goes_on) return {last};
+  if (was_lost()) {
+    const std::optional<Pose> predicted = odometry.predicted();
+    return predicted && is_in_view(*predicted, last) ? std::vector{*predicted, last} : std::vector{last};
+  }
   const Pose predicted = last * (history.registered_pose(1).inverse() * last);
   return {orthonormal(predicted), last};
+}
+
+// Whether the camera would look at something there that was in the newest view.
+bool Pipeline::is_in_view(const Pose& world_from_camera, const Pose& last) const {
+  const Eigen::Vector3d ahead(0.0, 0.0, median_depth(take_rows<Points>(frame.points, frame.valid)));
+  const Eigen::Vector2d pixel = camera.project(last.inverse() * world_from_camera * ahead);
+  return pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < camera.width() && pixel.y() < camera.height();
 }
 
 // Some of the newest poses from which the camera looked in different directions.
@@ -169,7 +182,7 @@ std::vector<Pose> Pipeline::key_poses() const {
 // Around some poses, and everywhere: but not at every frame where that has been to no avail.
 RelocalisationPlaces Pipeline::elsewhere(const RegionReport& region_report, bool may_search) const {
   RelocalisationPlaces places;
-  places.beside = options.relocalise && (!may_search || (!was_lost() && !jumped()));
+  places.beside = options.relocalise && (!may_search || (num_vain == 0 && !jumped()));
   places.beside_if_open = num_open % model_limits::search_interval == 0;
   if (!options.relocalise || !may_search) return places;
   places.views = &views;

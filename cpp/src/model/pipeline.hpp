@@ -120,6 +120,7 @@ struct Pipeline {
   void set_noise_factor(double factor);
   TrackingResult track_frame(TrackingPrior prior, bool may_search);
   std::vector<Pose> guesses(const FrameExtras& extras) const;
+  bool is_in_view(const Pose& world_from_camera, const Pose& last) const;
   std::vector<Pose> key_poses() const;
   RelocalisationPlaces elsewhere(const RegionReport& region_report, bool may_search) const;
   std::optional<ObjectView> view_of_object(const RegionReport& region_report) const;

@@ -12,6 +12,15 @@
 #include "tracking/limits.hpp"
 
 namespace nacre {
+namespace {
+
+// In view distances.
+double turn_of(const Pose& motion) { return angle_between(Pose::Identity(), motion) / camera_limits::view_turn; }
+double shift_of(const Pose& motion, double depth) {
+  return motion.translation().norm() / (camera_limits::view_shift * depth);
+}
+
+}  // namespace
 
 void FrameOdometry::look_at(const IcpSource& frame) {
   newest_ = Surface{frame.cloud.points, frame.cloud.normals};
@@ -49,7 +58,7 @@ void FrameOdometry::Uncertainty::add(double step, const WeakDirections& open, co
 }
 
 double FrameOdometry::reach(const Pose& motion) const {
-  return std::max(largest_step_, view_distance(Pose::Identity(), motion, depth_));
+  return std::max({largest_turn_, largest_shift_, view_distance(Pose::Identity(), motion, depth_)});
 }
 
 FrameOdometry::Uncertainty FrameOdometry::uncertainty() const {
@@ -60,9 +69,29 @@ FrameOdometry::Uncertainty FrameOdometry::uncertainty() const {
   return sum;
 }
 
+// Over images that show nothing the camera goes on as before; it may be faster than it ever was.
+std::optional<FrameOdometry::Path> FrameOdometry::path() const {
+  if (!path_) return std::nullopt;
+  if (step_) return Path{path_->world_from_camera * step_->motion, uncertainty(), path_->is_seen};
+  const bool is_unknown = largest_turn_ == 0.0 && largest_shift_ == 0.0;
+  if ((before_ && newest_) || is_unknown) return std::nullopt;
+  Path unseen{orthonormal(path_->world_from_camera * motion_), path_->uncertainty, false};
+  const auto hidden = [](double largest) {
+    return tracking_limits::unseen_speed * std::max(largest, tracking_limits::least_unseen_step);
+  };
+  unseen.uncertainty.shift += hidden(largest_shift_);
+  unseen.uncertainty.turn.diagonal().array() += hidden(largest_turn_);
+  return unseen;
+}
+
 std::optional<FrameOdometry::Place> FrameOdometry::place() const {
-  if (!path_ || !step_) return std::nullopt;
+  if (!path_ || !path_->is_seen || !step_) return std::nullopt;
   return Place{path_->world_from_camera * step_->motion, step_->weak_directions.cols() == 0};
+}
+
+std::optional<Pose> FrameOdometry::predicted() const {
+  if (!path_ || path_->is_seen || before_) return std::nullopt;
+  return orthonormal(path_->world_from_camera * motion_);
 }
 
 std::optional<Pose> FrameOdometry::motion() const {
@@ -70,9 +99,9 @@ std::optional<Pose> FrameOdometry::motion() const {
 }
 
 bool FrameOdometry::allows(const Pose& world_from_camera, double margin) const {
-  const std::optional<Place> here = place();
+  const std::optional<Path> here = path();
   if (!here) return true;
-  const Uncertainty most = uncertainty();
+  const Uncertainty& most = here->uncertainty;
   const Eigen::AngleAxisd turn(world_from_camera.linear() * here->world_from_camera.linear().transpose());
   const double shift = (world_from_camera.translation() - here->world_from_camera.translation()).norm();
   return std::abs(turn.angle()) <= camera_limits::view_turn * (margin + turn.axis().dot(most.turn * turn.axis())) &&
@@ -81,21 +110,19 @@ bool FrameOdometry::allows(const Pose& world_from_camera, double margin) const {
 
 void FrameOdometry::end_frame(FrameStatus status, const Pose& world_from_camera,
                               const WeakDirections& weak_directions) {
-  std::optional<Path> followed;
-  if (const auto here = place()) followed = Path{here->world_from_camera, uncertainty()};
+  const std::optional<Path> here = path(), followed = place() ? here : std::nullopt;
   const std::optional<Path> last = std::exchange(path_, std::nullopt);
   const std::optional<Step> step = std::exchange(step_, std::nullopt);
+  const Pose before_it = std::exchange(motion_, Pose::Identity());
   const bool was_tracked = std::exchange(is_tracked_, false);
   is_followed_ = false;
   before_ = std::exchange(newest_, std::nullopt);
-  motion_ = Pose::Identity();
-  if (!before_) return;
   if (status == FrameStatus::lost) {
-    if (!step) return;
-    motion_ = step->motion;
-    path_ = followed;
+    path_ = here;
+    if (here) motion_ = step ? step->motion : before_it;
     return;
   }
+  if (!before_) return;
   is_tracked_ = status != FrameStatus::weak;
   path_ = Path{world_from_camera, {}};
   if (!last || status == FrameStatus::relocalised) return;
@@ -106,7 +133,8 @@ void FrameOdometry::end_frame(FrameStatus status, const Pose& world_from_camera,
     path_->uncertainty = followed && is_followed ? followed->uncertainty : last->uncertainty;
     if (!is_followed) path_->uncertainty.add(reach(motion_), weak_directions, Eigen::Matrix3d::Identity());
   } else if (was_tracked) {
-    largest_step_ = reach(motion_);
+    largest_turn_ = std::max(largest_turn_, turn_of(motion_));
+    largest_shift_ = std::max(largest_shift_, shift_of(motion_, depth_));
   }
 }
 

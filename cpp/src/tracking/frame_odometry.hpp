@@ -32,6 +32,8 @@ class FrameOdometry {
 
   // Of the newest frame; none where the frames since the camera was last registered could not be followed.
   std::optional<Place> place() const;
+  // Where the camera is, if it went on as before over images that showed nothing; none elsewhere.
+  std::optional<Pose> predicted() const;
   // The newest frame's motion, camera before from camera now; none where it is not determined.
   std::optional<Pose> motion() const;
   // Whether the camera can have come to a place, as far as frames and a margin tell, in view distances.
@@ -53,12 +55,14 @@ class FrameOdometry {
   struct Path {
     Pose world_from_camera;
     Uncertainty uncertainty;
+    bool is_seen = true;  // no image of it showed nothing
   };
   struct Step {
     Pose motion;
     WeakDirections weak_directions;
   };
-  Uncertainty uncertainty() const;  // of the newest frame's place
+  std::optional<Path> path() const;  // up to the newest frame
+  Uncertainty uncertainty() const;   // of the newest frame's place
   // Of a motion, as long as it is, or as ever between tracked frames where directions are open.
   double reach(const Pose& motion) const;
 
@@ -66,7 +70,8 @@ class FrameOdometry {
   std::optional<Path> path_;        // up to it
   bool is_tracked_ = false;         // whether it was
   Pose motion_ = Pose::Identity();  // that led to it
-  double largest_step_ = 0.0;       // between tracked frames
+  // Between tracked frames, in view distances.
+  double largest_turn_ = 0.0, largest_shift_ = 0.0;
   // Of the newest frame.
   std::optional<Surface> newest_;
   std::optional<Step> step_;

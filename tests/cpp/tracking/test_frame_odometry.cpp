@@ -152,6 +152,33 @@ TEST_CASE("after a frame that shows nothing, or something else, it may be anywhe
   CHECK_FALSE(other.odometry.motion().has_value());
 }
 
+TEST_CASE("over frames that show nothing it goes on as before, and is not twice as fast as ever") {
+  Camcorder camera;
+  camera.see_and_register(0, hills);
+  camera.see_and_register(1, hills);
+  for (int step = 2; step < 5; ++step) {
+    camera.lose();
+    CAPTURE(step);
+    REQUIRE(camera.odometry.predicted().has_value());
+    CHECK(view_distance(*camera.odometry.predicted(), camera_at(step + 1), 1.0) < 0.05);
+  }
+  camera.see(camera_at(5), hills);
+  CHECK_FALSE(camera.odometry.place().has_value());
+  CHECK(camera.odometry.allows(camera_at(5), 0.0));
+  // Steps of 0.03 m, which hands may make longer: 4 of twice 0.25 of 0.15 m.
+  CHECK(camera.odometry.allows(moved_by(camera_at(5), {0.0, 0.29, 0.0}), 0.0));
+  CHECK_FALSE(camera.odometry.allows(moved_by(camera_at(5), {0.0, 0.31, 0.0}), 0.0));
+  CHECK(camera.odometry.allows(turned_by(camera_at(5), 0.39, Eigen::Vector3d::UnitX()), 0.0));
+  CHECK_FALSE(camera.odometry.allows(turned_by(camera_at(5), 0.41, Eigen::Vector3d::UnitX()), 0.0));
+  camera.lose();
+  CHECK_FALSE(camera.odometry.predicted().has_value());  // the last frame was seen
+  camera.see(camera_at(6), hills);
+  CHECK_FALSE(camera.odometry.place().has_value());  // it tells how it moved, but not from where
+  CHECK(camera.odometry.motion().has_value());
+  CHECK(camera.odometry.allows(camera_at(6), 0.0));
+  CHECK_FALSE(camera.odometry.allows(moved_by(camera_at(6), {0.0, 0.35, 0.0}), 0.0));
+}
+
 TEST_CASE("rounding does not grow where frame after frame is placed by the one before") {
   Camcorder camera;
   Pose pose = camera_at(0);

@@ -203,7 +203,8 @@ bool PrivateState::is_sound(const CarriedThings& things, const StillScene& scene
 bool PrivateState::is_sound(const FrameOdometry& odometry) {
   const auto& before = odometry.before_;
   const bool has_normals = !before || before->normals.rows() == 0 || before->normals.rows() == before->points.rows();
-  return has_normals && odometry.largest_step_ >= 0.0 && std::isfinite(odometry.largest_step_) &&
+  const auto is_size = [](double value) { return value >= 0.0 && std::isfinite(value); };
+  return has_normals && is_size(odometry.largest_turn_) && is_size(odometry.largest_shift_) &&
          (!odometry.path_ ||
           (odometry.path_->uncertainty.shift >= 0.0 && odometry.path_->uncertainty.turn.allFinite()));
 }

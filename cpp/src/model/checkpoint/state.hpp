@@ -174,11 +174,12 @@ struct PrivateState {
   }
   template <class Archive>
   static void exchange(Archive& archive, FrameOdometry::Path& path) {
-    archive(path.world_from_camera, path.uncertainty.shift, path.uncertainty.turn);
+    archive(path.world_from_camera, path.uncertainty.shift, path.uncertainty.turn, path.is_seen);
   }
   template <class Archive>
   static void exchange(Archive& archive, FrameOdometry& odometry) {
-    archive(odometry.before_, odometry.path_, odometry.is_tracked_, odometry.motion_, odometry.largest_step_);
+    archive(odometry.before_, odometry.path_, odometry.is_tracked_, odometry.motion_, odometry.largest_turn_,
+            odometry.largest_shift_);
   }
 
   template <class Archive>
