@@ -36,6 +36,8 @@ class FrameOdometry {
   std::optional<Pose> predicted() const;
   // The newest frame's motion, camera before from camera now; none where it is not determined.
   std::optional<Pose> motion() const;
+  // Whether no image showed nothing since the camera was last registered.
+  bool is_seen() const { return !path_ || path_->is_seen; }
   // Whether the camera can have come to a place, as far as frames and a margin tell, in view distances.
   bool allows(const Pose& world_from_camera, double margin = 1.0) const;
 

@@ -234,8 +234,10 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   registration.include_older_points();
   const RelocalisationPlaces& places = prior.elsewhere;
   if (const auto turned = turned_on_plane(target, now, places, options)) return *turned;
+  // Where nobody saw the camera go, it may have been carried away: to a place that speaks for itself.
   const auto keep_if_possible = [&](TrackingResult found) {
-    if (odometry.allows(found.alignment.target_from_source)) keep_better(found, best);
+    const bool is_sure = found.decision == Decision::accepted && !odometry.is_seen();
+    if (is_sure || odometry.allows(found.alignment.target_from_source)) keep_better(found, best);
   };
   if (followed) {
     keep_if_possible(registration.from(*followed, FrameRegistration::Gate::narrow, Expectation::unexpected));
