@@ -82,6 +82,23 @@ def test_a_camera_that_turned_back_is_found_where_the_wall_is_rough() -> None:
     assert model.frames[-1].status == "TRACKED"
 
 
+def test_a_camera_that_turns_on_the_spot_does_not_go_about_what_it_sees() -> None:
+    """Floor and wall tell how it turns, not where along them it stands."""
+    wall_and_floor = boxes(((-4, -2, 3), (4, 1, 3.1)), ((-4, 1, -1), (4, 1.1, 3)))
+    model = nacre.Model(CAMERA)
+    for number in range(6):
+        pose = np.eye(4)
+        angle = np.radians(3 * number)
+        pose[:3, :3] = [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
+        depth = wall_and_floor.simulate_depth(CAMERA, pose)
+        noise = np.random.default_rng(number).normal(0, 0.001, depth.shape)
+        report = model.add_frame(depth + noise.astype(np.float32))
+        if number > 0:
+            assert (report.status, len(report.weak_directions)) == ("WEAK", 1)
+        np.testing.assert_allclose(report.world_from_camera[:3, :3], pose[:3, :3], atol=0.003)
+        np.testing.assert_allclose(report.world_from_camera[:3, 3], 0, atol=0.02)
+
+
 def wall_with_boxes() -> nacre.Mesh:
     """Return a wall two metres away, with boxes before it that are a third of a metre deep."""
     random = np.random.default_rng(5)

@@ -198,6 +198,7 @@ IcpResult iterate(const IcpTarget& target, const IcpSource& source, const Pose& 
   result.normal_information = normal_information(pairs, options.method);
   result.off_planes = share_off_planes(pairs, result.residual_ratio);
   result.center = last.center;
+  result.extent = last.extent;
   const double variance = std::max(last.variance, resolution * resolution);
   result.information = last.hessian * (result.num_independent / static_cast<double>(pairs.size())) / variance;
   result.shape_information = last.shape / variance;

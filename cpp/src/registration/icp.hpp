@@ -10,6 +10,7 @@ namespace nacre {
 
 struct IcpResult : AlignResult {
   double residual_ratio = std::numeric_limits<double>::quiet_NaN();  // residuals to the largest they may be, rms
+  double extent = 1.0;                                               // in units of which weak directions turn [m]
   Matrix6 shape_information = Matrix6::Zero();                       // the part of it on which normals agree
   double signal = infinity<double>;                                  // see IcpStep
   Vector6 weakest = Vector6::Zero();                                 // see IcpStep

@@ -113,6 +113,7 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, const WeakTest
   step.rmse = std::sqrt(sums.squares / static_cast<double>(pairs.size()));
   step.variance = sums.weighted_squares / sums.weight;
   const double extent = std::sqrt(std::max(sums.extent / sums.weight - p_offset.squaredNorm(), 1e-24));
+  step.extent = extent;
 
   const NormalEquations equations = normal_equations(pairs, metric, &Pair::weight, p_mean, q_mean, extent, num_threads);
   const bool has_test = test.least_information > 0.0;

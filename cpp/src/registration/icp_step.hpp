@@ -35,6 +35,7 @@ struct IcpStep {
   double rmse = 0.0;               // of the residuals before the motion [m]
   double variance = 0.0;           // weighted mean of the squared residuals before the motion [m^2]
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  double extent = 1.0;                // of the pairs about it, root mean square [m]
   Matrix6 hessian = Matrix6::Zero();  // of half the weighted squares, for a twist (rotation, translation) about center
   Matrix6 shape = Matrix6::Zero();    // what the normals of both sides agree on of the hessian
   // The information that normals agree on, by what noise in them feigns, in the direction where that is least.

@@ -1,5 +1,7 @@
 #include "registration/open_directions.hpp"
 
+#include "base/se3.hpp"
+
 namespace nacre {
 
 IcpResult determine_open_directions(const IcpResult& geometric, OpenDirectionSearch& search) {
@@ -21,6 +23,21 @@ IcpResult determine_open_directions(const IcpResult& geometric, OpenDirectionSea
     if (directions.weak.cols() == 0) break;
   }
   return result;
+}
+
+Pose nearest_to(const Pose& guess, const IcpResult& result, double lever) {
+  const TwistBasis& weak = result.weak_directions;
+  const TwistBasis twists =
+      (TwistBasis(6, weak.cols()) << weak.topRows<3>() / result.extent, weak.bottomRows<3>()).finished();
+  const Pose& pose = result.target_from_source;
+  const Eigen::AngleAxisd turn(pose.linear() * guess.linear().transpose());
+  const Eigen::Vector3d arm = pose.translation() - result.center;
+  Eigen::MatrixXd motions(6, weak.cols());
+  motions << lever * twists.topRows<3>(), twists.bottomRows<3>() - cross_matrix(arm) * twists.topRows<3>();
+  Vector6 from_guess;
+  from_guess << lever * turn.angle() * turn.axis(), pose.translation() - guess.translation();
+  const Eigen::VectorXd least = -(motions.transpose() * motions).ldlt().solve(motions.transpose() * from_guess);
+  return motion_about(result.center, twists * least) * pose;
 }
 
 }  // namespace nacre

@@ -30,4 +30,8 @@ class OpenDirectionSearch {
 // others, and where the search does not agree, the pose stays as it was. What geometry determines is never left to it.
 IcpResult determine_open_directions(const IcpResult& geometric, OpenDirectionSearch& search);
 
+// Of all poses that differ in weak directions alone, the one that a camera at a guess comes to by the least motion of
+// its own. lever: by how many metres it moves as soon as it turns by a radian.
+Pose nearest_to(const Pose& guess, const IcpResult& result, double lever);
+
 }  // namespace nacre

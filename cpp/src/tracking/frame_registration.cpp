@@ -13,6 +13,7 @@
 #include "nacre/global_registration.hpp"
 #include "outlines/limits.hpp"
 #include "registration/limits.hpp"
+#include "registration/open_directions.hpp"
 #include "tracking/limits.hpp"
 
 namespace nacre {
@@ -57,6 +58,7 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   }
   IcpResult by_shape = align_to(pairing.target, pairing.source, start, pairing.options);
   if (by_shape.weak_directions.cols() > 0) {
+    hold_open_directions(pairing, guess, by_shape);
     determine_open_directions(pairing, colors_of(surfaces.view, pairing, pairing.source), by_shape);
     return test(std::move(by_shape), surfaces, guess, expectation);
   }
@@ -249,6 +251,15 @@ IcpSource FrameRegistration::gated(IcpSource source, const PointsInView& view, c
     source.largest_residual[i] = static_cast<float>(set > 0.0 ? set : std::min(across, largest));
   }
   return source;
+}
+
+// What the shapes leave open is the camera's to keep, not the scene's: one that turns on the spot does not go about
+// what it sees.
+void FrameRegistration::hold_open_directions(const Pairing& pairing, const Pose& guess, IcpResult& result) const {
+  const double lever = camera_limits::view_shift * depth_ / camera_limits::view_turn;
+  const Pose nearest = nearest_to(guess, result, lever);
+  IcpResult held = align_held(pairing.target, pairing.source, nearest, pairing.options, result.weak_test);
+  if (held.status != AlignStatus::too_few_pairs) result = std::move(held);
 }
 
 // What the shapes leave open, colours or outlines may decide.

@@ -128,6 +128,7 @@ class FrameRegistration {
   Pairing paired(const Surfaces& surfaces, Gate gate) const;
   TrackingResult test(IcpResult alignment, const Surfaces& surfaces, const Pose& guess, Expectation expectation) const;
   IcpSource gated(IcpSource source, const PointsInView& view, const IcpTarget& target) const;
+  void hold_open_directions(const Pairing& pairing, const Pose& guess, IcpResult& result) const;
   void determine_open_directions(const Pairing& pairing, const std::optional<ColorRegistration>& colors,
                                  IcpResult& result) const;
   Consistency consistency(const Surfaces& surfaces, const Pose& world_from_camera) const;

@@ -144,8 +144,10 @@ std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& reg
 // A place that a search has led to. Beside the last pose it is no surprise, however it was found.
 TrackingResult found_at(const Pose& place, const FrameRegistration& registration, const TrackingPrior& prior) {
   using Gate = FrameRegistration::Gate;
-  return prior.elsewhere.beside ? registration.from(place, prior.guesses.back(), Gate::narrow, Expectation::beside)
-                                : registration.from(place, Gate::narrow, Expectation::unexpected);
+  TrackingResult found = prior.elsewhere.beside
+                             ? registration.from(place, prior.guesses.back(), Gate::narrow, Expectation::beside)
+                             : registration.from(place, Gate::narrow, Expectation::unexpected);
+  return with_open_directions_held(std::move(found), place, prior);
 }
 
 // From every place where a camera has been, and around it.
