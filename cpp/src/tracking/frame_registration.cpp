@@ -254,12 +254,13 @@ IcpSource FrameRegistration::gated(IcpSource source, const PointsInView& view, c
 }
 
 // What the shapes leave open is the camera's to keep, not the scene's: one that turns on the spot does not go about
-// what it sees.
+// what it sees. Where the shapes fit less there, they told more than it seemed.
 void FrameRegistration::hold_open_directions(const Pairing& pairing, const Pose& guess, IcpResult& result) const {
   const double lever = camera_limits::view_shift * depth_ / camera_limits::view_turn;
   const Pose nearest = nearest_to(guess, result, lever);
   IcpResult held = align_held(pairing.target, pairing.source, nearest, pairing.options, result.weak_test);
-  if (held.status != AlignStatus::too_few_pairs) result = std::move(held);
+  const bool is_found = held.status != AlignStatus::too_few_pairs;
+  if (is_found && held.weak_directions.cols() <= result.weak_directions.cols()) result = std::move(held);
 }
 
 // What the shapes leave open, colours or outlines may decide.
