@@ -254,7 +254,7 @@ IcpSource FrameRegistration::gated(IcpSource source, const PointsInView& view, c
 }
 
 // What the shapes leave open is the camera's to keep, not the scene's: one that turns on the spot does not go about
-// what it sees. Where the shapes fit less there, they told more than it seemed.
+// what it sees. Where more is open there, the shapes told more than it seemed.
 void FrameRegistration::hold_open_directions(const Pairing& pairing, const Pose& guess, IcpResult& result) const {
   const double lever = camera_limits::view_shift * depth_ / camera_limits::view_turn;
   const Pose nearest = nearest_to(guess, result, lever);

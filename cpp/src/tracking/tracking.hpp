@@ -29,7 +29,7 @@ struct TrackingPrior {
   Expectation expectation;    // of the guesses
   bool is_predicted;          // the first guess is where the camera was going, or was given
   bool has_moved;             // two frames or more are registered: it is a recording, not a pair of images
-  bool was_lost;              // at the frame before
+  bool was_lost;              // at the frame before, and searched for
   RelocalisationPlaces elsewhere;
   std::optional<std::vector<Pose>> beside = std::nullopt;       // the places beside the last guess, once they are known
   std::vector<TrackingResult> tried = {};                       // what was found from the guesses and beside them
