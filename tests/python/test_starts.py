@@ -191,3 +191,20 @@ def test_where_the_camera_moves_on_lost_frames_are_found_from_those_beside_them(
     assert [frame.index for frame in done.retry_lost()] == [6, 5, 4]
     assert [done.frames[i].status for i in (4, 5, 6)] == ["RELOCALISED"] * 3
     assert np.abs(done.poses[:, 0, 3] - STEP * np.arange(12)).max() < 0.002
+
+
+def test_a_model_that_begins_before_a_bare_wall_begins_anew_behind_it() -> None:
+    """Nothing is added to its first frame, as a bare wall leaves directions open."""
+    vertices = WALL.vertices.copy()
+    vertices[:, 2] = 1 + (vertices[:, 2] - 1) * np.clip((vertices[:, 0] - 0.3) / 0.1, 0, 1)
+    wall = nacre.Mesh(vertices, WALL.triangles)
+    model, poses = nacre.Model(CAMERA), [np.eye(4) for _ in range(18)]
+    for number, pose in enumerate(poses):
+        pose[0, 3] = -0.3 + 0.1 * number
+        model.add_frame(wall.simulate_depth(CAMERA, pose, noise=0.0005, seed=number))
+    assert model.frames[1].status == "LOST"  # it was WEAK, and nothing is known of it any more
+    first = next(i for i, report in enumerate(model.frames) if report.status == "TRACKED")
+    assert 0 < first < 15
+    assert set(statuses(model)[first:]) == {"TRACKED"}
+    moved = [report.world_from_camera[0, 3] for report in model.frames[first:]]
+    np.testing.assert_allclose(moved, 0.1 * np.arange(len(moved)), atol=0.01)

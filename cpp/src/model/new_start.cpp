@@ -69,13 +69,15 @@ std::unique_ptr<Pipeline> begin_anew(Pipeline& model, const DepthRef& depth, con
     if (auto begun = begun_without_carried(model, depth, extras)) return begun;
   }
   std::vector<StartFrame>& frames = model.start_frames;
-  if (!is_wanted || (newest.status != FrameStatus::lost && !is_first)) frames.clear();
+  const bool is_lost = newest.status == FrameStatus::lost;
+  const bool adds_nothing = is_lost || newest.status == FrameStatus::weak;
+  if (!is_wanted || !(is_first || adds_nothing)) frames.clear();
   if (!is_wanted || (frames.empty() && !is_first) || model.frame.valid.size() < base_limits::least_points) {
     return nullptr;
   }
   frames.push_back({depth, extras, newest.index});
   if (frames.size() < model_limits::start_frames) return nullptr;
-  std::unique_ptr<Pipeline> begun = begun_with(frames, model);
+  std::unique_ptr<Pipeline> begun = is_lost ? begun_with(frames, model) : nullptr;
   frames.erase(frames.begin());
   return begun;
 }
