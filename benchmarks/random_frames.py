@@ -30,7 +30,7 @@ import nacre
 Array = npt.NDArray[Any]
 
 STATUSES = {"TRACKED", "WEAK", "LOST", "RELOCALISED"}
-REFUSALS = ("depth must be in metres with a median",)
+REFUSALS = ("depth must be in metres with a median", "depth_scale must be the stored units per metre")
 SLOWEST = 120.0  # seconds a model may take before the run is ended with a traceback
 
 
@@ -368,7 +368,7 @@ def run_model(seed: int, trial: int, largest: int, most_frames: int, told: colle
     camera = random_camera(rng, *random_size(rng, largest))
     scale = float(rng.choice([1.0, 1.0, 1.0, 1000.0, 5000.0]))
     changes = random_changes(rng)
-    if camera.model == "orthographic":
+    if camera.model == "orthographic" or changes.get("binning", 0) > min(camera.width, camera.height):
         changes.pop("binning", None)
     model = nacre.Model(camera, depth_scale=scale, **changes)
     scene = Scene(rng, camera)
