@@ -12,10 +12,14 @@ double median_depth(const Points& points) {
   return points.rows() > 0 ? static_cast<double>(median_of(points.col(2))) : 1.0;
 }
 
+double turn_distance(const Pose& a, const Pose& b) { return angle_between(a, b) / camera_limits::view_turn; }
+
+double shift_distance(const Pose& a, const Pose& b, double depth) {
+  return (a.translation() - b.translation()).norm() / (camera_limits::view_shift * depth);
+}
+
 double view_distance(const Pose& a, const Pose& b, double depth) {
-  const double angle = angle_between(a, b);
-  return std::max(angle / camera_limits::view_turn,
-                  (a.translation() - b.translation()).norm() / (camera_limits::view_shift * depth));
+  return std::max(turn_distance(a, b), shift_distance(a, b, depth));
 }
 
 }  // namespace nacre

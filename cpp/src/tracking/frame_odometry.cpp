@@ -12,15 +12,6 @@
 #include "tracking/limits.hpp"
 
 namespace nacre {
-namespace {
-
-// In view distances.
-double turn_of(const Pose& motion) { return angle_between(Pose::Identity(), motion) / camera_limits::view_turn; }
-double shift_of(const Pose& motion, double depth) {
-  return motion.translation().norm() / (camera_limits::view_shift * depth);
-}
-
-}  // namespace
 
 void FrameOdometry::look_at(const IcpSource& frame) {
   newest_ = Surface{frame.cloud.points, frame.cloud.normals};
@@ -133,8 +124,8 @@ void FrameOdometry::end_frame(FrameStatus status, const Pose& world_from_camera,
     path_->uncertainty = followed && is_followed ? followed->uncertainty : last->uncertainty;
     if (!is_followed) path_->uncertainty.add(reach(motion_), weak_directions, Eigen::Matrix3d::Identity());
   } else if (was_tracked) {
-    largest_turn_ = std::max(largest_turn_, turn_of(motion_));
-    largest_shift_ = std::max(largest_shift_, shift_of(motion_, depth_));
+    largest_turn_ = std::max(largest_turn_, turn_distance(Pose::Identity(), motion_));
+    largest_shift_ = std::max(largest_shift_, shift_distance(Pose::Identity(), motion_, depth_));
   }
 }
 
