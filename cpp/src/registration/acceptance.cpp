@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 
+#include "base/limits.hpp"
 #include "registration/limits.hpp"
 
 namespace nacre {
@@ -64,10 +65,20 @@ bool is_other_size(const SizeDifference& size, Expectation expectation) {
   return (is_far || size.sigma <= size_sigma) && std::abs(size.relative) > std::max(other_size, certainty * size.sigma);
 }
 
-}  // namespace
+enum class Looks { unknown, alike, unlike };
 
-Acceptance accept(const IcpResult& alignment, const Consistency& consistency, Expectation expectation,
-                  const AcceptanceOptions& options) {
+// The agreement's standard error is (1 - usual^2) / sqrt(n) where the place is right.
+Looks looks_of(const Likeness& found, const std::optional<Consistency>& usual) {
+  if (!usual || usual->likeness.num_squares == 0.0 || found.num_squares == 0.0) return Looks::unknown;
+  const double usually = usual->likeness.agreement, count = std::sqrt(found.num_squares);
+  const double sigmas = static_cast<double>(base_limits::noise_sigmas);
+  const double beyond_chance = count * found.agreement, short_of_usual = count * (usually - found.agreement);
+  if (beyond_chance < sigmas) return short_of_usual >= sigmas ? Looks::unlike : Looks::unknown;
+  return short_of_usual <= sigmas * (1.0 - usually * usually) ? Looks::alike : Looks::unknown;
+}
+
+Acceptance accept_as(const IcpResult& alignment, const Consistency& consistency, Expectation expectation,
+                     const AcceptanceOptions& options) {
   using namespace registration_limits;
   Acceptance acceptance;
   std::ostringstream reason;
@@ -118,6 +129,33 @@ Acceptance accept(const IcpResult& alignment, const Consistency& consistency, Ex
     acceptance.is_clear_cut = options.verify && overlap * acceptance.score >= clear_cut_score * options.min_score;
   }
   acceptance.reason = reason.str();
+  return acceptance;
+}
+
+}  // namespace
+
+Acceptance accept(const IcpResult& alignment, const Consistency& consistency, Expectation expectation,
+                  const AcceptanceOptions& options) {
+  Acceptance acceptance = accept_as(alignment, consistency, expectation, options);
+  const Looks looks = options.verify ? looks_of(consistency.likeness, options.usual) : Looks::unknown;
+  if (expectation == Expectation::expected || looks == Looks::unknown) return acceptance;
+  if (looks == Looks::unlike) {
+    if (acceptance.decision != Decision::rejected) {
+      std::ostringstream reason;
+      reason.precision(2);
+      reason << "it does not look like the model there: brightness agrees by " << consistency.likeness.agreement
+             << ", and by " << options.usual->likeness.agreement << " where frames were registered";
+      acceptance.reason = reason.str();
+    }
+    acceptance.decision = Decision::rejected;
+    acceptance.relocalisation_score = 0.0;
+    acceptance.is_clear_cut = false;
+    return acceptance;
+  }
+  if (acceptance.decision != Decision::rejected) return acceptance;
+  Acceptance recognised = accept_as(alignment, consistency, Expectation::confirmed, options);
+  if (recognised.decision == Decision::accepted) return recognised;
+  acceptance.is_hopeless = acceptance.is_hopeless && recognised.is_hopeless;
   return acceptance;
 }
 

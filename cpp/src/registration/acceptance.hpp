@@ -23,10 +23,17 @@ enum class Expectation {
   only_place,  // of all places, which a search has compared, the only one: see accept_best
 };
 
+// How far the brightness of two sides goes together: see tracking/likeness.hpp.
+struct Likeness {
+  double agreement = 0.0;   // at most 1; by chance 0, with a standard deviation of 1 / sqrt(num_squares)
+  double num_squares = 0.0;  // of the image, that tell; 0: nothing is known
+};
+
 // Of what either side should see of the other, the part that it does not see through.
 struct Consistency {
   double of_target = 1.0;  // of the target's points, in the source's image
   double of_source = 1.0;  // of the source's points, in the last image of the target; 1 where that shows too few
+  Likeness likeness = {};
 
   // What both see through, together.
   double contradiction() const { return (1.0 - of_target) + (1.0 - of_source); }
@@ -65,6 +72,10 @@ struct Acceptance {
 // square: what is new is told from what should match and does not. After a loss more is asked for. Beside the last
 // pose misfit above half counts, too; far from all guesses, where many places resemble, so does consistency^8, and the
 // score is the lower, the more of the matches lie on three planes: see share_off_planes.
+//
+// Where the two sides look alike, as the brightness of registered frames and what they fit has done, a place is as good
+// as one that another registration confirms, wherever it is. Where they look no more alike than chance makes them, though
+// registered frames did, it is none: but near a guess.
 //
 // What is left out, since it moves, tells nothing: both scores count as much as is left.
 //

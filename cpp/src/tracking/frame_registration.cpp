@@ -14,6 +14,7 @@
 #include "outlines/limits.hpp"
 #include "registration/limits.hpp"
 #include "registration/open_directions.hpp"
+#include "tracking/likeness.hpp"
 #include "tracking/limits.hpp"
 
 namespace nacre {
@@ -289,7 +290,8 @@ Consistency FrameRegistration::consistency(const Surfaces& surfaces, const Pose&
                   0.0),
           part_or(compare(samples.points, samples.normals, last, world_from_camera.inverse() * last.world_from_camera,
                           now_.camera, margin, options_.num_threads, take_rows<Values>(noise_, samples.rows)),
-                  1.0)};
+                  1.0),
+          likeness(model, now_.view, world_from_camera, now_.camera, margin)};
 }
 
 const OutlinePair& FrameRegistration::outlines() const {

@@ -41,6 +41,8 @@ constexpr int most_climb_rounds = 8;  // [rounds] budget: with steps of one leng
 constexpr double climb_lever = 3.0;  // [1/size] derived: turns by what shifts a point at a third of the size as far; dog
 constexpr double least_view_overlap = 0.1;  // [1] tuned: with the view that agrees most; dog
 constexpr double least_view_consistency = 0.75;  // [1] tuned: with all views; dog
+constexpr int likeness_squares = 12;  // [1] tuned: across the image, within which brightness is compared; test_likeness
+constexpr int least_in_square = 8;  // [points] derived: that tell a correlation to 1 / sqrt(8); test_likeness
 
 constexpr double even_odds = 0.092;  // [1] tuned: score of a registration that is right or wrong with the same probability; test_probability
 constexpr double right_on_plane = 0.86;  // [1] tuned: part of the views found by the search on the plane that are right: 64 of 74; benchmarks/turned_on_plane.py

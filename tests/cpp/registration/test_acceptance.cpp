@@ -269,3 +269,70 @@ TEST_CASE("views of a place add up, by how much they differ") {
   CHECK(PlaceOdds().is_enough(1.5, Expectation::expected));
   CHECK_FALSE(PlaceOdds().is_enough(1.5, Expectation::unexpected));
 }
+
+namespace {
+
+Registration looking(double agreement, double num_squares) {
+  Registration registration;
+  registration.consistency.likeness = {agreement, num_squares};
+  return registration;
+}
+
+// As frames of this recording are, of which each tells a mean of 60 squares.
+const AcceptanceOptions colored = {0.3, true, Consistency{1.0, 1.0, {0.7, 60.0}}};
+
+Acceptance tested_among_colored(const Registration& registration, Expectation expectation) {
+  return accept(registration.alignment, registration.consistency, expectation, colored);
+}
+
+}  // namespace
+
+TEST_CASE("of a place that looks as registered frames do as little is asked as where another registration leads") {
+  for (const Expectation expectation : {Expectation::near_lost, Expectation::beside, Expectation::unexpected}) {
+    Registration alike = looking(0.65, 60.0), unknown;
+    for (Registration* registration : {&alike, &unknown}) {
+      registration->alignment.overlap = 0.4;
+      registration->alignment.residual_ratio = 0.3;
+      registration->consistency.of_target = 0.98;
+    }
+    const Acceptance result = tested_among_colored(alike, expectation);
+    CHECK(result.decision == Decision::accepted);
+    CHECK(result.score ==
+          tested_among_colored(unknown, Expectation::confirmed).score);
+    CHECK(tested_among_colored(unknown, expectation).decision == Decision::rejected);
+    // So are some of few squares by chance, and such as are no more alike than those of other places may be.
+    for (const auto& [agreement, num_squares] : {std::pair{0.65, 20.0}, {0.35, 60.0}}) {
+      alike.consistency.likeness = {agreement, num_squares};
+      CHECK(tested_among_colored(alike, expectation).decision == Decision::rejected);
+    }
+  }
+}
+
+TEST_CASE("looks alone are no pose") {
+  Registration alike = looking(0.65, 60.0);
+  alike.alignment.overlap = 0.03;
+  CHECK(tested_among_colored(alike, Expectation::unexpected).decision == Decision::rejected);
+  alike = looking(0.65, 60.0);
+  alike.alignment.off_planes = 0.0;
+  CHECK(tested_among_colored(alike, Expectation::unexpected).decision == Decision::rejected);
+  alike = looking(0.65, 60.0);
+  alike.alignment.weak_directions = Eigen::Matrix<double, 6, Eigen::Dynamic>::Identity(6, 1);
+  CHECK(tested_among_colored(alike, Expectation::unexpected).decision == Decision::rejected);
+}
+
+TEST_CASE("a place that looks otherwise is none, but near a guess") {
+  const Registration unlike = looking(0.05, 60.0);
+  for (const Expectation expectation : {Expectation::near_lost, Expectation::beside, Expectation::only_near,
+                                        Expectation::confirmed, Expectation::unexpected, Expectation::only_place}) {
+    const Acceptance result = tested_among_colored(unlike, expectation);
+    CHECK(result.decision == Decision::rejected);
+    CHECK(result.reason.find("does not look like the model") != std::string::npos);
+    CHECK_FALSE(PlaceOdds::is_for(result.relocalisation_score));
+    CHECK(tested_among_colored(looking(0.05, 12.0), expectation).decision == Decision::accepted);  // few tell
+    CHECK(tested_among_colored(looking(0.0, 0.0), expectation).decision == Decision::accepted);    // no colours
+  }
+  CHECK(tested_among_colored(unlike, Expectation::expected).decision == Decision::accepted);
+  AcceptanceOptions unknown = colored;
+  unknown.usual->likeness = {};
+  CHECK(accept(unlike.alignment, unlike.consistency, Expectation::unexpected, unknown).decision == Decision::accepted);
+}

@@ -280,8 +280,10 @@ bool PrivateState::is_sound(const ResidualNoise& noise) {
 
 bool PrivateState::is_sound(const UsualConsistency& usual) {
   const auto is_part = [](double value) { return value >= 0.0 && value <= 1.0; };
-  return is_part(usual.mean_.of_target) && is_part(usual.mean_.of_source) && usual.count_ >= 0.0 &&
-         std::isfinite(usual.count_);
+  const auto is_count = [](double value) { return value >= 0.0 && std::isfinite(value); };
+  return is_part(usual.mean_.of_target) && is_part(usual.mean_.of_source) && is_count(usual.count_) &&
+         std::abs(usual.likeness_.agreement) <= 1.0 && is_count(usual.likeness_.num_squares) &&
+         is_count(usual.num_alike_);
 }
 
 // A file is none but one of its own folder's.

@@ -118,7 +118,8 @@ struct PrivateState {
 
   template <class Archive>
   static void exchange(Archive& archive, UsualConsistency& usual) {
-    archive(usual.mean_.of_target, usual.mean_.of_source, usual.count_);
+    archive(usual.mean_.of_target, usual.mean_.of_source, usual.count_, usual.likeness_.agreement,
+            usual.likeness_.num_squares, usual.num_alike_);
   }
 
   template <class Archive>
