@@ -125,7 +125,8 @@ void Pipeline::learn_from_given(const Pose& pose) {
 }
 
 void Pipeline::learn_from(const TrackingResult& tracking) {
-  if (tracking.expectation == Expectation::expected) usual_consistency.add(tracking.consistency);
+  const bool is_far = tracking.expectation == Expectation::unexpected || tracking.is_on_plane;
+  if (!is_far) usual_consistency.add(tracking.consistency);
   if (!learns_noise() || tracking.is_on_plane || (shape && shape->is_bent())) return residual_noise.add(0.0, false);
   residual_noise.add(noise_factor * tracking.alignment.residual_sigmas, tells_noise(tracking));
   set_noise_factor(residual_noise.factor());
