@@ -65,15 +65,18 @@ bool is_other_size(const SizeDifference& size, Expectation expectation) {
   return (is_far || size.sigma <= size_sigma) && std::abs(size.relative) > std::max(other_size, certainty * size.sigma);
 }
 
+bool is_beyond_chance(const Likeness& likeness) {
+  return std::sqrt(likeness.num_squares) * likeness.agreement >= static_cast<double>(base_limits::noise_sigmas);
+}
+
 enum class Looks { unknown, alike, unlike };
 
 // The agreement's standard error is (1 - usual^2) / sqrt(n) where the place is right.
 Looks looks_of(const Likeness& found, const std::optional<Consistency>& usual) {
   if (!usual || usual->likeness.num_squares == 0.0 || found.num_squares == 0.0) return Looks::unknown;
-  const double usually = usual->likeness.agreement, count = std::sqrt(found.num_squares);
-  const double sigmas = static_cast<double>(base_limits::noise_sigmas);
-  const double beyond_chance = count * found.agreement, short_of_usual = count * (usually - found.agreement);
-  if (beyond_chance < sigmas) return short_of_usual >= sigmas ? Looks::unlike : Looks::unknown;
+  const double usually = usual->likeness.agreement, sigmas = static_cast<double>(base_limits::noise_sigmas);
+  const double short_of_usual = std::sqrt(found.num_squares) * (usually - found.agreement);
+  if (!is_beyond_chance(found)) return short_of_usual >= sigmas ? Looks::unlike : Looks::unknown;
   return short_of_usual <= sigmas * (1.0 - usually * usually) ? Looks::alike : Looks::unknown;
 }
 
@@ -136,10 +139,12 @@ Acceptance accept_as(const IcpResult& alignment, const Consistency& consistency,
 
 Acceptance accept(const IcpResult& alignment, const Consistency& consistency, Expectation expectation,
                   const AcceptanceOptions& options) {
+  using registration_limits::least_signal;
   Acceptance acceptance = accept_as(alignment, consistency, expectation, options);
   const Looks looks = options.verify ? looks_of(consistency.likeness, options.usual) : Looks::unknown;
-  if (expectation == Expectation::expected || looks == Looks::unknown) return acceptance;
   if (looks == Looks::unlike) {
+    const bool rests_on_colors = acceptance.decision == Decision::accepted && !(alignment.signal >= least_signal);
+    if (expectation == Expectation::expected && !rests_on_colors) return acceptance;
     if (acceptance.decision != Decision::rejected) {
       std::ostringstream reason;
       reason.precision(2);
@@ -152,7 +157,7 @@ Acceptance accept(const IcpResult& alignment, const Consistency& consistency, Ex
     acceptance.is_clear_cut = false;
     return acceptance;
   }
-  if (acceptance.decision != Decision::rejected) return acceptance;
+  if (looks == Looks::unknown || acceptance.decision != Decision::rejected) return acceptance;
   Acceptance recognised = accept_as(alignment, consistency, Expectation::confirmed, options);
   if (recognised.decision == Decision::accepted) return recognised;
   acceptance.is_hopeless = acceptance.is_hopeless && recognised.is_hopeless;
@@ -187,6 +192,28 @@ SearchAcceptance accept_best(const std::vector<SearchFit>& fits, double min_over
     acceptance.status = acceptance.rivalry <= max_rivalry ? GlobalAlignStatus::found : GlobalAlignStatus::ambiguous;
   }
   return acceptance;
+}
+
+std::vector<std::size_t> accept_rivals(const std::vector<SearchFit>& fits, double min_overlap, double min_consistency,
+                                       double max_rivalry) {
+  const SearchAcceptance accepted = accept_best(fits, min_overlap, min_consistency, max_rivalry);
+  if (accepted.status == GlobalAlignStatus::not_found) return {};
+  std::vector<std::size_t> rivals = {accepted.best};
+  for (std::size_t i = accepted.best + 1; i < fits.size(); ++i) {
+    if (fits[i].is_close && fits[i].score > max_rivalry * fits[accepted.best].score) rivals.push_back(i);
+  }
+  return rivals;
+}
+
+std::optional<std::size_t> only_alike(const std::vector<Likeness>& rivals) {
+  if (rivals.size() == 1) return 0;
+  std::optional<std::size_t> found;
+  for (std::size_t i = 0; i < rivals.size(); ++i) {
+    if (!is_beyond_chance(rivals[i])) continue;
+    if (found) return std::nullopt;
+    found = i;
+  }
+  return found;
 }
 
 }  // namespace nacre

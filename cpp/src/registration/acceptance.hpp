@@ -25,7 +25,7 @@ enum class Expectation {
 
 // How far the brightness of two sides goes together: see tracking/likeness.hpp.
 struct Likeness {
-  double agreement = 0.0;   // at most 1; by chance 0, with a standard deviation of 1 / sqrt(num_squares)
+  double agreement = 0.0;    // at most 1; by chance 0, with a standard deviation of 1 / sqrt(num_squares)
   double num_squares = 0.0;  // of the image, that tell; 0: nothing is known
 };
 
@@ -74,8 +74,8 @@ struct Acceptance {
 // score is the lower, the more of the matches lie on three planes: see share_off_planes.
 //
 // Where the two sides look alike, as the brightness of registered frames and what they fit has done, a place is as good
-// as one that another registration confirms, wherever it is. Where they look no more alike than chance makes them, though
-// registered frames did, it is none: but near a guess.
+// as one that another registration confirms, wherever it is. Where they look no more alike than chance makes them,
+// though registered frames did, it is none: but near a guess.
 //
 // What is left out, since it moves, tells nothing: both scores count as much as is left.
 //
@@ -131,5 +131,12 @@ struct SearchAcceptance {
 // comes near it: all places have been compared.
 SearchAcceptance accept_best(const std::vector<SearchFit>& fits, double min_overlap, double min_consistency,
                              double max_rivalry);
+
+// The same, and where others come near the best one these, too: each of which would be believed without the others.
+std::vector<std::size_t> accept_rivals(const std::vector<SearchFit>& fits, double min_overlap, double min_consistency,
+                                       double max_rivalry);
+
+// Of rivals the only one that looks more alike than chance makes it; a single fit needs not.
+std::optional<std::size_t> only_alike(const std::vector<Likeness>& rivals);
 
 }  // namespace nacre

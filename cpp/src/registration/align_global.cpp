@@ -66,10 +66,14 @@ GlobalAcceptance accept_motion(const std::vector<SearchCandidate>& candidates, c
   const SearchAcceptance accepted =
       accept_best(fits, options.min_overlap, options.min_consistency, options.max_rivalry);
   const SearchFit& fit = fits[accepted.best];
-  GlobalAcceptance acceptance{accepted.status, candidates[accepted.best], fit.overlap, fit.consistency,
-                              accepted.rivalry};
+  GlobalAcceptance acceptance{accepted.status, candidates[accepted.best], fit.overlap,
+                              fit.consistency, accepted.rivalry,          {}};
   const bool is_open = acceptance.best.alignment.weak_directions.cols() > 0;
   if (acceptance.status == GlobalAlignStatus::found && is_open) acceptance.status = GlobalAlignStatus::ambiguous;
+  if (is_open) return acceptance;
+  for (const std::size_t i : accept_rivals(fits, options.min_overlap, options.min_consistency, options.max_rivalry)) {
+    acceptance.rivals.push_back(candidates[i].alignment.target_from_source);
+  }
   return acceptance;
 }
 

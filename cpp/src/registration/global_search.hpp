@@ -61,6 +61,7 @@ struct GlobalAcceptance {
   GlobalAlignStatus status;
   SearchCandidate best;
   double overlap, consistency, rivalry;  // see GlobalAlignResult
+  std::vector<Pose> rivals;              // the best one, and others that are believed as well as it is
 };
 GlobalAcceptance accept_motion(const std::vector<SearchCandidate>& candidates, const GlobalAlignOptions& options,
                                double tolerance);

@@ -44,7 +44,7 @@ TrackingResult FrameRegistration::from(const Pose& start, const Pose& guess, Gat
 
 TrackingResult FrameRegistration::whole_from(const Pose& start, const Pose& guess, Gate gate,
                                              Expectation expectation) const {
-  return registered({source_, in_view(start), 0.0}, start, guess, gate, expectation);
+  return registered({source_, in_view(start), 0.0, in_view(start)}, start, guess, gate, expectation);
 }
 
 TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
@@ -275,6 +275,16 @@ void FrameRegistration::determine_open_directions(const Pairing& pairing,
   }
 }
 
+Likeness FrameRegistration::likeness_at(const Pose& world_from_camera) const {
+  return likeness_in(in_view(world_from_camera), world_from_camera);
+}
+
+Likeness FrameRegistration::likeness_in(const PointsInView& model, const Pose& world_from_camera) const {
+  const double pixels = static_cast<double>(now_.frame.valid.size()) / tracking_limits::likeness_squares;
+  return likeness(model, now_.view, world_from_camera, now_.camera, {camera_limits::surface_spacings * target_.spacing},
+                  static_cast<int>(std::ceil(std::sqrt(pixels))));
+}
+
 // 0 where too few of the model's points are seen: then nothing is known.
 Consistency FrameRegistration::consistency(const Surfaces& surfaces, const Pose& world_from_camera) const {
   const VisibilityMargin margin = {camera_limits::surface_spacings * target_.spacing};
@@ -291,7 +301,7 @@ Consistency FrameRegistration::consistency(const Surfaces& surfaces, const Pose&
           part_or(compare(samples.points, samples.normals, last, world_from_camera.inverse() * last.world_from_camera,
                           now_.camera, margin, options_.num_threads, take_rows<Values>(noise_, samples.rows)),
                   1.0),
-          likeness(model, now_.view, world_from_camera, now_.camera, margin)};
+          likeness_in(surfaces.whole, world_from_camera)};
 }
 
 const OutlinePair& FrameRegistration::outlines() const {

@@ -78,6 +78,8 @@ class FrameRegistration {
   std::vector<Pose> beside(const Pose& world_from_camera) const;
   // Where keypoints of the last view say that the camera is; nothing where too few match.
   std::optional<Pose> by_keypoints() const;
+  // How alike frame and model look from there.
+  Likeness likeness_at(const Pose& world_from_camera) const;
   // Whether what was found from a guess is nearer to one beside it, and nothing rules those out.
   bool may_be_beside(const TrackingResult& found, const Pose& guess) const;
 
@@ -88,7 +90,8 @@ class FrameRegistration {
   struct Surfaces {
     const IcpSource& samples;
     const PointsInView& view;
-    double moving;  // part that is left out
+    double moving;              // part that is left out
+    const PointsInView& whole;  // the view, with what is left out: that may be what looks otherwise
   };
   // Both, ready to be matched.
   struct Pairing {
@@ -132,6 +135,7 @@ class FrameRegistration {
   void determine_open_directions(const Pairing& pairing, const std::optional<ColorRegistration>& colors,
                                  IcpResult& result) const;
   Consistency consistency(const Surfaces& surfaces, const Pose& world_from_camera) const;
+  Likeness likeness_in(const PointsInView& model, const Pose& world_from_camera) const;
   const OutlinePair& outlines() const;
 
   CurrentFrame now_;

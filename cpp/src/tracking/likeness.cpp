@@ -32,9 +32,8 @@ class Moments {
 }  // namespace
 
 Likeness likeness(const PointsInView& model, const DepthView& view, const Pose& world_from_camera, const Camera& camera,
-                  const VisibilityMargin& margin) {
+                  const VisibilityMargin& margin, int side) {
   if (model.brightness.size() == 0 || view.brightness.empty()) return {};
-  const int side = std::max(1, camera.width() / tracking_limits::likeness_squares);
   const int across = camera.width() / side + 1, down = camera.height() / side + 1;
   std::vector<Moments> squares(static_cast<std::size_t>(across) * static_cast<std::size_t>(down));
   const auto look = [&](Eigen::Index point, const PointProjection::Block& block, int i) {

@@ -41,7 +41,7 @@ constexpr int most_climb_rounds = 8;  // [rounds] budget: with steps of one leng
 constexpr double climb_lever = 3.0;  // [1/size] derived: turns by what shifts a point at a third of the size as far; dog
 constexpr double least_view_overlap = 0.1;  // [1] tuned: with the view that agrees most; dog
 constexpr double least_view_consistency = 0.75;  // [1] tuned: with all views; dog
-constexpr int likeness_squares = 12;  // [1] tuned: across the image, within which brightness is compared; test_likeness
+constexpr double likeness_squares = 100.0;  // [squares] tuned: of what a frame shows, within which brightness is compared; test_likeness
 constexpr int least_in_square = 8;  // [points] derived: that tell a correlation to 1 / sqrt(8); test_likeness
 
 constexpr double even_odds = 0.092;  // [1] tuned: score of a registration that is right or wrong with the same probability; test_probability

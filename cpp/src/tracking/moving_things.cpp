@@ -19,8 +19,8 @@ TrackingResult FrameRegistration::without_moving(const TrackingResult& whole, co
   for (const Pose& pose : {guess, whole.alignment.target_from_source}) {
     const auto still = still_at(pose, view);
     if (!still) continue;
-    const TrackingResult found =
-        registered({still->samples, view.part(still->points), still->moving}, pose, guess, Gate::narrow, expectation);
+    const TrackingResult found = registered({still->samples, view.part(still->points), still->moving, view}, pose,
+                                            guess, Gate::narrow, expectation);
     const bool is_better = best.is_lost()
                                ? found.rank() > best.rank()
                                : !found.is_lost() && fit(best) < tracking_limits::clearly_better * fit(found);
@@ -52,8 +52,8 @@ TrackingResult FrameRegistration::without_pulling(const TrackingResult& found, c
     const ConflictZones zones(conflicts, pose.translation());
     const auto still = zones.empty() ? std::nullopt : far_from(zones, pose, view);
     if (!still) return found;
-    other =
-        registered({still->samples, view.part(still->points), still->moving}, guess, guess, Gate::narrow, expectation);
+    other = registered({still->samples, view.part(still->points), still->moving, view}, guess, guess, Gate::narrow,
+                       expectation);
     conflicts = conflicts_at(other.alignment.target_from_source, view);
   }
   if (other.is_lost() || other.expectation != expectation) return found;

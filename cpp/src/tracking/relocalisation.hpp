@@ -14,8 +14,8 @@ namespace nacre {
 std::vector<Pose> most_promising(const AlignCloud& model, const IcpSource& source, const std::vector<Pose>& guesses,
                                  const AlignOptions& options);
 
-// Where a frame fits the model, wherever the camera is: none where it fits nowhere, or in several places about as well.
-// `source` holds points of the frame. Takes some tenths of a second.
-std::optional<Pose> fit_anywhere(const PointModel& model, const IcpSource& source, const AlignOptions& options);
+// Where a frame fits the model, wherever the camera is: nowhere, or in several places about as well. `source` holds
+// points of the frame. Takes some tenths of a second.
+std::vector<Pose> fits_anywhere(const PointModel& model, const IcpSource& source, const AlignOptions& options);
 
 }  // namespace nacre

@@ -64,21 +64,33 @@ void try_guesses(const FrameRegistration& registration, TrackingPrior& prior, Tr
   }
 }
 
+// Of places where a frame fits the model as well, the only one where it looks like it.
+std::optional<TrackingResult> only_alike(const std::vector<TrackingResult>& places) {
+  std::vector<Likeness> looks;
+  for (const TrackingResult& place : places) looks.push_back(place.consistency.likeness);
+  const auto found = only_alike(looks);
+  return found ? std::optional(places[*found]) : std::nullopt;
+}
+
 // An object that turned on its plane. The search has compared all places.
-std::optional<TrackingResult> turned_on_plane(const TrackingTarget& target, const CurrentFrame& now,
-                                              const RelocalisationPlaces& places, const TrackingOptions& options) {
+std::optional<TrackingResult> turned_on_plane(const FrameRegistration& registration, const TrackingTarget& target,
+                                              const CurrentFrame& now, const RelocalisationPlaces& places,
+                                              const TrackingOptions& options) {
   if (places.views == nullptr || places.views->empty()) return std::nullopt;
   const std::optional<ObjectView> view = places.view_of_frame();
-  const auto fit =
-      view ? fit_on_plane(target.model, *places.views, *view, now.camera, options.registration) : std::nullopt;
-  if (!fit) return std::nullopt;
-  TrackingResult result;
-  result.alignment = fit->alignment;
-  result.consistency.of_target = fit->consistency;
-  result.expectation = Expectation::only_place;
-  result.test(options, target.usual);
-  result.is_to_whole_model = result.is_on_plane = true;
-  return result;
+  if (!view) return std::nullopt;
+  std::vector<TrackingResult> found;
+  for (const PlaneFit& fit : fits_on_plane(target.model, *places.views, *view, now.camera, options.registration)) {
+    TrackingResult result;
+    result.alignment = fit.alignment;
+    result.consistency.of_target = fit.consistency;
+    result.consistency.likeness = registration.likeness_at(fit.alignment.target_from_source);
+    result.expectation = Expectation::only_place;
+    result.test(options, target.usual);
+    result.is_to_whole_model = result.is_on_plane = true;
+    found.push_back(std::move(result));
+  }
+  return only_alike(found);
 }
 
 // The place that fits best of those that were found with less noise.
@@ -235,7 +247,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
 
   registration.include_older_points();
   const RelocalisationPlaces& places = prior.elsewhere;
-  if (const auto turned = turned_on_plane(target, now, places, options)) return *turned;
+  if (const auto turned = turned_on_plane(registration, target, now, places, options)) return *turned;
   // Where nobody saw the camera go, it may have been carried away: to a place that speaks for itself.
   const auto keep_if_possible = [&](TrackingResult found) {
     const bool is_sure = found.decision == Decision::accepted && !odometry.is_seen();
@@ -252,8 +264,11 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     keep_if_possible(around_key_poses(registration, target.model, prior, options));
   }
   if (best.is_lost() && !goes_on && places.everywhere) {
-    const std::optional<Pose> pose = fit_anywhere(target.model, source, options.registration);
-    if (pose) keep_if_possible(found_at(*pose, registration, prior));
+    std::vector<TrackingResult> found;
+    for (const Pose& place : fits_anywhere(target.model, source, options.registration)) {
+      found.push_back(found_at(place, registration, prior));
+    }
+    if (const auto only = only_alike(found)) keep_if_possible(*only);
   }
   best.is_to_whole_model = true;
   if (best.is_lost() && options.relocalise && options.verify && hypothesis.add(best, prior.depth)) {

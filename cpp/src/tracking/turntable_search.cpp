@@ -179,9 +179,9 @@ class TurntableSearch {
 
 }  // namespace
 
-std::optional<PlaneFit> fit_on_plane(const PointModel& model, const std::vector<ObjectView>& views,
-                                     const ObjectView& frame, const Camera& camera, const AlignOptions& options) {
-  if (model.size() == 0 || views.empty()) return std::nullopt;
+std::vector<PlaneFit> fits_on_plane(const PointModel& model, const std::vector<ObjectView>& views,
+                                    const ObjectView& frame, const Camera& camera, const AlignOptions& options) {
+  if (model.size() == 0 || views.empty()) return {};
   const TurntableSearch search(model, views, frame, camera, options);
   const std::vector<Candidate> candidates = search.run();
   std::vector<SearchFit> fits;
@@ -189,16 +189,15 @@ std::optional<PlaneFit> fit_on_plane(const PointModel& model, const std::vector<
   for (const Candidate& candidate : candidates) {
     fits.push_back({candidate.score, candidate.overlap, candidate.agree / (candidate.agree + candidate.through), true});
   }
+  std::vector<PlaneFit> found;
   // A rival that is not contradicted is enough for doubt.
-  const SearchAcceptance accepted =
-      accept_best(fits, tracking_limits::least_view_overlap, tracking_limits::least_view_consistency, 0.0);
-  if (accepted.status != GlobalAlignStatus::found) return std::nullopt;
-  const Candidate& best = candidates[accepted.best];
-  PlaneFit fit;
-  fit.consistency = fits[accepted.best].consistency;
-  fit.alignment = search.settle(best);
-  fit.alignment.target_from_source = orthonormal(fit.alignment.target_from_source);
-  return fit;
+  for (const std::size_t i :
+       accept_rivals(fits, tracking_limits::least_view_overlap, tracking_limits::least_view_consistency, 0.0)) {
+    found.push_back({search.settle(candidates[i]), fits[i].consistency});
+    Pose& pose = found.back().alignment.target_from_source;
+    pose = orthonormal(pose);
+  }
+  return found;
 }
 
 }  // namespace nacre

@@ -2,7 +2,6 @@
 // are seen in every view: of the six unknowns three are left, the angle and the place on the plane.
 #pragma once
 
-#include <optional>
 #include <vector>
 
 #include "nacre/fusion.hpp"
@@ -16,8 +15,8 @@ struct PlaneFit {
   double consistency = 0.0;  // with the views: what agrees, of that and what they see through
 };
 
-// The best motion that keeps the plane: none where the frame fits nowhere, or in several places about as well.
-std::optional<PlaneFit> fit_on_plane(const PointModel& model, const std::vector<ObjectView>& views,
-                                     const ObjectView& frame, const Camera& camera, const AlignOptions& options);
+// The best motion that keeps the plane, or several where the frame fits as well; none where it fits nowhere.
+std::vector<PlaneFit> fits_on_plane(const PointModel& model, const std::vector<ObjectView>& views,
+                                    const ObjectView& frame, const Camera& camera, const AlignOptions& options);
 
 }  // namespace nacre

@@ -297,8 +297,7 @@ TEST_CASE("of a place that looks as registered frames do as little is asked as w
     }
     const Acceptance result = tested_among_colored(alike, expectation);
     CHECK(result.decision == Decision::accepted);
-    CHECK(result.score ==
-          tested_among_colored(unknown, Expectation::confirmed).score);
+    CHECK(result.score == tested_among_colored(unknown, Expectation::confirmed).score);
     CHECK(tested_among_colored(unknown, expectation).decision == Decision::rejected);
     // So are some of few squares by chance, and such as are no more alike than those of other places may be.
     for (const auto& [agreement, num_squares] : {std::pair{0.65, 20.0}, {0.35, 60.0}}) {
@@ -331,8 +330,34 @@ TEST_CASE("a place that looks otherwise is none, but near a guess") {
     CHECK(tested_among_colored(looking(0.05, 12.0), expectation).decision == Decision::accepted);  // few tell
     CHECK(tested_among_colored(looking(0.0, 0.0), expectation).decision == Decision::accepted);    // no colours
   }
+  // Light may have changed; but where noise tells more than shape does, the pose rests on colours.
   CHECK(tested_among_colored(unlike, Expectation::expected).decision == Decision::accepted);
+  Registration open = unlike;
+  open.alignment.signal = 0.5;
+  CHECK(tested_among_colored(open, Expectation::expected).decision == Decision::rejected);
+  open.alignment.weak_directions = Eigen::Matrix<double, 6, Eigen::Dynamic>::Identity(6, 1);
+  CHECK(tested_among_colored(open, Expectation::expected).decision == Decision::undetermined);
   AcceptanceOptions unknown = colored;
   unknown.usual->likeness = {};
   CHECK(accept(unlike.alignment, unlike.consistency, Expectation::unexpected, unknown).decision == Decision::accepted);
+}
+
+TEST_CASE("of rivals the only one that looks alike is right") {
+  const Likeness alike{0.7, 60.0}, by_chance{0.3, 60.0}, too_few{0.9, 12.0};
+  CHECK(only_alike({by_chance}) == 0);
+  CHECK(only_alike({by_chance, alike, too_few}) == 1);
+  CHECK(only_alike({alike, by_chance, alike}) == std::nullopt);
+  CHECK(only_alike({by_chance, too_few}) == std::nullopt);
+  CHECK(only_alike({}) == std::nullopt);
+}
+
+TEST_CASE("rivals are those that come near the best fit, where that is believed") {
+  using Rivals = std::vector<std::size_t>;
+  const SearchFit best{1.0, 0.5, 0.9, true}, near{0.8, 0.1, 0.5, true}, far{0.5, 0.5, 0.9, true},
+      coarse{0.9, 0.5, 0.9, false};
+  CHECK(accept_rivals({best, coarse, near, far}, 0.2, 0.7, 0.7) == Rivals{0, 2});
+  CHECK(accept_rivals({best, coarse, far}, 0.2, 0.7, 0.7) == Rivals{0});
+  CHECK(accept_rivals({coarse, best}, 0.2, 0.7, 0.7) == Rivals{1});
+  CHECK(accept_rivals({near, far}, 0.2, 0.7, 0.7) == Rivals{});
+  CHECK(accept_rivals({}, 0.2, 0.7, 0.7) == Rivals{});
 }

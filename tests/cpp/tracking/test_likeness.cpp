@@ -29,12 +29,13 @@ Likeness of_wall(OfModel&& of_model, OfView&& of_view, double wall = 2.0) {
       view.brightness.push_back(static_cast<std::uint8_t>(of_view(u, v)));
     }
   }
-  return likeness(model, view, Pose::Identity(), pinhole, {0.01});
+  return likeness(model, view, Pose::Identity(), pinhole, {0.01}, 10);
 }
 
 // Paint in 0 to 127.
 int paint(int u, int v, std::uint64_t seed = 0) {
-  return static_cast<int>(random_bits(seed, static_cast<std::uint64_t>(v) * width + static_cast<std::uint64_t>(u)) % 128);
+  return static_cast<int>(random_bits(seed, static_cast<std::uint64_t>(v) * width + static_cast<std::uint64_t>(u)) %
+                          128);
 }
 const auto paint_of_model = [](int u, int v) { return paint(u, v); };
 const auto other_paint = [](int u, int v) { return paint(u, v, 1); };
@@ -57,8 +58,9 @@ TEST_CASE("other paint agrees by chance alone, and its negative disagrees") {
 TEST_CASE("where nothing is known nothing is said") {
   const auto unknown = [](int, int) { return std::nanf(""); };
   const auto plain = [](int, int) { return 100; };
-  CHECK(of_wall(unknown, paint_of_model).num_squares == 0.0);        // points without colours
-  CHECK(of_wall(plain, plain).num_squares == 0.0);                   // no texture
+  CHECK(of_wall(unknown, paint_of_model).num_squares == 0.0);           // points without colours
+  CHECK(of_wall(plain, plain).num_squares == 0.0);                      // no texture
   CHECK(of_wall(paint_of_model, other_paint, 1.5).num_squares == 0.0);  // the model is elsewhere
-  CHECK(likeness({Points(0, 3), Points(0, 3), Values()}, DepthView(), Pose::Identity(), pinhole, {}).num_squares == 0.0);
+  CHECK(likeness({Points(0, 3), Points(0, 3), Values()}, DepthView(), Pose::Identity(), pinhole, {}, 10).num_squares ==
+        0.0);
 }
