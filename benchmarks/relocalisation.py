@@ -1,6 +1,6 @@
 #!/usr/bin/env python
 """
-Show a model of a part of a recording single frames of the rest of it, and hold what it says against the truth.
+Show the model of a part of a recording single frames of the rest, and hold what it says against the truth.
 
 For each recording, with its colours and without them: of so many frames how many are found, right (within 6 %
 of the median depth and 4 degrees, since parts drift) and wrong. Frames that show nothing of the part are
@@ -47,16 +47,15 @@ def shown_to(case: cases.Case, start: int, count: int, step: int) -> Counter[str
     model = nacre.Model(case.camera, num_threads=1)
     for i in range(start, start + count):
         model.add_frame(case.depths[i], color=case.colors[i])
-    known = [
-        report
-        for report in model.frames
-        if report.status in FOUND and case.truths[start + report.index] is not None
-    ]
+    world = []  # of the model in that of the truths, by each registered frame; parts drift: the newest tells
+    for report in model.frames:
+        truth = case.truths[start + report.index]
+        if report.status in FOUND and truth is not None:
+            world.append(truth @ np.linalg.inv(report.world_from_camera))
     found: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         part = Path(folder) / "part.nacre"
         model.save(part)
-        newest = case.truths[start + known[-1].index]
         for i in range(0, len(case.depths), step):
             truth = case.truths[i]
             if start <= i < start + count or truth is None:
@@ -65,8 +64,7 @@ def shown_to(case: cases.Case, start: int, count: int, step: int) -> Counter[str
             found["shown"] += 1
             if report.status not in FOUND:
                 continue
-            motion = np.linalg.inv(known[-1].world_from_camera) @ report.world_from_camera
-            off = np.linalg.inv(np.linalg.inv(newest) @ truth) @ motion
+            off = np.linalg.inv(truth) @ world[-1] @ report.world_from_camera
             depth = np.median(case.depths[i][case.depths[i] > 0])
             is_right = np.linalg.norm(off[:3, 3]) < LARGEST_SHIFT * depth
             is_right &= cases.angle_between(np.eye(3), off[:3, :3]) < LARGEST_TURN
@@ -88,14 +86,17 @@ def jobs_of(names: Iterable[str]) -> list[tuple[str, bool, int]]:
     """Return all that is to be run; with colours where there are some."""
     jobs = []
     for name in names:
-        kinds = (True, False) if any(color is not None for color in cases.make(name, most=2).colors) else (False,)
+        is_colored = cases.make(name, most=1).colors[0] is not None
+        kinds = (True, False) if is_colored else (False,)
         jobs += [(name, has_colors, start) for has_colors in kinds for start in PARTS[name][0]]
     return jobs
 
 
 def main() -> None:
     """Print a table of the recordings that are named, or of all."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("names", nargs="*", default=list(PARTS), help=f"of {', '.join(PARTS)}")
     names = parser.parse_args().names
     found: dict[tuple[str, bool], Counter[str]] = {}

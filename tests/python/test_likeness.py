@@ -1,4 +1,4 @@
-"""A wall whose relief repeats and whose paint does not: what shape takes for the same place looks otherwise."""
+"""A wall whose relief repeats and whose paint does not: what shape takes for one place looks otherwise."""
 
 import functools
 
@@ -15,7 +15,7 @@ NUM_FRAMES = 12
 
 @functools.cache
 def wall() -> nacre.Mesh:
-    """Return a wall of bumps, 1 m before cameras that look along z; after so many vertices all comes again."""
+    """Return a wall of bumps, 1 m before cameras that look along z; after a period all comes again."""
     random = np.random.default_rng(3)
     bumps = np.tile(0.1 * random.uniform(-1, 1, (PERIOD, PERIOD)), (1, 3))
     rows, columns = bumps.shape
