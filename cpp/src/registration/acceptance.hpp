@@ -75,7 +75,7 @@ struct Acceptance {
 //
 // Where the two sides look alike, as the brightness of registered frames and what they fit has done, a place is as good
 // as one that another registration confirms, wherever it is. Where they look no more alike than chance makes them,
-// though registered frames did, it is none: but near a guess.
+// though registered frames did, it is none: but near a guess, unless noise tells more there than the shapes do.
 //
 // What is left out, since it moves, tells nothing: both scores count as much as is left.
 //

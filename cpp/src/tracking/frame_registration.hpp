@@ -78,7 +78,8 @@ class FrameRegistration {
   std::vector<Pose> beside(const Pose& world_from_camera) const;
   // Where keypoints of the last view say that the camera is; nothing where too few match.
   std::optional<Pose> by_keypoints() const;
-  // How alike frame and model look from there.
+  // Whether frame and model have colours, and how alike they look from a place.
+  bool has_colors() const { return !now_.view.brightness.empty() && !target_.model.colors.empty(); }
   Likeness likeness_at(const Pose& world_from_camera) const;
   // Whether what was found from a guess is nearer to one beside it, and nothing rules those out.
   bool may_be_beside(const TrackingResult& found, const Pose& guess) const;

@@ -45,7 +45,8 @@ std::vector<Pose> most_promising(const AlignCloud& model, const IcpSource& sourc
   return best;
 }
 
-std::vector<Pose> fits_anywhere(const PointModel& model, const IcpSource& source, const AlignOptions& options) {
+std::vector<Pose> fits_anywhere(const PointModel& model, const IcpSource& source, const AlignOptions& options,
+                                bool with_rivals) {
   GlobalAlignOptions search_options;
   search_options.seed = options.seed;
   search_options.num_threads = options.num_threads;
@@ -54,7 +55,8 @@ std::vector<Pose> fits_anywhere(const PointModel& model, const IcpSource& source
   const SearchSide moving(frame, search_options, false), still(whole, search_options, false);
   if (!is_enough(moving) || !is_enough(still)) return {};
   const GlobalSearch search(moving, still, search_options);
-  return accept_motion(search.run(), search_options, search.tolerance()).rivals;
+  const GlobalAcceptance acceptance = accept_motion(search.run(), search_options, search.tolerance());
+  return with_rivals || acceptance.status == GlobalAlignStatus::found ? acceptance.rivals : std::vector<Pose>();
 }
 
 }  // namespace nacre

@@ -14,8 +14,9 @@ namespace nacre {
 std::vector<Pose> most_promising(const AlignCloud& model, const IcpSource& source, const std::vector<Pose>& guesses,
                                  const AlignOptions& options);
 
-// Where a frame fits the model, wherever the camera is: nowhere, or in several places about as well. `source` holds
-// points of the frame. Takes some tenths of a second.
-std::vector<Pose> fits_anywhere(const PointModel& model, const IcpSource& source, const AlignOptions& options);
+// Where a frame fits the model, wherever the camera is: in one place, or none; with rivals also where it fits in
+// several about as well. `source` holds points of the frame. Takes some tenths of a second.
+std::vector<Pose> fits_anywhere(const PointModel& model, const IcpSource& source, const AlignOptions& options,
+                                bool with_rivals);
 
 }  // namespace nacre

@@ -79,8 +79,10 @@ std::optional<TrackingResult> turned_on_plane(const FrameRegistration& registrat
   if (places.views == nullptr || places.views->empty()) return std::nullopt;
   const std::optional<ObjectView> view = places.view_of_frame();
   if (!view) return std::nullopt;
+  const std::vector<PlaneFit> fits =
+      fits_on_plane(target.model, *places.views, *view, now.camera, options.registration, registration.has_colors());
   std::vector<TrackingResult> found;
-  for (const PlaneFit& fit : fits_on_plane(target.model, *places.views, *view, now.camera, options.registration)) {
+  for (const PlaneFit& fit : fits) {
     TrackingResult result;
     result.alignment = fit.alignment;
     result.consistency.of_target = fit.consistency;
@@ -247,7 +249,8 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
 
   registration.include_older_points();
   const RelocalisationPlaces& places = prior.elsewhere;
-  if (const auto turned = turned_on_plane(registration, target, now, places, options)) return *turned;
+  const auto turned = turned_on_plane(registration, target, now, places, options);
+  if (turned && !turned->is_lost()) return *turned;
   // Where nobody saw the camera go, it may have been carried away: to a place that speaks for itself.
   const auto keep_if_possible = [&](TrackingResult found) {
     const bool is_sure = found.decision == Decision::accepted && !odometry.is_seen();
@@ -264,10 +267,9 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     keep_if_possible(around_key_poses(registration, target.model, prior, options));
   }
   if (best.is_lost() && !goes_on && places.everywhere) {
+    const std::vector<Pose> fits = fits_anywhere(target.model, source, options.registration, registration.has_colors());
     std::vector<TrackingResult> found;
-    for (const Pose& place : fits_anywhere(target.model, source, options.registration)) {
-      found.push_back(found_at(place, registration, prior));
-    }
+    for (const Pose& place : fits) found.push_back(found_at(place, registration, prior));
     if (const auto only = only_alike(found)) keep_if_possible(*only);
   }
   best.is_to_whole_model = true;

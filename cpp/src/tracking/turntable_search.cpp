@@ -180,7 +180,8 @@ class TurntableSearch {
 }  // namespace
 
 std::vector<PlaneFit> fits_on_plane(const PointModel& model, const std::vector<ObjectView>& views,
-                                    const ObjectView& frame, const Camera& camera, const AlignOptions& options) {
+                                    const ObjectView& frame, const Camera& camera, const AlignOptions& options,
+                                    bool with_rivals) {
   if (model.size() == 0 || views.empty()) return {};
   const TurntableSearch search(model, views, frame, camera, options);
   const std::vector<Candidate> candidates = search.run();
@@ -189,10 +190,12 @@ std::vector<PlaneFit> fits_on_plane(const PointModel& model, const std::vector<O
   for (const Candidate& candidate : candidates) {
     fits.push_back({candidate.score, candidate.overlap, candidate.agree / (candidate.agree + candidate.through), true});
   }
-  std::vector<PlaneFit> found;
   // A rival that is not contradicted is enough for doubt.
-  for (const std::size_t i :
-       accept_rivals(fits, tracking_limits::least_view_overlap, tracking_limits::least_view_consistency, 0.0)) {
+  const std::vector<std::size_t> accepted =
+      accept_rivals(fits, tracking_limits::least_view_overlap, tracking_limits::least_view_consistency, 0.0);
+  if (accepted.size() > 1 && !with_rivals) return {};
+  std::vector<PlaneFit> found;
+  for (const std::size_t i : accepted) {
     found.push_back({search.settle(candidates[i]), fits[i].consistency});
     Pose& pose = found.back().alignment.target_from_source;
     pose = orthonormal(pose);

@@ -15,8 +15,9 @@ struct PlaneFit {
   double consistency = 0.0;  // with the views: what agrees, of that and what they see through
 };
 
-// The best motion that keeps the plane, or several where the frame fits as well; none where it fits nowhere.
+// The best motion that keeps the plane, or none; with rivals also where the frame fits in several places.
 std::vector<PlaneFit> fits_on_plane(const PointModel& model, const std::vector<ObjectView>& views,
-                                    const ObjectView& frame, const Camera& camera, const AlignOptions& options);
+                                    const ObjectView& frame, const Camera& camera, const AlignOptions& options,
+                                    bool with_rivals);
 
 }  // namespace nacre
