@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from cases import angle_between
 from simulated import box, merged, turn_about_y
 from turned_on_plane import camera_pose
 
@@ -31,6 +32,8 @@ SQUARE = 0.012
 """[m] Of the paint."""
 NEAR, NUM_NEAR, NUM_FAR = 5.0, 8, 4
 FAR = (30.0, 45.0, 60.0, 90.0)
+LARGEST_TURN = 5.0
+"""[degrees]"""
 SENSORS = ("stereo", "structured_light")
 
 
@@ -83,8 +86,7 @@ def run(job: tuple[str, float, str, bool]) -> tuple[str, bool, Counter[str]]:
         if i < NUM_NEAR or report.status not in ("TRACKED", "RELOCALISED"):
             continue
         off = np.linalg.inv(world) @ turn @ world @ report.world_from_camera  # the identity where it is right
-        is_right = (np.trace(off[:3, :3]) - 1) / 2 > math.cos(math.radians(5))
-        found["right" if is_right else "wrong"] += 1
+        found["right" if angle_between(np.eye(3), off[:3, :3]) < LARGEST_TURN else "wrong"] += 1
     return name, is_colored, found
 
 
