@@ -109,7 +109,7 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
 
     Main is what most frames saw and many observations confirm; specks and far walls have no say. Without
     cameras it is seen as its file says, or else from the side to which it faces; a survey from the south, at
-    45 degrees.
+    45 degrees. What no camera had in view as a whole, and is low and wide, is seen from above.
     """
     if timeline.view is not None and _shows(timeline.view, cloud.points):
         return timeline.view
@@ -121,7 +121,7 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
         sign = 1 if timeline.is_upright else -1
         core = _main_part(few, np.ones(len(few.points)))
         toward = _in_front(_mean_normal(cloud), sign * _FORWARD, sign * _DOWN)
-        return _view(few.points, core, toward, sign * _DOWN)
+        return _not_a_sliver(_view(few.points, core, toward, sign * _DOWN), few.points, core)
     poses = _poses(timeline, places)
     shapes = [few.at(i) for i in places]
     views = zip(poses, shapes, strict=True)
@@ -133,7 +133,9 @@ def first_view(cloud: Snapshot, timeline: Timeline, place: int) -> View:
         points, core = np.concatenate([shape.points for shape in shapes]), np.tile(core, len(shapes))
     target = np.median(points[core], axis=0)
     toward = best[:3, 3] - target if timeline.camera.model == "pinhole" else -best[:3, 2]
-    return _view(points, core, toward, -poses[:, :3, 1].mean(axis=0))
+    view = _view(points, core, toward, -poses[:, :3, 1].mean(axis=0))
+    had_in_view = _in_image(timeline.camera, (points - best[:3, 3]) @ best[:3, :3]).mean()
+    return view if had_in_view > _WHOLE else _not_a_sliver(view, points, core)
 
 
 def _shows(view: View, points: npt.NDArray[np.float32]) -> bool:
@@ -145,6 +147,8 @@ _DOWN, _FORWARD = np.array([0.0, 1, 0]), np.array([0.0, 0, 1])
 _SKY, _OBLIQUE = np.array([0.0, 0, 1]), np.array([0.0, -1, 1])  # of surveys
 _CLOSED = 0.05  # of the mean normal: a surface of a shorter one faces nowhere
 _RAISED, _STEEP, _STEEPEST = np.radians([15, 30, 60])
+_WHOLE = 0.5  # of the points
+_LOW, _FULLER = 0.4, 1.5  # of a picture's height by its width; by which that must grow
 _ROWS_AT_ONCE = 1 << 18  # for the sake of memory
 
 
@@ -203,6 +207,23 @@ def _view(points: npt.NDArray[np.float32], core: npt.NDArray[np.bool_], toward: 
     shown = (points[distances <= radius] - middle) @ across.T
     target = middle + np.quantile(shown, (0.02, 0.98), axis=0).mean(axis=0) @ across
     return View(target, direction, upward, max(float(radius), 1e-6))
+
+
+def _not_a_sliver(view: View, points: npt.NDArray[np.float32], core: npt.NDArray[np.bool_]) -> View:
+    """Return a view of low and wide points, as of a flat, from 45 degrees above, where that shows more."""
+    level = view.direction - (view.direction @ view.up) * view.up
+    above = _view(points, core, _unit(level, -_FORWARD) + view.up, view.up)
+    low = _height_by_width(view, points)
+    return above if low < _LOW and _height_by_width(above, points) > _FULLER * low else view
+
+
+def _height_by_width(view: View, points: npt.NDArray[np.float32]) -> float:
+    """Return how high the points of a view are in the picture, by how wide."""
+    right = np.cross(view.up, view.direction)
+    shown = points[np.linalg.norm(points - view.target, axis=1) <= view.radius] - view.target
+    across = np.stack([_unit(right, _DOWN), np.cross(view.direction, _unit(right, _DOWN))])
+    width, height = np.ptp(np.quantile(shown @ across.T, (0.02, 0.98), axis=0), axis=0)
+    return float(height / max(width, 1e-9))
 
 
 def _unit(vector: Array, otherwise: Array) -> Array:

@@ -154,6 +154,45 @@ def test_a_mesh_of_no_area_is_seen_as_ever() -> None:
         assert seen_from(replace(sheet((1, 0, 0)), triangles=triangles)) == (0, 0)
 
 
+def flat(depth: float) -> Snapshot:
+    """Return a wall 6 m wide and 1 m high, and a floor before it, so deep."""
+    x = np.linspace(-3, 3, 121)
+    wall = [(a, b, 0) for a in x for b in np.linspace(0, 1, 21)]
+    floor = [(a, 1, -b) for a in x for b in np.linspace(0, depth, int(depth / 0.05) + 1)]
+    normals = np.repeat([[0, 0, -1], [0, -1, 0]], [len(wall), len(floor)], axis=0).astype(np.float32)
+    return Snapshot(np.array(wall + floor, np.float32), normals, 0.05)
+
+
+def elevation(view: View) -> float:
+    """Return how far above the level the eye is [degrees]; up is that of the world's camera."""
+    return math.degrees(math.asin(-view.direction[1]))
+
+
+@pytest.mark.parametrize(("depth", "above"), [(5.0, 45), (0.1, 0)])
+def test_what_no_frame_had_as_a_whole_is_no_sliver(depth: float, above: float) -> None:
+    cloud = flat(depth)
+    timeline = Timeline("flat", nacre.Camera(64, 48, 50, 50, 31.5, 23.5))
+    for index, x in enumerate(np.linspace(-2.5, 2.5, 9)):
+        pose = np.eye(4)
+        pose[:3, 3] = x, 0.5, -1
+        timeline.add(ReportedFrame(index, "TRACKED", world_from_camera=pose))
+    view = first_view(cloud, timeline, 8)
+    assert elevation(view) == pytest.approx(above, abs=10)
+    without_cameras = first_view(
+        replace(cloud, normals=np.zeros_like(cloud.normals)), Timeline("flat", None), -1
+    )
+    assert elevation(without_cameras) == pytest.approx(above, abs=10)
+
+
+def test_what_a_frame_had_as_a_whole_is_seen_from_there() -> None:
+    timeline = Timeline("flat", nacre.Camera(64, 48, 20, 20, 31.5, 23.5))
+    for index in range(2):
+        pose = np.eye(4)
+        pose[:3, 3] = 0.1 * index, 0.5, -9
+        timeline.add(ReportedFrame(index, "TRACKED", world_from_camera=pose))
+    assert elevation(first_view(flat(5.0), timeline, 1)) == pytest.approx(0, abs=10)
+
+
 def test_a_camera_that_looks_along_up_still_has_an_up() -> None:
     timeline = Timeline("plane", CAMERA)
     for pose in (np.eye(4), np.diag([1.0, -1, -1, 1])):  # their up directions cancel
