@@ -53,6 +53,8 @@ class CopcFile:
         Of the root, and between its points, as the file says; each level below has half of both.
     counts : dict of Key to int
         The points of each node.
+    comments : tuple of str
+        What the file says of its content, line by line.
 
     Raises
     ------
@@ -75,6 +77,7 @@ class CopcFile:
             self._stream.seek(0)
             with las.readable(path):
                 self._header = laspy.LasHeader.read_from(self._stream)
+            self.comments = las.comments_of(self._header)
             self._names = self._wanted(fields)
             self._laszip = self._laszip_record()
             info = next(iter(self._header.vlrs.get("CopcInfoVlr")), None)

@@ -15,9 +15,9 @@ from nacre._internal.arrays import localize
 from nacre._internal.warned import warn_of_loss
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_path
-from nacre.io.cloud import Cloud
-from nacre.io.e57_scan import AXES, COLORS, NORMALS, read_normals, write_scan
-from nacre.io.raw import require_regular
+from nacre.io.cloud import Cloud, check_comments
+from nacre.io.e57_scan import AXES, COLORS, NORMALS, read_description, read_normals, write_scan
+from nacre.io.raw import MAX_COMMENTS, require_regular
 
 _MISSING = 'E57 files need pye57: pip install "nacre[e57]"'
 FIELDS = ("normals", "colors", "intensity")
@@ -43,6 +43,7 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
                 for i in range(file.scan_count)
             ]
             normals = [read_normals(file, pye57.libe57, i) for i in range(file.scan_count)]
+            told = [line for i in range(file.scan_count) for line in read_description(file, i).splitlines()]
     except (MemoryError, FileFormatError):
         raise
     except Exception as error:  # of several kinds, the library's own among them
@@ -55,6 +56,7 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
         np.concatenate(known) if known and len(known) == len(normals) else None,
         colors=None if colors is None else colors.astype(np.uint8),
         attributes={} if intensity is None else {"intensity": intensity[:, 0]},
+        comments=tuple(dict.fromkeys(told))[:MAX_COMMENTS],
         path=Path(path),
     )
 
@@ -83,6 +85,7 @@ def write_cloud(
     pye57 = _import_pye57()
     if not len(cloud) or not np.isfinite(cloud.points).all():
         raise ValueError("points must be finite, and at least one, in an E57 file, got others")
+    lines = check_comments(comments)
     local, origin = localize(cloud.points)
     columns = dict(zip(AXES, _columns(local, np.float32), strict=True))
     if cloud.normals is not None:  # 0, where one is not known
@@ -100,7 +103,7 @@ def write_cloud(
     with atomic_path(path) as temporary:
         try:
             with pye57.E57(os.fspath(temporary), mode="w") as file:
-                write_scan(file, pye57.libe57, columns, Path(path).stem, origin)
+                write_scan(file, pye57.libe57, columns, Path(path).stem, origin, "\n".join(lines))
         except pye57.libe57.E57Exception as error:
             raise OSError(errno.EIO, _reason(error), os.fspath(path)) from error
 

@@ -19,7 +19,12 @@ _INVALID = ("cartesianInvalidState", "sphericalInvalidState")
 
 
 def write_scan(
-    file: Any, library: Any, columns: Mapping[str, npt.NDArray[Any]], name: str, origin: Array
+    file: Any,
+    library: Any,
+    columns: Mapping[str, npt.NDArray[Any]],
+    name: str,
+    origin: Array,
+    description: str = "",
 ) -> None:
     """
     Write a scan.
@@ -36,6 +41,8 @@ def write_scan(
         Of the scan.
     origin : (3,)
         The place of the scan.
+    description : str
+        Of what is in it.
     """
     image = file.image_file
 
@@ -77,6 +84,8 @@ def write_scan(
             }
         ),
     }
+    if description:
+        members["description"] = text(description)
     if "intensity" in columns:
         low, high = columns["intensity"].min(), columns["intensity"].max()
         members["intensityLimits"] = structure(
@@ -98,6 +107,12 @@ def write_scan(
     writer = points.writer(_buffers(image, library, columns))
     writer.write(len(columns[AXES[0]]))
     writer.close()
+
+
+def read_description(file: Any, index: int) -> str:
+    """Return what a scan says of what is in it; "" where it says nothing."""
+    scan = file.get_header(index).node
+    return str(scan["description"].value()) if scan.isDefined("description") else ""
 
 
 def read_normals(file: Any, library: Any, index: int) -> npt.NDArray[np.float32] | None:

@@ -7,7 +7,8 @@ import os
 import struct
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from itertools import chain
+from dataclasses import replace
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -15,11 +16,12 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal import arrays
+from nacre._internal.warned import warn_of_loss
 from nacre.errors import FileFormatError
 from nacre.io import copc
 from nacre.io.atomic import atomic_path
-from nacre.io.cloud import Cloud, Columns, native
-from nacre.io.raw import require_regular
+from nacre.io.cloud import Cloud, Columns, check_comments, native
+from nacre.io.raw import MAX_COMMENTS, decode, require_regular
 
 _MISSING = 'LAS and LAZ files need laspy and lazrs: pip install "nacre[las]"'
 NORMALS = ("NormalX", "NormalY", "NormalZ")  # as the Point Data Abstraction Library names them
@@ -32,6 +34,8 @@ _FINEST_SCALE = 1e-6  # [m]
 _DAY_AND_YEAR = (
     90  # where the header says when it was written; zeros: not known, and the same cloud the same bytes
 )
+_DESCRIPTION = ("LASF_Spec", 3)  # a record of text
+_MOST_TEXT = 65_534  # bytes of it, before a zero
 _DEFAULTS = {"return_number": 1, "number_of_returns": 1}
 _PLAIN, _COLORED = 6, 7  # the point formats of LAS 1.4
 _EXTREMES_ARE_TOLD = 0b110  # of extra bytes: bits of their options
@@ -50,7 +54,7 @@ def read_cloud(path: str | os.PathLike[str]) -> Cloud:
         names = list(reader.header.point_format.dimension_names)
         cloud = cloud_of(Path(path), chunks, names, is_wide, keep_all=False)
     _check_count(path, len(cloud), reader.header.point_count)
-    return cloud
+    return replace(cloud, comments=comments_of(reader.header))
 
 
 def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud]:
@@ -59,11 +63,12 @@ def read_chunks(path: str | os.PathLike[str], num_rows: int) -> Iterator[Cloud]:
     num_read = 0
     with _opened(path) as reader:
         names = list(reader.header.point_format.dimension_names)
+        comments = comments_of(reader.header)
         for chunk in reader.chunk_iterator(num_rows):
             num_read += len(chunk)
-            yield cloud_of(Path(path), [chunk], names, is_wide, keep_all=True)
+            yield replace(cloud_of(Path(path), [chunk], names, is_wide, keep_all=True), comments=comments)
         if not num_read:
-            yield cloud_of(Path(path), [], names, is_wide, keep_all=True)
+            yield replace(cloud_of(Path(path), [], names, is_wide, keep_all=True), comments=comments)
     _check_count(path, num_read, reader.header.point_count)
 
 
@@ -71,6 +76,13 @@ def count_points(path: str | os.PathLike[str]) -> int:
     """Return how many points the header promises."""
     with _opened(path) as reader:
         return int(reader.header.point_count)
+
+
+def comments_of(header: Any) -> tuple[str, ...]:
+    """Return the lines in which a file describes what is in it."""
+    found = (record for record in header.vlrs if (record.user_id, record.record_id) == _DESCRIPTION)
+    texts = (decode(bytes(record.record_data).partition(b"\0")[0]) for record in found)
+    return tuple(islice((line for text in texts for line in text.splitlines()), MAX_COMMENTS))
 
 
 def is_las(path: str | os.PathLike[str]) -> bool:
@@ -203,7 +215,7 @@ def write_cloud(
     """
     if not np.isfinite(cloud.points).all():
         raise ValueError("points must be finite in a LAS file, got some that are not")
-    write_chunks(path, [cloud], len(cloud), cloud.points)
+    write_chunks(path, [replace(cloud, comments=tuple(comments))], len(cloud), cloud.points)
 
 
 def write_chunks(
@@ -214,6 +226,8 @@ def write_chunks(
     pieces = iter(chunks)
     first = next(pieces)
     header = _las_header(laspy, first, extremes)
+    if first.comments:
+        header.vlrs.append(laspy.VLR(*_DESCRIPTION, "", _description(path, first.comments)))
     records = (_las_points(laspy, cloud, header) for cloud in chain([first], pieces))
     with atomic_path(path) as temporary, temporary.open("r+b") as stream:
         if copc.is_copc(path):
@@ -227,6 +241,13 @@ def write_chunks(
             writer.close()
         stream.seek(_DAY_AND_YEAR)
         stream.write(bytes(4))
+
+
+def _description(path: str | os.PathLike[str], comments: Sequence[str]) -> bytes:
+    """Return comments as a record has them, which holds no more than its length can say."""
+    text = "\n".join(check_comments(comments)).encode()
+    warn_of_loss(path, [f"comments of more than {_MOST_TEXT} bytes"] if len(text) > _MOST_TEXT else [])
+    return text[:_MOST_TEXT].decode(errors="ignore").encode() + b"\0"
 
 
 def _bounds(points: arrays.FloatArray) -> npt.NDArray[np.float64]:

@@ -104,8 +104,8 @@ def write_points(
           colours, attributes that LAS knows (``intensity``,
           ``classification``, ``gps_time``, ...), and all else, the normals too, as extra bytes.
         - ``.e57`` (extra ``e57``): one scan, coordinates in float32 about an origin in float64; normals
-          (libE57's extension ``nor``), colours and ``intensity``. What else there is has no place, which a
-          warning tells.
+          (libE57's extension ``nor``), colours, ``intensity`` and comments. What else there is has no place,
+          which a warning tells.
         - ``.xyz``: text with a first line of names.
         - ``.npz``: each field an array, exactly.
     points : (N, 3) array, or Cloud, Model, Reconstruction or Consolidated

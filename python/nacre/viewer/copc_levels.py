@@ -34,6 +34,8 @@ class CopcLevels:
     ----------
     origin : (3,) float64
         The middle of the root, in the file's coordinates.
+    comments : tuple of str
+        Of the file.
 
     Raises
     ------
@@ -43,7 +45,7 @@ class CopcLevels:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self._file = CopcFile(path, _FIELDS)
-        self.counts = self._file.counts
+        self.counts, self.comments = self._file.counts, self._file.comments
         self.side, self.spacing = self._file.side, self._file.spacing
         self.origin = self._file.corner + self.side / 2
         self.corner: npt.NDArray[np.float64] = np.full(3, -self.side / 2)

@@ -32,6 +32,7 @@ from nacre.viewer.copc_levels import CopcLevels
 from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline
 from nacre.viewer.view import View
 
+_SURVEYS = (".las", ".laz", ".e57")  # formats of them: z is up
 _COARSE_POINTS = 1_000_000
 _MOST_POINTS = 50_000_000
 _SAMPLES = 10_000
@@ -51,10 +52,10 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
     ----------
     path : path-like
         ``OUT``, which holds ``model.ply`` and ``report.json``; or a file of points or of a mesh. Where it has
-        no normals, they come from the triangles, or else are estimated; y is up unless a comment says that it
-        is nacre's, and another may say from where to look first. Of a COPC file (``.copc.laz``, extra
-        ``las``), in which z is up, only coarse levels are read; it stays open, and the viewer reads nodes of
-        its octree as they are looked at.
+        no normals, they come from the triangles, or else are estimated; y is up, or z in LAS, LAZ and E57
+        files, unless a comment says that it is nacre's, and another may say from where to look first. Of a
+        COPC file (``.copc.laz``, extra ``las``) only coarse levels are read; it stays open, and the viewer
+        reads nodes of its octree as they are looked at.
 
     Raises
     ------
@@ -93,12 +94,8 @@ def read_timeline(path: str | os.PathLike[str]) -> Timeline:
 def _of_file(path: Path) -> Timeline:
     """Return the points or the mesh of a file; those far from the origin about one of their own."""
     file, triangles, painting = _read(path)
-    is_upright = not any(CAMERA_FRAME in comment for comment in file.comments)
-    timeline = Timeline(path.name, None, is_upright=is_upright)
-    timeline.origin = _origin(file.points)
+    timeline = _timeline(path, file.comments, _origin(file.points))
     near = file if not timeline.origin.any() else replace(file, points=file.points - timeline.origin)
-    view = View.of_comments(file.comments)
-    timeline.view = None if view is None else view._replace(target=view.target - timeline.origin)
     timeline.set_snapshot(_cloud(near, None, triangles, painting))
     return timeline
 
@@ -106,10 +103,20 @@ def _of_file(path: Path) -> Timeline:
 def _streamed(path: Path) -> Timeline:
     """Return the coarse points of a COPC file, and its levels of detail."""
     levels = CopcLevels(path)
-    timeline = Timeline(path.name, None, is_survey=True)
-    timeline.origin = levels.origin
+    timeline = _timeline(path, levels.comments, levels.origin)
     timeline.set_snapshot(levels.coarsest(_COARSE_POINTS))
     timeline.levels = levels
+    return timeline
+
+
+def _timeline(path: Path, comments: tuple[str, ...], origin: npt.NDArray[np.float64]) -> Timeline:
+    """Return a timeline without points, upright as the comments of a file or else its format say."""
+    is_nacre_s = any(CAMERA_FRAME in comment for comment in comments)
+    is_survey = not is_nacre_s and path.suffix.lower() in _SURVEYS
+    timeline = Timeline(path.name, None, is_upright=not (is_nacre_s or is_survey), is_survey=is_survey)
+    timeline.origin = origin
+    view = View.of_comments(comments)
+    timeline.view = None if view is None else view._replace(target=view.target - origin)
     return timeline
 
 

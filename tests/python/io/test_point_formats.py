@@ -62,6 +62,13 @@ def test_normals_and_confidence_are_read_again(tmp_path, suffix):
     np.testing.assert_array_equal(cloud.attributes["confidence"].astype(np.float32), CONFIDENCE)
 
 
+@pytest.mark.parametrize("ending", [".ply", ".pcd", ".npz", ".las", ".laz", ".copc.laz", ".e57"])
+def test_comments_are_read_again(tmp_path, ending):
+    comments = ("made of café", "", "second line")
+    assert nacre.read_points(written(tmp_path / f"a{ending}", comments=comments)).comments == comments
+    assert nacre.read_points(written(tmp_path / f"b{ending}")).comments == ()
+
+
 @pytest.mark.parametrize("intensity", [np.arange(50, dtype=np.uint16) * 1000, np.linspace(0, 1, 50)])
 def test_intensity_is_read_again(tmp_path, suffix, intensity):
     found = nacre.read_points(written(tmp_path / f"a{suffix}", attributes={"intensity": intensity}))
@@ -131,6 +138,23 @@ def test_a_las_file_of_another_program(tmp_path):
     np.testing.assert_array_equal(cloud.colors, COLORS)
     nacre.write_points(tmp_path / "b.laz", cloud.points)
     np.testing.assert_allclose(nacre.read_points(tmp_path / "b.laz").points, cloud.points, rtol=0, atol=1e-6)
+
+
+def test_a_las_file_that_describes_itself(tmp_path):
+    laspy = pytest.importorskip("laspy")
+    las = laspy.read(written(tmp_path / "a.las", comments=["by hand", "é"]))
+    (record,) = las.vlrs
+    assert (record.user_id, record.record_id) == ("LASF_Spec", 3)
+    assert record.record_data == "by hand\né".encode() + b"\0"
+    record.record_data = b"another's\0no text"
+    las.write(tmp_path / "b.las")
+    assert nacre.read_points(tmp_path / "b.las").comments == ("another's",)
+
+
+def test_comments_that_a_las_file_has_no_place_for(tmp_path):
+    with pytest.warns(UserWarning, match="no place for comments of more than 65534 bytes"):
+        path = written(tmp_path / "a.las", comments=["é" * 40_000])
+    assert nacre.read_points(path).comments == ("é" * 32_767,)
 
 
 def test_points_far_apart_get_coarser_steps(tmp_path):

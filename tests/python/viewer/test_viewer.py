@@ -31,6 +31,7 @@ from viewer_scenes import plane, two_looks
 
 viewer = pytest.importorskip("nacre.viewer")
 FRAMES = 6
+SURVEYS = ["las", "laz", "copc.laz", "e57"]
 
 
 @pytest.fixture(scope="module")
@@ -256,6 +257,25 @@ def test_a_mesh_file_of_nacre_stands_upright(tmp_path: Path, ending: str) -> Non
         assert viewer.read_timeline(path).is_upright == (not comments)
 
 
+@pytest.mark.parametrize("ending", SURVEYS)
+def test_z_is_up_in_surveys_but_not_where_the_file_says_otherwise(tmp_path: Path, ending: str) -> None:
+    pytest.importorskip("pye57" if ending == "e57" else "laspy")
+    path, cloud = tmp_path / f"a.{ending}", plane()
+    nacre.write_points(path, cloud.points, normals=cloud.normals)
+    assert viewer.read_timeline(path).is_survey
+    np.testing.assert_allclose(opening(path).up, (0, 0, 1))
+    of_nacre = "metres; the world is the first camera's frame"
+    nacre.write_points(path, cloud.points, normals=cloud.normals, comments=[of_nacre])
+    np.testing.assert_allclose(opening(path).up, (0, -1, 0), atol=1e-6)
+    told = View(np.array([0, 0, 1.0]), np.array([0, 0, -1.0]), np.array([1.0, 0, 0]), 0.2)
+    moved = told._replace(target=told.target + 5000)
+    nacre.write_points(path, cloud.points + 5000, normals=cloud.normals, comments=[moved.as_comment()])
+    timeline = viewer.read_timeline(path)
+    view = opening(path)
+    np.testing.assert_allclose(view.up, told.up)
+    np.testing.assert_allclose(view.target + timeline.origin, moved.target, atol=0.01)
+
+
 def opening(path: Path) -> View:
     timeline = viewer.read_timeline(path)
     place, cloud = timeline.snapshots[-1]
@@ -269,6 +289,19 @@ def test_a_mesh_of_a_run_opens_as_the_run_does(out: Path, tmp_path: Path, ending
     for path in (out / "model.ply", tmp_path / f"a.{ending}", tmp_path / "b.ply"):
         for expected, value in zip(opening(out), opening(path), strict=True):
             np.testing.assert_allclose(value, expected, atol=1e-5)
+
+
+@pytest.mark.parametrize("ending", SURVEYS)
+def test_the_points_of_a_run_open_as_the_run_does_in_formats_of_surveys(
+    out: Path, tmp_path: Path, ending: str
+) -> None:
+    pytest.importorskip("pye57" if ending == "e57" else "laspy")
+    path = tmp_path / f"a.{ending}"
+    assert run("convert", out / "model.ply", path, "--quiet") == 0
+    view, timeline = opening(path), viewer.read_timeline(path)
+    moved = view._replace(target=view.target + timeline.origin)
+    for expected, value in zip(opening(out), moved, strict=True):
+        np.testing.assert_allclose(value, expected, atol=1e-5)
 
 
 def painted_plane(path: Path) -> Path:
