@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+
+_TOGETHER = 0.3  # seconds
 
 
 class Stopped(BaseException):
@@ -20,6 +23,9 @@ class Interruption:
     """
     Whether Ctrl-C (SIGINT) or SIGTERM came.
 
+    Signals that come together are one: a terminal sends it to the command and to what started it, such as
+    ``timeout``, which passes it on.
+
     Attributes
     ----------
     number : int
@@ -31,6 +37,7 @@ class Interruption:
     def __init__(self) -> None:
         self.number = 0
         self.ends_at_once = False
+        self._last = -_TOGETHER
 
     @property
     def wanted(self) -> bool:
@@ -53,6 +60,9 @@ class Interruption:
 
     def note(self, number: int) -> None:
         """Take a signal."""
+        before, self._last = self._last, time.monotonic()
+        if self._last - before < _TOGETHER:
+            return
         if self.number or self.ends_at_once:
             self.number = self.number or number
             raise Stopped(number)
