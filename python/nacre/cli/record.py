@@ -63,7 +63,8 @@ def record(
     Record a depth camera, and watch its model grow.
 
     A window opens in the browser: what the camera sees, the model, and the holes in it; buttons start, pause
-    and stop. Ctrl-C stops, too. Without a browser, or with --no-window, recording begins at once.
+    and stop. Ctrl-C stops, too. Without a browser recording begins at once, and the same page is there to be
+    opened from elsewhere; with --no-window there is none.
 
     OUT gets what nacre reconstruct writes, and OUT/recording keeps the frames: nacre reconstruct
     OUT/recording goes over them again, with other options. A camera that is unplugged loses nothing of that.
@@ -97,16 +98,17 @@ def record(
         report=report,
         parameters=changed_parameters(parameters),
     )
-    place = _window(waits=is_live, port=port) if window and has_browser() else None
+    place = _window(waits=is_live, port=port) if window else None
     with interruptible() as stop, closing(UnfinishedRun(out)) as unfinished:
         with in_option_words():
             job = begin_run(options, unfinished, parameters, stop, controls=place.controls if place else None)
-        if window and place is None:
-            terminal.say("no window: there is no browser, or no display; Ctrl-C stops")
+        if place and not place.opens:
+            terminal.say("no window: there is no browser, or no display; recording begins, Ctrl-C stops it")
         carry_out(terminal, job, stop, place)
 
 
 def _window(*, waits: bool, port: int) -> Window:
     from nacre.viewer import Controls
 
-    return Window(port, Controls("ready" if waits else "recording"), opens=True)
+    opens = has_browser()
+    return Window(port, Controls("ready" if waits and opens else "recording"), opens=opens, stays=opens)

@@ -55,11 +55,12 @@ def carry_out(terminal: Terminal, job: Job, stop: Interruption, window: Window |
     rows = depth_rows(job.run.done) + ([] if job.feed is None else job.feed.rows)
     files = file_rows(out, page=job.options.report)
     terminal.say(table([*verdict_rows(report), *trajectory_rows(job.run.done), *rows, *files]))
-    if live is not None:
+    if live is not None and window is not None:
         live.finish(_ending(job))
-        terminal.say(f"the model stays at {live.viewer.url}; Ctrl-C ends it")
-        with suppress(Stopped), stop.at_once():
-            live.viewer.wait()
+        if window.stays:
+            terminal.say(f"the model stays at {live.viewer.url}; Ctrl-C ends it")
+            with suppress(Stopped), stop.at_once():
+                live.viewer.wait()
         live.viewer.close()
     _complain(job)
 
@@ -71,8 +72,12 @@ def _show(terminal: Terminal, job: Job, window: Window) -> LiveView:
     for frame in job.run.done.frames:
         live.add(frame)
     terminal.say(f"the model is at {live.viewer.url}")
-    if window.opens:
-        webbrowser.open(live.viewer.url)
+    if window.opens and not webbrowser.open(live.viewer.url):
+        terminal.say("no window: the browser opened none; recording begins, Ctrl-C stops it")
+        window.controls.press("start")
+        window.stays = False
+    elif window.controls.state == "ready":
+        terminal.say("recording begins with the button Start there")
     return live
 
 

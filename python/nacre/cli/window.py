@@ -19,6 +19,7 @@ class Window:
     port: int
     controls: Controls
     opens: bool = False  # a browser, and does not wait to be looked at
+    stays: bool = True  # until Ctrl-C, when the run has ended
 
 
 def has_browser() -> bool:

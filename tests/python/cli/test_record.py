@@ -58,11 +58,48 @@ def test_in_a_terminal_alone_it_begins_at_once(
     assert done.code == 0, done.err
     assert library.stopped
     assert ("no window: there is no browser, or no display" in done.out) == (not options)
+    assert ("the model is at http://127.0.0.1:" in done.out) == (not options)
     report = json.loads((out / "report.json").read_text())
     assert report["num_frames"] == 5
     again = nacre.open_sequence(out / "recording")
     assert len(again) == 5
     assert len(nacre.read_points(out / "model.ply")) > 100
+
+
+@pytest.mark.usefixtures("no_browser")
+def test_without_a_display_the_page_is_there_and_ctrl_c_writes_everything(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    arguments = ("record", "realsense", "-o", str(out), "--port", "0", "--no-report")
+    running = fake.start("seconds=0.02", *arguments)
+    assert running.stdout is not None
+    url = next(line for line in running.stdout if "the model is at http" in line).split()[-1]
+    while True:
+        with urllib.request.urlopen(f"{url}/data/live") as answer:
+            live = json.load(answer)
+        assert live["state"] == "recording"
+        if live["numFrames"] > 3:
+            break
+        time.sleep(0.02)
+    for _ in range(2):  # a terminal's, and that of what started the command
+        running.send_signal(signal.SIGINT)
+    told, errors = running.communicate(timeout=60)
+    assert running.returncode == 0, errors
+    assert "Ctrl-C ends it" not in told  # nobody may be there
+    assert len(nacre.open_sequence(out / "recording")) > 3
+    assert len(nacre.read_points(out / "model.ply")) > 100
+    assert not (out / "unfinished").exists()
+
+
+def test_a_browser_that_opens_no_window(
+    plug: Callable[..., fake.Library], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("BROWSER", "firefox")
+    monkeypatch.setattr(webbrowser, "open", lambda url: False)
+    plug(seconds=0.005)
+    done = run("record", "realsense", "-o", tmp_path / "out", "--port", 0, "--last", 4, "--no-report")
+    assert done.code == 0, done.err
+    assert "no window: the browser opened none; recording begins" in done.out
+    assert json.loads((tmp_path / "out" / "report.json").read_text())["num_frames"] == 5
 
 
 @pytest.mark.usefixtures("no_browser")
@@ -99,12 +136,12 @@ def test_unplugged_before_the_start(
 ) -> None:
     monkeypatch.setenv("BROWSER", "firefox")
     opened: list[str] = []
-    monkeypatch.setattr(webbrowser, "open", opened.append)
+    monkeypatch.setattr(webbrowser, "open", lambda url: opened.append(url) is None)
     plug(frames=3, unplugged=True, seconds=0.005)
     done = run("record", "realsense", "-o", tmp_path / "out", "--port", 0)
     assert done.code == 1
     assert done.err == "error: Fake D435 0815 was unplugged: nothing was recorded\n"
-    assert f"the model is at {opened[0]}\n" in done.out
+    assert f"the model is at {opened[0]}\nrecording begins with the button Start there\n" in done.out
     assert not (tmp_path / "out" / "recording").exists()
     assert not (tmp_path / "out" / "unfinished").exists()
 
@@ -114,9 +151,10 @@ def test_unplugged_in_the_middle(
 ) -> None:
     shown: list[dict[str, Any]] = []
 
-    def press_start(url: str) -> None:
+    def press_start(url: str) -> bool:
         own = urllib.request.Request(f"{url}/press/start", headers={"Origin": url}, method="POST")
         urllib.request.urlopen(own).close()
+        return True
 
     def keep(viewer: Viewer) -> None:
         shown.append(json.loads(viewer.read("live")[1]))
