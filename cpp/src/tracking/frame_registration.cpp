@@ -350,6 +350,25 @@ bool FrameRegistration::may_be_beside(const TrackingResult& found, const Pose& g
   return !found.is_clear_cut && distance * camera_limits::view_turn > 0.5 * tracking_limits::beside_turn;
 }
 
+std::vector<Pose> FrameRegistration::along_open(const IcpResult& found, const Pose& guess) const {
+  const Surfaces all{source_, in_view(guess), 0.0, in_view(guess)};
+  const double gate = paired(all, Gate::narrow).options.max_distance;
+  const double farthest = 2.0 * camera_limits::new_direction / camera_limits::view_turn;
+  std::vector<Pose> poses;
+  for (Eigen::Index i = 0; i < found.weak_directions.cols(); ++i) {
+    Vector6 direction = found.weak_directions.col(i);
+    direction.head<3>() /= found.extent;
+    for (const double side : {-1.0, 1.0}) {
+      for (int step = 1; gate > 0.0; ++step) {
+        const Pose pose = motion_about(found.center, side * step * gate * direction) * found.target_from_source;
+        if (view_distance(guess, pose, depth_) > farthest) break;
+        poses.push_back(pose);
+      }
+    }
+  }
+  return poses;
+}
+
 std::vector<Pose> FrameRegistration::beside(const Pose& world_from_camera) const {
   const PointsInView& view = in_view(world_from_camera);
   std::vector<Pose> poses;

@@ -76,6 +76,8 @@ class FrameRegistration {
   // Cameras beside a known one, about as far apart as a registration finds its way: it turned about itself, or about
   // what it saw.
   std::vector<Pose> beside(const Pose& world_from_camera) const;
+  // Cameras along what a registration leaves open, a gate apart, and as far from a guess as those beside it.
+  std::vector<Pose> along_open(const IcpResult& found, const Pose& guess) const;
   // Where keypoints of the last view say that the camera is; nothing where too few match.
   std::optional<Pose> by_keypoints() const;
   // Whether frame and model have colours, and how alike they look from a place.

@@ -125,6 +125,38 @@ void try_beside(const FrameRegistration& registration, double noise_factor, Trac
   }
 }
 
+// Where directions are open the camera was taken to have gone on as before. Where nothing fits it may be elsewhere
+// along what the places leave open: at the only one of them that fits.
+std::optional<TrackingResult> only_along_open(const FrameRegistration& registration, TrackingPrior& prior,
+                                              const TrackingOptions& options) {
+  const Pose& last = prior.guesses.back();
+  const auto is_apart = [&](const Pose& a, const Pose& b) {
+    return view_distance(a, b, prior.depth) > tracking_limits::least_new_view;
+  };
+  std::vector<Pose> open, starts;
+  for (const TrackingResult& place : prior.tried) {
+    const Pose& pose = place.alignment.target_from_source;
+    const bool is_new = std::all_of(open.begin(), open.end(), [&](const Pose& other) { return is_apart(other, pose); });
+    if (place.alignment.weak_directions.cols() == 0 || !is_new) continue;
+    open.push_back(pose);
+    for (const Pose& start : registration.along_open(place.alignment, last)) starts.push_back(start);
+  }
+  if (starts.empty()) return std::nullopt;
+  const PointsInView& view = registration.in_view(last);
+  TrackingResult best;
+  for (const Pose& start :
+       most_promising(AlignCloud(view.points, view.normals), registration.source(), starts, options.registration)) {
+    const TrackingResult found = registration.from(start, FrameRegistration::Gate::narrow, Expectation::beside);
+    keep_better(found, best);
+    prior.tried.push_back(found);
+  }
+  const bool has_rival = std::any_of(prior.tried.begin(), prior.tried.end(), [&](const TrackingResult& other) {
+    return other.score > GlobalAlignOptions().max_rivalry * best.score &&
+           is_apart(other.alignment.target_from_source, best.alignment.target_from_source);
+  });
+  return best.is_lost() || has_rival ? std::nullopt : std::optional(best);
+}
+
 // The frame before may tell what the model leaves open: it shows what has not become part of that.
 TrackingResult held_by_odometry(const FrameRegistration& registration, const TrackingResult& open,
                                 const TrackingPrior& prior) {
@@ -238,6 +270,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     try_beside(registration, now.noise_factor, prior, options, best);
     if (best.is_lost()) {
       if (const auto only = only_near(prior, options, target.usual)) return *only;
+      if (const auto only = only_along_open(registration, prior, options)) best = *only;
     }
   }
   if (best.decision == Decision::accepted) return best;
