@@ -270,7 +270,10 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     try_beside(registration, now.noise_factor, prior, options, best);
     if (best.is_lost()) {
       if (const auto only = only_near(prior, options, target.usual)) return *only;
-      if (const auto only = only_along_open(registration, prior, options)) best = *only;
+    }
+    if (best.decision != Decision::accepted) {
+      const auto only = only_along_open(registration, prior, options);
+      if (only && (best.is_lost() || only->decision == Decision::accepted)) best = *only;
     }
   }
   if (best.decision == Decision::accepted) return best;
