@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "base/parallel.hpp"
+#include "camera/view_distance.hpp"
 #include "registration/global_search.hpp"
 #include "registration/icp.hpp"
 #include "tracking/limits.hpp"
@@ -13,7 +14,7 @@
 namespace nacre {
 
 std::vector<Pose> most_promising(const AlignCloud& model, const IcpSource& source, const std::vector<Pose>& guesses,
-                                 const AlignOptions& options) {
+                                 const AlignOptions& options, double depth) {
   const IcpTarget target(model, options);
   AlignOptions coarse = options;
   coarse.num_threads = 1;
@@ -36,7 +37,15 @@ std::vector<Pose> most_promising(const AlignCloud& model, const IcpSource& sourc
     });
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& a, const Candidate& b) { return a.overlap > b.overlap; });
-    if (candidates.size() > most) candidates.resize(most);
+    std::vector<Candidate> best;
+    for (const Candidate& candidate : candidates) {
+      const bool is_known =
+          depth > 0.0 && std::any_of(best.begin(), best.end(), [&](const Candidate& better) {
+            return view_distance(better.found, candidate.found, depth) < tracking_limits::least_new_view;
+          });
+      if (!is_known && best.size() < most) best.push_back(candidate);
+    }
+    candidates = std::move(best);
   };
   keep_best(tracking_limits::num_semifinalists, tracking_limits::first_samples);
   keep_best(tracking_limits::num_finalists, tracking_limits::coarse_turn_samples);

@@ -10,9 +10,10 @@
 namespace nacre {
 
 // The guesses (world_from_camera) on which most agrees after a short registration of a few points of the frame to the
-// model, best first: few enough to be registered in full. Of all of them fewer points show which to try with more.
+// model, best first: few enough to be registered in full. Of all of them fewer points show which to try with more. With
+// the depth of what the frame shows [m] no two are the same view of it.
 std::vector<Pose> most_promising(const AlignCloud& model, const IcpSource& source, const std::vector<Pose>& guesses,
-                                 const AlignOptions& options);
+                                 const AlignOptions& options, double depth = 0.0);
 
 // Where a frame fits the model, wherever the camera is: in one place, or none; with rivals also where it fits in
 // several about as well. `source` holds points of the frame. Takes some tenths of a second.

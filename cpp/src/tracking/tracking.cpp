@@ -151,7 +151,8 @@ std::optional<TrackingResult> only_along_open(const FrameRegistration& registrat
     prior.tried.push_back(found);
   }
   const bool has_rival = std::any_of(prior.tried.begin(), prior.tried.end(), [&](const TrackingResult& other) {
-    return other.score > GlobalAlignOptions().max_rivalry * best.score &&
+    return (other.decision == Decision::accepted || best.decision != Decision::accepted) &&
+           other.score > GlobalAlignOptions().max_rivalry * best.score &&
            is_apart(other.alignment.target_from_source, best.alignment.target_from_source);
   });
   return best.is_lost() || has_rival ? std::nullopt : std::optional(best);
@@ -273,7 +274,9 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     }
     if (best.decision != Decision::accepted) {
       const auto only = only_along_open(registration, prior, options);
-      if (only && (best.is_lost() || only->decision == Decision::accepted)) best = *only;
+      const bool is_better =
+          only && only->decision == Decision::accepted && best.score < tracking_limits::clearly_better * only->score;
+      if (only && (best.is_lost() || is_better)) best = *only;
     }
   }
   if (best.decision == Decision::accepted) return best;
