@@ -61,6 +61,9 @@ class FrameRegistration {
   // Where something that moves a little pulls the camera along, what is far from it is registered.
   TrackingResult without_pulling(const TrackingResult& found, const Pose& guess, Expectation expectation) const;
 
+  // Whether the camera's motion to a place explains what has changed since the last view, without anything that moved.
+  bool explains_change(const Pose& world_from_camera) const;
+
   // A gate that the user has set is neither narrow nor wide.
   bool has_automatic_gate() const { return !(options_.registration.max_distance > 0.0); }
 

@@ -65,6 +65,17 @@ TrackingResult FrameRegistration::without_pulling(const TrackingResult& found, c
   return other;
 }
 
+// Of what conflicts where the camera was, little may be left.
+bool FrameRegistration::explains_change(const Pose& pose) const {
+  const auto count_at = [&](const Pose& place) {
+    return static_cast<double>(conflicts_at(place, in_view(place)).rows());
+  };
+  const double left = count_at(pose), before = count_at(target_.last_view.world_from_camera);
+  const double deviation = std::sqrt(std::max(1.0, left));
+  return left - tracking_limits::unexplained_conflicts * before <
+         static_cast<double>(base_limits::noise_sigmas) * deviation;
+}
+
 // Of this frame as seen from a pose, and what the camera saw before.
 Points FrameRegistration::conflicts_at(const Pose& pose, const PointsInView& view) const {
   DepthView now = now_.view;

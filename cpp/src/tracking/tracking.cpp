@@ -274,9 +274,9 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
     }
     if (best.decision != Decision::accepted) {
       const auto only = only_along_open(registration, prior, options);
-      const bool is_better =
-          only && only->decision == Decision::accepted && best.score < tracking_limits::clearly_better * only->score;
-      if (only && (best.is_lost() || is_better)) best = *only;
+      const bool is_better = only && (best.is_lost() || (only->decision == Decision::accepted &&
+                                                         best.score < tracking_limits::clearly_better * only->score));
+      if (is_better && registration.explains_change(only->alignment.target_from_source)) best = *only;
     }
   }
   if (best.decision == Decision::accepted) return best;
