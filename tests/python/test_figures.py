@@ -35,7 +35,7 @@ def test_every_picture_is_drawn(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     drawn = {path.name for path in tmp_path.iterdir()}
     shown = {path.name.removeprefix("bunny-") for path in (ROOT / "docs" / "images").glob("*.webp")}
-    of_recordings = ("model-teddy", "recordings-", "removed-", "report", "viewer")
+    of_recordings = ("model-teddy", "record", "removed-", "report", "viewer")
     of_benchmarks = ("model-bunny12", "model-spot12")
     assert drawn == {name for name in shown if not name.startswith(of_recordings + of_benchmarks)}
     for name in drawn:
