@@ -8,17 +8,22 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from mesh_scenes import Laid, Scene
+from suite.native import POINTER, function
 
 import nacre
 from nacre import meshing
 
 Array = npt.NDArray[Any]
-MOST_VOXELS, MOST_OF_CGAL = 200_000_000, 20_000  # budgets
 BLOCK = 16  # [voxels] a side
+MOST_IN_BLOCKS = 2**27  # voxels: Open3D's extraction counts bytes, 16 a voxel, in 32 bits, and crashes beyond
+MOST_IN_BOX = 2_000_000_000  # voxels, which take 20 GB
 
 
 class OverBudgetError(Exception):
-    """A method would take more than its budget."""
+    """A method cannot take so many voxels."""
+
+    def __init__(self, voxels: int, most: int) -> None:
+        super().__init__(f"not run: {voxels / 1e6:.0f} million voxels, of {most / 1e6:.0f} that it can take")
 
 
 def nacre_open(scene: Scene) -> Laid:
@@ -56,7 +61,7 @@ def open3d_pivoting(scene: Scene) -> Laid:
 
 def open3d_tsdf(scene: Scene) -> Laid:
     """Fuse the images in a sparse grid of voxels of one spacing."""
-    mesh = _grid(scene).extract_triangle_mesh(weight_threshold=1.0)
+    mesh = _grid(scene, len, MOST_IN_BLOCKS).extract_triangle_mesh(weight_threshold=scene.more_than)
     colors = 255 * mesh.vertex.colors.numpy() if scene.has_color else None
     return Laid(mesh.vertex.positions.numpy(), mesh.triangle.indices.numpy(), colors)
 
@@ -66,16 +71,14 @@ def skimage_cubes(scene: Scene) -> Laid:
     from skimage import measure
 
     marching_cubes: Any = measure.marching_cubes
-    grid = _grid(scene)
+    grid = _grid(scene, lambda blocks: int(np.prod(np.ptp(blocks, axis=0) + 1)), MOST_IN_BOX)
     places, rows = grid.voxel_coordinates_and_flattened_indices()
     cells = np.round(places.numpy() / scene.spacing).astype(np.int64)
     lower, upper = cells.min(axis=0), cells.max(axis=0) + 1
-    if np.prod(upper - lower) > MOST_VOXELS:
-        raise OverBudgetError(f"not run: {np.prod(upper - lower)} voxels")
     volume, is_known = np.ones(upper - lower, np.float32), np.zeros(upper - lower, bool)
     values = {name: grid.attribute(name).numpy().reshape(-1)[rows.numpy()] for name in ("tsdf", "weight")}
     there = tuple((cells - lower).T)
-    volume[there], is_known[there] = values["tsdf"], values["weight"] > 1
+    volume[there], is_known[there] = values["tsdf"], values["weight"] > scene.more_than
     vertices, triangles, *_ = marching_cubes(volume, 0.0, gradient_direction="ascent")
     for axis in range(3):  # a cube counts where its eight voxels were seen
         is_known &= np.roll(is_known, -1, axis)
@@ -86,18 +89,11 @@ def skimage_cubes(scene: Scene) -> Laid:
 
 def cgal_front(scene: Scene) -> Laid:
     """Advance a front of triangles over the points."""
-    from CGAL.CGAL_Advancing_front_surface_reconstruction import advancing_front_surface_reconstruction
-    from CGAL.CGAL_Kernel import Point_3
-    from CGAL.CGAL_Point_set_3 import Point_set_3
-
-    if len(scene.cloud) > MOST_OF_CGAL:
-        raise OverBudgetError(f"not run: minutes for more than {MOST_OF_CGAL} points")
-    points = Point_set_3()
-    corners: list[int] = []
-    for point in scene.cloud.points.tolist():
-        points.insert(Point_3(*point))
-    advancing_front_surface_reconstruction(points, corners)
-    return Laid(scene.cloud.points, np.array(corners, np.int32).reshape(-1, 3), scene.cloud.colors)
+    points = np.ascontiguousarray(scene.cloud.points, np.float64)
+    facets = function("advancing_front", "advance", POINTER)(points, len(points))
+    corners = np.empty((function("advancing_front", "count", POINTER)(facets), 3), np.int32)
+    function("advancing_front", "unload")(facets, corners)
+    return Laid(points, corners, scene.cloud.colors)
 
 
 METHODS: dict[str, Callable[[Scene], Laid]] = {
@@ -138,18 +134,20 @@ def _of_open3d(scene: Scene, mesh: Any) -> Laid:
     return Laid(np.asarray(mesh.vertices), np.asarray(mesh.triangles), colors)
 
 
-def _grid(scene: Scene) -> Any:
-    """Fuse the images at nacre's poses."""
+def _grid(scene: Scene, size: Callable[[Array], int], most: int) -> Any:
+    """Fuse the images at nacre's poses; size: how many blocks a method takes for those that are touched."""
     import open3d as o3d
 
     core, camera = o3d.core, scene.camera
     names = ("tsdf", "weight", "color") if scene.has_color else ("tsdf", "weight")
     channels = ((1,), (1,), (3,))[: len(names)]
     types = (core.float32, core.float32, core.float32)[: len(names)]
-    grid = o3d.t.geometry.VoxelBlockGrid(names, types, channels, scene.spacing, BLOCK, 20_000)
     intrinsic = core.Tensor(
         [[camera.fx, 0.0, camera.cx], [0.0, camera.fy, camera.cy], [0.0, 0.0, 1.0]], core.float64
     )
+
+    def grid_of(blocks: int) -> Any:
+        return o3d.t.geometry.VoxelBlockGrid(names, types, channels, scene.spacing, BLOCK, blocks)
 
     def image(pixels: Array) -> Any:
         return o3d.t.geometry.Image(core.Tensor(np.ascontiguousarray(pixels, np.float32)))
@@ -157,13 +155,17 @@ def _grid(scene: Scene) -> Any:
     known = [i for i, pose in enumerate(scene.poses) if np.isfinite(pose).all()]
     depths = [image(np.nan_to_num(scene.depths[i])) for i in known]
     extrinsics = [core.Tensor(np.linalg.inv(scene.poses[i]), core.float64) for i in known]
+    empty = grid_of(1)
     blocks = [
-        grid.compute_unique_block_coordinates(depth, intrinsic, extrinsic, 1.0, 10.0)
+        empty.compute_unique_block_coordinates(depth, intrinsic, extrinsic, 1.0, 10.0)
         for depth, extrinsic in zip(depths, extrinsics, strict=True)
     ]
-    voxels = BLOCK**3 * len(np.unique(np.concatenate([rows.numpy() for rows in blocks]), axis=0))
-    if voxels > MOST_VOXELS:
-        raise OverBudgetError(f"not run: {voxels} voxels")
+    different = np.unique(np.concatenate([rows.numpy() for rows in blocks]), axis=0)
+    voxels = BLOCK**3 * size(different)
+    if voxels >= most:
+        raise OverBudgetError(voxels, most)
+    # As much memory as they take, and room for an image's, which are counted before those there are found.
+    grid = grid_of(len(different) + max(map(len, blocks)))
     for i, rows, depth, extrinsic in zip(known, blocks, depths, extrinsics, strict=True):
         color = scene.colors[i]
         images = [depth] if color is None else [depth, image(color / 255)]

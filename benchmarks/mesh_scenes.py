@@ -64,8 +64,11 @@ class Figures:
 class Scene:
     """What a method may use: a coloured cloud, and the images with their poses in its frame."""
 
-    def __init__(self, case: cases.Case) -> None:
-        _, model = cases.run(case, num_threads=0)
+    more_than = 1.0
+    """Images that have to have seen a voxel."""
+
+    def __init__(self, case: cases.Case, **options: Any) -> None:
+        _, model = cases.run(case, num_threads=0, **options)
         self.camera: nacre.Camera = case.camera
         self.cloud: Cloud = model.cloud()
         neighbors = nacre.KdTree(self.cloud.points).query(self.cloud.points, 7)[0][:, 1:]

@@ -9,8 +9,9 @@ voxels. `mesh_scenes.py` says what is compared with the truth of an object, and 
 recording. Parts are what edges join, holes rings of open edges, memory is how much the peak rises; times are
 the processor's, of all threads, so that other work on the machine does not count.
 
-    pip install open3d scikit-image cgal                         # peers, in an environment of their own
-    python benchmarks/meshing.py [CASE ...] [--page docs/algorithms/meshing.md]
+    pip install open3d scikit-image                              # peers, in an environment of their own
+    cmake -S benchmarks/cpp_peers -B PEERS && cmake --build PEERS
+    NACRE_BENCHMARK_PEERS=PEERS python benchmarks/meshing.py [CASE ...] [--page docs/algorithms/meshing.md]
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ import numpy as np
 import numpy.typing as npt
 from mesh_methods import METHODS, OverBudgetError
 from mesh_scenes import Figures, Laid, Painted, Recorded, Scene
+from suite.native import AbsentError
 from suite.worker import give_back_memory, memory, reset_peak
 
 Array = npt.NDArray[Any]
@@ -101,7 +103,7 @@ def result_of(scene: Painted | Recorded, method: Callable[[Scene], Laid]) -> Res
     """Measure a method, or say why it was not run."""
     try:
         seconds, megabytes, laid = timed(scene, method)
-    except (ImportError, OverBudgetError) as error:
+    except (ImportError, AbsentError, OverBudgetError) as error:
         return error
     laid.vertices = np.asarray(laid.vertices, np.float64)
     return Result(seconds, megabytes, laid.triangles, scene.measure(laid))
@@ -142,7 +144,7 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=cases.DATA, help="where the recordings are")
     options = parser.parse_args()
     cases.DATA = options.data
-    for peer in ("open3d", "skimage.measure", "CGAL"):
+    for peer in ("open3d", "skimage.measure"):
         with contextlib.suppress(ImportError):
             importlib.import_module(peer)  # before its memory is measured
     lines = []
