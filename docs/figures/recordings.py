@@ -31,16 +31,18 @@ sys.path += [str(ROOT / "benchmarks"), str(ROOT / "tests" / "python")]
 import cases  # noqa: E402
 import mesh_methods  # noqa: E402
 from browser import Browser  # noqa: E402
-from mesh_scenes import STEPS, Laid, Scene  # noqa: E402
+from mesh_scenes import Laid, Scene, backprojected  # noqa: E402
 
-MESHED = ["teddy", "d435", "icl"]
+# Recordings; after which part of the path the picture is taken, how far behind the camera, of the distance.
+MESHED = {"teddy": (0.5, 0.5), "d435": (0.5, 0.3), "icl": (0, 0.3), "dog": (0, -0.5)}
 METHODS = {
     "nacre": mesh_methods.nacre_open,
     "Open3D, Poisson": mesh_methods.open3d_poisson,
     "Open3D, TSDF": mesh_methods.open3d_tsdf,
 }
-SIDE, BACK = 0.2, 0.3  # of the distance: where the picture is taken, right of the camera, and behind it
+SIDE = 0.2  # of the distance: how far right of the camera, and half as far above it
 PANEL = (300, 225)
+KINDS = "depth", "rgb"
 DOG_CAMERA = nacre.Camera(640, 480, 616.87, 617.06, 319.57, 233.06)
 RECORDINGS = [
     "tum-fr3-teddy",
@@ -61,13 +63,13 @@ WIDTH = {PAGE: 480, VIEW: 370}  # of their pictures
 QUALITY = 60  # of the files, which stay below 150 kB
 
 
-def beside(points, pose):
-    """Return a camera's pose that was moved aside, towards the same middle of what it saw."""
+def beside(points, pose, back):
+    """Return a camera's pose that was moved aside and back, towards the same middle of what it saw."""
     local = (points - pose[:3, 3]) @ pose[:3, :3]
     seen = local[(local[:, 2] > 0) & (np.abs(local[:, :2]) < 0.6 * local[:, 2:]).all(axis=1)]
-    distance = float(np.median(seen[:, 2]))
-    eye = np.array([SIDE, -SIDE / 2, -BACK]) * distance
-    forward = np.array([0, 0, distance]) - eye
+    middle = np.median(seen, axis=0)
+    eye = np.array([SIDE, -SIDE / 2, -back]) * middle[2]
+    forward = middle - eye
     forward /= np.linalg.norm(forward)
     right = np.cross([0, 1, 0], forward)
     right /= np.linalg.norm(right)
@@ -77,10 +79,10 @@ def beside(points, pose):
     return moved
 
 
-def middle_pose(poses):
-    """Return the pose in the middle of those that are known."""
+def pose_after(part, poses):
+    """Return the pose after a part of those that are known."""
     known = [pose for pose in poses if np.isfinite(pose).all()]
-    return np.asarray(known[len(known) // 2])
+    return np.asarray(known[int(part * len(known))])
 
 
 def mesh_panel(laid: Laid, pose, size):
@@ -110,9 +112,9 @@ def mesh_panel(laid: Laid, pose, size):
 def meshes():
     """Draw meshes of the same poses, a row for each recording."""
     panels = []
-    for name in MESHED:
-        scene = Scene(cases.make(name, every=STEPS.get(name, 1)))
-        pose = beside(scene.cloud.points, middle_pose(scene.poses))
+    for name, (part, back) in MESHED.items():
+        scene = toy() if name == "dog" else Scene(cases.make(name))
+        pose = beside(scene.cloud.points, pose_after(part, scene.poses), back)
         for title, method in METHODS.items():
             panels.append((f"{name}: {title}", mesh_panel(method(scene), pose, PANEL)))
     return draw.sheet(panels, columns=len(METHODS))
@@ -182,13 +184,30 @@ def screens():
     return draw.sheet(panels, columns=2)
 
 
+def six_views():
+    """Return the recording of a toy on a turntable, far apart."""
+    folder = cases.DATA / "realsense-turntable-dog" / "data1"
+    images = {kind: [np.asarray(Image.open(folder / f"{kind}_{i}.png")) for i in range(6)] for kind in KINDS}
+    depths = [depth.astype(np.float32) / 1000 for depth in images["depth"]]
+    return cases.Case("dog", DOG_CAMERA, depths, [color[..., :3] for color in images["rgb"]], [None] * 6)
+
+
+def toy():
+    """Return the toy alone, as nacre found it; of the images, too, what lies near its points."""
+    scene = Scene(six_views(), region={"object": True})
+    scene.more_than = 0.0  # most of it is in one or two images
+    tree = nacre.KdTree(scene.cloud.points)
+    for depth, pose in zip(scene.depths, scene.poses, strict=True):
+        points, pixels = backprojected(depth, scene.camera)
+        points = points @ pose[:3, :3].T + pose[:3, 3]
+        is_far = tree.query(points, 1)[0] > 3 * scene.spacing
+        depth[tuple(rows[is_far] for rows in pixels)] = np.nan
+    return scene
+
+
 def dog():
     """Draw a toy of which six views, far apart, were joined, from four sides."""
-    folder = cases.DATA / "realsense-turntable-dog" / "data1"
-    model = nacre.Model(DOG_CAMERA, region={"object": True})
-    for i in range(6):
-        depth, color = (np.asarray(Image.open(folder / f"{kind}_{i}.png")) for kind in ("depth", "rgb"))
-        model.add_frame(depth.astype(np.float32) / 1000, color[..., :3])
+    _, model = cases.run(six_views(), region={"object": True})
     cloud = model.cloud()
     size, spacing = (360, 360), 1.5 * model.spacing
     more = {"hide_reverse": True, "spacing": spacing, "size": size}
