@@ -196,6 +196,26 @@ def wrong_focal_length(factor: float) -> Callable[[Case], Case]:
     return change
 
 
+def distorted(factor: float) -> Callable[[Case], Case]:
+    """Let the lens bend rays by a factor of the squared slope, of which nobody knows."""
+
+    def change(case: Case) -> Case:
+        camera, (height, width) = case.camera, case.depths[0].shape
+        v, u = np.mgrid[:height, :width]
+        x, y = (u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy
+        bent = 1 + factor * (x**2 + y**2)
+        column = np.round(x * bent * camera.fx + camera.cx).astype(int)
+        row = np.round(y * bent * camera.fy + camera.cy).astype(int)
+        inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+        column, row = np.clip(column, 0, width - 1), np.clip(row, 0, height - 1)
+        return replace(
+            each(case, lambda depth: np.where(inside, depth[row, column], np.nan).astype(np.float32)),
+            colors=[None if color is None else color[row, column] for color in case.colors],
+        )
+
+    return change
+
+
 def passed_by(part: float) -> Callable[[Case], Case]:
     """Let somebody walk through the image, there and back: a cylinder that fills so much of its width."""
 
@@ -273,6 +293,7 @@ DAMAGES: dict[str, Callable[[Case], Case]] = {
     **{f"somebody passing, {100 * part:.0f} % wide": passed_by(part) for part in (0.15, 0.3, 0.45)},
     **{f"a gripper over {100 * part:.0f} % of the image": holding(part) for part in (0.1, 0.2, 0.35)},
     **{f"focal length {factor:+.0%}": wrong_focal_length(1 + factor) for factor in (-0.03, 0.03)},
+    **{f"rays bent by {factor:+.0%} of their squared slope": distorted(factor) for factor in (-0.05, 0.05)},
 }
 
 
