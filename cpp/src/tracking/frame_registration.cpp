@@ -359,7 +359,7 @@ std::vector<Pose> FrameRegistration::along_open(const IcpResult& found, const Po
     Vector6 direction = found.weak_directions.col(i);
     direction.head<3>() /= found.extent;
     for (const double side : {-1.0, 1.0}) {
-      for (int step = 1; gate > 0.0; ++step) {
+      for (int step = 1; step <= tracking_limits::most_open_steps; ++step) {
         const Pose pose = motion_about(found.center, side * step * gate * direction) * found.target_from_source;
         if (view_distance(guess, pose, depth_) > farthest) break;
         poses.push_back(pose);

@@ -62,6 +62,7 @@ constexpr double least_staying = 0.9;  // [1] tuned: part of a thing that stays 
 constexpr double nearer_than_scene = 0.5;  // [1] tuned: its median depth by the image's; test_carried_things
 constexpr double most_asked_pixels = 20000.0;  // [pixels] budget: of a view, whether another one conflicts with it; benchmarks/run.py
 constexpr double conflict_reach = 0.15;  // [depth] tuned: of the surroundings of conflicts, which what moves may fill; test_moving_things
+constexpr int most_open_steps = 40;  // [steps] budget: along an open direction, one way, where a narrow gate of the user's makes them short; test_orbit
 constexpr double unexplained_conflicts = 0.1;  // [1] tuned: part of them that may be left where the camera's motion explains what changed, as at edges of what it turned about; test_orbit
 constexpr int least_conflicts = 6;  // [points] tuned: in a cell of half that size, that crowd; test_moving_things
 constexpr double fewer_conflicts = 2.0;  // [sigma] derived: of the difference of two counts, that is no chance; test_moving_things

@@ -144,8 +144,8 @@ std::optional<TrackingResult> only_along_open(const FrameRegistration& registrat
   if (starts.empty()) return std::nullopt;
   const PointsInView& view = registration.in_view(last);
   TrackingResult best;
-  for (const Pose& start :
-       most_promising(AlignCloud(view.points, view.normals), registration.source(), starts, options.registration)) {
+  for (const Pose& start : most_promising(AlignCloud(view.points, view.normals), registration.source(), starts,
+                                          options.registration, prior.depth)) {
     const TrackingResult found = registration.from(start, FrameRegistration::Gate::narrow, Expectation::beside);
     keep_better(found, best);
     prior.tried.push_back(found);
