@@ -9,7 +9,8 @@ millimetres; cartons in a corner are walked around, in steps of so many degrees;
 person, and a cow of 0.8 m, turn before the camera, alone; two people stand before a desk for two seconds,
 and then walk about, while somebody holds the camera. Things on a table are walked around, and a head, in
 steps of so many degrees; a camera before a shelf of books twists by so many degrees a frame; one turns about
-itself in a room; somebody walks along a corridor.
+itself in a room; somebody walks along a corridor, or over a bare floor, of which nothing should be claimed,
+in steps of so many millimetres.
 With `--colors` walls and things are printed with a soft pattern, and the camera takes colour images, too.
 With `--cameras` four of the scenes are seen by cameras of other sizes and lenses.
 
@@ -51,6 +52,7 @@ SCENES = {
     "shelf": ((1, 60), (3, 60)),
     "room": ((2, 60), (6, 60)),
     "corridor": ((30, 60), (10, 40)),
+    "floor": ((5, 40), (15, 40)),
 }
 # Other sizes and lenses: the kind of sensor, width and height, and the focal length [pixels].
 CAMERAS = {
@@ -65,7 +67,7 @@ CAMERAS = {
     "640 x 480, 67 degrees": ("phone_lidar", 640, 480, 480),
 }
 SEEN_BY_THEM = (("flat", 10, 40), ("table", 8, 30), ("cartons", 10, 24), ("shelf", 3, 30))
-UNITS = dict.fromkeys(("flat", "people", "corridor"), "frames a second") | {"wall": "mm"}
+UNITS = dict.fromkeys(("flat", "people", "corridor"), "frames a second") | dict.fromkeys(("wall", "floor"), "mm")
 DISTANCES = {"homer": 2.2, "spot": 1.2, "cartons": 2.0}  # [m]
 
 
@@ -96,6 +98,7 @@ def make(
         "shelf": (scenes.shelf, lambda: scenes.twisting(speed, count)),
         "room": (scenes.room, lambda: scenes.turning(speed, count)),
         "corridor": (scenes.corridor, lambda: scenes.along(speed, count)),
+        "floor": (scenes.floor, lambda: scenes.over(speed, count)),
     }
     if scene in still:
         mesh_of, poses_of = still[scene]

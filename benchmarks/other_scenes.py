@@ -105,6 +105,17 @@ def passing(step: int, count: int) -> list[Array]:
     return list(poses)
 
 
+def floor() -> nacre.Mesh:
+    """Return a bare floor 1.2 m below the camera."""
+    return merged([box([0, 1.25, 0], [60, 0.1, 60], 0)])
+
+
+def over(step: int, count: int) -> list[Array]:
+    """Return poses on a circle of 1.2 m, looking out and down, in steps of so many millimetres."""
+    outwards = [np.array([math.sin(turn), 0, math.cos(turn)]) for turn in 0.001 * step / 1.2 * np.arange(count)]
+    return [looking(1.2 * outward, outward + [0, 0.7, 0]) for outward in outwards]
+
+
 def upright(name: str, size: float) -> nacre.Mesh:
     """Return a mesh of a size about the origin, its head up, where y points down."""
     mesh = cases.object_mesh(name)

@@ -127,6 +127,23 @@ def test_what_sticks_to_a_camera_does_not_hold_it(sensor: Any, focal_length: flo
     np.testing.assert_allclose(come, 0.04 * np.arange(8), atol=0.02)
 
 
+@pytest.mark.parametrize(
+    ("sensor", "down"), [("stereo", 30), ("stereo", 70), ("structured_light", 30), ("phone_lidar", 70)]
+)
+def test_a_bare_floor_tells_nothing_of_who_passes_over_it(sensor: Any, down: float) -> None:
+    # What pixels err by again and again looks like relief that agrees, where the camera has not moved.
+    camera, floor = nacre.Camera(320, 240, 290, 290, 159.5, 119.5), boxes(((-9, 0, -9), (9, 0.1, 9)))
+    model, pose = nacre.Model(camera), np.eye(4)
+    cos, sin = np.cos(np.radians(down)), np.sin(np.radians(down))
+    pose[:3, :3] = [[1, 0, 0], [0, cos, sin], [0, -sin, cos]]
+    for number in range(12):
+        pose[:3, 3] = [0.014 * number, -1, 0]
+        model.add_frame(floor.simulate_depth(camera, pose, sensor=sensor, seed=number, sensor_seed=1))
+    assert [report.status for report in model.frames[2:]] == 10 * ["WEAK"]
+    shifts = [report.world_from_camera[0, 3] for report in model.frames if report.status == "TRACKED"]
+    np.testing.assert_allclose(shifts, 0.014 * np.arange(len(shifts)), atol=0.01)
+
+
 def corridor() -> nacre.Mesh:
     """Return a corridor two metres wide, with door frames 5 cm deep on one side or the other."""
     corners = [((-1.1, 1.15, -4), (1.1, 1.25, 16)), ((-1.1, -1.45, -4), (1.1, -1.35, 16))]

@@ -53,7 +53,8 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   if (options.registration.method == Metric::paper) {
     return PaperLoop{options, static_cast<std::int32_t>(history.size())}.register_frame(
         {frame, cells, camera, observer, now, noise_factor},
-        {cloud, blocks, spacing, before, still_scene, 0, usual_consistency.mean()}, guesses(extras).front());
+        {cloud, blocks, spacing, before, still_scene, earlier_pose(), num_open > 0, 0, usual_consistency.mean()},
+        guesses(extras).front());
   }
   const Expectation expectation = was_lost() || jumped() ? Expectation::near_lost : Expectation::expected;
   const bool is_predicted = !was_lost() || extras.guess.has_value();
@@ -76,7 +77,9 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
 TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
   const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
   const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
-  const TrackingTarget target{cloud, blocks, spacing, before, still_scene, oldest_frame, usual_consistency.mean()};
+  const TrackingTarget target{cloud,        blocks,       spacing,
+                              before,       still_scene,  earlier_pose(),
+                              num_open > 0, oldest_frame, usual_consistency.mean()};
   TrackingResult result;
   TrackingOptions nearby = options;
   nearby.relocalise = false;
@@ -120,7 +123,9 @@ void Pipeline::learn_from_given(const Pose& pose) {
   } else {
     const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
     odometry.look_at(
-        FrameRegistration(current, {cloud, blocks, spacing, before, still_scene, 0, {}}, options).source());
+        FrameRegistration(current, {cloud, blocks, spacing, before, still_scene, earlier_pose(), num_open > 0, 0, {}},
+                          options)
+            .source());
   }
 }
 
@@ -132,12 +137,15 @@ void Pipeline::learn_from(const TrackingResult& tracking) {
   set_noise_factor(residual_noise.factor());
 }
 
+Pose Pipeline::earlier_pose() const {
+  if (history.num_registered() == 0) return Pose::Identity();
+  return history.registered_pose(std::min(tracking_limits::telling_frames, history.num_registered() - 1));
+}
+
 // Whether the camera has not rested lately: errors that stay where they are in the image show where others saw what it
 // sees.
 bool Pipeline::tells_noise(const TrackingResult& tracking) const {
-  const Pose before_it =
-      history.registered_pose(std::min(tracking_limits::telling_frames, history.num_registered() - 1));
-  return mean_pixel_motion(cells, before_it.inverse() * tracking.alignment.target_from_source) >=
+  return mean_pixel_motion(cells, earlier_pose().inverse() * tracking.alignment.target_from_source) >=
          tracking_limits::telling_motion;
 }
 

@@ -127,7 +127,7 @@ IcpStep solve_step(const std::vector<Pair>& pairs, Metric metric, const WeakTest
   const Matrix6 by_scale = scale.cwiseInverse().asDiagonal();
   const Matrix6 otherwise = sums.agreement * (by_scale * test.told_otherwise * by_scale);
   const Vector6 told_otherwise = (eigen.vectors.transpose() * otherwise * eigen.vectors).diagonal();
-  const Vector6 needed = told_otherwise.cwiseMax(test.least_signal * feigned).cwiseMax(least);
+  const Vector6 needed = told_otherwise.cwiseMax(test.least_signal * feigned.cwiseMax(least)).cwiseMax(least);
   TwistBasis sure(6, 0);
   step.weak_directions.resize(6, 0);
   for (Eigen::Index i = 0; i < 6; ++i) {

@@ -8,8 +8,9 @@
 #include "camera/limits.hpp"
 #include "camera/view_distance.hpp"
 #include "registration/acceptance.hpp"
-#include "registration/icp.hpp"
+#include "registration/limits.hpp"
 #include "tracking/limits.hpp"
+#include "tracking/shared_errors.hpp"
 
 namespace nacre {
 
@@ -18,12 +19,16 @@ void FrameOdometry::look_at(const IcpSource& frame) {
   depth_ = median_depth(frame.cloud.points);
 }
 
-void FrameOdometry::follow(const IcpSource& frame, const DepthView& view, const Camera& camera, double margin,
-                           const std::optional<Consistency>& usual, const TrackingOptions& options) {
+void FrameOdometry::follow(const IcpSource& frame, const CoarseFrame& cells, const DepthView& view,
+                           const Camera& camera, double margin, const std::optional<Consistency>& usual,
+                           const TrackingOptions& options) {
   if (is_followed_ || !before_) return;
   is_followed_ = true;
   const IcpTarget target(AlignCloud(before_->points, before_->normals), options.registration);
-  const IcpResult moved = align_to(target, frame, motion_, options.registration);
+  IcpResult moved = align_to(target, frame, motion_, options.registration);
+  if (may_stick(cells, moved.target_from_source)) {
+    hold_feigned(target, frame, options.registration, registration_limits::signal_at_rest, moved);
+  }
   if (!(moved.overlap >= tracking_limits::least_followed)) return;
   const double consistency =
       compare(before_->points, before_->normals, view, moved.target_from_source, camera, {margin}, options.num_threads)

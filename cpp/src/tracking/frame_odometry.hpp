@@ -7,6 +7,7 @@
 #include "depth/depth_view.hpp"
 #include "nacre/tracking_options.hpp"
 #include "nacre/tracking_report.hpp"
+#include "region/coarse_frame.hpp"
 #include "registration/acceptance.hpp"
 #include "registration/correspondences.hpp"
 
@@ -25,8 +26,8 @@ class FrameOdometry {
   // The newest frame: at each, before it is followed.
   void look_at(const IcpSource& frame);
   // Registers the newest frame to the one before, once. margin: across a surface [m]; usual: of registered frames.
-  void follow(const IcpSource& frame, const DepthView& view, const Camera& camera, double margin,
-              const std::optional<Consistency>& usual, const TrackingOptions& options);
+  void follow(const IcpSource& frame, const CoarseFrame& cells, const DepthView& view, const Camera& camera,
+              double margin, const std::optional<Consistency>& usual, const TrackingOptions& options);
   // The newest frame is done with: it is registered there, or lost. weak_directions: as AlignResult has them.
   void end_frame(FrameStatus status, const Pose& world_from_camera, const WeakDirections& weak_directions);
 

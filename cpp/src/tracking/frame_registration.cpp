@@ -16,6 +16,7 @@
 #include "registration/open_directions.hpp"
 #include "tracking/likeness.hpp"
 #include "tracking/limits.hpp"
+#include "tracking/shared_errors.hpp"
 
 namespace nacre {
 
@@ -58,8 +59,10 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
     if (of_few.is_hopeless) return of_few;
   }
   IcpResult by_shape = align_to(pairing.target, pairing.source, start, pairing.options);
+  hold_feigned_directions(pairing, by_shape);
   if (by_shape.weak_directions.cols() > 0) {
     hold_open_directions(pairing, guess, by_shape);
+    hold_feigned_directions(pairing, by_shape);
     determine_open_directions(pairing, colors_of(surfaces.view, pairing, pairing.source), by_shape);
     return test(std::move(by_shape), surfaces, guess, expectation);
   }
@@ -71,9 +74,7 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   }
   if (result.is_hopeless) return result;
   const Pose& pose = result.alignment.target_from_source;
-  const bool may_stick = is_at_rest(pose);
-  const WeakTest by_noise{pairing.options.weak_threshold,
-                          may_stick ? registration_limits::signal_at_rest : registration_limits::least_signal};
+  const WeakTest by_noise{pairing.options.weak_threshold, registration_limits::least_signal};
   const bool is_doubtful = result.alignment.signal < by_noise.least_signal;
   const bool is_unclear = !result.is_clear_cut && result.alignment.signal < registration_limits::least_signal;
   const bool is_surprise = result.expectation == Expectation::expected && !are_close(pose, guess);
@@ -97,9 +98,7 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
     const bool is_rival = other.score > GlobalAlignOptions().max_rivalry * result.score;
     return is_rival && !are_close(pose, other.alignment.target_from_source) ? other : result;
   }
-  // At rest shared errors match, too, and raise the score: then it is for the shapes to fit clearly better.
-  const bool is_better = may_stick ? other.score > tracking_limits::clearly_better * result.score
-                                   : result.score < tracking_limits::clearly_better * other.score;
+  const bool is_better = result.score < tracking_limits::clearly_better * other.score;
   return is_better ? other : result;
 }
 
@@ -190,13 +189,6 @@ bool FrameRegistration::are_close(const Pose& a, const Pose& b) const {
   return shift_ahead(a, b) < outlines_limits::last_gate * now_.camera.footprint(depth_);
 }
 
-// The camera itself, since the last view.
-bool FrameRegistration::is_at_rest(const Pose& pose) const {
-  const Pose& last = target_.last_view.world_from_camera;
-  const double shift = (pose.translation() - last.translation()).norm() + depth_ * angle_between(pose, last);
-  return shift < outlines_limits::last_gate * now_.camera.footprint(depth_);
-}
-
 TrackingResult FrameRegistration::test(IcpResult alignment, const Surfaces& surfaces, const Pose& guess,
                                        Expectation expectation) const {
   TrackingResult result;
@@ -262,6 +254,14 @@ void FrameRegistration::hold_open_directions(const Pairing& pairing, const Pose&
   IcpResult held = align_held(pairing.target, pairing.source, nearest, pairing.options, result.weak_test);
   const bool is_found = held.status != AlignStatus::too_few_pairs;
   if (is_found && held.weak_directions.cols() <= result.weak_directions.cols()) result = std::move(held);
+}
+
+// What noise may feign: all that errors hold where they were, and what was open before.
+void FrameRegistration::hold_feigned_directions(const Pairing& pairing, IcpResult& result) const {
+  const bool sticks = may_stick(now_.cells, target_.earlier.inverse() * result.target_from_source);
+  const double least_otherwise = target_.was_open ? registration_limits::least_signal : 0.0;
+  const double least = sticks ? registration_limits::signal_at_rest : least_otherwise;
+  hold_feigned(pairing.target, pairing.source, pairing.options, least, result);
 }
 
 // What the shapes leave open, colours or outlines may decide.

@@ -35,6 +35,8 @@ struct TrackingTarget {
   double spacing;              // of the model [m]
   const DepthView& last_view;  // what the camera saw when it was last registered
   const StillScene& still_scene;
+  Pose earlier;                      // where the camera was some frames ago
+  bool was_open;                     // the frame before left directions open
   std::int32_t oldest_frame;         // points that no later frame has seen may have drifted away: they are left out
   std::optional<Consistency> usual;  // of registered frames: see AcceptanceOptions
 };
@@ -120,7 +122,6 @@ class FrameRegistration {
                                 const PointsInView& view) const;
   double shift_ahead(const Pose& a, const Pose& b) const;
   bool are_close(const Pose& a, const Pose& b) const;
-  bool is_at_rest(const Pose& world_from_camera) const;
   TrackingResult registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
                             Expectation expectation) const;
   // The best of what is found from places beside it, in the direction of which the shapes tell least.
@@ -137,6 +138,7 @@ class FrameRegistration {
   Pairing paired(const Surfaces& surfaces, Gate gate) const;
   TrackingResult test(IcpResult alignment, const Surfaces& surfaces, const Pose& guess, Expectation expectation) const;
   IcpSource gated(IcpSource source, const PointsInView& view, const IcpTarget& target) const;
+  void hold_feigned_directions(const Pairing& pairing, IcpResult& result) const;
   void hold_open_directions(const Pairing& pairing, const Pose& guess, IcpResult& result) const;
   void determine_open_directions(const Pairing& pairing, const std::optional<ColorRegistration>& colors,
                                  IcpResult& result) const;

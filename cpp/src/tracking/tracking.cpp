@@ -245,8 +245,8 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   FrameRegistration registration(now, target, options);
   const IcpSource& source = registration.source();
   const auto follow = [&] {
-    odometry.follow(source, now.view, now.camera, camera_limits::surface_spacings * target.spacing, target.usual,
-                    options);
+    odometry.follow(source, now.cells, now.view, now.camera, camera_limits::surface_spacings * target.spacing,
+                    target.usual, options);
     prior.followed = odometry.place();
   };
   odometry.look_at(source);

@@ -51,7 +51,9 @@ struct Camcorder {
     const Points normals = take_rows<Points>(frame.normals, frame.valid);
     const IcpSource source(AlignCloud(points, normals), options.registration);
     odometry.look_at(source);
-    if (is_followed) odometry.follow(source, {frame.points.col(2), frame.sigma}, pinhole, 0.01, std::nullopt, options);
+    if (is_followed)
+      odometry.follow(source, CoarseFrame(frame, pinhole, {}), {frame.points.col(2), frame.sigma}, pinhole, 0.01,
+                      std::nullopt, options);
   }
   void see_and_register(int step, Relief relief) {
     see(camera_at(step), relief);
