@@ -67,7 +67,8 @@ CAMERAS = {
     "640 x 480, 67 degrees": ("phone_lidar", 640, 480, 480),
 }
 SEEN_BY_THEM = (("flat", 10, 40), ("table", 8, 30), ("cartons", 10, 24), ("shelf", 3, 30))
-UNITS = dict.fromkeys(("flat", "people", "corridor"), "frames a second") | dict.fromkeys(("wall", "floor"), "mm")
+UNITS = dict.fromkeys(("flat", "people", "corridor"), "frames a second")
+UNITS |= dict.fromkeys(("wall", "floor"), "mm")
 DISTANCES = {"homer": 2.2, "spot": 1.2, "cartons": 2.0}  # [m]
 
 

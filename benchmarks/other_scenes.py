@@ -112,8 +112,9 @@ def floor() -> nacre.Mesh:
 
 def over(step: int, count: int) -> list[Array]:
     """Return poses on a circle of 1.2 m, looking out and down, in steps of so many millimetres."""
-    outwards = [np.array([math.sin(turn), 0, math.cos(turn)]) for turn in 0.001 * step / 1.2 * np.arange(count)]
-    return [looking(1.2 * outward, outward + [0, 0.7, 0]) for outward in outwards]
+    turns = 0.001 * step / 1.2 * np.arange(count)
+    outwards = [np.array([math.sin(turn), 0, math.cos(turn)]) for turn in turns]
+    return [looking(1.2 * outward, outward + np.array([0, 0.7, 0])) for outward in outwards]
 
 
 def upright(name: str, size: float) -> nacre.Mesh:
