@@ -52,8 +52,8 @@ struct Camcorder {
     const IcpSource source(AlignCloud(points, normals), options.registration);
     odometry.look_at(source);
     if (is_followed)
-      odometry.follow(source, CoarseFrame(frame, pinhole, {}), {frame.points.col(2), frame.sigma}, pinhole, 0.01,
-                      std::nullopt, options);
+      odometry.follow(source, CoarseFrame(frame, pinhole, MaskImage()), {frame.points.col(2), frame.sigma}, pinhole,
+                      0.01, std::nullopt, options);
   }
   void see_and_register(int step, Relief relief) {
     see(camera_at(step), relief);
