@@ -110,8 +110,6 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
   }
   if (result.is_lost()) result = track(current, target, prior, odometry, hypothesis, may_search ? options : nearby);
   if (result.decision == Decision::accepted) learn_from(result);
-  const bool is_weak = result.decision == Decision::undetermined;
-  if (is_weak && learns_noise() && !residual_noise.has_told()) learn_noise(result, false);
   return result;
 }
 
@@ -135,11 +133,7 @@ void Pipeline::learn_from(const TrackingResult& tracking) {
   const bool is_far = tracking.expectation == Expectation::unexpected || tracking.is_on_plane;
   if (!is_far) usual_consistency.add(tracking.consistency);
   if (!learns_noise() || tracking.is_on_plane || (shape && shape->is_bent())) return residual_noise.add(0.0, false);
-  learn_noise(tracking, tells_noise(tracking));
-}
-
-void Pipeline::learn_noise(const TrackingResult& tracking, bool tells) {
-  residual_noise.add(noise_factor * tracking.alignment.residual_sigmas, tells);
+  residual_noise.add(noise_factor * tracking.alignment.residual_sigmas, tells_noise(tracking));
   set_noise_factor(residual_noise.factor());
 }
 

@@ -114,7 +114,6 @@ struct Pipeline {
   void recall_layers(std::int32_t oldest_frame);
   TrackingResult register_frame(const FrameExtras& extras, const RegionReport& region_report);
   bool learns_noise() const;
-  void learn_noise(const TrackingResult& tracking, bool tells);
   Pose earlier_pose() const;
   bool tells_noise(const TrackingResult& tracking) const;
   void learn_from(const TrackingResult& tracking);
