@@ -52,9 +52,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
   }
   if (options.registration.method == Metric::paper) {
     return PaperLoop{options, static_cast<std::int32_t>(history.size())}.register_frame(
-        {frame, cells, camera, observer, now, noise_factor},
-        {cloud, blocks, spacing, before, still_scene, earlier_pose(), num_open > 0, 0, usual_consistency.mean()},
-        guesses(extras).front());
+        {frame, cells, camera, observer, now, noise_factor}, tracking_target(), guesses(extras).front());
   }
   const Expectation expectation = was_lost() || jumped() ? Expectation::near_lost : Expectation::expected;
   const bool is_predicted = !was_lost() || extras.guess.has_value();
@@ -77,9 +75,7 @@ TrackingResult Pipeline::register_frame(const FrameExtras& extras, const RegionR
 TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
   const std::int32_t oldest_frame = options.loop_closure && !was_lost() ? loops.oldest_frame() : 0;
   const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
-  const TrackingTarget target{cloud,        blocks,       spacing,
-                              before,       still_scene,  earlier_pose(),
-                              num_open > 0, oldest_frame, usual_consistency.mean()};
+  const TrackingTarget target = tracking_target(oldest_frame);
   TrackingResult result;
   TrackingOptions nearby = options;
   nearby.relocalise = false;
@@ -122,10 +118,7 @@ void Pipeline::learn_from_given(const Pose& pose) {
     track_frame({{pose}, Expectation::expected, true, history.num_registered() > 1, was_lost(), {}}, false);
   } else {
     const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
-    odometry.look_at(
-        FrameRegistration(current, {cloud, blocks, spacing, before, still_scene, earlier_pose(), num_open > 0, 0, {}},
-                          options)
-            .source());
+    odometry.look_at(FrameRegistration(current, tracking_target(), options).source());
   }
 }
 
@@ -135,6 +128,12 @@ void Pipeline::learn_from(const TrackingResult& tracking) {
   if (!learns_noise() || tracking.is_on_plane || (shape && shape->is_bent())) return residual_noise.add(0.0, false);
   residual_noise.add(noise_factor * tracking.alignment.residual_sigmas, tells_noise(tracking));
   set_noise_factor(residual_noise.factor());
+}
+
+TrackingTarget Pipeline::tracking_target(std::int32_t oldest_frame) const {
+  const bool was_open = num_open > 0;
+  return {
+      cloud, blocks, spacing, before, still_scene, earlier_pose(), was_open, oldest_frame, usual_consistency.mean()};
 }
 
 Pose Pipeline::earlier_pose() const {

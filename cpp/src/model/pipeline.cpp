@@ -260,8 +260,7 @@ void Pipeline::deform(const FrameExtras& extras, FrameReport& report) {
   blocks.renew(cloud);
   if (frame.valid.size() < base_limits::least_points) return;
   const CurrentFrame current{frame, cells, camera, observer, now, noise_factor};
-  const TrackingTarget target{
-      cloud, blocks, spacing, before, still_scene, earlier_pose(), num_open > 0, 0, usual_consistency.mean()};
+  const TrackingTarget target = tracking_target();
   const Pose pose = extras.keep_guess
                         ? *extras.guess
                         : FrameRegistration(current, target, options)

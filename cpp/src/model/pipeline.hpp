@@ -115,6 +115,7 @@ struct Pipeline {
   TrackingResult register_frame(const FrameExtras& extras, const RegionReport& region_report);
   bool learns_noise() const;
   Pose earlier_pose() const;
+  TrackingTarget tracking_target(std::int32_t oldest_frame = 0) const;
   bool tells_noise(const TrackingResult& tracking) const;
   void learn_from(const TrackingResult& tracking);
   void learn_from_given(const Pose& world_from_camera);

@@ -9,6 +9,7 @@
 #include "camera/limits.hpp"
 #include "camera/point_spacing.hpp"
 #include "camera/view_distance.hpp"
+#include "fusion/limits.hpp"
 #include "keypoints/motion.hpp"
 #include "nacre/global_registration.hpp"
 #include "outlines/limits.hpp"
@@ -76,7 +77,7 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   const Pose& pose = result.alignment.target_from_source;
   const WeakTest by_noise{pairing.options.weak_threshold, registration_limits::least_signal};
   const bool is_doubtful = result.alignment.signal < by_noise.least_signal;
-  const bool is_unclear = !result.is_clear_cut && result.alignment.signal < registration_limits::least_signal;
+  const bool is_unclear = is_doubtful && !result.is_clear_cut;
   const bool is_surprise = result.expectation == Expectation::expected && !are_close(pose, guess);
   const bool may_slide = is_surprise || (are_close(pose, target_.last_view.world_from_camera) &&
                                          result.alignment.signal < registration_limits::signal_at_rest);
@@ -98,8 +99,7 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
     const bool is_rival = other.score > GlobalAlignOptions().max_rivalry * result.score;
     return is_rival && !are_close(pose, other.alignment.target_from_source) ? other : result;
   }
-  const bool is_better = result.score < tracking_limits::clearly_better * other.score;
-  return is_better ? other : result;
+  return result.score < tracking_limits::clearly_better * other.score ? other : result;
 }
 
 // Where few matches tell of a direction, a registration may come to rest beside the right place, at the next door frame
@@ -256,12 +256,17 @@ void FrameRegistration::hold_open_directions(const Pairing& pairing, const Pose&
   if (is_found && held.weak_directions.cols() <= result.weak_directions.cols()) result = std::move(held);
 }
 
-// What noise may feign: all that errors hold where they were, and what was open before.
+// What noise may feign, as far as it tilts normals, which stand on a few pixels: where the camera may stick to what
+// they err by, and where directions were open before.
 void FrameRegistration::hold_feigned_directions(const Pairing& pairing, IcpResult& result) const {
-  const bool sticks = may_stick(now_.cells, target_.earlier.inverse() * result.target_from_source);
-  const double least_otherwise = target_.was_open ? registration_limits::least_signal : 0.0;
-  const double least = sticks ? registration_limits::signal_at_rest : least_otherwise;
-  hold_feigned(pairing.target, pairing.source, pairing.options, least, result);
+  const double support = fusion_limits::least_support * now_.camera.footprint(depth_);
+  const bool is_felt = result.weakest_part > std::pow(median_sigma(now_.frame) / support, 2);
+  if (is_felt || result.signal >= registration_limits::signal_at_rest) return;
+  if (may_stick(now_.cells, target_.earlier.inverse() * result.target_from_source)) {
+    hold_feigned(pairing.target, pairing.source, pairing.options, registration_limits::signal_at_rest, result);
+  } else if (target_.was_open) {
+    hold_feigned(pairing.target, pairing.source, pairing.options, registration_limits::least_signal, result);
+  }
 }
 
 // What the shapes leave open, colours or outlines may decide.

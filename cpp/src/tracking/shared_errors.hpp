@@ -6,7 +6,7 @@
 
 namespace nacre {
 
-// Whether a frame sees with so nearly the pixels of one before that errors of neighbours, which are alike, may hold it.
+// Whether a frame sees with about the pixels that one before saw with, so that what these err by may hold it.
 bool may_stick(const CoarseFrame& cells, const Pose& before_from_now);
 
 // Holds what noise may feign: directions of which the shapes tell less than this signal.
