@@ -73,7 +73,7 @@ constexpr double largest_noise_factor = 16.0;  // [1] budget: of the noise that 
 constexpr double least_residual_sigmas = 0.5;  // [sigma] derived: that confirm a noise that was tried: with half of it the frame had been lost; unrelated
 constexpr double telling_motion = 3.0;  // [pixel] tuned: by which a frame sees with other pixels than one before; test_residual_noise
 constexpr std::size_t telling_frames = 30;  // [frames] budget: so long ago; test_residual_noise
-constexpr double sticking_motion = 5.0;  // [pixel] tuned: within which errors that stay in the image may hold a camera: as far as neighbours share them; test_open_directions
+constexpr double sticking_motion = 8.0;  // [pixel] tuned: within which errors that stay in the image may hold a camera: as far as neighbours share them; test_open_directions
 constexpr double enough_frames = 5.0;  // [frames] tuned: that tell how noisy registered frames are, and what they contradict; unrelated
 constexpr std::int64_t least_judged = 20;  // [points] derived: that tell a part of all; test_tracking
 
