@@ -10,7 +10,6 @@
 #include "camera/point_spacing.hpp"
 #include "camera/view_distance.hpp"
 #include "fusion/limits.hpp"
-#include "keypoints/motion.hpp"
 #include "nacre/global_registration.hpp"
 #include "outlines/limits.hpp"
 #include "registration/limits.hpp"
@@ -73,7 +72,13 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   if (expectation == Expectation::expected && gate == Gate::narrow && is_still) {
     result = best_along_weakest(std::move(result), surfaces, pairing, guess, expectation);
   }
-  if (result.is_hopeless) return result;
+  return result.is_hopeless ? result : without_doubt(std::move(result), surfaces, pairing, start, guess, expectation);
+}
+
+// Where noise may feign what the shapes tell, outlines or colours may know better; where the camera seems to rest, or
+// not to go on as predicted, colours are asked.
+TrackingResult FrameRegistration::without_doubt(TrackingResult result, const Surfaces& surfaces, const Pairing& pairing,
+                                                const Pose& start, const Pose& guess, Expectation expectation) const {
   const Pose& pose = result.alignment.target_from_source;
   const WeakTest by_noise{pairing.options.weak_threshold, registration_limits::least_signal};
   const bool is_doubtful = result.alignment.signal < by_noise.least_signal;
@@ -322,78 +327,14 @@ const OutlinePair& FrameRegistration::outlines() const {
   return *outlines_;
 }
 
-std::vector<Pose> FrameRegistration::around(const Pose& world_from_camera) const {
-  const PointsInView& view = in_view(world_from_camera);
-  std::vector<Pose> poses = {world_from_camera};
-  if (view.points.rows() == 0) return poses;
-  const Eigen::Vector3d center = view.points.colwise().mean().transpose().cast<double>();
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const double angle : {-options_.registration.max_angle, options_.registration.max_angle}) {
-      Pose turn = Pose::Identity();
-      turn.linear() = Eigen::AngleAxisd(angle, world_from_camera.linear().col(axis)).toRotationMatrix();
-      turn.translation() = center - turn.linear() * center;
-      poses.push_back(turn * world_from_camera);
-    }
-  }
-  return poses;
-}
-
-std::optional<Pose> FrameRegistration::by_keypoints() const {
-  const auto keypoints_of = [&](const DepthView& view) {
-    return find_keypoints(view, now_.camera, depth_, options_.num_threads);
-  };
-  const DepthView& last = target_.last_view;
-  if (last.brightness.empty()) return std::nullopt;
-  const auto motion =
-      keypoint_motion(keypoints_of(now_.view), keypoints_of(last), options_.registration.seed, options_.num_threads);
-  return motion ? std::optional(last.world_from_camera * motion->target_from_source) : std::nullopt;
-}
-
 bool FrameRegistration::may_be_beside(const TrackingResult& found, const Pose& guess) const {
   if (found.is_lost() || found.decision == Decision::undetermined) return true;
   const double distance = view_distance(guess, found.alignment.target_from_source, depth_);
   return !found.is_clear_cut && distance * camera_limits::view_turn > 0.5 * tracking_limits::beside_turn;
 }
 
-std::vector<Pose> FrameRegistration::along_open(const IcpResult& found, const Pose& guess) const {
-  const Surfaces all{source_, in_view(guess), 0.0, in_view(guess)};
-  const double gate = paired(all, Gate::narrow).options.max_distance;
-  const double farthest = 2.0 * camera_limits::new_direction / camera_limits::view_turn;
-  std::vector<Pose> poses;
-  for (Eigen::Index i = 0; i < found.weak_directions.cols(); ++i) {
-    Vector6 direction = found.weak_directions.col(i);
-    direction.head<3>() /= found.extent;
-    for (const double side : {-1.0, 1.0}) {
-      for (int step = 1; step <= tracking_limits::most_open_steps; ++step) {
-        const Pose pose = motion_about(found.center, side * step * gate * direction) * found.target_from_source;
-        if (view_distance(guess, pose, depth_) > farthest) break;
-        poses.push_back(pose);
-      }
-    }
-  }
-  return poses;
-}
-
-std::vector<Pose> FrameRegistration::beside(const Pose& world_from_camera) const {
-  const PointsInView& view = in_view(world_from_camera);
-  std::vector<Pose> poses;
-  if (view.points.rows() == 0) return poses;
-  const Eigen::Vector3d seen = view.points.colwise().mean().transpose().cast<double>();
-  const int most = static_cast<int>(camera_limits::new_direction / tracking_limits::beside_turn);
-  for (const Eigen::Vector3d& center : {Eigen::Vector3d(world_from_camera.translation()), seen}) {
-    for (int i = -most; i <= most; ++i) {
-      for (int j = -most; j <= most; ++j) {
-        for (int k = -most; k <= most; ++k) {
-          const Eigen::Vector3d turn = tracking_limits::beside_turn * Eigen::Vector3d(i, j, k);
-          if (turn.norm() == 0.0 || turn.norm() > camera_limits::new_direction) continue;
-          Vector6 motion = Vector6::Zero();
-          motion.head<3>() = turn;
-          poses.push_back(motion_about(center, motion) * world_from_camera);
-        }
-      }
-    }
-  }
-  return poses;
+double FrameRegistration::narrow_gate(const Pose& guess) const {
+  return paired({source_, in_view(guess), 0.0, in_view(guess)}, Gate::narrow).options.max_distance;
 }
 
 }  // namespace nacre

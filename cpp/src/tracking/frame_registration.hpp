@@ -76,15 +76,8 @@ class FrameRegistration {
   const IcpSource& source() const { return source_; }
   double depth() const { return depth_; }
 
-  // Cameras around what a known camera saw: it turned about each of its axes, one way and the other.
-  std::vector<Pose> around(const Pose& world_from_camera) const;
-  // Cameras beside a known one, about as far apart as a registration finds its way: it turned about itself, or about
-  // what it saw.
-  std::vector<Pose> beside(const Pose& world_from_camera) const;
-  // Cameras along what a registration leaves open, a gate apart, and as far from a guess as those beside it.
-  std::vector<Pose> along_open(const IcpResult& found, const Pose& guess) const;
-  // Where keypoints of the last view say that the camera is; nothing where too few match.
-  std::optional<Pose> by_keypoints() const;
+  // As far as points are matched at first, from a guess that is about right [m].
+  double narrow_gate(const Pose& guess) const;
   // Whether frame and model have colours, and how alike they look from a place.
   bool has_colors() const { return !now_.view.brightness.empty() && !target_.model.colors.empty(); }
   Likeness likeness_at(const Pose& world_from_camera) const;
@@ -124,6 +117,9 @@ class FrameRegistration {
   bool are_close(const Pose& a, const Pose& b) const;
   TrackingResult registered(const Surfaces& surfaces, const Pose& start, const Pose& guess, Gate gate,
                             Expectation expectation) const;
+  // What colours or outlines know better than shapes that may be deceived.
+  TrackingResult without_doubt(TrackingResult result, const Surfaces& surfaces, const Pairing& pairing,
+                               const Pose& start, const Pose& guess, Expectation expectation) const;
   // The best of what is found from places beside it, in the direction of which the shapes tell least.
   TrackingResult best_along_weakest(TrackingResult found, const Surfaces& surfaces, const Pairing& pairing,
                                     const Pose& guess, Expectation expectation) const;

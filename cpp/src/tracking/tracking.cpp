@@ -8,6 +8,7 @@
 #include "nacre/global_registration.hpp"
 #include "tracking/limits.hpp"
 #include "tracking/relocalisation.hpp"
+#include "tracking/search_starts.hpp"
 #include "tracking/turntable_search.hpp"
 
 namespace nacre {
@@ -107,17 +108,19 @@ std::optional<Pose> best_with_less_noise(const TrackingPrior& prior, double nois
 
 // Beside the last pose, as where the camera turned fast. Directions that stay open could be those of any candidate.
 // More noise makes wider gates, which may lead away from a place that narrower ones have found.
-void try_beside(const FrameRegistration& registration, double noise_factor, TrackingPrior& prior,
-                const TrackingOptions& options, TrackingResult& best) {
+void try_beside(const FrameRegistration& registration, const CurrentFrame& now, const DepthView& last_view,
+                TrackingPrior& prior, const TrackingOptions& options, TrackingResult& best) {
   const Pose& last = prior.guesses.back();
   if (!prior.beside) {
     const PointsInView& view = registration.in_view(last);
     prior.beside = most_promising(AlignCloud(view.points, view.normals), registration.source(),
-                                  registration.beside(last), options.registration);
-    if (const auto place = registration.by_keypoints()) prior.beside->insert(prior.beside->begin(), *place);
+                                  starts_beside(last, view.points), options.registration);
+    const auto start = start_by_keypoints(now.view, last_view, now.camera, prior.depth, options.registration.seed,
+                                          options.num_threads);
+    if (start) prior.beside->insert(prior.beside->begin(), *start);
   }
   std::vector<Pose> starts = *prior.beside;
-  if (const auto found = best_with_less_noise(prior, noise_factor)) starts.push_back(*found);
+  if (const auto found = best_with_less_noise(prior, now.noise_factor)) starts.push_back(*found);
   for (const Pose& start : starts) {
     const TrackingResult found = registration.from(start, last, FrameRegistration::Gate::narrow, Expectation::beside);
     if (found.decision == Decision::accepted) keep_better(found, best);
@@ -133,15 +136,19 @@ std::optional<TrackingResult> only_along_open(const FrameRegistration& registrat
   const auto is_apart = [&](const Pose& a, const Pose& b) {
     return view_distance(a, b, prior.depth) > tracking_limits::least_new_view;
   };
-  std::vector<Pose> open, starts;
+  std::vector<IcpResult> open;
   for (const TrackingResult& place : prior.tried) {
-    const Pose& pose = place.alignment.target_from_source;
-    const bool is_new = std::all_of(open.begin(), open.end(), [&](const Pose& other) { return is_apart(other, pose); });
-    if (place.alignment.weak_directions.cols() == 0 || !is_new) continue;
-    open.push_back(pose);
-    for (const Pose& start : registration.along_open(place.alignment, last)) starts.push_back(start);
+    const bool is_new = std::all_of(open.begin(), open.end(), [&](const IcpResult& other) {
+      return is_apart(other.target_from_source, place.alignment.target_from_source);
+    });
+    if (place.alignment.weak_directions.cols() > 0 && is_new) open.push_back(place.alignment);
   }
-  if (starts.empty()) return std::nullopt;
+  if (open.empty()) return std::nullopt;
+  const double gate = registration.narrow_gate(last);
+  std::vector<Pose> starts;
+  for (const IcpResult& place : open) {
+    for (const Pose& start : starts_along_open(place, last, gate, prior.depth)) starts.push_back(start);
+  }
   const PointsInView& view = registration.in_view(last);
   TrackingResult best;
   for (const Pose& start : most_promising(AlignCloud(view.points, view.normals), registration.source(), starts,
@@ -200,13 +207,16 @@ TrackingResult found_at(const Pose& place, const FrameRegistration& registration
 // From every place where a camera has been, and around it.
 TrackingResult around_key_poses(const FrameRegistration& registration, const PointModel& model,
                                 const TrackingPrior& prior, const TrackingOptions& options) {
-  std::vector<Pose> guesses;
+  std::vector<Pose> starts;
   for (const Pose& key_pose : prior.elsewhere.key_poses()) {
-    for (const Pose& guess : registration.around(key_pose)) guesses.push_back(guess);
+    const PointsInView& view = registration.in_view(key_pose);
+    for (const Pose& start : starts_around(key_pose, view.points, options.registration.max_angle)) {
+      starts.push_back(start);
+    }
   }
   TrackingResult best;
   for (const Pose& candidate : most_promising(AlignCloud(as_rows(model.points), as_rows(model.normals)),
-                                              registration.source(), guesses, options.registration)) {
+                                              registration.source(), starts, options.registration)) {
     keep_better(found_at(candidate, registration, prior), best);
   }
   return best;
@@ -268,7 +278,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   const bool looks_beside =
       prior.elsewhere.beside && (best.decision != Decision::undetermined || prior.elsewhere.beside_if_open);
   if (looks_beside && registration.may_be_beside(best, prior.guesses.front())) {
-    try_beside(registration, now.noise_factor, prior, options, best);
+    try_beside(registration, now, target.last_view, prior, options, best);
     if (best.is_lost()) {
       if (const auto only = only_near(prior, options, target.usual)) return *only;
     }
