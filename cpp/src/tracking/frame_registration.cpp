@@ -63,8 +63,6 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   if (by_shape.weak_directions.cols() > 0) {
     hold_open_directions(pairing, guess, by_shape);
     hold_feigned_directions(pairing, by_shape);
-    TrackingResult held = test(by_shape, surfaces, guess, expectation);
-    if (held.is_hopeless) return held;
     determine_open_directions(pairing, colors_of(surfaces.view, pairing, pairing.source), by_shape);
     return test(std::move(by_shape), surfaces, guess, expectation);
   }
