@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -127,21 +128,61 @@ def test_what_sticks_to_a_camera_does_not_hold_it(sensor: Any, focal_length: flo
     np.testing.assert_allclose(come, 0.04 * np.arange(8), atol=0.02)
 
 
+FLOOR_CAMERA = nacre.Camera(320, 240, 290, 290, 159.5, 119.5)
+
+
+def over_a_floor(sensor: Any, down: float) -> list[Array]:
+    """Return what a camera sees that looks down by some degrees, and passes over a bare floor."""
+    floor, pose = boxes(((-9, 0, -9), (9, 0.1, 9))), np.eye(4)
+    cos, sin = np.cos(np.radians(down)), np.sin(np.radians(down))
+    pose[:3, :3] = [[1, 0, 0], [0, cos, sin], [0, -sin, cos]]
+    images = []
+    for number in range(12):
+        pose[:3, 3] = [0.014 * number, -1, 0]
+        images.append(floor.simulate_depth(FLOOR_CAMERA, pose, sensor=sensor, seed=number, sensor_seed=1))
+    return images
+
+
 @pytest.mark.parametrize(
     ("sensor", "down"), [("stereo", 30), ("stereo", 70), ("structured_light", 30), ("phone_lidar", 70)]
 )
 def test_a_bare_floor_tells_nothing_of_who_passes_over_it(sensor: Any, down: float) -> None:
     # What pixels err by again and again looks like relief that agrees, where the camera has not moved.
-    camera, floor = nacre.Camera(320, 240, 290, 290, 159.5, 119.5), boxes(((-9, 0, -9), (9, 0.1, 9)))
-    model, pose = nacre.Model(camera), np.eye(4)
-    cos, sin = np.cos(np.radians(down)), np.sin(np.radians(down))
-    pose[:3, :3] = [[1, 0, 0], [0, cos, sin], [0, -sin, cos]]
-    for number in range(12):
-        pose[:3, 3] = [0.014 * number, -1, 0]
-        model.add_frame(floor.simulate_depth(camera, pose, sensor=sensor, seed=number, sensor_seed=1))
+    model = nacre.Model(FLOOR_CAMERA)
+    for image in over_a_floor(sensor, down):
+        model.add_frame(image)
     assert [report.status for report in model.frames[2:]] == 10 * ["WEAK"]
     shifts = [report.world_from_camera[0, 3] for report in model.frames if report.status == "TRACKED"]
     np.testing.assert_allclose(shifts, 0.014 * np.arange(len(shifts)), atol=0.01)
+
+
+@pytest.mark.parametrize("sensor", ["stereo", "structured_light"])
+def test_what_noise_decides_is_no_motion_that_goes_on(sensor: Any) -> None:
+    model = nacre.Model(FLOOR_CAMERA)
+    for image in over_a_floor(sensor, 30):
+        model.add_frame(image)
+    assert [report.status for report in model.frames[1:]] == 11 * ["WEAK"]
+    assert max(np.linalg.norm(report.world_from_camera[:3, 3]) for report in model.frames) < 0.05
+
+
+@pytest.mark.parametrize(("sensor", "down"), [("stereo", 30), ("stereo", 70), ("phone_lidar", 70)])
+def test_nothing_is_found_again_that_was_open_before_images_were_lost(sensor: Any, down: float) -> None:
+    model = nacre.Model(FLOOR_CAMERA)
+    for number, image in enumerate(over_a_floor(sensor, down)):
+        model.add_frame(np.full_like(image, np.nan) if number in (4, 8) else image)
+    assert {report.status for report in model.frames[2:]} <= {"WEAK", "LOST"}
+
+
+def test_a_model_goes_on_to_the_same_bits_while_directions_are_open(tmp_path: Path) -> None:
+    images = over_a_floor("stereo", 30)
+    model, saved = nacre.Model(FLOOR_CAMERA), nacre.Model(FLOOR_CAMERA)
+    for image in images:
+        model.add_frame(image)
+        saved.add_frame(image)
+        saved.save(tmp_path / "model")
+        saved = nacre.Model.load(tmp_path / "model")
+    assert [report.status for report in model.frames[2:]] == 10 * ["WEAK"]
+    assert np.array_equal(saved.poses, model.poses)
 
 
 def corridor() -> nacre.Mesh:

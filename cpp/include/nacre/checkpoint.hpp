@@ -8,7 +8,7 @@
 namespace nacre {
 
 /// Of saved models. It changes with what a model keeps.
-constexpr std::uint32_t checkpoint_format = 23;
+constexpr std::uint32_t checkpoint_format = 24;
 
 /// Bytes that are no saved model, or not all of one, or one of another format; the message says which.
 class CheckpointError : public std::runtime_error {

@@ -92,7 +92,8 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
     RelocalisationPlaces elsewhere = std::exchange(prior.elsewhere, {});
     prior.elsewhere.beside = elsewhere.beside;
     prior.elsewhere.beside_if_open = elsewhere.beside_if_open;
-    for (double factor = noise_factor; factor <= tracking_limits::largest_noise_factor && !is_found(); factor *= 2.0) {
+    for (const double factor : noise_factors()) {
+      if (is_found()) break;
       set_noise_factor(factor);
       result = track(current, target, prior, odometry, hypothesis, nearby);
     }
@@ -105,8 +106,20 @@ TrackingResult Pipeline::track_frame(TrackingPrior prior, bool may_search) {
     }
   }
   if (result.is_lost()) result = track(current, target, prior, odometry, hypothesis, may_search ? options : nearby);
+  open_noise_factor = result.decision == Decision::undetermined ? noise_factor : 1.0;
   if (result.decision == Decision::accepted) learn_from(result);
   return result;
+}
+
+// Those that are tried in turn where it is not known: first that of the frame before, if it left directions open and so
+// told none.
+std::vector<double> Pipeline::noise_factors() const {
+  std::vector<double> factors;
+  if (open_noise_factor > noise_factor) factors.push_back(open_noise_factor);
+  for (double factor = noise_factor; factor <= tracking_limits::largest_noise_factor; factor *= 2.0) {
+    factors.push_back(factor);
+  }
+  return factors;
 }
 
 // A frame whose pose is given is registered there as well, until it is known how noisy the camera is, and now and then.
@@ -163,8 +176,11 @@ std::vector<Pose> Pipeline::guesses(const FrameExtras& extras) const {
     const std::optional<Pose> predicted = odometry.predicted();
     return predicted && is_in_view(*predicted, last) ? std::vector{*predicted, last} : std::vector{last};
   }
-  const Pose predicted = last * (history.registered_pose(1).inverse() * last);
-  return {orthonormal(predicted), last};
+  // What frames since have left open, noise may have decided in some of them: it is no motion.
+  const auto determined = static_cast<std::size_t>(num_open);
+  if (history.num_registered() < determined + 2) return {last};
+  const Pose motion = history.registered_pose(determined + 1).inverse() * history.registered_pose(determined);
+  return {orthonormal(last * motion), last};
 }
 
 // Whether the camera would look at something there that was in the newest view.

@@ -148,7 +148,7 @@ FrameReport Pipeline::add_worked_on(const DepthRef& depth, const FrameExtras& ex
     odometry.end_frame(report.status, report.world_from_camera, report.weak_directions);
     const bool is_lost = report.status == FrameStatus::lost && history.num_registered() > 0;
     num_lost = is_lost ? num_lost + 1 : 0;
-    num_open = report.status == FrameStatus::weak ? num_open + 1 : 0;
+    if (report.status != FrameStatus::lost) num_open = report.status == FrameStatus::weak ? num_open + 1 : 0;
     num_vain = is_lost ? num_vain + (frame.valid.size() >= base_limits::least_points) : 0;
     report.num_points = num_points();
     report.spacing = spacing;

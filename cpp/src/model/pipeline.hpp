@@ -65,7 +65,8 @@ struct Pipeline {
   double spacing = 0.0;
   std::int64_t num_lost = 0;             // frames in a row, up to the newest
   std::int64_t num_vain = 0;             // of them, those that showed something
-  std::int64_t num_open = 0;             // frames in a row that left directions open
+  std::int64_t num_open = 0;             // registered frames in a row that left directions open, up to the newest
+  double open_noise_factor = 1.0;        // with which the newest of them was found
   std::string torn;                      // why the newest frame is part of the model in part alone
   std::vector<StartFrame> start_frames;  // while the model holds one frame: the newest that may begin another
   bool is_trial = false;                 // whether the third frame is to confirm the first two
@@ -120,6 +121,7 @@ struct Pipeline {
   void learn_from(const TrackingResult& tracking);
   void learn_from_given(const Pose& world_from_camera);
   void set_noise_factor(double factor);
+  std::vector<double> noise_factors() const;
   TrackingResult track_frame(TrackingPrior prior, bool may_search);
   std::vector<Pose> guesses(const FrameExtras& extras) const;
   bool is_in_view(const Pose& world_from_camera, const Pose& last) const;

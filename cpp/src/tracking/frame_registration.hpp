@@ -36,7 +36,7 @@ struct TrackingTarget {
   const DepthView& last_view;  // what the camera saw when it was last registered
   const StillScene& still_scene;
   Pose earlier;                      // where the camera was some frames ago
-  bool was_open;                     // the frame before left directions open
+  bool was_open;                     // the newest registered frame left directions open
   std::int32_t oldest_frame;         // points that no later frame has seen may have drifted away: they are left out
   std::optional<Consistency> usual;  // of registered frames: see AcceptanceOptions
 };

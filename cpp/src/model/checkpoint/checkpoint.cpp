@@ -11,6 +11,7 @@
 #include "model/checkpoint/state.hpp"
 #include "model/checkpoint/surface_check.hpp"
 #include "model/limits.hpp"
+#include "tracking/limits.hpp"
 
 namespace nacre {
 namespace {
@@ -51,7 +52,8 @@ void exchange_state(Archive& archive, Pipeline& state) {
   archive(state.options.fusion.reference_sigma, state.options.depth.tilt, state.depth_view_frames, state.region,
           state.calibration, state.confidence_noise, state.residual_noise, state.usual_consistency, state.cloud,
           state.loops, state.history, state.before, state.still_scene, state.carried, state.odometry, state.hypothesis,
-          state.views, state.spacing, state.num_lost, state.num_vain, state.num_open, state.start_frames);
+          state.views, state.spacing, state.num_lost, state.num_vain, state.num_open, state.open_noise_factor,
+          state.start_frames);
   std::vector<BlockIndex::Gap> gaps = state.blocks.gaps();
   if (state.files.is_on()) archive(state.files, state.parked, gaps);
   state.blocks.set_gaps(std::move(gaps));
@@ -403,6 +405,8 @@ std::unique_ptr<Pipeline> load_checkpoint(std::string_view bytes, std::string* n
   archive.require(is_within(state.num_vain, static_cast<std::size_t>(state.num_lost) + 1),
                   "more frames were searched for than are lost");
   archive.require(is_within(state.num_open, num_frames + 1), "more frames left directions open than there are");
+  archive.require(state.open_noise_factor >= 1.0 && state.open_noise_factor <= tracking_limits::largest_noise_factor,
+                  "a frame that left directions open has another noise than is tried");
   const bool is_spaced = state.spacing > 0.0 || state.cloud.size() == 0;
   archive.require(is_spaced && state.spacing >= given.spacing && state.spacing < farthest_place,
                   "the spacing is not a distance between the points");
