@@ -67,7 +67,7 @@ class FrameReport(Value):
         Part of the model's points in view that the frame does not see through.
     score : float
         The registration score, that the pose is right, against chance: what the residuals tell a match, times
-        overlap^2 and consistency^4 (consistency^8 far from all guesses); less where residuals of neighbours
+        overlap^2 and consistency^4 (consistency^12 far from all guesses); less where residuals of neighbours
         agree beyond what noise explains. Unrelated surfaces seldom reach 0.3; good registrations have 0.35 to
         3, those of an object that turned far on its plane less.
     probability : float

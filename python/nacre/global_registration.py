@@ -133,7 +133,7 @@ def align_global(
     num_rotations, num_candidates : int
         Rotations to start from, and how many of the results are refined.
     tolerance : float
-        Surfaces agree within it, along their normals [m]; 0: three standard deviations of the noise that is
+        Surfaces agree within it, along their normals [m]; 0: four standard deviations of the noise that is
         left after averaging neighbours, at least 0.3 % of the smaller cloud's diameter.
     max_angle : float
         And where their normals differ by less [rad].

@@ -25,7 +25,7 @@ struct TrackingReport {
   double overlap = 0.0;      ///< part of the frame that matches the model
   double consistency = 0.0;  ///< part of the model's points in view that the frame does not see through
   double score = 0.0;        ///< of the registration: that it is right, against chance: what the residuals tell a
-                             ///< match, times overlap^2 consistency^4 (^8 far from all guesses), less
+                             ///< match, times overlap^2 consistency^4 (^12 far from all guesses), less
                              ///< where residuals of neighbours agree beyond noise
   double rmse = 0.0;         ///< of the inliers, along the normals [m]
   Eigen::Vector3d center = Eigen::Vector3d::Zero();          ///< see AlignResult; world frame

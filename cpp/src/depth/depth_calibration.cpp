@@ -7,12 +7,14 @@
 #include <utility>
 
 #include "base/check.hpp"
+#include "base/limits.hpp"
 #include "base/linear_algebra.hpp"
 #include "base/parallel.hpp"
 #include "base/pose_check.hpp"
 #include "base/se3.hpp"
 #include "base/statistics.hpp"
 #include "base/step_length.hpp"
+#include "camera/limits.hpp"
 #include "camera/ray_table.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/limits.hpp"
@@ -161,7 +163,8 @@ std::optional<PairFit> linearise(const CorrectedView& target, const CorrectedVie
     const Eigen::Vector3d q = target.point(seen), n = target.normal(seen);
     const double residual = (q - p).dot(n);
     const double facing = (motion.linear() * source_normal).dot(n);
-    if (!(std::abs(residual) < depth_limits::same_surface * q.z() && facing > depth_limits::same_facing)) continue;
+    if (!(std::abs(residual) < camera_limits::another_surface * q.z() && facing > base_limits::same_surface_cosine))
+      continue;
     // Both derivatives at the middle of the two points: at the points themselves, their noise would favour whatever
     // makes the scene smaller.
     const Eigen::Vector3d middle = 0.5 * (p + q);

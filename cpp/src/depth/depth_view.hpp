@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "camera/limits.hpp"
 #include "camera/point_projection.hpp"
 #include "nacre/camera.hpp"
 #include "nacre/types.hpp"
@@ -63,7 +64,7 @@ struct VisibilityMargin {
   double distance = 0.0;              // [m]
   double part_of_depth = 0.0;         // beside it
   bool with_systematic_error = true;  // see systematic_error.hpp
-  float least_facing = 0.3F;          // cosine between normal and viewing direction
+  float least_facing = camera_limits::least_facing;
 };
 
 // What a view says of one of a block of oriented points that are in its image; sigma: of the point [m].

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/limits.hpp"
 #include "base/numbers.hpp"
 #include "base/parallel.hpp"
+#include "camera/limits.hpp"
 #include "depth/limits.hpp"
 #include "simd/depth_edges.hpp"
 #include "simd/depth_planar_edges.hpp"
@@ -16,9 +18,9 @@ namespace {
 simd::EdgeLimits edge_limits(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options) {
   const Quadratic sigma = image.sigma(noise.local()), unit_slope = image.unit_slope();
   const auto bend_sigmas = static_cast<float>(options.edge_sigmas * std::sqrt(6.0));
-  const float step_sigmas = depth_limits::step_sigmas * std::sqrt(2.0F);
+  const float step_sigmas = base_limits::noise_sigmas * std::sqrt(2.0F);
   return {sigma * bend_sigmas,
-          unit_slope * depth_limits::crease_slope,
+          unit_slope * static_cast<float>(camera_limits::steepest),
           sigma * step_sigmas,
           unit_slope * static_cast<float>(std::tan(options.max_slant)),
           bend_sigmas * depth_limits::lateral_sigma,

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <limits>
 
+#include "base/limits.hpp"
 #include "base/statistics.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/limits.hpp"
@@ -54,7 +55,7 @@ bool is_lone(const DepthRef& depth, Eigen::Index v, Eigen::Index u, const OneSur
   const float median = median_of_them();
   for (float& other : around) other = std::abs(other - median);
   const auto scatter = static_cast<float>(mad_to_sigma) * median_of_them();
-  return std::abs(z - median) > depth_limits::step_sigmas * scatter;
+  return std::abs(z - median) > base_limits::noise_sigmas * scatter;
 }
 
 DepthImage without_lone_pixels(const DepthRef& depth, const OneSurface& one_surface) {
@@ -82,7 +83,7 @@ bool has_gaps(const DepthRef& depth, const Camera& camera) {
     }
   }
   const std::int64_t side = 2 * WindowFits::kRadius + 1;
-  return num_gaps >= depth_limits::least_windows && side * side * num_gaps > num_measured;
+  return num_gaps >= base_limits::least_points && side * side * num_gaps > num_measured;
 }
 
 DepthImage fill_gaps(const DepthRef& measured, const Camera& camera) {

@@ -8,7 +8,6 @@
 // clang-format off
 namespace nacre::depth_limits {
 
-constexpr float crease_slope = 3.0F;  // [1] tuned: a crease of a smaller bend is kept; test_planar_edges
 constexpr float lateral_sigma = 0.8F;  // [pixel] derived: a pixel looks aside (Nguyen et al. 2012, fig. 7); test_depth
 constexpr float slope_sigma = 0.07F;  // [1] tuned: a normal's window grows until its slope is this certain; test_frame
 constexpr float least_filled = 0.4F;  // [1] tuned: part of a normal's window that must be measured; test_frame
@@ -24,7 +23,6 @@ constexpr double smooth_bent = 0.0145;  // [1] derived: of smooth noise, what se
 constexpr double independent = 0.95;  // [1] tuned: bends by fits above which noise is independent; test_noise
 constexpr double most_shared = 0.85;  // [1] tuned: part of the variance that pixels may share; test_noise
 constexpr double most_frames = 100.0;  // [frames] tuned: a frame counts at least so much: drift is followed; test_noise
-constexpr std::int64_t least_windows = 40;  // [windows] tuned: of an image, and at some depth, that tell its noise; test_noise
 constexpr double prior_weight = 0.01;  // [1] tuned: of the prior's curve against all that was measured; test_noise
 constexpr double nearest_bin = 0.015625;  // [m] derived: where the bins of depth begin, nearer than any camera measures; test_noise
 constexpr double bins_per_octave = 3.0;  // [1] derived: of depth; test_noise
@@ -37,13 +35,11 @@ constexpr std::int64_t least_levels = 8;  // [levels] tuned: two walls are no un
 constexpr int farthest_pixels = 16;  // [pixel] budget: from one measured pixel to the next, what is farther is a hole; test_pixel_binning
 constexpr double most_worked_on = 100000.0;  // [pixels] budget: measured, of the first image; pixels are averaged where there are more; test_pixel_binning
 constexpr double least_saturated = 0.005;  // [1] tuned: part of an image that has its largest value; test_saturation
-constexpr std::int64_t fewest_saturated = 40;  // [pixels] tuned: probed, that have it by no chance; test_saturation, test_depth
 constexpr float saturation_gap = 0.1F;  // [1] tuned: of the largest value: fewer lie between; test_saturation
 constexpr float far_saturation = 3.0F;  // [1] tuned: of the median of the rest: a nearer largest value may be a flat wall; test_saturation
 constexpr float nearest_median = 0.05F;  // [m] derived: nearer medians: a wrong depth_scale; test_depth
 constexpr float farthest_median = 50.0F;  // [m] derived: farther medians: a wrong depth_scale; test_depth
 constexpr std::int64_t most_probes = 8192;  // [pixels] budget: that tell an image's median depth; test_depth
-constexpr float step_sigmas = 3.0F;  // [sigma] tuned: allowance for noise in steepness and links; test_depth
 constexpr double most_blocks = 19200.0;  // [blocks] budget: of pixels that a view is averaged to, to calibrate depth; test_depth_calibration
 constexpr int most_views = 24;  // [views] budget: that depth is calibrated by; test_depth_calibration
 constexpr double least_turn = 0.1;  // [rad] tuned: between views that are compared; a tilt that turns what it tilts by more is none; test_depth_calibration
@@ -53,8 +49,6 @@ constexpr double largest_stretch_step = 0.1;  // [1] budget: of the stretch, in 
 constexpr double least_part_left = 1e-4;  // [1] derived: of the information, that poses leave; rounding leaves less; test_depth_calibration
 constexpr double at_rest = 0.1;  // [sigma] derived: a smaller step changes nothing; test_depth_calibration
 constexpr std::int64_t least_matches = 200;  // [blocks] tuned: that two views must share; test_depth_calibration
-constexpr double same_surface = 0.05;  // [1] tuned: of the depth: surfaces farther apart are not the same; test_depth_calibration
-constexpr double same_facing = 0.85;  // [1] tuned: cosine between normals of one surface; test_depth_calibration
 constexpr double largest_block_step = 0.1;  // [1] tuned: of the depth, across two blocks of one surface; test_depth_calibration
 constexpr double sure_sigmas = 5.0;  // [sigma] derived: of a Gaussian: an error of depth is beyond chance; test_depth_calibration
 constexpr double least_tilt = 0.002;  // [1/m] derived: noise of one pixel's inverse depth, structured light; test_depth_calibration

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "base/limits.hpp"
 #include "base/parallel.hpp"
-#include "depth/limits.hpp"
 #include "simd/depth_keep.hpp"
 
 #ifdef _MSC_VER
@@ -174,7 +174,7 @@ void remove_isolated(double max_missing, int num_threads, ByteImage& keep) {
 void remove_speckles(const PlanarImage& image, const NoiseModel& noise, const DepthOptions& options, int num_threads,
                      ByteImage& keep) {
   if (options.min_component <= 1) return;
-  const simd::LinkRule rule = {image.sigma(noise.local()) * (depth_limits::step_sigmas * std::sqrt(2.0F)),
+  const simd::LinkRule rule = {image.sigma(noise.local()) * (base_limits::noise_sigmas * std::sqrt(2.0F)),
                                image.unit_slope() * static_cast<float>(std::tan(options.max_slant))};
   PixelLinks links(keep.width(), keep.height());
   const auto link_row = simd::link_pixels();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "camera/limits.hpp"
 #include "camera/view_volume.hpp"
@@ -73,7 +74,7 @@ std::vector<std::uint8_t> merge_layers(PointModel& model, std::int32_t oldest_fr
       const float offset = difference.dot(model.normals[j]);
       const float along = difference.squaredNorm() - offset * offset;
       if (std::abs(offset) < across && (along < least || (along == least && j < best)) &&
-          model.normals[i].dot(model.normals[j]) > fusion_limits::sheet_cosine) {
+          model.normals[i].dot(model.normals[j]) > base_limits::same_side_cosine) {
         least = along;
         best = j;
       }

@@ -86,7 +86,7 @@ KnownSurface update(PointModel& model, const std::vector<PointRange>& ranges, co
       observer.add(block, points.point(j), points.normal(j), points.pixel[j], sigma,
                    spacing_at(points.z[j], sigma, camera, spacing));
     }
-    observer.observe_and_cover(block, fusion_limits::sheet_cosine);
+    observer.observe_and_cover(block, base_limits::same_side_cosine);
     std::vector<Cover>& covered = covers[static_cast<std::size_t>(number)];
     covered.reserve(static_cast<std::size_t>(block.size()));
     for (int k = 0; k < block.size(); ++k) {

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "base/concatenate.hpp"
+#include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "camera/point_spacing.hpp"
 #include "fusion/exposure.hpp"
@@ -67,7 +68,7 @@ std::vector<NewPoint> find_candidates(const RegisteredFrame& now, const PixelSet
       observer.add(block, candidate.point, candidate.normal, row, frame.sigma[row], candidate.spacing);
       candidates.push_back(candidate);
     }
-    observer.observe_and_cover(block, fusion_limits::sheet_cosine);
+    observer.observe_and_cover(block, base_limits::same_side_cosine);
     std::size_t kept = 0;
     for (int k = 0; k < block.size(); ++k) {
       const Observation observed = block[k];
@@ -108,7 +109,7 @@ std::int64_t insert_points(PointModel& model, KnownSurface known, const Register
   }
   const int side = std::max(1, farthest / fusion_limits::squares_across);
   const auto is_near = [&](const PixelIndex& points, const NewPoint& candidate) {
-    const float largest_offset = std::max(candidate.spacing, fusion_limits::cover_sigmas * frame.sigma[candidate.row]);
+    const float largest_offset = std::max(candidate.spacing, base_limits::noise_sigmas * frame.sigma[candidate.row]);
     return points.any_near(candidate.row, candidate.reach, [&](std::size_t i) {
       return same_surface(candidate.point, candidate.normal, model.points[i], model.normals[i], candidate.spacing,
                           largest_offset);

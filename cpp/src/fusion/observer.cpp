@@ -148,7 +148,7 @@ void SurfaceObserver::observe(ObservationBlock& block) const {
 
 void SurfaceObserver::observe_and_cover(ObservationBlock& block, float least_cosine) const {
   for (int i = 0; i < block.count_; ++i) {
-    block.cover_offset_[i] = std::max(block.spacing_[i], fusion_limits::cover_sigmas * block.sigma_[i]);
+    block.cover_offset_[i] = std::max(block.spacing_[i], base_limits::noise_sigmas * block.sigma_[i]);
   }
   const simd::WindowCover cover = {block.spacing_, block.cover_offset_, least_cosine, block.cover_rows_};
   float* const colors[3] = {block.red_, block.green_, block.blue_};

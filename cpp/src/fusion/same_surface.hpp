@@ -4,7 +4,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
-#include "fusion/limits.hpp"
+#include "base/limits.hpp"
 
 namespace nacre {
 
@@ -14,7 +14,7 @@ inline bool same_surface(const Eigen::Vector3f& point, const Eigen::Vector3f& no
   const Eigen::Vector3f difference = other - point;
   const float along = difference.dot(normal);
   return std::abs(along) < largest_offset && difference.squaredNorm() - along * along < spacing * spacing &&
-         normal.dot(other_normal) > fusion_limits::sheet_cosine;
+         normal.dot(other_normal) > base_limits::same_side_cosine;
 }
 
 }  // namespace nacre

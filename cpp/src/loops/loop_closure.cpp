@@ -131,7 +131,7 @@ bool LoopClosure::is_next_node(const LoopFrame& frame) const {
 double LoopClosure::part_in_view(int key_frame, const LoopFrame& frame) const {
   const auto view = views_[key_frame];
   const Pose camera_from_view = frame.alignment.target_from_source.inverse() * pose_of(key_frame);
-  return part_of(compare(*view, camera_from_view, frame.view, camera_, loops_limits::search_radius).agreeing, *view);
+  return part_of(compare(*view, camera_from_view, frame.view, camera_, camera_limits::view_shift).agreeing, *view);
 }
 
 // The key frames whose surfaces are in view.
@@ -139,7 +139,7 @@ LoopClosure::SeenKeyFrames LoopClosure::select(const LoopFrame& frame) const {
   SeenKeyFrames seen;
   std::vector<SeenKeyFrame> in_question;
   const ViewVolume volume =
-      agreeing_volume(frame.view, frame.alignment.target_from_source, camera_, loops_limits::search_radius);
+      agreeing_volume(frame.view, frame.alignment.target_from_source, camera_, camera_limits::view_shift);
   for (int k = 0; k < num_key_frames(); ++k) {
     if (!volume.may_hold(moved(key_frames_[static_cast<std::size_t>(k)].bounds, pose_of(k)))) continue;
     const double part = part_in_view(k, frame);
@@ -283,7 +283,7 @@ std::optional<LoopClosure::Match> LoopClosure::match(const LoopFrame& frame, con
     source.reach[i] = static_cast<float>(std::min(along, largest));
     source.largest_residual[i] = static_cast<float>(std::min(across, largest));
   }
-  align_options.max_distance = loops_limits::search_radius * cloud.depth;
+  align_options.max_distance = camera_limits::view_shift * cloud.depth;
   align_options.final_distance = static_cast<double>(median_of(source.reach));
 
   Match found;

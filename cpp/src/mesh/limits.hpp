@@ -9,7 +9,6 @@ constexpr int most_neighbors = 20;  // [points] budget: that are asked for the t
 constexpr int spacing_neighbors = 6;  // [points] derived: around a point of an even surface: their mean distance is its spacing; test_triangulate
 constexpr double largest_circle = 1.75;  // [spacing] tuned: radius of a triangle's circle through its corners: larger ones are gaps; test_meshing
 constexpr double same_circle = 1e-4;  // [1] derived: of a squared distance: rounding of coordinates hides which of four points on a circle are nearer; test_meshing
-constexpr double same_side = 0.3;  // [cosine] tuned: between normals of neighbours on one side of something thin; test_meshing
 constexpr double steepest = 1.5;  // [1] tuned: a neighbour rises at most so much above the tangent plane for its distance along it; test_meshing
 constexpr int longest_hole = 10;  // [edges] budget: a hole with more is not closed; test_triangulate
 constexpr double largest_filling = 3.0;  // [spacing] tuned: likewise as largest_circle, of the triangles that close a hole; test_triangulate

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "base/check.hpp"
+#include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "mesh/limits.hpp"
 #include "mesh/spacing.hpp"
@@ -179,7 +180,7 @@ class Triangulation {
     VoronoiCell cell(largest_circle);
     for (std::size_t n = 0; n < static_cast<std::size_t>(count); ++n) {
       const auto j = static_cast<std::int32_t>(indices[n]);
-      if (!(normal(j).dot(up) >= mesh_limits::same_side)) continue;
+      if (!(normal(j).dot(up) >= base_limits::same_side_cosine)) continue;
       if (squared[n] == 0.0 && j < i) return;  // the other point in this place has the triangles
       const Vector3 step = point(j) - point(i);
       const Vector2 along(step.dot(right), step.dot(ahead));

@@ -201,7 +201,7 @@ void Pipeline::forget_carried() {
   const Values& depth = carried.found();
   if (depth.size() == 0) return;
   const auto is_carried = [&](Eigen::Index cell, float z) {
-    return z < static_cast<float>(1.0 + tracking_limits::least_step) * depth[cell];
+    return z < static_cast<float>(1.0 + camera_limits::another_surface) * depth[cell];
   };
   const Camera coarse = StillScene::camera_of_cells(camera);
   std::vector<std::uint8_t> stays(cloud.points.size(), 1);

@@ -10,7 +10,6 @@
 #include "base/statistics.hpp"
 #include "camera/limits.hpp"
 #include "outlines/limits.hpp"
-#include "registration/limits.hpp"
 
 namespace nacre {
 namespace {
@@ -86,8 +85,8 @@ std::vector<int> nearest_edges(const std::vector<OutlinePoint>& outline, const s
       const OutlinePoint& other = others[static_cast<std::size_t>(at->second)];
       const double squared = (other.point - edge.point).squaredNorm();
       const bool is_nearer = squared < least || (squared == least && at->second < nearest[i]);
-      if (!is_nearer || other.outward.dot(edge.outward) < registration_limits::same_surface_cosine ||
-          other.normal.dot(edge.normal) < registration_limits::same_surface_cosine) {
+      if (!is_nearer || other.outward.dot(edge.outward) < base_limits::same_surface_cosine ||
+          other.normal.dot(edge.normal) < base_limits::same_surface_cosine) {
         continue;
       }
       least = squared;

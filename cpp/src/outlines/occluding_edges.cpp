@@ -140,8 +140,8 @@ class OutlineSearch {
   }
   double depth(int u, int v) const { return static_cast<double>(sight_.depth[v * width_ + u]); }
   double tolerance(int u, int v, double distance) const {
-    return outlines_limits::most_slope * camera_.footprint(depth(u, v)) * distance +
-           6.0 * static_cast<double>(sight_.sigma[v * width_ + u]);
+    return camera_limits::steepest * camera_.footprint(depth(u, v)) * distance +
+           base_limits::noise_sigmas * static_cast<double>(sight_.sigma[v * width_ + u]);
   }
 
   const DepthView& sight_;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "camera/limits.hpp"
 #include "region/limits.hpp"
 
 namespace nacre {
@@ -99,7 +100,8 @@ double mean_pixel_motion(const CoarseFrame& cells, const Pose& before_from_now) 
 }
 
 bool are_linked(const Cell& a, const Cell& b, int steps) {
-  const float reach = region_limits::steepest * static_cast<float>(steps) * std::min(a.footprint, b.footprint);
+  const float reach =
+      static_cast<float>(camera_limits::steepest) * static_cast<float>(steps) * std::min(a.footprint, b.footprint);
   return (a.point - b.point).squaredNorm() < reach * reach;
 }
 

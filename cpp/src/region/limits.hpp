@@ -8,11 +8,10 @@
 namespace nacre::region_limits {
 
 constexpr int image_border = 1;  // [cell] derived: cleaning leaves little at the very border; test_region
-constexpr float steepest = 3.0F;  // [1] tuned: slope up to which neighbouring cells hold together; test_region
 constexpr int link_reach = 3;  // [cells] tuned: across which cells are linked: noisy edges are missing; test_region
 constexpr int most_cells = 20000;  // [cells] budget: of an image seen coarsely; benchmarks/run.py
-constexpr int largest_step = 12;  // [pixel] budget: side of a cell; benchmarks/run.py
 constexpr float least_cosine = 0.9F;  // [cosine] tuned: between normals of one plane, as measured; test_region
+constexpr int largest_step = 12;  // [pixel] budget: side of a cell; benchmarks/run.py
 constexpr float bend = 0.008F;  // [1] tuned: of a plane, as a part of its distance; dog
 constexpr float plane_pixels = 2.0F;  // [pixel] tuned: margin of a plane: pixels; test_region
 constexpr double least_plane = 0.1;  // [1] tuned: part of the points that a supporting plane holds; test_region

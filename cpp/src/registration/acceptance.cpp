@@ -61,8 +61,10 @@ double likelihood_ratio(const Consistency& found, const std::optional<Consistenc
 bool is_other_size(const SizeDifference& size, Expectation expectation) {
   using namespace registration_limits;
   const bool is_far = expectation == Expectation::unexpected;
-  const double certainty = is_far ? far_size_sigmas : size_sigmas;
-  return (is_far || size.sigma <= size_sigma) && std::abs(size.relative) > std::max(other_size, certainty * size.sigma);
+  const double by_noise = (is_far ? far_size_sigmas : size_sigmas) * size.sigma;
+  // Near a guess a size that is not certain says nothing.
+  if (!is_far && by_noise > other_size) return false;
+  return std::abs(size.relative) > std::max(other_size, by_noise);
 }
 
 bool is_beyond_chance(const Likeness& likeness) {
@@ -107,8 +109,8 @@ Acceptance accept_as(const IcpResult& alignment, const Consistency& consistency,
   const double beyond_planes = demands.beyond_planes ? part_beyond_planes(alignment) : 1.0;
   acceptance.score = overlap * consistent * per_match * beyond_planes;
   if (expectation == Expectation::unexpected) acceptance.score *= unlikely;
-  acceptance.relocalisation_score = overlap * std::pow(consistency.of_target, relocalisation_consistency_power) *
-                                    per_match / (bent * bent) * alignment.normal_information * unlikely * beyond_planes;
+  acceptance.relocalisation_score = overlap * std::pow(consistency.of_target, far_consistency_power) * per_match /
+                                    (bent * bent) * alignment.normal_information * unlikely * beyond_planes;
   if (options.verify && is_other_size(alignment.size_difference, expectation)) {
     acceptance.relocalisation_score = 0.0;
     reason << "the frame is " << 1.0 / (1.0 + alignment.size_difference.relative)

@@ -70,7 +70,7 @@ struct Acceptance {
 // shape that only resembles is bent another way. Once it is known how much right places contradict, near a guess
 // the usual contradictions to these ones, of either side, take the place of consistency^4, and overlap that of its
 // square: what is new is told from what should match and does not. After a loss more is asked for. Beside the last
-// pose misfit above half counts, too; far from all guesses, where many places resemble, so does consistency^8, and the
+// pose misfit above half counts, too; far from all guesses, where many places resemble, so does consistency^12, and the
 // score is the lower, the more of the matches lie on three planes: see share_off_planes.
 //
 // Where the two sides look alike, as the brightness of registered frames and what they fit has done, a place is as good

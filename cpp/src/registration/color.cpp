@@ -102,7 +102,8 @@ class ColorRegistration::Search : public OpenDirectionSearch {
     // As dense as the target: a gradient is that of the surroundings of a point.
     const std::int64_t denser = source_colors_.points.rows() / std::max<std::int64_t>(1, target_colors_.points.rows());
     const auto field = [&](const BrightCloud& cloud, std::int64_t step, const IcpCloud& at) {
-      const double reach = 4.0 * std::sqrt(static_cast<double>(thinning)) * target_.spacing();
+      const double reach =
+          registration_limits::color_reach * std::sqrt(static_cast<double>(thinning)) * target_.spacing();
       return ColorField(cloud.thinned(step, options_.seed), at.points, at.normals, reach, options_.num_threads);
     };
     return kept.emplace(ColorLevel{field(target_colors_, thinning, target_.cloud()),

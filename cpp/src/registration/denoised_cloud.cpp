@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/limits.hpp"
 #include "base/parallel.hpp"
 #include "base/statistics.hpp"
 #include "nacre/normals.hpp"
@@ -46,7 +47,7 @@ void denoise(const PointsRef& all, const Points& all_normals, const std::vector<
   const Neighbors near =
       KdTree(all, num_threads)
           .query(PointsRef(points), registration_limits::mean_neighbors, KdTree::infinity, num_threads);
-  constexpr auto cosine = static_cast<float>(registration_limits::same_surface_cosine);
+  constexpr auto cosine = static_cast<float>(base_limits::same_surface_cosine);
   parallel_for(points.rows(), cloud_block, num_threads, [&](std::int64_t i) {
     float sum = 0.0F, count = 0.0F;
     for (Eigen::Index k = 0; k < near.indices.cols(); ++k) {

@@ -75,7 +75,8 @@ GlobalSearch::GlobalSearch(const SearchSide& source, const SearchSide& target, c
       tolerance_(options.tolerance) {
   if (tolerance_ > 0.0) return;
   tolerance_ =
-      std::max(registration_limits::least_tolerance * size_, 3.0 * std::hypot(source.cloud.noise, target.cloud.noise));
+      std::max(registration_limits::least_tolerance * size_,
+               static_cast<double>(base_limits::noise_sigmas) * std::hypot(source.cloud.noise, target.cloud.noise));
 }
 
 std::vector<SearchCandidate> GlobalSearch::run() const {
@@ -125,7 +126,7 @@ void GlobalSearch::score(SearchCandidate& candidate, bool with_few, double toler
 }
 
 bool GlobalSearch::is_same(const Pose& a, const Pose& b) const {
-  return angle_between(a, b) < registration_limits::same_turn &&
+  return angle_between(a, b) < camera_limits::view_turn &&
          (a * source_.middle - b * source_.middle).norm() < registration_limits::search_gate * size_;
 }
 

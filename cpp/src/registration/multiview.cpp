@@ -30,7 +30,7 @@ std::vector<Pair> match(const IcpSource& source, const IcpTarget& target, const 
   nearest.resize(static_cast<std::size_t>(source.cloud.points.rows()), no_slot);
   std::vector<Pair> pairs =
       target.match(source, source.cloud.points.rows(), world_from_target.inverse() * world_from_source,
-                   {tolerance, registration_limits::same_surface_cosine, false}, nearest);
+                   {tolerance, base_limits::same_surface_cosine, false}, nearest);
   if (pairs.size() < base_limits::least_points) return {};
   weight_pairs(pairs, Metric::symmetric, true, 0.05 * tolerance);
   for (Pair& pair : pairs) {

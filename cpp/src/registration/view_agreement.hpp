@@ -1,6 +1,8 @@
 // How well two views of a surface agree at a pose.
 #pragma once
 
+#include "registration/limits.hpp"
+
 namespace nacre {
 
 // What a view says about points of another, as parts of all that were asked.
@@ -11,7 +13,9 @@ struct ViewAgreement {
   double beyond = 0.0;        // they lie beyond the outline of what it measured
 
   double score(bool outlines = false) const {
-    return agree - 3.0 * seen_through - 0.5 * occluded - (outlines ? 2.0 * beyond : 0.0);
+    using namespace registration_limits;
+    return agree - seen_through_weight * seen_through - occluded_weight * occluded -
+           (outlines ? beyond_weight * beyond : 0.0);
   }
   double against(bool outlines) const { return seen_through + occluded + (outlines ? beyond : 0.0); }
 };

@@ -6,6 +6,7 @@
 
 #include "base/numbers.hpp"
 #include "base/statistics.hpp"
+#include "camera/limits.hpp"
 #include "camera/point_projection.hpp"
 #include "depth/limits.hpp"
 #include "fusion/limits.hpp"
@@ -28,7 +29,7 @@ void ConfidenceNoise::add(const MaskImage& confidence, const Frame& frame, const
     const std::int32_t pixel = point.pixel[0];
     const Eigen::Vector3f difference = frame.points.row(pixel).transpose() - point.point(0);
     const float residual = std::abs(difference.dot(point.normal(0)));
-    if (!(residual < static_cast<float>(depth_limits::same_surface) * point.z[0])) continue;
+    if (!(residual < static_cast<float>(camera_limits::another_surface) * point.z[0])) continue;
     const std::uint8_t level = confidence.data()[pixel];
     residuals[level].push_back(residual * known[level] / frame.sigma[pixel]);
   }

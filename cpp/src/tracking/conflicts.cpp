@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "camera/limits.hpp"
 #include "tracking/limits.hpp"
 
 namespace nacre {
@@ -13,7 +14,7 @@ Points seen_through(const PointsRef& points, const PointsRef& normals, const Val
                     const Camera& camera, double margin) {
   std::vector<Eigen::Index> rows;
   const PointProjection projection(camera, sight.world_from_camera);
-  const VisibilityMargin of_surface{margin, tracking_limits::least_step};
+  const VisibilityMargin of_surface{margin, camera_limits::another_surface};
   visit_points_in_view(points, normals, 0, points.rows(), projection,
                        [&](Eigen::Index i, const PointProjection::Block& block, int k) {
                          const float own = sigma.size() > 0 ? sigma[i] : 0.0F;

@@ -33,8 +33,8 @@ std::optional<ObjectView> object_view(const Frame& frame, const MaskImage& regio
     const Eigen::Index row = rows[static_cast<std::size_t>(i)];
     view.points.row(i) = samples.points.row(row);
     view.normals.row(i) = samples.normals.row(row);
-    errors[static_cast<std::size_t>(i)] =
-        std::hypot(3.0F * samples.noise[row], region_limits::bend * samples.points.row(row).norm());
+    errors[static_cast<std::size_t>(i)] = std::hypot(base_limits::noise_sigmas * samples.noise[row],
+                                                     region_limits::bend * samples.points.row(row).norm());
   }
   view.size = static_cast<double>((view.points.colwise().maxCoeff() - view.points.colwise().minCoeff()).norm());
   view.tolerance =

@@ -20,7 +20,8 @@ std::vector<RowsOfBlock> rows_in_view(const PointModel& model, const BlockIndex&
   constexpr std::int64_t block_size = PointProjection::capacity;
   const PointProjection projection(camera, world_from_camera);
   const auto width = static_cast<float>(camera.width()), height = static_cast<float>(camera.height());
-  const float margin_u = width / 3.0F, margin_v = height / 3.0F;
+  constexpr auto margin = static_cast<float>(tracking_limits::view_margin);
+  const float margin_u = width * margin, margin_v = height * margin;
   const ViewVolume volume(camera, world_from_camera, tracking_limits::view_margin, 0.0,
                           std::numeric_limits<double>::infinity());
   const std::vector<PointRange> ranges = blocks.in_view(volume, oldest_frame);

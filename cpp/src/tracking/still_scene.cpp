@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "camera/limits.hpp"
 #include "tracking/limits.hpp"
 
 namespace nacre {
@@ -11,7 +12,7 @@ namespace {
 constexpr CellBudget cell_budget = {tracking_limits::most_cells, tracking_limits::largest_cell};
 constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
 
-VisibilityMargin of_surface(double margin) { return {margin, tracking_limits::least_step}; }
+VisibilityMargin of_surface(double margin) { return {margin, camera_limits::another_surface}; }
 
 DepthView view_of(const CoarseFrame& cells, const Pose& world_from_camera) {
   DepthView view{Values(cells.size()), Values(cells.size()), world_from_camera};
@@ -250,7 +251,7 @@ std::vector<std::int32_t> still_points(const PointsRef& points, const PointsRef&
     num_gone += is_gone[i] != 0 ? counts[i].judged : 0;
   }
   std::vector<std::uint8_t> stays(static_cast<std::size_t>(points.rows()), 1);
-  if (num_gone > 0 && num_gone < tracking_limits::most_gone * num_judged) {
+  if (num_gone > 0 && num_gone < (1.0 - tracking_limits::most_moving) * num_judged) {
     visit_points_in_view(points, normals, 0, points.rows(), projection, [&](auto i, const auto& block, int k) {
       stays[static_cast<std::size_t>(i)] = is_gone[squares.at(block.pixel[k])] == 0;
     });

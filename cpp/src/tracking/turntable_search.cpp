@@ -5,6 +5,7 @@
 
 #include "base/parallel.hpp"
 #include "base/se3.hpp"
+#include "camera/limits.hpp"
 #include "registration/acceptance.hpp"
 #include "registration/icp.hpp"
 #include "registration/limits.hpp"
@@ -53,7 +54,7 @@ class TurntableSearch {
               .toRotationMatrix();
       candidates[static_cast<std::size_t>(i)] =
           align(few_, plane_ * turn * ground_frame_.inverse(),
-                gates(registration_limits::first_gate * frame_.size, tracking_limits::turn_gate,
+                gates(registration_limits::first_gate * frame_.size, tracking_limits::narrow_gate,
                       tracking_limits::most_coarse_steps));
     });
     candidates = different(std::move(candidates), tracking_limits::num_turn_candidates);
@@ -61,7 +62,7 @@ class TurntableSearch {
       Candidate& candidate = candidates[static_cast<std::size_t>(i)];
       candidate =
           climb(align(source_, candidate.alignment.target_from_source,
-                      gates(tracking_limits::turn_gate * frame_.tolerance, 1.0, tracking_limits::most_turn_steps)));
+                      gates(tracking_limits::narrow_gate * frame_.tolerance, 1.0, tracking_limits::most_turn_steps)));
     });
     const std::size_t num_refined = candidates.size();
     return different(std::move(candidates), num_refined);
@@ -158,7 +159,7 @@ class TurntableSearch {
       const Pose& pose = candidate.alignment.target_from_source;
       const auto is_known = [&](const Candidate& other) {
         const Pose& other_pose = other.alignment.target_from_source;
-        return angle_between(pose, other_pose) < registration_limits::same_turn &&
+        return angle_between(pose, other_pose) < camera_limits::view_turn &&
                (pose * middle - other_pose * middle).norm() < registration_limits::search_gate * frame_.size;
       };
       if (std::none_of(kept.begin(), kept.end(), is_known)) kept.push_back(candidate);
@@ -191,8 +192,8 @@ std::vector<PlaneFit> fits_on_plane(const PointModel& model, const std::vector<O
     fits.push_back({candidate.score, candidate.overlap, candidate.agree / (candidate.agree + candidate.through), true});
   }
   // A rival that is not contradicted is enough for doubt.
-  const std::vector<std::size_t> accepted =
-      accept_rivals(fits, tracking_limits::least_view_overlap, tracking_limits::least_view_consistency, 0.0);
+  const GlobalAlignOptions usual;
+  const std::vector<std::size_t> accepted = accept_rivals(fits, usual.min_overlap, usual.min_consistency, 0.0);
   if (accepted.size() > 1 && !with_rivals) return {};
   std::vector<PlaneFit> found;
   for (const std::size_t i : accepted) {
