@@ -1,10 +1,10 @@
 // Which points of two outlines match.
 #include <vector>
 
+#include "base/limits.hpp"
 #include "base/random.hpp"
 #include "doctest/doctest.h"
 #include "outlines/match.hpp"
-#include "base/limits.hpp"
 
 using namespace nacre;
 
@@ -29,8 +29,7 @@ std::vector<int> nearest_of_all(const std::vector<OutlinePoint>& outline, const 
     nearest.push_back(-1);
     for (std::size_t k = 0; k < others.size(); ++k) {
       const double squared = (others[k].point - edge.point).squaredNorm();
-      if (!(squared < least) || others[k].outward.dot(edge.outward) < base_limits::same_surface_cosine)
-        continue;
+      if (!(squared < least) || others[k].outward.dot(edge.outward) < base_limits::same_surface_cosine) continue;
       least = squared;
       nearest.back() = static_cast<int>(k);
     }
