@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Protocol
 from nacre.errors import RunError
 
 if TYPE_CHECKING:
-    from nacre import Camera
+    from nacre.camera import Camera
     from nacre.datasets import SequenceFrame
 
 

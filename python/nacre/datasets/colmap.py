@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal.guided import guided
 from nacre._internal.quaternions import quaternion_from_matrix
+from nacre.camera import Camera
 from nacre.datasets.posed_images import (
     PIXEL_CENTER,
     POSES_OF_RUN,

@@ -8,9 +8,9 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from nacre import Camera
 from nacre._internal.guided import guided
 from nacre._internal.names_elsewhere import SOME_FRAMES
+from nacre.camera import Camera
 from nacre.datasets import (
     azure_kinect,
     icl_nuim,

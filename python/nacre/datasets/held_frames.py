@@ -9,8 +9,8 @@ from typing import Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal import arrays
+from nacre.camera import Camera
 from nacre.datasets.sequence import SequenceFrame
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nacre import Camera
+from nacre.camera import Camera
 from nacre.datasets.listing import describe, files, pair, require_order
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence

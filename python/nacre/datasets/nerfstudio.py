@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal.guided import guided
+from nacre.camera import Camera
 from nacre.datasets.posed_images import (
     PIXEL_CENTER,
     POSES_OF_RUN,

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal.warned import warn
+from nacre.camera import Camera
 from nacre.datasets.closable import Closable
 from nacre.datasets.sequence import SequenceFrame
 from nacre.errors import CameraError

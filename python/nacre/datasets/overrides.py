@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from nacre import Camera
+from nacre.camera import Camera
 from nacre.errors import UnknownRecordingError
 from nacre.io.cameras import read_camera
 

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal import arrays
 from nacre._internal.guided import guided
 from nacre._internal.kinds import as_items
+from nacre.camera import Camera
 from nacre.datasets.listing import describe, files, require_order
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal.arrays import FloatArray, as_poses
 from nacre._internal.kinds import as_kind
+from nacre.camera import Camera
 from nacre.datasets.sequence import Sequence
 from nacre.errors import FileFormatError
 from nacre.io.cloud import cloud_of

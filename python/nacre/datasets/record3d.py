@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal.arrays import FARTHEST
 from nacre._internal.quaternions import matrix_from_quaternion
+from nacre.camera import Camera
 from nacre.datasets.listing import describe
 from nacre.datasets.open_file import OpenFile
 from nacre.datasets.overrides import Overrides

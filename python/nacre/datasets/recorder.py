@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from nacre import Camera
+from nacre.camera import Camera
 from nacre.datasets import plain
 from nacre.datasets.sequence import FrameSource, Sequence, SequenceFrame
 from nacre.errors import CameraError

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from nacre import Camera
 from nacre._internal.warned import warn
+from nacre.camera import Camera
 from nacre.datasets.listing import describe, files, pair
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal.warned import warn
+from nacre.camera import Camera
 from nacre.datasets.rational_lens import polynomial_of
 from nacre.errors import FileFormatError
 from nacre.io.cameras import check_lens

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal.warned import warn
+from nacre.camera import Camera
 from nacre.datasets.listing import describe
 from nacre.datasets.open_file import OpenFile
 from nacre.datasets.overrides import Overrides

@@ -16,11 +16,11 @@ from typing import Any, overload
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal import arrays
 from nacre._internal.guided import guided
 from nacre._internal.value_equality import Value
 from nacre._internal.warned import warn
+from nacre.camera import Camera
 from nacre.datasets.listing import files, pair
 from nacre.datasets.sanity_check import depth_oddity
 from nacre.errors import FileFormatError, printable

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal.warned import warn
+from nacre.camera import Camera
 from nacre.datasets.listing import describe, natural_key
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence

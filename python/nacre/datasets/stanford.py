@@ -17,9 +17,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal.arrays import FARTHEST
 from nacre._internal.quaternions import matrix_from_quaternion
+from nacre.camera import Camera
 from nacre.datasets.listing import describe, files
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence

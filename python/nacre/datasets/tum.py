@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal.warned import warn
+from nacre.camera import Camera
 from nacre.datasets.listing import describe, require_order
 from nacre.datasets.overrides import Overrides
 from nacre.datasets.sequence import FrameSource, Sequence

@@ -318,7 +318,7 @@ def _as_reference(reference: Any, reference_normals: npt.ArrayLike | None) -> tu
 
 
 def _nearest(cloud: Array, queries: Array) -> tuple[Array, npt.NDArray[np.int64]]:
-    from nacre import KdTree
+    from nacre.kdtree import KdTree
 
     distances, indices = KdTree(cloud).query(queries, k=1)
     return np.asarray(distances, dtype=np.float64), np.asarray(indices, dtype=np.int64)
@@ -330,7 +330,7 @@ def _to_disks(points: Array, cloud: Array, normals: Array) -> tuple[Array, Array
 
     A disk reaches as far as the surface may be from its nearest cloud point: three times the median spacing.
     """
-    from nacre import KdTree
+    from nacre.kdtree import KdTree
 
     radius = 0.0
     if len(cloud) > 1:

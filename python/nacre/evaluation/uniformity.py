@@ -44,7 +44,7 @@ def uniformity(points: npt.ArrayLike) -> Uniformity:
     Uniformity
         NaN for fewer than two points.
     """
-    from nacre import KdTree
+    from nacre.kdtree import KdTree
 
     array = as_points("points", points)
     array = array[np.isfinite(array).all(axis=1)]

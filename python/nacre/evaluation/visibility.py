@@ -7,10 +7,10 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
 from nacre._internal.arrays import as_camera, as_number, as_poses
 from nacre._internal.guided import guided
 from nacre._internal.kinds import as_kind
+from nacre.camera import Camera
 from nacre.evaluation.surface import SurfaceSamples
 from nacre.mesh import Mesh
 

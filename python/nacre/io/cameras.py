@@ -9,10 +9,10 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from nacre import Camera
 from nacre._internal.arrays import as_camera, as_scale
 from nacre._internal.guided import GuidedNames, guided
 from nacre._internal.warned import warn
+from nacre.camera import Camera
 from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
 from nacre.io.image_limits import MAX_PIXELS

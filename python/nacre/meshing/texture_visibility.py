@@ -8,7 +8,7 @@ import functools
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
+from nacre.camera import Camera
 from nacre.mesh import Mesh
 from nacre.meshing.texture_views import TextureView
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nacre import __version__
+from nacre._core import __version__
 
 if TYPE_CHECKING:
     from nacre.reconstruction.reconstruction import Reconstruction

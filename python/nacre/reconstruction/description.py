@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from nacre import Camera
+    from nacre.camera import Camera
     from nacre.datasets import Sequence
 
 

@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from nacre import Camera
 from nacre._internal.arrays import as_count
 from nacre._internal.guided import guided
 from nacre._internal.names_elsewhere import SOME_FRAMES
+from nacre.camera import Camera
 from nacre.datasets import Sequence as Recording
 from nacre.datasets import SequenceFrame, open_sequence
 from nacre.datasets.held_frames import HeldFrames, first_of

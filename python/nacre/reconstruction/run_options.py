@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nacre import __version__
+from nacre._core import __version__
 from nacre._internal.arrays import as_count, as_flag, as_number, as_scale
 from nacre._internal.core_options import leaves
 from nacre.datasets import open_sequence

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nacre import __version__
+from nacre._core import __version__
 from nacre.errors import printable
 from nacre.report.summary import Tile
 from nacre.report.templating import render

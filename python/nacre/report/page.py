@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from nacre import __version__
+from nacre._core import __version__
 from nacre._internal.guided import guided
 from nacre._internal.kinds import as_kind
 from nacre.errors import printable

@@ -17,7 +17,7 @@ from nacre.io.json_files import read_json
 from nacre.report.reported_frame import NUMBERS, ReportedFrame
 
 if TYPE_CHECKING:
-    from nacre import Camera
+    from nacre.camera import Camera
 
 Matrix = npt.NDArray[np.float64]
 

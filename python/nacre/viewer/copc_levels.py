@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import estimate_normals
 from nacre.io.cloud import Cloud
 from nacre.io.copc_reader import CopcFile
 from nacre.io.octree import Key
+from nacre.normals import estimate_normals
 from nacre.viewer.timeline import Snapshot
 
 _AFAR = 1000.0  # sides of the root

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
+from nacre.camera import Camera
 from nacre.depth import PIXEL_LABELS, label_pixels
 from nacre.parameters import DepthParameters
 from nacre.report.colormap import CATEGORIES, category_rgb, viridis

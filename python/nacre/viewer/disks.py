@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import KdTree
+from nacre.kdtree import KdTree
 from nacre.viewer.timeline import Snapshot
 
 _NEIGHBORS = 4  # of a point of a square grid

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
+from nacre.camera import Camera
 from nacre.errors import FileFormatError
 from nacre.io.quantization import quantized
 from nacre.meshing import triangulate

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import KdTree, estimate_normals
 from nacre._internal.guided import guided
 from nacre._internal.warned import warn
 from nacre.errors import FileFormatError
@@ -25,6 +24,8 @@ from nacre.io.painting import Painting
 from nacre.io.ply_header import read_header
 from nacre.io.points import count_points, read_points
 from nacre.io.raw import read_head
+from nacre.kdtree import KdTree
+from nacre.normals import estimate_normals
 from nacre.reconstruction.motion import Motion, read_motion
 from nacre.report.saved_run import SavedRun
 from nacre.report.text import count

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
+from nacre.camera import Camera
 from nacre.errors import printable
 from nacre.io.painting import Painting
 from nacre.model import Model

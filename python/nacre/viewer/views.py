@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import Camera
+from nacre.camera import Camera
 from nacre.viewer.timeline import Snapshot, Timeline
 from nacre.viewer.view import View
 

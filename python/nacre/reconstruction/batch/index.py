@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from nacre import __version__
+from nacre._core import __version__
 from nacre.evaluation.result import plain
 from nacre.io.atomic import atomic_writer
 from nacre.reconstruction.batch.result import BatchResult

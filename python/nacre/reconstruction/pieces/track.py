@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre import __version__
+from nacre._core import __version__
 from nacre.errors import FileFormatError, RunError
 from nacre.io.atomic import atomic_writer
 from nacre.io.json_files import read_json
