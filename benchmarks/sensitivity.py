@@ -2,9 +2,9 @@
 """
 Change every tuned number of the C++ sources at random, build that, and run the pieces of real recordings.
 
-What is tuned should hardly matter: cameras differ by more than numbers are known to. Each seed multiplies each
-number that a `limits.hpp` calls tuned by FACTOR or divides it, as a coin decides; of a part of something above a
-half, what is missing to one.
+What is tuned should hardly matter: cameras differ by more than numbers are known to. Each seed multiplies
+each number that a `limits.hpp` calls tuned by FACTOR or divides it, as a coin decides; of a part of something
+above a half, what is missing to one.
 
     python benchmarks/sensitivity.py WORK --seeds 0 1 2 3 --factor 1.25
     python benchmarks/sensitivity.py WORK --seeds 0 --numbers depth tracking.narrow_gate
@@ -43,7 +43,7 @@ def changed(kind: str, value: str, factor: float) -> str:
 
 
 def write_changed(work: Path, seed: int | None, factor: float, numbers: list[str]) -> dict[str, str]:
-    """Write the headers of numbers anew, with those that are named (or all) changed; return what they are now."""
+    """Write the headers anew, with the numbers that are named (or all) changed; return what they are now."""
     now = {}
     for header in sorted((ROOT / "cpp" / "src").glob("*/limits.hpp")):
         lines = header.read_text(encoding="utf-8").splitlines(keepends=True)
@@ -105,7 +105,9 @@ def main() -> None:
     parser.add_argument("work", type=Path, metavar="WORK")
     parser.add_argument("--seeds", type=int, nargs="*", default=[0, 1, 2, 3])
     parser.add_argument("--factor", type=float, default=1.25)
-    parser.add_argument("--numbers", nargs="*", default=[], help="those alone that are changed, or their folders; all")
+    parser.add_argument(
+        "--numbers", nargs="*", default=[], help="those alone that are changed, or their folders; all"
+    )
     parser.add_argument("--names", nargs="*", default=[], help="recordings whose pieces run; all")
     parser.add_argument("--as-they-are", action="store_true", help="run the numbers as they are, too")
     arguments = parser.parse_args()

@@ -24,7 +24,7 @@ from nacre.cli.source import reopen
 from nacre.meshing import Texture, simplify, texture_mesh, texture_views, triangulate
 from nacre.meshing.texture_exposure import colors_at
 from nacre.meshing.texture_labels import neighbors_of
-from nacre.report.saved_run import SavedRun
+from nacre.run_data.saved_run import SavedRun
 
 Array = npt.NDArray[Any]
 

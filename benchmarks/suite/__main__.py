@@ -13,7 +13,8 @@ from typing import Any
 import report
 
 from suite import contest, machine
-from suite.registry import Workload, all_workloads
+from suite.registry import all_workloads
+from suite.workload import Workload
 
 
 def describe(workload: Workload) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from suite.registry import Contender, Workload
+from suite.workload import Contender, Workload
 
 PAUSE = 0.02
 """Before each turn [s], so that threads that still spin go to sleep."""

@@ -20,7 +20,8 @@ from typing import Any
 import numpy as np
 
 from suite import native
-from suite.registry import Arrays, Contender, Workload, all_workloads
+from suite.registry import all_workloads
+from suite.workload import Arrays, Contender, Workload
 
 TURN = 0.05
 """A turn repeats a fast run until it has lasted so long [s]; the median run counts."""

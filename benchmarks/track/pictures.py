@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 import nacre
+from nacre.pictures.image_files import encode_png, encode_small
 from nacre.rendering import View, render_points
 from nacre.report import ModelCloud
 from nacre.report.first_view import disk_radii, first_view
-from nacre.report.image_files import encode_png, encode_small
-from nacre.report.saved_run import SavedRun
+from nacre.run_data.saved_run import SavedRun
 from track.rows import Places
 
 Image = npt.NDArray[np.uint8]

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
+from nacre.pictures.colormap import CATEGORIES, category_rgb, viridis
 from nacre.rendering import View, render_points
-from nacre.report.colormap import CATEGORIES, category_rgb, viridis
-from nacre.report.text import ticks
+from nacre.run_data.text import ticks
 
 __all__ = [
     "Curve",

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre import _core
+from nacre._internal.array_of_points import ArrayOfPoints
 from nacre._internal.arrays import (
     FloatArray,
     as_count,
@@ -23,7 +24,6 @@ from nacre._internal.arrays import (
 )
 from nacre._internal.core_options import as_choice
 from nacre._internal.guided import guided
-from nacre._internal.point_exchange import ArrayOfPoints
 from nacre._internal.value_equality import Value
 from nacre.kdtree import KdTree
 from nacre.progress import as_progress
@@ -94,7 +94,7 @@ class Consolidated(ArrayOfPoints, Value):
         return f"Consolidated({len(self.points)} points {self.points.dtype}{carried}{ended})"
 
     def _repr_png_(self) -> bytes | None:
-        from nacre.report.notebook_pictures import picture_of_points
+        from nacre.pictures.notebook import picture_of_points
 
         normals, colors = self.attributes.get("normals"), self.attributes.get("colors")
         return picture_of_points(self.points, normals, colors)

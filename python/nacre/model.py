@@ -31,7 +31,6 @@ from nacre._internal.checkpoint import Checkpointed, checkpoint_of, file_name, r
 from nacre._internal.core_options import from_core, mirrored, to_core, updated
 from nacre._internal.guided import guided
 from nacre._internal.kinds import as_kind
-from nacre._internal.point_exchange import ExchangeablePoints
 from nacre.camera import Camera, camera_of
 from nacre.depth_calibration import DepthCalibration
 from nacre.frame_report import FrameReport, FrameReports, report_from
@@ -41,6 +40,7 @@ from nacre.parameters import (
     ModelParameters,
     Preset,
 )
+from nacre.point_exchange import ExchangeablePoints
 from nacre.point_sigma import point_sigma
 
 if TYPE_CHECKING:

@@ -2,22 +2,75 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-if TYPE_CHECKING:
-    from nacre.model import Model
+from nacre.camera import Camera
+from nacre.frame_report import FrameReport
+from nacre.noise import NoiseModel
+from nacre.parameters import ModelParameters
 
 Array = npt.NDArray[np.float64]
+
+
+class FusedModel(Protocol):
+    """What of a :class:`nacre.Model` tells it."""
+
+    @property
+    def points(self) -> npt.NDArray[np.float32]:
+        """(N, 3) [m]."""
+        ...
+
+    @property
+    def confidence(self) -> npt.NDArray[np.float32]:
+        """(N,), in frontal observations."""
+        ...
+
+    @property
+    def last_seen(self) -> npt.NDArray[Any]:
+        """(N,): which frame saw each point last."""
+        ...
+
+    @property
+    def frames(self) -> Sequence[FrameReport]:
+        """What became of each frame."""
+        ...
+
+    @property
+    def poses(self) -> Array:
+        """(F, 4, 4) ``world_from_camera``."""
+        ...
+
+    @property
+    def camera(self) -> Camera:
+        """Of every frame."""
+        ...
+
+    @property
+    def parameters(self) -> ModelParameters:
+        """Of the model."""
+        ...
+
+    @property
+    def noise(self) -> NoiseModel:
+        """Of a pixel, as one image shows it."""
+        ...
+
+    @property
+    def noise_factor(self) -> float:
+        """By how much it is more."""
+        ...
+
 
 _WINDOW_RADIUS = 4  # [pixels] largest window of pixels that fusion averages (fusion_limits::largest_support)
 _CORRELATION_LENGTH = 3.3  # [pixels] of the errors that neighbouring pixels share (docs/algorithms/noise.md)
 _CELLS = 40  # across an image, to find what its pixels see
 
 
-def point_sigma(model: Model) -> Array:
+def point_sigma(model: FusedModel) -> Array:
     """Return the standard deviation of each point across the surface (N,) [m]; see `Model.point_sigma`."""
     confidence = model.confidence.astype(np.float64)
     fused = (frame.world_from_camera for frame in model.frames if frame.status in ("TRACKED", "RELOCALISED"))
@@ -35,7 +88,7 @@ def point_sigma(model: Model) -> Array:
     return np.where(confidence > 0, np.sqrt(variance), np.nan)
 
 
-def _knows_noise(model: Model) -> bool:
+def _knows_noise(model: FusedModel) -> bool:
     """
     Say whether the whole noise is given, or a frame has told by how much it is more than one image shows.
 
@@ -48,7 +101,7 @@ def _knows_noise(model: Model) -> bool:
     return any(frame.num_inliers > 0 and not frame.corrects_earlier for frame in model.frames)
 
 
-def _observation_sigma(model: Model) -> Array:
+def _observation_sigma(model: FusedModel) -> Array:
     """Return the noise of a pixel that shows each point, in the last frame that saw it (N,) [m]."""
     pose = model.poses[model.last_seen]
     depth = np.einsum("ni,ni->n", model.points - pose[:, :3, 3], pose[:, :3, 2])
@@ -66,7 +119,7 @@ def _variance_of_window() -> tuple[float, float]:
     return float(weights @ weights / total), float(weights @ correlation @ weights / total)
 
 
-def _median_sigma(model: Model, world_from_camera: Array) -> float:
+def _median_sigma(model: FusedModel, world_from_camera: Array) -> float:
     """Return the median noise of what the pixels of a camera see of the model."""
     inside = (model.points - world_from_camera[:3, 3]) @ world_from_camera[:3, :3]
     pixels = np.asarray(model.camera.project(inside), np.float64)

@@ -28,6 +28,8 @@ SIDES: dict[str, tuple[tuple[float, float, float], tuple[float, float, float]]] 
     "top": ((0, -1, 0), (0, 0, -1)),
     "bottom": ((0, 1, 0), (0, 0, 1)),
 }
+#: Where the viewer is for a picture from the front, seen from the model: from above at an angle.
+OBLIQUE = (-0.75, -0.55, -1.0)
 
 
 @dataclass(frozen=True, eq=False)

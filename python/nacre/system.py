@@ -2,6 +2,8 @@
 
 from nacre import _core
 
+__version__ = _core.__version__
+
 
 def instruction_set() -> str:
     """Return the instruction set whose kernels run.

@@ -126,7 +126,7 @@ def test_the_registry_is_well_formed() -> None:
 
 def test_turns_rotate_and_failures_stay() -> None:
     from suite import contest
-    from suite.registry import Contender, Workload
+    from suite.workload import Contender, Workload
 
     contenders = [Contender(name, lambda arrays, threads: lambda lap: {}) for name in ("a", "b", "c")]
     work = Workload("work", "Work", 1, dict, contenders, lambda arrays, answer: {}, {})

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -101,7 +102,7 @@ def module_of(path: Path) -> tuple[str, str]:
     return folder_of(path), path.stem
 
 
-def circles(graph: dict[tuple[str, str], set[tuple[str, str]]]) -> set[tuple[str, str]]:
+def circles(graph: dict[Any, set[Any]]) -> set[Any]:
     """Return the modules that are left when those that need none of the rest go, again and again."""
     left = dict(graph)
     while free := [name for name, needed in left.items() if needed.isdisjoint(left)]:
@@ -129,6 +130,44 @@ def test_no_modules_include_each_other_in_a_circle() -> None:
         graph.setdefault(module_of(path), set()).update(needed)
     assert circles(graph) == set()
     assert circles({("a", "a"): {("b", "b")}, ("b", "b"): {("a", "a")}, ("c", "c"): set()}) != set()
+
+
+def python_modules(root: Path) -> dict[str, Path]:
+    """Return the modules below a folder by their names."""
+    paths = {path: path.relative_to(root).with_suffix("").parts for path in root.rglob("*.py")}
+    return {".".join(p[:-1] if p[-1] == "__init__" else p): path for path, p in paths.items()}
+
+
+def imported(name: str, path: Path, modules: dict[str, Path]) -> set[str]:
+    """Return what a module imports, at any time or for types alone, and the packages that come with it."""
+    found: set[str] = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module is not None:
+            whole = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {part if part in modules else node.module for part in whole}
+        elif isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+    packages = {package for module in found for package in enclosing(module)[1:]}
+    return ((found | packages) & modules.keys()) - {name} - set(enclosing(name))
+
+
+def enclosing(module: str) -> list[str]:
+    """Return the packages that a module is in, the outermost first."""
+    parts = module.split(".")
+    return [".".join(parts[:length]) for length in range(1, len(parts))]
+
+
+@pytest.mark.parametrize("folder", ["python", "benchmarks"])
+def test_no_python_modules_import_each_other_in_a_circle(folder: str) -> None:
+    modules = python_modules(ROOT / folder)
+    graph = {name: imported(name, path, modules) for name, path in modules.items()}
+    assert circles(graph) == set()
+
+
+def test_nothing_in_the_package_imports_the_names_that_it_shows_to_users() -> None:
+    paths = [path for path in files("python/nacre", suffixes={".py"}) if "cli" not in path.parts]
+    found = lines_matching(r"^\s*from nacre import (?!_core$)", paths)
+    assert [line for line in found if not line.startswith("python/nacre/__init__.py")] == []
 
 
 # Folders whose numbers decide about data, and stand in their limits.hpp; those before only decide how fast.
@@ -207,7 +246,8 @@ def test_only_the_facade_touches_the_extension_module() -> None:
 
 # The Python package from the bottom up: the facade's modules, and the packages behind it. What functions and
 # type checkers import does not count.
-ROOMS = ["facade", "evaluation", "io", "out_of_core", "datasets", "report", "reconstruction", "viewer", "cli"]
+ROOMS = ["facade", "pictures", "evaluation", "io", "out_of_core", "datasets", "run_data"]
+ROOMS += ["viewer", "report", "reconstruction", "cli"]
 
 
 def imported_modules(path: Path) -> set[str]:

@@ -59,7 +59,7 @@ def test_the_command_line_starts_without_what_it_does_not_need(words: str) -> No
     assert packages(modules) & HEAVY == set()
     core = {"nacre._core"} if "version" in words else set()
     below = {name for name in modules if name.startswith("nacre") and not name.startswith("nacre.cli")}
-    light = {"nacre._internal", "nacre._internal.signals", "nacre._internal.live_cameras"}
+    light = {"nacre._internal", "nacre._internal.signals", "nacre._internal.camera_names"}
     assert below - light == {"nacre", "nacre.errors"} | core
 
 

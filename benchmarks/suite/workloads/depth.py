@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from suite.registry import Arrays, Bound, Contender, Lap, Run, Workload
+from suite.workload import Arrays, Bound, Contender, Lap, Run, Workload
 
 PIXELS = 640 * 480
 SIGMA = 0.0005

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from suite.clouds import degrees_between
-from suite.registry import Arrays, Contender, Lap, Run, Workload
+from suite.workload import Arrays, Contender, Lap, Run, Workload
 
 FRAMES, FAR = 12, 4.0
 STAGES = ("preprocess", "back_project", "registration", "fuse", "normals")

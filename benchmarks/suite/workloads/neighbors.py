@@ -11,7 +11,7 @@ import numpy as np
 
 from suite.clouds import cloud
 from suite.native import function, touched
-from suite.registry import Arrays, Bound, Contender, Lap, Run, Workload
+from suite.workload import Arrays, Bound, Contender, Lap, Run, Workload
 
 
 def nacre(arrays: Arrays, threads: int, k: int) -> Run:

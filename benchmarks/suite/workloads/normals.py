@@ -8,7 +8,7 @@ import numpy as np
 
 from suite.clouds import cloud
 from suite.native import POINTER, function
-from suite.registry import Arrays, Bound, Contender, Lap, Run, Workload
+from suite.workload import Arrays, Bound, Contender, Lap, Run, Workload
 
 K = 16
 

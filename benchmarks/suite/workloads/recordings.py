@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from suite.registry import Arrays, Contender, Lap, Run, Workload
+from suite.workload import Arrays, Contender, Lap, Run, Workload
 from suite.workloads.loop import COMPOSED, check
 
 FRAMES = 40

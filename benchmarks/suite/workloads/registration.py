@@ -9,7 +9,7 @@ import numpy as np
 
 from suite.clouds import degrees_between, rotation, scan
 from suite.native import POINTER, function
-from suite.registry import Arrays, Contender, Lap, Run, Workload
+from suite.workload import Arrays, Contender, Lap, Run, Workload
 
 SIZE = 100_000
 AXES = ((1, 2, 3), (-2, 1, 1), (2, -2, 1), (0, 0, -1))

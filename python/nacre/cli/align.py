@@ -81,7 +81,7 @@ def align(
     import numpy as np
 
     import nacre
-    from nacre.report.text import count, quantity
+    from nacre.run_data.text import count, quantity
 
     if everywhere and initial is not None:
         raise CommandError("--initial is the first guess that --global does without; give one of them", 2)
@@ -147,7 +147,7 @@ def align(
 
 def _align_globally(terminal: Terminal, source: Path, target: Path, out: Path | None, seen: bool) -> None:
     import nacre
-    from nacre.report.text import quantity
+    from nacre.run_data.text import quantity
 
     moving, still = nacre.read_points(source), nacre.read_points(target)
     origin = (0.0, 0.0, 0.0) if seen else None

@@ -146,7 +146,7 @@ def batch(
 
 def _follow(terminal: Terminal, results: Iterable[BatchResult], total: int) -> None:
     """Tell of each result when it is there, and how long the others will take."""
-    from nacre.report.text import duration
+    from nacre.run_data.text import duration
 
     start, num_reconstructed = time.monotonic(), 0
     with terminal.progress("recordings", total) as advance:

@@ -90,7 +90,7 @@ def consolidate(
     import nacre
     from nacre.evaluation import uniformity
     from nacre.io.points import require_point_suffix
-    from nacre.report.text import count
+    from nacre.run_data.text import count
 
     writable_file(out)
     require_point_suffix(out)

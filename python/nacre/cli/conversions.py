@@ -141,7 +141,7 @@ def _write_trajectory(job: Job, trajectory: Trajectory) -> Figures:
 
 def _images_of_run(job: Job) -> Figures:
     import nacre
-    from nacre.report.saved_run import SavedRun
+    from nacre.run_data.saved_run import SavedRun
 
     sequence, poses = reopen(SavedRun(job.source), job.recording)
     return _write_images(job, sequence, poses, nacre.read_points(written_file(job.source, "model.ply")))

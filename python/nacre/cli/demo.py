@@ -130,7 +130,7 @@ def _pose_error(done: Any, center: Any) -> dict[str, Any] | None:
 
 
 def _rows(done: Any, pose_error: dict[str, Any] | None) -> list[tuple[str, str]]:
-    from nacre.report.text import quantity
+    from nacre.run_data.text import quantity
 
     rows = [row for row in trajectory_rows(done) if row[0] in ("frames tracked", "model", "time per frame")]
     if pose_error is not None:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from nacre import Mesh, Trajectory
     from nacre.evaluation import SurfaceSamples
     from nacre.evaluation.result import Result
-    from nacre.report.saved_run import SavedRun
+    from nacre.run_data.saved_run import SavedRun
 
     Matrix = npt.NDArray[np.float64]
 
@@ -99,7 +99,7 @@ def evaluate(
         terminal.answer(*_large_surface(estimate, truth, tau, scale, memory))
         return
     if estimate.is_dir():
-        from nacre.report.saved_run import SavedRun
+        from nacre.run_data.saved_run import SavedRun
 
         if not (estimate / "report.json").is_file():
             raise CommandError(
@@ -201,7 +201,7 @@ def _large_surface(
 def _add(figures: Figures, rows: Rows, results: Mapping[str, Result], saved: SavedRun | None = None) -> None:
     """Add results, and what became of the frames, to the figures and as rows for people."""
     from nacre.evaluation.result import result_dict
-    from nacre.report.text import label, quantity
+    from nacre.run_data.text import label, quantity
 
     if saved:
         figures["frames"] = saved.counts

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from nacre.cli.terminal import Terminal
 
 if TYPE_CHECKING:
-    from nacre.reconstruction.runner import Run, Step
+    from nacre.reconstruction.runner import Run
+    from nacre.reconstruction.steps import Step
 
 
 class Bars:
@@ -30,8 +31,8 @@ class Bars:
 
     def show(self, step: Step) -> None:
         """Bring the bars to where a run is after a step."""
-        from nacre.reconstruction.runner import FrameDone, StageBegun
-        from nacre.report.text import count
+        from nacre.reconstruction.steps import FrameDone, StageBegun
+        from nacre.run_data.text import count
 
         done = self._run.done
         num_lost = done.counts["LOST"]

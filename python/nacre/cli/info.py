@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from nacre._internal.live_cameras import is_camera, open_camera
+from nacre._internal.camera_names import is_camera
 from nacre.cli.source import CameraOption, DepthScaleOption, FormatOption, open_source
 from nacre.cli.surfaces import has_faces, mesh_suffixes, point_suffixes
 from nacre.cli.terminal import CommandError, Json, Quiet, Terminal, Verbose
@@ -68,6 +68,8 @@ def info(
 
 
 def _camera(source: Path) -> tuple[dict[str, Any], Rows]:
+    from nacre.datasets.live_cameras import open_camera
+
     camera = open_camera(source)
     try:
         frame = next(iter(camera))
@@ -127,7 +129,7 @@ def _recording(sequence: Any) -> tuple[dict[str, Any], Rows]:
 
 def _points(path: Path) -> tuple[dict[str, Any], Rows]:
     import nacre
-    from nacre.report.text import count
+    from nacre.run_data.text import count
 
     cloud = nacre.read_points(path)
     figures, rows = _geometry(cloud.points)
@@ -151,7 +153,7 @@ def _points(path: Path) -> tuple[dict[str, Any], Rows]:
 
 def _mesh(path: Path) -> tuple[dict[str, Any], Rows]:
     import nacre
-    from nacre.report.text import count
+    from nacre.run_data.text import count
 
     mesh = nacre.read_mesh(path)
     figures, rows = _geometry(mesh.vertices)
@@ -167,7 +169,7 @@ def _geometry(points: Any) -> tuple[dict[str, Any], Rows]:
     import numpy as np
 
     from nacre.evaluation import uniformity
-    from nacre.report.text import count
+    from nacre.run_data.text import count
 
     finite = points[np.isfinite(points).all(axis=1)]
     figures: dict[str, Any] = {"num_finite": len(finite), "lower": None, "upper": None, "spacing": None}
@@ -192,8 +194,8 @@ def _geometry(points: Any) -> tuple[dict[str, Any], Rows]:
 def _finished(out: Path) -> tuple[dict[str, Any], Rows]:
     """Return what there is to tell of a finished run."""
     from nacre.cli.outputs import file_rows, verdict_rows
-    from nacre.report.saved_run import SavedRun
-    from nacre.report.text import count
+    from nacre.run_data.saved_run import SavedRun
+    from nacre.run_data.text import count
 
     report = {"verdict": None, "point_sigma": None, **SavedRun(out).report}
     counts = {name: report.get(name) for name in ("num_frames", "num_tracked", "num_points")}
@@ -211,8 +213,8 @@ def _finished(out: Path) -> tuple[dict[str, Any], Rows]:
 def describe_unfinished(out: Path) -> tuple[dict[str, Any], list[tuple[str, str]]]:
     """Return what there is to tell of an unfinished run."""
     from nacre.reconstruction.journal import read_journal
-    from nacre.reconstruction.resume import UnfinishedRun
-    from nacre.reconstruction.run_options import options_before, read_document
+    from nacre.reconstruction.resume import UnfinishedRun, read_document
+    from nacre.reconstruction.run_options import options_before
 
     unfinished = UnfinishedRun(out)
     source = options_before(read_document(unfinished), unfinished.document_path)[0].source

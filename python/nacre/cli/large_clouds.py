@@ -89,7 +89,7 @@ def write_cloud(
     terminal: Terminal, out: Path, method: Callable[[Callable[[int, int], None]], CloudResult]
 ) -> None:
     """Write what a method makes of a cloud, which tells its progress; say what became of the cloud."""
-    from nacre.report.text import count
+    from nacre.run_data.text import count
 
     writable_file(out)
     with _following(terminal) as progress:

@@ -79,7 +79,7 @@ def mesh(
     from nacre import read_points, write_mesh
     from nacre.io.meshes import read_mesh_arrays, require_mesh_suffix
     from nacre.meshing import largest_part, part_sizes
-    from nacre.report.text import count
+    from nacre.run_data.text import count
 
     if not source.exists():
         raise CommandError(
@@ -170,7 +170,7 @@ def _stored_attributes(target: Path, mesh: MeshArrays) -> dict[str, Any]:
 
 
 def _words(name: str, value: Any) -> str:
-    from nacre.report.text import count
+    from nacre.run_data.text import count
 
     if name == "seen":
         return f"{value:.1%} of the area; the rest is a guess"
@@ -200,7 +200,7 @@ def _views(source: Path) -> list[TextureView]:
     import numpy as np
 
     from nacre.meshing import texture_views
-    from nacre.report.saved_run import SavedRun
+    from nacre.run_data.saved_run import SavedRun
 
     if source.is_file():
         raise CommandError(

@@ -17,7 +17,7 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
     import numpy as np
 
     from nacre.report.summary import told_trajectory_error
-    from nacre.report.text import count, quantity
+    from nacre.run_data.text import count, quantity
 
     counts = {name.lower(): number for name, number in done.counts.items() if number and name != "TRACKED"}
     extra = f" ({', '.join(f'{number} {name}' for name, number in counts.items())})" if counts else ""
@@ -53,7 +53,7 @@ def trajectory_rows(done: Reconstruction) -> list[tuple[str, str]]:
 def verdict_rows(report: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Return the verdict that report.json holds, what else was found, and how well the points are known."""
     from nacre.report.summary import noise_alone
-    from nacre.report.text import quantity
+    from nacre.run_data.text import quantity
 
     rows = []
     verdict, spread = report["verdict"], report["point_sigma"]

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from nacre._internal.live_cameras import CAMERAS, is_camera
+from nacre._internal.camera_names import CAMERAS, is_camera
 from nacre._internal.signals import interruptible
 from nacre.cli.config import ConfigOption, PresetOption, SetOption
 from nacre.cli.reconstruct_options import (

@@ -19,7 +19,7 @@ from nacre.cli.window import Window
 if TYPE_CHECKING:
     from nacre.reconstruction.job import Job
     from nacre.reconstruction.reconstruction import Reconstruction
-    from nacre.reconstruction.runner import Step
+    from nacre.reconstruction.steps import Step
     from nacre.viewer import LiveView
 
 
@@ -93,7 +93,7 @@ def _ending(job: Job) -> str:
 
 def _added_to(live: LiveView) -> Callable[[Step], None]:
     """Return what shows each frame that is done."""
-    from nacre.reconstruction.runner import FrameDone
+    from nacre.reconstruction.steps import FrameDone
 
     def add(step: Step) -> None:
         if isinstance(step, FrameDone):

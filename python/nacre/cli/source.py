@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from nacre import Camera
     from nacre.datasets import Sequence
-    from nacre.report.saved_run import SavedRun
+    from nacre.run_data.saved_run import SavedRun
 
 
 def complete_format(incomplete: str) -> list[str]:

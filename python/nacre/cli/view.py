@@ -50,7 +50,7 @@ def view(
     other is brought into the frame of the first where frames differ. --rrd needs the extra "rerun".
     """
     terminal = Terminal(False, quiet, verbose)
-    from nacre.report.text import count
+    from nacre.run_data.text import count
     from nacre.viewer import Viewer, export_html, export_rrd, in_frame_of, read_timeline
     from nacre.viewer.page_data import kept_points
 

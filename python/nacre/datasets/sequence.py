@@ -93,7 +93,7 @@ class SequenceFrame(Value):
         return f"SequenceFrame({', '.join(parts)})"
 
     def _repr_png_(self) -> bytes | None:
-        from nacre.report.notebook_pictures import picture_of_depth
+        from nacre.pictures.notebook import picture_of_depth
 
         return picture_of_depth(self.depth)
 

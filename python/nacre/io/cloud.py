@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal import arrays
+from nacre._internal.array_of_points import ArrayOfPoints
 from nacre._internal.kinds import as_items, as_kind
-from nacre._internal.point_exchange import ArrayOfPoints
 from nacre._internal.value_equality import Value
 from nacre.io.raw import MAX_COMMENTS
 
@@ -99,7 +99,7 @@ class Cloud(ArrayOfPoints, Value):
         return f"Cloud({', '.join(parts)})"
 
     def _repr_png_(self) -> bytes | None:
-        from nacre.report.notebook_pictures import picture_of_points
+        from nacre.pictures.notebook import picture_of_points
 
         return picture_of_points(self.points, self.normals, self.colors)
 

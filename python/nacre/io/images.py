@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre._internal.guided import guided
+from nacre._internal.pillow import import_pillow
 from nacre.errors import FileFormatError, shown
 from nacre.io.atomic import atomic_writer
 from nacre.io.image_limits import check_exr, check_pixels, checked_png
@@ -154,17 +155,6 @@ def _checked_color(color: npt.ArrayLike) -> npt.NDArray[np.uint8]:
     if array.dtype != np.uint8 or array.ndim != 3 or array.shape[2] != 3:
         raise ValueError(f"color must be (H, W, 3) uint8, got {array.shape} of {array.dtype}")
     return array
-
-
-def import_pillow() -> Any:
-    """Return ``PIL.Image``, or say how to install it."""
-    try:
-        import PIL.Image
-    except ImportError as error:
-        raise ImportError(
-            'PNG and JPEG images need pillow: pip install "nacre[images]"', name="PIL"
-        ) from error
-    return PIL.Image
 
 
 def _write_image(path: str | os.PathLike[str], array: npt.NDArray[Any], format: str, **options: Any) -> None:

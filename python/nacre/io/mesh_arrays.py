@@ -14,7 +14,7 @@ import numpy.typing as npt
 from nacre._internal import arrays
 from nacre.errors import FileFormatError
 from nacre.io.cloud import Columns
-from nacre.meshing.texture import Texture
+from nacre.texture import Texture
 
 
 @dataclass(frozen=True)

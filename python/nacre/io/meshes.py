@@ -18,7 +18,7 @@ from nacre.io import glb, glb_reader, obj, off, ply, stl
 from nacre.io.cloud import check_cloud
 from nacre.io.mesh_arrays import MeshArrays
 from nacre.io.raw import require_path
-from nacre.meshing.texture import Texture, check_texture
+from nacre.texture import Texture, check_texture
 
 if TYPE_CHECKING:
     from nacre.mesh import Mesh

@@ -19,7 +19,7 @@ from nacre.io.images import encode_jpeg
 from nacre.io.mesh_arrays import MeshArrays, Polygons, float_of
 from nacre.io.raw import MAX_COMMENTS, code_lines, decode, excerpt, file_writer, read_file
 from nacre.io.rows import encode_lines
-from nacre.meshing.texture import Texture
+from nacre.texture import Texture
 
 Float64 = npt.NDArray[np.float64]
 

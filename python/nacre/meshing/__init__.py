@@ -7,10 +7,10 @@ from nacre.meshing.closed_surface import ClosedSurface, close_surface
 from nacre.meshing.parts import largest_part, part_sizes
 from nacre.meshing.simplification import simplify
 from nacre.meshing.surface_points import on_surface
-from nacre.meshing.texture import Texture
 from nacre.meshing.texture_views import TextureView, texture_views
 from nacre.meshing.texturing import texture_mesh
 from nacre.meshing.triangulation import mesh_points, triangulate, used_rows
+from nacre.texture import Texture
 
 __all__ = [
     "ClosedSurface",

@@ -8,12 +8,12 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from nacre.meshing.texture import Texture
 from nacre.meshing.texture_atlas import CELL, MOST_PIXELS, Changes, cut, pack, paint_cells, rectangles
 from nacre.meshing.texture_blending import Layer
 from nacre.meshing.texture_labels import NO_VIEW
 from nacre.meshing.texture_patches import Patches
 from nacre.meshing.texture_views import TextureView
+from nacre.texture import Texture
 
 Array = npt.NDArray[np.float64]
 Image = npt.NDArray[np.uint8]
@@ -97,7 +97,7 @@ def paint(
 def _scaled(image: Image, scale: float) -> Image:
     if scale == 1:
         return image
-    from nacre.io.images import import_pillow
+    from nacre._internal.pillow import import_pillow
 
     pillow = import_pillow()
     size = [max(1, round(scale * side)) for side in image.shape[1::-1]]

@@ -13,7 +13,6 @@ from nacre._internal import arrays
 from nacre._internal.guided import guided
 from nacre.camera import Camera
 from nacre.mesh import Mesh
-from nacre.meshing.texture import Texture
 from nacre.meshing.texture_blending import layers_at_seams
 from nacre.meshing.texture_exposure import (
     Falloff,
@@ -29,6 +28,7 @@ from nacre.meshing.texture_painting import paint
 from nacre.meshing.texture_patches import Patches
 from nacre.meshing.texture_views import TextureView, check_views
 from nacre.meshing.texture_visibility import edge_lengths, project
+from nacre.texture import Texture
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from nacre.io.animations import write_animation
 from nacre.meshing.triangulation import triangulate, used_rows
 from nacre.model import Model
-from nacre.reconstruction.frame_record import FrameRecord
-from nacre.reconstruction.motion import shown_rows
+from nacre.run_data.frame_record import FrameRecord
+from nacre.run_data.motion import shown_rows
 
 _MOST_VERTICES = 20_000_000  # of all frames together: half a GB
 _TOLERANCE = 0.1  # [spacing] that a vertex may be off

@@ -15,7 +15,8 @@ from nacre.reconstruction.job import Job
 from nacre.reconstruction.journal import ChangedRunError
 from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.results import depth_rows, write_results
-from nacre.reconstruction.runner import FrameDone, Run, Step
+from nacre.reconstruction.runner import Run
+from nacre.reconstruction.steps import FrameDone, Step
 
 Listener = Callable[[Step], None]
 

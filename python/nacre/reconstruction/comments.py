@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nacre._core import __version__
+from nacre.system import __version__
 
 if TYPE_CHECKING:
     from nacre.reconstruction.reconstruction import Reconstruction
@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 def file_comments(done: Reconstruction) -> list[str]:
     """Return lines for their headers: who wrote them, in which frame, and from where to look first."""
+    from nacre.reconstruction.run_figures import run_report
     from nacre.report.first_view import viewers_view
-    from nacre.report.run_figures import run_report
     from nacre.viewer.timeline import CAMERA_FRAME
 
     comments = [f"nacre {__version__}", f"metres; {CAMERA_FRAME}"]

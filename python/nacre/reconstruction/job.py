@@ -22,13 +22,12 @@ from nacre.reconstruction.live_feed import LiveFeed, camera_feed, real_time_feed
 from nacre.reconstruction.pieces.motions import PieceMotions
 from nacre.reconstruction.pieces.workers import Cluster
 from nacre.reconstruction.reconstruction import Reconstruction
-from nacre.reconstruction.resume import UnfinishedRun
+from nacre.reconstruction.resume import UnfinishedRun, read_document
 from nacre.reconstruction.run_options import (
     RunOptions,
     check_recording,
     may_park,
     options_before,
-    read_document,
 )
 from nacre.reconstruction.runner import Run
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from nacre.errors import FileFormatError
-from nacre.reconstruction.frame_record import FrameRecord
+from nacre.run_data.frame_record import FrameRecord
 
 
 class ChangedRunError(RuntimeError):

@@ -9,13 +9,13 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nacre._internal.live_cameras import open_camera
 from nacre._internal.signals import Interruption
+from nacre.datasets.live_cameras import open_camera
 from nacre.errors import CameraError, FileFormatError, RunError
 
 if TYPE_CHECKING:
     from nacre.datasets import LiveQueue, Sequence, SequenceFrame
-    from nacre.reconstruction.runner import Step
+    from nacre.reconstruction.steps import Step
     from nacre.viewer import Controls
 
 
@@ -79,7 +79,7 @@ class LiveFeed:
     def tend(self, step: Step) -> None:
         """Between two steps of a run: see that what came can be read again; end where it is enough."""
         from nacre.datasets.recorder import GrowingRecording
-        from nacre.reconstruction.runner import FrameDone, StageBegun
+        from nacre.reconstruction.steps import FrameDone, StageBegun
 
         if isinstance(step, FrameDone) and isinstance(self.sequence, GrowingRecording):
             self.sequence.settle()  # what a journal will name

@@ -19,12 +19,11 @@ from nacre.datasets.held_frames import HeldFrames, first_of
 from nacre.io.cameras import read_camera
 from nacre.model import Model
 from nacre.parameters import ModelParameters, Preset
-from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.pieces.motions import PieceMotions
 from nacre.reconstruction.pieces.workers import Cluster
 from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.run_options import RunOptions
-from nacre.reconstruction.runner import Run
+from nacre.run_data.frame_record import FrameRecord
 
 
 @guided("a recording, or a list of depth images with camera=", **SOME_FRAMES)
@@ -99,7 +98,7 @@ def reconstruct(
     """
     frames, of_all, indices = _opened(source, format, camera, depth_scale)
     model = Model(of_all, preset, parameters=parameters, points_folder=points_folder, **changes)
-    run = Run(Reconstruction(frames, model), indices, retry=retry)
+    done, motions = Reconstruction(frames, model), None
     if workers is not None or scheduler is not None:
         if not isinstance(source, str | os.PathLike):
             raise TypeError(f"source must be a path where workers open it too, got {type(source).__name__}")
@@ -114,10 +113,10 @@ def reconstruct(
             None if camera is None else os.path.abspath(camera),  # noqa: PTH100
             depth_scale,
         )
-        run.motions = PieceMotions.of(
+        motions = PieceMotions.of(
             options, model.parameters, range(len(frames)), folder=Path.cwd(), kept_in=None, cluster=cluster
         )
-    done = run.to_end(progress)
+    done.complete(indices, progress=progress, retry=retry, motions=motions)
     errors = [frame.error for frame in done.frames]
     if errors and errors[0] is not None and None not in errors:
         raise errors[0]
@@ -129,29 +128,29 @@ def _opened(
     format: str | None,
     camera: Camera | str | os.PathLike[str] | None,
     depth_scale: float | None,
-) -> tuple[Sequence[SequenceFrame], Camera, Iterable[int]]:
-    """Return the frames of a source, their camera, and the indices of all, which may come one by one."""
+) -> tuple[Sequence[SequenceFrame], Camera, Iterable[int] | None]:
+    """Return the frames of a source, their camera, and their indices, where they come one by one."""
     if isinstance(source, str | os.PathLike):
         recording = open_sequence(source, format=format, camera=camera, depth_scale=depth_scale)
-        return recording, recording.camera, range(len(recording))
+        return recording, recording.camera, None
     if not isinstance(source, Iterable) or isinstance(source, Mapping):
         raise TypeError(f"source must be a path or a sequence of frames, got {type(source).__name__}")
     if isinstance(source, Recording):
         _refuse("this one is open", format=format, camera=camera, depth_scale=depth_scale)
         if not len(source):
             raise ValueError("source must have at least one frame, got none")
-        return source, source.camera, range(len(source))
+        return source, source.camera, None
     first, items = first_of(source)
     depth = first[0] if isinstance(first, tuple) and first else first
     if isinstance(depth, str | os.PathLike):
         recording = open_sequence(items, format=format, camera=camera, depth_scale=depth_scale)
-        return recording, recording.camera, range(len(recording))
+        return recording, recording.camera, None
     if not isinstance(first, SequenceFrame):
         _refuse("these are arrays", format=format)
         return _held(first, items, camera, depth_scale)
     _refuse("its frames have their own", format=format, camera=camera, depth_scale=depth_scale)
     if isinstance(items, Sequence):
-        return items, first.camera, range(len(items))
+        return items, first.camera, None
     held = HeldFrames(None)
     return held, first.camera, held.receive(items)
 
@@ -167,7 +166,7 @@ def _held(
     items: Iterable[Any],
     camera: Camera | str | os.PathLike[str] | None,
     depth_scale: float | None,
-) -> tuple[HeldFrames, Camera, Iterable[int]]:
+) -> tuple[HeldFrames, Camera, Iterable[int] | None]:
     """Return frames of depth images in memory; the first is made at once, so that its errors come first."""
     of_integers = None
     if isinstance(camera, str | os.PathLike):
@@ -177,6 +176,6 @@ def _held(
     of_all = held[0].camera
     if isinstance(items, Sequence | np.ndarray):
         held = HeldFrames(camera, depth_scale, of_integers, items)
-        return held, of_all, range(len(held))
+        return held, of_all, None
     held = HeldFrames(camera, depth_scale, of_integers)
     return held, of_all, held.receive(items)

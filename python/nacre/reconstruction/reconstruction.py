@@ -6,60 +6,38 @@ import collections.abc
 import dataclasses
 import itertools
 import logging
-import math
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from contextlib import closing, nullcontext
 from dataclasses import dataclass
-from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from nacre._internal.arrays import as_count, as_flag, stacked_poses
+from nacre._internal.arrays import as_count, as_flag
 from nacre._internal.checkpoint import Checkpointed
 from nacre._internal.guided import guided
-from nacre._internal.kinds import as_kind
+from nacre._internal.rotations import rotation_angles
 from nacre.datasets.read_ahead import read_ahead
 from nacre.datasets.sequence import SequenceFrame
-from nacre.depth_calibration import DepthCalibration
 from nacre.errors import FileFormatError
-from nacre.evaluation import absolute_trajectory_error, relative_pose_error
-from nacre.evaluation.result import Result
-from nacre.frame_report import FrameReport, count_statuses
-from nacre.io.cloud import Cloud
+from nacre.frame_report import FrameReport
 from nacre.model import Model
-from nacre.reconstruction.frame_record import FrameRecord
+from nacre.progress import as_progress
+from nacre.reconstruction.known_motions import Motions
+from nacre.reconstruction.run_figures import run_dict, run_report
+from nacre.reconstruction.run_record import Pose, RunRecord
 from nacre.reconstruction.saved_state import record_from, record_state
-from nacre.report.doubled_surfaces import DoubledSurfaces, find_doubled_surfaces
+from nacre.reconstruction.steps import FrameDone, StageBegun, Step
+from nacre.report.data import ReportData
 from nacre.report.limits import MIN_TRACKED
-from nacre.report.run_figures import run_dict, run_report
-from nacre.trajectory import Trajectory
-
-if TYPE_CHECKING:
-    from nacre.reconstruction.pieces.motions import PieceMotions
-    from nacre.report import ReportData
+from nacre.run_data.frame_record import FrameRecord
 
 _log = logging.getLogger("nacre.reconstruction")
 
+# How much each status knows of the camera's pose.
 _RANK = {"LOST": 0, "WEAK": 1, "RELOCALISED": 2, "TRACKED": 2}
-
-
-def _renewed(record: FrameRecord, report: FrameReport) -> FrameRecord:
-    return dataclasses.replace(record, status=report.status, reason=report.reason, report=report)
-
-
-def _turn_between(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> float:
-    """Return the angle between the directions of two poses [rad]."""
-    trace = float(np.sum(a[:3, :3] * b[:3, :3]))
-    return math.acos(min(1.0, max(-1.0, 0.5 * (trace - 1.0))))
-
-
-def _fused_index(record: FrameRecord) -> int:
-    """Return which of the model's frames it is; -1 where it did not change the model."""
-    if record.report is None or _RANK[record.status] < _RANK["TRACKED"]:
-        return -1
-    return record.report.index
 
 
 @dataclass
@@ -71,7 +49,7 @@ class _Retry:
     found_any: bool = False  # since the first of them
 
 
-class Reconstruction(Checkpointed):
+class Reconstruction(RunRecord, Checkpointed):
     """
     A recording run through a model.
 
@@ -97,16 +75,8 @@ class Reconstruction(Checkpointed):
     """
 
     def __init__(self, sequence: collections.abc.Sequence[SequenceFrame], model: Model) -> None:
-        self.sequence = as_kind("sequence", sequence, collections.abc.Sequence, "a nacre.Sequence")
-        self.model = as_kind("model", model, Model, "a nacre.Model")
-        self.frames: list[FrameRecord] = []
-        self.evaluation: dict[str, Result] = {}
-        self.cancelled = False
-        self.all_points = False
-        self.num_dropped = 0  # of frames that came faster than they could be registered
+        super().__init__(sequence, model)
         self._retry: _Retry | None = None
-        self._cloud: tuple[tuple[int, bool], Cloud] | None = None  # of so many frames
-        self._doubled: tuple[int, DoubledSurfaces] | None = None  # after so many of the model's frames
 
     def __repr__(self) -> str:
         ended = ", cancelled" * self.cancelled
@@ -122,6 +92,7 @@ class Reconstruction(Checkpointed):
         *,
         progress: Callable[[FrameRecord], bool | None] | None = None,
         retry: bool = True,
+        motions: Motions | None = None,
     ) -> Reconstruction:
         """
         Run frames to the end, go over the lost ones again, and evaluate the trajectory where truth is known.
@@ -136,19 +107,60 @@ class Reconstruction(Checkpointed):
             exceptions, Ctrl-C too, come out of this call, and what is done is kept all the same.
         retry : bool
             Whether lost frames are tried again at the end.
+        motions : Motions, optional
+            How the camera went on, where it is known: that spares the registration.
 
         Returns
         -------
         Reconstruction
             This one.
         """
-        from nacre.reconstruction.runner import Run
-
+        goes_on = None if progress is None else as_progress("progress", progress)
         rest = range(len(self.sequence)) if indices is None else iter(indices)
-        return Run(self, rest, retry=retry).to_end(progress)
+        with closing(self.steps(rest, retry=retry, motions=motions)) as steps:
+            for step in steps:
+                if isinstance(step, FrameDone) and goes_on is not None and not goes_on(step.frame):
+                    self.cancelled = True
+                    _log.info("cancelled after %d frames", len(self.frames))
+                    break
+        self.evaluate_trajectory()
+        return self
+
+    def steps(
+        self, indices: Iterable[int], *, retry: bool = True, motions: Motions | None = None
+    ) -> Generator[Step, None, None]:
+        """
+        Do one thing after the other, and yield each when it is done; a stage, when it begins.
+
+        Parameters
+        ----------
+        indices : iterable of int
+            The frames to run. Of a sequence, those that are done are left out; others are run as they come.
+        retry : bool
+            Whether lost frames are tried again at the end.
+        motions : Motions, optional
+            What others have found of the camera's way.
+
+        Yields
+        ------
+        StageBegun or FrameDone
+        """
+        with nullcontext() if motions is None else motions.at_work():
+            if isinstance(indices, collections.abc.Sequence):
+                done = {frame.index for frame in self.frames}
+                indices = [index for index in indices if index not in done]
+            count = len(indices) if isinstance(indices, list) else None
+            if count != 0:
+                yield StageBegun("frames", count)
+                yield from map(FrameDone, self.run(indices, motions=motions))
+        if retry:
+            yield StageBegun("lost frames", self.counts["LOST"] or None)
+            yield from map(FrameDone, self.retry_lost())
+        for sentence in self.advice:
+            _log.warning("%s", sentence)
 
     def run(
-        self, indices: Iterable[int] | None = None, *, motions: PieceMotions | None = None
+        self, indices: Iterable[int] | None = None, *, motions: Motions | None = None
     ) -> Iterator[FrameRecord]:
         """
         Add frames to the model, and yield each when it is done.
@@ -157,7 +169,7 @@ class Reconstruction(Checkpointed):
         ----------
         indices : iterable of int, optional
             Of the frames; by default all that were not added yet.
-        motions : PieceMotions, optional
+        motions : Motions, optional
             How the camera went on, where it is known: that spares the registration.
 
         Yields
@@ -192,7 +204,7 @@ class Reconstruction(Checkpointed):
                 return
             self._retry = _Retry(self._views_are_far_apart())
         state, count = self._retry, len(self.frames)
-        newest_fused = max(map(_fused_index, self.frames), default=-1)
+        newest_fused = max((frame.fused_index for frame in self.frames), default=-1)
         while True:
             while state.step < 2 * count:  # from the last to the first, then back
                 is_back = state.step >= count
@@ -212,7 +224,7 @@ class Reconstruction(Checkpointed):
                     record = dataclasses.replace(record, status="RELOCALISED")
                 is_better = _RANK[record.status] > _RANK[before.status]
                 state.found_any |= is_better
-                newest_fused = max(newest_fused, _fused_index(record))
+                newest_fused = max(newest_fused, record.fused_index)
                 if is_better or record.status == "LOST":
                     self.frames[place] = record
                 state.step += 1
@@ -222,24 +234,7 @@ class Reconstruction(Checkpointed):
             self._retry = state = _Retry(state.are_apart)
         self._retry = None
 
-    def _newest_poses(self, count: int) -> dict[int, npt.NDArray[np.float64]]:
-        """Return the poses of those of the newest frames that are part of the model, by their indices."""
-        places = range(max(0, len(self.frames) - count), len(self.frames))
-        poses = {self.frames[place].index: self._pose_at(place) for place in places}
-        return {index: pose for index, pose in poses.items() if pose is not None}
-
-    @property
-    def fused_poses(self) -> dict[int, npt.NDArray[np.float64]]:
-        """(4, 4) ``world_from_camera`` of the frames that are part of the model, by their indices."""
-        return self._newest_poses(len(self.frames))
-
-    def _pose_at(self, place: int) -> npt.NDArray[np.float64] | None:
-        """Return the pose of a frame that is part of the model."""
-        if not 0 <= place < len(self.frames) or _fused_index(self.frames[place]) < 0:
-            return None
-        return self.frames[place].world_from_camera
-
-    def _predicted(self, place: int, side: int) -> npt.NDArray[np.float64] | None:
+    def _predicted(self, place: int, side: int) -> Pose | None:
         """Return where the camera was if it moved on from the frame on one side as it had; or that pose."""
         near, far = self._pose_at(place + side), self._pose_at(place + 2 * side)
         return near if near is None or far is None else near @ np.linalg.inv(far) @ near
@@ -247,8 +242,9 @@ class Reconstruction(Checkpointed):
     def _views_are_far_apart(self) -> bool:
         """Say whether the camera ever turned farther from frame to frame than a registration reaches."""
         poses = [self._pose_at(place) for place in range(len(self.frames))]
-        turns = [_turn_between(a, b) for a, b in itertools.pairwise(poses) if a is not None and b is not None]
-        return not turns or max(turns) > self.model.parameters.registration.max_angle
+        known = [(a, b) for a, b in itertools.pairwise(poses) if a is not None and b is not None]
+        turns = rotation_angles(np.array([a[:3, :3].T @ b[:3, :3] for a, b in known]).reshape(-1, 3, 3))
+        return not len(turns) or float(turns.max()) > self.model.parameters.registration.max_angle
 
     def _checkpoint(self, **more: Any) -> bytes:
         retry = None if self._retry is None else dataclasses.asdict(self._retry)
@@ -319,7 +315,7 @@ class Reconstruction(Checkpointed):
         self,
         index: int,
         read: Callable[[], SequenceFrame],
-        guess: npt.NDArray[np.float64] | None = None,
+        guess: Pose | None = None,
         *,
         search: bool = True,
         keep_guess: bool = False,
@@ -363,114 +359,9 @@ class Reconstruction(Checkpointed):
     def _take_corrected_poses(self) -> None:
         reports = self.model.frames
         self.frames[:] = [
-            record if record.report is None else _renewed(record, reports[record.report.index])
+            record if record.report is None else record.renewed(reports[record.report.index])
             for record in self.frames
         ]
-
-    @property
-    def depth_calibration(self) -> DepthCalibration | None:
-        """What the frames say of systematic errors of the depth (:attr:`Model.depth_calibration`)."""
-        return self.model.depth_calibration
-
-    @property
-    def advice(self) -> list[str]:
-        """What the frames say is wrong with the camera as it was given, or with its depth; sentences."""
-        told, unit = [self.camera_doubt], self.model.depth_unit
-        if unit > self.model.spacing > 0.0:
-            told.append(
-                f"depth comes in steps of {1e3 * unit:.3g} mm, coarser than its noise and than the model's "
-                "points are apart: poses and surfaces may be off by as much"
-            )
-        return [sentence for sentence in told if sentence]
-
-    @property
-    def camera_doubt(self) -> str:
-        """What the frames say is wrong with the camera as it was given; empty where nothing is."""
-        calibration = self.depth_calibration
-        return "" if calibration is None else calibration.camera_advice(self.model.camera)
-
-    @property
-    def doubled_surfaces(self) -> DoubledSurfaces | None:
-        """How much of the model is there twice, as frames that disagree leave it; None without points."""
-        model = self.model
-        if not len(model):
-            return None
-        num_frames = len(model.frames)
-        if self._doubled is None or self._doubled[0] != num_frames:
-            found = find_doubled_surfaces(
-                model.points,
-                model.normals,
-                spacing=model.spacing,
-                max_slant=model.parameters.depth.max_slant,
-            )
-            self._doubled = num_frames, found
-        return self._doubled[1]
-
-    @property
-    def counts(self) -> dict[str, int]:
-        """How many frames have each status."""
-        return count_statuses(self.frames)
-
-    @property
-    def loops(self) -> list[FrameRecord]:
-        """The frames that closed a loop."""
-        return [
-            frame for frame in self.frames if frame.report is not None and frame.report.loop_frame is not None
-        ]
-
-    @property
-    def num_tracked(self) -> int:
-        """How many frames have a pose, WEAK ones, which are not fused, among them."""
-        return sum(frame.world_from_camera is not None for frame in self.frames)
-
-    @property
-    def poses(self) -> npt.NDArray[np.float64]:
-        """(F, 4, 4) ``world_from_camera``; NaN where it is not known."""
-        return stacked_poses(frame.world_from_camera for frame in self.frames)
-
-    @property
-    def truths(self) -> npt.NDArray[np.float64] | None:
-        """(F, 4, 4) true poses, NaN where they are not known; None where none is."""
-        if all(frame.truth is None for frame in self.frames):
-            return None
-        return stacked_poses(frame.truth for frame in self.frames)
-
-    @property
-    def trajectory(self) -> Trajectory:
-        """The poses of the tracked frames, timed by the frames' indices where there are no time stamps."""
-        tracked = [frame for frame in self.frames if frame.world_from_camera is not None]
-        timed = bool(tracked) and all(frame.timestamp is not None for frame in tracked)
-        times = [frame.timestamp if timed else frame.index for frame in tracked]
-        return Trajectory(
-            np.array(times, np.float64), stacked_poses(frame.world_from_camera for frame in tracked)
-        )
-
-    @property
-    def milliseconds(self) -> npt.NDArray[np.float64]:
-        """The model's time for each frame that it got."""
-        return np.array([f.report.milliseconds["total"] for f in self.frames if f.report is not None])
-
-    def evaluate_trajectory(self) -> None:
-        """Add the errors of the trajectory to ``evaluation``, where the recording knows the truth."""
-        truths = self.truths
-        if truths is None:
-            return
-        poses = self.poses
-        self.evaluation["absolute_trajectory_error"] = absolute_trajectory_error(poses, truths)
-        self.evaluation["relative_pose_error"] = relative_pose_error(poses, truths)
-
-    @cached_property
-    def parameters(self) -> dict[str, Any]:
-        """The model's parameters as nested mappings."""
-        return dataclasses.asdict(self.model.parameters)
-
-    @property
-    def cloud(self) -> Cloud:
-        """The points that reports and files show: :meth:`nacre.Model.cloud`."""
-        state = (len(self.model.frames), self.all_points)
-        if self._cloud is None or self._cloud[0] != state:
-            self._cloud = state, self.model.cloud(all_points=self.all_points)
-        return self._cloud[1]
 
     def as_dict(self, *, min_tracked: float = MIN_TRACKED, **more: Any) -> dict[str, Any]:
         """

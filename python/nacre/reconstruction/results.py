@@ -16,7 +16,7 @@ from nacre.io.points import write_points
 from nacre.io.trajectories import write_trajectory
 from nacre.reconstruction.animation import write_model_animation
 from nacre.reconstruction.comments import file_comments
-from nacre.reconstruction.motion import write_model_motion
+from nacre.run_data.motion import write_model_motion
 
 if TYPE_CHECKING:
     from nacre.reconstruction.reconstruction import Reconstruction
@@ -84,7 +84,7 @@ def _write(path: Path, data: bytes) -> None:
 
 def _write_pictures(folder: Path, page: str) -> None:
     """Write the pictures that a page holds as PNG files, as they are named there."""
-    from nacre.report.image_files import as_png
+    from nacre.pictures.image_files import as_png
 
     folder.mkdir(exist_ok=True)
     pattern = r'<img src="data:image/webp;base64,([^"]+)"[^>]* data-name="([^"]+)"'

@@ -12,14 +12,14 @@ from typing import Any
 
 from nacre._internal.arrays import as_count
 from nacre.datasets.sequence import SequenceFrame
-from nacre.errors import FileFormatError
+from nacre.errors import FileFormatError, RunError
 from nacre.io.atomic import atomic_writer, remove_leftovers
 from nacre.io.folder_lock import lock_folder
 from nacre.io.json_files import read_json
-from nacre.reconstruction.frame_record import FrameRecord
 from nacre.reconstruction.journal import Journal, read_journal
 from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.runner import Run
+from nacre.run_data.frame_record import FrameRecord
 
 _FORMAT = 1
 _RARE = 50.0  # a checkpoint is written when so many times what the last one took has gone by: 2 % of the time
@@ -179,3 +179,15 @@ class UnfinishedRun:
         for folder in (self.points_folder, self.folder):
             with suppress(OSError):
                 folder.rmdir()
+
+
+def read_document(unfinished: UnfinishedRun) -> dict[str, Any]:
+    """Return what ``run.json`` says, or say that there is nothing to resume."""
+    out = unfinished.out
+    try:
+        return unfinished.document()
+    except FileNotFoundError:
+        if (out / "report.json").exists():
+            raise RunError(f"{out} holds a run that is finished: there is nothing to resume", 2) from None
+        what = f"{out} holds no unfinished run" if out.is_dir() else f"there is no folder {out}"
+        raise RunError(f"{what}; give the folder that nacre reconstruct wrote to", 2) from None

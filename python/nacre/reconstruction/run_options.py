@@ -9,17 +9,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nacre._core import __version__
 from nacre._internal.arrays import as_count, as_flag, as_number, as_scale
 from nacre._internal.core_options import leaves
 from nacre.datasets import open_sequence
 from nacre.errors import CannotResumeError, FileFormatError, RunError, shown
 from nacre.evaluation.result import plain
 from nacre.parameters import ModelParameters
+from nacre.system import __version__
 
 if TYPE_CHECKING:
     from nacre.datasets import Sequence
-    from nacre.reconstruction.resume import UnfinishedRun
 
 _log = logging.getLogger(__name__)
 
@@ -114,18 +113,6 @@ def options_before(document: Mapping[str, Any], path: Path) -> tuple[RunOptions,
         return checked(RunOptions(**document["options"])), Path(document["folder"])
     except (KeyError, TypeError, ValueError) as error:
         raise FileFormatError(path, f"it does not say what was asked for ({error})") from None
-
-
-def read_document(unfinished: UnfinishedRun) -> dict[str, Any]:
-    """Return what ``run.json`` says, or say that there is nothing to resume."""
-    out = unfinished.out
-    try:
-        return unfinished.document()
-    except FileNotFoundError:
-        if (out / "report.json").exists():
-            raise RunError(f"{out} holds a run that is finished: there is nothing to resume", 2) from None
-        what = f"{out} holds no unfinished run" if out.is_dir() else f"there is no folder {out}"
-        raise RunError(f"{what}; give the folder that nacre reconstruct wrote to", 2) from None
 
 
 def checked(options: RunOptions) -> RunOptions:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from nacre._internal.arrays import as_count, as_number, as_vector
 from nacre.errors import FileFormatError
 from nacre.frame_report import FrameReport
-from nacre.reconstruction.frame_record import FrameRecord
+from nacre.run_data.frame_record import FrameRecord
 
 _STATUSES = {"TRACKED": ("TRACKED", "RELOCALISED")}  # of a report: those of a frame, which may be found later
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.report.templating import render
-from nacre.report.text import number, ticks
+from nacre.run_data.text import number, ticks
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

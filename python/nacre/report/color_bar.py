@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from nacre.report.text import length_unit, number, ticks
+from nacre.run_data.text import length_unit, number, ticks
 
 
 @dataclass(frozen=True)

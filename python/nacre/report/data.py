@@ -12,7 +12,7 @@ import numpy.typing as npt
 from nacre.camera import Camera
 from nacre.report.doubled_surfaces import DoubledSurfaces
 from nacre.report.limits import MIN_TRACKED
-from nacre.report.reported_frame import ReportedFrame
+from nacre.run_data.reported_frame import ReportedFrame
 
 
 @dataclass(frozen=True, eq=False)

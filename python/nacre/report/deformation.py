@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from nacre.report.limits import LEAST_STRAIN
-from nacre.report.reported_frame import ReportedFrame
+from nacre.run_data.reported_frame import ReportedFrame
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class DeformationFigures:
 
 def deformation_figures(frames: Sequence[ReportedFrame]) -> DeformationFigures | None:
     """Return how a model was bent; None where it has no warp field."""
-    tracked = [frame for frame in frames if frame.is_tracked and _of(frame, "num_nodes")]
+    tracked = [frame for frame in frames if frame.is_tracked and frame.may_be_bent]
     if not tracked:
         return None
     strains = [_of(frame, "strain") for frame in tracked]
@@ -46,7 +46,7 @@ def deformation_figures(frames: Sequence[ReportedFrame]) -> DeformationFigures |
 
 def explained_part(frame: ReportedFrame) -> float | None:
     """Return the part of the points in view that a frame shows where they were bent to, where it is known."""
-    is_registered = frame.is_tracked and frame.num_inliers and _of(frame, "num_nodes")
+    is_registered = frame.is_tracked and frame.num_inliers and frame.may_be_bent
     return _of(frame, "explained") if is_registered else None
 
 

@@ -8,20 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre.report.colormap import category_rgb, viridis
+from nacre.pictures.colormap import category_rgb, reason_color, viridis
 from nacre.report.data import DepthExample
 from nacre.report.pictures import Picture, draw
-from nacre.report.text import label, quantity
+from nacre.run_data.text import label, quantity
 
-_REASON_COLORS = {
-    "edge": 5,
-    "slanted": 1,
-    "isolated": 3,
-    "out_of_range": 0,
-    "masked": 4,
-    "outside": 2,
-    "removed": 5,
-}
 _MAX_DEPTH_WIDTH = 640
 
 
@@ -34,11 +25,6 @@ class DepthPictures:
     num_measured: int
     num_pixels: int
     range: tuple[float, float]  #: nearest and farthest colour [m]
-
-
-def reason_color(name: str, index: int) -> int:
-    """Return the index of the colour that stands for a reason to remove pixels."""
-    return _REASON_COLORS.get(name, index)
 
 
 def draw_depth(example: DepthExample) -> DepthPictures:

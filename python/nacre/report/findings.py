@@ -16,8 +16,8 @@ from nacre.report.deformation import deformation_figures, explained_part
 from nacre.report.limits import FLIP_ANGLE, MAX_DOUBLED, MAX_POSE_ERROR, MIN_EXPLAINED, MIN_PROBABILITY
 from nacre.report.lost_frames import advice_on, most_common_reason
 from nacre.report.motion_check import Jump, find_jumps
-from nacre.report.reported_frame import ReportedFrame
-from nacre.report.text import count, quantity, ranges
+from nacre.run_data.reported_frame import ReportedFrame
+from nacre.run_data.text import count, quantity, ranges
 
 Level = Literal["ok", "weak", "lost"]
 

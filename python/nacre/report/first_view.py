@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -12,11 +11,11 @@ import numpy.typing as npt
 from nacre.camera import Camera
 from nacre.rendering import View
 from nacre.report.data import ModelCloud
-from nacre.report.reported_frame import ReportedFrame
-
-if TYPE_CHECKING:
-    from nacre.viewer import Snapshot
-    from nacre.viewer.view import View as ViewersView
+from nacre.run_data.reported_frame import ReportedFrame
+from nacre.viewer import disks, saved_timeline, views
+from nacre.viewer.snapshot import Snapshot
+from nacre.viewer.timeline import Timeline
+from nacre.viewer.view import View as ViewersView
 
 _FIELD_OF_VIEW = 0.7  # of the viewer's page [rad]
 
@@ -50,8 +49,6 @@ def first_view(
 
 def viewers_view(model: ModelCloud, frames: Sequence[ReportedFrame], camera: Camera | None) -> ViewersView:
     """Return that view as the viewer has it; :func:`first_view` has the parameters."""
-    from nacre.viewer import Timeline, views
-
     timeline = Timeline("", camera)
     for frame in frames:
         timeline.add(frame)
@@ -60,14 +57,10 @@ def viewers_view(model: ModelCloud, frames: Sequence[ReportedFrame], camera: Cam
 
 def disk_radii(model: ModelCloud) -> npt.NDArray[np.float32]:
     """Return how large the viewer draws each point [m], so that the surface of what is far closes, too."""
-    from nacre.viewer import disks
-
     return disks.disk_radii(_snapshot(model))
 
 
 def _snapshot(model: ModelCloud) -> Snapshot:
-    from nacre.viewer import Snapshot, saved_timeline
-
     points = np.asarray(model.points, np.float32)
     normals = np.full(points.shape, np.nan) if model.normals is None else np.asarray(model.normals)
     known = np.isfinite(normals).all(axis=1, keepdims=True)

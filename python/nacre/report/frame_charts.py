@@ -13,8 +13,8 @@ from nacre.evaluation import AbsoluteTrajectoryError
 from nacre.report.charts import Mark, Series, group_size, grouped, line_chart, map_chart, runs, stacked_chart
 from nacre.report.deformation import explained_part
 from nacre.report.limits import MIN_EXPLAINED
-from nacre.report.reported_frame import ReportedFrame
-from nacre.report.text import label, length_unit, quantity
+from nacre.run_data.reported_frame import ReportedFrame
+from nacre.run_data.text import label, length_unit, quantity
 
 Array = npt.NDArray[np.float64]
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from nacre.report.reported_frame import ReportedFrame
+from nacre.run_data.reported_frame import ReportedFrame, plain_reason
 
 _NEXT_STEPS = {
     "empty": "The depth images hold no measurement: is it the right folder or topic, and the right "
@@ -57,19 +56,6 @@ def stretches(frames: Sequence[ReportedFrame]) -> list[Stretch]:
 def most_common_reason(reasons: Iterable[str]) -> str:
     """Return why most of some frames are lost or weak, in plain words."""
     return Counter(map(plain_reason, reasons)).most_common(1)[0][0]
-
-
-def plain_reason(reason: str) -> str:
-    """Return a frame's reason without the figures that differ from frame to frame."""
-    if reason.startswith("registration score "):
-        return "it does not fit the model well enough"
-    if re.match(r"only 0 pixels", reason):
-        return "no usable pixel"
-    if re.match(r"only \d+ pixels", reason):
-        return "too few usable pixels"
-    if "direction(s)" in reason:
-        return "the shape leaves directions of the pose open"
-    return reason
 
 
 def advice_on(frames: Sequence[ReportedFrame], *, some_are_tracked: bool = False) -> str:

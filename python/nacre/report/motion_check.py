@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from nacre._internal.rotations import rotation_angles
 from nacre.report.limits import FLIP_ANGLE, MAX_POSE_ERROR, MAX_STEP_RATIO, MIN_STEPS, STEPS_AROUND
-from nacre.report.reported_frame import ReportedFrame
+from nacre.run_data.reported_frame import ReportedFrame
 
 Array = npt.NDArray[np.float64]
 

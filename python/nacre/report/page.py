@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-from nacre._core import __version__
 from nacre._internal.guided import guided
 from nacre._internal.kinds import as_kind
 from nacre.errors import printable
@@ -19,11 +18,12 @@ from nacre.report.frame_charts import deformation_charts, registration_charts, t
 from nacre.report.lost_frames import stretches
 from nacre.report.pictures import ModelPictures, draw_model
 from nacre.report.pixel_counts import pixel_counts, removed_chart
-from nacre.report.reported_frame import ReportedFrame
 from nacre.report.summary import Summary, summarize
 from nacre.report.tables import frame_table, result_tables
 from nacre.report.templating import render
-from nacre.report.text import flatten, ranges
+from nacre.run_data.reported_frame import ReportedFrame
+from nacre.run_data.text import flatten, ranges
+from nacre.system import __version__
 
 
 class Section(NamedTuple):

@@ -14,17 +14,16 @@ import numpy.typing as npt
 from nacre._internal.arrays import as_points
 from nacre.camera import Camera
 from nacre.kdtree import KdTree
-from nacre.rendering import SIDES, View, render_points
-from nacre.report.colormap import viridis
+from nacre.pictures.colormap import viridis
+from nacre.pictures.image_files import encode_small
+from nacre.rendering import OBLIQUE, SIDES, View, render_points
 from nacre.report.data import ModelCloud
 from nacre.report.deformation import deformation_figures
 from nacre.report.first_view import disk_radii, first_view
-from nacre.report.image_files import encode_small
-from nacre.report.reported_frame import ReportedFrame
 from nacre.report.reverse_sides import ReverseParts, reverse_parts
-from nacre.report.text import length_unit, ticks
+from nacre.run_data.reported_frame import ReportedFrame
+from nacre.run_data.text import length_unit, ticks
 
-OBLIQUE = (-0.75, -0.55, -1.0)
 BEHIND = (0.75, -0.55, 1.0)
 
 _SIZE = (560, 560)

@@ -7,11 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from nacre.pictures.colormap import reason_color
 from nacre.report.charts import Series
-from nacre.report.depth_pictures import reason_color
 from nacre.report.frame_charts import ChartFigure, stacked_figure, values
-from nacre.report.reported_frame import ReportedFrame
-from nacre.report.text import label, quantity
+from nacre.run_data.reported_frame import ReportedFrame
+from nacre.run_data.text import label, quantity
 
 _USED, _MISSING, _DROPPED, _OUTSIDE = 7, 6, 8, 9  # indices of the palette
 

@@ -19,9 +19,9 @@ from nacre.evaluation import (
 from nacre.evaluation.trajectory import MIN_ALIGNED
 from nacre.report.data import ReportData
 from nacre.report.deformation import DeformationFigures, deformation_figures
-from nacre.report.reported_frame import ReportedFrame
-from nacre.report.text import count, length_unit, quantity
 from nacre.report.verdict import Verdict, judge
+from nacre.run_data.reported_frame import ReportedFrame
+from nacre.run_data.text import count, length_unit, quantity
 
 ResultType = TypeVar("ResultType")
 

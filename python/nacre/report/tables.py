@@ -10,8 +10,8 @@ import numpy as np
 from nacre.evaluation import AbsoluteTrajectoryError
 from nacre.evaluation.result import Result
 from nacre.report.data import ReportData
-from nacre.report.reported_frame import ReportedFrame
-from nacre.report.text import flatten, label, quantity
+from nacre.run_data.reported_frame import ReportedFrame
+from nacre.run_data.text import flatten, label, quantity
 
 _MAX_ROWS = 300
 _COLUMNS = (

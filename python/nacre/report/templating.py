@@ -7,9 +7,9 @@ import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from nacre.pictures.colormap import CATEGORIES
 from nacre.report.color_bar import color_bar
-from nacre.report.colormap import CATEGORIES
-from nacre.report.text import count, label, quantity
+from nacre.run_data.text import count, label, quantity
 
 if TYPE_CHECKING:
     import jinja2

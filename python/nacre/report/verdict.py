@@ -9,7 +9,7 @@ from nacre.evaluation.trajectory import MIN_ALIGNED
 from nacre.report.data import ReportData
 from nacre.report.deformation import deformation_figures
 from nacre.report.findings import Finding, Level, find_problems
-from nacre.report.text import count, quantity
+from nacre.run_data.text import count, quantity
 
 
 @dataclass(frozen=True)

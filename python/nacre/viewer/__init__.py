@@ -11,7 +11,8 @@ from nacre.viewer.rerun_file import export_rrd
 from nacre.viewer.same_frame import in_frame_of
 from nacre.viewer.saved_timeline import read_timeline
 from nacre.viewer.server import Viewer
-from nacre.viewer.timeline import Snapshot, Timeline
+from nacre.viewer.snapshot import Snapshot
+from nacre.viewer.timeline import Timeline
 
 __all__ = [
     "Controls",

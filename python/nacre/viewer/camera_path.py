@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from nacre.report.deformation import deformation_figures
-from nacre.report.reported_frame import ReportedFrame
+from nacre.run_data.reported_frame import ReportedFrame
 
 
 def make_path(frames: Sequence[ReportedFrame]) -> bool:
@@ -19,7 +18,7 @@ def make_path(frames: Sequence[ReportedFrame]) -> bool:
     it, and no path of a camera.
     """
     centers = np.array([f.world_from_camera[:3, 3] for f in frames if f.world_from_camera is not None])
-    if len(centers) < 2 or deformation_figures(frames) is not None:
+    if len(centers) < 2 or any(frame.is_tracked and frame.may_be_bent for frame in frames):
         return False
     steps = (np.diff(centers, axis=0) ** 2).sum(axis=1).mean()
     between_any_two = 2 * centers.var(axis=0, ddof=1).sum()

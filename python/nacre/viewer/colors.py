@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from nacre.viewer.timeline import Snapshot
+from nacre.viewer.snapshot import Snapshot
 
 STATUS_COLORS = {
     "TRACKED": (90, 150, 220),

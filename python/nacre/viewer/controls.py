@@ -10,7 +10,7 @@ from typing import Any, Literal
 from nacre.datasets.sequence import SequenceFrame
 from nacre.io.images import encode_jpeg
 from nacre.parameters import DepthParameters
-from nacre.report.image_files import encode_png
+from nacre.pictures.image_files import encode_png
 from nacre.viewer.depth_picture import depth_picture
 
 State = Literal["ready", "recording", "paused", "stopped", "finished"]

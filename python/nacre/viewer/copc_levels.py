@@ -13,7 +13,7 @@ from nacre.io.cloud import Cloud
 from nacre.io.copc_reader import CopcFile
 from nacre.io.octree import Key
 from nacre.normals import estimate_normals
-from nacre.viewer.timeline import Snapshot
+from nacre.viewer.snapshot import Snapshot
 
 _AFAR = 1000.0  # sides of the root
 _FIELDS = ("confidence", "last_seen", "sigma")

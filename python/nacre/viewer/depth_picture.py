@@ -8,8 +8,7 @@ import numpy.typing as npt
 from nacre.camera import Camera
 from nacre.depth import PIXEL_LABELS, label_pixels
 from nacre.parameters import DepthParameters
-from nacre.report.colormap import CATEGORIES, category_rgb, viridis
-from nacre.report.depth_pictures import reason_color
+from nacre.pictures.colormap import CATEGORIES, category_rgb, reason_color, viridis
 
 
 def depth_picture(

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.kdtree import KdTree
-from nacre.viewer.timeline import Snapshot
+from nacre.viewer.snapshot import Snapshot
 
 _NEIGHBORS = 4  # of a point of a square grid
 _AROUND = 12  # nearest points that tell of the surface about one

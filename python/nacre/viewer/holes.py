@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.meshing import boundary_loops
-from nacre.viewer.timeline import Snapshot, Timeline
+from nacre.viewer.snapshot import Snapshot
+from nacre.viewer.timeline import Timeline
 from nacre.viewer.views import Array, could_be_measured
 
 _MIN_EDGES = 16  # of a hole: shorter ones are gaps between a few points

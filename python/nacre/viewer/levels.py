@@ -11,7 +11,7 @@ import numpy.typing as npt
 from nacre.io.octree import Key
 from nacre.viewer.packing import morton_order, pack
 from nacre.viewer.point_columns import point_columns
-from nacre.viewer.timeline import Snapshot
+from nacre.viewer.snapshot import Snapshot
 
 STEPS = 1 << 24
 """Of a node's side, to which its points are rounded: a graphics card's float32 tells no more apart."""

@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
+from typing import Protocol
 
-from nacre.reconstruction import Reconstruction
-from nacre.reconstruction.frame_record import FrameRecord
-from nacre.reconstruction.motion import frames_shown
-from nacre.report.reported_frame import ReportedFrame
+from nacre.datasets.sequence import SequenceFrame
+from nacre.model import Model
+from nacre.run_data.frame_record import FrameRecord
+from nacre.run_data.motion import frames_shown
+from nacre.run_data.reported_frame import ReportedFrame
 from nacre.viewer.controls import Controls
 from nacre.viewer.server import Viewer
-from nacre.viewer.timeline import Snapshot, Timeline
+from nacre.viewer.snapshot import Snapshot
+from nacre.viewer.timeline import Timeline
 
 _SHARE = 5.0
+
+
+class GrowingRun(Protocol):
+    """What of a :class:`nacre.reconstruction.Reconstruction` is shown."""
+
+    sequence: Sequence[SequenceFrame]
+    model: Model
+    frames: list[FrameRecord]
 
 
 class LiveView:
@@ -31,7 +43,7 @@ class LiveView:
 
     def __init__(
         self,
-        done: Reconstruction,
+        done: GrowingRun,
         title: str,
         *,
         host: str = "127.0.0.1",

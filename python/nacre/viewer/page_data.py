@@ -16,9 +16,9 @@ from nacre.errors import FileFormatError
 from nacre.io.quantization import quantized
 from nacre.meshing import triangulate
 from nacre.parameters import DepthParameters
-from nacre.report.colormap import viridis
-from nacre.report.image_files import encode_png
-from nacre.report.lost_frames import plain_reason
+from nacre.pictures.colormap import viridis
+from nacre.pictures.image_files import encode_png
+from nacre.run_data.reported_frame import plain_reason
 from nacre.viewer.camera_path import make_path
 from nacre.viewer.colors import STATUS_COLORS
 from nacre.viewer.depth_picture import depth_legend, depth_picture
@@ -27,8 +27,9 @@ from nacre.viewer.holes import find_holes
 from nacre.viewer.levels import Levels, pack_node, pack_tree
 from nacre.viewer.packing import morton_order, pack, rounded
 from nacre.viewer.point_columns import point_columns
+from nacre.viewer.snapshot import Snapshot
 from nacre.viewer.snapshot_levels import SnapshotLevels
-from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline, words
+from nacre.viewer.timeline import CAMERA_FRAME, Timeline, words
 from nacre.viewer.views import first_seen, first_view
 
 MAX_POINTS, MAX_VERTICES = 1_000_000, 4_000_000

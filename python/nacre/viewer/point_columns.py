@@ -10,7 +10,7 @@ import numpy.typing as npt
 from nacre.io.quantization import octahedral
 from nacre.viewer.disks import disk_radii
 from nacre.viewer.packing import rounded
-from nacre.viewer.timeline import Snapshot
+from nacre.viewer.snapshot import Snapshot
 
 
 def point_columns(cloud: Snapshot, largest: float = np.inf) -> dict[str, npt.NDArray[Any]]:

@@ -12,10 +12,11 @@ import numpy as np
 from nacre._internal.kinds import as_kind
 from nacre.errors import FileFormatError
 from nacre.io.atomic import atomic_path
-from nacre.report.reported_frame import ReportedFrame
+from nacre.run_data.reported_frame import ReportedFrame
 from nacre.viewer.camera_path import make_path
 from nacre.viewer.colors import STATUS_COLORS, point_colors
-from nacre.viewer.timeline import Snapshot, Timeline, words
+from nacre.viewer.snapshot import Snapshot
+from nacre.viewer.timeline import Timeline, words
 
 _MISSING = 'files for Rerun need rerun-sdk: pip install "nacre[rerun]"'
 _MOST_DEPTH_IMAGES = 100

@@ -9,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.global_registration import align_global
-from nacre.report.reported_frame import ReportedFrame
-from nacre.report.text import quantity
+from nacre.run_data.reported_frame import ReportedFrame
+from nacre.run_data.text import quantity
 from nacre.viewer.disks import deviation
-from nacre.viewer.timeline import Snapshot, Timeline
+from nacre.viewer.snapshot import Snapshot
+from nacre.viewer.timeline import Timeline
 
 _SAMPLES = 20_000  # budget
 _TOLERANCE = 3.0  # spacings: how far apart the same place may be in two runs of one frame

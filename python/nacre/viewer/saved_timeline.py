@@ -26,11 +26,12 @@ from nacre.io.points import count_points, read_points
 from nacre.io.raw import read_head
 from nacre.kdtree import KdTree
 from nacre.normals import estimate_normals
-from nacre.reconstruction.motion import Motion, read_motion
-from nacre.report.saved_run import SavedRun
-from nacre.report.text import count
+from nacre.run_data.motion import Motion, read_motion
+from nacre.run_data.saved_run import SavedRun
+from nacre.run_data.text import count
 from nacre.viewer.copc_levels import CopcLevels
-from nacre.viewer.timeline import CAMERA_FRAME, Snapshot, Timeline
+from nacre.viewer.snapshot import Snapshot
+from nacre.viewer.timeline import CAMERA_FRAME, Timeline
 from nacre.viewer.view import View
 
 _SURVEYS = (".las", ".laz", ".e57")  # formats of them: z is up

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.io.octree import CELLS_PER_SIDE, Cube, Key, divided
-from nacre.viewer.timeline import Snapshot
+from nacre.viewer.snapshot import Snapshot
 
 _BITS = 21  # of a coordinate in the octree
 _RECORD = np.dtype([("X", "<i4"), ("Y", "<i4"), ("Z", "<i4"), ("row", "<u4")])

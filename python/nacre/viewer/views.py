@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 
 from nacre.camera import Camera
-from nacre.viewer.timeline import Snapshot, Timeline
+from nacre.viewer.snapshot import Snapshot
+from nacre.viewer.timeline import Timeline
 from nacre.viewer.view import View
 
 Array = npt.NDArray[np.float64]

@@ -14,8 +14,8 @@ import nacre
 from nacre.datasets import write_recording
 from nacre.errors import FileFormatError
 from nacre.io.npz import read_arrays, write_arrays
-from nacre.reconstruction import motion as motions
-from nacre.reconstruction.motion import Motion, frames_shown, motion_of, read_motion
+from nacre.run_data import motion as motions
+from nacre.run_data.motion import Motion, frames_shown, motion_of, read_motion
 
 LOST = 3
 

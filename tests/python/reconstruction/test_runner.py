@@ -6,7 +6,8 @@ from test_wide_views import view
 
 import nacre
 from nacre.reconstruction import Reconstruction
-from nacre.reconstruction.runner import FrameDone, Run, StageBegun
+from nacre.reconstruction.runner import Run
+from nacre.reconstruction.steps import FrameDone, StageBegun
 
 
 def frames(depths: list[np.ndarray], camera: nacre.Camera) -> list[nacre.SequenceFrame]:

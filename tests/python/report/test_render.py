@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from nacre.pictures.image_files import encode_small
 from nacre.report import View, encode_png, render_points
-from nacre.report.image_files import encode_small
 
 Image = pytest.importorskip("PIL.Image")
 

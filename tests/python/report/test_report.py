@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from nacre import Camera, DepthCalibration
 from nacre.evaluation import Completeness, SurfaceAccuracy, absolute_trajectory_error
+from nacre.pictures.colormap import viridis
 from nacre.report import (
     DepthExample,
     ModelCloud,
@@ -26,11 +27,10 @@ from nacre.report import (
     write_report,
 )
 from nacre.report.charts import MAX_VALUES, Mark, Series, grouped, line_chart, map_chart, stacked_chart
-from nacre.report.colormap import viridis
 from nacre.report.depth_pictures import draw_depth
 from nacre.report.first_view import disk_radii, first_view
 from nacre.report.pictures import draw_model
-from nacre.report.text import flatten, label, quantity, ranges, ticks
+from nacre.run_data.text import flatten, label, quantity, ranges, ticks
 
 SPACE = "\N{NARROW NO-BREAK SPACE}"
 

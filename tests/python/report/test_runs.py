@@ -17,7 +17,7 @@ import pytest
 import nacre
 from nacre.cli import main
 from nacre.report import pictures
-from nacre.report.text import count, quantity
+from nacre.run_data.text import count, quantity
 
 NUM_FRAMES = 6
 

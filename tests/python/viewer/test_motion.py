@@ -15,8 +15,8 @@ import pytest
 import nacre
 from nacre.io.quantization import octahedral
 from nacre.reconstruction import Reconstruction
-from nacre.reconstruction.motion import Motion, read_motion
 from nacre.report import ReportedFrame
+from nacre.run_data.motion import Motion, read_motion
 from nacre.viewer import LiveView, Snapshot, Timeline, in_frame_of, read_timeline
 from nacre.viewer.page_data import PageData
 from nacre.viewer.views import first_seen, first_view

@@ -15,7 +15,7 @@ import pytest
 import nacre
 import nacre.viewer
 from nacre.report import ReportedFrame
-from nacre.report.text import count, quantity
+from nacre.run_data.text import count, quantity
 from nacre.viewer import Timeline, Viewer, export_html
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

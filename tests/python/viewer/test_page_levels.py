@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import nacre
-from nacre.report.text import count
+from nacre.run_data.text import count
 from nacre.viewer import Viewer, export_html, read_timeline
 
 sys.path.insert(0, str(Path(__file__).parents[1]))

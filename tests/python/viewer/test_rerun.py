@@ -13,8 +13,8 @@ import pytest
 import nacre
 import nacre.viewer
 from nacre.cli.app import run
-from nacre.reconstruction.motion import Motion
 from nacre.report import ReportedFrame
+from nacre.run_data.motion import Motion
 from nacre.viewer import Snapshot, Timeline, export_rrd
 
 

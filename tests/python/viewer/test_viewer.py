@@ -20,7 +20,7 @@ from nacre.cli import main
 from nacre.meshing import Texture
 from nacre.reconstruction import Reconstruction
 from nacre.report import ReportedFrame
-from nacre.report.lost_frames import plain_reason
+from nacre.run_data.reported_frame import plain_reason
 from nacre.viewer.page_data import PageData
 from nacre.viewer.timeline import words
 from nacre.viewer.view import View

@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from nacre._core import __version__
 from nacre.evaluation.result import plain
 from nacre.io.atomic import atomic_writer
+from nacre.reconstruction.batch.page import render_batch
 from nacre.reconstruction.batch.result import BatchResult
 from nacre.reconstruction.batch.sources import INDEX_FILE, INDEX_PAGE
-from nacre.report.batch_page import render_batch
+from nacre.system import __version__
 
 _RARE = 20.0  # while recordings run it is written when so many times what it took last has gone by
 _LEAST_SECONDS = 2.0

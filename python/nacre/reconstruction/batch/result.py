@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from nacre.reconstruction.batch.sources import thumbnail_path
 
 if TYPE_CHECKING:
-    from nacre.report.saved_run import SavedRun
+    from nacre.run_data.saved_run import SavedRun
 
 Outcome = Literal["reconstructed", "resumed", "finished before", "failed", "not done"]
 

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import nacre
-from nacre._internal.live_cameras import is_camera
+from nacre._internal.camera_names import is_camera
 from nacre.datasets.detect import require_format
 from nacre.errors import FileFormatError, RunError, explain
 from nacre.evaluation.result import plain
@@ -23,7 +22,8 @@ from nacre.reconstruction.carry_out import carry_out
 from nacre.reconstruction.job import begin_run, resume_run
 from nacre.reconstruction.resume import UnfinishedRun
 from nacre.reconstruction.run_options import RunOptions, checked
-from nacre.report.saved_run import SavedRun
+from nacre.run_data.saved_run import SavedRun
+from nacre.system import __version__
 
 if TYPE_CHECKING:
     from nacre.parameters import ModelParameters
@@ -41,7 +41,7 @@ class Task:
     folder: Path
     overwrite: bool = False
     checkpoint_every: int | None = None
-    version: str = nacre.__version__  #: of who asks: another one may give other bytes
+    version: str = __version__  #: of who asks: another one may give other bytes
 
     @property
     def empty_result(self) -> BatchResult:
@@ -105,8 +105,8 @@ def reconstruct_recording(task: Task) -> BatchResult:
     little memory) are raised: the cluster tries again.
     """
     try:
-        if task.version != nacre.__version__:
-            raise RunError(f"the worker has nacre {nacre.__version__}, the batch {task.version}")
+        if task.version != __version__:
+            raise RunError(f"the worker has nacre {__version__}, the batch {task.version}")
         with closing(UnfinishedRun(writable_folder(task.folder), task.checkpoint_every)) as unfinished:
             _wait_for_the_folder(unfinished)
             return _reconstruct(task, unfinished)

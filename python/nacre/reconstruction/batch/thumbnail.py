@@ -9,7 +9,7 @@ from nacre.io.points import read_points
 from nacre.reconstruction.batch.sources import thumbnail_path
 from nacre.report.data import ModelCloud
 from nacre.report.pictures import draw_thumbnail
-from nacre.report.saved_run import SavedRun
+from nacre.run_data.saved_run import SavedRun
 
 
 def write_thumbnail(folder: Path) -> None:

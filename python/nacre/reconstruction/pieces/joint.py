@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from nacre.reconstruction.pieces.track import Poses
+from nacre.reconstruction.known_motions import Poses
 
 Pose = npt.NDArray[np.float64]
 _OUTLYING = 3 * 1.4826  # median distances: three standard deviations, where errors are normal

@@ -4,35 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from nacre.parameters import ModelParameters
+from nacre.reconstruction.known_motions import Place, Poses
 from nacre.reconstruction.pieces.cut import PIECE, SHARED, cut
 from nacre.reconstruction.pieces.joint import joint
-from nacre.reconstruction.pieces.track import Piece, Poses
+from nacre.reconstruction.pieces.track import Piece
 from nacre.reconstruction.pieces.workers import Cluster, Workers
 from nacre.reconstruction.run_options import RunOptions
-
-
-@dataclass(frozen=True)
-class Place:
-    """
-    Where a frame is to be.
-
-    Attributes
-    ----------
-    world_from_camera : (4, 4) float64
-        Its pose.
-    is_first : bool
-        Whether its piece has placed none before it: registration is to confirm how the piece lies.
-    """
-
-    world_from_camera: npt.NDArray[np.float64]
-    is_first: bool
 
 
 class PieceMotions:

@@ -9,20 +9,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
-from nacre._core import __version__
 from nacre.errors import FileFormatError, RunError
 from nacre.io.atomic import atomic_writer
 from nacre.io.json_files import read_json
 from nacre.model import Model
 from nacre.parameters import ModelParameters
+from nacre.reconstruction.known_motions import Poses
 from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.run_options import RunOptions, may_park
 from nacre.reconstruction.saved_state import pose_from
-
-Poses = dict[int, npt.NDArray[np.float64]]
+from nacre.system import __version__
 
 
 @dataclass(frozen=True)

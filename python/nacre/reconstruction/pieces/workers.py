@@ -11,7 +11,8 @@ from typing import Any
 
 from nacre._internal.cluster import cluster_client, import_distributed
 from nacre.errors import FileFormatError
-from nacre.reconstruction.pieces.track import Piece, Poses, read_poses, track, write_poses
+from nacre.reconstruction.known_motions import Poses
+from nacre.reconstruction.pieces.track import Piece, read_poses, track, write_poses
 
 _log = logging.getLogger(__name__)
 _RETRIES = 2  # where memory is short, elsewhere or a moment later it may not be

@@ -1,16 +1,15 @@
-"""Live cameras by the names that the command line gives them."""
+"""Live cameras, opened by the names that the command line gives them."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
+from nacre._internal.camera_names import CameraKind, kind_of
+from nacre.camera import Camera
+from nacre.datasets.sequence import SequenceFrame
 from nacre.errors import RunError
-
-if TYPE_CHECKING:
-    from nacre.camera import Camera
-    from nacre.datasets import SequenceFrame
 
 
 class LiveCamera(Protocol):
@@ -32,7 +31,7 @@ class LiveCamera(Protocol):
 
 
 def _realsense(which: str, color: bool) -> LiveCamera:
-    from nacre.datasets import RealSense
+    from nacre.datasets.realsense import RealSense
 
     is_file = bool(Path(which).suffix) or (which != "" and Path(which).exists())
     return RealSense(None if is_file else which or None, file=which if is_file else None, color=color)
@@ -40,7 +39,7 @@ def _realsense(which: str, color: bool) -> LiveCamera:
 
 def _opencv(driver: str | None) -> Callable[[str, bool], LiveCamera]:
     def opener(which: str, color: bool) -> LiveCamera:
-        from nacre.datasets import OpenCVCamera
+        from nacre.datasets.opencv_camera import OpenCVCamera
 
         if which and not which.isdecimal():
             raise RunError(f"{driver or 'opencv'} needs the camera's index, 0 or more, got {which!r}", 2)
@@ -50,7 +49,7 @@ def _opencv(driver: str | None) -> Callable[[str, bool], LiveCamera]:
 
 
 def _ros(which: str, color: bool) -> LiveCamera:
-    from nacre.datasets import RosTopic
+    from nacre.datasets.ros_topic import RosTopic
 
     depth, _, colors = which.partition(",")
     if not depth:
@@ -58,25 +57,16 @@ def _ros(which: str, color: bool) -> LiveCamera:
     return RosTopic(depth, colors if color and colors else None)
 
 
-_OPENERS: dict[str, Callable[[str, bool], LiveCamera]] = {
+_OPENERS: dict[CameraKind, Callable[[str, bool], LiveCamera]] = {
     "realsense": _realsense,
     "opencv": _opencv(None),
     "openni": _opencv("openni"),
     "orbbec": _opencv("orbbec"),
     "ros2": _ros,
 }
-CAMERAS = (
-    "realsense, openni, orbbec or opencv, where there are several as realsense:SERIAL or openni:INDEX; "
-    "ros2:/DEPTH/TOPIC or ros2:/DEPTH/TOPIC,/COLOUR/TOPIC"
-)
-
-
-def is_camera(source: Path) -> bool:
-    """Say whether a source is a live camera, and not a file of that name."""
-    return str(source).partition(":")[0] in _OPENERS and not source.exists()
 
 
 def open_camera(source: Path, color: bool = True) -> LiveCamera:
     """Start a camera: the name of its kind, and behind a colon which of them."""
-    kind, _, which = str(source).partition(":")
+    kind, which = kind_of(source)
     return _OPENERS[kind](which, color)

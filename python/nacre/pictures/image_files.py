@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre.io.images import import_pillow
+from nacre._internal.pillow import import_pillow
 
 _QUALITIES = (80, 65, 50)
 

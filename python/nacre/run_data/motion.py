@@ -17,7 +17,7 @@ from nacre.io.npz import read_arrays, write_arrays
 from nacre.io.quantization import octahedral, quantized, unit_vectors
 from nacre.meshing.surface_points import surface_rows
 from nacre.model import Model
-from nacre.reconstruction.frame_record import FrameRecord
+from nacre.run_data.frame_record import FrameRecord
 
 _MOST_POSITIONS = 4_000_000  # of all shapes together: 32 MB
 _FINEST = 0.01  # [spacing] of the step: what is finer takes room, and is noise

@@ -14,7 +14,7 @@ from nacre.errors import FileFormatError, shown
 from nacre.frame_report import STATUSES, count_statuses
 from nacre.io.cameras import camera_of
 from nacre.io.json_files import read_json
-from nacre.report.reported_frame import NUMBERS, ReportedFrame
+from nacre.run_data.reported_frame import NUMBERS, ReportedFrame
 
 if TYPE_CHECKING:
     from nacre.camera import Camera

@@ -5,27 +5,26 @@ from __future__ import annotations
 import dataclasses
 import platform
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from nacre._core import __version__
 from nacre.depth import PIXEL_LABELS, label_pixels
 from nacre.errors import FileFormatError
 from nacre.evaluation.result import plain, result_dict
 from nacre.frame_report import STATUSES
+from nacre.reconstruction.run_record import RunRecord
+from nacre.report.data import DepthExample, ModelCloud, ReportData
 from nacre.report.limits import MIN_TRACKED
-from nacre.report.reported_frame import ReportedFrame
+from nacre.report.summary import sigma_statistics, summarize
+from nacre.run_data.frame_record import FrameRecord
+from nacre.run_data.reported_frame import ReportedFrame
+from nacre.run_data.text import label
+from nacre.system import __version__
 
-if TYPE_CHECKING:
-    from nacre.reconstruction import FrameRecord, Reconstruction
-    from nacre.report import DepthExample, ReportData
 
-
-def run_dict(run: Reconstruction, *, min_tracked: float = MIN_TRACKED, **more: Any) -> dict[str, Any]:
+def run_dict(run: RunRecord, *, min_tracked: float = MIN_TRACKED, **more: Any) -> dict[str, Any]:
     """Return what ``report.json`` says of a run."""
-    from nacre.report.summary import sigma_statistics, summarize
-
     counts = run.counts
     times = run.milliseconds
     told = run_report(run, "", "", interrupted=bool(more.get("interrupted")), min_tracked=min_tracked)
@@ -66,7 +65,7 @@ def run_dict(run: Reconstruction, *, min_tracked: float = MIN_TRACKED, **more: A
 
 
 def run_report(
-    run: Reconstruction,
+    run: RunRecord,
     title: str,
     source: str,
     figures: Mapping[str, Any] | None = None,
@@ -76,9 +75,6 @@ def run_report(
     with_depth: bool = False,
 ) -> ReportData:
     """Return what ``report.html`` says of a run; ``with_depth`` reads some frames again."""
-    from nacre.report import ModelCloud, ReportData
-    from nacre.report.text import label
-
     model, cloud = None, run.cloud
     if len(cloud):
         assert cloud.normals is not None
@@ -102,7 +98,7 @@ def run_report(
     )
 
 
-def _reported_frames(run: Reconstruction) -> list[ReportedFrame]:
+def _reported_frames(run: RunRecord) -> list[ReportedFrame]:
     """Return what became of each frame, with what only the whole run knows."""
     errors = _frame_errors(run)
     return [
@@ -118,7 +114,7 @@ def _reported_frames(run: Reconstruction) -> list[ReportedFrame]:
     ]
 
 
-def _loop_frame(run: Reconstruction, frame: FrameRecord) -> int | None:
+def _loop_frame(run: RunRecord, frame: FrameRecord) -> int | None:
     """Return the place in the recording of the frame that another closed a loop with."""
     if frame.report is None or frame.report.loop_frame is None:
         return None
@@ -127,10 +123,8 @@ def _loop_frame(run: Reconstruction, frame: FrameRecord) -> int | None:
     return next(found, None)
 
 
-def _depth_examples(run: Reconstruction) -> list[DepthExample]:
+def _depth_examples(run: RunRecord) -> list[DepthExample]:
     """Return the depth image of the first frame that was tracked and of the first one that was not."""
-    from nacre.report import DepthExample
-
     examples = []
     for status in ("TRACKED", "LOST", "WEAK"):
         frame = next((frame for frame in run.frames if frame.status == status), None)
@@ -148,7 +142,7 @@ def _depth_examples(run: Reconstruction) -> list[DepthExample]:
     return examples
 
 
-def _frame_errors(run: Reconstruction) -> list[tuple[float | None, float | None]]:
+def _frame_errors(run: RunRecord) -> list[tuple[float | None, float | None]]:
     ate: Any = run.evaluation.get("absolute_trajectory_error")
     if ate is None:
         return [(None, None)] * len(run.frames)

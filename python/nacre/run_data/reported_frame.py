@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
@@ -75,6 +76,11 @@ class ReportedFrame:
         return self.figures.get("milliseconds") or {}
 
     @property
+    def may_be_bent(self) -> bool:
+        """Whether the model has a warp field, to which the pose is relative."""
+        return bool((self.figures.get("deformation") or {}).get("num_nodes"))
+
+    @property
     def total_milliseconds(self) -> float | None:
         """Time of all steps; None where it was not measured."""
         times = self.milliseconds
@@ -101,3 +107,16 @@ class ReportedFrame:
         """Pixels with a depth."""
         pixels = self.num_pixels
         return None if pixels is None else pixels - self.figures["depth"]["num_invalid"]
+
+
+def plain_reason(reason: str) -> str:
+    """Return a frame's reason without the figures that differ from frame to frame."""
+    if reason.startswith("registration score "):
+        return "it does not fit the model well enough"
+    if re.match(r"only 0 pixels", reason):
+        return "no usable pixel"
+    if re.match(r"only \d+ pixels", reason):
+        return "too few usable pixels"
+    if "direction(s)" in reason:
+        return "the shape leaves directions of the pose open"
+    return reason

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nacre._core import __version__
 from nacre.errors import printable
 from nacre.report.summary import Tile
 from nacre.report.templating import render
-from nacre.report.text import count, duration
+from nacre.run_data.text import count, duration
+from nacre.system import __version__
 
 if TYPE_CHECKING:
     from nacre.reconstruction.batch.result import BatchResult

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,16 @@ class FrameRecord(Value):
     def world_from_camera(self) -> npt.NDArray[np.float64] | None:
         """The camera's pose; None where it is not known."""
         return self.report.world_from_camera if self.report is not None and self.report.tracked else None
+
+    @property
+    def fused_index(self) -> int:
+        """Which of the model's frames it is; -1 where it did not change the model."""
+        is_fused = self.report is not None and self.status in ("TRACKED", "RELOCALISED")
+        return self.report.index if self.report is not None and is_fused else -1
+
+    def renewed(self, report: FrameReport) -> FrameRecord:
+        """Return it with what the model says of it now."""
+        return replace(self, status=report.status, reason=report.reason, report=report)
 
     @property
     def refused(self) -> bool:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from nacre._internal.guided import GuidedNames, guided
+from nacre._internal.array_of_points import ArrayOfPoints
+from nacre._internal.guided import guided
 
 if TYPE_CHECKING:
     from nacre.io.cloud import Cloud
@@ -17,20 +18,6 @@ if TYPE_CHECKING:
 
 _CLOSED = "nacre.meshing.close_surface(cloud.points, cloud.normals) does, of cloud = model.cloud()"
 _FEWER = "nacre.meshing.simplify(mesh.vertices, mesh.triangles, num_triangles) does, of a mesh"
-
-
-class ArrayOfPoints(GuidedNames):
-    """What has points is taken for them by NumPy's functions, and so by nacre's."""
-
-    __slots__ = ()
-
-    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]:
-        """Return the points (N, 3)."""
-        points: npt.NDArray[Any] = self.points  # type: ignore[attr-defined]
-        array = points.astype(points.dtype if dtype is None else dtype, copy=bool(copy))
-        if copy is False and array is not points:
-            raise ValueError(f"copy must be True or None for points as {array.dtype}, got False")
-        return array
 
 
 class ExchangeablePoints(ArrayOfPoints, ABC):
@@ -124,6 +111,6 @@ class ExchangeablePoints(ArrayOfPoints, ABC):
 
     def _repr_png_(self) -> bytes | None:
         """Return a picture of the points, which notebooks show in place of the words of ``repr``."""
-        from nacre.report.notebook_pictures import picture_of_points
+        from nacre.pictures.notebook import picture_of_points
 
         return picture_of_points(self.points, self.normals, self.colors)

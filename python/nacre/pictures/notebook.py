@@ -15,8 +15,7 @@ _MOST_POINTS = 100_000
 def picture_of_points(points: npt.ArrayLike, normals: Any = None, colors: Any = None) -> bytes | None:
     """Return a PNG image of points from above at an angle, shaded by normals; None where there are none."""
     from nacre.normals import estimate_normals
-    from nacre.rendering import View, measure_spacing, render_points
-    from nacre.report.pictures import OBLIQUE
+    from nacre.rendering import OBLIQUE, View, measure_spacing, render_points
 
     cloud = np.asarray(points)
     finite = np.flatnonzero(np.isfinite(cloud).all(axis=1))
@@ -46,7 +45,7 @@ def picture_of_points(points: npt.ArrayLike, normals: Any = None, colors: Any = 
 
 def picture_of_depth(depth: npt.NDArray[np.floating[Any]]) -> bytes | None:
     """Return a PNG image of a depth image by inverse depth, near yellow; None where nothing was measured."""
-    from nacre.report.colormap import viridis
+    from nacre.pictures.colormap import viridis
 
     step = max(1, -(-depth.shape[1] // _SIZE[0]))
     part = depth[::step, ::step]
@@ -61,7 +60,7 @@ def picture_of_depth(depth: npt.NDArray[np.floating[Any]]) -> bytes | None:
 
 
 def _png(image: npt.NDArray[np.uint8]) -> bytes | None:
-    from nacre.report.image_files import encode_png
+    from nacre.pictures.image_files import encode_png
 
     try:
         return encode_png(image)
