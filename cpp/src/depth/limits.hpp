@@ -16,6 +16,7 @@ constexpr float gate_slope = 5.67F;  // [1] derived: neighbours of one surface: 
 constexpr double noise_quantile = 0.4;  // [1] tuned: of residuals: edges leave more over than noise; test_noise
 constexpr double least_noise = 1e-3;  // [pixel] tuned: sigma of a clean image, in sizes of a pixel; test_noise
 constexpr double unknown_noise = 0.1;  // [pixel] tuned: sigma of an orthographic image that shows nothing; test_noise
+constexpr std::int64_t least_windows = 40;  // [windows] tuned: of an image, and at some depth, that tell its noise, its gaps, and values that are none; test_noise, test_saturation
 constexpr double least_stepped = 0.1;  // [1] tuned: part of windows that cross plateaus of depth; test_noise
 constexpr float largest_step = 3.0F;  // [pixel] derived: orthographic: a larger step of depth is an edge; test_noise
 constexpr double smooth_left = 0.1192;  // [1] derived: of smooth noise, what 7 x 7 fits leave over; docs/algorithms/noise.md

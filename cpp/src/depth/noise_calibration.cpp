@@ -3,7 +3,6 @@
 #include <cmath>
 #include <vector>
 
-#include "base/limits.hpp"
 #include "depth/coarse_depth.hpp"
 #include "depth/limits.hpp"
 #include "depth/restored_depth.hpp"
@@ -116,7 +115,7 @@ void NoiseCalibration::add(const PlanarImage& image, const WindowFits& fits, int
     }
   }
   for (std::size_t bin = 0; bin < num_bins; ++bin) {
-    if (static_cast<std::int64_t>(residuals[bin].size()) < base_limits::least_points) continue;
+    if (static_cast<std::int64_t>(residuals[bin].size()) < depth_limits::least_windows) continue;
     const double typical = quantile(residuals[bin], depth_limits::noise_quantile);
     if (!(typical > 0.0)) continue;
     pool(bins_[bin], std::log(typical));

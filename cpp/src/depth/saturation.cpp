@@ -5,7 +5,6 @@
 #include <limits>
 #include <vector>
 
-#include "base/limits.hpp"
 #include "depth/inverse_depth_image.hpp"
 #include "depth/limits.hpp"
 
@@ -40,7 +39,7 @@ Largest largest_of(const DepthRef& depth) {
 
 bool is_saturated(const Largest& largest, const DepthRef& depth) {
   const double least = depth_limits::least_saturated * static_cast<double>(largest.num_probed);
-  if (largest.count < base_limits::least_points || static_cast<double>(largest.count) < least) return false;
+  if (largest.count < depth_limits::least_windows || static_cast<double>(largest.count) < least) return false;
   std::vector<float> levels;  // some of the rest
   const float near = (1.0F - depth_limits::saturation_gap) * largest.value;
   const float far = largest.value / depth_limits::far_saturation;
