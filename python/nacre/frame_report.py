@@ -72,7 +72,7 @@ class FrameReport(Value):
         3, those of an object that turned far on its plane less.
     probability : float
         That the registration is right, by its score; of a lost frame, that the best one was, which was not
-        taken. 0.86 of all views that the search on the plane found, on which an object was turned. NaN where
+        taken. 0.9 of all views that the search on the plane found, on which an object was turned. NaN where
         the pose came without a registration, as the first frame's.
     loop_frame : int or None
         The earlier frame that this one closed a loop with: model and poses were corrected.
