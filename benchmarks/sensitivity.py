@@ -92,6 +92,10 @@ def run(installed: Path, names: list[str], output: Path) -> dict[str, int]:
     """Run the pieces with what was built; return the sums over all."""
     command = [sys.executable, str(ROOT / "benchmarks" / "pieces.py"), *names, "--output", str(output)]
     environment = os.environ | {"PYTHONPATH": str(installed)}
+    where = [sys.executable, "-c", "import nacre; print(nacre.__file__)"]
+    imported = subprocess.check_output(where, env=environment, text=True).strip()
+    if installed not in Path(imported).parents:
+        raise SystemExit(f"Python imports {imported}, not what was built; uninstall the editable nacre")
     subprocess.run(command, check=True, env=environment, stdout=subprocess.DEVNULL)
     pieces = json.loads(output.read_text(encoding="utf-8"))
     return {key: sum(piece[key] for piece in pieces) for key in ("right", "claimed", "far_off", "frames")}

@@ -5,7 +5,7 @@
 // clang-format off
 namespace nacre::base_limits {
 
-constexpr float noise_sigmas = 4.0F;  // [sigma] derived: what noise does not reach, but for 1 of 16 000; test_frame, test_fusion
+constexpr float noise_sigmas = 4.0F;  // [sigma] derived: what noise does not reach, but for 1 of 16 000; test_frame, test_fusion, test_depth, test_occluding_edges, test_global_registration
 constexpr double same_surface_cosine = 0.8;  // [cosine] tuned: between normals of neighbours on one surface, and of views that match; test_global_registration, test_depth_calibration
 constexpr float same_side_cosine = 0.3F;  // [cosine] tuned: between normals of points that stand for one side of a thing; test_fusion, test_meshing
 constexpr double damping = 1e-9;  // [1] derived: of the mean information, so that there always is a solution; test_icp

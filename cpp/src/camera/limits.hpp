@@ -7,7 +7,7 @@
 // clang-format off
 namespace nacre::camera_limits {
 
-constexpr double view_turn = 0.2;  // [rad] tuned: turn that makes another view; test_loop_closure
+constexpr double view_turn = 0.2;  // [rad] tuned: turn that makes another view, and another candidate of a search; test_loop_closure, test_global_registration
 constexpr double view_shift = 0.15;  // [depth] tuned: shift that makes another view, and drift that is looked for within one; test_loop_closure
 constexpr double least_point_pixels = 1.5;  // [pixel] tuned: of the sensor, between new points in their frame, which has one for each of its own at most; bunny12
 constexpr float least_facing = 0.3F;  // [cosine] tuned: at which a surface should be seen; test_global_registration, dog

@@ -83,7 +83,7 @@ bool has_gaps(const DepthRef& depth, const Camera& camera) {
     }
   }
   const std::int64_t side = 2 * WindowFits::kRadius + 1;
-  return num_gaps >= depth_limits::least_windows && side * side * num_gaps > num_measured;
+  return num_gaps >= depth_limits::least_witnesses && side * side * num_gaps > num_measured;
 }
 
 DepthImage fill_gaps(const DepthRef& measured, const Camera& camera) {

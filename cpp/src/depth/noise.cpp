@@ -154,7 +154,7 @@ NoiseModel estimate_noise(const DepthRef& depth, const Camera& camera, int num_t
 
 std::optional<NoiseScale> measure_noise(const WindowFits& fits, int num_threads) {
   const std::int64_t num_windows = count_values(fits.residual), num_steps = count_values(fits.step);
-  if (num_windows < depth_limits::least_windows) return std::nullopt;
+  if (num_windows < depth_limits::least_witnesses) return std::nullopt;
   const std::array<std::function<double()>, 3> parts = {
       // Below the median of the residuals: edges and fine structure leave more over than noise does.
       [&] { return quantile(fits.residual, depth_limits::noise_quantile); },

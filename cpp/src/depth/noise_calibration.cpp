@@ -115,7 +115,7 @@ void NoiseCalibration::add(const PlanarImage& image, const WindowFits& fits, int
     }
   }
   for (std::size_t bin = 0; bin < num_bins; ++bin) {
-    if (static_cast<std::int64_t>(residuals[bin].size()) < depth_limits::least_windows) continue;
+    if (static_cast<std::int64_t>(residuals[bin].size()) < depth_limits::least_witnesses) continue;
     const double typical = quantile(residuals[bin], depth_limits::noise_quantile);
     if (!(typical > 0.0)) continue;
     pool(bins_[bin], std::log(typical));

@@ -39,7 +39,7 @@ Largest largest_of(const DepthRef& depth) {
 
 bool is_saturated(const Largest& largest, const DepthRef& depth) {
   const double least = depth_limits::least_saturated * static_cast<double>(largest.num_probed);
-  if (largest.count < depth_limits::least_windows || static_cast<double>(largest.count) < least) return false;
+  if (largest.count < depth_limits::least_witnesses || static_cast<double>(largest.count) < least) return false;
   std::vector<float> levels;  // some of the rest
   const float near = (1.0F - depth_limits::saturation_gap) * largest.value;
   const float far = largest.value / depth_limits::far_saturation;

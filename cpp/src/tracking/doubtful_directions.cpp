@@ -1,6 +1,5 @@
 // Directions of a frame's pose that its shapes leave open, or that noise may feign: colours, outlines and the camera's
 // motion tell more.
-#include <algorithm>
 #include <cmath>
 #include <utility>
 

@@ -114,12 +114,12 @@ class RunRecord:
         return sum(frame.world_from_camera is not None for frame in self.frames)
 
     @property
-    def poses(self) -> Pose:
+    def poses(self) -> npt.NDArray[np.float64]:
         """(F, 4, 4) ``world_from_camera``; NaN where it is not known."""
         return stacked_poses(frame.world_from_camera for frame in self.frames)
 
     @property
-    def truths(self) -> Pose | None:
+    def truths(self) -> npt.NDArray[np.float64] | None:
         """(F, 4, 4) true poses, NaN where they are not known; None where none is."""
         if all(frame.truth is None for frame in self.frames):
             return None
@@ -136,7 +136,7 @@ class RunRecord:
         )
 
     @property
-    def milliseconds(self) -> Pose:
+    def milliseconds(self) -> npt.NDArray[np.float64]:
         """The model's time for each frame that it got."""
         return np.array([f.report.milliseconds["total"] for f in self.frames if f.report is not None])
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterable
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 
 from nacre.reconstruction.known_motions import Motions
 from nacre.reconstruction.reconstruction import Reconstruction
 from nacre.reconstruction.steps import Step
 
 
-@dataclass
+@dataclass(eq=False)
 class Run:
     """
     A recording that is run through a model, step by step.
@@ -20,13 +20,16 @@ class Run:
     done : Reconstruction
         The run up to now.
     indices : iterable of int
+        Frames of the recording that are still to do, in this order.
     retry : bool
+        Whether frames whose pose was not found are tried again at the end.
     motions : Motions or None
-        As :meth:`Reconstruction.steps` has them.
+        What is known of the camera's motion between frames, apart from the images.
     """
 
     done: Reconstruction
     indices: Iterable[int]
+    _: KW_ONLY
     retry: bool = True
     motions: Motions | None = None
 

@@ -47,3 +47,7 @@ def __getattr__(name: str) -> Any:
     if name in _SHOWING:
         return getattr(importlib.import_module(f"nacre.viewer.{_SHOWING[name]}"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return __all__
