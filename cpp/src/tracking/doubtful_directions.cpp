@@ -132,6 +132,25 @@ void FrameRegistration::hold_feigned_directions(const Pairing& pairing, IcpResul
   }
 }
 
+// Several starts lead to one place, from which colours and outlines lead on to one, too.
+IcpResult FrameRegistration::without_open(const Surfaces& surfaces, const Pairing& pairing, IcpResult open) const {
+  if (surfaces.moving > 0.0) {
+    determine_open_directions(pairing, colors_of(surfaces.view, pairing, pairing.source), open);
+    return open;
+  }
+  const Pose& pose = open.target_from_source;
+  for (const Decided& other : decided_) {
+    const Pose& from = other.open.target_from_source;
+    const bool is_same = other.open.weak_directions.cols() == open.weak_directions.cols() &&
+                         mean_pixel_motion(now_.cells, from.inverse() * pose) < 1.0;
+    if (is_same) return other.alignment;
+  }
+  IcpResult alignment = open;
+  determine_open_directions(pairing, colors_of(surfaces.view, pairing, pairing.source), alignment);
+  decided_.push_back({std::move(open), alignment});
+  return alignment;
+}
+
 // What the shapes leave open, colours or outlines may decide.
 void FrameRegistration::determine_open_directions(const Pairing& pairing,
                                                   const std::optional<ColorRegistration>& colors,

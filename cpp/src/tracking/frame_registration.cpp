@@ -57,8 +57,7 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   if (by_shape.weak_directions.cols() > 0) {
     hold_open_directions(pairing, guess, by_shape);
     hold_feigned_directions(pairing, by_shape);
-    determine_open_directions(pairing, colors_of(surfaces.view, pairing, pairing.source), by_shape);
-    return test(std::move(by_shape), surfaces, guess, expectation);
+    return test(without_open(surfaces, pairing, std::move(by_shape)), surfaces, guess, expectation);
   }
   TrackingResult result = test(std::move(by_shape), surfaces, guess, expectation);
   // What moves before the scene contradicts it wherever the camera is, unless it is left out.
@@ -125,6 +124,7 @@ const PointsInView& FrameRegistration::in_view(const Pose& world_from_camera) co
 void FrameRegistration::include_older_points() {
   target_.oldest_frame = 0;
   newest_view_.reset();
+  decided_.clear();
 }
 
 // A match may be about as far along the surface as the model's points are apart, and as far across it as noise and the

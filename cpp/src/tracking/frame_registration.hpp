@@ -138,6 +138,7 @@ class FrameRegistration {
   void hold_open_directions(const Pairing& pairing, const Pose& guess, IcpResult& result) const;
   void determine_open_directions(const Pairing& pairing, const std::optional<ColorRegistration>& colors,
                                  IcpResult& result) const;
+  IcpResult without_open(const Surfaces& surfaces, const Pairing& pairing, IcpResult open) const;
   Consistency consistency(const Surfaces& surfaces, const Pose& world_from_camera) const;
   Likeness likeness_in(const PointsInView& model, const Pose& world_from_camera) const;
   const OutlinePair& outlines() const;
@@ -150,6 +151,11 @@ class FrameRegistration {
   Values noise_;  // of the sampled points [m]
   double depth_;  // of the sampled points, the median [m]
   mutable std::optional<std::pair<Pose, PointsInView>> newest_view_;
+  // A place whose open directions colours and outlines were asked to decide, before and after.
+  struct Decided {
+    IcpResult open, alignment;
+  };
+  mutable std::vector<Decided> decided_;
   mutable std::optional<OutlinePair> outlines_;  // found when they are first asked for
 };
 
