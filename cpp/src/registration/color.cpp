@@ -35,6 +35,7 @@ class ColorRegistration::Search : public OpenDirectionSearch {
       : target_(target),
         source_(std::move(source)),
         few_(source_.few()),
+        nearest_(static_cast<std::size_t>(source_.cloud.points.rows()), no_slot),
         target_colors_(std::move(target_colors)),
         source_colors_(std::move(source_colors)),
         options_(options) {
@@ -42,6 +43,8 @@ class ColorRegistration::Search : public OpenDirectionSearch {
     held_.max_distance = gate().distance;
     held_.max_iterations = 6;
   }
+
+  std::int64_t num_samples() const { return source_.cloud.points.rows(); }
 
   OpenFit fit(const IcpResult& geometric, const TwistBasis* only) override {
     OpenFit fit;
@@ -120,12 +123,11 @@ class ColorRegistration::Search : public OpenDirectionSearch {
   // source's, or its first.
   std::vector<MotionRow> match(ColorLevel& level, const IcpSource& samples, const Pose& pose,
                                const Eigen::Vector3d& center) {
-    std::vector<std::uint32_t> nearest(static_cast<std::size_t>(samples.cloud.points.rows()), no_slot);
     const std::int64_t count = samples.levels.back();
-    target_.match(samples, count, pose, gate(), nearest);
+    target_.match(samples, count, pose, gate(), nearest_);
     std::vector<std::uint32_t> matched_targets, matched_sources;
     for (Eigen::Index i = 0; i < count; ++i) {
-      const std::uint32_t slot = nearest[static_cast<std::size_t>(i)];
+      const std::uint32_t slot = nearest_[static_cast<std::size_t>(i)];
       if (slot == no_slot) continue;
       matched_targets.push_back(slot);
       matched_sources.push_back(static_cast<std::uint32_t>(i));
@@ -216,6 +218,7 @@ class ColorRegistration::Search : public OpenDirectionSearch {
 
   const IcpTarget& target_;
   const IcpSource source_, few_;
+  std::vector<std::uint32_t> nearest_;  // of the source's points, where they were last: the next are not far from them
   const BrightCloud target_colors_, source_colors_;
   std::optional<ColorLevel> coarse_, fine_;
   const AlignOptions& options_;
@@ -233,6 +236,8 @@ ColorRegistration::ColorRegistration(const IcpTarget& target, IcpSource source, 
 ColorRegistration::~ColorRegistration() = default;
 ColorRegistration::ColorRegistration(ColorRegistration&&) noexcept = default;
 ColorRegistration& ColorRegistration::operator=(ColorRegistration&&) noexcept = default;
+
+std::int64_t ColorRegistration::num_samples() const { return search_ ? search_->num_samples() : 0; }
 
 Matrix6 ColorRegistration::information(const IcpResult& geometric) const {
   return search_ ? search_->information(geometric) : Matrix6::Zero();

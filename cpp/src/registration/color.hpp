@@ -1,6 +1,7 @@
 // Colour decides what shape leaves open: the directions of a pose that geometry does not determine.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 
 #include "registration/color_field.hpp"
@@ -16,6 +17,8 @@ class ColorRegistration {
   ~ColorRegistration();
   ColorRegistration(ColorRegistration&&) noexcept;
   ColorRegistration& operator=(ColorRegistration&&) noexcept;
+
+  std::int64_t num_samples() const;
 
   // What colours tell of a pose: see WeakTest.
   Matrix6 information(const IcpResult& geometric) const;

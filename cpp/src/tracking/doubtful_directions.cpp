@@ -103,7 +103,7 @@ std::optional<IcpResult> FrameRegistration::without_doubtful(const Pairing& pair
   for (const Pose& pose : {start, by_shape}) {
     IcpResult held = align_held(pairing.target, few, pose, pairing.options, doubt);
     if (held.weak_directions.cols() == 0) continue;
-    determine_open_directions(pairing, colors, held);
+    held = with_open_decided(pairing, colors, std::move(held));
     if (held.weak_directions.cols() == 0) return held;
   }
   return std::nullopt;
@@ -132,34 +132,26 @@ void FrameRegistration::hold_feigned_directions(const Pairing& pairing, IcpResul
   }
 }
 
-// Several starts lead to one place, from which colours and outlines lead on to one, too.
-IcpResult FrameRegistration::without_open(const Surfaces& surfaces, const Pairing& pairing, IcpResult open) const {
-  if (surfaces.moving > 0.0) {
-    determine_open_directions(pairing, colors_of(surfaces.view, pairing, pairing.source), open);
-    return open;
-  }
-  const Pose& pose = open.target_from_source;
+// What the shapes leave open, colours or outlines may decide. Several starts lead to one place, from which they lead on
+// to one, too.
+IcpResult FrameRegistration::with_open_decided(const Pairing& pairing, const std::optional<ColorRegistration>& colors,
+                                               IcpResult open) const {
+  if (open.weak_directions.cols() == 0) return open;
+  const std::int64_t num_points = pairing.source.cloud.points.rows();
+  const std::int64_t num_colors = colors ? colors->num_samples() : 0;
   for (const Decided& other : decided_) {
-    const Pose& from = other.open.target_from_source;
-    const bool is_same = other.open.weak_directions.cols() == open.weak_directions.cols() &&
-                         mean_pixel_motion(now_.cells, from.inverse() * pose) < 1.0;
+    const bool is_same =
+        other.num_points == num_points && other.num_colors == num_colors &&
+        other.open.weak_directions.cols() == open.weak_directions.cols() &&
+        mean_pixel_motion(now_.cells, other.open.target_from_source.inverse() * open.target_from_source) < 1.0;
     if (is_same) return other.alignment;
   }
-  IcpResult alignment = open;
-  determine_open_directions(pairing, colors_of(surfaces.view, pairing, pairing.source), alignment);
-  decided_.push_back({std::move(open), alignment});
-  return alignment;
-}
-
-// What the shapes leave open, colours or outlines may decide.
-void FrameRegistration::determine_open_directions(const Pairing& pairing,
-                                                  const std::optional<ColorRegistration>& colors,
-                                                  IcpResult& result) const {
-  const Eigen::Index num_weak = result.weak_directions.cols();
-  if (num_weak > 0 && colors) result = colors->determine(result);
-  if (num_weak > 0 && result.weak_directions.cols() == num_weak) {
-    result = determine_by_outline(pairing.target, pairing.source, outlines(), result, pairing.options);
+  IcpResult alignment = colors ? colors->determine(open) : open;
+  if (alignment.weak_directions.cols() == open.weak_directions.cols()) {
+    alignment = determine_by_outline(pairing.target, pairing.source, outlines(), alignment, pairing.options);
   }
+  decided_.push_back({num_points, num_colors, std::move(open), alignment});
+  return alignment;
 }
 
 const OutlinePair& FrameRegistration::outlines() const {

@@ -57,7 +57,8 @@ TrackingResult FrameRegistration::registered(const Surfaces& surfaces, const Pos
   if (by_shape.weak_directions.cols() > 0) {
     hold_open_directions(pairing, guess, by_shape);
     hold_feigned_directions(pairing, by_shape);
-    return test(without_open(surfaces, pairing, std::move(by_shape)), surfaces, guess, expectation);
+    by_shape = with_open_decided(pairing, colors_of(surfaces.view, pairing, pairing.source), std::move(by_shape));
+    return test(std::move(by_shape), surfaces, guess, expectation);
   }
   TrackingResult result = test(std::move(by_shape), surfaces, guess, expectation);
   // What moves before the scene contradicts it wherever the camera is, unless it is left out.

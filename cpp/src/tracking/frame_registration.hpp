@@ -136,9 +136,8 @@ class FrameRegistration {
   IcpSource gated(IcpSource source, const PointsInView& view, const IcpTarget& target) const;
   void hold_feigned_directions(const Pairing& pairing, IcpResult& result) const;
   void hold_open_directions(const Pairing& pairing, const Pose& guess, IcpResult& result) const;
-  void determine_open_directions(const Pairing& pairing, const std::optional<ColorRegistration>& colors,
-                                 IcpResult& result) const;
-  IcpResult without_open(const Surfaces& surfaces, const Pairing& pairing, IcpResult open) const;
+  IcpResult with_open_decided(const Pairing& pairing, const std::optional<ColorRegistration>& colors,
+                              IcpResult open) const;
   Consistency consistency(const Surfaces& surfaces, const Pose& world_from_camera) const;
   Likeness likeness_in(const PointsInView& model, const Pose& world_from_camera) const;
   const OutlinePair& outlines() const;
@@ -153,6 +152,7 @@ class FrameRegistration {
   mutable std::optional<std::pair<Pose, PointsInView>> newest_view_;
   // A place whose open directions colours and outlines were asked to decide, before and after.
   struct Decided {
+    std::int64_t num_points, num_colors;  // that were registered
     IcpResult open, alignment;
   };
   mutable std::vector<Decided> decided_;
