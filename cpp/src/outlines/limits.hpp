@@ -14,6 +14,7 @@ constexpr int window_radius = 6;  // [pixels] tuned: of the window that shows th
 constexpr double least_offset = 0.25;  // [radius] derived: of the window's pixels from its center; a half window has 0.42; test_occluding_edges
 constexpr double most_offset = 0.65;  // [radius] derived: likewise; a corner of 90 degrees has 0.6; test_occluding_edges
 constexpr double least_filled = 0.18;  // [1] derived: part of the window that shows the surface; a corner of 90 degrees has 0.25; test_occluding_edges
+constexpr double sag_sigmas = 2.5;  // [sigma] tuned: by which a surface bends towards its outline, if it does; test_occluding_edges
 constexpr int num_rounds = 4;  // [rounds] budget: of steps along the outline, each then back onto the surface; fandisk12, cabinet
 constexpr int least_steps = 4;  // [steps] budget: in each round; fandisk12, cabinet
 constexpr double step_damping = 1e-3;  // [1] derived: of the information, where few rows determine a direction; fandisk12

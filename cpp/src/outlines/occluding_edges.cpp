@@ -89,7 +89,8 @@ class OutlineSearch {
     const double half = 0.25 * outlines_limits::window_radius * outlines_limits::window_radius,
                  sigma = static_cast<double>(sight_.sigma[v * width_ + u]);
     const double sag = std::abs(bend.dot(found.normal)) * half;
-    if (sag > std::max(0.5 * camera_.footprint(z), 2.5 * sigma * std::sqrt(inverse(3, 3)) * half)) return std::nullopt;
+    const double by_noise = outlines_limits::sag_sigmas * sigma * std::sqrt(inverse(3, 3)) * half;
+    if (sag > std::max(0.5 * camera_.footprint(z), by_noise)) return std::nullopt;
 
     // What begins beyond it.
     for (int step = 1; step <= gap_; ++step) {

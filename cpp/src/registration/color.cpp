@@ -90,7 +90,9 @@ class ColorRegistration::Search : public OpenDirectionSearch {
   }
 
  private:
-  double distance_noise(const IcpResult& geometric) const { return std::max(geometric.rmse, 0.1 * target_.spacing()); }
+  double distance_noise(const IcpResult& geometric) const {
+    return std::max(geometric.rmse, registration_limits::least_distance_noise * target_.spacing());
+  }
 
   Eigen::MatrixXd information_per_pair(const std::vector<MotionRow>& rows, const TwistBasis& basis, double extent,
                                        double distance_noise) const {
@@ -199,7 +201,8 @@ class ColorRegistration::Search : public OpenDirectionSearch {
     for (double& value : source_values) value = std::abs(value - source_middle);
     // By the spreads: a regression would flatten what does not yet agree.
     const double source_spread = median_of(source_values);
-    const double gain = source_spread > 0.0 ? std::clamp(median_of(target_values) / source_spread, 0.25, 4.0) : 1.0;
+    const double ratio = source_spread > 0.0 ? median_of(target_values) / source_spread : 1.0;
+    const double gain = std::clamp(ratio, 1.0 / registration_limits::largest_gain, registration_limits::largest_gain);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       rows[i].residual = brightness[i].target - target_middle - gain * (brightness[i].source - source_middle);
       rows[i].source_gradient = gain * rows[i].source_gradient;

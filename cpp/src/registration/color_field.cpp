@@ -83,7 +83,7 @@ void ColorField::fit_one(std::uint32_t row, const std::int64_t* neighbors) {
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   std::for_each(neighbors, end, [&](std::int64_t neighbor) {
     const Eigen::Vector3d d = offset(neighbor) / radius;
-    const double falloff = 1.0 - 0.9 * d.squaredNorm();
+    const double falloff = 1.0 - registration_limits::color_falloff * d.squaredNorm();
     const Eigen::Vector3d terms(1.0, d.dot(across), d.dot(along));
     equations += falloff * terms * terms.transpose();
     right += falloff * static_cast<double>(cloud_.brightness[neighbor]) * terms;

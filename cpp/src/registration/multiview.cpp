@@ -32,7 +32,7 @@ std::vector<Pair> match(const IcpSource& source, const IcpTarget& target, const 
       target.match(source, source.cloud.points.rows(), world_from_target.inverse() * world_from_source,
                    {tolerance, base_limits::same_surface_cosine, false}, nearest);
   if (pairs.size() < base_limits::least_points) return {};
-  weight_pairs(pairs, Metric::symmetric, true, 0.05 * tolerance);
+  weight_pairs(pairs, Metric::symmetric, true, registration_limits::least_residual_scale * tolerance);
   for (Pair& pair : pairs) {
     // Beyond a view's rim, matches only continue it: the farther along the surface, the less they count.
     const double across = residual(pair, Metric::symmetric);
