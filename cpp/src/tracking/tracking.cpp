@@ -165,16 +165,6 @@ std::optional<TrackingResult> only_along_open(const FrameRegistration& registrat
   return best.is_lost() || has_rival ? std::nullopt : std::optional(best);
 }
 
-// The frame before may tell what the model leaves open: it shows what has not become part of that.
-TrackingResult held_by_odometry(const FrameRegistration& registration, const TrackingResult& open,
-                                const TrackingPrior& prior) {
-  if (prior.guesses_followed || !prior.followed || !prior.followed->is_determined) return open;
-  const Pose& followed = prior.followed->world_from_camera;
-  const TrackingResult held = registration.from(followed, FrameRegistration::Gate::narrow, prior.expectation);
-  const bool fits = !held.is_lost() && held.score > GlobalAlignOptions().max_rivalry * open.score;
-  return fits ? held : open;
-}
-
 // A place that the model alone says too little of, but to which the frame before leads, too.
 std::optional<TrackingResult> confirmed_by_odometry(const FrameRegistration& registration,
                                                     const FrameOdometry& odometry, TrackingPrior& prior,
@@ -291,7 +281,7 @@ TrackingResult track(const CurrentFrame& now, const TrackingTarget& target, Trac
   }
   if (best.decision == Decision::accepted) return best;
   follow();
-  if (!best.is_lost()) return held_by_odometry(registration, best, prior);
+  if (!best.is_lost()) return best;
   if (const auto confirmed = confirmed_by_odometry(registration, odometry, prior, options, target.usual)) {
     return *confirmed;
   }
